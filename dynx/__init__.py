@@ -1,0 +1,67 @@
+"""dynx: one interface over several rigid-body engines, proven to give one answer.
+
+    import dynx
+
+    model = dynx.load("ur5")                        # a path, URDF text, or a name (`dynx robots`)
+    engine = dynx.backend("pinocchio", model)       # or "pybullet", "reference"
+    tau = engine.inverse_dynamics(q, v, a)
+    report = dynx.agree(model)                      # do all engines give the same answers?
+
+Importing dynx imports no engine; each name below is imported when it is first used.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from dynx._version import __version__
+
+if TYPE_CHECKING:
+    from dynx import errors
+    from dynx.agreement import AgreementReport, agree
+    from dynx.backends import Backend, backend, installed_backends, register
+    from dynx.ik import IKResult
+    from dynx.model import Model
+    from dynx.model.library import robots
+    from dynx.model.loading import load
+
+__all__ = [
+    "AgreementReport",
+    "Backend",
+    "IKResult",
+    "Model",
+    "__version__",
+    "agree",
+    "backend",
+    "errors",
+    "installed_backends",
+    "load",
+    "register",
+    "robots",
+]
+
+_HOME = {
+    "AgreementReport": "dynx.agreement",
+    "Backend": "dynx.backends",
+    "IKResult": "dynx.ik",
+    "Model": "dynx.model",
+    "agree": "dynx.agreement",
+    "backend": "dynx.backends",
+    "installed_backends": "dynx.backends",
+    "load": "dynx.model.loading",
+    "register": "dynx.backends",
+    "robots": "dynx.model.library",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name == "errors":
+        return import_module("dynx.errors")
+    if name not in _HOME:
+        raise AttributeError(f"module 'dynx' has no attribute {name!r}")
+    return getattr(import_module(_HOME[name]), name)
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -1,0 +1,399 @@
+"""The interface every backend keeps: checked arguments, batches, mimic joints, joint dynamics.
+
+`Backend` turns what a user asks (model coordinates, names, any leading axes) into what an engine
+answers (`EngineHooks`: tree coordinates, frame numbers, one sample). The four calls that control
+loops make thousands of times a second (forward kinematics of one frame, Jacobian, inverse dynamics,
+mass matrix) go to the engine in a straight line when there is one sample and no mimic joint.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from types import TracebackType
+from typing import Any, ClassVar, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dynx.backends.arguments import Arguments
+from dynx.backends.hooks import EngineHooks, solve_mass_matrix
+from dynx.backends.joint_dynamics import JointDynamicsTerms
+from dynx.backends.solvability import refuse_singular
+from dynx.ik import IKResult, inverse_kinematics
+from dynx.model import Model
+from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED, Reference, shift_jacobian
+from dynx.spatial.scalar import Floats
+
+Forces = Mapping[str, ArrayLike]
+B = TypeVar("B", bound="Backend")
+
+
+class Backend(EngineHooks):
+    """An engine wrapped: the same questions, conventions and answers whichever engine is behind.
+
+    Arrays are float64 and take leading batch axes, which broadcast: q (..., nq), v, a, tau
+    (..., nv). One sample in, one sample out. SI units. Poses are T_world_frame (..., 4, 4).
+    Jacobians (..., 6, nv) have linear rows first; `reference` names the axes and the point:
+
+    - ``"local_world_aligned"`` (default): the frame's origin, the world's axes
+    - ``"local"``: the frame's origin and axes
+    - ``"world"``: the world's origin and axes (the spatial Jacobian)
+
+    `point` (3,) [m], in the frame's axes, moves the origin of the first two.
+
+    `joint_dynamics=True` adds what the description says of the joints, alike in every backend:
+    ``armature * a + damping * v + friction * sign(v)`` to the torque, armature to the diagonal of
+    the mass matrix. The default is the rigid bodies alone.
+
+    `external_forces` maps frame names to wrenches (..., 6), force [N] then moment [N m], that act
+    on the robot, expressed at and in `force_reference` as a Jacobian is.
+
+    Raises errors of `dynx.errors` only. With ``validate=False`` the arguments must be float64
+    arrays of the right shape and are not looked at; a wrong one then gives an undefined answer.
+    """
+
+    name: ClassVar[str]
+    """The name under which the registry finds the backend."""
+
+    def __init__(self, model: Model, *, validate: bool = True) -> None:
+        self.model = model
+        self._mechanism = model.mechanism
+        self._coupling = self._mechanism.coupling
+        self._S = None if self._coupling is None else self._coupling.matrix()
+        self._straight = self._coupling is None
+        self._arguments = Arguments(model)
+        self._joint_terms = JointDynamicsTerms(model)
+        self._frame_index = {name: index for index, name in enumerate(model.frame_names)}
+        self._options: dict[str, Any] = {"validate": validate}
+        # True while arguments are looked at; a closed backend always looks, and refuses.
+        self._validate = validate
+
+    @property
+    def engine_version(self) -> str:
+        """Name and version of the engine behind."""
+        from dynx._version import __version__
+
+        return f"dynx {__version__}"
+
+    # -- kinematics ---------------------------------------------------------------------------
+
+    def forward_kinematics(self, q: ArrayLike, frame: str | Sequence[str] | None = None) -> Floats:
+        """T_world_frame (..., 4, 4); for several frames, or None for all, (..., n, 4, 4)."""
+        if self._validate:
+            q = self._arguments.q(q)
+        if isinstance(frame, str):
+            index = self._index(frame)
+            if self._straight and q.ndim == 1:  # type: ignore[union-attr]
+                return self._frame_placement(q, index)  # type: ignore[arg-type]
+            return self._evaluate(self._frame_placement, (4, 4), q, args=(index,))
+        placements = self._evaluate(self._frame_placements, (len(self._frame_index), 4, 4), q)
+        if frame is None:
+            return placements
+        return np.asarray(placements[..., [self._index(name) for name in frame], :, :])
+
+    def jacobian(
+        self,
+        q: ArrayLike,
+        frame: str,
+        *,
+        reference: str = LOCAL_WORLD_ALIGNED,
+        point: ArrayLike | None = None,
+    ) -> Floats:
+        """J (..., 6, nv) with J v the velocity of `frame`, linear [m/s] then angular [rad/s]."""
+        if self._validate:
+            q = self._arguments.q(q)
+            reference = self._arguments.reference(reference)
+        index = self._index(frame)
+        if self._straight and point is None and q.ndim == 1:  # type: ignore[union-attr]
+            return self._jacobian(q, index, reference)  # type: ignore[arg-type]
+        J = self._evaluate(
+            self._jacobian, (6, -1), q, args=(index, reference), reduce=self._reduce_rows
+        )
+        return J if point is None else self._at_point(J, None, q, None, frame, reference, point)
+
+    def jacobian_derivative(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        frame: str,
+        *,
+        reference: str = LOCAL_WORLD_ALIGNED,
+        point: ArrayLike | None = None,
+    ) -> Floats:
+        """dJ/dt (..., 6, nv) along the motion `v`."""
+        q, v, reference = self._checked_motion(q, v, reference)
+        index = self._index(frame)
+        dJ = self._evaluate(
+            self._jacobian_derivative, (6, -1), q, v, args=(index, reference), reduce=self._reduce_rows
+        )
+        if point is None:
+            return dJ
+        J = self.jacobian(q, frame, reference=reference)
+        return self._at_point(J, dJ, q, v, frame, reference, point)
+
+    def frame_velocity(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        frame: str,
+        *,
+        reference: str = LOCAL_WORLD_ALIGNED,
+        point: ArrayLike | None = None,
+    ) -> Floats:
+        """J v (..., 6): linear [m/s] then angular [rad/s] velocity of the frame."""
+        q, v, reference = self._checked_motion(q, v, reference)
+        if point is not None:
+            return _apply(self.jacobian(q, frame, reference=reference, point=point), v)
+        index = self._index(frame)
+        return self._evaluate(self._frame_velocity, (6,), q, v, args=(index, reference))
+
+    def frame_acceleration(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        a: ArrayLike,
+        frame: str,
+        *,
+        reference: str = LOCAL_WORLD_ALIGNED,
+        point: ArrayLike | None = None,
+    ) -> Floats:
+        """J a + dJ/dt v (..., 6), the time derivative of `frame_velocity` in the same reference.
+
+        In ``local_world_aligned`` that is the classical acceleration of the frame's origin; in
+        ``local`` and ``world`` the spatial acceleration. Gravity has no part in it.
+        """
+        q, v, reference = self._checked_motion(q, v, reference)
+        a = self._arguments.v(a, "a") if self._validate else a
+        if point is not None:
+            J = self.jacobian(q, frame, reference=reference, point=point)
+            dJ = self.jacobian_derivative(q, v, frame, reference=reference, point=point)
+            return _apply(J, a) + _apply(dJ, v)
+        index = self._index(frame)
+        return self._evaluate(self._frame_acceleration, (6,), q, v, a, args=(index, reference))
+
+    def inverse_kinematics(
+        self, target: ArrayLike, frame: str, q0: ArrayLike | None = None, **options: Any
+    ) -> IKResult:
+        """The configuration that brings `frame` to `target`; see `dynx.ik.inverse_kinematics`."""
+        return inverse_kinematics(self, target, frame, q0, **options)
+
+    # -- dynamics -----------------------------------------------------------------------------
+
+    def inverse_dynamics(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        a: ArrayLike,
+        *,
+        external_forces: Forces | None = None,
+        force_reference: str = LOCAL_WORLD_ALIGNED,
+        joint_dynamics: bool = False,
+    ) -> Floats:
+        """The torque tau (..., nv) that gives acceleration `a`: M a + bias - J' external forces."""
+        if self._validate:
+            q, v, a = self._arguments.q(q), self._arguments.v(v), self._arguments.v(a, "a")
+        if self._straight and q.ndim == 1 and v.ndim == 1 and a.ndim == 1:  # type: ignore[union-attr]
+            tau = self._inverse_dynamics(q, v, a)  # type: ignore[arg-type]
+        else:
+            tau = self._evaluate(self._inverse_dynamics, (-1,), q, v, a, reduce=self._reduce_rows)
+        if external_forces:
+            tau = tau - self._force_torque(q, external_forces, force_reference)
+        if joint_dynamics:
+            tau = tau + self._joint_terms.losses(v) + self._joint_terms.rotor_torque(a)
+        return tau
+
+    def forward_dynamics(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        tau: ArrayLike,
+        *,
+        external_forces: Forces | None = None,
+        force_reference: str = LOCAL_WORLD_ALIGNED,
+        joint_dynamics: bool = False,
+    ) -> Floats:
+        """The acceleration a (..., nv) that `tau` and the external forces give.
+
+        Raises SingularMassMatrixError, which names the joints, where a joint moves no inertia.
+        """
+        q, v, _ = self._checked_motion(q, v, LOCAL_WORLD_ALIGNED)
+        tau = self._arguments.v(tau, "tau") if self._validate else tau
+        refuse_singular(self.model, joint_dynamics)
+        if external_forces:
+            tau = tau + self._force_torque(q, external_forces, force_reference)
+        if joint_dynamics:
+            tau = tau - self._joint_terms.losses(v)
+        if self._straight and not (joint_dynamics and self._joint_terms.has_rotors):
+            a = self._evaluate(self._forward_dynamics, (-1,), q, v, tau)
+        else:
+            M = self.mass_matrix(q, joint_dynamics=joint_dynamics)
+            a = solve_mass_matrix(M, tau - self.bias_torque(q, v))
+        return self._arguments.finite_acceleration(a)
+
+    def mass_matrix(self, q: ArrayLike, *, joint_dynamics: bool = False) -> Floats:
+        """M (..., nv, nv), symmetric."""
+        if self._validate:
+            q = self._arguments.q(q)
+        if self._straight and q.ndim == 1:  # type: ignore[union-attr]
+            M = self._mass_matrix(q)  # type: ignore[arg-type]
+        else:
+            M = self._evaluate(self._mass_matrix, (-1, -1), q, reduce=self._reduce_both)
+        return M + self._joint_terms.rotors if joint_dynamics else M
+
+    def bias_torque(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        *,
+        external_forces: Forces | None = None,
+        force_reference: str = LOCAL_WORLD_ALIGNED,
+        joint_dynamics: bool = False,
+    ) -> Floats:
+        """C v + g (..., nv): `inverse_dynamics` at zero acceleration."""
+        q, v, _ = self._checked_motion(q, v, LOCAL_WORLD_ALIGNED)
+        tau = self._evaluate(self._bias_torque, (-1,), q, v, reduce=self._reduce_rows)
+        if external_forces:
+            tau = tau - self._force_torque(q, external_forces, force_reference)
+        return tau + self._joint_terms.losses(v) if joint_dynamics else tau
+
+    def gravity_torque(self, q: ArrayLike) -> Floats:
+        """g (..., nv): `inverse_dynamics` at rest, the gradient of the potential energy."""
+        q = self._arguments.q(q) if self._validate else q
+        return self._evaluate(self._gravity_torque, (-1,), q, reduce=self._reduce_rows)
+
+    def coriolis_matrix(self, q: ArrayLike, v: ArrayLike) -> Floats:
+        """C (..., nv, nv) with C v + g = bias and dM/dt - 2 C skew-symmetric (`dynx.rbd.coriolis`)."""
+        q, v, _ = self._checked_motion(q, v, LOCAL_WORLD_ALIGNED)
+        return self._evaluate(self._coriolis_matrix, (-1, -1), q, v, reduce=self._reduce_both)
+
+    # -- the whole body -----------------------------------------------------------------------
+
+    def center_of_mass(self, q: ArrayLike) -> Floats:
+        """Centre of mass in the world (..., 3) [m]; the base frame's origin if nothing has mass."""
+        q = self._arguments.q(q) if self._validate else q
+        return self._evaluate(self._center_of_mass, (3,), q)
+
+    def center_of_mass_jacobian(self, q: ArrayLike) -> Floats:
+        """J (..., 3, nv) with J v the velocity of the centre of mass, world axes."""
+        q = self._arguments.q(q) if self._validate else q
+        return self._evaluate(self._center_of_mass_jacobian, (3, -1), q, reduce=self._reduce_rows)
+
+    def centroidal_momentum(self, q: ArrayLike, v: ArrayLike) -> Floats:
+        """Linear [kg m/s] then angular [kg m^2/s] momentum about the centre of mass (..., 6)."""
+        q, v, _ = self._checked_motion(q, v, LOCAL_WORLD_ALIGNED)
+        return self._evaluate(self._centroidal_momentum, (6,), q, v)
+
+    def kinetic_energy(self, q: ArrayLike, v: ArrayLike, *, joint_dynamics: bool = False) -> Floats:
+        """v' M v / 2 (...,) [J]."""
+        q, v, _ = self._checked_motion(q, v, LOCAL_WORLD_ALIGNED)
+        energy = self._evaluate(self._kinetic_energy, (), q, v)
+        if joint_dynamics:
+            energy = energy + 0.5 * np.sum(v * self._joint_terms.rotor_torque(v), axis=-1)
+        return energy
+
+    def potential_energy(self, q: ArrayLike) -> Floats:
+        """Energy in the field of gravity (...,) [J], zero with the mass at the world's origin."""
+        q = self._arguments.q(q) if self._validate else q
+        return self._evaluate(self._potential_energy, (), q)
+
+    # -- life cycle ---------------------------------------------------------------------------
+
+    def close(self) -> None:
+        """Release what the engine holds; further calls raise ClosedError. Closing twice is harmless."""
+        if not self._arguments.closed:
+            self._validate = True
+            self._arguments.closed = True
+            self._release()
+
+    def _release(self) -> None:
+        """Give back what the engine holds."""
+
+    def __enter__(self: B) -> B:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _rebuild, (type(self), self.model, self._options)
+
+    def __repr__(self) -> str:
+        return f"<{self.name} backend of {self.model.name}>"
+
+    # -- from questions to hooks --------------------------------------------------------------
+
+    def _index(self, frame: str) -> int:
+        try:
+            return self._frame_index[frame]
+        except (KeyError, TypeError):
+            return self.model.frame_index(frame)
+
+    def _checked_motion(self, q: Any, v: Any, reference: str) -> tuple[Floats, Floats, Reference]:
+        if self._validate:
+            return self._arguments.q(q), self._arguments.v(v), self._arguments.reference(reference)
+        return q, v, reference  # type: ignore[return-value]
+
+    def _evaluate(
+        self,
+        hook: Callable[..., Floats],
+        tail: tuple[int, ...],
+        q: Any,
+        *velocities: Any,
+        args: tuple[Any, ...] = (),
+        reduce: Callable[[Floats], Floats] | None = None,
+    ) -> Floats:
+        """`hook` over leading batch axes and through the mimic joints; -1 in `tail` is nv."""
+        batch = np.broadcast_shapes(q.shape[:-1], *(v.shape[:-1] for v in velocities))
+        if self._coupling is not None and self._S is not None:
+            q = self._coupling.expand_q(q)
+            velocities = tuple(v @ self._S.T for v in velocities)
+        arrays = [np.broadcast_to(x, (*batch, x.shape[-1])) for x in (q, *velocities)]
+        if self.vectorized or not batch:
+            result = np.asarray(hook(*arrays, *args))
+        else:
+            tail = tuple(self._mechanism.nv if n == -1 else n for n in tail)
+            flat = [np.ascontiguousarray(x).reshape(-1, x.shape[-1]) if x.size else x.reshape(int(np.prod(batch)), x.shape[-1]) for x in arrays]
+            result = np.empty((len(flat[0]), *tail))
+            for k, sample in enumerate(zip(*flat, strict=True)):
+                result[k] = hook(*sample, *args)
+            result = result.reshape(*batch, *tail)
+        if self._coupling is not None and reduce is not None:
+            result = reduce(result)
+        return result
+
+    def _reduce_rows(self, result: Floats) -> Floats:
+        return np.asarray(result @ self._S)
+
+    def _reduce_both(self, result: Floats) -> Floats:
+        assert self._S is not None
+        return np.asarray(self._S.T @ result @ self._S)
+
+    def _force_torque(self, q: Any, forces: Forces, reference: str) -> Floats:
+        """J' w summed over the frames that a wrench acts on."""
+        total: Any = 0.0
+        for frame, wrench in forces.items():
+            J = self.jacobian(q, frame, reference=reference)
+            total = total + _apply(np.swapaxes(J, -1, -2), self._arguments.wrench(wrench, frame))
+        return np.asarray(total)
+
+    def _at_point(
+        self, J: Floats, dJ: Floats | None, q: Any, v: Any, frame: str, reference: str, point: Any
+    ) -> Floats:
+        point = self._arguments.point(point)
+        if reference == "world":
+            return J if dJ is None else dJ
+        R = self.forward_kinematics(q, frame)[..., :3, :3]
+        return shift_jacobian(J, dJ, v, R, point, self._arguments.reference(reference))
+
+
+def _apply(matrix: Any, vector: Any) -> Floats:
+    return np.asarray((matrix @ np.asarray(vector)[..., None])[..., 0])
+
+
+def _rebuild(kind: type[Backend], model: Model, options: dict[str, Any]) -> Backend:
+    return kind(model, **options)

@@ -1,0 +1,141 @@
+"""What an engine answers, and how everything it does not offer follows from what it does.
+
+A backend implements two hooks, the placements of all frames and inverse dynamics; every other hook
+has a derivation here from those two. It overrides those its engine computes natively. Hooks work
+in tree coordinates (every moving joint, mimic joints included; see `dynx.model.mechanism`) and
+receive float64 arrays that were checked: one sample, unless `vectorized` is set, in which case any
+leading batch axes. Hooks return arrays the caller may keep and change.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import ClassVar
+
+import numpy as np
+
+from dynx.errors import SingularMassMatrixError
+from dynx.model import Mechanism
+from dynx.rbd import centroidal, coriolis, jacobians, kinematics
+from dynx.rbd.jacobians import Reference
+from dynx.spatial.scalar import Floats
+
+
+class EngineHooks(ABC):
+    """The questions dynx asks of an engine, in tree coordinates."""
+
+    vectorized: ClassVar[bool] = False
+    """Whether the hooks take leading batch axes."""
+
+    _mechanism: Mechanism
+
+    # -- what every engine must answer --------------------------------------------------------
+
+    @abstractmethod
+    def _frame_placements(self, q: Floats) -> Floats:
+        """T_world_frame of every frame, (..., n_frames, 4, 4)."""
+
+    @abstractmethod
+    def _inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
+        """Torque (..., nv) without external forces, damping, friction and armature."""
+
+    # -- kinematics ---------------------------------------------------------------------------
+
+    def _frame_placement(self, q: Floats, frame: int) -> Floats:
+        """T_world_frame of frame number `frame`, (..., 4, 4)."""
+        return self._frame_placements(q)[..., frame, :, :]
+
+    def _jacobian(self, q: Floats, frame: int, reference: Reference) -> Floats:
+        """Geometric Jacobian (..., 6, nv), linear rows first."""
+        return jacobians.frame_jacobian(self._mechanism, self._body_poses(q), frame, reference)
+
+    def _jacobian_derivative(
+        self, q: Floats, v: Floats, frame: int, reference: Reference
+    ) -> Floats:
+        """Time derivative of the Jacobian (..., 6, nv) along the velocity `v`."""
+        return jacobians.frame_jacobian_derivative(
+            self._mechanism, self._body_poses(q), v, frame, reference
+        )
+
+    def _frame_velocity(self, q: Floats, v: Floats, frame: int, reference: Reference) -> Floats:
+        """J v, (..., 6)."""
+        return _apply(self._jacobian(q, frame, reference), v)
+
+    def _frame_acceleration(
+        self, q: Floats, v: Floats, a: Floats, frame: int, reference: Reference
+    ) -> Floats:
+        """J a + dJ/dt v, (..., 6)."""
+        return _apply(self._jacobian(q, frame, reference), a) + _apply(
+            self._jacobian_derivative(q, v, frame, reference), v
+        )
+
+    # -- dynamics -----------------------------------------------------------------------------
+
+    def _bias_torque(self, q: Floats, v: Floats) -> Floats:
+        """Inverse dynamics at zero acceleration (..., nv)."""
+        return self._inverse_dynamics(q, v, np.zeros_like(v))
+
+    def _gravity_torque(self, q: Floats) -> Floats:
+        """Inverse dynamics at rest (..., nv)."""
+        rest = np.zeros((*q.shape[:-1], self._mechanism.nv))
+        return self._inverse_dynamics(q, rest, rest)
+
+    def _mass_matrix(self, q: Floats) -> Floats:
+        """Joint-space inertia (..., nv, nv), a column for each unit acceleration."""
+        n = self._mechanism.nv
+        rest = np.zeros((*q.shape[:-1], n))
+        gravity = self._inverse_dynamics(q, rest, rest)
+        columns = [self._inverse_dynamics(q, rest, rest + unit) - gravity for unit in np.eye(n)]
+        if not columns:
+            return np.zeros((*q.shape[:-1], 0, 0))
+        M = np.stack(columns, axis=-1)
+        return np.asarray(0.5 * (M + np.swapaxes(M, -1, -2)))
+
+    def _forward_dynamics(self, q: Floats, v: Floats, tau: Floats) -> Floats:
+        """The acceleration a (..., nv) with M a + bias = tau."""
+        return solve_mass_matrix(self._mass_matrix(q), tau - self._bias_torque(q, v))
+
+    def _coriolis_matrix(self, q: Floats, v: Floats) -> Floats:
+        """The C (..., nv, nv) of `dynx.rbd.coriolis`, for which dM/dt - 2 C is skew-symmetric."""
+        return coriolis.coriolis_matrix(self._mechanism, self._body_poses(q), v)
+
+    # -- the whole body -----------------------------------------------------------------------
+
+    def _center_of_mass(self, q: Floats) -> Floats:
+        """Centre of mass in the world (..., 3)."""
+        return centroidal.center_of_mass(self._mechanism, self._body_poses(q))
+
+    def _center_of_mass_jacobian(self, q: Floats) -> Floats:
+        """Jacobian of the centre of mass (..., 3, nv), world axes."""
+        return centroidal.center_of_mass_jacobian(self._mechanism, self._body_poses(q))
+
+    def _centroidal_momentum(self, q: Floats, v: Floats) -> Floats:
+        """Linear then angular momentum about the centre of mass, world axes (..., 6)."""
+        return centroidal.centroidal_momentum(self._mechanism, self._body_poses(q), v)
+
+    def _kinetic_energy(self, q: Floats, v: Floats) -> Floats:
+        """v' M v / 2, (...,)."""
+        return np.asarray(0.5 * np.sum(v * _apply(self._mass_matrix(q), v), axis=-1))
+
+    def _potential_energy(self, q: Floats) -> Floats:
+        """Of the centre of mass in the field of gravity, zero at the world's origin (...,)."""
+        return centroidal.potential_energy(self._mechanism, self._body_poses(q))
+
+    def _body_poses(self, q: Floats) -> kinematics.Poses:
+        """Pose of the root and of each moving body, read off the engine's own frame placements."""
+        return kinematics.poses_from_frames(self._mechanism, self._frame_placements(q))
+
+
+def solve_mass_matrix(M: Floats, torque: Floats) -> Floats:
+    """a with M a = torque, by Cholesky; raises SingularMassMatrixError where M is singular."""
+    try:
+        np.linalg.cholesky(M)
+        return np.asarray(np.linalg.solve(M, torque[..., None])[..., 0])
+    except np.linalg.LinAlgError:
+        raise SingularMassMatrixError(
+            "the mass matrix is not positive definite: no unique acceleration exists"
+        ) from None
+
+
+def _apply(matrix: Floats, vector: Floats) -> Floats:
+    return np.asarray((matrix @ vector[..., None])[..., 0])

@@ -1,0 +1,38 @@
+"""Damping, dry friction and armature of the description: one option, one meaning in every backend.
+
+On the torque side, tau = rigid bodies + armature a + damping v + friction sign(v) for each moving
+joint. A mimic joint has its own three numbers; they act on its driver through its multiplier.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from dynx.model import Model
+from dynx.spatial.scalar import Floats
+
+
+class JointDynamicsTerms:
+    """The `<dynamics>` of all moving joints, in the coordinates of the model."""
+
+    def __init__(self, model: Model) -> None:
+        moving = [joint.dynamics for joint in model.joints if joint.moves]
+        base = [0.0] * (6 if model.floating else 0)
+        self._damping = np.array(base + [d.damping for d in moving])
+        self._friction = np.array(base + [d.friction for d in moving])
+        armature = np.array(base + [d.armature for d in moving])
+        coupling = model.mechanism.coupling
+        self._S = np.eye(len(armature)) if coupling is None else coupling.matrix()
+        self.rotors: Floats = self._S.T @ np.diag(armature) @ self._S
+        self.has_rotors = bool(np.any(armature != 0.0))
+
+    def losses(self, v: Any) -> Floats:
+        """Torque (..., nv) that damping and dry friction take at velocity v (..., nv)."""
+        tree = np.asarray(v) @ self._S.T
+        return np.asarray((self._damping * tree + self._friction * np.sign(tree)) @ self._S)
+
+    def rotor_torque(self, a: Any) -> Floats:
+        """Torque (..., nv) that accelerates the rotors by a (..., nv)."""
+        return np.asarray(np.asarray(a) @ self.rotors)

@@ -1,0 +1,63 @@
+"""Whether forward dynamics has an answer at all: joints that move no inertia, by name.
+
+A joint below which nothing has mass makes the mass matrix singular at every configuration. Engines
+then answer NaN, zero or garbage, each its own way; dynx refuses alike in every backend.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from dynx.backends.joint_dynamics import JointDynamicsTerms
+from dynx.errors import SingularMassMatrixError, shown
+from dynx.model import Model
+from dynx.rbd.crba import mass_matrix
+from dynx.spatial.scalar import Floats
+
+
+@lru_cache(maxsize=256)
+def singular_coordinates(model: Model, joint_dynamics: bool = False) -> tuple[str, ...]:
+    """Coordinates that take part in a motion without inertia, at every configuration; often none.
+
+    Names are those of joints, or ``base``. Found by three random configurations: M scaled to a unit
+    diagonal has an eigenvalue below nv times the rounding error of its entries.
+    """
+    q = model.random(np.random.default_rng(0), 3)
+    coupling = model.mechanism.coupling
+    M = np.asarray(mass_matrix(model.mechanism, q if coupling is None else coupling.expand_q(q)))
+    if coupling is not None:
+        S = coupling.matrix()
+        M = S.T @ M @ S
+    if joint_dynamics:
+        M = M + JointDynamicsTerms(model).rotors
+    involved = [_null_coordinates(each) for each in M]
+    always = set.intersection(*(set(each) for each in involved))
+    base = 6 if model.floating else 0
+    names = ["base" if k < base else model.joint_names[k - base] for k in sorted(always)]
+    return tuple(dict.fromkeys(names))
+
+
+def refuse_singular(model: Model, joint_dynamics: bool) -> None:
+    """Raise SingularMassMatrixError, naming the joints, if M is singular everywhere."""
+    names = singular_coordinates(model, joint_dynamics)
+    if names:
+        listed = ", ".join(shown(name) for name in names[:6]) + (" ..." if len(names) > 6 else "")
+        raise SingularMassMatrixError(
+            f"{model.name} has no unique acceleration: nothing that {listed} moves has inertia "
+            "(lock the joint, or give its links an <inertial>)"
+        )
+
+
+def _null_coordinates(M: Floats) -> list[int]:
+    diagonal = np.diagonal(M)
+    if not len(diagonal):
+        return []
+    floor = 1e-14 * max(float(np.max(np.abs(diagonal))), np.finfo(float).tiny)
+    massless = np.flatnonzero(diagonal <= floor * 1e-6)
+    scale = 1.0 / np.sqrt(np.where(diagonal > floor * 1e-6, diagonal, 1.0))
+    values, vectors = np.linalg.eigh(M * scale[:, None] * scale[None, :])
+    null = vectors[:, np.abs(values) < len(M) * 4 * np.finfo(float).eps]
+    mixed = np.flatnonzero(np.max(np.abs(null), axis=1, initial=0.0) > 1e-3)
+    return sorted({*massless.tolist(), *mixed.tolist()})

@@ -1,0 +1,141 @@
+"""Every exception dynx raises, and how each one finds the nearest right name.
+
+    DynxError
+    |- ModelError                   the robot description cannot be used
+    |  |- DescriptionError          malformed or contradictory file (source and line)
+    |  |- UnsupportedFeatureError   legal, but a feature dynx refuses by name
+    |  `- RobotNotFoundError        no such file or library name
+    |- ArgumentError                a call that cannot be answered
+    |  |- ShapeError                wrong shape
+    |  |- DTypeError                not real numbers
+    |  |- NotFiniteError            NaN or infinity where a number is needed
+    |  `- UnknownNameError          no such frame, joint, reference, ...
+    |- BackendError                 an engine cannot be used
+    |  |- UnknownBackendError       no backend of that name is registered
+    |  |- NotInstalledError         a package is missing (says which extra brings it)
+    |  |- EngineLimitError          the model is larger than the engine can hold
+    |  |- EngineError               the engine failed; its own exception is ``__cause__``
+    |  `- ClosedError               the backend was closed
+    `- SingularMassMatrixError      forward dynamics has no unique answer
+
+No other exception reaches a caller because of his input; anything else is a defect of dynx.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class DynxError(Exception):
+    """Root of everything dynx raises on purpose."""
+
+
+class ModelError(DynxError, ValueError):
+    """The robot description cannot be used."""
+
+
+class DescriptionError(ModelError):
+    """A description is malformed or contradicts itself.
+
+    ``source`` is the file (or ``<string>``) and ``line`` the line, where they are known.
+    """
+
+    def __init__(self, message: str, *, source: str | None = None, line: int | None = None) -> None:
+        self.message = message
+        self.source = source
+        self.line = line
+        super().__init__(located(message, source, line))
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return _rebuild_located, (type(self), self.message, self.source, self.line)
+
+
+class UnsupportedFeatureError(DescriptionError):
+    """The description uses a feature that dynx refuses rather than drops."""
+
+
+class RobotNotFoundError(ModelError, LookupError):
+    """Neither a file nor a name of the library."""
+
+
+class ArgumentError(DynxError, ValueError):
+    """An argument of a call cannot be used."""
+
+
+class ShapeError(ArgumentError):
+    """An array has the wrong shape."""
+
+
+class DTypeError(ArgumentError, TypeError):
+    """An array does not hold real numbers."""
+
+
+class NotFiniteError(ArgumentError):
+    """An array holds NaN or infinity."""
+
+
+class UnknownNameError(ArgumentError, LookupError):
+    """A name that is not there; the message offers the nearest that is."""
+
+
+class BackendError(DynxError, RuntimeError):
+    """An engine cannot be used."""
+
+
+class UnknownBackendError(BackendError, LookupError):
+    """No backend of that name is registered."""
+
+
+class NotInstalledError(BackendError, ImportError):
+    """A package is missing; the message says which extra of dynx brings it."""
+
+
+class EngineLimitError(BackendError):
+    """The model is larger than the engine can hold without a wrong answer or a crash."""
+
+
+class EngineError(BackendError):
+    """The engine failed; ``__cause__`` is the engine's own exception."""
+
+
+class ClosedError(BackendError):
+    """The backend was used after ``close()``."""
+
+
+class SingularMassMatrixError(DynxError, ArithmeticError):
+    """The mass matrix is singular, so no unique acceleration exists."""
+
+
+def located(message: str, source: str | None, line: int | None) -> str:
+    """Prefix `message` with ``source:line`` as compilers do."""
+    if source is None:
+        return message if line is None else f"line {line}: {message}"
+    return f"{source}: {message}" if line is None else f"{source}:{line}: {message}"
+
+
+def shown(text: object, limit: int = 80) -> str:
+    """`text` quoted, control characters escaped and long text cut, for use in a message."""
+    quoted = repr(str(text))
+    return quoted if len(quoted) <= limit else f"{quoted[: limit - 20]}...' ({len(str(text))} characters)"
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """A clause such as ``; did you mean 'tool0'?`` or, for a short list, all that is known."""
+    names = list(known)
+    if len(name) <= 200:
+        lowered = {known_name.lower(): known_name for known_name in reversed(names)}
+        close = difflib.get_close_matches(name.lower(), lowered, n=3, cutoff=0.55)
+        if close:
+            return "; did you mean " + " or ".join(shown(lowered[match]) for match in close) + "?"
+    if not names:
+        return ""
+    if len(names) <= 8:
+        return "; known: " + ", ".join(names)
+    return f"; {len(names)} are known, such as " + ", ".join(names[:5])
+
+
+def _rebuild_located(
+    kind: type[DescriptionError], message: str, source: str | None, line: int | None
+) -> DescriptionError:
+    return kind(message, source=source, line=line)

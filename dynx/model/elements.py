@@ -1,0 +1,145 @@
+"""The parts of a robot description, as the document states them.
+
+Numbers are those of the file, in SI units; nothing is lumped, diagonalised or repaired here.
+`line` is the line of the XML element, or None for a part that was made in a program.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from dynx.spatial.scalar import Floats
+from dynx.spatial.se3 import homogeneous
+from dynx.spatial.so3 import rotation_from_rpy
+
+JointType = Literal["revolute", "continuous", "prismatic", "fixed"]
+Vector = tuple[float, float, float]
+
+ZERO: Vector = (0.0, 0.0, 0.0)
+INFINITY = float("inf")
+
+
+@dataclass(frozen=True)
+class Pose:
+    """URDF's ``<origin>``: translation `xyz` [m], then roll-pitch-yaw `rpy` [rad]."""
+
+    xyz: Vector = ZERO
+    rpy: Vector = ZERO
+
+    @cached_property
+    def matrix(self) -> Floats:
+        """The pose as a homogeneous matrix (4, 4)."""
+        return homogeneous(rotation_from_rpy(np.array(self.rpy)), np.array(self.xyz))
+
+
+@dataclass(frozen=True)
+class Inertial:
+    """Mass [kg], pose of the inertial frame in the link, central inertia tensor in that frame."""
+
+    mass: float = 0.0
+    origin: Pose = Pose()
+    ixx: float = 0.0
+    ixy: float = 0.0
+    ixz: float = 0.0
+    iyy: float = 0.0
+    iyz: float = 0.0
+    izz: float = 0.0
+    line: int | None = field(default=None, compare=False)
+
+    @property
+    def tensor(self) -> Floats:
+        """The central inertia tensor (3, 3) [kg m^2], in the axes of `origin`."""
+        return np.array(
+            [
+                [self.ixx, self.ixy, self.ixz],
+                [self.ixy, self.iyy, self.iyz],
+                [self.ixz, self.iyz, self.izz],
+            ]
+        )
+
+
+@dataclass(frozen=True)
+class Link:
+    """A rigid link; without `inertial` it has no mass."""
+
+    name: str
+    inertial: Inertial | None = None
+    line: int | None = field(default=None, compare=False)
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Range of a coordinate [rad or m], and the largest speed and effort the joint allows."""
+
+    lower: float = -INFINITY
+    upper: float = INFINITY
+    velocity: float = INFINITY
+    effort: float = INFINITY
+
+
+@dataclass(frozen=True)
+class JointDynamics:
+    """Viscous damping, dry friction and reflected rotor inertia of a joint (see `Backend`)."""
+
+    damping: float = 0.0
+    friction: float = 0.0
+    armature: float = 0.0
+
+
+@dataclass(frozen=True)
+class Mimic:
+    """This joint follows another: ``value = multiplier * value_of(joint) + offset``."""
+
+    joint: str
+    multiplier: float = 1.0
+    offset: float = 0.0
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A joint from `parent` to `child`; `origin` is its frame in the parent link at value 0.
+
+    `axis` is a unit vector in the joint frame. `locked_at` remembers the value at which a joint
+    that could move was locked; its type is then ``fixed`` and `origin` already holds that value.
+    """
+
+    name: str
+    type: JointType
+    parent: str
+    child: str
+    origin: Pose = Pose()
+    axis: Vector = (1.0, 0.0, 0.0)
+    limits: Limits = Limits()
+    dynamics: JointDynamics = JointDynamics()
+    mimic: Mimic | None = None
+    locked_at: float | None = None
+    line: int | None = field(default=None, compare=False)
+
+    @property
+    def moves(self) -> bool:
+        """Whether the joint can move, by itself or by following another."""
+        return self.type != "fixed"
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A named frame fixed to a link; every link has one of its own name at the identity."""
+
+    name: str
+    link: str
+    placement: Pose = Pose()
+
+
+@dataclass(frozen=True)
+class Note:
+    """Something in the description that was read as meant, and that the user should know."""
+
+    message: str
+    line: int | None = None
+
+    def __str__(self) -> str:
+        return self.message if self.line is None else f"line {self.line}: {self.message}"

@@ -1,0 +1,203 @@
+"""The moving bodies of a model: fixed joints welded, inertias lumped, frames attached to bodies.
+
+This is what the algorithms of `dynx.rbd` work on. It is generic in the scalar: the same text lumps
+in float64 for the backend `reference` and in 50 digits for the referee.
+
+A mechanism has its own *tree coordinates*: one for each moving joint, mimic joints included, after
+the six of a floating base. `Coupling` maps the coordinates of the model to them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dynx.model.elements import Pose
+from dynx.spatial.inertia import RigidInertia, inertia_about_origin
+from dynx.spatial.scalar import Array, Floats
+from dynx.spatial.so3 import rotate, rotation_about, rotation_from_rpy
+
+if TYPE_CHECKING:
+    from dynx.model.model import Model
+
+Numbers = Callable[[object], Array]
+"""Turns nested floats into an array of the scalar in use."""
+
+ROOT = -1
+"""Index of the root body: the world for a fixed base, the base link for a floating one."""
+
+
+def float64(numbers: object) -> Array:
+    """The scalar of the backends."""
+    return np.asarray(numbers, dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class Body:
+    """A rigid body and the one-degree-of-freedom joint that carries it.
+
+    The body frame is that of the joint's child link. (R, p) is the pose of the joint frame, at
+    value 0, in the parent's body frame; `axis` is the unit axis in the joint frame.
+    """
+
+    joint: str
+    parent: int
+    revolute: bool
+    R: Array
+    p: Array
+    axis: Array
+    inertia: RigidInertia
+
+
+@dataclass(frozen=True)
+class BodyFrame:
+    """A named frame: its pose (R, p) in the frame of body number `body` (ROOT for the root)."""
+
+    name: str
+    body: int
+    R: Array
+    p: Array
+
+
+@dataclass(frozen=True)
+class Coupling:
+    """Mimic joints as a linear map: tree position = scale * model position[index] + offset.
+
+    Velocities and accelerations follow without the offset, torques by the transpose (virtual work).
+    Indices count joints, without the base.
+    """
+
+    index: tuple[int, ...]
+    scale: tuple[float, ...]
+    offset: tuple[float, ...]
+    n_joints: int
+    floating: bool
+
+    def matrix(self) -> Floats:
+        """S (nv of the tree, nv of the model) with v_tree = S v."""
+        base = 6 if self.floating else 0
+        S = np.zeros((base + len(self.index), base + self.n_joints))
+        S[:base, :base] = np.eye(base)
+        for row, (column, scale) in enumerate(zip(self.index, self.scale, strict=True)):
+            S[base + row, base + column] = scale
+        return S
+
+    def expand_q(self, q: Floats) -> Floats:
+        """Model configuration (..., nq) to tree configuration."""
+        base = 7 if self.floating else 0
+        joints = q[..., base:][..., list(self.index)] * np.array(self.scale) + np.array(self.offset)
+        return np.concatenate([q[..., :base], joints], axis=-1)
+
+
+@dataclass(frozen=True)
+class Mechanism:
+    """Bodies in depth-first order (a parent precedes its children), frames, gravity, coupling."""
+
+    name: str
+    floating: bool
+    gravity: Array
+    root: RigidInertia
+    bodies: tuple[Body, ...]
+    frames: tuple[BodyFrame, ...]
+    coupling: Coupling | None
+
+    @cached_property
+    def body_frames(self) -> tuple[int, ...]:
+        """For the root and each body, the number of the frame that is its body frame."""
+        first: dict[int, int] = {}
+        for number, frame in enumerate(self.frames):
+            first.setdefault(frame.body, number)
+        return tuple(first[body] for body in range(ROOT, len(self.bodies)))
+
+    @cached_property
+    def has_mass(self) -> bool:
+        """Whether any body has mass."""
+        return any(inertia.mass != 0 for inertia in (self.root, *(b.inertia for b in self.bodies)))
+
+    @property
+    def nv(self) -> int:
+        """Number of tree velocities."""
+        return len(self.bodies) + (6 if self.floating else 0)
+
+    @property
+    def nq(self) -> int:
+        """Number of tree positions."""
+        return len(self.bodies) + (7 if self.floating else 0)
+
+
+def pose_arrays(pose: Pose, numbers: Numbers) -> tuple[Array, Array]:
+    """(R, p) of a pose, in the scalar that `numbers` makes."""
+    return rotation_from_rpy(numbers(pose.rpy)), numbers(pose.xyz)
+
+
+def build_mechanism(model: Model, numbers: Numbers = float64) -> Mechanism:
+    """Weld what cannot move and lump its inertia, in the scalar that `numbers` makes."""
+    # Where each link sits: its body and its pose (R, p) in that body's frame.
+    here: dict[str, tuple[int, Array, Array]] = {
+        model.root: (ROOT, numbers(np.eye(3)), numbers(np.zeros(3)))
+    }
+    carried: list[tuple[str, int, bool, Array, Array, Array]] = []
+    for joint in model.joints:
+        body, R_parent, p_parent = here[joint.parent]
+        R_joint, p_joint = pose_arrays(joint.origin, numbers)
+        R, p = R_parent @ R_joint, p_parent + rotate(R_parent, p_joint)
+        if joint.moves:
+            revolute = joint.type != "prismatic"
+            carried.append((joint.name, body, revolute, R, p, numbers(joint.axis)))
+            here[joint.child] = (len(carried) - 1, numbers(np.eye(3)), numbers(np.zeros(3)))
+        else:
+            here[joint.child] = (body, R, p)
+
+    nothing = RigidInertia(numbers(0.0), numbers(np.zeros(3)), numbers(np.zeros((3, 3))))
+    lumped = dict.fromkeys(range(ROOT, len(carried)), nothing)
+    for link in model.links:
+        if link.inertial is None:
+            continue
+        body, R, p = here[link.name]
+        R_inertial, p_inertial = pose_arrays(link.inertial.origin, numbers)
+        own = inertia_about_origin(
+            numbers(link.inertial.mass), p_inertial, R_inertial, numbers(link.inertial.tensor)
+        )
+        lumped[body] = lumped[body] + own.seen_from(R, p)
+
+    frames = []
+    for frame in model.frames:
+        body, R, p = here[frame.link]
+        R_frame, p_frame = pose_arrays(frame.placement, numbers)
+        frames.append(BodyFrame(frame.name, body, R @ R_frame, p + rotate(R, p_frame)))
+
+    return Mechanism(
+        name=model.name,
+        floating=model.floating,
+        gravity=numbers(model.gravity),
+        root=lumped[ROOT],
+        bodies=tuple(Body(*fields, inertia=lumped[k]) for k, fields in enumerate(carried)),
+        frames=tuple(frames),
+        coupling=_coupling(model),
+    )
+
+
+def joint_motion(body: Body, value: Array) -> tuple[Array, Array]:
+    """(R, p) of the body frame in its parent's body frame at joint position `value` (...,)."""
+    value = np.asarray(value)
+    if body.revolute:
+        return body.R @ rotation_about(body.axis, value), body.p
+    return body.R, body.p + rotate(body.R, body.axis * value[..., None])
+
+
+def _coupling(model: Model) -> Coupling | None:
+    moving = [joint for joint in model.joints if joint.moves]
+    if all(joint.mimic is None for joint in moving):
+        return None
+    position = {name: index for index, name in enumerate(model.joint_names)}
+    index, scale, offset = [], [], []
+    for joint in moving:
+        driver = joint.mimic
+        index.append(position[joint.name if driver is None else driver.joint])
+        scale.append(1.0 if driver is None else driver.multiplier)
+        offset.append(0.0 if driver is None else driver.offset)
+    return Coupling(tuple(index), tuple(scale), tuple(offset), len(position), model.floating)

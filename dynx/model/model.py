@@ -1,0 +1,272 @@
+"""The robot description as every backend receives it: a frozen tree of links, joints and frames."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dynx.errors import UnknownNameError, nearest, shown
+from dynx.model import configuration, locking, topology
+from dynx.model.elements import Frame, Inertial, Joint, Link, Note, Pose, Vector
+from dynx.model.mechanism import Mechanism, build_mechanism
+from dynx.spatial.scalar import Floats
+
+Base = Literal["fixed", "floating"]
+STANDARD_GRAVITY: Vector = (0.0, 0.0, -9.81)
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A robot: links and joints in depth-first order, its base, and gravity.
+
+    Make one with `dynx.load` or `Model.build`. Coordinates (`q`, `v`) list the moving joints in the
+    order of `joint_names`: depth-first from the root, children in the order of the document. With a
+    floating base, ``q[:3]`` is the position of the base frame in the world [m], ``q[3:7]`` its unit
+    quaternion (x, y, z, w), and ``v[:3]``, ``v[3:6]`` its linear [m/s] and angular [rad/s] velocity,
+    both expressed in the base frame.
+
+    Models compare by their content (`==`), hash, pickle and are never changed after they are made.
+    """
+
+    name: str
+    links: tuple[Link, ...]
+    joints: tuple[Joint, ...]
+    base: Base = "fixed"
+    gravity: Vector = STANDARD_GRAVITY
+    extra_frames: tuple[Frame, ...] = ()
+    notes: tuple[Note, ...] = field(default=(), compare=False)
+    source: str = field(default="<memory>", compare=False)
+
+    @classmethod
+    def build(
+        cls,
+        name: str,
+        links: Iterable[Link],
+        joints: Iterable[Joint],
+        *,
+        base: Base = "fixed",
+        gravity: ArrayLike = STANDARD_GRAVITY,
+        lock: Mapping[str, float] | None = None,
+        notes: Iterable[Note] = (),
+        source: str = "<memory>",
+    ) -> Model:
+        """Check that links and joints form one tree, order them, lock joints, and make the model.
+
+        Raises DescriptionError where they do not form a tree, UnknownNameError for a joint to lock
+        that is not there or cannot move.
+        """
+        notes = list(notes)
+        ordered_links, ordered_joints = topology.depth_first(list(links), list(joints), source)
+        ordered_joints = locking.lock_joints(ordered_joints, lock or {})
+        ordered_joints = topology.resolve_mimics(ordered_joints, notes, source)
+        return cls(
+            name=name,
+            links=tuple(ordered_links),
+            joints=tuple(ordered_joints),
+            base=configuration.checked_base(base),
+            gravity=configuration.checked_gravity(gravity),
+            notes=tuple(notes),
+            source=source,
+        )
+
+    # -- names and sizes ---------------------------------------------------------------------
+
+    @cached_property
+    def coordinate_joints(self) -> tuple[Joint, ...]:
+        """The joints that own a coordinate: they move and follow no other."""
+        return tuple(joint for joint in self.joints if joint.moves and joint.mimic is None)
+
+    @cached_property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the coordinates, in order; entry k is ``v[k]``, after the 6 of a floating base."""
+        return tuple(joint.name for joint in self.coordinate_joints)
+
+    @cached_property
+    def frames(self) -> tuple[Frame, ...]:
+        """One frame per link, in depth-first order, then the frames that were added."""
+        return tuple(Frame(link.name, link.name) for link in self.links) + self.extra_frames
+
+    @cached_property
+    def frame_names(self) -> tuple[str, ...]:
+        """Names of all frames, in the order in which `forward_kinematics` stacks them."""
+        return tuple(frame.name for frame in self.frames)
+
+    @cached_property
+    def root(self) -> str:
+        """Name of the root link, whose frame is the base frame."""
+        return self.links[0].name
+
+    @cached_property
+    def floating(self) -> bool:
+        """Whether the base moves freely."""
+        return self.base == "floating"
+
+    @cached_property
+    def nq(self) -> int:
+        """Length of a configuration `q`."""
+        return len(self.coordinate_joints) + (7 if self.floating else 0)
+
+    @cached_property
+    def nv(self) -> int:
+        """Length of a velocity `v`, an acceleration `a` and a torque `tau`."""
+        return len(self.coordinate_joints) + (6 if self.floating else 0)
+
+    @cached_property
+    def total_mass(self) -> float:
+        """Sum of the masses of the links [kg]."""
+        return float(sum(link.inertial.mass for link in self.links if link.inertial is not None))
+
+    def joint(self, name: str) -> Joint:
+        """The joint of that name (of any type)."""
+        try:
+            return self._joint_by_name[name]
+        except KeyError:
+            raise UnknownNameError(self._no_such("joint", name, self._joint_by_name)) from None
+
+    def link(self, name: str) -> Link:
+        """The link of that name."""
+        try:
+            return self._link_by_name[name]
+        except KeyError:
+            raise UnknownNameError(self._no_such("link", name, self._link_by_name)) from None
+
+    def frame_index(self, name: str) -> int:
+        """Position of the frame in `frame_names`."""
+        try:
+            return self._frame_index[name]
+        except (KeyError, TypeError):
+            raise UnknownNameError(self._no_such("frame", name, self._frame_index)) from None
+
+    def coordinate_index(self, joint: str) -> int:
+        """Position of the joint's coordinate in `v` (in `q` it is one further with a floating base)."""
+        offset = 6 if self.floating else 0
+        if joint in self.joint_names:
+            return offset + self.joint_names.index(joint)
+        found = self.joint(joint)
+        why = "it is locked" if found.locked_at is not None else "it is fixed"
+        if found.mimic is not None:
+            why = f"it follows {shown(found.mimic.joint)}"
+        raise UnknownNameError(f"joint {shown(joint)} of {self.name} has no coordinate: {why}")
+
+    # -- limits ------------------------------------------------------------------------------
+
+    @cached_property
+    def lower(self) -> Floats:
+        """Lower position limits (nq,); -inf for a continuous joint and for a floating base."""
+        return configuration.position_limits(self)[0]
+
+    @cached_property
+    def upper(self) -> Floats:
+        """Upper position limits (nq,)."""
+        return configuration.position_limits(self)[1]
+
+    @cached_property
+    def velocity_limit(self) -> Floats:
+        """Largest speed of each coordinate (nv,) [rad/s or m/s], inf where there is none."""
+        base = [np.inf] * (6 if self.floating else 0)
+        return np.array(base + [joint.limits.velocity for joint in self.coordinate_joints])
+
+    @cached_property
+    def effort_limit(self) -> Floats:
+        """Largest effort of each coordinate (nv,) [N m or N], inf where there is none."""
+        base = [np.inf] * (6 if self.floating else 0)
+        return np.array(base + [joint.limits.effort for joint in self.coordinate_joints])
+
+    # -- configuration arithmetic ------------------------------------------------------------
+
+    def neutral(self) -> Floats:
+        """The configuration (nq,) at which every joint is 0 and the base is at the world's frame."""
+        return configuration.neutral(self)
+
+    def random(self, rng: np.random.Generator | int | None = None, size: tuple[int, ...] | int = ()) -> Floats:
+        """Configurations (*size, nq), uniform within limits; see `configuration.random`."""
+        return configuration.random(self, rng, size)
+
+    def integrate(self, q: ArrayLike, v: ArrayLike) -> Floats:
+        """The configuration reached from `q` (..., nq) by the velocity `v` (..., nv) in unit time."""
+        return configuration.integrate(self, q, v)
+
+    def difference(self, q0: ArrayLike, q1: ArrayLike) -> Floats:
+        """The velocity (..., nv) that `integrate` needs to go from `q0` to `q1` in unit time."""
+        return configuration.difference(self, q0, q1)
+
+    def clip(self, q: ArrayLike) -> Floats:
+        """`q` (..., nq) moved into the position limits, and its quaternion to unit length."""
+        return configuration.clip(self, q)
+
+    # -- other forms -------------------------------------------------------------------------
+
+    @cached_property
+    def mechanism(self) -> Mechanism:
+        """The moving bodies alone, in float64: what the algorithms of `dynx.rbd` work on."""
+        return build_mechanism(self)
+
+    def to_urdf(self) -> str:
+        """The model as URDF text, in canonical form; `dynx.load` of it gives an equal model."""
+        from dynx.model.urdf_writer import write_urdf
+
+        return write_urdf(self)
+
+    def with_base(self, base: Base) -> Model:
+        """The same robot on the other kind of base."""
+        return replace(self, base=configuration.checked_base(base))
+
+    def with_gravity(self, gravity: ArrayLike) -> Model:
+        """The same robot in another field of gravity (3,) [m/s^2]."""
+        return replace(self, gravity=configuration.checked_gravity(gravity))
+
+    def with_frame(self, name: str, link: str, placement: Pose = Pose()) -> Model:
+        """The same robot with one more named frame, fixed to `link` (a tool tip, say)."""
+        self.link(link)
+        if name in self._frame_index:
+            raise UnknownNameError(f"frame {shown(name)} exists already in {self.name}")
+        return replace(self, extra_frames=(*self.extra_frames, Frame(name, link, placement)))
+
+    def inertial(self, link: str) -> Inertial:
+        """The inertial of a link; a link without one has no mass."""
+        return self.link(link).inertial or Inertial()
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Model) and self._content == other._content
+
+    def __hash__(self) -> int:
+        return hash(self._content)
+
+    def __repr__(self) -> str:
+        return f"<Model {self.name}: {self.base} base, nq {self.nq}, nv {self.nv}, {len(self.links)} links>"
+
+    def __getstate__(self) -> dict[str, Any]:
+        fields = self.__dataclass_fields__
+        return {name: value for name, value in self.__dict__.items() if name in fields}
+
+    @cached_property
+    def _content(self) -> tuple[object, ...]:
+        return (self.name, self.links, self.joints, self.base, self.gravity, self.extra_frames)
+
+    @cached_property
+    def _joint_by_name(self) -> dict[str, Joint]:
+        return {joint.name: joint for joint in self.joints}
+
+    @cached_property
+    def _link_by_name(self) -> dict[str, Link]:
+        return {link.name: link for link in self.links}
+
+    @cached_property
+    def _frame_index(self) -> dict[str, int]:
+        return {name: index for index, name in enumerate(self.frame_names)}
+
+    def _no_such(self, kind: str, name: object, known: Mapping[str, object]) -> str:
+        message = f"no {kind} {shown(name)} in {self.name}"
+        if kind != "joint" and name in self._joint_by_name:
+            child = self._joint_by_name[str(name)].child
+            return f"{message}: that is a joint; the {kind} it moves is {shown(child)}"
+        if kind == "joint" and name in self._link_by_name:
+            above = [joint.name for joint in self.joints if joint.child == name]
+            moved = f"; the joint that moves it is {shown(above[0])}" if above else ", the root"
+            return f"{message}: that is a link{moved}"
+        return message + nearest(str(name), known)

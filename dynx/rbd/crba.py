@@ -1,0 +1,52 @@
+"""Mass matrix: the composite-rigid-body algorithm (Featherstone 2008, table 6.2)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dynx.model.mechanism import ROOT, Mechanism, joint_motion
+from dynx.rbd.kinematics import joint_value
+from dynx.spatial.scalar import Array
+from dynx.spatial.so3 import cross, rotate, skew
+
+
+def mass_matrix(mechanism: Mechanism, q: Array) -> Array:
+    """M (..., nv, nv) in tree coordinates."""
+    bodies = mechanism.bodies
+    placements = [joint_motion(body, joint_value(mechanism, q, k)) for k, body in enumerate(bodies)]
+    composite = {ROOT: mechanism.root, **{k: body.inertia for k, body in enumerate(bodies)}}
+    for index in reversed(range(len(bodies))):
+        parent = bodies[index].parent
+        composite[parent] = composite[parent] + composite[index].seen_from(*placements[index])
+
+    base = 6 if mechanism.floating else 0
+    zero = 0 * np.sum(q, axis=-1)
+    M = [[zero] * mechanism.nv for _ in range(mechanism.nv)]
+    for index, body in enumerate(bodies):
+        still = 0 * body.axis
+        twist = (still, body.axis) if body.revolute else (body.axis, still)
+        force, moment = composite[index].momentum(*twist)
+        row = index
+        while row != ROOT:
+            owner = bodies[row]
+            along = np.sum(owner.axis * (moment if owner.revolute else force), axis=-1)
+            M[base + row][base + index] = M[base + index][base + row] = along + zero
+            R, p = placements[row]
+            force, moment = rotate(R, force), rotate(R, moment)
+            moment = moment + cross(p, force)
+            row = owner.parent
+        if mechanism.floating:
+            for k in range(3):
+                M[k][base + index] = M[base + index][k] = force[..., k] + zero
+                M[3 + k][base + index] = M[base + index][3 + k] = moment[..., k] + zero
+    if mechanism.floating:
+        root = composite[ROOT]
+        coupling = skew(root.first_moment)
+        for i in range(3):
+            for j in range(3):
+                M[i][j] = (root.mass if i == j else 0) + zero
+                M[3 + i][j] = M[j][3 + i] = coupling[..., i, j] + zero
+                M[3 + i][3 + j] = root.second_moment[..., i, j] + zero
+    if not M:
+        return np.zeros((*q.shape[:-1], 0, 0))
+    return np.stack([np.stack(row, axis=-1) for row in M], axis=-2)

@@ -1,0 +1,133 @@
+"""Geometric Jacobians of frames and their time derivatives, from the poses of the bodies.
+
+Rows: linear, then angular. Columns of a revolute joint with axis z through o: (z x (p - o), z); of
+a prismatic joint: (z, 0) (Siciliano et al., Robotics, eq. 3.30). The six columns of a floating base
+are three prismatic and three revolute ones along the axes of the base frame.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+from dynx.model.mechanism import ROOT, Mechanism
+from dynx.rbd.kinematics import Poses, ancestry, body_twists, frame_pose, joint_axis
+from dynx.spatial.scalar import Array
+from dynx.spatial.so3 import cross, skew
+
+Reference = Literal["local_world_aligned", "local", "world"]
+LOCAL_WORLD_ALIGNED: Reference = "local_world_aligned"
+REFERENCES: dict[str, Reference] = {
+    "local_world_aligned": "local_world_aligned",
+    "local": "local",
+    "world": "world",
+}
+
+
+def frame_jacobian(mechanism: Mechanism, poses: Poses, frame: int, reference: Reference) -> Array:
+    """J (..., 6, nv) of frame number `frame`."""
+    R, p = frame_pose(mechanism, poses, frame)
+    linear, angular = _aligned(mechanism, poses, mechanism.frames[frame].body, p)
+    return _referred(linear, angular, R, p, reference)
+
+
+def frame_jacobian_derivative(
+    mechanism: Mechanism, poses: Poses, v: Array, frame: int, reference: Reference
+) -> Array:
+    """dJ/dt (..., 6, nv) of frame number `frame` at the tree velocity `v` (..., nv)."""
+    R, p = frame_pose(mechanism, poses, frame)
+    body = mechanism.frames[frame].body
+    twists = body_twists(mechanism, poses, v)
+    turning = twists[body][1]
+    velocity = twists[body][0] + cross(turning, p - poses[body][1])
+
+    linear, angular = _aligned(mechanism, poses, body, p)
+    d_linear, d_angular = [0 * column for column in linear], [0 * column for column in angular]
+    for column, z, o, owner in _moving_columns(mechanism, poses, body):
+        o_velocity, o_turning = twists[owner]
+        dz = cross(o_turning, z)
+        if _turns(mechanism, column, owner):
+            d_linear[column] = cross(dz, p - o) + cross(z, velocity - o_velocity)
+            d_angular[column] = dz + 0 * d_linear[column]
+        else:
+            d_linear[column] = dz + 0 * d_linear[column]
+
+    if reference == "world":
+        J, dJ = _stacked(linear, angular, p), _stacked(d_linear, d_angular, p)
+        moved = skew(velocity) @ J[..., 3:, :] + skew(p) @ dJ[..., 3:, :]
+        return np.concatenate([dJ[..., :3, :] + moved, dJ[..., 3:, :]], axis=-2)
+    if reference == "local":
+        # d(R' x)/dt = R' (dx/dt - omega x x)
+        d_linear = [d - cross(turning, x) for d, x in zip(d_linear, linear, strict=True)]
+        d_angular = [d - cross(turning, x) for d, x in zip(d_angular, angular, strict=True)]
+    return _referred(d_linear, d_angular, R, p, reference)
+
+
+def shift_jacobian(
+    J: Array, dJ: Array | None, v: Array | None, R: Array, point: Array, reference: Reference
+) -> Array:
+    """J, or dJ/dt where it is given, moved to `point` (3,) given in the axes of the frame at (R, p)."""
+    if reference == "world":
+        return J if dJ is None else dJ
+    lever = point if reference == "local" else (R @ point[..., None])[..., 0]
+    arm = skew(lever)
+    if dJ is None or v is None:
+        return np.concatenate([J[..., :3, :] - arm @ J[..., 3:, :], J[..., 3:, :]], axis=-2)
+    moved = dJ[..., :3, :] - arm @ dJ[..., 3:, :]
+    if reference == LOCAL_WORLD_ALIGNED:
+        turning = (J[..., 3:, :] @ v[..., None])[..., 0]
+        moved = moved - skew(cross(turning, lever)) @ J[..., 3:, :]
+    return np.concatenate([moved, dJ[..., 3:, :]], axis=-2)
+
+
+def _moving_columns(
+    mechanism: Mechanism, poses: Poses, body: int
+) -> list[tuple[int, Array, Array, int]]:
+    """(column, axis z, origin o, owning body) of every coordinate that moves `body`."""
+    base = 6 if mechanism.floating else 0
+    columns = [
+        (base + k, joint_axis(mechanism, poses, k), poses[k][1], k) for k in ancestry(mechanism, body)
+    ]
+    if mechanism.floating:
+        R, o = poses[ROOT]
+        columns += [(k, R[..., :, k % 3], o, ROOT) for k in range(6)]
+    return columns
+
+
+def _turns(mechanism: Mechanism, column: int, owner: int) -> bool:
+    return column >= 3 if owner == ROOT else mechanism.bodies[owner].revolute
+
+
+def _aligned(
+    mechanism: Mechanism, poses: Poses, body: int, p: Array
+) -> tuple[list[Array], list[Array]]:
+    """Columns (linear, angular), in world axes, of the point p fixed to `body`."""
+    zero = 0 * p
+    linear, angular = [zero] * mechanism.nv, [zero] * mechanism.nv
+    for column, z, o, owner in _moving_columns(mechanism, poses, body):
+        if _turns(mechanism, column, owner):
+            linear[column], angular[column] = cross(z, p - o), z + zero
+        else:
+            linear[column] = z + zero
+    return linear, angular
+
+
+def _referred(
+    linear: list[Array], angular: list[Array], R: Array, p: Array, reference: Reference
+) -> Array:
+    J = _stacked(linear, angular, p)
+    if reference == "local":
+        R_T = np.swapaxes(R, -1, -2)
+        return np.concatenate([R_T @ J[..., :3, :], R_T @ J[..., 3:, :]], axis=-2)
+    if reference == "world":
+        return np.concatenate([J[..., :3, :] + skew(p) @ J[..., 3:, :], J[..., 3:, :]], axis=-2)
+    return J
+
+
+def _stacked(linear: list[Array], angular: list[Array], p: Array) -> Array:
+    if not linear:
+        return np.zeros((*p.shape[:-1], 6, 0))
+    columns = [np.concatenate(pair, axis=-1) for pair in zip(linear, angular, strict=True)]
+    shape = np.broadcast_shapes(*(column.shape for column in columns))
+    return np.stack([np.broadcast_to(column, shape) for column in columns], axis=-1)

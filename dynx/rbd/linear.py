@@ -1,0 +1,42 @@
+"""Solving A x = b for a symmetric positive definite A of any scalar, branching on no value."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dynx.spatial.scalar import Array
+
+
+def solve_positive(A: Array, b: Array) -> Array:
+    """x (..., n) with A x = b by A = L D L' (Golub and Van Loan, algorithm 4.1.2).
+
+    Square roots are not needed, so any field of numbers will do; a singular A divides by zero.
+    """
+    n = A.shape[-1]
+    if n == 0:
+        return b
+    L: list[list[Array]] = [[] for _ in range(n)]
+    D: list[Array] = []
+    for i in range(n):
+        scaled: list[Array] = []
+        for j in range(i):
+            entry = A[..., i, j]
+            for k in range(j):
+                entry = entry - scaled[k] * L[j][k]
+            scaled.append(entry)
+            L[i].append(entry / D[j])
+        pivot = A[..., i, i]
+        for k in range(i):
+            pivot = pivot - scaled[k] * L[i][k]
+        D.append(pivot)
+    x: list[Array] = []
+    for i in range(n):
+        entry = b[..., i]
+        for k in range(i):
+            entry = entry - L[i][k] * x[k]
+        x.append(entry)
+    x = [entry / pivot for entry, pivot in zip(x, D, strict=True)]
+    for i in reversed(range(n)):
+        for k in range(i + 1, n):
+            x[i] = x[i] - L[k][i] * x[k]
+    return np.stack(x, axis=-1)

@@ -1,0 +1,53 @@
+"""Rigid-body inertia as ten linear parameters: mass, first moment, second moment about a point.
+
+Linear parameters add when bodies are welded together and need no division by a mass that may be
+zero (Featherstone, Rigid Body Dynamics Algorithms, section 2.13).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dynx.spatial.scalar import Array
+from dynx.spatial.so3 import cross, rotate, skew
+
+
+@dataclass(frozen=True)
+class RigidInertia:
+    """Inertia of a rigid body about the origin O of a frame, in the axes of that frame."""
+
+    mass: Array  # () [kg]
+    first_moment: Array  # (3,) mass times centre of mass [kg m]
+    second_moment: Array  # (3, 3) rotational inertia about O [kg m^2]
+
+    def __add__(self, other: RigidInertia) -> RigidInertia:
+        """Two bodies welded together; both must be about the same frame."""
+        return RigidInertia(
+            np.asarray(self.mass + other.mass),
+            self.first_moment + other.first_moment,
+            self.second_moment + other.second_moment,
+        )
+
+    def seen_from(self, R: Array, p: Array) -> RigidInertia:
+        """The same body about the origin of frame A, where (R, p) is the pose of this frame in A."""
+        h = rotate(R, self.first_moment)
+        shift, H = skew(p), skew(h)
+        rotated = R @ self.second_moment @ np.swapaxes(R, -1, -2)
+        moved = rotated - shift @ H - H @ shift - self.mass * (shift @ shift)
+        return RigidInertia(self.mass, h + p * self.mass, moved)
+
+    def momentum(self, linear: Array, angular: Array) -> tuple[Array, Array]:
+        """Linear and angular momentum about O of a body with this velocity at O."""
+        return (
+            linear * self.mass + cross(angular, self.first_moment),
+            rotate(self.second_moment, angular) + cross(self.first_moment, linear),
+        )
+
+
+def inertia_about_origin(mass: Array, center: Array, rotation: Array, tensor: Array) -> RigidInertia:
+    """From what a URDF says: mass, centre of mass, axes and central inertia tensor in those axes."""
+    central = rotation @ tensor @ np.swapaxes(rotation, -1, -2)
+    C = skew(center)
+    return RigidInertia(np.asarray(mass), center * mass, central - (C @ C) * mass)

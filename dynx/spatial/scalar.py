@@ -1,0 +1,57 @@
+"""Elementary functions over arrays of any scalar: float64, 50-digit numbers, traced symbols.
+
+The algorithms of `dynx.rbd` are written once and evaluated on several kinds of number. NumPy's
+operators already dispatch on the elements of an object array; its ``sin`` does so only where the
+element has a method of that name. These three functions close that gap.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[Any]
+"""An array of scalars: float64, or object for every other kind of number."""
+
+Floats = NDArray[np.float64]
+
+
+def sin(x: Array) -> Array:
+    """Sine of each element [rad]."""
+    return _elementwise("sin", x)
+
+
+def cos(x: Array) -> Array:
+    """Cosine of each element [rad]."""
+    return _elementwise("cos", x)
+
+
+def sqrt(x: Array) -> Array:
+    """Square root of each element."""
+    return _elementwise("sqrt", x)
+
+
+def along(x: Any) -> Array:
+    """x[..., None]: a scalar per sample, ready to multiply a vector per sample.
+
+    Arithmetic on 0-d object arrays gives bare scalars, which cannot be indexed.
+    """
+    return np.asarray(np.asarray(x)[..., None])
+
+
+def _elementwise(function: str, x: Array) -> Array:
+    x = np.asarray(x)
+    if x.dtype != object:
+        return np.asarray(getattr(np, function)(x))
+
+    def one(element: Any) -> Any:
+        method = getattr(element, function, None)
+        if method is not None:
+            return method()
+        import mpmath
+
+        return getattr(mpmath, function)(element)
+
+    return np.asarray(np.frompyfunc(one, 1, 1)(x), dtype=object)

@@ -1,0 +1,119 @@
+"""Rotations: matrices, roll-pitch-yaw, axis and angle, unit quaternions ordered (x, y, z, w).
+
+Every function takes leading batch axes. Those that must serve `dynx.rbd` (`cross`, `skew`,
+`rotation_about`, `rotation_from_rpy`, `rotation_from_quat`) branch on no value and work on any
+scalar; the others are for float64.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dynx.spatial.scalar import Array, Floats, cos, sin
+
+
+def cross(a: Array, b: Array) -> Array:
+    """a x b, for arrays (..., 3)."""
+    a0, a1, a2 = a[..., 0], a[..., 1], a[..., 2]
+    b0, b1, b2 = b[..., 0], b[..., 1], b[..., 2]
+    return np.stack([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0], axis=-1)
+
+
+def skew(a: Array) -> Array:
+    """The matrix [a] with [a] b = a x b, (..., 3) to (..., 3, 3)."""
+    x, y, z = a[..., 0], a[..., 1], a[..., 2]
+    zero = x * 0
+    rows = [[zero, -z, y], [z, zero, -x], [-y, x, zero]]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def rotate(R: Array, a: Array) -> Array:
+    """R a, for R (..., 3, 3) and a (..., 3)."""
+    return np.asarray((R @ a[..., None])[..., 0])
+
+
+def rotate_back(R: Array, a: Array) -> Array:
+    """R^T a, for R (..., 3, 3) and a (..., 3)."""
+    return np.asarray((np.swapaxes(R, -1, -2) @ a[..., None])[..., 0])
+
+
+def rotation_about(axis: Array, angle: Array) -> Array:
+    """Rotation by `angle` [rad] about the unit vector `axis` (Rodrigues)."""
+    angle = np.asarray(angle)
+    c, s = cos(angle)[..., None, None], sin(angle)[..., None, None]
+    along = axis[..., :, None] * axis[..., None, :]
+    eye = np.eye(3, dtype=int)
+    return np.asarray(along + (eye - along) * c + skew(axis) * s)
+
+
+def rotation_from_rpy(rpy: Array) -> Array:
+    """URDF's roll, pitch, yaw [rad] (..., 3): R = Rz(yaw) Ry(pitch) Rx(roll)."""
+    c, s = cos(rpy), sin(rpy)
+    cr, cp, cy = c[..., 0], c[..., 1], c[..., 2]
+    sr, sp, sy = s[..., 0], s[..., 1], s[..., 2]
+    rows = [
+        [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+        [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+        [-sp, cp * sr, cp * cr],
+    ]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def rpy_from_rotation(R: Floats) -> Floats:
+    """The roll, pitch, yaw [rad] of R (..., 3, 3); at pitch = +-90 degrees, yaw is put to 0."""
+    R = np.asarray(R, dtype=float)
+    horizontal = np.hypot(R[..., 0, 0], R[..., 1, 0])
+    locked = horizontal < 1e-9
+    pitch = np.arctan2(-R[..., 2, 0], horizontal)
+    roll = np.where(
+        locked, np.arctan2(-R[..., 1, 2], R[..., 1, 1]), np.arctan2(R[..., 2, 1], R[..., 2, 2])
+    )
+    yaw = np.where(locked, 0.0, np.arctan2(R[..., 1, 0], R[..., 0, 0]))
+    return np.stack([roll, pitch, yaw], axis=-1)
+
+
+def rotation_from_quat(quat_xyzw: Array) -> Array:
+    """Rotation matrix of a unit quaternion (..., 4); the norm is not checked."""
+    x, y, z, w = (quat_xyzw[..., i] for i in range(4))
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def quat_from_rotation(R: Floats) -> Floats:
+    """Unit quaternion (x, y, z, w), w >= 0, of a rotation matrix (..., 3, 3)."""
+    from scipy.spatial.transform import Rotation
+
+    R = np.asarray(R, dtype=float)
+    quat = Rotation.from_matrix(R.reshape(-1, 3, 3)).as_quat(canonical=True)
+    return np.asarray(quat, dtype=float).reshape(*R.shape[:-2], 4)
+
+
+def quat_product(a_xyzw: Floats, b_xyzw: Floats) -> Floats:
+    """Hamilton product a b, so that R(a b) = R(a) R(b)."""
+    av, aw = a_xyzw[..., :3], a_xyzw[..., 3:]
+    bv, bw = b_xyzw[..., :3], b_xyzw[..., 3:]
+    vector = aw * bv + bw * av + cross(av, bv)
+    scalar = aw * bw - np.sum(av * bv, axis=-1, keepdims=True)
+    return np.concatenate([vector, scalar], axis=-1)
+
+
+def quat_exp(rotation_vector: Floats) -> Floats:
+    """Unit quaternion (x, y, z, w) of a rotation vector [rad] (..., 3)."""
+    half = 0.5 * np.linalg.norm(rotation_vector, axis=-1, keepdims=True)
+    vector = 0.5 * rotation_vector * np.sinc(half / np.pi)
+    return np.concatenate([vector, np.cos(half)], axis=-1)
+
+
+def quat_log(quat_xyzw: Floats) -> Floats:
+    """Rotation vector [rad] (..., 3), of length at most pi, of a unit quaternion."""
+    vector, w = quat_xyzw[..., :3], quat_xyzw[..., 3:]
+    sign = np.where(w < 0, -1.0, 1.0)
+    length = np.linalg.norm(vector, axis=-1, keepdims=True)
+    angle = 2.0 * np.arctan2(length, sign * w)
+    # Near the identity 2 atan2(n, w) / n tends to 2 / w; n = 0 must not divide.
+    scale = np.where(length > 1e-12, angle / np.where(length > 0, length, 1.0), 2.0 / np.abs(np.where(w == 0, 1.0, w)))
+    return np.asarray(sign * scale * vector)
