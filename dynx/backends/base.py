@@ -8,7 +8,8 @@ mass matrix) go to the engine in a straight line when there is one sample and no
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import math
+from collections.abc import Mapping, Sequence
 from types import TracebackType
 from typing import Any, ClassVar, TypeVar
 
@@ -16,9 +17,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.backends.arguments import Arguments
-from dynx.backends.hooks import EngineHooks, solve_mass_matrix
+from dynx.backends.evaluation import Evaluation
+from dynx.backends.hooks import EngineHooks, apply_matrix, solve_mass_matrix
 from dynx.backends.joint_dynamics import JointDynamicsTerms
-from dynx.backends.solvability import refuse_singular
+from dynx.backends.solvability import Solvability
 from dynx.ik import IKResult, inverse_kinematics
 from dynx.model import Model
 from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED, Reference, shift_jacobian
@@ -58,11 +60,11 @@ class Backend(EngineHooks):
     def __init__(self, model: Model, *, validate: bool = True) -> None:
         self.model = model
         self._mechanism = model.mechanism
-        self._coupling = self._mechanism.coupling
-        self._S = None if self._coupling is None else self._coupling.matrix()
-        self._straight = self._coupling is None
+        self._evaluation = Evaluation(self._mechanism, vectorized=self.vectorized)
+        self._straight = self._mechanism.coupling is None
         self._arguments = Arguments(model)
         self._joint_terms = JointDynamicsTerms(model)
+        self._solvability = Solvability(model)
         self._frame_index = {name: index for index, name in enumerate(model.frame_names)}
         self._options: dict[str, Any] = {"validate": validate}
         # True while arguments are looked at; a closed backend always looks, and refuses.
@@ -85,8 +87,8 @@ class Backend(EngineHooks):
             index = self._index(frame)
             if self._straight and q.ndim == 1:  # type: ignore[union-attr]
                 return self._frame_placement(q, index)  # type: ignore[arg-type]
-            return self._evaluate(self._frame_placement, (4, 4), q, args=(index,))
-        placements = self._evaluate(self._frame_placements, (len(self._frame_index), 4, 4), q)
+            return self._evaluation(self._frame_placement, (4, 4), q, args=(index,))
+        placements = self._evaluation(self._frame_placements, (len(self._frame_index), 4, 4), q)
         if frame is None:
             return placements
         return np.asarray(placements[..., [self._index(name) for name in frame], :, :])
@@ -106,8 +108,8 @@ class Backend(EngineHooks):
         index = self._index(frame)
         if self._straight and point is None and q.ndim == 1:  # type: ignore[union-attr]
             return self._jacobian(q, index, reference)  # type: ignore[arg-type]
-        J = self._evaluate(
-            self._jacobian, (6, -1), q, args=(index, reference), reduce=self._reduce_rows
+        J = self._evaluation(
+            self._jacobian, (6, -1), q, args=(index, reference), reduce=self._evaluation.reduce_rows
         )
         return J if point is None else self._at_point(J, None, q, None, frame, reference, point)
 
@@ -123,8 +125,8 @@ class Backend(EngineHooks):
         """dJ/dt (..., 6, nv) along the motion `v`."""
         q, v, reference = self._checked_motion(q, v, reference)
         index = self._index(frame)
-        dJ = self._evaluate(
-            self._jacobian_derivative, (6, -1), q, v, args=(index, reference), reduce=self._reduce_rows
+        dJ = self._evaluation(
+            self._jacobian_derivative, (6, -1), q, v, args=(index, reference), reduce=self._evaluation.reduce_rows
         )
         if point is None:
             return dJ
@@ -143,9 +145,9 @@ class Backend(EngineHooks):
         """J v (..., 6): linear [m/s] then angular [rad/s] velocity of the frame."""
         q, v, reference = self._checked_motion(q, v, reference)
         if point is not None:
-            return _apply(self.jacobian(q, frame, reference=reference, point=point), v)
+            return apply_matrix(self.jacobian(q, frame, reference=reference, point=point), v)
         index = self._index(frame)
-        return self._evaluate(self._frame_velocity, (6,), q, v, args=(index, reference))
+        return self._evaluation(self._frame_velocity, (6,), q, v, args=(index, reference))
 
     def frame_acceleration(
         self,
@@ -167,9 +169,9 @@ class Backend(EngineHooks):
         if point is not None:
             J = self.jacobian(q, frame, reference=reference, point=point)
             dJ = self.jacobian_derivative(q, v, frame, reference=reference, point=point)
-            return _apply(J, a) + _apply(dJ, v)
+            return apply_matrix(J, a) + apply_matrix(dJ, v)
         index = self._index(frame)
-        return self._evaluate(self._frame_acceleration, (6,), q, v, a, args=(index, reference))
+        return self._evaluation(self._frame_acceleration, (6,), q, v, a, args=(index, reference))
 
     def inverse_kinematics(
         self, target: ArrayLike, frame: str, q0: ArrayLike | None = None, **options: Any
@@ -195,7 +197,7 @@ class Backend(EngineHooks):
         if self._straight and q.ndim == 1 and v.ndim == 1 and a.ndim == 1:  # type: ignore[union-attr]
             tau = self._inverse_dynamics(q, v, a)  # type: ignore[arg-type]
         else:
-            tau = self._evaluate(self._inverse_dynamics, (-1,), q, v, a, reduce=self._reduce_rows)
+            tau = self._evaluation(self._inverse_dynamics, (-1,), q, v, a, reduce=self._evaluation.reduce_rows)
         if external_forces:
             tau = tau - self._force_torque(q, external_forces, force_reference)
         if joint_dynamics:
@@ -218,13 +220,13 @@ class Backend(EngineHooks):
         """
         q, v, _ = self._checked_motion(q, v, LOCAL_WORLD_ALIGNED)
         tau = self._arguments.v(tau, "tau") if self._validate else tau
-        refuse_singular(self.model, joint_dynamics)
+        self._solvability.refuse_singular(joint_dynamics)
         if external_forces:
             tau = tau + self._force_torque(q, external_forces, force_reference)
         if joint_dynamics:
             tau = tau - self._joint_terms.losses(v)
         if self._straight and not (joint_dynamics and self._joint_terms.has_rotors):
-            a = self._evaluate(self._forward_dynamics, (-1,), q, v, tau)
+            a = self._evaluation(self._forward_dynamics, (-1,), q, v, tau)
         else:
             M = self.mass_matrix(q, joint_dynamics=joint_dynamics)
             a = solve_mass_matrix(M, tau - self.bias_torque(q, v))
@@ -237,7 +239,7 @@ class Backend(EngineHooks):
         if self._straight and q.ndim == 1:  # type: ignore[union-attr]
             M = self._mass_matrix(q)  # type: ignore[arg-type]
         else:
-            M = self._evaluate(self._mass_matrix, (-1, -1), q, reduce=self._reduce_both)
+            M = self._evaluation(self._mass_matrix, (-1, -1), q, reduce=self._evaluation.reduce_both)
         return M + self._joint_terms.rotors if joint_dynamics else M
 
     def bias_torque(
@@ -251,7 +253,7 @@ class Backend(EngineHooks):
     ) -> Floats:
         """C v + g (..., nv): `inverse_dynamics` at zero acceleration."""
         q, v, _ = self._checked_motion(q, v, LOCAL_WORLD_ALIGNED)
-        tau = self._evaluate(self._bias_torque, (-1,), q, v, reduce=self._reduce_rows)
+        tau = self._evaluation(self._bias_torque, (-1,), q, v, reduce=self._evaluation.reduce_rows)
         if external_forces:
             tau = tau - self._force_torque(q, external_forces, force_reference)
         return tau + self._joint_terms.losses(v) if joint_dynamics else tau
@@ -259,34 +261,34 @@ class Backend(EngineHooks):
     def gravity_torque(self, q: ArrayLike) -> Floats:
         """g (..., nv): `inverse_dynamics` at rest, the gradient of the potential energy."""
         q = self._arguments.q(q) if self._validate else q
-        return self._evaluate(self._gravity_torque, (-1,), q, reduce=self._reduce_rows)
+        return self._evaluation(self._gravity_torque, (-1,), q, reduce=self._evaluation.reduce_rows)
 
     def coriolis_matrix(self, q: ArrayLike, v: ArrayLike) -> Floats:
         """C (..., nv, nv) with C v + g = bias and dM/dt - 2 C skew-symmetric (`dynx.rbd.coriolis`)."""
         q, v, _ = self._checked_motion(q, v, LOCAL_WORLD_ALIGNED)
-        return self._evaluate(self._coriolis_matrix, (-1, -1), q, v, reduce=self._reduce_both)
+        return self._evaluation(self._coriolis_matrix, (-1, -1), q, v, reduce=self._evaluation.reduce_both)
 
     # -- the whole body -----------------------------------------------------------------------
 
     def center_of_mass(self, q: ArrayLike) -> Floats:
         """Centre of mass in the world (..., 3) [m]; the base frame's origin if nothing has mass."""
         q = self._arguments.q(q) if self._validate else q
-        return self._evaluate(self._center_of_mass, (3,), q)
+        return self._evaluation(self._center_of_mass, (3,), q)
 
     def center_of_mass_jacobian(self, q: ArrayLike) -> Floats:
         """J (..., 3, nv) with J v the velocity of the centre of mass, world axes."""
         q = self._arguments.q(q) if self._validate else q
-        return self._evaluate(self._center_of_mass_jacobian, (3, -1), q, reduce=self._reduce_rows)
+        return self._evaluation(self._center_of_mass_jacobian, (3, -1), q, reduce=self._evaluation.reduce_rows)
 
     def centroidal_momentum(self, q: ArrayLike, v: ArrayLike) -> Floats:
         """Linear [kg m/s] then angular [kg m^2/s] momentum about the centre of mass (..., 6)."""
         q, v, _ = self._checked_motion(q, v, LOCAL_WORLD_ALIGNED)
-        return self._evaluate(self._centroidal_momentum, (6,), q, v)
+        return self._evaluation(self._centroidal_momentum, (6,), q, v)
 
     def kinetic_energy(self, q: ArrayLike, v: ArrayLike, *, joint_dynamics: bool = False) -> Floats:
         """v' M v / 2 (...,) [J]."""
         q, v, _ = self._checked_motion(q, v, LOCAL_WORLD_ALIGNED)
-        energy = self._evaluate(self._kinetic_energy, (), q, v)
+        energy = self._evaluation(self._kinetic_energy, (), q, v)
         if joint_dynamics:
             energy = energy + 0.5 * np.sum(v * self._joint_terms.rotor_torque(v), axis=-1)
         return energy
@@ -294,7 +296,7 @@ class Backend(EngineHooks):
     def potential_energy(self, q: ArrayLike) -> Floats:
         """Energy in the field of gravity (...,) [J], zero with the mass at the world's origin."""
         q = self._arguments.q(q) if self._validate else q
-        return self._evaluate(self._potential_energy, (), q)
+        return self._evaluation(self._potential_energy, (), q)
 
     # -- life cycle ---------------------------------------------------------------------------
 
@@ -338,47 +340,12 @@ class Backend(EngineHooks):
             return self._arguments.q(q), self._arguments.v(v), self._arguments.reference(reference)
         return q, v, reference  # type: ignore[return-value]
 
-    def _evaluate(
-        self,
-        hook: Callable[..., Floats],
-        tail: tuple[int, ...],
-        q: Any,
-        *velocities: Any,
-        args: tuple[Any, ...] = (),
-        reduce: Callable[[Floats], Floats] | None = None,
-    ) -> Floats:
-        """`hook` over leading batch axes and through the mimic joints; -1 in `tail` is nv."""
-        batch = np.broadcast_shapes(q.shape[:-1], *(v.shape[:-1] for v in velocities))
-        if self._coupling is not None and self._S is not None:
-            q = self._coupling.expand_q(q)
-            velocities = tuple(v @ self._S.T for v in velocities)
-        arrays = [np.broadcast_to(x, (*batch, x.shape[-1])) for x in (q, *velocities)]
-        if self.vectorized or not batch:
-            result = np.asarray(hook(*arrays, *args))
-        else:
-            tail = tuple(self._mechanism.nv if n == -1 else n for n in tail)
-            flat = [np.ascontiguousarray(x).reshape(-1, x.shape[-1]) if x.size else x.reshape(int(np.prod(batch)), x.shape[-1]) for x in arrays]
-            result = np.empty((len(flat[0]), *tail))
-            for k, sample in enumerate(zip(*flat, strict=True)):
-                result[k] = hook(*sample, *args)
-            result = result.reshape(*batch, *tail)
-        if self._coupling is not None and reduce is not None:
-            result = reduce(result)
-        return result
-
-    def _reduce_rows(self, result: Floats) -> Floats:
-        return np.asarray(result @ self._S)
-
-    def _reduce_both(self, result: Floats) -> Floats:
-        assert self._S is not None
-        return np.asarray(self._S.T @ result @ self._S)
-
     def _force_torque(self, q: Any, forces: Forces, reference: str) -> Floats:
         """J' w summed over the frames that a wrench acts on."""
         total: Any = 0.0
         for frame, wrench in forces.items():
             J = self.jacobian(q, frame, reference=reference)
-            total = total + _apply(np.swapaxes(J, -1, -2), self._arguments.wrench(wrench, frame))
+            total = total + apply_matrix(np.swapaxes(J, -1, -2), self._arguments.wrench(wrench, frame))
         return np.asarray(total)
 
     def _at_point(
@@ -389,10 +356,6 @@ class Backend(EngineHooks):
             return J if dJ is None else dJ
         R = self.forward_kinematics(q, frame)[..., :3, :3]
         return shift_jacobian(J, dJ, v, R, point, self._arguments.reference(reference))
-
-
-def _apply(matrix: Any, vector: Any) -> Floats:
-    return np.asarray((matrix @ np.asarray(vector)[..., None])[..., 0])
 
 
 def _rebuild(kind: type[Backend], model: Model, options: dict[str, Any]) -> Backend:

@@ -13,6 +13,7 @@ from abc import ABC, abstractmethod
 from typing import ClassVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from dynx.errors import SingularMassMatrixError
 from dynx.model import Mechanism
@@ -59,13 +60,13 @@ class EngineHooks(ABC):
 
     def _frame_velocity(self, q: Floats, v: Floats, frame: int, reference: Reference) -> Floats:
         """J v, (..., 6)."""
-        return _apply(self._jacobian(q, frame, reference), v)
+        return apply_matrix(self._jacobian(q, frame, reference), v)
 
     def _frame_acceleration(
         self, q: Floats, v: Floats, a: Floats, frame: int, reference: Reference
     ) -> Floats:
         """J a + dJ/dt v, (..., 6)."""
-        return _apply(self._jacobian(q, frame, reference), a) + _apply(
+        return apply_matrix(self._jacobian(q, frame, reference), a) + apply_matrix(
             self._jacobian_derivative(q, v, frame, reference), v
         )
 
@@ -115,7 +116,7 @@ class EngineHooks(ABC):
 
     def _kinetic_energy(self, q: Floats, v: Floats) -> Floats:
         """v' M v / 2, (...,)."""
-        return np.asarray(0.5 * np.sum(v * _apply(self._mass_matrix(q), v), axis=-1))
+        return np.asarray(0.5 * np.sum(v * apply_matrix(self._mass_matrix(q), v), axis=-1))
 
     def _potential_energy(self, q: Floats) -> Floats:
         """Of the centre of mass in the field of gravity, zero at the world's origin (...,)."""
@@ -137,5 +138,6 @@ def solve_mass_matrix(M: Floats, torque: Floats) -> Floats:
         ) from None
 
 
-def _apply(matrix: Floats, vector: Floats) -> Floats:
-    return np.asarray((matrix @ vector[..., None])[..., 0])
+def apply_matrix(matrix: Floats, vector: ArrayLike) -> Floats:
+    """A x over batch axes, for A (..., m, n) and x (..., n)."""
+    return np.asarray((matrix @ np.asarray(vector)[..., None])[..., 0])

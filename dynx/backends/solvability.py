@@ -6,8 +6,6 @@ then answer NaN, zero or garbage, each its own way; dynx refuses alike in every 
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 
 from dynx.backends.joint_dynamics import JointDynamicsTerms
@@ -17,7 +15,27 @@ from dynx.rbd.crba import mass_matrix
 from dynx.spatial.scalar import Floats
 
 
-@lru_cache(maxsize=256)
+class Solvability:
+    """Which coordinates of a model have no unique acceleration, found once and remembered."""
+
+    def __init__(self, model: Model) -> None:
+        self._model = model
+        self._found: dict[bool, tuple[str, ...]] = {}
+
+    def refuse_singular(self, joint_dynamics: bool) -> None:
+        """Raise SingularMassMatrixError, naming the joints, if M is singular at every q."""
+        if joint_dynamics not in self._found:
+            self._found[joint_dynamics] = singular_coordinates(self._model, joint_dynamics)
+        names = self._found[joint_dynamics]
+        if names:
+            listed = ", ".join(shown(name) for name in names[:6])
+            listed += f" and {len(names) - 6} more" if len(names) > 6 else ""
+            raise SingularMassMatrixError(
+                f"{self._model.name} has no unique acceleration: nothing that {listed} moves has "
+                "inertia (lock the joint, or give its links an <inertial>)"
+            )
+
+
 def singular_coordinates(model: Model, joint_dynamics: bool = False) -> tuple[str, ...]:
     """Coordinates that take part in a motion without inertia, at every configuration; often none.
 
@@ -32,22 +50,10 @@ def singular_coordinates(model: Model, joint_dynamics: bool = False) -> tuple[st
         M = S.T @ M @ S
     if joint_dynamics:
         M = M + JointDynamicsTerms(model).rotors
-    involved = [_null_coordinates(each) for each in M]
-    always = set.intersection(*(set(each) for each in involved))
+    always = set.intersection(*(set(_null_coordinates(each)) for each in M))
     base = 6 if model.floating else 0
     names = ["base" if k < base else model.joint_names[k - base] for k in sorted(always)]
     return tuple(dict.fromkeys(names))
-
-
-def refuse_singular(model: Model, joint_dynamics: bool) -> None:
-    """Raise SingularMassMatrixError, naming the joints, if M is singular everywhere."""
-    names = singular_coordinates(model, joint_dynamics)
-    if names:
-        listed = ", ".join(shown(name) for name in names[:6]) + (" ..." if len(names) > 6 else "")
-        raise SingularMassMatrixError(
-            f"{model.name} has no unique acceleration: nothing that {listed} moves has inertia "
-            "(lock the joint, or give its links an <inertial>)"
-        )
 
 
 def _null_coordinates(M: Floats) -> list[int]:

@@ -18,7 +18,7 @@ import numpy as np
 
 from dynx.model.elements import Pose
 from dynx.spatial.inertia import RigidInertia, inertia_about_origin
-from dynx.spatial.scalar import Array, Floats
+from dynx.spatial.scalar import Array, Floats, sqrt
 from dynx.spatial.so3 import rotate, rotation_about, rotation_from_rpy
 
 if TYPE_CHECKING:
@@ -147,7 +147,10 @@ def build_mechanism(model: Model, numbers: Numbers = float64) -> Mechanism:
         R, p = R_parent @ R_joint, p_parent + rotate(R_parent, p_joint)
         if joint.moves:
             revolute = joint.type != "prismatic"
-            carried.append((joint.name, body, revolute, R, p, numbers(joint.axis)))
+            # The axis is unit to rounding in float64; a rotation about it must be one in any scalar.
+            axis = numbers(joint.axis)
+            axis = axis / sqrt(np.sum(axis * axis))
+            carried.append((joint.name, body, revolute, R, p, axis))
             here[joint.child] = (len(carried) - 1, numbers(np.eye(3)), numbers(np.zeros(3)))
         else:
             here[joint.child] = (body, R, p)

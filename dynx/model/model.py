@@ -235,7 +235,7 @@ class Model:
         return isinstance(other, Model) and self._content == other._content
 
     def __hash__(self) -> int:
-        return hash(self._content)
+        return self._hash
 
     def __repr__(self) -> str:
         return f"<Model {self.name}: {self.base} base, nq {self.nq}, nv {self.nv}, {len(self.links)} links>"
@@ -247,6 +247,10 @@ class Model:
     @cached_property
     def _content(self) -> tuple[object, ...]:
         return (self.name, self.links, self.joints, self.base, self.gravity, self.extra_frames)
+
+    @cached_property
+    def _hash(self) -> int:
+        return hash(self._content)
 
     @cached_property
     def _joint_by_name(self) -> dict[str, Joint]:

@@ -1,0 +1,80 @@
+"""From a call with any leading axes to the engine's one sample at a time, through the mimic joints.
+
+A mimic joint is a linear map v_tree = S v (`dynx.model.mechanism.Coupling`). By virtual work torques
+go back by S', Jacobians and matrices by S, so every engine gives the reduced dynamics although it
+only ever sees a plain tree.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import prod
+from typing import Any
+
+import numpy as np
+
+from dynx.model import Mechanism
+from dynx.spatial.scalar import Floats
+
+Reduction = Callable[[Floats], Floats]
+
+
+class Evaluation:
+    """Calls hooks of an engine on behalf of one model."""
+
+    def __init__(self, mechanism: Mechanism, *, vectorized: bool) -> None:
+        self._nv = mechanism.nv
+        self._vectorized = vectorized
+        self._coupling = mechanism.coupling
+        self._S: Floats = np.eye(0) if self._coupling is None else self._coupling.matrix()
+
+    def __call__(
+        self,
+        hook: Callable[..., Any],
+        tail: tuple[int, ...],
+        q: Floats,
+        *velocities: Floats,
+        args: tuple[Any, ...] = (),
+        reduce: Reduction | None = None,
+    ) -> Floats:
+        """`hook(q, *velocities, *args)` for every sample of the broadcast batch.
+
+        q (..., nq) and velocities (..., nv) are in model coordinates, the hook's in tree
+        coordinates. `tail` is the shape of one answer in tree coordinates, -1 standing for nv;
+        `reduce` brings it back.
+        """
+        batch = np.broadcast_shapes(q.shape[:-1], *(v.shape[:-1] for v in velocities))
+        if self._coupling is not None:
+            q = self._coupling.expand_q(q)
+            velocities = tuple(v @ self._S.T for v in velocities)
+        samples = [np.broadcast_to(x, (*batch, x.shape[-1])) for x in (q, *velocities)]
+        if self._vectorized or not batch:
+            answer = np.asarray(hook(*samples, *args))
+        else:
+            answer = self._one_by_one(hook, tail, batch, samples, args)
+        if self._coupling is not None and reduce is not None:
+            return reduce(answer)
+        return answer
+
+    def reduce_rows(self, answer: Floats) -> Floats:
+        """A torque (..., nv) or the columns of a Jacobian (..., 6, nv), in model coordinates."""
+        return np.asarray(answer @ self._S)
+
+    def reduce_both(self, answer: Floats) -> Floats:
+        """S' A S for a matrix (..., nv, nv)."""
+        return np.asarray(self._S.T @ answer @ self._S)
+
+    def _one_by_one(
+        self,
+        hook: Callable[..., Any],
+        tail: tuple[int, ...],
+        batch: tuple[int, ...],
+        samples: list[Floats],
+        args: tuple[Any, ...],
+    ) -> Floats:
+        count = prod(batch)
+        flat = [np.ascontiguousarray(x).reshape(count, x.shape[-1]) for x in samples]
+        answer = np.empty((count, *(self._nv if n == -1 else n for n in tail)))
+        for k, sample in enumerate(zip(*flat, strict=True)):
+            answer[k] = hook(*sample, *args)
+        return answer.reshape(*batch, *answer.shape[1:])
