@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from math import isfinite
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dynx.errors import ArgumentError, ClosedError, SingularMassMatrixError, UnknownNameError, nearest, shown
+from dynx.errors import (
+    ArgumentError,
+    ClosedError,
+    SingularMassMatrixError,
+    UnknownNameError,
+    nearest,
+    shown,
+)
 from dynx.model import Model
 from dynx.model.configuration import checked_array, checked_q
 from dynx.rbd.jacobians import REFERENCES, Reference
@@ -46,9 +54,13 @@ class Arguments:
 
     def v(self, v: Any, name: str = "v") -> Floats:
         """A velocity, acceleration or torque (..., nv), finite."""
-        if type(v) is np.ndarray and v.dtype is _FLOAT64 and v.shape == self._v_shape:
-            if isfinite(sum(v.tolist())):
-                return v
+        if (
+            type(v) is np.ndarray
+            and v.dtype is _FLOAT64
+            and v.shape == self._v_shape
+            and isfinite(sum(v.tolist()))
+        ):
+            return v
         return checked_array(name, v, self._v_shape[0])
 
     def reference(self, reference: str) -> Reference:
@@ -60,9 +72,25 @@ class Arguments:
                 f"reference is {shown(reference)}{nearest(str(reference), REFERENCES)}"
             ) from None
 
-    def wrench(self, wrench: ArrayLike, frame: str) -> Floats:
-        """A wrench (..., 6) on the frame."""
-        return checked_array(f"external_forces[{shown(frame)}]", wrench, 6)
+    def frames(self, frames: object) -> list[str]:
+        """The names in a sequence of frames."""
+        if isinstance(frames, Iterable):
+            return list(frames)
+        raise ArgumentError(
+            f"frame is of type {type(frames).__name__}; wanted a name, a sequence of names, or None for all"
+        )
+
+    def wrenches(self, forces: object) -> dict[str, Floats]:
+        """The wrenches (..., 6) by the frame they act on."""
+        if not isinstance(forces, Mapping):
+            raise ArgumentError(
+                f"external_forces is of type {type(forces).__name__}; "
+                "wanted a mapping from frame names to wrenches (..., 6)"
+            )
+        return {
+            frame: checked_array(f"external_forces[{shown(frame)}]", wrench, 6)
+            for frame, wrench in forces.items()
+        }
 
     def point(self, point: ArrayLike) -> Floats:
         """A point (3,) in the axes of a frame [m]."""

@@ -8,7 +8,6 @@ mass matrix) go to the engine in a straight line when there is one sample and no
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from types import TracebackType
 from typing import Any, ClassVar, TypeVar
@@ -17,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.backends.arguments import Arguments
-from dynx.backends.evaluation import Evaluation
+from dynx.backends.evaluation import Evaluation, common_batch
 from dynx.backends.hooks import EngineHooks, apply_matrix, solve_mass_matrix
 from dynx.backends.joint_dynamics import JointDynamicsTerms
 from dynx.backends.solvability import Solvability
@@ -77,21 +76,25 @@ class Backend(EngineHooks):
 
         return f"dynx {__version__}"
 
+    @classmethod
+    def require_engine(cls) -> None:
+        """Raise NotInstalledError if the engine is missing: for one that its class imports late."""
+
     # -- kinematics ---------------------------------------------------------------------------
 
     def forward_kinematics(self, q: ArrayLike, frame: str | Sequence[str] | None = None) -> Floats:
         """T_world_frame (..., 4, 4); for several frames, or None for all, (..., n, 4, 4)."""
-        if self._validate:
-            q = self._arguments.q(q)
+        known: Any = self._arguments.q(q) if self._validate else q
         if isinstance(frame, str):
             index = self._index(frame)
-            if self._straight and q.ndim == 1:  # type: ignore[union-attr]
-                return self._frame_placement(q, index)  # type: ignore[arg-type]
-            return self._evaluation(self._frame_placement, (4, 4), q, args=(index,))
-        placements = self._evaluation(self._frame_placements, (len(self._frame_index), 4, 4), q)
+            if self._straight and known.ndim == 1:
+                return self._frame_placement(known, index)
+            return self._evaluation(self._frame_placement, (4, 4), known, args=(index,))
+        placements = self._evaluation(self._frame_placements, (len(self._frame_index), 4, 4), known)
         if frame is None:
             return placements
-        return np.asarray(placements[..., [self._index(name) for name in frame], :, :])
+        names = self._arguments.frames(frame)
+        return np.asarray(placements[..., [self._index(name) for name in names], :, :])
 
     def jacobian(
         self,
@@ -102,16 +105,15 @@ class Backend(EngineHooks):
         point: ArrayLike | None = None,
     ) -> Floats:
         """J (..., 6, nv) with J v the velocity of `frame`, linear [m/s] then angular [rad/s]."""
-        if self._validate:
-            q = self._arguments.q(q)
-            reference = self._arguments.reference(reference)
+        known: Any = self._arguments.q(q) if self._validate else q
+        axes: Any = self._arguments.reference(reference) if self._validate else reference
         index = self._index(frame)
-        if self._straight and point is None and q.ndim == 1:  # type: ignore[union-attr]
-            return self._jacobian(q, index, reference)  # type: ignore[arg-type]
+        if self._straight and point is None and known.ndim == 1:
+            return self._jacobian(known, index, axes)
         J = self._evaluation(
-            self._jacobian, (6, -1), q, args=(index, reference), reduce=self._evaluation.reduce_rows
+            self._jacobian, (6, -1), known, args=(index, axes), reduce=self._evaluation.reduce_rows
         )
-        return J if point is None else self._at_point(J, None, q, None, frame, reference, point)
+        return J if point is None else self._at_point(J, None, known, None, frame, axes, point)
 
     def jacobian_derivative(
         self,
@@ -126,7 +128,12 @@ class Backend(EngineHooks):
         q, v, reference = self._checked_motion(q, v, reference)
         index = self._index(frame)
         dJ = self._evaluation(
-            self._jacobian_derivative, (6, -1), q, v, args=(index, reference), reduce=self._evaluation.reduce_rows
+            self._jacobian_derivative,
+            (6, -1),
+            q,
+            v,
+            args=(index, reference),
+            reduce=self._evaluation.reduce_rows,
         )
         if point is None:
             return dJ
@@ -145,6 +152,7 @@ class Backend(EngineHooks):
         """J v (..., 6): linear [m/s] then angular [rad/s] velocity of the frame."""
         q, v, reference = self._checked_motion(q, v, reference)
         if point is not None:
+            common_batch(q, v)
             return apply_matrix(self.jacobian(q, frame, reference=reference, point=point), v)
         index = self._index(frame)
         return self._evaluation(self._frame_velocity, (6,), q, v, args=(index, reference))
@@ -165,8 +173,9 @@ class Backend(EngineHooks):
         ``local`` and ``world`` the spatial acceleration. Gravity has no part in it.
         """
         q, v, reference = self._checked_motion(q, v, reference)
-        a = self._arguments.v(a, "a") if self._validate else a
+        a = self._checked_v(a, "a")
         if point is not None:
+            common_batch(q, v, a)
             J = self.jacobian(q, frame, reference=reference, point=point)
             dJ = self.jacobian_derivative(q, v, frame, reference=reference, point=point)
             return apply_matrix(J, a) + apply_matrix(dJ, v)
@@ -192,16 +201,19 @@ class Backend(EngineHooks):
         joint_dynamics: bool = False,
     ) -> Floats:
         """The torque tau (..., nv) that gives acceleration `a`: M a + bias - J' external forces."""
-        if self._validate:
-            q, v, a = self._arguments.q(q), self._arguments.v(v), self._arguments.v(a, "a")
-        if self._straight and q.ndim == 1 and v.ndim == 1 and a.ndim == 1:  # type: ignore[union-attr]
-            tau = self._inverse_dynamics(q, v, a)  # type: ignore[arg-type]
+        known: Any = self._arguments.q(q) if self._validate else q
+        speed: Any = self._arguments.v(v) if self._validate else v
+        wanted: Any = self._arguments.v(a, "a") if self._validate else a
+        if self._straight and known.ndim == 1 and speed.ndim == 1 and wanted.ndim == 1:
+            tau = self._inverse_dynamics(known, speed, wanted)
         else:
-            tau = self._evaluation(self._inverse_dynamics, (-1,), q, v, a, reduce=self._evaluation.reduce_rows)
-        if external_forces:
-            tau = tau - self._force_torque(q, external_forces, force_reference)
+            tau = self._evaluation(
+                self._inverse_dynamics, (-1,), known, speed, wanted, reduce=self._evaluation.reduce_rows
+            )
+        if external_forces is not None:
+            tau = tau - self._force_torque(known, tau, external_forces, force_reference)
         if joint_dynamics:
-            tau = tau + self._joint_terms.losses(v) + self._joint_terms.rotor_torque(a)
+            tau = tau + self._joint_terms.losses(speed) + self._joint_terms.rotor_torque(wanted)
         return tau
 
     def forward_dynamics(
@@ -219,10 +231,11 @@ class Backend(EngineHooks):
         Raises SingularMassMatrixError, which names the joints, where a joint moves no inertia.
         """
         q, v, _ = self._checked_motion(q, v, LOCAL_WORLD_ALIGNED)
-        tau = self._arguments.v(tau, "tau") if self._validate else tau
+        tau = self._checked_v(tau, "tau")
+        common_batch(q, v, tau)
         self._solvability.refuse_singular(joint_dynamics)
-        if external_forces:
-            tau = tau + self._force_torque(q, external_forces, force_reference)
+        if external_forces is not None:
+            tau = tau + self._force_torque(q, tau, external_forces, force_reference)
         if joint_dynamics:
             tau = tau - self._joint_terms.losses(v)
         if self._straight and not (joint_dynamics and self._joint_terms.has_rotors):
@@ -234,12 +247,11 @@ class Backend(EngineHooks):
 
     def mass_matrix(self, q: ArrayLike, *, joint_dynamics: bool = False) -> Floats:
         """M (..., nv, nv), symmetric."""
-        if self._validate:
-            q = self._arguments.q(q)
-        if self._straight and q.ndim == 1:  # type: ignore[union-attr]
-            M = self._mass_matrix(q)  # type: ignore[arg-type]
+        known: Any = self._arguments.q(q) if self._validate else q
+        if self._straight and known.ndim == 1:
+            M = self._mass_matrix(known)
         else:
-            M = self._evaluation(self._mass_matrix, (-1, -1), q, reduce=self._evaluation.reduce_both)
+            M = self._evaluation(self._mass_matrix, (-1, -1), known, reduce=self._evaluation.reduce_both)
         return M + self._joint_terms.rotors if joint_dynamics else M
 
     def bias_torque(
@@ -254,13 +266,13 @@ class Backend(EngineHooks):
         """C v + g (..., nv): `inverse_dynamics` at zero acceleration."""
         q, v, _ = self._checked_motion(q, v, LOCAL_WORLD_ALIGNED)
         tau = self._evaluation(self._bias_torque, (-1,), q, v, reduce=self._evaluation.reduce_rows)
-        if external_forces:
-            tau = tau - self._force_torque(q, external_forces, force_reference)
+        if external_forces is not None:
+            tau = tau - self._force_torque(q, tau, external_forces, force_reference)
         return tau + self._joint_terms.losses(v) if joint_dynamics else tau
 
     def gravity_torque(self, q: ArrayLike) -> Floats:
         """g (..., nv): `inverse_dynamics` at rest, the gradient of the potential energy."""
-        q = self._arguments.q(q) if self._validate else q
+        q = self._checked_q(q)
         return self._evaluation(self._gravity_torque, (-1,), q, reduce=self._evaluation.reduce_rows)
 
     def coriolis_matrix(self, q: ArrayLike, v: ArrayLike) -> Floats:
@@ -272,13 +284,15 @@ class Backend(EngineHooks):
 
     def center_of_mass(self, q: ArrayLike) -> Floats:
         """Centre of mass in the world (..., 3) [m]; the base frame's origin if nothing has mass."""
-        q = self._arguments.q(q) if self._validate else q
+        q = self._checked_q(q)
         return self._evaluation(self._center_of_mass, (3,), q)
 
     def center_of_mass_jacobian(self, q: ArrayLike) -> Floats:
         """J (..., 3, nv) with J v the velocity of the centre of mass, world axes."""
-        q = self._arguments.q(q) if self._validate else q
-        return self._evaluation(self._center_of_mass_jacobian, (3, -1), q, reduce=self._evaluation.reduce_rows)
+        q = self._checked_q(q)
+        return self._evaluation(
+            self._center_of_mass_jacobian, (3, -1), q, reduce=self._evaluation.reduce_rows
+        )
 
     def centroidal_momentum(self, q: ArrayLike, v: ArrayLike) -> Floats:
         """Linear [kg m/s] then angular [kg m^2/s] momentum about the centre of mass (..., 6)."""
@@ -295,7 +309,7 @@ class Backend(EngineHooks):
 
     def potential_energy(self, q: ArrayLike) -> Floats:
         """Energy in the field of gravity (...,) [J], zero with the mass at the world's origin."""
-        q = self._arguments.q(q) if self._validate else q
+        q = self._checked_q(q)
         return self._evaluation(self._potential_energy, (), q)
 
     # -- life cycle ---------------------------------------------------------------------------
@@ -335,17 +349,25 @@ class Backend(EngineHooks):
         except (KeyError, TypeError):
             return self.model.frame_index(frame)
 
+    def _checked_q(self, q: Any) -> Floats:
+        return self._arguments.q(q) if self._validate else q
+
+    def _checked_v(self, v: Any, name: str) -> Floats:
+        return self._arguments.v(v, name) if self._validate else v
+
     def _checked_motion(self, q: Any, v: Any, reference: str) -> tuple[Floats, Floats, Reference]:
         if self._validate:
             return self._arguments.q(q), self._arguments.v(v), self._arguments.reference(reference)
         return q, v, reference  # type: ignore[return-value]
 
-    def _force_torque(self, q: Any, forces: Forces, reference: str) -> Floats:
-        """J' w summed over the frames that a wrench acts on."""
+    def _force_torque(self, q: Any, tau: Any, forces: Forces, reference: str) -> Floats:
+        """J' w summed over the frames that a wrench acts on, to be added to or taken from `tau`."""
+        wrenches = self._arguments.wrenches(forces)
+        common_batch(tau, q, *wrenches.values())
         total: Any = 0.0
-        for frame, wrench in forces.items():
+        for frame, wrench in wrenches.items():
             J = self.jacobian(q, frame, reference=reference)
-            total = total + apply_matrix(np.swapaxes(J, -1, -2), self._arguments.wrench(wrench, frame))
+            total = total + apply_matrix(np.swapaxes(J, -1, -2), wrench)
         return np.asarray(total)
 
     def _at_point(

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from dynx.errors import ShapeError
 from dynx.model import Mechanism
 from dynx.spatial.scalar import Floats
 
@@ -43,15 +44,19 @@ class Evaluation:
         coordinates. `tail` is the shape of one answer in tree coordinates, -1 standing for nv;
         `reduce` brings it back.
         """
-        batch = np.broadcast_shapes(q.shape[:-1], *(v.shape[:-1] for v in velocities))
+        batch = common_batch(q, *velocities)
         if self._coupling is not None:
             q = self._coupling.expand_q(q)
             velocities = tuple(v @ self._S.T for v in velocities)
         samples = [np.broadcast_to(x, (*batch, x.shape[-1])) for x in (q, *velocities)]
+        shape = (*batch, *(self._nv if n == -1 else n for n in tail))
         if self._vectorized or not batch:
             answer = np.asarray(hook(*samples, *args))
+            if answer.shape != shape:
+                # What no coordinate moves may come back without the batch.
+                answer = np.array(np.broadcast_to(answer, shape))
         else:
-            answer = self._one_by_one(hook, tail, batch, samples, args)
+            answer = self._one_by_one(hook, shape, samples, args)
         if self._coupling is not None and reduce is not None:
             return reduce(answer)
         return answer
@@ -65,16 +70,23 @@ class Evaluation:
         return np.asarray(self._S.T @ answer @ self._S)
 
     def _one_by_one(
-        self,
-        hook: Callable[..., Any],
-        tail: tuple[int, ...],
-        batch: tuple[int, ...],
-        samples: list[Floats],
-        args: tuple[Any, ...],
+        self, hook: Callable[..., Any], shape: tuple[int, ...], samples: list[Floats], args: tuple[Any, ...]
     ) -> Floats:
-        count = prod(batch)
-        flat = [np.ascontiguousarray(x).reshape(count, x.shape[-1]) for x in samples]
-        answer = np.empty((count, *(self._nv if n == -1 else n for n in tail)))
+        batch = samples[0].shape[:-1]
+        flat = [np.ascontiguousarray(x).reshape(prod(batch), x.shape[-1]) for x in samples]
+        answer = np.empty((prod(batch), *shape[len(batch) :]))
         for k, sample in enumerate(zip(*flat, strict=True)):
             answer[k] = hook(*sample, *args)
-        return answer.reshape(*batch, *answer.shape[1:])
+        return answer.reshape(shape)
+
+
+def common_batch(q: Floats, *others: Floats) -> tuple[int, ...]:
+    """The leading axes that the arguments broadcast to, or a ShapeError."""
+    batch = q.shape[:-1]
+    if all(other.shape[:-1] == batch for other in others):
+        return batch
+    try:
+        return np.broadcast_shapes(batch, *(other.shape[:-1] for other in others))
+    except ValueError:
+        shapes = ", ".join(str(array.shape) for array in (q, *others))
+        raise ShapeError(f"the leading axes of {shapes} do not broadcast") from None

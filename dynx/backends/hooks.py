@@ -128,14 +128,21 @@ class EngineHooks(ABC):
 
 
 def solve_mass_matrix(M: Floats, torque: Floats) -> Floats:
-    """a with M a = torque, by Cholesky; raises SingularMassMatrixError where M is singular."""
+    """a with M a = torque; raises SingularMassMatrixError where M is singular to double precision.
+
+    M is scaled to a unit diagonal first. It may be indefinite: the inertias of a file are used as
+    they stand, and a unique acceleration then exists all the same.
+    """
+    diagonal = np.abs(np.diagonal(M, axis1=-2, axis2=-1))
+    size = np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
+    scaled = M / (size[..., :, None] * size[..., None, :])
     try:
-        np.linalg.cholesky(M)
-        return np.asarray(np.linalg.solve(M, torque[..., None])[..., 0])
+        smallest = np.min(np.abs(np.linalg.eigvalsh(scaled)), axis=-1, initial=np.inf)
+        if np.all(smallest > M.shape[-1] * np.finfo(np.float64).eps):
+            return np.asarray(np.linalg.solve(scaled, (torque / size)[..., None])[..., 0] / size)
     except np.linalg.LinAlgError:
-        raise SingularMassMatrixError(
-            "the mass matrix is not positive definite: no unique acceleration exists"
-        ) from None
+        pass  # NaN or infinity in M: no acceleration either.
+    raise SingularMassMatrixError("the mass matrix is singular: no unique acceleration exists")
 
 
 def apply_matrix(matrix: Floats, vector: ArrayLike) -> Floats:

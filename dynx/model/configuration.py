@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -30,7 +31,9 @@ def checked_array(name: str, value: ArrayLike, length: int) -> Floats:
     array = np.asarray(array, dtype=np.float64)
     if not np.isfinite(array).all():
         where = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
-        raise NotFiniteError(f"{name}[{', '.join(map(str, where))}] is {array[where]}; wanted a finite number")
+        raise NotFiniteError(
+            f"{name}[{', '.join(map(str, where))}] is {array[where]}; wanted a finite number"
+        )
     return array
 
 
@@ -87,7 +90,8 @@ def position_limits(model: Model) -> tuple[Floats, Floats]:
         low, high = max(lower[k], ends[0]), min(upper[k], ends[1])
         if low <= high:
             lower[k], upper[k] = low, high
-    return lower, upper
+    # Without -0.0: NumPy's generator refuses the range from 0.0 to -0.0.
+    return lower + 0.0, upper + 0.0
 
 
 def neutral(model: Model) -> Floats:
@@ -112,9 +116,7 @@ def random(
     base = 7 if model.floating else 0
     for k, joint in enumerate(model.coordinate_joints, start=base):
         reach = 1.0 if joint.type == "prismatic" else np.pi
-        low, high = model.lower[k], model.upper[k]
-        if not np.isfinite(low) or not np.isfinite(high):
-            low, high = _half_bounded(low, high, reach)
+        low, high = _bounded(float(model.lower[k]), float(model.upper[k]), reach)
         q[..., k] = rng.uniform(low, high, shape)
     if model.floating:
         q[..., :3] = rng.uniform(-1.0, 1.0, (*shape, 3))
@@ -159,16 +161,16 @@ def clip(model: Model, q: ArrayLike) -> Floats:
     return array
 
 
-def _half_bounded(low: float, high: float, reach: float) -> tuple[float, float]:
-    if np.isfinite(low):
-        return low, low + 2.0 * reach
-    if np.isfinite(high):
-        return high - 2.0 * reach, high
-    return -reach, reach
+def _bounded(low: float, high: float, reach: float) -> tuple[float, float]:
+    """Ends to draw between: those given, and within `reach` of 0 or of the one end where one is not."""
+    if math.isfinite(high - low):
+        return low, high
+    if math.isfinite(low) == math.isfinite(high):
+        # No ends, or two so far apart that their distance is no float; 0 is then between them.
+        return max(low, -reach), min(high, reach)
+    return (low, low + 2.0 * reach) if math.isfinite(low) else (high - 2.0 * reach, high)
 
 
 def _join(*parts: Floats) -> Floats:
     shape = np.broadcast_shapes(*(part.shape[:-1] for part in parts))
-    return np.concatenate(
-        [np.broadcast_to(part, (*shape, part.shape[-1])) for part in parts], axis=-1
-    )
+    return np.concatenate([np.broadcast_to(part, (*shape, part.shape[-1])) for part in parts], axis=-1)

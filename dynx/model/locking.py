@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import SupportsFloat
 
 import numpy as np
 
-from dynx.errors import NotFiniteError, UnknownNameError, nearest, shown
+from dynx.errors import DTypeError, NotFiniteError, UnknownNameError, nearest, shown
 from dynx.model.elements import Joint, Pose
 from dynx.spatial.so3 import rotation_about, rpy_from_rotation
 
@@ -16,36 +17,21 @@ from dynx.spatial.so3 import rotation_about, rpy_from_rotation
 def lock_joints(joints: list[Joint], lock: Mapping[str, float]) -> list[Joint]:
     """`joints` with those named in `lock` fixed at the given values [rad or m].
 
-    A joint that follows a locked one is fixed at the value it follows to. Raises UnknownNameError
-    for a name that is no joint, or a joint that cannot move.
+    Joints that follow a locked one are fixed with it, by `topology.resolve_mimics`. Raises
+    UnknownNameError for a name that is no joint, or a joint that cannot move; DTypeError or
+    NotFiniteError for a value that is no finite number.
     """
     by_name = {joint.name: joint for joint in joints}
     for name, value in lock.items():
         if name not in by_name:
-            raise UnknownNameError(f"cannot lock {shown(name)}: no such joint{nearest(name, by_name)}")
+            raise UnknownNameError(f"cannot lock {shown(name)}: no such joint{nearest(str(name), by_name)}")
         if not by_name[name].moves:
             raise UnknownNameError(f"cannot lock {shown(name)}: it is a fixed joint already")
+        if isinstance(value, bool | str) or not isinstance(value, SupportsFloat):
+            raise DTypeError(f"cannot lock {shown(name)} at {shown(value)}; wanted a number")
         if not math.isfinite(value):
             raise NotFiniteError(f"cannot lock {shown(name)} at {value}: wanted a finite number")
-    return [_locked(joint, lock, by_name) for joint in joints]
-
-
-def _locked(joint: Joint, lock: Mapping[str, float], by_name: Mapping[str, Joint]) -> Joint:
-    if joint.name in lock:
-        return fixed_at(joint, float(lock[joint.name]))
-    # Follow the chain of mimics up to a locked joint; a cycle is refused elsewhere, by name.
-    scale, offset, current, seen = 1.0, 0.0, joint, {joint.name}
-    while current.mimic is not None:
-        offset += scale * current.mimic.offset
-        scale *= current.mimic.multiplier
-        driver = current.mimic.joint
-        if driver in lock:
-            return fixed_at(joint, scale * float(lock[driver]) + offset)
-        if driver in seen or driver not in by_name:
-            break
-        seen.add(driver)
-        current = by_name[driver]
-    return joint
+    return [fixed_at(joint, float(lock[joint.name])) if joint.name in lock else joint for joint in joints]
 
 
 def fixed_at(joint: Joint, value: float) -> Joint:

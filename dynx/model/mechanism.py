@@ -137,9 +137,7 @@ def pose_arrays(pose: Pose, numbers: Numbers) -> tuple[Array, Array]:
 def build_mechanism(model: Model, numbers: Numbers = float64) -> Mechanism:
     """Weld what cannot move and lump its inertia, in the scalar that `numbers` makes."""
     # Where each link sits: its body and its pose (R, p) in that body's frame.
-    here: dict[str, tuple[int, Array, Array]] = {
-        model.root: (ROOT, numbers(np.eye(3)), numbers(np.zeros(3)))
-    }
+    here: dict[str, tuple[int, Array, Array]] = {model.root: (ROOT, numbers(np.eye(3)), numbers(np.zeros(3)))}
     carried: list[tuple[str, int, bool, Array, Array, Array]] = []
     for joint in model.joints:
         body, R_parent, p_parent = here[joint.parent]

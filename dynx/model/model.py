@@ -125,14 +125,14 @@ class Model:
         """The joint of that name (of any type)."""
         try:
             return self._joint_by_name[name]
-        except KeyError:
+        except (KeyError, TypeError):
             raise UnknownNameError(self._no_such("joint", name, self._joint_by_name)) from None
 
     def link(self, name: str) -> Link:
         """The link of that name."""
         try:
             return self._link_by_name[name]
-        except KeyError:
+        except (KeyError, TypeError):
             raise UnknownNameError(self._no_such("link", name, self._link_by_name)) from None
 
     def frame_index(self, name: str) -> int:
@@ -183,7 +183,9 @@ class Model:
         """The configuration (nq,) at which every joint is 0 and the base is at the world's frame."""
         return configuration.neutral(self)
 
-    def random(self, rng: np.random.Generator | int | None = None, size: tuple[int, ...] | int = ()) -> Floats:
+    def random(
+        self, rng: np.random.Generator | int | None = None, size: tuple[int, ...] | int = ()
+    ) -> Floats:
         """Configurations (*size, nq), uniform within limits; see `configuration.random`."""
         return configuration.random(self, rng, size)
 
@@ -266,11 +268,13 @@ class Model:
 
     def _no_such(self, kind: str, name: object, known: Mapping[str, object]) -> str:
         message = f"no {kind} {shown(name)} in {self.name}"
+        if not isinstance(name, str):
+            return f"{message}: a name is a str, not {type(name).__name__}"
         if kind != "joint" and name in self._joint_by_name:
-            child = self._joint_by_name[str(name)].child
+            child = self._joint_by_name[name].child
             return f"{message}: that is a joint; the {kind} it moves is {shown(child)}"
         if kind == "joint" and name in self._link_by_name:
             above = [joint.name for joint in self.joints if joint.child == name]
             moved = f"; the joint that moves it is {shown(above[0])}" if above else ", the root"
             return f"{message}: that is a link{moved}"
-        return message + nearest(str(name), known)
+        return message + nearest(name, known)

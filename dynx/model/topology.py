@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import replace
 
 from dynx.errors import DescriptionError, nearest, shown
 from dynx.model.elements import Joint, Link, Mimic, Note
+from dynx.model.locking import fixed_at
 
 MAX_LINKS = 10_000
 """More links than any robot; a longer file is refused before an engine's recursion overflows."""
 
 
-def depth_first(
-    links: list[Link], joints: list[Joint], source: str
-) -> tuple[list[Link], list[Joint]]:
+def depth_first(links: list[Link], joints: list[Joint], source: str) -> tuple[list[Link], list[Joint]]:
     """Both lists in depth-first order from the root, children in the order of their joints.
 
     Raises DescriptionError for a repeated name, an unknown link, a link with two parents, two
@@ -84,55 +84,63 @@ def depth_first(
 def resolve_mimics(joints: list[Joint], notes: list[Note], source: str) -> list[Joint]:
     """Let every mimic joint name the independent joint at the end of its chain.
 
-    A joint that follows a fixed one is itself fixed; one that follows a joint that is not there
-    moves freely; each with a note. Raises DescriptionError for a cycle of mimics.
+    A joint that follows a fixed or locked one is itself fixed; one that follows a joint that is not
+    there moves freely, with a note. Raises DescriptionError for a circle of mimics.
     """
     by_name = {joint.name: joint for joint in joints}
     resolved: dict[str, Joint] = {}
     for joint in joints:
-        resolved[joint.name] = _resolve_mimic(joint, by_name, notes, source)
+        for follower in reversed(_unresolved_chain(joint, by_name, resolved, source)):
+            resolved[follower.name] = _resolve_mimic(follower, resolved, notes, source)
     return [resolved[joint.name] for joint in joints]
 
 
-def _resolve_mimic(
-    joint: Joint, by_name: dict[str, Joint], notes: list[Note], source: str
-) -> Joint:
+def _unresolved_chain(
+    joint: Joint, by_name: dict[str, Joint], resolved: dict[str, Joint], source: str
+) -> list[Joint]:
+    """`joint`, the joint it follows, and so on, up to one that follows none or is resolved."""
+    chain: dict[str, Joint] = {}
+    current: Joint | None = joint
+    while current is not None and current.name not in resolved:
+        if current.name in chain:
+            circle = list(chain)[list(chain).index(current.name) :]
+            named = " -> ".join(shown(name) for name in [*circle[:5], current.name])
+            raise DescriptionError(
+                f"mimic joints follow each other in a circle: {named}", source=source, line=joint.line
+            )
+        chain[current.name] = current
+        current = by_name.get(current.mimic.joint) if current.moves and current.mimic else None
+    return list(chain.values())
+
+
+def _resolve_mimic(joint: Joint, resolved: dict[str, Joint], notes: list[Note], source: str) -> Joint:
     if joint.mimic is None or not joint.moves:
         return replace(joint, mimic=None)
-    scale, offset, current, seen = 1.0, 0.0, joint, [joint.name]
-    while current.mimic is not None:
-        offset += scale * current.mimic.offset
-        scale *= current.mimic.multiplier
-        driver = current.mimic.joint
-        if driver not in by_name:
-            notes.append(
-                Note(
-                    f"joint {shown(joint.name)} mimics {shown(driver)}, which does not exist; "
-                    "it is read as moving freely" + nearest(driver, by_name),
-                    joint.line,
-                )
-            )
-            return replace(joint, mimic=None)
-        if driver in seen:
-            raise DescriptionError(
-                "mimic joints follow each other in a circle: " + " -> ".join([*seen, driver]),
-                source=source,
-                line=joint.line,
-            )
-        seen.append(driver)
-        current = by_name[driver]
-    if not current.moves:
-        from dynx.model.locking import fixed_at
-
-        notes.append(
-            Note(
-                f"joint {shown(joint.name)} mimics {shown(current.name)}, which cannot move; "
-                f"it is read as fixed at {offset}",
-                joint.line,
-            )
+    driver = resolved.get(joint.mimic.joint)
+    what = f"joint {shown(joint.name)} mimics {shown(joint.mimic.joint)}"
+    if driver is None:
+        known = nearest(joint.mimic.joint, resolved)
+        notes.append(Note(f"{what}, which does not exist; it is read as moving freely{known}", joint.line))
+        return replace(joint, mimic=None)
+    scale, offset = joint.mimic.multiplier, joint.mimic.offset
+    if driver.moves and driver.mimic is None:
+        return joint
+    if driver.mimic is not None:
+        offset += scale * driver.mimic.offset
+        scale *= driver.mimic.multiplier
+    else:
+        offset += scale * (driver.locked_at or 0.0)
+    if not (math.isfinite(scale) and math.isfinite(offset)):
+        raise DescriptionError(
+            f"{what} by multiplier {scale} and offset {offset}; wanted finite numbers",
+            source=source,
+            line=joint.line,
         )
-        return fixed_at(joint, offset)
-    return replace(joint, mimic=Mimic(current.name, scale, offset))
+    if driver.mimic is not None:
+        return replace(joint, mimic=Mimic(driver.mimic.joint, scale, offset))
+    if driver.locked_at is None:
+        notes.append(Note(f"{what}, which cannot move; it is read as fixed at {offset}", joint.line))
+    return fixed_at(joint, offset)
 
 
 def _refuse_duplicates(kind: str, parts: Iterable[Link | Joint], source: str) -> None:
@@ -148,11 +156,11 @@ def _refuse_duplicates(kind: str, parts: Iterable[Link | Joint], source: str) ->
 
 
 def _cycle(start: str, parent_joint: dict[str, Joint], source: str) -> DescriptionError:
-    path, name = [start], parent_joint[start].parent
+    path, name = {start: 0}, parent_joint[start].parent
     while name not in path:
-        path.append(name)
+        path[name] = len(path)
         name = parent_joint[name].parent
-    loop = path[path.index(name) :]
+    loop = list(path)[path[name] :]
     return DescriptionError(
         f"the links {', '.join(shown(link) for link in loop[:5])} form a cycle, not a tree",
         source=source,

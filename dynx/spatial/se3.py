@@ -66,4 +66,3 @@ def pose_error(T_world_target: Floats, T_world_frame: Floats) -> tuple[Floats, F
     position = T_world_target[..., :3, 3] - T_world_frame[..., :3, 3]
     R = T_world_target[..., :3, :3] @ np.swapaxes(T_world_frame[..., :3, :3], -1, -2)
     return position, quat_log(quat_from_rotation(R))
-

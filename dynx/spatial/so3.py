@@ -60,15 +60,17 @@ def rotation_from_rpy(rpy: Array) -> Array:
 
 
 def rpy_from_rotation(R: Floats) -> Floats:
-    """The roll, pitch, yaw [rad] of R (..., 3, 3); at pitch = +-90 degrees, yaw is put to 0."""
+    """The roll, pitch, yaw [rad] of R (..., 3, 3); at pitch = +-90 degrees, yaw is put to 0.
+
+    Roll is taken from Rz(-yaw) R, so that it makes up for a yaw that is ill-determined near
+    pitch = +-90 degrees: the three always give R back to rounding.
+    """
     R = np.asarray(R, dtype=float)
-    horizontal = np.hypot(R[..., 0, 0], R[..., 1, 0])
-    locked = horizontal < 1e-9
-    pitch = np.arctan2(-R[..., 2, 0], horizontal)
-    roll = np.where(
-        locked, np.arctan2(-R[..., 1, 2], R[..., 1, 1]), np.arctan2(R[..., 2, 1], R[..., 2, 2])
-    )
+    locked = np.hypot(R[..., 0, 0], R[..., 1, 0]) < 4.0 * np.finfo(float).eps
     yaw = np.where(locked, 0.0, np.arctan2(R[..., 1, 0], R[..., 0, 0]))
+    c, s = np.cos(yaw), np.sin(yaw)
+    pitch = np.arctan2(-R[..., 2, 0], c * R[..., 0, 0] + s * R[..., 1, 0])
+    roll = np.arctan2(s * R[..., 0, 2] - c * R[..., 1, 2], c * R[..., 1, 1] - s * R[..., 0, 1])
     return np.stack([roll, pitch, yaw], axis=-1)
 
 
@@ -115,5 +117,7 @@ def quat_log(quat_xyzw: Floats) -> Floats:
     length = np.linalg.norm(vector, axis=-1, keepdims=True)
     angle = 2.0 * np.arctan2(length, sign * w)
     # Near the identity 2 atan2(n, w) / n tends to 2 / w; n = 0 must not divide.
-    scale = np.where(length > 1e-12, angle / np.where(length > 0, length, 1.0), 2.0 / np.abs(np.where(w == 0, 1.0, w)))
+    scale = np.where(
+        length > 1e-12, angle / np.where(length > 0, length, 1.0), 2.0 / np.abs(np.where(w == 0, 1.0, w))
+    )
     return np.asarray(sign * scale * vector)

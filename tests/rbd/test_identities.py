@@ -143,9 +143,7 @@ def test_jacobian_is_the_rate_of_forward_kinematics(case: Case) -> None:
     T = kinematics.frame_placements(mechanism, q)
     dT = rate(lambda x: kinematics.frame_placements(mechanism, x), mechanism, q, v)
     for frame in range(len(mechanism.frames)):
-        velocity = apply(
-            jacobians.frame_jacobian(mechanism, poses, frame, "local_world_aligned"), v
-        )
+        velocity = apply(jacobians.frame_jacobian(mechanism, poses, frame, "local_world_aligned"), v)
         assert distance(dT[frame, :3, 3], velocity[:3]) < CLOSE
         W = dT[frame, :3, :3] @ T[frame, :3, :3].T
         spin = np.array([W[2, 1], W[0, 2], W[1, 0]])

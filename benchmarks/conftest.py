@@ -1,0 +1,53 @@
+"""Puts the measurements of one run beside each other, and says what dynx adds to the engine."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+from _pytest.terminal import TerminalReporter
+from pytest_benchmark.fixture import BenchmarkFixture
+
+Record = Callable[[str, str, BenchmarkFixture], None]
+SECONDS = pytest.StashKey[dict[str, dict[str, float]]]()
+
+CHECKED_MORE = 2e-6
+"""What a call with its checks may cost more than the engine's own [s]."""
+UNCHECKED_MORE, UNCHECKED_RATIO = 0.7e-6, 1.5
+"""What a call without checks may cost more: the larger of so many seconds and so many times."""
+
+
+@pytest.fixture
+def record(request: pytest.FixtureRequest) -> Record:
+    """Keep the fastest round of a benchmark under (quantity, way), for the table at the end."""
+    seconds = request.config.stash.setdefault(SECONDS, {})
+
+    def keep(quantity: str, way: str, benchmark: BenchmarkFixture) -> None:
+        # Without stats, benchmarks are switched off and only run once.
+        if benchmark.stats is not None:
+            seconds.setdefault(quantity, {})[way] = float(benchmark.stats.stats.min)
+
+    return keep
+
+
+def pytest_terminal_summary(terminalreporter: TerminalReporter, config: pytest.Config) -> None:
+    """A line per quantity, if raw, checked and unchecked calls were all timed."""
+    complete = {
+        quantity: ways
+        for quantity, ways in config.stash.get(SECONDS, {}).items()
+        if ways.keys() >= {"raw", "checked", "unchecked"}
+    }
+    if not complete:
+        return
+    write = terminalreporter.write_line
+    terminalreporter.write_sep("-", "one call on UR5, fastest round [ns]")
+    write(f"{'':22}{'pinocchio':>10}{'dynx':>9}{'more':>8}{'unchecked':>12}{'more':>8}{'ratio':>7}  bar")
+    for quantity, ways in complete.items():
+        raw, checked, unchecked = ways["raw"], ways["checked"], ways["unchecked"]
+        allowed = max(UNCHECKED_MORE, (UNCHECKED_RATIO - 1.0) * raw)
+        kept = checked - raw <= CHECKED_MORE and unchecked - raw <= allowed
+        write(
+            f"{quantity:22}{raw * 1e9:10.0f}{checked * 1e9:9.0f}{(checked - raw) * 1e9:+8.0f}"
+            f"{unchecked * 1e9:12.0f}{(unchecked - raw) * 1e9:+8.0f}{unchecked / raw:7.2f}"
+            f"  {'kept' if kept else 'MISSED'}"
+        )

@@ -1,0 +1,8 @@
+"""``python -m dynx`` is the command line `dynx`."""
+
+from __future__ import annotations
+
+from dynx.cli.main import main
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,231 @@
+"""The comparison of a robot in several backends, from beginning to end."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+
+from dynx.agreement.answers import Answers
+from dynx.agreement.comparison import Comparison, compare
+from dynx.agreement.identities import IdentityCheck, check_identities
+from dynx.agreement.magnitudes import Magnitudes
+from dynx.agreement.quantities import QUANTITIES
+from dynx.agreement.referee import Referee
+from dynx.agreement.report import AgreementReport, refused_report
+from dynx.agreement.sampling import Samples, draw_samples
+from dynx.agreement.solutions import compare_forward_dynamics, compare_inverse_kinematics
+from dynx.agreement.suspects import DERIVED, EXACT, find_suspects
+from dynx.backends import (
+    Backend,
+    DerivedBackend,
+    backend,
+    backend_class,
+    installed_backends,
+    native_quantities,
+)
+from dynx.backends.solvability import singular_coordinates
+from dynx.errors import ArgumentError, DynxError
+from dynx.model import Model
+from dynx.model.loading import load
+
+DEFAULT_SAMPLES = 16
+DEFAULT_REFEREE_SAMPLES = 2
+
+DERIVED_SAMPLES = 2
+"""Samples at which native answers are compared with derived ones: a derived mass matrix costs an
+evaluation per column."""
+
+CALM_SAMPLES = 4
+"""Samples at which identities are tested: a derivative costs eight evaluations."""
+
+Progress = Callable[[str], None]
+
+
+def agree(
+    model: Model | str | Path,
+    backends: Sequence[str | Backend] | None = None,
+    samples: int = DEFAULT_SAMPLES,
+    seed: int = 0,
+    *,
+    referee_samples: int = DEFAULT_REFEREE_SAMPLES,
+    progress: Progress | None = None,
+) -> AgreementReport:
+    """Whether backends give the same answers about a robot, and to how many digits.
+
+    `model` is a `Model` or whatever `dynx.load` takes. `backends` are names (default: all that are
+    installed) or backends made of this very model, which are left open; one alone is compared with
+    the referee and with itself. Every quantity is compared pairwise at `samples` states that follow
+    from `seed`, with the 50-digit referee at `referee_samples` of them, and where an engine answers
+    natively, with what dynx derives; each backend is tested against the identities of mechanics.
+    `progress` is called with the name of each step.
+
+    A robot that cannot be read, or that a backend refuses, gives a report with `error` set. Raises
+    ArgumentError for arguments that could be right for no robot, UnknownBackendError and
+    NotInstalledError for a backend that is not there.
+    """
+    started = time.perf_counter()
+    chosen = _checked(backends, samples, seed, referee_samples)
+    names = [each if isinstance(each, str) else each.name for each in chosen]
+    try:
+        loaded = load(model)
+    except DynxError as error:
+        took = time.perf_counter() - started
+        return refused_report(_label(model), error, backends=names, seconds=took)
+    _refuse_strangers(loaded, chosen)
+    try:
+        # NaN and infinity from an engine are judged by their value, not announced by NumPy.
+        with ExitStack() as opened, np.errstate(all="ignore"):
+            engines = [_opened(each, loaded, opened) for each in chosen]
+            return _compared(loaded, engines, samples, seed, referee_samples, progress or _silent, started)
+    except DynxError as error:
+        return refused_report(
+            loaded.name,
+            error,
+            source=loaded.source,
+            base=loaded.base,
+            backends=names,
+            seconds=time.perf_counter() - started,
+        )
+
+
+def _compared(
+    model: Model,
+    engines: list[Backend],
+    count: int,
+    seed: int,
+    referee_samples: int,
+    progress: Progress,
+    started: float,
+) -> AgreementReport:
+    names = _distinct(engines)
+    samples = draw_samples(model, count, seed)
+    sizes = Magnitudes(samples)
+    all_answers = [Answers(name, engine, samples) for name, engine in zip(names, engines, strict=True)]
+    rows: list[Comparison] = []
+    for first, second in combinations(all_answers, 2):
+        progress(f"{first.name}~{second.name}")
+        rows += [compare(quantity, first, second, sizes) for quantity in QUANTITIES]
+        rows.append(compare_forward_dynamics(first, second, sizes))
+        if model.nv:
+            rows.append(compare_inverse_kinematics(first, second, sizes))
+    if referee_samples:
+        progress(EXACT)
+        rows += _refereed(samples.take(list(range(min(referee_samples, count))), 1), names, engines)
+    few = samples.take(list(range(min(DERIVED_SAMPLES, count))), 1)
+    for name, engine in zip(names, engines, strict=True):
+        progress(f"{name}~{DERIVED}")
+        rows += _self_compared(Magnitudes(few), name, engine)
+    identities: list[IdentityCheck] = []
+    calm = samples.calm(CALM_SAMPLES)
+    if calm and model.nv:
+        calm_sizes = Magnitudes(samples.take(calm, 1))
+        for name, engine in zip(names, engines, strict=True):
+            progress(f"identities of {name}")
+            identities += check_identities(name, engine, calm_sizes)
+    return AgreementReport(
+        robot=model.name,
+        source=model.source,
+        base=model.base,
+        backends=tuple(names),
+        nq=model.nq,
+        nv=model.nv,
+        samples=count,
+        seed=seed,
+        quantities=tuple(rows),
+        identities=tuple(identities),
+        suspects=find_suspects(rows, identities, names),
+        notes=_notes(model, names, samples),
+        seconds=time.perf_counter() - started,
+    )
+
+
+def _refereed(samples: Samples, names: list[str], engines: list[Backend]) -> list[Comparison]:
+    """Each backend's distance from the exact answer."""
+    sizes = Magnitudes(samples)
+    exact = Answers(EXACT, Referee(samples.model), samples)
+    rows = []
+    for name, engine in zip(names, engines, strict=True):
+        answers = Answers(name, engine, samples)
+        rows += [compare(quantity, answers, exact, sizes) for quantity in QUANTITIES if quantity.refereed]
+        rows.append(compare_forward_dynamics(answers, exact, sizes, both=False))
+    return rows
+
+
+def _self_compared(sizes: Magnitudes, name: str, engine: Backend) -> list[Comparison]:
+    """What the engine answers itself beside what dynx derives from its poses and inverse dynamics."""
+    native = native_quantities(engine)
+    own = Answers(name, engine, sizes.samples)
+    derived = Answers(DERIVED, DerivedBackend(engine), sizes.samples)
+    rows = [compare(quantity, own, derived, sizes) for quantity in QUANTITIES if quantity.native in native]
+    if "forward_dynamics" in native:
+        rows.append(compare_forward_dynamics(own, derived, sizes, both=False))
+    return rows
+
+
+def _notes(model: Model, names: list[str], samples: Samples) -> tuple[str, ...]:
+    notes = [str(note) for note in model.notes]
+    singular = singular_coordinates(model)
+    if singular:
+        listed = ", ".join(singular[:6]) + (" ..." if len(singular) > 6 else "")
+        notes.append(
+            f"the mass matrix is singular (nothing that {listed} moves has inertia): "
+            "forward dynamics has no answer, and each backend must refuse it"
+        )
+    if len(names) == 1:
+        notes.append("one backend alone: compared with the referee and with itself only")
+    return tuple(notes)
+
+
+def _checked(
+    backends: Sequence[str | Backend] | None, samples: int, seed: int, referee_samples: int
+) -> list[str | Backend]:
+    numbers = (("samples", samples, 1), ("seed", seed, 0), ("referee_samples", referee_samples, 0))
+    for name, value, least in numbers:
+        if isinstance(value, bool) or not isinstance(value, int) or value < least:
+            raise ArgumentError(f"{name} is {value!r}; wanted a whole number, at least {least}")
+    if isinstance(backends, (str, Backend)):
+        backends = [backends]
+    chosen = list(installed_backends() if backends is None else backends)
+    if not chosen:
+        raise ArgumentError("backends is empty; wanted at least one name or backend")
+    for each in chosen:
+        if isinstance(each, str):
+            backend_class(each)
+        elif not isinstance(each, Backend):
+            raise ArgumentError(f"a backend is of type {type(each).__name__}; wanted a name or a Backend")
+    return chosen
+
+
+def _refuse_strangers(model: Model, chosen: list[str | Backend]) -> None:
+    for each in chosen:
+        if isinstance(each, Backend) and each.model != model:
+            raise ArgumentError(f"{each!r} was made of another model than {model!r}")
+
+
+def _opened(chosen: str | Backend, model: Model, opened: ExitStack) -> Backend:
+    if isinstance(chosen, str):
+        return opened.enter_context(backend(chosen, model))
+    return chosen
+
+
+def _distinct(engines: list[Backend]) -> list[str]:
+    """Their names; a repeated one is numbered."""
+    names: list[str] = []
+    for engine in engines:
+        again = sum(name.partition("#")[0] == engine.name for name in names)
+        names.append(f"{engine.name}#{again + 1}" if again else engine.name)
+    return names
+
+
+def _label(model: object) -> str:
+    text = str(model)
+    return text if len(text) <= 200 and "\n" not in text else "<string>"
+
+
+def _silent(step: str) -> None:
+    """No one wants to know."""

@@ -1,0 +1,47 @@
+"""What one backend (or the referee) answers to each quantity at one set of samples, asked once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from dynx.agreement.sampling import Samples
+from dynx.errors import DynxError, SingularMassMatrixError
+from dynx.spatial.scalar import Array
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """An answer that is an error of `dynx.errors`."""
+
+    error: DynxError
+
+    @property
+    def singular(self) -> bool:
+        """Whether it says that no unique acceleration exists."""
+        return isinstance(self.error, SingularMassMatrixError)
+
+    def __str__(self) -> str:
+        return f"{type(self.error).__name__}: {self.error}"
+
+
+class Answers:
+    """Asks `answerer` and remembers; an error of dynx is an answer too."""
+
+    def __init__(self, name: str, answerer: Any, samples: Samples) -> None:
+        self.name = name
+        self.answerer = answerer
+        self.samples = samples
+        self._known: dict[str, Array | Refusal] = {}
+
+    def of(self, name: str, evaluate: Callable[[Any, Samples], Array]) -> Array | Refusal:
+        """The answer to the quantity `name`."""
+        if name not in self._known:
+            try:
+                self._known[name] = np.asarray(evaluate(self.answerer, self.samples))
+            except DynxError as error:
+                self._known[name] = Refusal(error)
+        return self._known[name]

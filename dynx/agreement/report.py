@@ -1,0 +1,151 @@
+"""The outcome of a comparison, and its JSON form (schema 1).
+
+    {"schema": 1, "dynx": version, "results": [...], "summary": {robots, agree, differ, refused}}
+
+One entry of ``results`` per robot:
+
+    robot, source, base      its name, where it was read from, "fixed" or "floating"
+    backends                 names of the backends compared
+    nq, nv, samples, seed    sizes (null for a robot that was refused)
+    agree                    whether every quantity and every identity is within tolerance
+    error                    null, or {"type", "message"}: why the robot could not be used
+    seconds                  wall-clock time
+    quantities               [{quantity, pair, max_abs_error, max_rel_error, tolerance, agree,
+                             worst_sample, note}], pair being "a~b", "a~referee" or "a~derived"
+    identities               [{identity, backend, max_error, tolerance, agree, worst_sample, note}]
+    suspects                 [{backend, quantity, evidence}] where something differs
+    notes                    sentences about the description and the comparison
+
+An error that has no size (a refusal, a NaN, a wrong shape) is null, and `note` says what it was.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from dynx._version import __version__
+from dynx.agreement.comparison import Comparison
+from dynx.agreement.identities import IdentityCheck
+from dynx.agreement.suspects import Suspect
+from dynx.errors import DynxError
+
+SCHEMA = 1
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Why a robot, or a backend for it, could not be used."""
+
+    type: str
+    message: str
+
+
+@dataclass(frozen=True)
+class AgreementReport:
+    """How well backends agree about one robot; true in a condition if they do.
+
+    `quantities` compares answers, `identities` tests each backend alone, `suspects` says who is
+    wrong where something differs. `error` is set, and nothing compared, where the robot was refused.
+    """
+
+    robot: str
+    source: str | None = None
+    base: str | None = None
+    backends: tuple[str, ...] = ()
+    nq: int | None = None
+    nv: int | None = None
+    samples: int | None = None
+    seed: int | None = None
+    quantities: tuple[Comparison, ...] = ()
+    identities: tuple[IdentityCheck, ...] = ()
+    suspects: tuple[Suspect, ...] = ()
+    notes: tuple[str, ...] = ()
+    error: Failure | None = None
+    seconds: float = field(default=0.0, compare=False)
+
+    @property
+    def agree(self) -> bool:
+        """Whether the robot was used and everything is within tolerance."""
+        rows: list[Comparison | IdentityCheck] = [*self.quantities, *self.identities]
+        return self.error is None and all(row.agree for row in rows)
+
+    def __bool__(self) -> bool:
+        return self.agree
+
+    @property
+    def differences(self) -> tuple[Comparison, ...]:
+        """The comparisons that are out of tolerance."""
+        return tuple(comparison for comparison in self.quantities if not comparison.agree)
+
+    def worst(self, quantity: str) -> float:
+        """Largest relative error of a quantity over all pairs; 0 if it was not compared."""
+        found = (row.max_rel_error for row in self.quantities if row.quantity == quantity)
+        return max(found, default=0.0)
+
+    def to_dict(self) -> dict[str, Any]:
+        """One entry of ``results``, of plain numbers, strings and lists."""
+        return {
+            "robot": self.robot,
+            "source": self.source,
+            "base": self.base,
+            "backends": list(self.backends),
+            "nq": self.nq,
+            "nv": self.nv,
+            "samples": self.samples,
+            "seed": self.seed,
+            "agree": self.agree,
+            "error": None if self.error is None else asdict(self.error),
+            "seconds": round(self.seconds, 4),
+            "quantities": [_row(row) for row in self.quantities],
+            "identities": [_row(row) for row in self.identities],
+            "suspects": [{**vars(suspect), "evidence": list(suspect.evidence)} for suspect in self.suspects],
+            "notes": list(self.notes),
+        }
+
+
+def refused_report(
+    robot: str,
+    error: DynxError,
+    *,
+    source: str | None = None,
+    base: str | None = None,
+    backends: Iterable[str] = (),
+    seconds: float = 0.0,
+) -> AgreementReport:
+    """The report of a robot that could not be used."""
+    return AgreementReport(
+        robot=robot,
+        source=source,
+        base=base,
+        backends=tuple(backends),
+        error=Failure(type(error).__name__, str(error)),
+        seconds=seconds,
+    )
+
+
+def results_document(reports: Iterable[AgreementReport]) -> dict[str, Any]:
+    """The JSON document of many reports; see the head of this file."""
+    results = [report.to_dict() for report in reports]
+    refused = sum(result["error"] is not None for result in results)
+    agreeing = sum(result["agree"] for result in results)
+    return {
+        "schema": SCHEMA,
+        "dynx": __version__,
+        "results": results,
+        "summary": {
+            "robots": len(results),
+            "agree": agreeing,
+            "differ": len(results) - agreeing - refused,
+            "refused": refused,
+        },
+    }
+
+
+def _row(row: Comparison | IdentityCheck) -> dict[str, Any]:
+    entry = dict(vars(row))
+    entry["worst_sample"] = None if row.worst_sample is None else row.worst_sample.to_dict()
+    sizeless = [key for key, value in entry.items() if isinstance(value, float) and not math.isfinite(value)]
+    return {**entry, **dict.fromkeys(sizeless)}

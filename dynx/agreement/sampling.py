@@ -1,0 +1,188 @@
+"""The states at which backends are compared: the same for every backend, made from a seed alone.
+
+Kinds take turns, so that few samples still see each: ``within`` the limits, ``anywhere`` in
+(-pi, pi) (robots whose limits have no width move too), ``straight`` (every joint at a multiple of a
+quarter turn, where arms are singular), ``limit`` (each joint at one of its limits) and ``turns``
+(angles of many turns). Half of the samples are within limits. A floating base takes any attitude.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dynx.backends.reference import ReferenceBackend
+from dynx.errors import ArgumentError
+from dynx.model import Model
+from dynx.model.mechanism import ROOT
+from dynx.rbd.jacobians import REFERENCES
+from dynx.spatial.scalar import Floats
+
+Kind = Literal["within", "anywhere", "straight", "limit", "turns"]
+Indices = NDArray[np.intp]
+
+KINDS: tuple[Kind, ...] = ("within", "anywhere", "within", "straight", "within", "anywhere", "limit", "turns")
+
+FEW_TURNS = 50
+"""Samples of many turns reach this many turns to either side."""
+
+CALM = 2.0 * np.pi
+"""Positions up to this size [rad or m] are differentiated along a motion: the rounding of q itself
+must stay below that of what is computed from it."""
+
+
+@dataclass(frozen=True)
+class FrameQuestion:
+    """One frame in one reference, at the samples of these numbers."""
+
+    frame: str
+    reference: str
+    samples: Indices
+
+
+@dataclass(frozen=True)
+class Samples:
+    """n states of one model: q (n, nq), v, a, tau (n, nv) and a wrench (n, 6) for one frame.
+
+    `every_frame` asks for each frame in each reference at some samples; `derivatives` does so for
+    the dearer quantities and, of robots with very many frames, asks in fewer references of each.
+    All questions of one list are about equally many samples.
+    """
+
+    model: Model
+    index: Indices
+    kinds: tuple[Kind, ...]
+    q: Floats
+    v: Floats
+    a: Floats
+    tau: Floats
+    wrench: Floats
+    wrench_frame: str
+    every_frame: tuple[FrameQuestion, ...]
+    derivatives: tuple[FrameQuestion, ...]
+
+    def __len__(self) -> int:
+        return len(self.q)
+
+    def take(self, chosen: list[int], frame_share: int) -> Samples:
+        """Some of the samples; each frame is asked once, in one reference in `frame_share`-th turn."""
+        pick = np.array(chosen, dtype=np.intp)
+        questions = deal(self.model.frame_names, len(pick), each=1, references=frame_share)
+        return replace(
+            self,
+            index=self.index[pick],
+            kinds=tuple(self.kinds[k] for k in pick),
+            q=self.q[pick],
+            v=self.v[pick],
+            a=self.a[pick],
+            tau=self.tau[pick],
+            wrench=self.wrench[pick],
+            every_frame=questions,
+            derivatives=questions,
+        )
+
+    def calm(self, count: int) -> list[int]:
+        """Numbers of up to `count` samples near zero and in motion, for differentiation."""
+        joints = self.q[:, 7 if self.model.floating else 0 :]
+        calm = np.max(np.abs(joints), axis=-1, initial=0.0) <= CALM
+        calm &= np.any(self.v != 0.0, axis=-1) & (np.array(self.kinds) != "limit")
+        return np.flatnonzero(calm).tolist()[:count]
+
+
+def draw_samples(model: Model, count: int, seed: int) -> Samples:
+    """`count` samples of `model`; equal arguments give equal samples."""
+    if count < 1:
+        raise ArgumentError(f"samples is {count}; wanted at least 1")
+    if seed < 0:
+        raise ArgumentError(f"seed is {seed}; wanted a number that is not negative")
+    rng = np.random.default_rng(seed)
+    kinds = tuple(KINDS[k % len(KINDS)] for k in range(count))
+    q = np.stack([_configuration(model, kind, rng) for kind in kinds])
+    v, a, wanted = (rng.uniform(-2.0, 2.0, (count, model.nv)) for _ in range(3))
+    # One sample at rest: there dry friction and every velocity product must vanish.
+    if count >= len(KINDS):
+        v[KINDS.index("straight")] = 0.0
+    with ReferenceBackend(model) as reference:
+        tau = reference.inverse_dynamics(q, v, wanted)
+    names, carried = model.frame_names, _carried_frames(model)
+    n_questions = len(names) * len(REFERENCES)
+    return Samples(
+        model=model,
+        index=np.arange(count),
+        kinds=kinds,
+        q=q,
+        v=v,
+        a=a,
+        tau=tau,
+        wrench=rng.uniform(-5.0, 5.0, (count, 6)),
+        wrench_frame=carried[int(rng.integers(len(carried)))],
+        every_frame=deal(names, count, each=_share(256, n_questions, count), references=3),
+        derivatives=deal(
+            names,
+            count,
+            each=_share(128, n_questions, count),
+            references=_share(192, len(names), len(REFERENCES)),
+        ),
+    )
+
+
+def deal(frames: tuple[str, ...], count: int, *, each: int, references: int) -> tuple[FrameQuestion, ...]:
+    """Deal samples round to frames: `references` references of each frame, `each` samples of those.
+
+    Successive questions take successive samples, so that together they see all of them.
+    """
+    names = tuple(REFERENCES)
+    questions, turn = [], 0
+    for number, frame in enumerate(frames):
+        for k in range(references):
+            chosen = (turn + np.arange(each)) % count
+            questions.append(FrameQuestion(frame, names[(number + k) % len(names)], chosen.astype(np.intp)))
+            turn += each
+    return tuple(questions)
+
+
+def _carried_frames(model: Model) -> list[str]:
+    """Frames that some coordinate moves; all of them if there are none."""
+    moved = [frame.name for frame in model.mechanism.frames if frame.body != ROOT or model.floating]
+    return moved or list(model.frame_names)
+
+
+def _narrowed(lower: Floats, upper: Floats) -> tuple[Floats, Floats]:
+    """Limits within `CALM` of zero, where they leave room there; some files have limits of 1e16."""
+    low, high = np.maximum(lower, -CALM), np.minimum(upper, CALM)
+    room = low <= high
+    return np.where(room, low, lower), np.where(room, high, upper)
+
+
+def _share(budget: int, among: int, most: int) -> int:
+    return min(max(budget // among, 1), most)
+
+
+def _configuration(model: Model, kind: Kind, rng: np.random.Generator) -> Floats:
+    q = model.random(rng)
+    base = 7 if model.floating else 0
+    n = model.nq - base
+    lower, upper = _narrowed(model.lower[base:], model.upper[base:])
+    turning = np.array([joint.type != "prismatic" for joint in model.coordinate_joints], dtype=bool)
+    reach = np.where(turning, np.pi, 1.0)
+    if kind == "within":
+        limited = np.isfinite(lower) & np.isfinite(upper)
+        drawn = rng.uniform(np.where(limited, lower, -reach), np.where(limited, upper, reach))
+        q[base:] = np.where(limited, drawn, q[base:])
+    elif kind == "anywhere":
+        q[base:] = rng.uniform(-reach, reach)
+    elif kind == "straight":
+        q[base:] = np.where(turning, 0.5 * np.pi * rng.integers(-1, 3, n), 0.0)
+    elif kind == "limit":
+        ends = np.where(rng.integers(0, 2, n) == 0, lower, upper)
+        q[base:] = np.where(np.isfinite(ends), ends, q[base:])
+    elif kind == "turns":
+        many = 2.0 * np.pi * FEW_TURNS
+        q[base:] = np.where(turning, rng.uniform(-many, many, n), rng.uniform(-1.0, 1.0, n))
+    # Half of the attitudes have the scalar of the quaternion negative; one kind turns by exactly pi.
+    if model.floating and kind == "straight":
+        q[3:7] = np.eye(4)[int(rng.integers(3))]
+    return q

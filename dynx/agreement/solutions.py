@@ -1,0 +1,147 @@
+"""Quantities whose answers solve something: each engine's solution is put to the other engine.
+
+Two accelerations, or two configurations that reach one target, may differ while both are right. What
+must hold is that the other engine finds the equation solved.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from dynx.agreement import tolerances
+from dynx.agreement.answers import Answers, Refusal
+from dynx.agreement.comparison import (
+    Comparison,
+    Verdict,
+    judge,
+    pair_name,
+    refusals,
+    state,
+)
+from dynx.agreement.magnitudes import Magnitudes
+from dynx.agreement.sampling import Samples
+from dynx.model import Model
+from dynx.rbd.kinematics import ancestry
+from dynx.spatial.scalar import Array, Floats
+from dynx.spatial.se3 import pose_error
+
+
+def regular_samples(sizes: Magnitudes) -> list[int]:
+    """Samples whose mass matrix is positive definite to double precision; the first if none is.
+
+    Where it is singular (wrists of point masses, stretched out) no unique acceleration exists, and
+    whether an engine notices is rounding.
+    """
+    least = tolerances.singular(sizes.samples.model.nv)
+    return np.flatnonzero(sizes.lowest_eigenvalue > least).tolist() or [0]
+
+
+def compare_forward_dynamics(
+    solver: Answers, verifier: Answers, sizes: Magnitudes, *, both: bool = True
+) -> Comparison:
+    """The backward error: an acceleration found by one, put into the inverse dynamics of the other,
+    must take the torque asked for. With `both` it is done both ways round.
+    """
+    name, samples = "forward_dynamics", solver.samples
+    tolerance = tolerances.solving(sizes.depth, samples.model.nv)
+    chosen = regular_samples(sizes)
+
+    def solve(backend: Any, samples: Samples) -> Array:
+        return np.asarray(backend.forward_dynamics(samples.q[chosen], samples.v[chosen], samples.tau[chosen]))
+
+    ways = [(solver, verifier), (verifier, solver)] if both else [(solver, verifier)]
+    solutions = [each.of(name, solve) for each, _ in ways]
+    refused = refusals(name, solver, verifier, solutions, tolerance)
+    if refused is not None:
+        return refused
+    worst = Verdict(0.0, 0.0, None)
+    for (_, judging), a in zip(ways, solutions, strict=True):
+        assert not isinstance(a, Refusal)
+        verdict = _backward_error(a, judging, chosen, sizes)
+        if verdict.relative > worst.relative or worst.position is None:
+            worst = verdict
+    left_out = len(samples) - len(chosen)
+    note = f"without {left_out} of {len(samples)} samples, where the mass matrix is singular"
+    return Comparison(
+        name,
+        pair_name(solver, verifier),
+        worst.absolute,
+        worst.relative,
+        tolerance,
+        worst.relative <= tolerance,
+        None if worst.position is None else state(samples, chosen[worst.position[0]]),
+        note if left_out else None,
+    )
+
+
+def _backward_error(a: Array, judging: Answers, chosen: list[int], sizes: Magnitudes) -> Verdict:
+    samples = judging.samples
+    if a.shape != (len(chosen), samples.model.nv) or not np.isfinite(a).all():
+        return Verdict(np.inf, np.inf, (0,))
+    tau = judging.answerer.inverse_dynamics(samples.q[chosen], samples.v[chosen], a)
+    everywhere = np.zeros_like(samples.tau)
+    everywhere[chosen] = a
+    return judge(tau - samples.tau[chosen], sizes.solved_torque(everywhere)[chosen, None])
+
+
+def compare_inverse_kinematics(first: Answers, second: Answers, sizes: Magnitudes) -> Comparison:
+    """A configuration that one engine calls a solution must reach the target by the other's poses.
+
+    Targets are poses that the deepest frame takes within limits, searched for from nearby. A search
+    that ends without a solution and says so is no disagreement; the note counts them.
+    """
+    name, samples, frame = "inverse_kinematics", first.samples, deepest_frame(first.samples.model)
+    tolerance = tolerances.reached(sizes.depth, float(np.max(sizes.length)))
+    q_target, q_start = _targets(samples)
+
+    def solve(backend: Any, samples: Samples) -> Array:
+        target = backend.forward_kinematics(q_target, frame)
+        result = backend.inverse_kinematics(target, frame, q_start)
+        q = np.where(result.success[:, None], result.q, np.nan)
+        return np.concatenate([q, target.reshape(len(q), 16)], axis=-1)
+
+    solutions = [each.of(name, solve) for each in (first, second)]
+    refused = refusals(name, first, second, solutions, tolerance)
+    if refused is not None:
+        return refused
+    errors = []
+    for answer, verifier in zip(solutions, (second, first), strict=True):
+        assert not isinstance(answer, Refusal)
+        q, target = answer[:, : samples.model.nq], answer[:, samples.model.nq :].reshape(-1, 4, 4)
+        found = np.isfinite(q).all(axis=-1)
+        errors.append(_distance(target[found], verifier.answerer.forward_kinematics(q[found], frame)))
+    searches = 2 * len(q_target)
+    missed = searches - sum(len(error) for error in errors)
+    verdict = judge(np.concatenate(errors), np.ones(1))
+    return Comparison(
+        name,
+        pair_name(first, second),
+        verdict.absolute,
+        verdict.relative,
+        tolerance,
+        verdict.relative <= tolerance,
+        None,
+        f"{missed} of {searches} searches ended without a solution, and said so" if missed else None,
+    )
+
+
+def deepest_frame(model: Model) -> str:
+    """The frame that the most moving joints carry; the first of them."""
+    mechanism = model.mechanism
+    depths = [len(ancestry(mechanism, frame.body)) for frame in mechanism.frames]
+    return model.frame_names[int(np.argmax(depths))]
+
+
+def _targets(samples: Samples) -> tuple[Floats, Floats]:
+    """Configurations within limits, and starting points some tenths of a radian away from them."""
+    model = samples.model
+    q = samples.q[: tolerances.KINEMATIC_TARGETS]
+    q_target = model.clip(q)
+    return q_target, model.clip(model.integrate(q_target, 0.1 * samples.v[: len(q)]))
+
+
+def _distance(T_world_target: Floats, T_world_frame: Floats) -> Floats:
+    position, rotation = pose_error(T_world_target, T_world_frame)
+    return np.stack([np.linalg.norm(position, axis=-1), np.linalg.norm(rotation, axis=-1)], axis=-1)

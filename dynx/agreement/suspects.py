@@ -1,0 +1,88 @@
+"""When two backends differ: which one is wrong, and how we know."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from dynx.agreement.comparison import Comparison
+from dynx.agreement.identities import IdentityCheck
+
+EXACT = "referee"
+DERIVED = "derived"
+
+
+@dataclass(frozen=True)
+class Suspect:
+    """A backend that is probably wrong about something, and the evidence."""
+
+    backend: str
+    quantity: str
+    evidence: tuple[str, ...]
+
+
+def find_suspects(
+    quantities: Sequence[Comparison], identities: Sequence[IdentityCheck], backends: Sequence[str]
+) -> tuple[Suspect, ...]:
+    """For each quantity in dispute, the backends that evidence speaks against; strongest kind first.
+
+    A distance from the 50-digit referee convicts. Failing that, the backend that differs from all
+    others while they agree among themselves is named, then one that contradicts itself: its own
+    derivation, or an identity of mechanics. Without any evidence all parties are named.
+    """
+    suspects = []
+    for quantity in dict.fromkeys(comparison.quantity for comparison in quantities):
+        failed = [c for c in quantities if c.quantity == quantity and not c.agree]
+        if not failed:
+            continue
+        rows = [c for c in quantities if c.quantity == quantity]
+        evidence = {name: _evidence(name, rows, identities, backends) for name in backends}
+        parties = [name for name in backends if any(name in c.names for c in failed)]
+        strength = max(strongest for strongest, _ in (evidence[name] for name in parties))
+        for name in parties:
+            weight, reasons = evidence[name]
+            if weight == strength:
+                nothing = ("differs, and nothing shows which side is wrong",)
+                suspects.append(Suspect(name, quantity, tuple(reasons) or nothing))
+    named = {suspect.backend for suspect in suspects}
+    for check in identities:
+        if not check.agree and check.backend not in named:
+            reason = f"breaks the identity: {check.identity} ({_figures(check.max_error, check.tolerance)})"
+            suspects.append(Suspect(check.backend, check.identity, (reason,)))
+    return tuple(suspects)
+
+
+def _evidence(
+    name: str,
+    rows: Sequence[Comparison],
+    identities: Sequence[IdentityCheck],
+    backends: Sequence[str],
+) -> tuple[int, list[str]]:
+    """How much speaks against a backend in one quantity: 3 referee, 2 majority, 1 itself, 0 nothing."""
+    weight, reasons = 0, []
+    against = [c for c in rows if name in c.names and not c.agree]
+    for row in against:
+        other = row.names[1] if row.names[0] == name else row.names[0]
+        if other == EXACT:
+            weight = 3
+            figures = _figures(row.max_rel_error, row.tolerance)
+            reasons.append(f"is off the 50-digit answer by {figures}")
+        elif other == DERIVED:
+            weight = max(weight, 1)
+            reasons.append("differs from what follows from its own poses and inverse dynamics")
+    others = [other for other in backends if other != name]
+    among = [c for c in rows if set(c.names) <= set(others)]
+    differs = {n for c in against for n in c.names} & set(others)
+    if len(others) >= 2 and differs == set(others) and among and all(c.agree for c in among):
+        weight = max(weight, 2)
+        reasons.append("differs from " + " and ".join(others) + ", which agree")
+    for check in identities:
+        if check.backend == name and not check.agree:
+            weight = max(weight, 1)
+            figures = _figures(check.max_error, check.tolerance)
+            reasons.append(f"breaks the identity: {check.identity} ({figures})")
+    return weight, reasons
+
+
+def _figures(error: float, tolerance: float) -> str:
+    return f"{error:.2g}, allowed {tolerance:.1g}"

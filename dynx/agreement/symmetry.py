@@ -1,0 +1,49 @@
+"""The same robot in a world that is turned together with gravity."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from dynx.model import Joint, Link, Model, Pose
+from dynx.spatial.scalar import Floats
+from dynx.spatial.so3 import quat_exp, quat_product, rotate, rotation_from_quat, rpy_from_rotation
+
+ROTATION_VECTOR = (0.7, -1.1, 0.4)
+"""The turn [rad]; it is along no axis, so that no exchange of axes goes unseen."""
+
+
+def turned(model: Model) -> tuple[Model, Callable[[Floats], Floats]]:
+    """A model in the turned world, and the map from configurations (..., nq) of `model` to its own.
+
+    A floating base is turned by its configuration; a fixed one is welded to a new root.
+    """
+    quat = quat_exp(np.array(ROTATION_VECTOR))
+    R = rotation_from_quat(quat)
+    x, y, z = rotate(R, np.array(model.gravity)).tolist()
+    if model.floating:
+
+        def turn(q: Floats) -> Floats:
+            attitude = quat_product(np.broadcast_to(quat, (*q.shape[:-1], 4)), q[..., 3:7])
+            return np.concatenate([rotate(R, q[..., :3]), attitude, q[..., 7:]], axis=-1)
+
+        return model.with_gravity((x, y, z)), turn
+    roll, pitch, yaw = rpy_from_rotation(R).tolist()
+    link = Link(_free_name("turned_world", {link.name for link in model.links}))
+    joint = Joint(
+        _free_name("turned_mount", {joint.name for joint in model.joints}),
+        "fixed",
+        link.name,
+        model.root,
+        Pose(rpy=(roll, pitch, yaw)),
+    )
+    links, joints = (link, *model.links), (joint, *model.joints)
+    return replace(model, links=links, joints=joints, gravity=(x, y, z)), lambda q: q
+
+
+def _free_name(wanted: str, taken: set[str]) -> str:
+    while wanted in taken:
+        wanted += "_"
+    return wanted

@@ -1,0 +1,30 @@
+"""One interface over several engines: `backend(name, model)`.
+
+Importing this package imports no engine; each foreign one is imported in exactly one file, when a
+backend of that name is asked for.
+"""
+
+from __future__ import annotations
+
+from dynx.backends.base import Backend
+from dynx.backends.derived import DerivedBackend, native_quantities
+from dynx.backends.registry import (
+    backend,
+    backend_class,
+    backend_names,
+    installed_backends,
+    register,
+    unregister,
+)
+
+__all__ = [
+    "Backend",
+    "DerivedBackend",
+    "backend",
+    "backend_class",
+    "backend_names",
+    "installed_backends",
+    "native_quantities",
+    "register",
+    "unregister",
+]

@@ -1,0 +1,160 @@
+"""Rigid-body inertia in the form Bullet takes: mass, centre of mass, principal moments and axes.
+
+Bullet's own diagonalisation stops at a relative 1e-6, and its checks refuse what rounding brings
+about. So the inertia is lumped and diagonalised here, in NumPy's long double, and Bullet is given
+moments and axes.
+
+Bullet also refuses some inertias that a description can hold: a negative principal moment, a rod or
+a point that meets a triangle inequality with equality, a mass that is not positive on a floating
+root (which it then nails to the world), a first moment without a mass. Inverse dynamics f and the
+mass matrix are affine in the inertia of every body, so such a body is carried with *ballast* s, once
+and twice: f(I) = 2 f(I + s) - f(I + 2 s).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dynx.model.mechanism import Mechanism
+from dynx.spatial.inertia import RigidInertia
+from dynx.spatial.scalar import Array, Floats
+from dynx.spatial.so3 import skew
+
+FLOAT64_EPS = float(np.finfo(np.float64).eps)
+
+
+def longdouble(numbers: object) -> Array:
+    """The scalar in which inertias are lumped: 64 bits or more of mantissa where the platform has them."""
+    return np.asarray(numbers, dtype=np.longdouble)
+
+
+@dataclass(frozen=True)
+class PrincipalInertia:
+    """A rigid body by its centre of mass and principal axes, in long double.
+
+    `axes` (3, 3) has the principal axes as columns, in the axes of the body frame (right-handed);
+    `moments` (3,) [kg m^2] belong to them. `accepted` says whether Bullet's inverse dynamics takes
+    the body with its axes in this order.
+    """
+
+    mass: float
+    center: Array
+    axes: Array
+    moments: Floats
+    accepted: bool
+
+
+@dataclass(frozen=True)
+class Ballast:
+    """Mass [kg] at the body's origin, and rotational inertia [kg m^2] alike about every axis."""
+
+    mass: float = 0.0
+    rotational: float = 0.0
+
+    def added(self, inertia: RigidInertia, times: int) -> RigidInertia:
+        """The inertia of the body with `times` this ballast on board."""
+        return RigidInertia(
+            np.asarray(inertia.mass + times * longdouble(self.mass)),
+            inertia.first_moment,
+            inertia.second_moment + times * longdouble(self.rotational) * longdouble(np.eye(3)),
+        )
+
+
+def principal_inertia(inertia: RigidInertia, *, about_center: bool = False) -> PrincipalInertia:
+    """Centre of mass, principal axes and moments of a body; about its origin if it has no mass.
+
+    The axes are in an order that Bullet accepts, where there is one. `about_center` says that Bullet
+    has the body's frame at the centre of mass (the root's), not at the joint.
+    """
+    mass = float(inertia.mass)
+    second = longdouble(inertia.second_moment)
+    center = longdouble(np.zeros(3))
+    if mass != 0.0:
+        center = longdouble(inertia.first_moment) / longdouble(inertia.mass)
+        arm = skew(center)
+        second = second + longdouble(inertia.mass) * (arm @ arm)
+    values, axes = eigen(second)
+    # A point mass has no moments, but lumping leaves it last digits of either sign. Negative ones
+    # below the rounding of float64 in the moments about the origin stand for zero.
+    noise = 4 * FLOAT64_EPS * _size(inertia.second_moment)
+    values = np.where((values < 0) & (values >= -noise), 0, values)
+    moments = np.asarray(values, dtype=np.float64)
+    lever = np.zeros(3) if about_center else np.asarray(axes.T @ center, dtype=np.float64)
+    # Cyclic orders keep the axes right-handed; the first leaves an aligned body as it is.
+    orders = [order for order in _CYCLIC if _accepts(mass, lever[order], moments[order])]
+    order = (orders or _CYCLIC)[0]
+    return PrincipalInertia(mass, center, axes[:, order], moments[order], accepted=bool(orders))
+
+
+_CYCLIC = ([0, 1, 2], [1, 2, 0], [2, 0, 1])
+
+
+def _accepts(mass: float, lever: Floats, moments: Floats) -> bool:
+    """Whether Bullet's inverse dynamics takes a body with these moments about these axes.
+
+    It wants x + y >= z and y + z >= x of the moments about the body's origin, to the last bit; that
+    z + x >= y is not asked (btInverseDynamics, `isValidInertiaMatrix`, where the second test is the
+    first once more). A body that meets one with equality must not depend on how Bullet rounds.
+    """
+    x, y, z = moments
+    square_x, square_y, square_z = mass * lever * lever
+    x, y, z = x + square_z + square_y, y + square_x + square_z, z + square_x + square_y
+    exact = np.count_nonzero(lever) <= 1
+    margin = 0.0 if exact else 8 * FLOAT64_EPS * max(x, y, z)
+    return bool(min(moments) >= 0.0 and x + y >= z + margin and y + z >= x + margin)
+
+
+def eigen(symmetric: Array) -> tuple[Array, Array]:
+    """Eigenvalues (3,) and eigenvectors (3, 3), as columns, by Jacobi's method.
+
+    Works in the precision of `symmetric`, which LAPACK does not (Golub and Van Loan, Matrix
+    Computations, section 8.5).
+    """
+    A = np.array(symmetric)
+    V = np.eye(3, dtype=A.dtype)
+    floor = np.finfo(A.dtype).eps ** 2 * _size(A)
+    for _ in range(50):
+        if max(abs(A[0, 1]), abs(A[0, 2]), abs(A[1, 2])) <= floor:
+            break
+        for i, j in ((0, 1), (0, 2), (1, 2)):
+            if abs(A[i, j]) <= floor:
+                continue
+            ratio = (A[j, j] - A[i, i]) / (2 * A[i, j])
+            tangent = (1 if ratio >= 0 else -1) / (abs(ratio) + np.hypot(ratio, 1))
+            cosine = 1 / np.hypot(tangent, 1)
+            sine = tangent * cosine
+            turn = np.eye(3, dtype=A.dtype)
+            turn[i, i] = turn[j, j] = cosine
+            turn[i, j], turn[j, i] = sine, -sine
+            A = turn.T @ A @ turn
+            A[i, j] = A[j, i] = 0
+            V = V @ turn
+    return np.diagonal(A).copy(), V
+
+
+def ballast_for(mechanism: Mechanism) -> tuple[Ballast, ...]:
+    """The ballast that the root and each body need for Bullet to take them; mostly none."""
+    inertias = [body.inertia for body in mechanism.bodies]
+    total = sum(abs(float(inertia.mass)) for inertia in [mechanism.root, *inertias])
+    unit = total / 16 if total > 0.0 else 1.0
+    root = _ballast(mechanism.root, unit, root=True) if mechanism.floating else Ballast()
+    return (root, *(_ballast(inertia, unit, root=False) for inertia in inertias))
+
+
+def _ballast(inertia: RigidInertia, unit: float, *, root: bool) -> Ballast:
+    """No more than it takes: what ballast adds is subtracted again, and costs digits."""
+    mass = float(inertia.mass)
+    weightless = mass == 0.0 and not root and not np.any(inertia.first_moment)
+    needed = Ballast() if mass > 0.0 or weightless else Ballast(mass=unit - mass)
+    body = principal_inertia(needed.added(inertia, 1), about_center=root)
+    if not body.accepted:
+        negative = max(0.0, -float(np.min(body.moments)))
+        size = float(_size(inertia.second_moment))
+        needed = Ballast(needed.mass, 2.0 * negative + 64 * FLOAT64_EPS * size)
+    return needed
+
+
+def _size(matrix: Array) -> Array:
+    return np.asarray(np.max(np.abs(matrix)))

@@ -1,0 +1,138 @@
+"""``dynx agree``: do the engines give the same answers on these robots?"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import click
+
+from dynx.cli.exits import ANSWER_IS_NO, BAD_INPUT, DONE, complain
+from dynx.cli.options import model_options, name_list
+from dynx.cli.output_file import check_writable, write_text
+
+if TYPE_CHECKING:
+    from dynx.cli.agreement_run import Run
+    from dynx.cli.agreement_task import Entry
+    from dynx.model.model import Base
+
+
+@click.command(short_help="Do the engines give the same answers on a robot?")
+@click.argument("robots", nargs=-1, required=True, metavar="ROBOT...")
+@click.option(
+    "--backends",
+    type=name_list,
+    metavar="A,B,C",
+    help="The engines to compare (default: all that are installed).",
+)
+@model_options
+@click.option("--samples", type=click.IntRange(min=1), help="Random configurations per robot (default: 16).")
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the samples.")
+@click.option(
+    "--jobs",
+    type=click.IntRange(min=1),
+    help="Robots at a time, each in a process of its own (default: one per processor).",
+)
+@click.option(
+    "--timeout",
+    type=click.FloatRange(min=0.0),
+    default=600.0,
+    show_default=True,
+    help="Seconds after which a robot is given up; 0 for never.",
+)
+@click.option(
+    "--json", "json_path", metavar="FILE", help="Also write the results as JSON; - is standard output."
+)
+@click.option("--quiet", is_flag=True, help="No table and no progress: errors, JSON and exit code only.")
+def agree(
+    robots: tuple[str, ...],
+    backends: tuple[str, ...] | None,
+    base: Base,
+    lock: tuple[tuple[str, float], ...],
+    samples: int | None,
+    seed: int,
+    jobs: int | None,
+    timeout: float,
+    json_path: str | None,
+    quiet: bool,
+) -> int:
+    """Compare all engines on every quantity, pair by pair and against a 50-digit referee.
+
+    ROBOT is a name (see `dynx robots`), a URDF file, a directory (every .urdf below it), or `all`:
+    every robot of example-robot-data. One robot gives the full table, several give a line each.
+
+    Exit code 0 if all agree, 1 if some differ, 2 if some could not be used (the others are done all
+    the same). Ctrl-C ends the run with what is done so far, and 130. A robot that crashes an engine
+    or takes too long is reported as refused.
+
+    \b
+    Examples:
+      dynx agree ur5
+      dynx agree ur5 panda --base floating --samples 100
+      dynx agree all --backends pinocchio,pybullet,reference --json all.json
+      dynx agree path/to/urdfs --lock gripper_joint=0.02
+    """
+    from dynx.cli.agreement_run import Run, processors
+    from dynx.cli.agreement_task import AgreementTask, refused
+    from dynx.cli.inputs import expand
+    from dynx.cli.interruption import interruptible
+
+    if json_path is not None and json_path != "-":
+        check_writable(json_path)
+    if backends is not None:
+        _check_backends(backends)
+    inputs = expand(robots)
+    run = Run([AgreementTask(each.robot, base, lock, backends, samples, seed) for each in inputs])
+    for index, each in enumerate(inputs):
+        if each.refusal is not None:
+            run.record(index, refused(run.tasks[index], each.refusal))
+    with interruptible() as interruption:
+        try:
+            run.measure(jobs or processors(), timeout or None, show_progress=not quiet)
+        except KeyboardInterrupt:
+            complain(f"interrupted: {len(run.not_done)} of {len(run.tasks)} robots were not done")
+        interruption.finishing = True
+        code = _report(run, json_path, quiet)
+    return code if interruption.code is None else interruption.code
+
+
+def _report(run: Run, json_path: str | None, quiet: bool) -> int:
+    """Write the document, the tables and the errors; the exit code."""
+    from dynx.cli.agreement_tables import show_many, show_one, show_summary
+    from dynx.cli.agreement_task import counts, document
+    from dynx.cli.terminal import console, echo_json, json_text
+
+    entries = run.entries
+    # First the document: a pipe that closes while the table is written must not lose it.
+    if json_path == "-":
+        echo_json(document(entries, run.not_done))
+    elif json_path is not None:
+        write_text(json_path, json_text(document(entries, run.not_done)) + "\n")
+    if not quiet:
+        out = console(err=json_path == "-")
+        if len(run.tasks) == 1:
+            for entry in entries:
+                show_one(out, entry)
+        else:
+            show_many(out, entries)
+            show_summary(out, entries, run.seconds, len(run.not_done))
+    for entry in entries:
+        if entry["error"] is not None:
+            complain(_refusal(entry))
+    count = counts(entries)
+    if count["refused"]:
+        return BAD_INPUT
+    return ANSWER_IS_NO if count["differ"] else DONE
+
+
+def _refusal(entry: Entry) -> str:
+    """Why a robot was refused; most messages name its file already."""
+    robot, message = entry["robot"], entry["error"]["message"]
+    return message if robot in message else f"{robot}: {message}"
+
+
+def _check_backends(names: tuple[str, ...]) -> None:
+    """Raise for a backend that is unknown or not installed: once, not for every robot."""
+    from dynx.backends.registry import backend_class
+
+    for name in names:
+        backend_class(name)

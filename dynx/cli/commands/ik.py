@@ -1,0 +1,105 @@
+"""``dynx ik``: the configuration that brings a frame to a target."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from dynx.cli.commands.evaluate import frame_option, robot_options, sample_option
+from dynx.cli.options import number_list
+
+if TYPE_CHECKING:
+    from dynx.cli.configuration_input import Numbers
+    from dynx.spatial.scalar import Floats
+
+
+@click.command(short_help="Inverse kinematics: the configuration that reaches a target.")
+@robot_options
+@click.option(
+    "--target",
+    type=number_list,
+    required=True,
+    metavar="NUMBERS",
+    help="x,y,z [m], then nothing (any rotation), roll,pitch,yaw [rad], or qx,qy,qz,qw; "
+    "or the 16 numbers of T_world_target, row by row.",
+)
+@frame_option
+@sample_option("q", "Where to start (default: chosen by the solver)")
+def ik(target: Numbers, frame: str | None, q: Numbers, as_json: bool, **robot: Any) -> int:
+    """Inverse kinematics: the configuration, within limits, that brings a frame to a target.
+
+    Exit code 0 if the target was reached, as forward kinematics says; 1 if not, and then the best
+    configuration that was found is shown.
+
+    \b
+    Examples:
+      dynx ik ur5 --target 0.4,0.2,0.3 --frame tool0
+      dynx ik ur5 --target 0.4,0.2,0.3,3.14,0,0 --frame tool0 --json
+    """
+    from dynx.cli import terminal
+    from dynx.cli.commands.evaluate import chosen_frame, head, opened, title
+    from dynx.cli.configuration_input import configuration
+    from dynx.cli.exits import ANSWER_IS_NO, DONE
+
+    wanted = _target(target)
+    with opened(robot) as engine:
+        model = engine.model
+        name = chosen_frame(model, frame)
+        start = None if q is None else configuration(model, q)
+        found = engine.inverse_kinematics(wanted, name, start)
+        result = {
+            **head(engine),
+            "frame": name,
+            "target": wanted.tolist(),
+            "success": bool(found.success),
+            "q": found.q.tolist(),
+            "position_error": float(found.position_error),
+            "rotation_error": float(found.rotation_error),
+            "iterations": int(found.iterations),
+            "restarts": int(found.restarts),
+        }
+        joints = dict(zip(model.joint_names, result["q"][model.nq - len(model.joint_names) :], strict=True))
+    code = DONE if result["success"] else ANSWER_IS_NO
+    if as_json:
+        terminal.echo_json(result)
+        return code
+    from dynx.cli.exits import one_line
+
+    out = terminal.console()
+    out.print(f"{title(result)}: {one_line(name)} to its target", style="bold")
+    out.print(one_line(found.message), style="green" if result["success"] else "red")
+    table = terminal.plain_table("joint", "q", right=("q",))
+    for joint, value in joints.items():
+        table.add_row(one_line(joint), terminal.number(value))
+    out.print(table)
+    out.print(f"--q {','.join(format(value, '.17g') for value in result['q'])}")
+    return code
+
+
+def _target(given: Numbers) -> Floats:
+    """A position (3,) or a pose (4, 4), from the numbers of ``--target``."""
+    import numpy as np
+
+    from dynx.errors import ArgumentError
+    from dynx.spatial.se3 import homogeneous
+    from dynx.spatial.so3 import rotation_from_quat, rotation_from_rpy
+
+    if not isinstance(given, list):
+        raise ArgumentError("--target takes numbers without names")
+    numbers = np.array(given)
+    if len(numbers) == 3:
+        return numbers
+    if len(numbers) == 6:
+        return homogeneous(rotation_from_rpy(numbers[3:]), numbers[:3])
+    if len(numbers) == 7:
+        norm = float(np.linalg.norm(numbers[3:]))
+        if abs(norm - 1.0) > 1e-3:
+            raise ArgumentError(f"--target: the quaternion has length {norm:.6g}; wanted 1")
+        return homogeneous(rotation_from_quat(numbers[3:] / norm), numbers[:3])
+    if len(numbers) == 16:
+        return numbers.reshape(4, 4)
+    raise ArgumentError(
+        f"--target has {len(numbers)} numbers; wanted 3 (position), 6 (and roll, pitch, yaw), "
+        "7 (and a quaternion xyzw) or 16 (a matrix)"
+    )

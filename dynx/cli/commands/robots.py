@@ -1,0 +1,52 @@
+"""``dynx robots``: the robots that have a name."""
+
+from __future__ import annotations
+
+import click
+
+from dynx.cli.options import json_flag
+
+
+@click.command(short_help="List the robots that have a name.")
+@click.argument("words", nargs=-1, metavar="[WORD]...")
+@json_flag
+def robots(words: tuple[str, ...], as_json: bool) -> None:
+    """List every robot that has a name: where it comes from, and its file.
+
+    With WORDs, only the robots whose name or path contains one of them.
+
+    \b
+    Examples:
+      dynx robots
+      dynx robots ur talos
+      dynx robots --json
+    """
+    from dynx.cli.terminal import console, echo_json, plain_table
+    from dynx.model.library import robots as library
+
+    entries = [
+        entry
+        for entry in library()
+        if not words or any(word.lower() in f"{entry.name} {entry.path}".lower() for word in words)
+    ]
+    if as_json:
+        echo_json(
+            {
+                "schema": 1,
+                "robots": [
+                    {
+                        "name": entry.name,
+                        "aliases": list(entry.aliases),
+                        "source": entry.source,
+                        "path": str(entry.path),
+                    }
+                    for entry in entries
+                ],
+            }
+        )
+        return
+    table = plain_table("name", "from", "path")
+    for entry in entries:
+        table.add_row(entry.name, entry.source, str(entry.path))
+    console().print(table)
+    console().print(f"{len(entries)} robots")

@@ -1,0 +1,80 @@
+"""Options that several commands share, and how lists of numbers are read."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import click
+
+from dynx.errors import shown
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def number_list(text: str) -> list[float] | dict[str, float]:
+    """Numbers separated by commas or white space, or ``joint=value`` pairs as a dictionary."""
+    words = text.replace(",", " ").split()
+    if not any("=" in word for word in words):
+        return [_number(word) for word in words]
+    named: dict[str, float] = {}
+    for word in words:
+        name, value = _pair(word)
+        if name in named:
+            raise click.BadParameter(f"{shown(name)} is given twice")
+        named[name] = value
+    return named
+
+
+def name_list(text: str) -> tuple[str, ...]:
+    """Names separated by commas, each once, in order."""
+    names = tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
+    if not names:
+        raise click.BadParameter("wanted names separated by commas")
+    return names
+
+
+def _pair(word: str) -> tuple[str, float]:
+    """One ``joint=value``; the name may hold any sign but a comma or white space."""
+    name, equals, text = word.rpartition("=")
+    if not equals or not name:
+        raise click.BadParameter(f"{shown(word)} is no joint=value, such as finger=0.02")
+    return name, _number(text)
+
+
+def _number(word: str) -> float:
+    try:
+        number = float(word)
+    except ValueError:
+        raise click.BadParameter(
+            f"{shown(word)} is not a number (write 0.5,-1.2 with decimal points)"
+        ) from None
+    if not math.isfinite(number):
+        raise click.BadParameter(f"{shown(word)} is not finite")
+    return number
+
+
+def model_options(command: F) -> F:
+    """``--base`` and ``--lock``, as parameters `base` and `lock` (pairs)."""
+    command = click.option(
+        "--lock",
+        type=_pair,
+        metavar="JOINT=VALUE",
+        multiple=True,
+        help="Fix a joint at a value [rad or m]; it leaves q. May be given several times.",
+    )(command)
+    return click.option(
+        "--base",
+        type=click.Choice(["fixed", "floating"]),
+        default="fixed",
+        show_default=True,
+        help="Whether the root link is bolted to the world or free.",
+    )(command)
+
+
+def json_flag(command: F) -> F:
+    """``--json`` without a value, as parameter `as_json`."""
+    return click.option(
+        "--json", "as_json", is_flag=True, help="Write JSON to standard output instead of a table."
+    )(command)

@@ -1,0 +1,110 @@
+"""What a frame is asked to reach: a pose, or the position of a point with the rotation left free."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dynx.errors import ArgumentError, DTypeError, NotFiniteError, ShapeError
+from dynx.spatial.scalar import Floats
+
+ORTHONORMALITY = 1e-6
+"""Largest entry of R'R - 1, and of the last row less (0, 0, 0, 1), in a pose that is accepted."""
+
+_ROUNDED = 1e-12
+"""Above this departure from orthonormality (a pose in float32, say) the nearest rotation is taken."""
+
+
+@dataclass(frozen=True, eq=False)
+class Targets:
+    """Poses or positions in world axes, with the leading axes `batch`.
+
+    `rotations` is None where only a position is asked for.
+    """
+
+    positions: Floats  # (*batch, 3) [m]
+    rotations: Floats | None  # (*batch, 3, 3)
+
+    @property
+    def batch(self) -> tuple[int, ...]:
+        """The leading axes."""
+        return self.positions.shape[:-1]
+
+
+def checked_targets(target: ArrayLike) -> Targets:
+    """Read poses T_world_target (..., 4, 4) or positions (..., 3) [m].
+
+    A rotation that is orthonormal to 1e-6 only is replaced by the nearest rotation (Higham,
+    Matrix nearness problems, section 3). Raises ShapeError, DTypeError, NotFiniteError, or
+    ArgumentError for a matrix that is no rigid transform.
+    """
+    if (
+        isinstance(target, np.ndarray)
+        and target.dtype == np.float64
+        and target.shape == (4, 4)
+        and _is_rigid(target.tolist())
+    ):
+        return Targets(target[:3, 3], target[:3, :3])
+    array = _checked_numbers(target)
+    if array.ndim >= 1 and array.shape[-1] == 3:
+        return Targets(array, None)
+    if array.ndim < 2 or array.shape[-2:] != (4, 4):
+        raise ShapeError(f"target has shape {array.shape}; wanted a pose (..., 4, 4) or a position (..., 3)")
+    return Targets(array[..., :3, 3], _checked_rotations(array))
+
+
+def _is_rigid(T: list[list[float]]) -> bool:
+    """Whether one pose needs no further look; in floats, as array code would take ten times as long."""
+    a, b, c, bottom = T
+    if bottom != [0.0, 0.0, 0.0, 1.0] or not math.isfinite(a[3] + b[3] + c[3]):
+        return False
+    departure = max(
+        abs(_dot(a, a) - 1.0),
+        abs(_dot(b, b) - 1.0),
+        abs(_dot(a, b)),
+        abs(a[1] * b[2] - a[2] * b[1] - c[0]),
+        abs(a[2] * b[0] - a[0] * b[2] - c[1]),
+        abs(a[0] * b[1] - a[1] * b[0] - c[2]),
+    )
+    return departure <= _ROUNDED
+
+
+def _dot(a: list[float], b: list[float]) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _checked_numbers(target: ArrayLike) -> Floats:
+    try:
+        array = np.asarray(target)
+    except ValueError as error:
+        raise ShapeError(f"target is ragged: {error}") from None
+    if array.dtype.kind not in "fiu":
+        raise DTypeError(f"target has dtype {array.dtype}; wanted real numbers (float64)")
+    array = np.asarray(array, dtype=np.float64)
+    if not np.isfinite(array).all():
+        where = ", ".join(str(i) for i in np.argwhere(~np.isfinite(array))[0])
+        raise NotFiniteError(f"target[{where}] is not finite; wanted finite numbers")
+    return array
+
+
+def _checked_rotations(T: Floats) -> Floats:
+    R = T[..., :3, :3]
+    departure = np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max(axis=(-1, -2))
+    bottom = np.abs(T[..., 3, :] - (0.0, 0.0, 0.0, 1.0)).max(axis=-1)
+    _refuse(bottom > ORTHONORMALITY, "its last row is not (0, 0, 0, 1)")
+    _refuse(departure > ORTHONORMALITY, "its rotation is not orthonormal to 1e-6")
+    _refuse(np.linalg.det(R) < 0.0, "its rotation has determinant -1 (a reflection)")
+    if (departure > _ROUNDED).any():
+        U, _, V_T = np.linalg.svd(R)
+        R = U @ V_T
+    return np.asarray(R)
+
+
+def _refuse(wrong: np.ndarray[tuple[int, ...], np.dtype[np.bool_]], why: str) -> None:
+    if np.any(wrong):
+        where = tuple(int(i) for i in np.argwhere(wrong)[0])
+        which = f"[{', '.join(map(str, where))}]" if where else ""
+        raise ArgumentError(f"target{which} is not a rigid transform: {why}")

@@ -1,0 +1,150 @@
+"""Names of robots to files: example-robot-data, and the small models that come with dynx.
+
+example-robot-data is used as data alone: its Python loaders, which import an engine, are not.
+Its robots have the names of those loaders; a file without a loader has the stem of its file. The
+robots of dynx have their stems. A name that is taken already gets its folder in front.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib import metadata
+from pathlib import Path
+
+from dynx.errors import RobotNotFoundError, nearest, shown
+
+EXAMPLE_ROBOT_DATA = "example-robot-data"
+OWN_MODELS = "dynx"
+
+# The loaders' short names that differ from the stem of the file, by the file they load.
+_LOADER_NAMES = {
+    "alexander_description/urdf/alexander_v1.lowerBodyOnly.urdf": "alexander",
+    "anymal_b_simple_description/robots/anymal-kinova.urdf": "anymal_kinova",
+    "anymal_b_simple_description/robots/anymal.urdf": "anymal",
+    "anymal_c_simple_description/urdf/anymal.urdf": "anymal_c",
+    "asr_twodof_description/urdf/TwoDofs.urdf": "asr_twodof",
+    "b1_description/urdf/b1-z1.urdf": "b1_z1",
+    "borinot_description/urdf/borinot_flying_arm_2.urdf": "borinot",
+    "g1_description/urdf/g1_29dof_rev_1_0.urdf": "g1",
+    "g1_description/urdf/g1_29dof_with_hand_rev_1_0.urdf": "g1_with_hands",
+    "hector_description/robots/quadrotor_base.urdf": "hector",
+    "hextilt_description/urdf/hextilt_flying_arm_5.urdf": "hextilt",
+    "hyq_description/robots/hyq_no_sensors.urdf": "hyq",
+    "iris_description/robots/iris_simple.urdf": "iris",
+    "solo_description/robots/solo.urdf": "solo8",
+    "talos_data/robots/talos_full_v2.urdf": "talos_full",
+    "talos_data/robots/talos_full_v2_box.urdf": "talos_full_box",
+    "talos_data/robots/talos_left_arm.urdf": "talos_arm",
+    "talos_data/robots/talos_reduced.urdf": "talos",
+    "talos_data/robots/talos_reduced_box.urdf": "talos_box",
+    "ur_description/urdf/ur10_joint_limited_robot.urdf": "ur10_limited",
+    "ur_description/urdf/ur10_robot.urdf": "ur10",
+    "ur_description/urdf/ur3_joint_limited_robot.urdf": "ur3_limited",
+    "ur_description/urdf/ur3_robot.urdf": "ur3",
+    "ur_description/urdf/ur5_joint_limited_robot.urdf": "ur5_limited",
+    "ur_description/urdf/ur5_robot.urdf": "ur5",
+}
+
+
+@dataclass(frozen=True)
+class RobotEntry:
+    """A robot of the library: its name, its file, where it comes from, and its other names."""
+
+    name: str
+    path: Path
+    source: str
+    aliases: tuple[str, ...] = ()
+
+
+@lru_cache(maxsize=1)
+def robots() -> tuple[RobotEntry, ...]:
+    """Every robot of the library: example-robot-data, then dynx's own; each by name.
+
+    Names are unique, and no alias is the name or the alias of another robot.
+    """
+    files = [(path, EXAMPLE_ROBOT_DATA, root) for root in _example_roots() for path in _urdf_files(root)]
+    files += [(path, OWN_MODELS, root) for root in _own_roots() for path in _urdf_files(root)]
+    relative = [path.relative_to(root).as_posix() for path, _, root in files]
+    names: dict[str, int] = {}
+    for index, inside in enumerate(relative):
+        if files[index][1] == EXAMPLE_ROBOT_DATA and inside in _LOADER_NAMES:
+            names[_LOADER_NAMES[inside]] = index
+    named = set(names.values())
+    for index, (path, source, _) in enumerate(files):
+        if index not in named:
+            names[_free_name(path.stem, relative[index], source, names)] = index
+
+    stems = [path.stem for path, _, _ in files]
+    entries = []
+    for name, index in names.items():
+        path, source, _ = files[index]
+        alias = path.stem
+        unused = alias not in names and stems.count(alias) == 1
+        entries.append(RobotEntry(name, path, source, (alias,) if unused else ()))
+    return tuple(sorted(entries, key=lambda entry: (entry.source != EXAMPLE_ROBOT_DATA, entry.name)))
+
+
+def find(name: str) -> Path:
+    """The file of a robot of the library, by its name or an alias.
+
+    Raises RobotNotFoundError with the nearest names.
+    """
+    by_name = {alias: entry.path for entry in robots() for alias in entry.aliases}
+    by_name.update((entry.name, entry.path) for entry in robots())
+    try:
+        return by_name[name]
+    except KeyError:
+        hint = nearest(name, by_name) or "; the library is empty: is example-robot-data installed?"
+        raise RobotNotFoundError(f"no robot {shown(name)} in the library, and no such file{hint}") from None
+
+
+def _free_name(stem: str, inside: str, source: str, taken: dict[str, int]) -> str:
+    if stem not in taken:
+        return stem
+    folders = inside.split("/")[:-1]
+    name = f"{folders[0] if folders else source}_{stem}"
+    return name if name not in taken else "_".join([source, *folders, stem])
+
+
+def _urdf_files(root: Path) -> list[Path]:
+    # Descriptions lie at most three folders deep; the meshes, far more files, lie elsewhere.
+    found = {path for depth in ("*", "*/*", "*/*/*", "*/*/*/*") for path in root.glob(f"{depth}.urdf")}
+    return sorted(path for path in found if path.is_file())
+
+
+def _example_roots() -> list[Path]:
+    for root in _example_candidates():
+        if root.is_dir():
+            return [root]
+    return []
+
+
+def _example_candidates() -> Iterator[Path]:
+    inside = Path("share", EXAMPLE_ROBOT_DATA, "robots")
+    try:
+        installed = metadata.distribution(EXAMPLE_ROBOT_DATA)
+    except metadata.PackageNotFoundError:
+        pass
+    else:
+        yield Path(str(installed.locate_file("cmeel.prefix"))) / inside
+    for folder in sys.path:
+        yield Path(folder or ".", "cmeel.prefix") / inside
+    # A ROS, conda or CMake installation keeps the same tree under its prefix.
+    for variable in ("AMENT_PREFIX_PATH", "CMAKE_PREFIX_PATH", "CONDA_PREFIX"):
+        for prefix in os.environ.get(variable, "").split(os.pathsep):
+            if prefix:
+                yield Path(prefix) / inside
+    yield Path(sys.prefix) / inside
+
+
+def _own_roots() -> list[Path]:
+    # In a wheel the models lie inside the package, in a source checkout beside it.
+    package = Path(__file__).resolve().parent.parent
+    for root in (package / "models", package.parent / "models"):
+        if root.is_dir():
+            return [root]
+    return []

@@ -1,0 +1,139 @@
+"""`load`: a path, a text or a name to a model."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from pathlib import PurePath
+
+from numpy.typing import ArrayLike
+
+from dynx.errors import ArgumentError, DescriptionError, RobotNotFoundError, nearest, shown
+from dynx.model.file_reading import printable, read_file
+from dynx.model.library import find, robots
+from dynx.model.model import STANDARD_GRAVITY, Base, Model
+from dynx.model.urdf_reader import read_urdf
+
+StrPath = str | os.PathLike[str]
+
+_SUFFIXES = (".urdf", ".xacro", ".xml")
+
+
+def load(
+    x: StrPath | bytes | Model,
+    *,
+    base: Base | None = None,
+    lock: Mapping[str, float] | None = None,
+    gravity: ArrayLike | None = None,
+    package_dirs: Iterable[StrPath] = (),
+) -> Model:
+    """The model of a robot.
+
+    `x` is one of
+
+    - URDF text: a `str` or `bytes` whose first character, after white space or a byte-order mark,
+      is ``<``;
+    - a path: any `os.PathLike`, or a `str` with a separator or with the suffix .urdf, .xacro or
+      .xml (.xacro needs the extra ``xacro``). Such a string is never looked up as a name;
+    - a name of the library, see ``dynx robots``. A name of the library wins over a file of that
+      name in the working directory; write ``./name`` for the file. A bare name that the library
+      lacks may still be a file;
+    - a `Model`, which keeps its base and gravity unless they are given.
+
+    `base` is ``"fixed"`` (default) or ``"floating"``. `lock` fixes joints at values [rad or m], by
+    name; they leave q. `gravity` is (3,) [m/s^2] in the world, by default (0, 0, -9.81).
+    `package_dirs` are the roots in which xacro may look for packages.
+
+    Raises RobotNotFoundError where nothing is found, DescriptionError where the description is
+    malformed (with file and line), UnsupportedFeatureError where it needs what dynx refuses,
+    UnknownNameError for a joint to lock that is not there.
+    """
+    if isinstance(x, Model):
+        return _changed(x, base, lock, gravity)
+    if isinstance(x, bytes | bytearray | memoryview):
+        return _from_text(bytes(x), "<string>", None, base, lock, gravity)
+    if isinstance(x, str) and x.lstrip("\ufeff \t\r\n").startswith("<"):
+        return _from_text(x, "<string>", None, base, lock, gravity)
+    if not isinstance(x, str | os.PathLike):
+        raise ArgumentError(f"cannot load {type(x).__name__}; wanted a path, URDF text, a name or a Model")
+    path = _path_of(x)
+    name = PurePath(path).name.split(".")[0]
+    if path.endswith(".xacro"):
+        from dynx.model.xacro_reading import expand_xacro
+
+        data: str | bytes = expand_xacro(path, package_dirs)
+    else:
+        data = read_file(path)
+    return _from_text(data, printable(path), name, base, lock, gravity)
+
+
+def _path_of(x: StrPath) -> str:
+    if not isinstance(x, str):
+        return os.fsdecode(os.fspath(x))
+    separators = {os.sep, os.altsep or os.sep, "/"}
+    if any(separator in x for separator in separators) or x.endswith(_SUFFIXES):
+        path = os.path.expanduser(x)
+        if not _exists(path):
+            known = [entry.name for entry in robots()]
+            stem = PurePath(x).stem
+            hint = f"; the library has {shown(stem)}" if stem in known else ""
+            raise RobotNotFoundError(f"no such file: {shown(x, 300)}{hint}")
+        return path
+    try:
+        return str(find(x))
+    except RobotNotFoundError:
+        if x and _exists(x):
+            return x
+        raise
+
+
+def _exists(path: str) -> bool:
+    try:
+        return os.path.lexists(path)
+    except ValueError:
+        # A null character in the path.
+        return False
+
+
+def _from_text(
+    data: str | bytes,
+    source: str,
+    name: str | None,
+    base: Base | None,
+    lock: Mapping[str, float] | None,
+    gravity: ArrayLike | None,
+) -> Model:
+    content = read_urdf(data, source)
+    model = Model.build(
+        content.name or name or "robot",
+        content.links,
+        content.joints,
+        base=base or "fixed",
+        gravity=STANDARD_GRAVITY if gravity is None else gravity,
+        lock=lock,
+        notes=content.notes,
+        source=source,
+    )
+    for frame in content.frames:
+        if frame.link not in model.frame_names:
+            raise DescriptionError(
+                f"frame {shown(frame.name)} is on {shown(frame.link)}, which is no link"
+                + nearest(frame.link, model.frame_names),
+                source=source,
+            )
+        model = model.with_frame(frame.name, frame.link, frame.placement)
+    return model
+
+
+def _changed(
+    model: Model, base: Base | None, lock: Mapping[str, float] | None, gravity: ArrayLike | None
+) -> Model:
+    if lock:
+        relocked = Model.build(
+            model.name, model.links, model.joints, lock=lock, notes=model.notes, source=model.source
+        )
+        model = replace(model, joints=relocked.joints, notes=relocked.notes)
+    if base is not None:
+        model = model.with_base(base)
+    return model if gravity is None else model.with_gravity(gravity)

@@ -1,0 +1,45 @@
+"""``package://`` names to files, inside given roots only."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from pathlib import Path
+
+from dynx.errors import DescriptionError, shown
+
+StrPath = str | os.PathLike[str]
+
+
+def find_package(name: str, roots: Iterable[StrPath]) -> Path:
+    """The folder of a ROS package: a root of that name, or a folder of that name in a root.
+
+    Raises DescriptionError where no root has it.
+    """
+    tried = [Path(root).resolve() for root in roots]
+    if name and name == os.path.basename(name) and name not in (".", ".."):
+        for root in tried:
+            for folder in ([root] if root.name == name else []) + [root / name]:
+                if folder.is_dir() and folder.resolve().is_relative_to(root):
+                    return folder.resolve()
+    where = ", ".join(str(root) for root in tried) or "no folder (give package_dirs=)"
+    raise DescriptionError(f"package {shown(name)} was not found; looked in {where}")
+
+
+def resolve_package(uri: str, roots: Iterable[StrPath]) -> Path:
+    """The file that ``package://name/rest`` means.
+
+    Raises DescriptionError for another scheme, a package that no root has, a file that is not there,
+    or a path that leaves its package by ``..`` or by a symbolic link.
+    """
+    scheme, _, rest = uri.partition("://")
+    if scheme != "package" or not rest:
+        raise DescriptionError(f"{shown(uri)} is no package path; wanted package://NAME/FILE")
+    name, _, inside = rest.partition("/")
+    package = find_package(name, roots)
+    found = (package / inside).resolve()
+    if not found.is_relative_to(package):
+        raise DescriptionError(f"{shown(uri)} leads out of package {shown(name)}, which is refused")
+    if not found.is_file():
+        raise DescriptionError(f"{shown(uri)} is not there: no file {shown(inside)} in {package}")
+    return found

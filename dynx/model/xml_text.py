@@ -1,0 +1,75 @@
+"""Bytes of an XML document to text: byte-order marks, declared encodings, stray ends."""
+
+from __future__ import annotations
+
+import codecs
+import re
+
+from dynx.errors import DescriptionError, shown
+from dynx.model.elements import Note
+
+_MARKS = (
+    (codecs.BOM_UTF8, "utf-8"),
+    (codecs.BOM_UTF32_LE, "utf-32-le"),
+    (codecs.BOM_UTF32_BE, "utf-32-be"),
+    (codecs.BOM_UTF16_LE, "utf-16-le"),
+    (codecs.BOM_UTF16_BE, "utf-16-be"),
+)
+_DECLARED = re.compile(rb"""\s*<\?xml\b[^>]{0,200}?\bencoding\s*=\s*["']([A-Za-z0-9._-]{1,40})["']""")
+_WIDE = ("utf-16", "utf-32", "utf16", "utf32", "ucs", "iso-10646")
+_NOT_CHARACTER_SETS = frozenset(
+    {"idna", "punycode", "undefined", "unicode-escape", "raw-unicode-escape", "mbcs", "oem"}
+)
+
+
+def decode(data: bytes, source: str, notes: list[Note]) -> str:
+    """The text of `data`, by its byte-order mark, its declared encoding, or as UTF-8.
+
+    Text that is not UTF-8 though it should be is read as Latin-1, with a note: such bytes are found
+    in comments of old files, which every engine reads.
+    """
+    for mark, encoding in _MARKS:
+        if data.startswith(mark):
+            return _strictly(data[len(mark) :], encoding, source)
+    for start, encoding in ((b"<\0", "utf-16-le"), (b"\0<", "utf-16-be")):
+        if data.startswith(start):
+            return _strictly(data, encoding, source)
+    declared = _DECLARED.match(data)
+    name = declared.group(1).decode("ascii").lower().replace("_", "-") if declared else "utf-8"
+    # The declaration itself was read as ASCII, so the text cannot be in 16 or 32 bits.
+    if name in ("utf8", "utf-8", "ascii", "us-ascii") or name.startswith(_WIDE):
+        try:
+            return data.decode("utf-8")
+        except UnicodeDecodeError as error:
+            line = data.count(b"\n", 0, error.start) + 1
+            notes.append(Note("not valid UTF-8; read as Latin-1", line))
+            return data.decode("latin-1")
+    return _strictly(data, name, source)
+
+
+def without_ends(text: str, notes: list[Note]) -> tuple[str, int]:
+    """`text` without a byte-order mark, leading white space and trailing null characters.
+
+    Returns it with the number of lines that were taken away in front.
+    """
+    text = text.removeprefix("\ufeff")
+    if text.endswith("\0"):
+        text = text.rstrip("\0")
+        notes.append(Note("null characters after the end were ignored"))
+    stripped = text.lstrip(" \t\r\n\ufeff")
+    front = text[: len(text) - len(stripped)]
+    return stripped, len(re.findall(r"\r\n|\r|\n", front))
+
+
+def _strictly(data: bytes, encoding: str, source: str) -> str:
+    if encoding in _NOT_CHARACTER_SETS:
+        message = f"declares the encoding {shown(encoding)}, which is no character set"
+        raise DescriptionError(message, source=source)
+    try:
+        return data.decode(encoding)
+    except LookupError:
+        message = f"declares the encoding {shown(encoding)}, which is not known"
+        raise DescriptionError(message, source=source) from None
+    except UnicodeError as error:
+        reason = getattr(error, "reason", str(error))
+        raise DescriptionError(f"is not valid {encoding}: {reason}", source=source) from None

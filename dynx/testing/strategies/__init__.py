@@ -1,0 +1,47 @@
+"""Hypothesis strategies for robots, configurations, poses, wrenches and URDF text.
+
+    from hypothesis import given, strategies as st
+    from dynx.testing.strategies import models, samples
+
+    @given(st.data())
+    def test_something(data):
+        model = data.draw(models(max_links=5, solvable=True))
+        q, v, a = data.draw(samples(model))
+
+What is drawn is valid by construction, never by filtering, so no health check fires and every
+failing example shrinks. Shrink targets: a model shrinks to the fewest links in a chain with a fixed
+base, standard gravity, revolute joints about z at the parent's origin, round numbers, no mimic
+joint, no limits and no dynamics; a configuration to the neutral one; velocities and wrenches to
+zero; poses to the identity; text to the tidy spelling.
+
+Every argument is checked when the strategy is made, not when it is drawn from; a wrong one raises
+an error of `dynx.errors`.
+"""
+
+from dynx.testing.strategies.configurations import (
+    Sample,
+    accelerations,
+    configurations,
+    samples,
+    velocities,
+)
+from dynx.testing.strategies.geometry import poses, quaternions, unit_vectors, vectors, wrenches
+from dynx.testing.strategies.inertials import inertials
+from dynx.testing.strategies.models import models
+from dynx.testing.strategies.urdf_text import urdf_text
+
+__all__ = [
+    "Sample",
+    "accelerations",
+    "configurations",
+    "inertials",
+    "models",
+    "poses",
+    "quaternions",
+    "samples",
+    "unit_vectors",
+    "urdf_text",
+    "vectors",
+    "velocities",
+    "wrenches",
+]

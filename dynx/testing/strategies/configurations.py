@@ -1,0 +1,117 @@
+"""Configurations, velocities and whole samples of a given model."""
+
+from __future__ import annotations
+
+import math
+import operator
+from typing import NamedTuple
+
+import numpy as np
+from hypothesis import strategies as st
+
+from dynx.errors import DTypeError, shown
+from dynx.model import Joint, Model
+from dynx.spatial.scalar import Floats
+from dynx.testing.strategies.geometry import (
+    SMALL_STEPS,
+    Strategy,
+    checked_reach,
+    numbers,
+    quaternions,
+    vectors,
+)
+
+QUARTER_TURNS = tuple(n * math.pi / 2 for n in (0, 1, -1, 2, -2))
+TURNS = 20.0
+"""How far [rad] an angle without limits is taken: some turns either way."""
+
+
+class Sample(NamedTuple):
+    """One state and acceleration of a robot: q (nq,), v (nv,), a (nv,)."""
+
+    q: Floats
+    v: Floats
+    a: Floats
+
+
+def configurations(model: Model, *, within_limits: bool = False) -> Strategy[Floats]:
+    """A configuration q (nq,) of `model`. Shrinks to the neutral one.
+
+    A coordinate is exactly 0, at or next to a quarter turn (where arms are singular) or a limit,
+    between the limits, or, unless `within_limits`, anywhere: limits bound no quantity that a
+    backend computes. A floating base has any attitude, half turns and their neighbours among them.
+    """
+    checked_model(model)
+    if not isinstance(within_limits, bool):
+        raise DTypeError(f"within_limits is {shown(within_limits)}; wanted True or False")
+    base = 7 if model.floating else 0
+    joints = [
+        _coordinate(joint, float(low), float(high), within_limits)
+        for joint, low, high in zip(
+            model.coordinate_joints, model.lower[base:], model.upper[base:], strict=True
+        )
+    ]
+    values = st.tuples(*joints)
+    if not model.floating:
+        anywhere = values.map(lambda q: np.array(q, dtype=float))
+    else:
+        anywhere = st.builds(
+            lambda p, quat, q: np.concatenate([p, quat, q]), vectors(2.0), quaternions(), values
+        )
+    if within_limits:
+        return anywhere
+    return st.one_of(st.builds(model.neutral), anywhere)
+
+
+def velocities(model: Model, reach: float = 3.0) -> Strategy[Floats]:
+    """v (nv,) with components within `reach` [rad/s or m/s]. Shrinks to rest."""
+    return _coordinates(model, reach)
+
+
+def accelerations(model: Model, reach: float = 5.0) -> Strategy[Floats]:
+    """a (nv,), or a torque, with components within `reach`. Shrinks to zero."""
+    return _coordinates(model, reach)
+
+
+def samples(model: Model) -> Strategy[Sample]:
+    """A `Sample` (q, v, a) of `model`. Shrinks to rest at the neutral configuration."""
+    return st.builds(Sample, configurations(model), velocities(model), accelerations(model))
+
+
+def checked_model(model: Model) -> Model:
+    """`model` itself, or an error if it is none."""
+    if not isinstance(model, Model):
+        raise DTypeError(f"model is {shown(type(model).__name__)}; wanted a dynx Model")
+    return model
+
+
+def _coordinates(model: Model, reach: float) -> Strategy[Floats]:
+    nv = checked_model(model).nv
+    number = numbers(checked_reach("reach", reach))
+    anything = st.lists(number, min_size=nv, max_size=nv).map(lambda v: np.array(v, dtype=float))
+    return st.one_of(st.builds(np.zeros, st.just(nv)), anything)
+
+
+def _coordinate(joint: Joint, low: float, high: float, within_limits: bool) -> Strategy[float]:
+    reach = 1.0 if joint.type == "prismatic" else math.pi
+    span = 2.0 * reach if within_limits else 2.0 * TURNS
+    bounded_low = low if math.isfinite(low) else min(high, span / 2) - span
+    bounded_high = high if math.isfinite(high) else bounded_low + span
+    home = min(max(0.0, bounded_low), bounded_high)
+    inside = numbers(1.0).map(lambda x: _between(home, bounded_low, bounded_high, x))
+    choices = [st.just(home), inside]
+    inward = st.sampled_from([abs(step) for step in SMALL_STEPS])
+    if math.isfinite(low):
+        choices.append(inward.map(lambda step: min(low + step, bounded_high)))
+    if math.isfinite(high):
+        choices.append(inward.map(lambda step: max(high - step, bounded_low)))
+    if not within_limits:
+        near = st.builds(operator.add, st.sampled_from(QUARTER_TURNS), st.sampled_from(SMALL_STEPS))
+        choices = [st.just(0.0), near, numbers(reach), *choices]
+    return st.one_of(choices)
+
+
+def _between(home: float, low: float, high: float, fraction: float) -> float:
+    """From `home` (fraction 0) to `high` (1) or `low` (-1)."""
+    end = high if fraction >= 0 else low
+    return min(max(home + abs(fraction) * (end - home), low), high)

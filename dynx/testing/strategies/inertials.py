@@ -1,0 +1,93 @@
+"""Inertials: of bodies that can exist, of bodies that cannot, and of none."""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+import numpy as np
+from hypothesis import strategies as st
+
+from dynx.errors import UnknownNameError, nearest, shown
+from dynx.model.elements import Inertial, Pose, Vector
+from dynx.spatial.so3 import rotation_from_rpy
+from dynx.testing.strategies.geometry import Strategy, angles, numbers, origins, vectors
+
+Kind = Literal["solid", "physical", "any"]
+KINDS: tuple[Kind, ...] = ("solid", "physical", "any")
+
+
+def inertials(kind: Kind = "physical") -> Strategy[Inertial | None]:
+    """What a link's ``<inertial>`` may say. Shrinks to a solid cube of 1 kg at the link's origin.
+
+    - ``"solid"``: positive mass and extent along every axis, so that any motion has inertia
+    - ``"physical"``: also plates, rods, point masses, an explicit zero, and no inertial at all
+    - ``"any"``: also tensors that no body can have, with negative principal moments or a broken
+      triangle inequality
+
+    A body is given by its mass and its radii of gyration along three axes that are then turned, so
+    that the tensor is physical by construction, to rounding.
+    """
+    if kind not in KINDS:
+        raise UnknownNameError(f"kind is {shown(kind)}{nearest(str(kind), KINDS)}")
+    solid = _bodies(st.sampled_from((0.25, 0.125, 0.5)) | st.floats(0.05, 0.5).map(_rounded))
+    if kind == "solid":
+        return solid
+    thin = _bodies(st.sampled_from((0.0, 0.25)))
+    choices: list[Strategy[Inertial | None]] = [solid, thin, st.none(), st.just(Inertial())]
+    if kind == "any":
+        choices.append(_impossible())
+    return st.one_of(choices)
+
+
+def _masses() -> Strategy[float]:
+    return st.sampled_from((1.0, 2.0, 0.5)) | st.floats(-1.0, 1.0).map(lambda x: _rounded(10.0**x))
+
+
+def _bodies(radius: Strategy[float]) -> Strategy[Inertial | None]:
+    turn = st.one_of(st.just((0.0, 0.0, 0.0)), st.tuples(angles(), angles(), angles()))
+    return st.builds(_body, _masses(), st.tuples(radius, radius, radius), turn, origins(0.5))
+
+
+def _body(mass: float, radii: Vector, turn: Vector, origin: Pose) -> Inertial:
+    """A body with these radii of gyration along its axes, which `turn` (rpy) turns in `origin`."""
+    squares = np.array(radii) ** 2
+    principal = mass * (np.sum(squares) - squares)
+    R = rotation_from_rpy(np.array(turn))
+    tensor = R @ np.diag(principal) @ R.T if any(turn) else np.diag(principal)
+    tensor = 0.5 * (tensor + tensor.T)
+    return Inertial(
+        mass,
+        origin,
+        ixx=float(tensor[0, 0]),
+        ixy=float(tensor[0, 1]),
+        ixz=float(tensor[0, 2]),
+        iyy=float(tensor[1, 1]),
+        iyz=float(tensor[1, 2]),
+        izz=float(tensor[2, 2]),
+    )
+
+
+def _impossible() -> Strategy[Inertial | None]:
+    moments = st.tuples(numbers(0.5), numbers(0.5), numbers(0.5))
+    return st.builds(
+        lambda mass, origin, diagonal, products: Inertial(
+            mass,
+            origin,
+            ixx=diagonal[0],
+            iyy=diagonal[1],
+            izz=diagonal[2],
+            ixy=products[0],
+            ixz=products[1],
+            iyz=products[2],
+        ),
+        _masses(),
+        origins(0.5),
+        moments,
+        vectors(0.25),
+    )
+
+
+def _rounded(x: float) -> float:
+    """`x` to six significant digits, as people write them."""
+    return 0.0 if x == 0.0 else round(x, 5 - math.floor(math.log10(abs(x))))

@@ -1,0 +1,75 @@
+from __future__ import annotations
+
+import mpmath
+import numpy as np
+
+from dynx.agreement.answers import Answers
+from dynx.agreement.comparison import compare, judge
+from dynx.agreement.magnitudes import Magnitudes
+from dynx.agreement.quantities import QUANTITIES
+from dynx.agreement.sampling import draw_samples
+from dynx.backends.reference import ReferenceBackend
+from dynx.errors import EngineError
+from dynx.spatial.scalar import Floats
+
+from .robots import Broken, arm
+
+MASS = next(quantity for quantity in QUANTITIES if quantity.name == "mass_matrix")
+
+
+def test_the_largest_relative_error_and_its_place() -> None:
+    verdict = judge(np.array([[1.0, -3.0], [0.5, 0.0]]), np.array([[1.0, 10.0], [0.1, 0.0]]))
+    assert verdict.absolute == 3.0
+    assert verdict.relative == 5.0
+    assert verdict.position == (1, 0)
+
+
+def test_an_error_of_zero_needs_no_size_and_any_other_does() -> None:
+    assert judge(np.zeros(2), np.zeros(2)).relative == 0.0
+    assert judge(np.array([1e-300]), np.zeros(1)).relative == np.inf
+
+
+def test_what_is_no_number_is_infinitely_wrong() -> None:
+    assert judge(np.array([0.0, np.nan]), np.ones(2)).relative == np.inf
+    assert judge(np.array([-np.inf]), np.ones(1)).absolute == np.inf
+
+
+def test_nothing_to_compare_agrees() -> None:
+    assert judge(np.zeros((3, 0)), np.ones((3, 0))).position is None
+
+
+def test_numbers_of_many_digits_are_subtracted_exactly() -> None:
+    error = np.array([mpmath.mpf("1e-40")], dtype=object)
+    assert judge(error, np.ones(1)).absolute == 1e-40
+
+
+def pair(defect: type[Broken]) -> tuple[Answers, Answers, Magnitudes]:
+    samples = draw_samples(arm(), 2, 0)
+    one, other = ReferenceBackend(arm()), defect(arm())
+    answers = Answers("reference", one, samples), Answers("broken", other, samples)
+    return *answers, Magnitudes(samples)
+
+
+class Misshapen(Broken):
+    vectorized = False
+
+    def mass_matrix(self, q: object, *, joint_dynamics: bool = False) -> Floats:
+        return np.zeros((2, 3, 4))
+
+
+class Refusing(Broken):
+    def _mass_matrix(self, q: Floats) -> Floats:
+        raise EngineError("out of order")
+
+
+def test_another_shape_is_a_difference() -> None:
+    row = compare(MASS, *pair(Misshapen))
+    assert not row.agree
+    assert "(2, 3, 4)" in (row.note or "")
+
+
+def test_a_refusal_by_one_is_a_difference_that_names_it() -> None:
+    row = compare(MASS, *pair(Refusing))
+    assert not row.agree
+    assert row.note == "broken refuses: EngineError: out of order"
+    assert row.worst_sample is None

@@ -1,0 +1,120 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from dynx.agreement.identities import IDENTITIES, IdentityCheck, check_identities
+from dynx.agreement.magnitudes import Magnitudes
+from dynx.agreement.sampling import draw_samples
+from dynx.backends import Backend
+from dynx.backends.reference import ReferenceBackend
+from dynx.model import Inertial, Joint, Link, Model
+from dynx.model.model import Base
+from dynx.spatial.scalar import Floats
+
+from .robots import BODY, Broken, GravityUpsideDown, TransposedRotation, arm
+
+
+def checked(backend: Backend) -> dict[str, IdentityCheck]:
+    samples = draw_samples(backend.model, 8, 0)
+    sizes = Magnitudes(samples.take(samples.calm(4), 1))
+    return {check.identity: check for check in check_identities(backend.name, backend, sizes)}
+
+
+def broken(backend: Backend) -> set[str]:
+    return {name for name, check in checked(backend).items() if not check.agree}
+
+
+@pytest.mark.parametrize("base", ["fixed", "floating"])
+def test_the_reference_keeps_every_identity(base: Base) -> None:
+    checks = checked(ReferenceBackend(arm(base)))
+    assert len(checks) == len(IDENTITIES) + 1
+    assert all(check.agree for check in checks.values())
+
+
+class Lopsided(Broken):
+    def _mass_matrix(self, q: Floats) -> Floats:
+        M = super()._mass_matrix(q)
+        M[..., 0, 1] *= 1.0 + 1e-9
+        return M
+
+
+class Negative(Broken):
+    def _mass_matrix(self, q: Floats) -> Floats:
+        return -super()._mass_matrix(q)
+
+
+class StaleRates(Broken):
+    def _coriolis_matrix(self, q: Floats, v: Floats) -> Floats:
+        return super()._coriolis_matrix(q, v).swapaxes(-1, -2).copy()
+
+
+class SlantedGravity(Broken):
+    def _potential_energy(self, q: Floats) -> Floats:
+        return super()._potential_energy(q) * (1.0 + 1e-9)
+
+
+class WrongCenter(Broken):
+    def _center_of_mass(self, q: Floats) -> Floats:
+        return super()._center_of_mass(q) * (1.0 + 1e-9)
+
+
+class WrongMomentum(Broken):
+    def _centroidal_momentum(self, q: Floats, v: Floats) -> Floats:
+        return super()._centroidal_momentum(q, v) * (1.0 + 1e-9)
+
+
+class TiltedWorld(Broken):
+    """Gravity is taken to point down whatever the model says."""
+
+    def _gravity(self) -> None:
+        self._mechanism = self.model.with_gravity((0.0, 0.0, -9.81)).mechanism
+
+    def _inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
+        self._gravity()
+        return super()._inverse_dynamics(q, v, a)
+
+
+@pytest.mark.parametrize(
+    ("defect", "identity"),
+    [
+        (Lopsided, "mass matrix is symmetric"),
+        (Negative, "mass matrix is positive"),
+        (Negative, "M a + bias = inverse dynamics"),
+        (StaleRates, "C v + gravity = bias"),
+        (GravityUpsideDown, "gravity torque = gradient of potential energy"),
+        (SlantedGravity, "gravity torque = gradient of potential energy"),
+        (SlantedGravity, "power of the torques = d/dt energy"),
+        (WrongCenter, "J v = d/dt centre of mass"),
+        (WrongMomentum, "linear momentum = mass * velocity of its centre"),
+        (TransposedRotation, "J v = d/dt forward kinematics"),
+        (TiltedWorld, "turning the world changes nothing"),
+    ],
+)
+def test_a_defect_breaks_its_identity(defect: type[Broken], identity: str) -> None:
+    assert identity in broken(defect(arm()))
+
+
+def test_the_momentum_of_a_floating_base_is_checked_about_its_centre() -> None:
+    assert "momentum = base rows of M v" in broken(WrongMomentum(arm("floating")))
+    assert checked(ReferenceBackend(arm()))["momentum = base rows of M v"].note
+
+
+class Shapeless(Broken):
+    def _gravity_torque(self, q: Floats) -> Floats:
+        return super()._gravity_torque(q)[..., :1].repeat(7, axis=-1)
+
+
+def test_an_answer_of_the_wrong_shape_breaks_identities_rather_than_the_test() -> None:
+    joints = [Joint("j", "continuous", "a", "b"), Joint("k", "continuous", "b", "c")]
+    model = Model.build("two", [Link("a", BODY), Link("b", BODY), Link("c", BODY)], joints)
+    assert "C v + gravity = bias" in broken(Shapeless(model))
+
+
+def test_positivity_is_not_asked_where_no_body_has_such_an_inertia() -> None:
+    model = arm()
+    odd = replace(model.links[1], inertial=Inertial(1.0, ixx=-0.1, iyy=0.1, izz=0.1))
+    check = checked(ReferenceBackend(replace(model, links=(model.links[0], odd, *model.links[2:]))))
+    assert check["mass matrix is positive"].agree
+    assert "upper" in (check["mass matrix is positive"].note or "")

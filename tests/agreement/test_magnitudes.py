@@ -1,0 +1,54 @@
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given
+
+from dynx.agreement import tolerances
+from dynx.agreement.magnitudes import Magnitudes
+from dynx.agreement.quantities import QUANTITIES
+from dynx.agreement.sampling import draw_samples
+from dynx.backends.reference import ReferenceBackend
+from dynx.model import Model
+from dynx.testing.strategies import models
+
+BOUNDS = {
+    "forward_kinematics",
+    "jacobian",
+    "jacobian_derivative",
+    "frame_velocity",
+    "frame_acceleration",
+    "gravity_torque",
+    "mass_matrix",
+    "kinetic_energy",
+    "potential_energy",
+    "center_of_mass",
+    "center_of_mass_jacobian",
+    "centroidal_momentum",
+}
+"""Quantities whose natural size is a proven bound."""
+
+
+@given(models(base="either"))
+def test_natural_sizes_bound_the_quantities(model: Model) -> None:
+    samples = draw_samples(model, 6, 0)
+    sizes = Magnitudes(samples)
+    slack = 1.0 + tolerances.rounding(sizes.depth)
+    with ReferenceBackend(model) as backend:
+        for quantity in QUANTITIES:
+            if quantity.name in BOUNDS:
+                value = np.abs(np.asarray(quantity.evaluate(backend, samples), dtype=float))
+                scale = np.asarray(quantity.scale(sizes))
+                floor = tolerances.rounding(sizes.depth) * np.max(scale, initial=0.0)
+                assert np.all(value <= 2.0 * scale * slack + floor), quantity.name
+
+
+@given(models())
+def test_poses_turn_no_faster_than_the_bound(model: Model) -> None:
+    samples = draw_samples(model, 4, 1)
+    sizes = Magnitudes(samples)
+    with ReferenceBackend(model) as backend:
+        for frame in model.frame_names:
+            twist = backend.frame_velocity(samples.q, samples.v, frame)
+            slack = 1.0 + tolerances.rounding(sizes.depth)
+            assert np.all(np.linalg.norm(twist[:, 3:], axis=-1) <= 2.0 * sizes.turning_speed * slack)
+            assert np.all(np.linalg.norm(twist[:, :3], axis=-1) <= 2.0 * sizes.speed * slack)

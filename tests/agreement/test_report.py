@@ -1,0 +1,93 @@
+from __future__ import annotations
+
+import json
+
+import numpy as np
+
+from dynx._version import __version__
+from dynx.agreement import AgreementReport, Comparison, agree, refused_report, results_document
+from dynx.backends.reference import ReferenceBackend
+from dynx.errors import DescriptionError
+
+from .robots import GravityUpsideDown, arm
+
+RESULT_KEYS = {
+    "robot",
+    "source",
+    "base",
+    "backends",
+    "nq",
+    "nv",
+    "samples",
+    "seed",
+    "agree",
+    "error",
+    "seconds",
+    "quantities",
+    "identities",
+    "suspects",
+    "notes",
+}
+QUANTITY_KEYS = {
+    "quantity",
+    "pair",
+    "max_abs_error",
+    "max_rel_error",
+    "tolerance",
+    "agree",
+    "worst_sample",
+    "note",
+}
+IDENTITY_KEYS = {"identity", "backend", "max_error", "tolerance", "agree", "worst_sample", "note"}
+
+
+def test_the_document_has_the_form_that_is_documented() -> None:
+    fine = agree(arm(), ["reference"], samples=2)
+    wrong = agree(arm(), [ReferenceBackend(arm()), GravityUpsideDown(arm())], samples=2)
+    refused = refused_report("shell", DescriptionError("the robot has no link", source="a.urdf", line=3))
+    document = json.loads(json.dumps(results_document([fine, wrong, refused]), allow_nan=False))
+    assert set(document) == {"schema", "dynx", "results", "summary"}
+    assert document["schema"] == 1
+    assert document["dynx"] == __version__
+    assert document["summary"] == {"robots": 3, "agree": 1, "differ": 1, "refused": 1}
+    for result in document["results"]:
+        assert set(result) == RESULT_KEYS
+        assert all(set(entry) == QUANTITY_KEYS for entry in result["quantities"])
+        assert all(set(entry) == IDENTITY_KEYS for entry in result["identities"])
+    assert document["results"][1]["suspects"][0]["backend"] == "broken"
+    assert document["results"][2]["error"] == {
+        "type": "DescriptionError",
+        "message": "a.urdf:3: the robot has no link",
+    }
+
+
+def test_the_worst_sample_is_enough_to_see_the_error_again() -> None:
+    model = arm("floating")
+    backends = ReferenceBackend(model), GravityUpsideDown(model)
+    report = agree(model, backends, samples=4)
+    row = next(row for row in report.differences if row.quantity == "gravity_torque")
+    assert row.worst_sample is not None
+    q = np.array(row.worst_sample.q)
+    again = np.max(np.abs(backends[0].gravity_torque(q) - backends[1].gravity_torque(q)))
+    assert again <= row.max_abs_error
+    assert again > 0.0
+
+
+def test_the_worst_sample_of_a_frame_names_frame_and_reference() -> None:
+    report = agree(arm(), ["reference", "pinocchio"], samples=3)
+    row = next(row for row in report.quantities if row.quantity == "jacobian")
+    assert row.worst_sample is not None
+    assert row.worst_sample.frame in arm().frame_names
+    assert row.worst_sample.reference in ("local", "world", "local_world_aligned")
+
+
+def test_an_error_without_a_size_is_null() -> None:
+    row = Comparison("mass_matrix", "a~b", np.inf, np.nan, 1e-13, False, note="refused")
+    entry = AgreementReport("x", quantities=(row,)).to_dict()["quantities"][0]
+    assert entry["max_abs_error"] is None
+    assert entry["max_rel_error"] is None
+    assert entry["tolerance"] == 1e-13
+
+
+def test_a_refused_robot_does_not_agree() -> None:
+    assert not refused_report("x", DescriptionError("bad"))

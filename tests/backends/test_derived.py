@@ -1,0 +1,103 @@
+from __future__ import annotations
+
+import inspect
+import pickle
+
+import numpy as np
+import pytest
+
+from dynx.backends import Backend, DerivedBackend, native_quantities
+from dynx.backends.derived import HOOK_OF_QUANTITY
+from dynx.backends.hooks import EngineHooks
+from dynx.backends.pinocchio import PinocchioBackend
+from dynx.backends.reference import ReferenceBackend
+from dynx.errors import ClosedError
+from dynx.spatial.scalar import Floats
+from tests.backends.robots import all_quantities, assert_close, assert_same, chain, mixed_robot, motion
+
+MINIMUM = {"forward_kinematics", "inverse_dynamics"}
+
+
+def test_every_quantity_has_a_hook_and_every_hook_a_quantity() -> None:
+    hooks = {
+        name
+        for name, member in vars(EngineHooks).items()
+        if inspect.isfunction(member) and "engine's own" not in (member.__doc__ or "")
+    }
+    # The placement of one frame serves forward kinematics too, and poses of bodies are no quantity.
+    assert hooks - {"_frame_placement", "_body_poses"} == set(HOOK_OF_QUANTITY.values())
+    for quantity in HOOK_OF_QUANTITY:
+        assert callable(getattr(Backend, quantity))
+
+
+def test_a_view_computes_nothing_natively_but_the_two() -> None:
+    assert native_quantities(DerivedBackend) == MINIMUM
+    assert native_quantities(DerivedBackend(PinocchioBackend(chain(1)))) == MINIMUM
+    assert native_quantities(Backend) == frozenset()
+    assert native_quantities(ReferenceBackend) > MINIMUM
+
+
+def test_the_engine_is_asked_for_nothing_else(monkeypatch: pytest.MonkeyPatch) -> None:
+    def never(*_: object) -> Floats:
+        raise AssertionError("a native hook was used")
+
+    for hook in set(HOOK_OF_QUANTITY.values()) - {"_frame_placements", "_inverse_dynamics"}:
+        monkeypatch.setattr(PinocchioBackend, hook, never)
+    monkeypatch.setattr(PinocchioBackend, "_frame_placement", never)
+    model = mixed_robot("floating", mimic=True)
+    answers = all_quantities(DerivedBackend(PinocchioBackend(model)), *motion(model))
+    assert all(np.isfinite(answer).all() for answer in answers.values())
+
+
+@pytest.mark.parametrize("kind", [PinocchioBackend, ReferenceBackend])
+@pytest.mark.parametrize("base", ["fixed", "floating"])
+@pytest.mark.parametrize("size", [(), (2, 3)])
+def test_derived_answers_are_the_native_ones(kind: type[Backend], base: str, size: tuple[int, ...]) -> None:
+    model = mixed_robot(base, mimic=True)
+    native = kind(model)
+    view = DerivedBackend(native)
+    assert view.vectorized is native.vectorized
+    sample = motion(model, size=size)
+    condition = float(np.linalg.cond(native.mass_matrix(sample[0])).max())
+    expected = all_quantities(native, *sample)
+    for quantity, answer in all_quantities(view, *sample).items():
+        scale = condition if quantity == "forward_dynamics" else 1.0
+        assert_close(answer, expected[quantity], scale, quantity)
+
+
+def test_a_view_has_the_name_and_version_of_what_it_shows() -> None:
+    inner = PinocchioBackend(chain(1))
+    view = DerivedBackend(inner)
+    assert view.name == "pinocchio/derived"
+    assert view.engine_version == inner.engine_version
+    assert repr(view) == "<pinocchio/derived backend of chain>"
+    assert PinocchioBackend.name == "pinocchio"
+    assert DerivedBackend.name == "derived"
+
+
+def test_closing_a_view_leaves_the_backend_open() -> None:
+    inner = PinocchioBackend(chain(2))
+    view = DerivedBackend(inner)
+    view.close()
+    with pytest.raises(ClosedError):
+        view.mass_matrix(np.zeros(2))
+    assert inner.mass_matrix(np.zeros(2)).shape == (2, 2)
+
+
+@pytest.mark.parametrize("validate", [True, False])
+def test_a_view_of_a_closed_backend_refuses(validate: bool) -> None:
+    inner = ReferenceBackend(chain(2))
+    view = DerivedBackend(inner, validate=validate)
+    inner.close()
+    for call in (view.mass_matrix, view.forward_kinematics):
+        with pytest.raises(ClosedError, match="behind reference/derived of chain was closed"):
+            call(np.zeros(2))
+
+
+def test_a_view_pickles_with_what_it_shows() -> None:
+    model = mixed_robot()
+    view = DerivedBackend(PinocchioBackend(model, validate=False), validate=False)
+    copy = pickle.loads(pickle.dumps(view))
+    assert copy.name == "pinocchio/derived"
+    assert copy._validate is False
+    assert_same(all_quantities(copy, *motion(model)), all_quantities(view, *motion(model)))

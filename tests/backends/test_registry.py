@@ -1,0 +1,225 @@
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from importlib.metadata import EntryPoint, EntryPoints, entry_points
+from typing import Any
+
+import pytest
+
+import dynx.backends.registry as registry
+from dynx.backends import (
+    Backend,
+    backend,
+    backend_class,
+    backend_names,
+    installed_backends,
+    register,
+    unregister,
+)
+from dynx.backends.reference import ReferenceBackend
+from dynx.errors import ArgumentError, BackendError, NotInstalledError, UnknownBackendError
+from tests.backends.robots import chain
+
+BUILT_IN = ("reference", "pinocchio", "pybullet")
+
+
+class Mine(ReferenceBackend):
+    """A backend of somebody else's."""
+
+    name = "mine"
+
+
+def _offer(monkeypatch: pytest.MonkeyPatch, **values: str) -> None:
+    points = EntryPoints(EntryPoint(name, value, registry.GROUP) for name, value in values.items())
+    monkeypatch.setattr(registry, "entry_points", lambda *, group: points.select(group=group))
+
+
+@pytest.fixture
+def mine() -> Iterator[str]:
+    register("mine", lambda: Mine)
+    yield "mine"
+    unregister("mine")
+
+
+def test_the_backends_of_dynx_are_known_without_package_metadata(monkeypatch: pytest.MonkeyPatch) -> None:
+    _offer(monkeypatch)
+    assert backend_names() == BUILT_IN
+    for name in installed_backends():
+        assert backend_class(name).name == name
+    assert {"reference", "pinocchio"} <= set(installed_backends())
+
+
+def test_the_metadata_of_dynx_says_what_its_table_says() -> None:
+    offered = {point.name: point.value for point in entry_points(group=registry.GROUP)}
+    if "reference" not in offered:
+        pytest.skip("dynx is not installed here, so it has no metadata")
+    assert {name: offered[name] for name in BUILT_IN} == registry._BUILT_IN
+
+
+def test_a_backend_is_made_by_name_with_options() -> None:
+    made = backend("pinocchio", chain(2), validate=False)
+    assert isinstance(made, Backend)
+    assert made.name == "pinocchio"
+    assert made._validate is False
+
+
+def test_listing_imports_no_engine() -> None:
+    program = (
+        "import sys; import dynx.backends as b; b.backend_names(); "
+        "b.backend_class('reference'); "
+        "print(sorted({'pinocchio', 'pybullet', 'mujoco', 'pydrake'} & sys.modules.keys()))"
+    )
+    found = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert found.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("engine", ["pinocchio", "pybullet"])
+def test_a_backend_without_its_engine_is_known_but_not_installed(
+    engine: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, engine, None)
+    monkeypatch.delitem(sys.modules, f"dynx.backends.{engine}", raising=False)
+    assert engine in backend_names()
+    assert engine not in installed_backends()
+    with pytest.raises(NotInstalledError, match=f"the backend '{engine}' needs"):
+        backend(engine, chain(1))
+
+
+@pytest.mark.parametrize(
+    ("name", "hint"),
+    [
+        ("pinochio", "did you mean 'pinocchio'"),
+        ("Bullet", "did you mean 'pybullet'"),
+        ("drake", "known: reference, pinocchio, pybullet"),
+        ("", "known: reference"),
+        ("x" * 10_000, r"\(10000 characters\)"),
+    ],
+)
+def test_an_unknown_name_is_answered_with_the_nearest(
+    name: str, hint: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _offer(monkeypatch)
+    with pytest.raises(UnknownBackendError, match=hint):
+        backend(name, chain(1))
+
+
+@pytest.mark.parametrize("name", [None, 3, ["pinocchio"], ReferenceBackend])
+def test_a_name_must_be_text(name: Any) -> None:
+    with pytest.raises(ArgumentError, match=r"a backend's name is of type \w+; wanted a str"):
+        backend(name, chain(1))
+
+
+@pytest.mark.parametrize(
+    ("model", "hint"),
+    [("ur5", r"type str; wanted a Model, such as dynx\.load\('ur5'\)"), (None, r"type NoneType.*dynx\.load")],
+)
+def test_what_is_no_model_is_answered_with_how_to_make_one(model: Any, hint: str) -> None:
+    with pytest.raises(ArgumentError, match=hint):
+        backend("reference", model)
+
+
+def test_an_unknown_option_is_answered_with_those_there_are() -> None:
+    with pytest.raises(ArgumentError, match="'valdate'; its options: validate"):
+        backend("pinocchio", chain(1), valdate=False)
+
+
+# -- backends of a program --------------------------------------------------------------------
+
+
+def test_a_program_can_register_its_own(mine: str) -> None:
+    assert mine in backend_names()
+    assert mine in installed_backends()
+    assert type(backend(mine, chain(1))) is Mine
+
+
+def test_what_was_registered_can_be_taken_back(mine: str) -> None:
+    unregister(mine)
+    assert mine not in backend_names()
+    with pytest.raises(UnknownBackendError, match="was registered"):
+        unregister(mine)
+    register(mine, lambda: Mine)
+
+
+def test_a_name_that_is_taken_is_refused(mine: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    _offer(monkeypatch, theirs="some.package:Theirs")
+    for taken in (*BUILT_IN, mine, "theirs"):
+        with pytest.raises(ArgumentError, match=f"'{taken}' is taken"):
+            register(taken, lambda: Mine)
+    assert backend_class("reference") is ReferenceBackend
+
+
+@pytest.mark.parametrize("name", ["", None, 3])
+def test_a_registered_name_must_be_text(name: Any) -> None:
+    with pytest.raises(ArgumentError, match="wanted a str that is not empty"):
+        register(name, lambda: Mine)
+
+
+def test_a_loader_must_be_callable() -> None:
+    with pytest.raises(ArgumentError, match="of type str, not callable"):
+        register("mine", "package:Mine")  # type: ignore[arg-type]
+    assert "mine" not in backend_names()
+
+
+@pytest.mark.parametrize("loaded", [None, 3, dict, ReferenceBackend(chain(1))])
+def test_what_is_loaded_must_be_a_backend(loaded: Any) -> None:
+    register("odd", lambda: loaded)
+    try:
+        with pytest.raises(BackendError, match=r"'odd', provided by this program, .*no subclass"):
+            backend_class("odd")
+        assert "odd" not in installed_backends()
+    finally:
+        unregister("odd")
+
+
+# -- entry points of other packages -----------------------------------------------------------
+
+
+def test_entry_points_add_backends(monkeypatch: pytest.MonkeyPatch) -> None:
+    _offer(monkeypatch, theirs=f"{__name__}:Mine")
+    assert backend_names() == (*BUILT_IN, "theirs")
+    assert backend_class("theirs") is Mine
+
+
+def test_an_entry_point_cannot_take_the_name_of_a_built_in(monkeypatch: pytest.MonkeyPatch) -> None:
+    _offer(monkeypatch, reference=f"{__name__}:Mine")
+    assert backend_class("reference") is ReferenceBackend
+    assert backend_names() == BUILT_IN
+
+
+def test_a_broken_entry_point_is_named_only_when_it_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    _offer(monkeypatch, broken="no_such_package.backends:Theirs", absent=f"{__name__}:Absent")
+    assert backend_names() == (*BUILT_IN, "absent", "broken")
+    assert not {"absent", "broken"} & set(installed_backends())
+    backend("reference", chain(1))
+    for name, cause in (("broken", ModuleNotFoundError), ("absent", AttributeError)):
+        with pytest.raises(
+            BackendError,
+            match=rf"'{name}', provided by the entry point .* cannot be loaded: {cause.__name__}",
+        ) as caught:
+            backend(name, chain(1))
+        assert type(caught.value.__cause__) is cause
+
+
+def test_a_missing_engine_of_another_package_stays_not_installed(monkeypatch: pytest.MonkeyPatch) -> None:
+    def missing() -> type[Backend]:
+        raise NotInstalledError("the backend 'far' needs the package far")
+
+    register("far", missing)
+    try:
+        with pytest.raises(NotInstalledError, match="needs the package far"):
+            backend_class("far")
+        assert "far" not in installed_backends()
+    finally:
+        unregister("far")
+
+
+def test_two_packages_with_one_name_are_both_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    points = EntryPoints(
+        EntryPoint("theirs", value, registry.GROUP) for value in ("one.package:A", "other.package:B")
+    )
+    monkeypatch.setattr(registry, "entry_points", lambda *, group: points)
+    with pytest.raises(BackendError, match=r"more than once.*one\.package:A.*and.*other\.package:B"):
+        backend_class("theirs")
+    assert backend_names() == (*BUILT_IN, "theirs")

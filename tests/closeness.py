@@ -1,0 +1,112 @@
+"""Closeness as `dynx.agreement` judges it: error over natural size, against the derived tolerance.
+
+No test has a tolerance of its own; this is how they use those of `dynx.agreement.tolerances`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dynx.agreement import tolerances
+from dynx.agreement.comparison import judge
+from dynx.agreement.magnitudes import Magnitudes
+from dynx.agreement.quantities import QUANTITIES
+from dynx.agreement.sampling import Kind, Samples, deal
+from dynx.model import Model
+from dynx.spatial.scalar import Floats
+
+ANYWHERE: Kind = "anywhere"
+BY_NAME = {quantity.name: quantity for quantity in QUANTITIES}
+
+
+def samples_at(
+    model: Model,
+    q: ArrayLike,
+    v: ArrayLike | None = None,
+    a: ArrayLike | None = None,
+    tau: ArrayLike | None = None,
+    wrench: ArrayLike | None = None,
+    frame: str | None = None,
+    references: int = 3,
+) -> Samples:
+    """The samples of given states: q (n, nq) or (nq,), the others alike, zero where not given.
+
+    Every frame is asked for at every sample, in every reference or, in turns, in fewer.
+    """
+    q = np.atleast_2d(np.asarray(q, dtype=float))
+    n = len(q)
+
+    def rows(x: ArrayLike | None, width: int) -> Floats:
+        return np.array(np.broadcast_to(0.0 if x is None else np.asarray(x, dtype=float), (n, width)))
+
+    questions = deal(model.frame_names, n, each=n, references=references)
+    return Samples(
+        model=model,
+        index=np.arange(n),
+        kinds=(ANYWHERE,) * n,
+        q=q,
+        v=rows(v, model.nv),
+        a=rows(a, model.nv),
+        tau=rows(tau, model.nv),
+        wrench=rows(wrench, 6),
+        wrench_frame=frame or model.frame_names[-1],
+        every_frame=questions,
+        derivatives=questions,
+    )
+
+
+class Closeness:
+    """Judges answers at the given samples; one sample (nq,) or several (n, nq)."""
+
+    def __init__(self, samples: Samples) -> None:
+        self.samples = samples
+        self.sizes = Magnitudes(samples)
+
+    def check(self, quantity: str, got: ArrayLike, wanted: ArrayLike) -> None:
+        """Assert that two answers to `quantity` (for frames: about one frame) are the same."""
+        got, wanted = np.asarray(got), np.asarray(wanted)
+        assert got.shape == wanted.shape, f"{quantity}: shape {got.shape}, wanted {wanted.shape}"
+        asked = BY_NAME[quantity]
+        tolerance = asked.tolerance(self.sizes)
+        self._assert_small(quantity, got - wanted, self._scale(quantity), tolerance, got, wanted)
+
+    def check_rate(self, quantity: str, got: ArrayLike, wanted: ArrayLike) -> None:
+        """The same where one of the two is a numerical derivative of that quantity along the motion."""
+        got, wanted = np.asarray(got), np.asarray(wanted)
+        scale = self._scale(quantity)
+        rate = scale * self.sizes.frequency.reshape(-1, *([1] * (scale.ndim - 1)))
+        tolerance = tolerances.derivative(self.sizes.depth)
+        self._assert_small(f"rate of {quantity}", got - wanted, rate, tolerance, got, wanted)
+
+    def check_solves(self, a: ArrayLike, tau_of_a: ArrayLike, tau: ArrayLike) -> None:
+        """Assert that forward dynamics' `a` takes the torque that was asked for (backward error)."""
+        a, tau_of_a, tau = np.atleast_2d(a), np.atleast_2d(tau_of_a), np.atleast_2d(tau)
+        scale = self.sizes.solved_torque(a)[:, None]
+        tolerance = tolerances.solving(self.sizes.depth, self.samples.model.nv)
+        self._assert_small("forward_dynamics", tau_of_a - tau, scale, tolerance, tau_of_a, tau)
+
+    def _scale(self, quantity: str) -> Floats:
+        """The natural size at each sample, for one frame."""
+        asked = BY_NAME[quantity]
+        scale = np.asarray(asked.scale(self.sizes))
+        if asked.layout == "frames":
+            return np.asarray(scale[:, 0])
+        return scale if asked.layout == "samples" else np.asarray(scale[0])
+
+    def _assert_small(
+        self,
+        what: str,
+        error: Floats,
+        scale: Floats,
+        tolerance: float,
+        got: Floats,
+        wanted: Floats,
+    ) -> None:
+        if len(self.samples) == 1 and error.ndim == scale.ndim - 1:
+            error = error[None]
+        verdict = judge(error, scale)
+        assert verdict.relative <= tolerance, (
+            f"{what} is off by {verdict.relative:.3g} of its size, more than {tolerance:.3g}, at "
+            f"{verdict.position}\ngot    {got}\nwanted {wanted}"
+        )

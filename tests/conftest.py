@@ -1,0 +1,23 @@
+"""Hypothesis profiles: ``ci`` (200 examples of each property, the default) and ``dev`` (20, for a
+quick look); ``pytest --hypothesis-profile dev`` or ``HYPOTHESIS_PROFILE=dev`` chooses.
+
+Examples are drawn from a fixed seed, so a failure in CI is a failure everywhere; no deadline, since
+the time of one example says more about the machine than about dynx.
+"""
+
+from __future__ import annotations
+
+import os
+
+from hypothesis import HealthCheck, settings
+
+settings.register_profile(
+    "ci",
+    max_examples=200,
+    deadline=None,
+    derandomize=True,
+    print_blob=True,
+    suppress_health_check=[HealthCheck.too_slow],
+)
+settings.register_profile("dev", parent=settings.get_profile("ci"), max_examples=20)
+settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))

@@ -1,0 +1,257 @@
+"""Joint order, what a coordinate means, locked and mimic joints, the floating base."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from scipy.spatial.transform import Rotation
+
+from dynx.agreement.differentiation import time_derivative
+from dynx.errors import UnknownNameError
+from dynx.model import Model, Pose
+from dynx.model.loading import load
+from dynx.spatial.scalar import Floats
+from dynx.testing.strategies import Sample, samples
+from tests.closeness import Closeness, samples_at
+from tests.contract.conftest import Make
+from tests.contract.questions import QUESTIONS, Question, State, random_state
+from tests.contract.robots import JOINT_ORDER, LINK_ORDER, LINKS, branched, followed_elbow, mimicking
+
+BELOW = {
+    "z_shoulder": {"zeta", "plate", "mid", "tool"},
+    "m_wheel": {"mid", "tool"},
+    "a_slide": {"alpha", "beta"},
+    "b_elbow": {"beta"},
+}
+each_base = pytest.mark.parametrize("base", ["fixed", "floating"])
+each_question = pytest.mark.parametrize("question", QUESTIONS, ids=str)
+
+
+def test_order_is_depth_first_in_the_order_of_the_document() -> None:
+    model = branched()
+    assert model.joint_names == JOINT_ORDER
+    assert model.frame_names == LINK_ORDER
+    assert [model.coordinate_index(name) for name in JOINT_ORDER] == [0, 1, 2, 3]
+    assert model.with_base("floating").coordinate_index("m_wheel") == 7
+
+
+@each_base
+def test_a_coordinate_moves_what_is_below_its_joint_along_its_axis(make: Make, base: str) -> None:
+    """Which frames move, and that the child moves by the coordinate about or along the axis."""
+    model = branched() if base == "fixed" else branched().with_base("floating")
+    engine = make(model)
+    for seed in range(3):
+        q = random_state(model, seed).q
+        close = Closeness(samples_at(model, q))
+        for name in JOINT_ORDER:
+            joint, step = model.joint(name), 0.7
+            moved = q.copy()
+            moved[model.nq - model.nv + model.coordinate_index(name)] += step
+            for frame in model.frame_names:
+                before, after = (engine.forward_kinematics(x, frame) for x in (q, moved))
+                if frame not in BELOW[name]:
+                    close.check("forward_kinematics", after, before)
+                elif frame == joint.child:
+                    motion = np.eye(4)
+                    if joint.type == "prismatic":
+                        motion[:3, 3] = step * np.array(joint.axis)
+                    else:
+                        motion[:3, :3] = Rotation.from_rotvec(step * np.array(joint.axis)).as_matrix()
+                    close.check("forward_kinematics", after, before @ motion)
+                else:
+                    assert not np.array_equal(after, before)
+
+
+@each_base
+def test_at_zero_frames_are_where_the_description_puts_them(make: Make, base: str) -> None:
+    model = branched() if base == "fixed" else branched().with_base("floating")
+    engine = make(model)
+    wanted = {model.root: np.eye(4)}
+    for joint in model.joints:
+        origin = np.eye(4)
+        origin[:3, :3] = Rotation.from_euler("xyz", joint.origin.rpy).as_matrix()
+        origin[:3, 3] = joint.origin.xyz
+        wanted[joint.child] = wanted[joint.parent] @ origin
+    q = model.neutral()
+    close = Closeness(samples_at(model, q))
+    for frame, pose in wanted.items():
+        close.check("forward_kinematics", engine.forward_kinematics(q, frame), pose)
+
+
+def test_a_continuous_joint_is_one_unbounded_angle(make: Make) -> None:
+    model = branched()
+    engine, wheel = make(model), model.coordinate_index("m_wheel")
+    assert (model.lower[wheel], model.upper[wheel]) == (-np.inf, np.inf)
+    state = random_state(model, 21, (3,))
+    turned = state.q.copy()
+    turned[:, wheel] += 2 * np.pi
+    for question in QUESTIONS:
+        answer = question.ask(engine, State(turned, state.v, state.a, state.tau))
+        question.check(engine, state, answer, question.ask(engine, state))
+
+
+@each_base
+def test_velocity_is_the_rate_of_the_pose(make: Make, base: str) -> None:
+    """Along `integrate`, which holds the conventions of q and v together."""
+    model = branched() if base == "fixed" else branched().with_base("floating")
+    engine = make(model)
+
+    @given(samples(model))
+    def holds(state: Sample) -> None:
+        q, v, _ = state
+        close = Closeness(samples_at(model, q, v))
+        frequency = close.sizes.frequency
+
+        def poses(t: Floats) -> Floats:
+            return engine.forward_kinematics(model.integrate(q, v * t[..., None]))
+
+        rates = time_derivative(poses, frequency)[0]
+        for frame, rate in zip(model.frame_names, rates, strict=True):
+            twist, T = engine.frame_velocity(q, v, frame), engine.forward_kinematics(q, frame)
+            wanted = np.zeros((4, 4))
+            wanted[:3, :3] = np.cross(twist[3:], T[:3, :3].T).T
+            wanted[:3, 3] = twist[:3]
+            close.check_rate("forward_kinematics", rate, wanted)
+
+    holds()
+
+
+class TestFloatingBase:
+    """q[:3] position, q[3:7] quaternion xyzw; v[:3] linear, v[3:6] angular, in the base frame."""
+
+    model = branched().with_base("floating")
+
+    def test_pose_of_the_base(self, make: Make) -> None:
+        engine = make(self.model)
+        for seed in range(5):
+            q = random_state(self.model, seed).q
+            wanted = np.eye(4)
+            wanted[:3, :3] = Rotation.from_quat(q[3:7]).as_matrix()
+            wanted[:3, 3] = q[:3]
+            close = Closeness(samples_at(self.model, q))
+            close.check("forward_kinematics", engine.forward_kinematics(q, "trunk"), wanted)
+
+    def test_velocity_of_the_base_is_in_the_base_frame(self, make: Make) -> None:
+        engine = make(self.model)
+        for seed in range(5):
+            q, v = (getattr(random_state(self.model, seed), name) for name in "qv")
+            close = Closeness(samples_at(self.model, q, v))
+            close.check("frame_velocity", engine.frame_velocity(q, v, "trunk", reference="local"), v[:6])
+            wanted = np.eye(6, self.model.nv)
+            close.check("jacobian", engine.jacobian(q, "trunk", reference="local"), wanted)
+
+    def test_neutral_is_at_the_worlds_frame(self, make: Make) -> None:
+        q = self.model.neutral()
+        close = Closeness(samples_at(self.model, q))
+        close.check("forward_kinematics", make(self.model).forward_kinematics(q, "trunk"), np.eye(4))
+
+    @each_question
+    def test_both_quaternions_of_an_attitude_are_one(self, make: Make, question: Question) -> None:
+        engine, state = make(self.model), random_state(self.model, 22, (3,))
+        other = state.q.copy()
+        other[:, 3:7] *= -1.0
+        answer = question.ask(engine, State(other, state.v, state.a, state.tau))
+        question.check(engine, state, answer, question.ask(engine, state))
+
+    def test_a_base_that_is_held_is_a_fixed_base(self, make: Make) -> None:
+        """Without motion of the base, the joints see the torques that they see on a fixed base."""
+        fixed = branched()
+        state = random_state(fixed, 23, (4,))
+        q = np.concatenate([np.tile([0.0, 0, 0, 0, 0, 0, 1], (4, 1)), state.q], axis=1)
+        v, a = (np.concatenate([np.zeros((4, 6)), x], axis=1) for x in (state.v, state.a))
+        tau = make(self.model).inverse_dynamics(q, v, a)[:, 6:]
+        close = Closeness(samples_at(fixed, state.q, state.v, state.a))
+        close.check("inverse_dynamics", make(fixed).inverse_dynamics(state.q, state.v, state.a), tau)
+
+
+class TestLockedJoints:
+    """A locked joint leaves q; the robot moves as the whole one does with that joint held."""
+
+    whole = branched()
+    value = 0.25
+    locked = load(whole, lock={"a_slide": value})
+    kept = (0, 1, 3)
+
+    def test_it_leaves_the_coordinates(self) -> None:
+        assert self.locked.joint_names == ("z_shoulder", "m_wheel", "b_elbow")
+        assert self.locked.frame_names == self.whole.frame_names
+        with pytest.raises(UnknownNameError, match="locked"):
+            self.locked.coordinate_index("a_slide")
+
+    def test_all_else_is_as_it_was(self, make: Make) -> None:
+        whole, locked = make(self.whole), make(self.locked)
+        state = random_state(self.locked, 24, (4,))
+        q = np.insert(state.q, 2, self.value, axis=1)
+        v, a = (np.insert(x, 2, 0.0, axis=1) for x in (state.v, state.a))
+        close = Closeness(samples_at(self.locked, state.q, state.v, state.a))
+        for frame in self.whole.frame_names:
+            pose = whole.forward_kinematics(q, frame)
+            close.check("forward_kinematics", locked.forward_kinematics(state.q, frame), pose)
+            J = whole.jacobian(q, frame)[..., list(self.kept)]
+            close.check("jacobian", locked.jacobian(state.q, frame), J)
+        tau = whole.inverse_dynamics(q, v, a)[:, list(self.kept)]
+        close.check("inverse_dynamics", locked.inverse_dynamics(state.q, state.v, state.a), tau)
+        M = whole.mass_matrix(q)[:, self.kept][:, :, self.kept]
+        close.check("mass_matrix", locked.mass_matrix(state.q), M)
+
+
+class TestMimicJoints:
+    """A mimic joint leaves q, and the robot obeys the reduced dynamics S' (...) S."""
+
+    free = branched()
+    S = np.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 1], [0, 2.0, 0]])
+    offset = np.array([0.0, 0.0, 0.0, 0.3])
+
+    def test_it_leaves_the_coordinates(self) -> None:
+        model = mimicking()
+        assert model.joint_names == ("z_shoulder", "m_wheel", "a_slide")
+        with pytest.raises(UnknownNameError, match="m_wheel"):
+            model.coordinate_index("b_elbow")
+
+    @each_question
+    def test_reduced_answers(self, make: Make, question: Question) -> None:
+        if question.options.get("joint_dynamics") or question.method == "forward_dynamics":
+            pytest.skip("not a projection of the answer of the free robot")
+        model = mimicking()
+        state = random_state(model, 25, (4,))
+        free = State(
+            state.q @ self.S.T + self.offset, state.v @ self.S.T, state.a @ self.S.T, state.tau @ self.S.T
+        )
+        # What is asked about a frame is about the one that the mimic joint moves.
+        assert model.frame_names[-1] == self.free.frame_names[-1] == "beta"
+        answer = question.ask(make(self.free), free)
+        wide, narrow = question.tail(self.free), question.tail(model)
+        if wide[-1:] != narrow[-1:]:
+            answer = answer @ self.S
+        if wide[:-1] != narrow[:-1]:
+            answer = self.S.T @ answer
+        question.check(make(model), state, question.ask(make(model), state), answer)
+
+    def test_forward_dynamics_gives_what_inverse_dynamics_took(self, make: Make) -> None:
+        model = mimicking()
+        engine, state = make(model), random_state(model, 26, (4,))
+        a = engine.forward_dynamics(state.q, state.v, state.tau)
+        close = Closeness(samples_at(model, state.q, state.v, tau=state.tau))
+        close.check_solves(a, engine.inverse_dynamics(state.q, state.v, a), state.tau)
+
+    def test_a_joint_that_follows_with_ratio_zero_stands_still(self, make: Make) -> None:
+        model = Model.build("still", LINKS, followed_elbow(0.0, 0.3))
+        held = load(branched().with_gravity(model.gravity), lock={"b_elbow": 0.3})
+        state = random_state(model, 27, (3,))
+        close = Closeness(samples_at(model, state.q, state.v, state.a))
+        tau = make(held).inverse_dynamics(state.q, state.v, state.a)
+        close.check("inverse_dynamics", make(model).inverse_dynamics(state.q, state.v, state.a), tau)
+
+
+def test_frames_can_be_added(make: Make) -> None:
+    """A named frame on a link, with an origin of its own."""
+    placement = Pose((0.1, -0.2, 0.3), (0.4, 0.5, -0.6))
+    model = branched().with_base("floating").with_frame("grip", "tool", placement)
+    engine, q = make(model), random_state(model, 28).q
+    offset = np.eye(4)
+    offset[:3, :3] = Rotation.from_euler("xyz", placement.rpy).as_matrix()
+    offset[:3, 3] = placement.xyz
+    wanted = engine.forward_kinematics(q, "tool") @ offset
+    close = Closeness(samples_at(model, q))
+    close.check("forward_kinematics", engine.forward_kinematics(q, "grip"), wanted)

@@ -1,0 +1,70 @@
+"""`import dynx` imports no engine and changes nothing global."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+HEAVY = ("pinocchio", "pybullet", "mujoco", "hypothesis", "mpmath", "rich", "click", "scipy", "numpy")
+ENGINES = ("pinocchio", "pybullet", "mujoco", "pydrake")
+
+
+def modules_after(program: str) -> set[str]:
+    """The top-level modules that a fresh interpreter holds after `program`."""
+    report = "import sys; print(' '.join({name.partition('.')[0] for name in sys.modules}))"
+    done = subprocess.run(
+        [sys.executable, "-c", f"{program}\n{report}"], capture_output=True, text=True, check=True
+    )
+    assert done.stderr == ""
+    return set(done.stdout.split())
+
+
+def test_import_dynx_imports_nothing_heavy() -> None:
+    assert modules_after("import dynx").isdisjoint(HEAVY)
+
+
+@pytest.mark.parametrize(
+    "program",
+    [
+        "import dynx; dynx.load, dynx.backend, dynx.Model, dynx.installed_backends",
+        "import dynx.backends, dynx.model, dynx.rbd, dynx.ik",
+        "import dynx.agreement",
+        "import dynx.cli.main",
+        "import dynx; dynx.backend('reference', dynx.load('<robot name=\"r\"><link name=\"l\"/></robot>'))",
+    ],
+)
+def test_no_engine_is_imported_before_it_is_asked_for(program: str) -> None:
+    assert modules_after(program).isdisjoint(ENGINES)
+
+
+def test_everything_exported_exists() -> None:
+    import dynx
+
+    for name in dynx.__all__:
+        assert getattr(dynx, name) is not None
+    assert set(dynx.__all__) <= set(dir(dynx))
+    with pytest.raises(AttributeError, match="nothing_of_the_kind"):
+        dynx.nothing_of_the_kind  # noqa: B018
+
+
+def test_importing_changes_no_global_state() -> None:
+    program = """
+import locale, os, random, signal, sys, warnings
+import numpy as np
+
+def state():
+    return (
+        np.geterr(), np.get_printoptions(), np.random.get_state()[1].tolist(), random.getstate(),
+        list(warnings.filters), signal.getsignal(signal.SIGINT), dict(os.environ), list(sys.path),
+        locale.getlocale(), sys.getrecursionlimit(), os.getcwd(),
+    )
+
+before = state()
+import dynx
+dynx.load, dynx.backend, dynx.agree
+after = state()
+assert before == after, [pair for pair in zip(before, after) if pair[0] != pair[1]]
+"""
+    modules_after(program)

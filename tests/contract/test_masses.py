@@ -1,0 +1,134 @@
+"""Links without mass, and inertias that no body can have: the numbers of the file as they stand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dynx.errors import SingularMassMatrixError
+from dynx.model import Inertial, Joint, Link, Model, Pose
+from tests.closeness import Closeness, samples_at
+from tests.contract.conftest import Make
+from tests.contract.questions import QUESTIONS, Question, random_state
+from tests.contract.robots import JOINTS, LINKS, body, branched, hinge
+
+MASSLESS = {"no inertial": None, "zero inertial": Inertial()}
+each_massless = pytest.mark.parametrize("inertial", MASSLESS.values(), ids=MASSLESS.keys())
+
+
+@each_massless
+@pytest.mark.parametrize("question", QUESTIONS, ids=str)
+@pytest.mark.parametrize("base", ["fixed", "floating"])
+def test_a_link_without_inertial_has_no_mass(
+    make: Make, base: str, question: Question, inertial: Inertial | None
+) -> None:
+    """Massless links welded on change no answer."""
+    extra_links = [Link("flag", inertial), Link("pole", inertial)]
+    extra_joints = [
+        Joint("pole_weld", "fixed", "trunk", "pole", Pose((0.5, 0.0, 1.0))),
+        Joint("flag_weld", "fixed", "pole", "flag", Pose((0.0, 0.3, 0.2), (0.1, 0.2, 0.3))),
+    ]
+    plain = branched() if base == "fixed" else branched().with_base("floating")
+    decked = Model.build(
+        "decked", [*extra_links, *LINKS], [*extra_joints, *JOINTS], base=plain.base, gravity=plain.gravity
+    )
+    assert plain.frame_names[-1] == decked.frame_names[-1]
+    state = random_state(plain, 51, (3,))
+    answer = question.ask(make(decked), state)
+    question.check(make(decked), state, answer, question.ask(make(plain), state))
+
+
+@each_massless
+def test_a_massless_link_on_a_joint(make: Make, inertial: Inertial | None) -> None:
+    """No torque moves it; forward dynamics has no answer and says which joint is to blame."""
+    engine = make(hinge(inertial))
+    np.testing.assert_array_equal(engine.mass_matrix([0.4]), [[0.0]])
+    np.testing.assert_array_equal(engine.inverse_dynamics([0.4], [1.0], [2.0]), [0.0])
+    np.testing.assert_array_equal(engine.gravity_torque([0.4]), [0.0])
+    np.testing.assert_array_equal(engine.kinetic_energy([0.4], [1.0]), 0.0)
+    with pytest.raises(SingularMassMatrixError, match="hinge"):
+        engine.forward_dynamics([0.4], [1.0], [0.0])
+
+
+def test_a_massless_link_between_two_bodies(make: Make) -> None:
+    """As in a wrist of two crossed axes: solvable, though the link between has no mass."""
+    links = [Link("ground"), Link("cross"), Link("end", body(1.0, 0.1, 0.05, 0.3))]
+    joints = [
+        Joint("first", "continuous", "ground", "cross", axis=(1.0, 0.0, 0.0)),
+        Joint("second", "continuous", "cross", "end", axis=(0.0, 1.0, 0.0)),
+    ]
+    model = Model.build("wrist", links, joints)
+    engine, state = make(model), random_state(model, 52, (4,))
+    a = engine.forward_dynamics(state.q, state.v, state.tau)
+    close = Closeness(samples_at(model, state.q, state.v, tau=state.tau))
+    close.check_solves(a, engine.inverse_dynamics(state.q, state.v, a), state.tau)
+
+
+def test_a_massless_root_floats(make: Make) -> None:
+    """The base frame moves freely although its own link weighs nothing."""
+    links = [Link("root"), Link("block", body(2.0, 0.1, 0.0, 0.2))]
+    weld = Joint("weld", "fixed", "root", "block", Pose((0.1, 0.2, 0.3), (0.4, 0.5, 0.6)))
+    model = Model.build("hull", links, [weld], base="floating")
+    engine, state = make(model), random_state(model, 53)
+    a = engine.forward_dynamics(state.q, state.v, state.tau)
+    close = Closeness(samples_at(model, state.q, state.v, tau=state.tau))
+    close.check_solves(a, engine.inverse_dynamics(state.q, state.v, a), state.tau)
+    fall = engine.forward_dynamics(model.neutral(), np.zeros(6), np.zeros(6))
+    close = Closeness(samples_at(model, model.neutral()))
+    close.check_solves(fall, np.zeros(6), np.zeros(6))
+    weight = engine.mass_matrix(model.neutral()) @ np.array([0, 0, -9.81, 0, 0, 0])
+    close.check("gravity_torque", engine.gravity_torque(model.neutral()), -weight)
+
+
+IMPOSSIBLE = {
+    "triangle inequality broken": (0.01, 0.5, 0.02),
+    "broken by rounding": (0.1, 0.2, 0.3000000000000001),
+    "one negative moment": (0.2, -0.3, 0.4),
+    "all negative": (-0.1, -0.2, -0.3),
+    "zero but for one": (0.0, 0.7, 0.0),
+}
+
+
+@pytest.mark.parametrize("moments", IMPOSSIBLE.values(), ids=IMPOSSIBLE.keys())
+@pytest.mark.parametrize("axis", range(3))
+def test_an_inertia_that_no_body_can_have_is_used_as_it_stands(
+    make: Make, axis: int, moments: tuple[float, float, float]
+) -> None:
+    """On a hinge, M = I_axis + m d^2 whatever the other moments are."""
+    unit = np.eye(3)[axis]
+    center = np.roll([0.0, 0.3, 0.4], axis)
+    ixx, iyy, izz = moments
+    inertial = Inertial(2.0, Pose(tuple(center.tolist())), ixx=ixx, iyy=iyy, izz=izz)
+    model = hinge(inertial, tuple(unit.tolist())).with_gravity((0.0, 0.0, 0.0))
+    distance2 = float(center @ center - (center @ unit) ** 2)
+    wanted = moments[axis] + 2.0 * distance2
+    engine = make(model)
+    close = Closeness(samples_at(model, [0.6], [0.5], [1.5]))
+    close.check("mass_matrix", engine.mass_matrix([0.6]), np.array([[wanted]]))
+    tau = engine.inverse_dynamics([0.6], [0.5], [1.5])
+    close.check("inverse_dynamics", tau, np.array([1.5 * wanted]))
+
+
+def test_impossible_products_of_inertia(make: Make) -> None:
+    """A tensor with a negative principal moment, on a floating base, where each of its entries shows."""
+    tensor = np.array([[0.4, 0.3, -0.2], [0.3, -0.5, 0.25], [-0.2, 0.25, 0.6]])
+    inertial = Inertial(
+        1.5,
+        ixx=tensor[0, 0],
+        iyy=tensor[1, 1],
+        izz=tensor[2, 2],
+        ixy=tensor[0, 1],
+        ixz=tensor[0, 2],
+        iyz=tensor[1, 2],
+    )
+    model = Model.build("odd", [Link("odd", inertial)], [], base="floating", gravity=(0.0, 0.0, 0.0))
+    engine, state = make(model), random_state(model, 54)
+    wanted = np.zeros((6, 6))
+    wanted[:3, :3], wanted[3:, 3:] = 1.5 * np.eye(3), tensor
+    close = Closeness(samples_at(model, state.q, state.v, state.a))
+    close.check("mass_matrix", engine.mass_matrix(state.q), wanted)
+    v, a = state.v, state.a
+    force = 1.5 * (a[:3] + np.cross(v[3:], v[:3]))
+    moment = tensor @ a[3:] + np.cross(v[3:], tensor @ v[3:])
+    tau = engine.inverse_dynamics(state.q, v, a)
+    close.check("inverse_dynamics", tau, np.concatenate([force, moment]))

@@ -1,0 +1,98 @@
+"""Leading axes are batch everywhere and broadcast; one sample in, one sample out."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dynx.model import Link, Model
+from tests.contract.conftest import Make
+from tests.contract.questions import QUESTIONS, Question, State, random_state
+from tests.contract.robots import body, branched, mimicking
+
+MODELS = {
+    "fixed": branched(),
+    "floating": branched().with_base("floating"),
+    "mimicking": mimicking(),
+    "without_joints": Model.build("block", [Link("block", body(1.0))], []),
+}
+SIZES = ((), (1,), (3,), (2, 3), (0,), (2, 0))
+
+each_model = pytest.mark.parametrize("model", MODELS.values(), ids=MODELS.keys())
+each_question = pytest.mark.parametrize("question", QUESTIONS, ids=str)
+
+
+@each_model
+@each_question
+def test_shape_and_type_for_every_size_of_batch(make: Make, model: Model, question: Question) -> None:
+    engine = make(model)
+    for size in SIZES:
+        answer = question.ask(engine, random_state(model, 1, size))
+        assert type(answer) is np.ndarray or size == (), f"{type(answer)} for {size}"
+        assert np.shape(answer) == (*size, *question.tail(model))
+        assert np.asarray(answer).dtype == np.float64
+        assert np.isfinite(answer).all()
+
+
+@each_model
+@each_question
+def test_a_batch_is_its_samples(make: Make, model: Model, question: Question) -> None:
+    engine = make(model)
+    state = random_state(model, 2, (3,))
+    together = question.ask(engine, state)
+    one_by_one = [
+        question.ask(engine, State(*row)) for row in zip(state.q, state.v, state.a, state.tau, strict=True)
+    ]
+    question.check(engine, state, together, np.stack(one_by_one))
+
+
+@pytest.mark.parametrize("base", ["fixed", "floating"])
+@each_question
+def test_leading_axes_broadcast(make: Make, base: str, question: Question) -> None:
+    model = MODELS[base]
+    engine = make(model)
+    whole = random_state(model, 3, (2, 3))
+    apart = State(whole.q[:, :1], whole.v[0], whole.a[0, 0], whole.tau[0, 0])
+    answer = question.ask(engine, apart)
+    shapes = {"q": (2, 1), "v": (3,), "a": (), "tau": ()}
+    batch = np.broadcast_shapes(*(shapes[argument] for argument in question.arguments))
+    assert answer.shape == (*batch, *question.tail(model))
+    spread = apart.map(lambda x: np.broadcast_to(x, (2, 3, x.shape[-1])).reshape(6, -1))
+    answers = np.broadcast_to(answer, (2, 3, *question.tail(model)))
+    question.check(engine, spread, answers.reshape(6, *question.tail(model)), question.ask(engine, spread))
+
+
+@each_model
+def test_poses_of_several_frames(make: Make, model: Model) -> None:
+    engine = make(model)
+    names = [model.frame_names[-1], model.frame_names[0]]
+    for size in SIZES:
+        q = random_state(model, 4, size).q
+        every = engine.forward_kinematics(q)
+        assert every.shape == (*size, len(model.frame_names), 4, 4)
+        some = engine.forward_kinematics(q, names)
+        assert some.shape == (*size, 2, 4, 4)
+        np.testing.assert_array_equal(some, every[..., [-1, 0], :, :])
+        assert engine.forward_kinematics(q, []).shape == (*size, 0, 4, 4)
+
+
+@each_model
+def test_one_frame_is_that_of_all_frames(make: Make, model: Model) -> None:
+    engine = make(model)
+    state = random_state(model, 5, (4,))
+    every = engine.forward_kinematics(state.q)
+    for index, name in enumerate(model.frame_names):
+        one = engine.forward_kinematics(state.q, name)
+        QUESTIONS[0].check(engine, state, one, every[:, index])
+
+
+def test_a_batch_of_wrenches(make: Make) -> None:
+    model = MODELS["floating"]
+    engine = make(model)
+    state = random_state(model, 6)
+    wrenches = np.random.default_rng(6).uniform(-3.0, 3.0, (4, 6))
+    together = engine.inverse_dynamics(state.q, state.v, state.a, external_forces={"tool": wrenches})
+    assert together.shape == (4, model.nv)
+    for wrench, torque in zip(wrenches, together, strict=True):
+        alone = engine.inverse_dynamics(state.q, state.v, state.a, external_forces={"tool": wrench})
+        np.testing.assert_array_equal(torque, alone)

@@ -1,0 +1,160 @@
+"""What cannot be used is refused by name; what is merely unusual has a sensible answer."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dynx.backends import Backend, backend, installed_backends
+from dynx.errors import ArgumentError, ClosedError, DTypeError, NotFiniteError, ShapeError, UnknownNameError
+from dynx.ik import IKResult
+from dynx.model import Link, Model
+from dynx.model.loading import load
+from tests.oracles.closed_form import MODELS
+
+REFLECTION = np.diag([1.0, 1.0, -1.0, 1.0])
+STRETCHED = np.diag([1.0, 1.0, 1.00001, 1.0])
+PROJECTIVE = np.eye(4) + np.eye(4, k=-3)
+
+
+@pytest.fixture
+def engine() -> Iterator[Backend]:
+    with backend("pinocchio", load(MODELS / "six_axis_arm.urdf")) as engine:
+        yield engine
+
+
+@pytest.mark.parametrize(
+    ("target", "error", "says"),
+    [
+        (REFLECTION, ArgumentError, "reflection"),
+        (STRETCHED, ArgumentError, "not orthonormal"),
+        (PROJECTIVE, ArgumentError, "last row"),
+        (np.zeros((4, 4)), ArgumentError, "rigid transform"),
+        (np.stack([np.eye(4), REFLECTION]), ArgumentError, r"target\[1\]"),
+        (np.full((4, 4), np.nan), NotFiniteError, "finite"),
+        (np.array([0.0, np.inf, 0.0]), NotFiniteError, r"target\[1\]"),
+        (np.eye(3)[:, :2], ShapeError, r"\(3, 2\)"),
+        (np.zeros(7), ShapeError, r"\(7,\)"),
+        (1.0, ShapeError, "wanted a pose"),
+        ([[1.0], [1.0, 2.0]], ShapeError, "ragged"),
+        ("flange", DTypeError, "real numbers"),
+        (np.eye(4) * 1j, DTypeError, "complex"),
+    ],
+)
+def test_targets_that_are_none(engine: Backend, target: Any, error: type[Exception], says: str) -> None:
+    with pytest.raises(error, match=says):
+        engine.inverse_kinematics(target, "flange")
+
+
+@pytest.mark.parametrize(
+    ("options", "error"),
+    [
+        ({"q0": np.zeros(5)}, ShapeError),
+        ({"q0": np.full(6, np.nan)}, NotFiniteError),
+        ({"point": [0.0, 1.0]}, ShapeError),
+        ({"point": np.zeros((2, 3))}, ShapeError),
+        ({"position_tolerance": 0.0}, ArgumentError),
+        ({"rotation_tolerance": float("nan")}, ArgumentError),
+        ({"position_tolerance": "small"}, ArgumentError),
+        ({"max_iterations": -1}, ArgumentError),
+        ({"max_restarts": 1.5}, ArgumentError),
+        ({"max_restarts": True}, ArgumentError),
+        ({"rng": "seed"}, ArgumentError),
+        ({"rng": -1}, ArgumentError),
+        ({"method": "newton"}, ArgumentError),
+        ({"method": "engine"}, ArgumentError),
+    ],
+)
+def test_options_that_cannot_be_used(
+    engine: Backend, options: dict[str, Any], error: type[Exception]
+) -> None:
+    with pytest.raises(error):
+        engine.inverse_kinematics(np.eye(4), "flange", **options)
+
+
+def test_axes_that_do_not_broadcast(engine: Backend) -> None:
+    with pytest.raises(ShapeError, match="broadcast"):
+        engine.inverse_kinematics(np.zeros((2, 3)), "flange", np.zeros((3, 6)))
+
+
+@pytest.mark.parametrize("frame", ["flang", None, 3, ["flange"]])
+def test_frames_that_are_not_there(engine: Backend, frame: Any) -> None:
+    with pytest.raises(UnknownNameError):
+        engine.inverse_kinematics(np.eye(4), frame)
+
+
+def test_a_closed_backend_refuses(engine: Backend) -> None:
+    engine.close()
+    with pytest.raises(ClosedError):
+        engine.inverse_kinematics(np.eye(4), "flange")
+
+
+def test_an_empty_batch(engine: Backend) -> None:
+    result = engine.inverse_kinematics(np.zeros((0, 3)), "flange")
+    assert result.q.shape == (0, 6)
+    assert result
+    assert result.message.startswith("0 of 0")
+
+
+@pytest.mark.parametrize("name", installed_backends())
+def test_a_frame_that_nothing_moves(name: str) -> None:
+    for model in (load(MODELS / "six_axis_arm.urdf"), Model.build("stone", [Link("stone")], [])):
+        with backend(name, model) as engine:
+            there = engine.inverse_kinematics(np.eye(4), model.root)
+            elsewhere = engine.inverse_kinematics([0.0, 3.0, 4.0], model.root)
+        assert there.success
+        assert not elsewhere.success
+        assert elsewhere.position_error == 5.0
+        assert there.iterations == elsewhere.iterations == elsewhere.restarts == 0
+        np.testing.assert_array_equal(there.q, model.clip(model.neutral()))
+
+
+def test_a_start_outside_the_limits_is_moved_to_them(engine: Backend) -> None:
+    model = engine.model
+    target = engine.forward_kinematics(model.upper, "flange")
+    result = engine.inverse_kinematics(target, "flange", model.upper + 1.0)
+    assert result.iterations == 0
+    np.testing.assert_array_equal(result.q, model.upper)
+
+
+def test_a_pose_in_single_precision_is_reached(engine: Backend) -> None:
+    target = engine.forward_kinematics(engine.model.random(1), "flange").astype(np.float32)
+    assert engine.inverse_kinematics(target, "flange").success
+
+
+def test_arguments_are_not_written_to(engine: Backend) -> None:
+    target = engine.forward_kinematics(engine.model.random(1), "flange")
+    q_start = engine.model.random(2)
+    before = target.copy(), q_start.copy()
+    result = engine.inverse_kinematics(target, "flange", q_start)
+    result.q[:] = 0.0
+    np.testing.assert_array_equal(target, before[0])
+    np.testing.assert_array_equal(q_start, before[1])
+
+
+def test_without_effort_the_start_is_judged(engine: Backend) -> None:
+    q_start = engine.model.random(1)
+    result = engine.inverse_kinematics(np.eye(4), "flange", q_start, max_iterations=0, max_restarts=0)
+    assert isinstance(result, IKResult)
+    assert not result.success
+    assert result.iterations == 0
+    np.testing.assert_array_equal(result.q, q_start)
+
+
+@pytest.mark.skipif("pybullet" not in installed_backends(), reason="PyBullet is not installed")
+def test_the_engine_s_own_solver_is_judged_like_any_other() -> None:
+    model = load(MODELS / "six_axis_arm.urdf")
+    with backend("pybullet", model) as engine:
+        targets = engine.forward_kinematics(model.random(0, 20), "flange")
+        result = engine.inverse_kinematics(targets, "flange", method="engine", position_tolerance=1e-3)
+        reached = engine.forward_kinematics(result.q, "flange")
+        distance = np.linalg.norm(targets[:, :3, 3] - reached[:, :3, 3], axis=-1)
+        np.testing.assert_allclose(result.position_error, distance, rtol=1e-9)
+        assert (result.q >= model.lower).all()
+        assert (result.q <= model.upper).all()
+        assert not result.success[distance > 1e-3].any()
+        with pytest.raises(ArgumentError, match="poses"):
+            engine.inverse_kinematics(targets[0, :3, 3], "flange", method="engine")

@@ -1,0 +1,133 @@
+"""All files of example-robot-data, and dynx's own, are reachable by names that do not change."""
+
+from __future__ import annotations
+
+from collections import Counter
+from importlib import metadata
+from pathlib import Path
+
+import pytest
+
+from dynx.errors import DescriptionError, RobotNotFoundError
+from dynx.model import library
+from dynx.model.library import EXAMPLE_ROBOT_DATA, OWN_MODELS, find, robots
+from dynx.model.loading import load
+
+EXAMPLES = [entry for entry in robots() if entry.source == EXAMPLE_ROBOT_DATA]
+OWN = [entry for entry in robots() if entry.source == OWN_MODELS]
+
+# The file that each loader of example-robot-data loads.
+LOADERS = {
+    "a1": "a1_description/urdf/a1.urdf",
+    "anymal": "anymal_b_simple_description/robots/anymal.urdf",
+    "anymal_c": "anymal_c_simple_description/urdf/anymal.urdf",
+    "hector": "hector_description/robots/quadrotor_base.urdf",
+    "iris": "iris_description/robots/iris_simple.urdf",
+    "panda": "panda_description/urdf/panda.urdf",
+    "solo12": "solo_description/robots/solo12.urdf",
+    "solo8": "solo_description/robots/solo.urdf",
+    "talos": "talos_data/robots/talos_reduced.urdf",
+    "talos_arm": "talos_data/robots/talos_left_arm.urdf",
+    "ur3": "ur_description/urdf/ur3_robot.urdf",
+    "ur5": "ur_description/urdf/ur5_robot.urdf",
+    "ur5_limited": "ur_description/urdf/ur5_joint_limited_robot.urdf",
+    "xarm7": "xarm_description/urdf/xarm7.urdf",
+    "z1": "z1_description/urdf/z1.urdf",
+}
+
+
+def test_every_installed_file_has_exactly_one_name() -> None:
+    installed = metadata.distribution(EXAMPLE_ROBOT_DATA)
+    files = {Path(str(installed.locate_file(f))) for f in installed.files or [] if f.name.endswith(".urdf")}
+    assert {entry.path.resolve() for entry in EXAMPLES} == {path.resolve() for path in files}
+    assert len(EXAMPLES) == len(files)
+
+
+def test_every_model_of_our_own_has_exactly_one_name() -> None:
+    folder = Path(__file__).resolve().parents[2] / "models"
+    assert {entry.path for entry in OWN} == set(folder.rglob("*.urdf"))
+    assert len(OWN) == len({entry.path for entry in OWN})
+
+
+def test_no_name_means_two_robots() -> None:
+    count = Counter(name for entry in robots() for name in (entry.name, *entry.aliases))
+    assert [name for name, n in count.items() if n > 1] == []
+
+
+def test_names_can_be_typed_and_are_never_taken_for_paths() -> None:
+    for entry in robots():
+        for name in (entry.name, *entry.aliases):
+            assert name.replace("_", "").replace("-", "").replace(".", "").isalnum()
+            assert not name.endswith((".urdf", ".xacro", ".xml"))
+            assert find(name) == entry.path
+
+
+@pytest.mark.parametrize("name", LOADERS)
+def test_short_names_are_those_of_the_loaders(name: str) -> None:
+    assert find(name).as_posix().endswith("/" + LOADERS[name])
+
+
+def test_names_of_files_that_share_a_stem_are_told_apart_by_their_folder() -> None:
+    assert find("ur_description_ur3").name == "ur3.urdf"
+    assert find("iris_description_iris").name == "iris.urdf"
+    assert find("dynx_double_pendulum") != find("double_pendulum")
+
+
+def test_names_do_not_depend_on_the_order_of_the_file_system(monkeypatch: pytest.MonkeyPatch) -> None:
+    before = robots()
+    in_order = library._urdf_files
+    monkeypatch.setattr(library, "_urdf_files", lambda root: in_order(root)[::-1])
+    robots.cache_clear()
+    try:
+        assert robots() == before
+    finally:
+        robots.cache_clear()
+
+
+@pytest.mark.parametrize("entry", robots(), ids=lambda entry: entry.name)
+def test_every_robot_loads_but_the_empty_shell(entry: library.RobotEntry) -> None:
+    if entry.name == "ur_description_ur3":
+        with pytest.raises(DescriptionError, match="the robot has no link"):
+            load(entry.name)
+        return
+    for base, extra in (("fixed", 0), ("floating", 7)):
+        model = load(entry.name, base="floating" if base == "floating" else "fixed")
+        assert model.nq == len(model.joint_names) + extra
+        assert model.total_mass >= 0.0
+        assert model.source == str(entry.path)
+
+
+def test_an_unknown_name_offers_the_nearest() -> None:
+    with pytest.raises(RobotNotFoundError, match=r"no robot 'ur_5'.*did you mean 'ur5'"):
+        find("ur_5")
+
+
+def test_an_empty_library_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(library, "_example_roots", list)
+    monkeypatch.setattr(library, "_own_roots", list)
+    robots.cache_clear()
+    try:
+        assert robots() == ()
+        with pytest.raises(RobotNotFoundError, match="is example-robot-data installed"):
+            find("ur5")
+    finally:
+        robots.cache_clear()
+
+
+def test_the_data_is_found_under_a_prefix_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    robot = tmp_path / "share/example-robot-data/robots/z_description/urdf/zed.urdf"
+    robot.parent.mkdir(parents=True)
+    robot.write_text('<robot name="zed"><link name="base"/></robot>')
+
+    def absent(_: str) -> metadata.Distribution:
+        raise metadata.PackageNotFoundError
+
+    monkeypatch.setattr(library.metadata, "distribution", absent)
+    monkeypatch.setattr(library.sys, "path", [])
+    monkeypatch.setenv("CMAKE_PREFIX_PATH", str(tmp_path))
+    monkeypatch.delenv("AMENT_PREFIX_PATH", raising=False)
+    robots.cache_clear()
+    try:
+        assert find("zed") == robot
+    finally:
+        robots.cache_clear()

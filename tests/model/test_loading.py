@@ -1,0 +1,163 @@
+"""What `load` takes: text, bytes, paths, names, models; and what wins where two could be meant."""
+
+from __future__ import annotations
+
+import codecs
+import os
+from pathlib import Path
+
+import pytest
+
+from dynx.errors import (
+    ArgumentError,
+    DescriptionError,
+    DTypeError,
+    ModelError,
+    NotFiniteError,
+    RobotNotFoundError,
+    UnknownNameError,
+)
+from dynx.model.library import find
+from dynx.model.loading import load
+from tests.model.descriptions import joint, robot
+
+TEXT = joint()
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_text_bytes_and_files_give_equal_models(here: Path) -> None:
+    path = here / "x.urdf"
+    path.write_text(TEXT)
+    ways = [TEXT, "\n \ufeff" + TEXT, TEXT.encode(), codecs.BOM_UTF8 + TEXT.encode(), path, str(path)]
+    ways += ["x.urdf", "./x.urdf", bytearray(TEXT.encode())]  # type: ignore[list-item]
+    assert len({load(way) for way in ways}) == 1
+    assert load(TEXT).source == "<string>"
+    assert load("x.urdf").source == "x.urdf"
+
+
+def test_errors_name_the_file_and_the_line(here: Path) -> None:
+    Path("x.urdf").write_text(robot("<link/>"))
+    with pytest.raises(DescriptionError, match=r"^x\.urdf:2: a <link> has no name"):
+        load("x.urdf")
+
+
+def test_a_name_wins_over_a_file_of_that_name_and_a_path_over_the_name(here: Path) -> None:
+    Path("ur5").write_text(TEXT)
+    assert load("ur5").name == "ur5"
+    assert load("ur5").nq == 6
+    assert load("./ur5").nq == load(Path("ur5")).nq == 1
+
+
+def test_a_suffix_is_never_looked_up_as_a_name(here: Path) -> None:
+    with pytest.raises(RobotNotFoundError, match=r"no such file: 'ur5\.urdf'; the library has 'ur5'"):
+        load("ur5.urdf")
+    Path("ur5.urdf").write_text(TEXT)
+    assert load("ur5.urdf").nq == 1
+
+
+def test_a_bare_name_outside_the_library_may_be_a_file(here: Path) -> None:
+    Path("mine").write_text(TEXT)
+    assert load("mine").nq == 1
+
+
+def test_a_robot_without_a_name_is_named_after_its_file(here: Path) -> None:
+    Path("arm.v2.urdf").write_text(robot('<link name="a"/>', ""))
+    assert load("arm.v2.urdf").name == "arm"
+
+
+def test_the_home_folder_is_expanded(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("HOME", str(here))
+    (here / "x.urdf").write_text(TEXT)
+    assert load("~/x.urdf").nq == 1
+
+
+@pytest.mark.parametrize(
+    "x", ["", " ", "no_such_robot", "a\0b", "x" * 10_000, "\x1b[31m", "robot\n", "nul\0.urdf"]
+)
+def test_what_is_nothing_is_not_found(here: Path, x: str) -> None:
+    with pytest.raises(RobotNotFoundError) as caught:
+        load(x)
+    assert str(caught.value).isprintable()
+    assert len(str(caught.value)) < 1000
+
+
+@pytest.mark.parametrize("x", [".", "/", "folder/"])
+def test_a_directory_is_refused(here: Path, x: str) -> None:
+    Path("folder").mkdir()
+    with pytest.raises((DescriptionError, RobotNotFoundError)):
+        load(x)
+    with pytest.raises(DescriptionError, match="is a directory"):
+        load(Path("folder"))
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no FIFOs")
+def test_a_fifo_is_refused_under_every_suffix(here: Path) -> None:
+    for name in ("pipe.urdf", "pipe.xacro", "pipe"):
+        os.mkfifo(name)
+        with pytest.raises(DescriptionError, match="is a FIFO"):
+            load(name)
+
+
+def test_a_broken_link_is_not_found(here: Path) -> None:
+    os.symlink("gone.urdf", "x.urdf")
+    with pytest.raises(RobotNotFoundError, match="no such file"):
+        load("x.urdf")
+
+
+@pytest.mark.parametrize("x", [None, 3, ["ur5"], object()])
+def test_what_can_be_no_description_is_an_argument_error(x: object) -> None:
+    with pytest.raises(ArgumentError, match="wanted a path, URDF text, a name or a Model"):
+        load(x)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("data", [b"", b"ur5", b"\0\0", b"\xff\xfe"])
+def test_bytes_are_always_text(data: bytes) -> None:
+    with pytest.raises(ModelError):
+        load(data)
+
+
+def test_base_gravity_and_locks_are_as_asked() -> None:
+    model = load(TEXT, base="floating", gravity=(1, 2, 3), lock={"j": 0.5})
+    assert (model.base, model.gravity, model.nq, model.nv) == ("floating", (1.0, 2.0, 3.0), 7, 6)
+    plain = load(TEXT)
+    assert (plain.base, plain.gravity, plain.nq) == ("fixed", (0.0, 0.0, -9.81), 1)
+
+
+def test_wrong_arguments_are_named() -> None:
+    with pytest.raises(ArgumentError, match="wanted 'fixed' or 'floating'"):
+        load(TEXT, base="free")  # type: ignore[arg-type]
+    with pytest.raises(NotFiniteError, match="gravity"):
+        load(TEXT, gravity=(0, 0, float("nan")))
+    with pytest.raises(ArgumentError, match="gravity has shape"):
+        load(TEXT, gravity=9.81)
+    with pytest.raises(UnknownNameError, match="cannot lock 'k': no such joint"):
+        load(TEXT, lock={"k": 0.0})
+    with pytest.raises(DTypeError, match="cannot lock 'j' at 'shut'"):
+        load(TEXT, lock={"j": "shut"})  # type: ignore[dict-item]
+    with pytest.raises(NotFiniteError, match="cannot lock 'j' at inf"):
+        load(TEXT, lock={"j": float("inf")})
+
+
+def test_a_model_keeps_what_is_not_asked_to_change() -> None:
+    model = load("ur5", base="floating", gravity=(0, 0, -1)).with_frame("tip", "tool0")
+    assert load(model) == model
+    assert load(model, base="fixed") == model.with_base("fixed")
+    assert load(model, gravity=(0, 0, 1)) == model.with_gravity((0, 0, 1))
+    locked = load(model, lock={"elbow_joint": 0.3})
+    assert locked.nq == model.nq - 1
+    assert (locked.base, locked.gravity, locked.extra_frames) == (
+        model.base,
+        model.gravity,
+        model.extra_frames,
+    )
+    direct = load("ur5", base="floating", gravity=(0, 0, -1), lock={"elbow_joint": 0.3})
+    assert locked == direct.with_frame("tip", "tool0")
+
+
+def test_a_path_of_the_library_and_its_name_give_equal_models() -> None:
+    assert load(find("z1")) == load("z1")

@@ -1,0 +1,104 @@
+"""What is written is read back as the same model, by dynx and by other readers."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from xml.etree import ElementTree
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dynx.errors import DescriptionError
+from dynx.model import Inertial, Joint, JointDynamics, Limits, Link, Mimic, Model, Pose
+from dynx.model.library import robots
+from dynx.model.loading import load
+from dynx.testing.strategies import models
+
+LOADABLE = [entry.name for entry in robots() if entry.name != "ur_description_ur3"]
+
+
+def read_back(model: Model) -> Model:
+    return load(model.to_urdf(), base=model.base, gravity=model.gravity)
+
+
+@given(models(physical=False))
+def test_a_random_model_is_read_back_equal(model: Model) -> None:
+    assert read_back(model) == model
+    assert read_back(model).to_urdf() == model.to_urdf()
+
+
+@pytest.mark.parametrize("name", LOADABLE)
+def test_a_robot_of_the_library_is_read_back_equal(name: str) -> None:
+    model = load(name)
+    assert read_back(model) == model
+
+
+@pytest.mark.parametrize("name", ["ur5", "panda", "talos"])
+def test_a_robot_with_half_its_joints_locked_is_read_back_equal(name: str) -> None:
+    model = load(name)
+    locked = load(name, lock={joint: 0.1 + 0.01 * k for k, joint in enumerate(model.joint_names[::2])})
+    assert locked.nq == model.nq // 2
+    back = read_back(locked)
+    assert back == locked
+    assert [joint.locked_at for joint in back.joints] == [joint.locked_at for joint in locked.joints]
+
+
+odd_floats = st.one_of(
+    st.sampled_from((-0.0, 5e-324, 2.2250738585072014e-308, 0.1, 1 / 3, -1e22, 1e308)),
+    st.floats(allow_nan=False, allow_infinity=False, max_value=1e308, min_value=-1e308),
+)
+names = st.text(
+    st.characters(exclude_categories=("Cc", "Cs", "Zl", "Zp"), exclude_characters="\ufffe\uffff"),
+    min_size=1,
+    max_size=40,
+)
+
+
+@given(st.lists(names, min_size=5, max_size=5, unique=True), st.lists(odd_floats, min_size=16, max_size=16))
+def test_any_name_and_any_number_survive(words: list[str], numbers: list[float]) -> None:
+    robot, a, b, first, second = words
+    n = iter(numbers)
+    inertial = Inertial(abs(next(n)), Pose((next(n), next(n), next(n))), next(n), next(n), next(n))
+    dynamics = JointDynamics(next(n), next(n), next(n))
+    limits = Limits(next(n), next(n), next(n), next(n))
+    joints = [
+        Joint(first, "prismatic", a, b, Pose(), (0.0, 1.0, 0.0), limits, dynamics),
+        Joint(second, "continuous", b, "end", mimic=Mimic(first, next(n), next(n))),
+    ]
+    model = Model.build(robot, [Link(a, inertial), Link(b), Link("end")], joints)
+    assert read_back(model) == model
+
+
+def test_limits_of_infinity_are_written_as_a_number_that_every_engine_reads() -> None:
+    joint = Joint("j", "revolute", "a", "b", limits=Limits(-math.inf, 2.0, math.inf, math.inf))
+    model = Model.build("r", [Link("a"), Link("b")], [joint])
+    assert "inf" not in model.to_urdf()
+    assert read_back(model) == model
+
+
+def test_frames_that_were_added_stay_frames_and_are_links_to_others() -> None:
+    model = load("ur5").with_frame("tip", "tool0", Pose((0.0, 0.0, 0.1))).with_frame("tip_frame", "tool0")
+    assert read_back(model) == model
+    root = ElementTree.fromstring(model.to_urdf())
+    links = [element.get("name") for element in root.iter("link")]
+    joints = [element.get("name") for element in root.iter("joint")]
+    assert {"tip", "tip_frame"} <= set(links)
+    assert len(links) == len(set(links)) == len(joints) + 1 == len(set(joints)) + 1
+
+
+@pytest.mark.parametrize("bad", ["", "a\nb", "\x00", "\ud800", "x" * 1001, "\uffff"])
+def test_a_name_that_urdf_cannot_hold_is_refused(bad: str) -> None:
+    model = Model.build("r", [Link("a")], [])
+    with pytest.raises(DescriptionError, match="a name that URDF cannot hold"):
+        Model.build("r", [Link(bad)], []).to_urdf()
+    with pytest.raises(DescriptionError, match="a name that URDF cannot hold"):
+        replace(model, name=bad).to_urdf()
+
+
+def test_no_line_is_longer_than_pybullet_reads() -> None:
+    long = "&" * 1000
+    joint = Joint("j" + long[1:], "revolute", long, "b", limits=Limits(-1 / 3, 1 / 3, 1 / 3, 1 / 3))
+    text = Model.build(long, [Link(long), Link("b")], [joint]).to_urdf()
+    assert max(map(len, text.splitlines())) < 8191

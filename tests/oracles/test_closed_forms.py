@@ -1,0 +1,96 @@
+"""Every installed backend against the closed forms, over random states."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dynx.backends import Backend, backend, installed_backends
+from dynx.model.loading import load
+from dynx.testing.strategies import samples
+from tests.closeness import Closeness, samples_at
+from tests.oracles.cart_pole import CartPole
+from tests.oracles.closed_form import MODELS, ClosedForm
+from tests.oracles.free_body import FreeBody
+from tests.oracles.pendulums import DoublePendulum, Pendulum
+from tests.oracles.planar_arms import Planar2R, Planar3R
+from tests.oracles.scara import Scara
+
+FORMS: tuple[ClosedForm, ...] = (
+    Pendulum(),
+    DoublePendulum(),
+    Planar2R(),
+    Planar3R(),
+    CartPole(),
+    Scara(),
+    FreeBody(),
+)
+STATES = 4
+"""States in one example, evaluated as a batch."""
+
+
+def engine_of(form: ClosedForm, name: str) -> Backend:
+    model = load(MODELS / f"{form.robot}.urdf", base=form.base, gravity=form.gravity)
+    return backend(name, model)
+
+
+@pytest.mark.parametrize("name", installed_backends())
+@pytest.mark.parametrize("form", FORMS, ids=lambda form: form.robot)
+def test_backend_matches_closed_form(form: ClosedForm, name: str) -> None:
+    with engine_of(form, name) as engine:
+
+        @given(st.lists(samples(engine.model), min_size=STATES, max_size=STATES))
+        def matches(states: list[tuple[np.ndarray, np.ndarray, np.ndarray]]) -> None:
+            q, v, a = (np.stack(column) for column in zip(*states, strict=True))
+            check_kinematics(form, engine, q, v, a)
+            check_dynamics(form, engine, q, v, a)
+
+        matches()
+
+
+def check_kinematics(form: ClosedForm, engine: Backend, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> None:
+    close = Closeness(samples_at(engine.model, q, v, a))
+    J, dJ = form.jacobian(q), form.jacobian_derivative(q, v)
+    close.check("forward_kinematics", engine.forward_kinematics(q, form.tip), form.placement(q))
+    close.check("jacobian", engine.jacobian(q, form.tip), J)
+    close.check("jacobian_derivative", engine.jacobian_derivative(q, v, form.tip), dJ)
+    close.check("frame_velocity", engine.frame_velocity(q, v, form.tip), np.einsum("nij,nj->ni", J, v))
+    acceleration = np.einsum("nij,nj->ni", J, a) + np.einsum("nij,nj->ni", dJ, v)
+    close.check("frame_acceleration", engine.frame_acceleration(q, v, a, form.tip), acceleration)
+
+
+def check_dynamics(form: ClosedForm, engine: Backend, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> None:
+    wanted = form.inverse_dynamics(q, v, a)
+    close = Closeness(samples_at(engine.model, q, v, a, tau=wanted))
+    products, gravity = form.velocity_torque(q, v), form.gravity_torque(q)
+    close.check("inverse_dynamics", engine.inverse_dynamics(q, v, a), wanted)
+    close.check("mass_matrix", engine.mass_matrix(q), form.mass_matrix(q))
+    close.check("bias_torque", engine.bias_torque(q, v), products + gravity)
+    close.check("gravity_torque", engine.gravity_torque(q), gravity)
+    close.check("kinetic_energy", engine.kinetic_energy(q, v), form.kinetic_energy(q, v))
+    close.check("potential_energy", engine.potential_energy(q), form.potential_energy(q))
+    C = engine.coriolis_matrix(q, v)
+    close.check("bias_torque", np.einsum("nij,nj->ni", C, v) + gravity, products + gravity)
+    christoffel = form.coriolis_matrix(q, v)
+    if christoffel is not None:
+        close.check("coriolis_matrix", C, christoffel)
+    found = engine.forward_dynamics(q, v, wanted)
+    close.check_solves(found, form.inverse_dynamics(q, v, found), wanted)
+
+
+@pytest.mark.parametrize("name", installed_backends())
+def test_momentum_of_a_free_body(name: str) -> None:
+    form = FreeBody()
+    with engine_of(form, name) as engine:
+
+        @given(samples(engine.model))
+        def matches(state: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
+            q, v, _ = state
+            close = Closeness(samples_at(engine.model, q, v))
+            close.check("centroidal_momentum", engine.centroidal_momentum(q, v), form.momentum(q, v))
+            center = q[:3] + form.rotation(q) @ form.c
+            close.check("center_of_mass", engine.center_of_mass(q), center)
+
+        matches()

@@ -1,0 +1,124 @@
+"""All installed backends give one answer, to every quantity, on random robots and on real ones."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from itertools import combinations
+from typing import Literal
+
+import numpy as np
+import pytest
+from hypothesis import given, note
+from hypothesis import strategies as st
+
+from dynx.agreement.answers import Answers
+from dynx.agreement.comparison import Comparison, compare
+from dynx.agreement.magnitudes import Magnitudes
+from dynx.agreement.quantities import QUANTITIES
+from dynx.agreement.sampling import Samples, draw_samples
+from dynx.agreement.solutions import compare_forward_dynamics
+from dynx.backends import Backend, backend, installed_backends
+from dynx.backends.derived import DerivedBackend, native_quantities
+from dynx.model import Model
+from dynx.model.loading import load
+from dynx.testing.strategies import models, samples, wrenches
+from tests.closeness import samples_at
+
+REAL = ("ur5", "panda", "solo12", "hyq", "xarm7", "z1", "six_axis_arm", "seven_axis_arm", "scara")
+STATES = 2
+"""States in one example, evaluated as a batch."""
+
+Base = Literal["fixed", "floating"]
+each_base = pytest.mark.parametrize("base", ["fixed", "floating"])
+
+
+@contextmanager
+def backends_of(model: Model) -> Iterator[list[Backend]]:
+    """Every installed backend of a model, closed at the end."""
+    with ExitStack() as stack:
+        yield [stack.enter_context(backend(name, model)) for name in installed_backends()]
+
+
+def assert_agree(engines: list[Backend], states: Samples) -> None:
+    """Every quantity, every pair of backends, every frame in every reference."""
+    sizes = Magnitudes(states)
+    answers = [Answers(engine.name, engine, states) for engine in engines]
+    for pair in combinations(answers, 2):
+        for quantity in QUANTITIES:
+            assert_agreement(compare(quantity, *pair, sizes))
+        assert_agreement(compare_forward_dynamics(*pair, sizes))
+
+
+def assert_agreement(comparison: Comparison) -> None:
+    assert comparison.agree, (
+        f"{comparison.quantity} of {comparison.pair}: error {comparison.max_rel_error:.3g} of its size, "
+        f"more than {comparison.tolerance:.3g}; {comparison.note or ''}\n{comparison.worst_sample}"
+    )
+
+
+@st.composite
+def robots_in_states(
+    draw: st.DrawFn, base: Base, physical: bool = True, solvable: bool = False
+) -> tuple[Model, Samples]:
+    """A random robot and some states, with a wrench on one of its frames."""
+    model = draw(models(base=base, physical=physical, solvable=solvable))
+    q, v, a = (np.stack(each) for each in zip(*(draw(samples(model)) for _ in range(STATES)), strict=True))
+    frame = draw(st.sampled_from(model.frame_names))
+    # Torques as inverse dynamics gives them are those at which forward dynamics is of use.
+    tau = draw(samples(model)).a
+    return model, samples_at(model, q, v, a, tau, wrench=draw(wrenches()), frame=frame, references=1)
+
+
+@each_base
+@given(data=st.data())
+def test_random_robots(base: Base, data: st.DataObject) -> None:
+    """Thin bodies, massless links, mimic joints and locked joints among them."""
+    model, states = data.draw(robots_in_states(base))
+    note(model.to_urdf())
+    with backends_of(model) as engines:
+        assert_agree(engines, states)
+
+
+@each_base
+@given(data=st.data())
+def test_random_robots_that_forward_dynamics_can_solve(base: Base, data: st.DataObject) -> None:
+    model, states = data.draw(robots_in_states(base, solvable=True))
+    note(model.to_urdf())
+    with backends_of(model) as engines:
+        for engine in engines:
+            assert np.isfinite(engine.forward_dynamics(states.q, states.v, states.tau)).all()
+        assert_agree(engines, states)
+
+
+@each_base
+@given(data=st.data())
+def test_random_robots_with_impossible_inertias(base: Base, data: st.DataObject) -> None:
+    model, states = data.draw(robots_in_states(base, physical=False))
+    note(model.to_urdf())
+    with backends_of(model) as engines:
+        assert_agree(engines, states)
+
+
+@each_base
+@given(data=st.data())
+def test_derived_answers_are_the_native_ones(base: Base, data: st.DataObject) -> None:
+    """What an engine computes itself, against what the base derives from its poses and torques."""
+    model, states = data.draw(robots_in_states(base))
+    note(model.to_urdf())
+    sizes = Magnitudes(states)
+    with backends_of(model) as engines:
+        for engine in engines:
+            native = Answers(engine.name, engine, states)
+            derived = Answers("derived", DerivedBackend(engine), states)
+            for quantity in QUANTITIES:
+                if quantity.native in native_quantities(engine):
+                    assert_agreement(compare(quantity, native, derived, sizes))
+
+
+@each_base
+@pytest.mark.parametrize("robot", REAL)
+def test_real_robots(robot: str, base: Base) -> None:
+    model = load(robot, base=base)
+    with backends_of(model) as engines:
+        assert_agree(engines, draw_samples(model, 8, seed=0))

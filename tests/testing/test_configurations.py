@@ -1,0 +1,82 @@
+"""Configurations and velocities fit their model; singular and limiting ones occur."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import find, given
+from hypothesis import strategies as st
+
+from dynx.errors import ArgumentError, DTypeError, NotFiniteError
+from dynx.model import Joint, Limits, Link, Model
+from dynx.model.configuration import checked_q
+from dynx.testing.strategies import accelerations, configurations, models, samples, velocities
+
+ARM = Model.build(
+    "arm",
+    [Link("a"), Link("b"), Link("c")],
+    [
+        Joint("turn", "revolute", "a", "b", limits=Limits(-1.0, 2.0)),
+        Joint("spin", "continuous", "b", "c"),
+    ],
+)
+
+
+@given(st.data())
+def test_they_fit_the_model(data: st.DataObject) -> None:
+    model = data.draw(models())
+    q, v, a = data.draw(samples(model))
+    assert q.shape == (model.nq,)
+    assert v.shape == a.shape == (model.nv,)
+    assert {q.dtype, v.dtype, a.dtype} == {np.dtype(np.float64)}
+    checked_q(model, q)
+    assert np.isfinite(v).all()
+    assert np.isfinite(a).all()
+
+
+@given(st.data())
+def test_within_limits(data: st.DataObject) -> None:
+    model = data.draw(models())
+    q = data.draw(configurations(model, within_limits=True))
+    assert (q >= model.lower).all()
+    assert (q <= model.upper).all()
+
+
+@given(velocities(ARM, reach=0.5))
+def test_velocities_within_reach(v: np.ndarray) -> None:
+    assert np.max(np.abs(v)) <= 0.5
+
+
+def test_shrink_targets() -> None:
+    np.testing.assert_array_equal(find(configurations(ARM), lambda q: True), ARM.neutral())
+    floating = ARM.with_base("floating")
+    np.testing.assert_array_equal(find(configurations(floating), lambda q: True), floating.neutral())
+    np.testing.assert_array_equal(find(velocities(ARM), lambda v: True), np.zeros(2))
+    np.testing.assert_array_equal(find(accelerations(ARM), lambda a: True), np.zeros(2))
+
+
+def test_what_occurs() -> None:
+    for limit in (-1.0, 2.0):
+        find(configurations(ARM), lambda q, limit=limit: q[0] == limit)
+        find(configurations(ARM), lambda q, limit=limit: 0.0 < abs(q[0] - limit) < 1e-5)
+    find(configurations(ARM), lambda q: 0.0 < abs(abs(q[1]) - np.pi / 2) < 1e-8)
+    find(configurations(ARM), lambda q: abs(q[1]) > 2 * np.pi)
+    find(configurations(ARM), lambda q: q[0] > 2.0)
+    find(configurations(ARM, within_limits=True), lambda q: q[0] == 2.0)
+
+
+@pytest.mark.parametrize("strategy", [configurations, velocities, accelerations, samples])
+def test_something_that_is_no_model(strategy: Any) -> None:
+    with pytest.raises(DTypeError, match="wanted a dynx Model"):
+        strategy("ur5")
+
+
+def test_arguments_that_cannot_be() -> None:
+    with pytest.raises(DTypeError, match="within_limits"):
+        configurations(ARM, within_limits="yes")  # type: ignore[arg-type]
+    with pytest.raises(ArgumentError, match="reach"):
+        velocities(ARM, reach=-1.0)
+    with pytest.raises(NotFiniteError, match="reach"):
+        accelerations(ARM, reach=float("nan"))
