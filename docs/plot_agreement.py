@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 import os
 import sys
+from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
@@ -32,9 +33,7 @@ def directly(path: str) -> float:
     data = pin_model.createData()
     client = p.connect(p.DIRECT)
     p.setGravity(0, 0, -9.81, physicsClientId=client)
-    body = p.loadURDF(
-        path, useFixedBase=True, flags=p.URDF_USE_INERTIA_FROM_FILE, physicsClientId=client
-    )
+    body = p.loadURDF(path, useFixedBase=True, flags=p.URDF_USE_INERTIA_FROM_FILE, physicsClientId=client)
     names = []
     for index in range(p.getNumJoints(body, physicsClientId=client)):
         info = p.getJointInfo(body, index, physicsClientId=client)
@@ -89,13 +88,15 @@ def both(path: str) -> tuple[str, float, float]:
     devnull = os.open(os.devnull, os.O_WRONLY)
     os.dup2(devnull, 1)
     os.dup2(devnull, 2)
-    found = []
-    for measure in (directly, through_dynx):
-        try:
-            found.append(max(measure(path), FLOOR))
-        except Exception:  # noqa: BLE001  (an engine that cannot answer is a gap in the picture)
-            found.append(math.nan)
-    return path, found[0], found[1]
+    return path, measured(directly, path), measured(through_dynx, path)
+
+
+def measured(measure: Callable[[str], float], path: str) -> float:
+    """What `measure` finds, or nan where an engine cannot answer: a gap in the picture."""
+    try:
+        return max(measure(path), FLOOR)
+    except Exception:
+        return math.nan
 
 
 def main() -> None:

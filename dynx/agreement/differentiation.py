@@ -18,6 +18,9 @@ from dynx.spatial.scalar import Floats
 WEIGHTS = {1: 4.0 / 5.0, 2: -1.0 / 5.0, 3: 4.0 / 105.0, 4: -1.0 / 280.0}
 """Weight of f(k h) - f(-k h), to be divided by h."""
 
+REST = 1e-100
+"""Frequencies up to this count as rest [rad/s]; their step would overflow."""
+
 
 def time_derivative(function: Callable[[Floats], Floats], frequency: Floats) -> Floats:
     """d/dt at 0 of ``function(t)`` for n motions at once.
@@ -25,7 +28,7 @@ def time_derivative(function: Callable[[Floats], Floats], frequency: Floats) -> 
     `frequency` (n,) is each motion's highest angular frequency [rad/s]. `function` takes times
     (m, n), m at a time, and returns (m, n, ...); the derivative is (n, ...).
     """
-    step = STEP / np.where(frequency > 0.0, frequency, 1.0)
+    step = STEP / np.where(frequency > REST, frequency, 1.0)
     multiples = [k for order in WEIGHTS for k in (order, -order)]
     values = function(np.array(multiples)[:, None] * step)
     total = sum(

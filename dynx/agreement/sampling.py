@@ -89,7 +89,7 @@ class Samples:
         joints = self.q[:, 7 if self.model.floating else 0 :]
         calm = np.max(np.abs(joints), axis=-1, initial=0.0) <= CALM
         calm &= np.any(self.v != 0.0, axis=-1) & (np.array(self.kinds) != "limit")
-        return np.flatnonzero(calm).tolist()[:count]
+        return [int(k) for k in np.flatnonzero(calm)[:count]]
 
 
 def draw_samples(model: Model, count: int, seed: int) -> Samples:

@@ -50,13 +50,9 @@ class EngineHooks(ABC):
         """Geometric Jacobian (..., 6, nv), linear rows first."""
         return jacobians.frame_jacobian(self._mechanism, self._body_poses(q), frame, reference)
 
-    def _jacobian_derivative(
-        self, q: Floats, v: Floats, frame: int, reference: Reference
-    ) -> Floats:
+    def _jacobian_derivative(self, q: Floats, v: Floats, frame: int, reference: Reference) -> Floats:
         """Time derivative of the Jacobian (..., 6, nv) along the velocity `v`."""
-        return jacobians.frame_jacobian_derivative(
-            self._mechanism, self._body_poses(q), v, frame, reference
-        )
+        return jacobians.frame_jacobian_derivative(self._mechanism, self._body_poses(q), v, frame, reference)
 
     def _frame_velocity(self, q: Floats, v: Floats, frame: int, reference: Reference) -> Floats:
         """J v, (..., 6)."""

@@ -59,7 +59,7 @@ def _show_traceback(ctx: click.Context, option: click.Parameter, wanted: bool) -
 
 @click.group(
     cls=CommandLine,
-    no_args_is_help=True,
+    invoke_without_command=True,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
     epilog="""
     \b
@@ -83,11 +83,14 @@ def _show_traceback(ctx: click.Context, option: click.Parameter, wanted: bool) -
     callback=_show_traceback,
     help=f"Show where an error was raised (also: {TRACEBACK_VARIABLE}=1).",
 )
-def cli() -> None:
+@click.pass_context
+def cli(ctx: click.Context) -> None:
     """One interface over several rigid-body engines, proven to give one answer.
 
     ROBOT is always a path to a URDF file or a name of the library (see `dynx robots`).
     """
+    if ctx.invoked_subcommand is None:
+        click.echo(ctx.get_help())
 
 
 for _command in (agree, info, robots, backends, fk, jacobian, id_, fd, mass, ik):

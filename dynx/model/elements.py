@@ -36,6 +36,9 @@ class Pose:
         return homogeneous(rotation_from_rpy(np.array(self.rpy)), np.array(self.xyz))
 
 
+IDENTITY = Pose()
+
+
 @dataclass(frozen=True)
 class Inertial:
     """Mass [kg], pose of the inertial frame in the link, central inertia tensor in that frame."""

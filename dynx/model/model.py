@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from dynx.errors import UnknownNameError, nearest, shown
 from dynx.model import configuration, locking, topology
-from dynx.model.elements import Frame, Inertial, Joint, Link, Note, Pose, Vector
+from dynx.model.elements import IDENTITY, Frame, Inertial, Joint, Link, Note, Pose, Vector
 from dynx.model.mechanism import Mechanism, build_mechanism
 from dynx.spatial.scalar import Floats
 
@@ -222,7 +222,7 @@ class Model:
         """The same robot in another field of gravity (3,) [m/s^2]."""
         return replace(self, gravity=configuration.checked_gravity(gravity))
 
-    def with_frame(self, name: str, link: str, placement: Pose = Pose()) -> Model:
+    def with_frame(self, name: str, link: str, placement: Pose = IDENTITY) -> Model:
         """The same robot with one more named frame, fixed to `link` (a tool tip, say)."""
         self.link(link)
         if name in self._frame_index:

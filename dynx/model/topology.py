@@ -91,7 +91,7 @@ def resolve_mimics(joints: list[Joint], notes: list[Note], source: str) -> list[
     resolved: dict[str, Joint] = {}
     for joint in joints:
         for follower in reversed(_unresolved_chain(joint, by_name, resolved, source)):
-            resolved[follower.name] = _resolve_mimic(follower, resolved, notes, source)
+            resolved[follower.name] = _resolve_mimic(follower, resolved, by_name, notes, source)
     return [resolved[joint.name] for joint in joints]
 
 
@@ -113,14 +113,16 @@ def _unresolved_chain(
     return list(chain.values())
 
 
-def _resolve_mimic(joint: Joint, resolved: dict[str, Joint], notes: list[Note], source: str) -> Joint:
+def _resolve_mimic(
+    joint: Joint, resolved: dict[str, Joint], known: Iterable[str], notes: list[Note], source: str
+) -> Joint:
     if joint.mimic is None or not joint.moves:
         return replace(joint, mimic=None)
     driver = resolved.get(joint.mimic.joint)
     what = f"joint {shown(joint.name)} mimics {shown(joint.mimic.joint)}"
     if driver is None:
-        known = nearest(joint.mimic.joint, resolved)
-        notes.append(Note(f"{what}, which does not exist; it is read as moving freely{known}", joint.line))
+        hint = nearest(joint.mimic.joint, known)
+        notes.append(Note(f"{what}, which does not exist; it is read as moving freely{hint}", joint.line))
         return replace(joint, mimic=None)
     scale, offset = joint.mimic.multiplier, joint.mimic.offset
     if driver.moves and driver.mimic is None:

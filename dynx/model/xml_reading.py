@@ -76,7 +76,9 @@ class _TreeBuilder:
         try:
             self._parser.Parse(text.encode("utf-8"), True)
         except expat.ExpatError as error:
-            raise self._error(_said_plainly(error.code, self._root is not None), self._first + error.lineno) from None
+            raise self._error(
+                _said_plainly(error.code, self._root is not None), self._first + error.lineno
+            ) from None
         except UnicodeEncodeError as error:
             line = self._first + text.count("\n", 0, error.start) + 1
             raise self._error("holds half of a surrogate pair, which is no character", line) from None

@@ -18,7 +18,7 @@ def center_of_mass(mechanism: Mechanism, poses: Poses) -> Array:
     """(..., 3) [m]; the root's origin if nothing has mass."""
     mass, moment = subtree_moments(mechanism, poses)
     if not mechanism.has_mass:
-        return poses[ROOT][1] + 0 * moment[0]
+        return np.asarray(poses[ROOT][1] + 0 * moment[0])
     return np.asarray(moment[0] / mass[0])
 
 

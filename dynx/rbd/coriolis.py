@@ -35,7 +35,7 @@ def coriolis_matrix(mechanism: Mechanism, poses: Poses, v: Array) -> Array:
         twist = (J @ v[..., None])[..., 0]
         eye = inertia_matrix(inertia)
         total = total + np.swapaxes(J, -1, -2) @ (eye @ dJ + _gyroscopic(eye, twist) @ J)
-    return total
+    return np.asarray(total)
 
 
 def _gyroscopic(inertia: Array, twist: Array) -> Array:
@@ -45,7 +45,7 @@ def _gyroscopic(inertia: Array, twist: Array) -> Array:
     on_motion = _blocks(W, V, 0 * W, W)
     on_force = _blocks(W, 0 * W, V, W)
     L, H = skew(momentum[..., :3]), skew(momentum[..., 3:])
-    return (on_force @ inertia + inertia @ on_motion + _blocks(0 * L, -L, -L, -H)) / 2
+    return np.asarray(on_force @ inertia + inertia @ on_motion + _blocks(0 * L, -L, -L, -H)) / 2
 
 
 def _blocks(a: Array, b: Array, c: Array, d: Array) -> Array:

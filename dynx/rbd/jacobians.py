@@ -81,14 +81,10 @@ def shift_jacobian(
     return np.concatenate([moved, dJ[..., 3:, :]], axis=-2)
 
 
-def _moving_columns(
-    mechanism: Mechanism, poses: Poses, body: int
-) -> list[tuple[int, Array, Array, int]]:
+def _moving_columns(mechanism: Mechanism, poses: Poses, body: int) -> list[tuple[int, Array, Array, int]]:
     """(column, axis z, origin o, owning body) of every coordinate that moves `body`."""
     base = 6 if mechanism.floating else 0
-    columns = [
-        (base + k, joint_axis(mechanism, poses, k), poses[k][1], k) for k in ancestry(mechanism, body)
-    ]
+    columns = [(base + k, joint_axis(mechanism, poses, k), poses[k][1], k) for k in ancestry(mechanism, body)]
     if mechanism.floating:
         R, o = poses[ROOT]
         columns += [(k, R[..., :, k % 3], o, ROOT) for k in range(6)]
@@ -99,9 +95,7 @@ def _turns(mechanism: Mechanism, column: int, owner: int) -> bool:
     return column >= 3 if owner == ROOT else mechanism.bodies[owner].revolute
 
 
-def _aligned(
-    mechanism: Mechanism, poses: Poses, body: int, p: Array
-) -> tuple[list[Array], list[Array]]:
+def _aligned(mechanism: Mechanism, poses: Poses, body: int, p: Array) -> tuple[list[Array], list[Array]]:
     """Columns (linear, angular), in world axes, of the point p fixed to `body`."""
     zero = 0 * p
     linear, angular = [zero] * mechanism.nv, [zero] * mechanism.nv
@@ -113,9 +107,7 @@ def _aligned(
     return linear, angular
 
 
-def _referred(
-    linear: list[Array], angular: list[Array], R: Array, p: Array, reference: Reference
-) -> Array:
+def _referred(linear: list[Array], angular: list[Array], R: Array, p: Array, reference: Reference) -> Array:
     J = _stacked(linear, angular, p)
     if reference == "local":
         R_T = np.swapaxes(R, -1, -2)

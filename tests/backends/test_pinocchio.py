@@ -215,7 +215,7 @@ def test_what_the_engine_raises_becomes_an_engine_error(
 def test_without_validation_a_wrong_shape_that_the_engine_notices_is_still_an_engine_error() -> None:
     engine = PinocchioBackend(chain(2), validate=False)
     with pytest.raises(
-        EngineError, match="pinocchio failed on chain: ValueError: wrong argument size: expected 2, got 3$"
+        EngineError, match=r"pinocchio failed on chain: ValueError: wrong argument size: expected 2, got 3$"
     ):
         engine.inverse_dynamics(np.zeros(3), np.zeros(2), np.zeros(2))
 

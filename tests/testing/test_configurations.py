@@ -13,6 +13,7 @@ from dynx.errors import ArgumentError, DTypeError, NotFiniteError
 from dynx.model import Joint, Limits, Link, Model
 from dynx.model.configuration import checked_q
 from dynx.testing.strategies import accelerations, configurations, models, samples, velocities
+from tests.testing.occurrence import assert_occurs
 
 ARM = Model.build(
     "arm",
@@ -57,14 +58,20 @@ def test_shrink_targets() -> None:
     np.testing.assert_array_equal(find(accelerations(ARM), lambda a: True), np.zeros(2))
 
 
-def test_what_occurs() -> None:
-    for limit in (-1.0, 2.0):
-        find(configurations(ARM), lambda q, limit=limit: q[0] == limit)
-        find(configurations(ARM), lambda q, limit=limit: 0.0 < abs(q[0] - limit) < 1e-5)
-    find(configurations(ARM), lambda q: 0.0 < abs(abs(q[1]) - np.pi / 2) < 1e-8)
-    find(configurations(ARM), lambda q: abs(q[1]) > 2 * np.pi)
-    find(configurations(ARM), lambda q: q[0] > 2.0)
-    find(configurations(ARM, within_limits=True), lambda q: q[0] == 2.0)
+@pytest.mark.parametrize("limit", [-1.0, 2.0])
+def test_limits_occur(limit: float) -> None:
+    def next_to_it(q: np.ndarray) -> bool:
+        return bool(0.0 < abs(q[0] - limit) < 1e-5)
+
+    assert_occurs(configurations(ARM), lambda q: q[0] == limit)
+    assert_occurs(configurations(ARM), next_to_it)
+    assert_occurs(configurations(ARM, within_limits=True), lambda q: q[0] == limit)
+
+
+def test_singular_postures_and_turns_occur() -> None:
+    assert_occurs(configurations(ARM), lambda q: 0.0 < abs(abs(q[1]) - np.pi / 2) < 1e-8)
+    assert_occurs(configurations(ARM), lambda q: abs(q[1]) > 2 * np.pi)
+    assert_occurs(configurations(ARM), lambda q: q[0] > 2.0)
 
 
 @pytest.mark.parametrize("strategy", [configurations, velocities, accelerations, samples])

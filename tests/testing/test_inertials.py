@@ -12,6 +12,7 @@ from dynx.agreement.magnitudes import EPS
 from dynx.errors import UnknownNameError
 from dynx.model import Inertial
 from dynx.testing.strategies import inertials
+from tests.testing.occurrence import assert_occurs
 
 ROUNDING = 32 * EPS
 """Of a tensor that was turned (two products of 3 x 3 matrices) and whose moments were found again."""
@@ -49,11 +50,11 @@ def test_what_occurs() -> None:
     def broken(inertial: Inertial | None) -> bool:
         return inertial is not None and moments_of(inertial)[0] < -0.1
 
-    find(inertials("any"), broken)
-    assert find(inertials("physical"), lambda inertial: inertial is None) is None
-    find(inertials("physical"), lambda i: i is not None and i.mass > 0.0 and not i.tensor.any())
-    find(inertials("physical"), lambda i: i == Inertial())
-    find(inertials("physical"), lambda i: i is not None and i.ixy != 0.0)
+    assert_occurs(inertials("any"), broken)
+    assert_occurs(inertials("physical"), lambda i: i is None)
+    assert_occurs(inertials("physical"), lambda i: i is not None and i.mass > 0.0 and not i.tensor.any())
+    assert_occurs(inertials("physical"), lambda i: i == Inertial())
+    assert_occurs(inertials("physical"), lambda i: i is not None and i.ixy != 0.0)
 
 
 @pytest.mark.parametrize("kind", ["solid", "physical", "any"])

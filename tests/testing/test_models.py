@@ -7,13 +7,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import find, given, settings
+from hypothesis import find, given
 from hypothesis import strategies as st
 
 from dynx.errors import ArgumentError, DTypeError, DynxError, UnknownNameError
 from dynx.model import Inertial, Model, Pose
 from dynx.rbd.crba import mass_matrix
 from dynx.testing.strategies import configurations, models
+from tests.testing.occurrence import assert_occurs
 
 
 @given(models())
@@ -86,7 +87,7 @@ SORTS: dict[str, Callable[[Model], bool]] = {
 
 @pytest.mark.parametrize("sort", SORTS)
 def test_every_sort_occurs(sort: str) -> None:
-    find(models(), SORTS[sort], settings=settings(max_examples=2000))
+    assert_occurs(models(), SORTS[sort])
 
 
 class TestShrinking:

@@ -11,6 +11,7 @@ from dynx.model import Joint, Link, Model
 from dynx.model.loading import load
 from dynx.testing.strategies import models, urdf_text
 from dynx.testing.strategies.urdf_text import HABITS
+from tests.testing.occurrence import assert_occurs
 
 ARM = Model.build("arm", [Link("a"), Link("b")], [Joint("turn", "revolute", "a", "b")])
 
@@ -48,7 +49,7 @@ SIGNS = {
 @pytest.mark.parametrize("habit", SIGNS)
 def test_every_habit_occurs(habit: str) -> None:
     assert habit in HABITS
-    find(urdf_text(ARM), lambda text: SIGNS[habit] in text)
+    assert_occurs(urdf_text(ARM), lambda text: SIGNS[habit] in text)
 
 
 def test_shrinks_to_the_tidy_spelling() -> None:

@@ -100,6 +100,6 @@ def _target(given: Numbers) -> Floats:
     if len(numbers) == 16:
         return numbers.reshape(4, 4)
     raise ArgumentError(
-        f"--target has {len(numbers)} numbers; wanted 3 (position), 6 (and roll, pitch, yaw), "
-        "7 (and a quaternion xyzw) or 16 (a matrix)"
+        "--target: wanted 3 numbers (position), 6 (and roll, pitch, yaw), 7 (and a quaternion xyzw) "
+        f"or 16 (a matrix); got {len(numbers)}"
     )

@@ -1,0 +1,83 @@
+"""The model as a value: names, sizes, equality, pickling, and the errors of look-ups."""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+import pickle
+
+import numpy as np
+import pytest
+from hypothesis import given
+
+from dynx.errors import UnknownNameError
+from dynx.model import Link, Model, Pose
+from dynx.model.loading import load
+from dynx.testing.strategies import models
+
+
+@given(models())
+def test_names_sizes_and_limits_fit_together(model: Model) -> None:
+    base_q, base_v = (7, 6) if model.floating else (0, 0)
+    assert model.nq == base_q + len(model.joint_names)
+    assert model.nv == base_v + len(model.joint_names)
+    assert model.lower.shape == model.upper.shape == model.neutral().shape == (model.nq,)
+    assert model.velocity_limit.shape == model.effort_limit.shape == (model.nv,)
+    assert np.all(model.lower <= model.upper)
+    for k, name in enumerate(model.joint_names):
+        assert model.coordinate_index(name) == base_v + k
+        assert model.joint(name).moves
+    for k, name in enumerate(model.frame_names):
+        assert model.frame_index(name) == k
+    assert model.frame_names[0] == model.root
+
+
+@given(models())
+def test_a_model_is_a_value(model: Model) -> None:
+    for twin in (pickle.loads(pickle.dumps(model)), copy.deepcopy(model), dataclasses.replace(model)):
+        assert twin == model
+        assert hash(twin) == hash(model)
+        np.testing.assert_array_equal(twin.random(1), model.random(1))
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        model.name = "other"  # type: ignore[misc]
+    assert model != "a model"
+
+
+@given(models())
+def test_any_change_makes_another_model(model: Model) -> None:
+    others = [
+        dataclasses.replace(model, name=model.name + "x"),
+        model.with_gravity((1.0, 2.0, 3.0)),
+        model.with_base("fixed" if model.floating else "floating"),
+        model.with_frame("one more", model.root),
+        dataclasses.replace(model, links=(*model.links[:-1], Link("renamed"))),
+    ]
+    assert all(other != model for other in others)
+    assert others[1].with_gravity(model.gravity) == others[2].with_base(model.base) == model
+
+
+@pytest.mark.parametrize(
+    ("ask", "says"),
+    [
+        (lambda m: m.joint("elbow"), "no joint 'elbow' in ur5; did you mean 'elbow_joint'"),
+        (lambda m: m.joint("forearm_link"), "that is a link; the joint that moves it is 'elbow_joint'"),
+        (lambda m: m.link("elbow_joint"), "that is a joint; the link it moves is 'forearm_link'"),
+        (lambda m: m.frame_index("tool"), "did you mean 'tool0'"),
+        (lambda m: m.frame_index("elbow_joint"), "the frame it moves is 'forearm_link'"),
+        (lambda m: m.coordinate_index("ee_fixed_joint"), "has no coordinate: it is fixed"),
+        (lambda m: m.with_frame("tool0", "tool0"), "frame 'tool0' exists already"),
+        (lambda m: m.with_frame("tip", "no_link", Pose()), "no link 'no_link'"),
+        (lambda m: m.joint(["elbow_joint"]), "no joint .* a name is a str, not list"),
+        (lambda m: m.link(None), "no link 'None'"),
+        (lambda m: m.frame_index(3), "no frame '3'"),
+    ],
+)
+def test_a_name_that_is_not_there_is_an_error_that_helps(ask: object, says: str) -> None:
+    assert callable(ask)
+    with pytest.raises(UnknownNameError, match=says):
+        ask(load("ur5"))
+
+
+def test_only_a_name_that_is_there_is_looked_up_by_case() -> None:
+    with pytest.raises(UnknownNameError, match="did you mean 'tool0'"):
+        load("ur5").frame_index("TOOL0")
