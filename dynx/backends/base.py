@@ -9,8 +9,7 @@ mass matrix) go to the engine in a straight line when there is one sample and no
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from types import TracebackType
-from typing import Any, ClassVar, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,6 +18,7 @@ from dynx.backends.arguments import Arguments
 from dynx.backends.evaluation import Evaluation, common_batch
 from dynx.backends.hooks import EngineHooks, apply_matrix, solve_mass_matrix
 from dynx.backends.joint_dynamics import JointDynamicsTerms
+from dynx.backends.lifecycle import Lifecycle
 from dynx.backends.solvability import Solvability
 from dynx.ik import IKResult, inverse_kinematics
 from dynx.model import Model
@@ -26,10 +26,9 @@ from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED, Reference, shift_jacobian
 from dynx.spatial.scalar import Floats
 
 Forces = Mapping[str, ArrayLike]
-B = TypeVar("B", bound="Backend")
 
 
-class Backend(EngineHooks):
+class Backend(Lifecycle, EngineHooks):
     """An engine wrapped: the same questions, conventions and answers whichever engine is behind.
 
     Arrays are float64 and take leading batch axes, which broadcast: q (..., nq), v, a, tau
@@ -53,32 +52,14 @@ class Backend(EngineHooks):
     arrays of the right shape and are not looked at; a wrong one then gives an undefined answer.
     """
 
-    name: ClassVar[str]
-    """The name under which the registry finds the backend."""
-
     def __init__(self, model: Model, *, validate: bool = True) -> None:
-        self.model = model
+        super().__init__(model, Arguments(model), validate=validate)
         self._mechanism = model.mechanism
         self._evaluation = Evaluation(self._mechanism, vectorized=self.vectorized)
         self._straight = self._mechanism.coupling is None
-        self._arguments = Arguments(model)
         self._joint_terms = JointDynamicsTerms(model)
         self._solvability = Solvability(model)
         self._frame_index = {name: index for index, name in enumerate(model.frame_names)}
-        self._options: dict[str, Any] = {"validate": validate}
-        # True while arguments are looked at; a closed backend always looks, and refuses.
-        self._validate = validate
-
-    @property
-    def engine_version(self) -> str:
-        """Name and version of the engine behind."""
-        from dynx._version import __version__
-
-        return f"dynx {__version__}"
-
-    @classmethod
-    def require_engine(cls) -> None:
-        """Raise NotInstalledError if the engine is missing: for one that its class imports late."""
 
     # -- kinematics ---------------------------------------------------------------------------
 
@@ -312,35 +293,6 @@ class Backend(EngineHooks):
         q = self._checked_q(q)
         return self._evaluation(self._potential_energy, (), q)
 
-    # -- life cycle ---------------------------------------------------------------------------
-
-    def close(self) -> None:
-        """Release what the engine holds; further calls raise ClosedError. Closing twice is harmless."""
-        if not self._arguments.closed:
-            self._validate = True
-            self._arguments.closed = True
-            self._release()
-
-    def _release(self) -> None:
-        """Give back what the engine holds."""
-
-    def __enter__(self: B) -> B:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return _rebuild, (type(self), self.model, self._options)
-
-    def __repr__(self) -> str:
-        return f"<{self.name} backend of {self.model.name}>"
-
     # -- from questions to hooks --------------------------------------------------------------
 
     def _index(self, frame: str) -> int:
@@ -378,7 +330,3 @@ class Backend(EngineHooks):
             return J if dJ is None else dJ
         R = self.forward_kinematics(q, frame)[..., :3, :3]
         return shift_jacobian(J, dJ, v, R, point, self._arguments.reference(reference))
-
-
-def _rebuild(kind: type[Backend], model: Model, options: dict[str, Any]) -> Backend:
-    return kind(model, **options)

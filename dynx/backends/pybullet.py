@@ -83,11 +83,6 @@ class PyBulletBackend(Backend):
         except PackageNotFoundError:
             return "pybullet"
 
-    @classmethod
-    def require_engine(cls) -> None:
-        """Raise NotInstalledError if PyBullet is missing."""
-        _bullet()
-
     @property
     def ballast(self) -> bool:
         """Whether the model has an inertia that Bullet refuses, so that answers are extrapolated.
@@ -178,7 +173,7 @@ class PyBulletBackend(Backend):
         else is wrong, which refinement must not hide.
         """
         left = tau - self._inverse_dynamics(q, v, a)
-        if np.max(np.abs(left)) <= REFINE_ABOVE * np.max(np.abs(tau)):
+        if np.max(np.abs(left), initial=0.0) <= REFINE_ABOVE * np.max(np.abs(tau), initial=0.0):
             return a
         again = self._robot().forward_dynamics(q, v, tau + left)
         return again if np.max(np.abs(again - a)) <= REFINE_BELOW * np.max(np.abs(a)) else a

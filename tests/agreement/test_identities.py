@@ -48,7 +48,7 @@ class Negative(Broken):
 
 class StaleRates(Broken):
     def _coriolis_matrix(self, q: Floats, v: Floats) -> Floats:
-        return np.swapaxes(super()._coriolis_matrix(q, v), -1, -2).copy()
+        return np.array(np.swapaxes(super()._coriolis_matrix(q, v), -1, -2))
 
 
 class SlantedGravity(Broken):

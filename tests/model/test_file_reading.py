@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 
 from dynx.errors import DescriptionError, RobotNotFoundError
-from dynx.model import file_reading
 from dynx.model.file_reading import MAX_BYTES, read_file
 
 
@@ -50,7 +49,7 @@ def test_an_unreadable_file_is_refused(tmp_path: Path, monkeypatch: pytest.Monke
         raise PermissionError(13, "Permission denied")
 
     # Permissions of the file itself do not bind the superuser, under whom tests may run.
-    monkeypatch.setattr(file_reading.os, "open", refuse)
+    monkeypatch.setattr("dynx.model.file_reading.os.open", refuse)
     with pytest.raises(DescriptionError, match=r"secret\.urdf: cannot be read: Permission denied"):
         read_file(str(path))
 

@@ -122,8 +122,8 @@ def test_the_data_is_found_under_a_prefix_too(tmp_path: Path, monkeypatch: pytes
     def absent(_: str) -> metadata.Distribution:
         raise metadata.PackageNotFoundError
 
-    monkeypatch.setattr(library.metadata, "distribution", absent)
-    monkeypatch.setattr(library.sys, "path", [])
+    monkeypatch.setattr("dynx.model.library.metadata.distribution", absent)
+    monkeypatch.setattr("dynx.model.library.sys.path", [])
     monkeypatch.setenv("CMAKE_PREFIX_PATH", str(tmp_path))
     monkeypatch.delenv("AMENT_PREFIX_PATH", raising=False)
     robots.cache_clear()

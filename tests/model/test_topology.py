@@ -92,7 +92,10 @@ def test_a_cycle_of_ten_thousand_links_is_named_in_short() -> None:
 def followers(*drivers: tuple[str, str, float, float], moving: str = "") -> list[Joint]:
     """Joints that follow others, and the joints named in `moving`, which follow none."""
     joints = [Joint(name, "revolute", "x", "y") for name in moving]
-    joints += [Joint(name, "revolute", "x", "y", mimic=Mimic(*mimic)) for name, *mimic in drivers]
+    joints += [
+        Joint(name, "revolute", "x", "y", mimic=Mimic(driver, scale, offset))
+        for name, driver, scale, offset in drivers
+    ]
     return joints
 
 

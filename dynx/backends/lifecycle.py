@@ -1,0 +1,72 @@
+"""What a backend is apart from the questions it answers: its name, how it closes, how it pickles."""
+
+from __future__ import annotations
+
+from types import TracebackType
+from typing import Any, ClassVar, TypeVar
+
+from dynx._version import __version__
+from dynx.backends.arguments import Arguments
+from dynx.model import Model
+
+Self = TypeVar("Self", bound="Lifecycle")
+
+
+class Lifecycle:
+    """Opened by its constructor, closed by `close` or the end of a ``with``; pickled by its recipe.
+
+    A pickle holds the model and the options, not the engine: the copy makes an engine of its own.
+    """
+
+    name: ClassVar[str]
+    """The name under which the registry finds the backend."""
+
+    model: Model
+    """The robot."""
+
+    def __init__(self, model: Model, arguments: Arguments, *, validate: bool) -> None:
+        self.model = model
+        self._arguments = arguments
+        self._options: dict[str, Any] = {"validate": validate}
+        # True while arguments are looked at; a closed backend always looks, and refuses.
+        self._validate = validate
+
+    @property
+    def engine_version(self) -> str:
+        """Name and version of the engine behind."""
+        return f"dynx {__version__}"
+
+    @classmethod
+    def require_engine(cls) -> None:
+        """Raise NotInstalledError if the engine is missing: for one that its class imports late."""
+
+    def close(self) -> None:
+        """Release what the engine holds; further calls raise ClosedError. Closing twice is harmless."""
+        if not self._arguments.closed:
+            self._validate = True
+            self._arguments.closed = True
+            self._release()
+
+    def _release(self) -> None:
+        """Give back what the engine holds."""
+
+    def __enter__(self: Self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _rebuild, (type(self), self.model, self._options)
+
+    def __repr__(self) -> str:
+        return f"<{self.name} backend of {self.model.name}>"
+
+
+def _rebuild(kind: Any, model: Model, options: dict[str, Any]) -> Any:
+    return kind(model, **options)

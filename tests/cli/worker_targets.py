@@ -1,0 +1,32 @@
+"""What the worker processes of the tests do: answer, die, hang, raise."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from typing import Any
+
+from dynx.cli.agreement_task import AgreementTask, Entry, measure
+
+
+def act(task: Any) -> Any:
+    """Do what `task` says; anything else is answered with itself and the number of the process."""
+    if task == "segfault":
+        os.kill(os.getpid(), signal.SIGSEGV)
+    elif task == "exit":
+        os._exit(7)
+    elif task == "hang":
+        time.sleep(600.0)
+    elif task == "raise":
+        raise ZeroDivisionError("no reason")
+    elif task == "print":
+        os.write(1, b"an engine says hello\n" * 1000)
+    return task, os.getpid()
+
+
+def crash_on_panda(task: AgreementTask) -> Entry:
+    """Measure, but end the process at the robot `panda` as an engine would."""
+    if task.robot == "panda":
+        os.kill(os.getpid(), signal.SIGSEGV)
+    return measure(task)
