@@ -1,5 +1,6 @@
-"""Hypothesis profiles: ``ci`` (200 examples of each property, the default) and ``dev`` (20, for a
-quick look); ``pytest --hypothesis-profile dev`` or ``HYPOTHESIS_PROFILE=dev`` chooses.
+"""Hypothesis profiles: ``ci`` (200 examples of each property, the default), ``dev`` (20, for a quick
+look) and ``faults`` (25, not shrunk: `tests.faults` asks only whether a test fails);
+``pytest --hypothesis-profile dev`` or ``HYPOTHESIS_PROFILE=dev`` chooses.
 
 Examples are drawn from a fixed seed, so a failure in CI is a failure everywhere; no deadline, since
 the time of one example says more about the machine than about dynx.
@@ -9,7 +10,7 @@ from __future__ import annotations
 
 import os
 
-from hypothesis import HealthCheck, settings
+from hypothesis import HealthCheck, Phase, settings
 
 settings.register_profile(
     "ci",
@@ -20,4 +21,10 @@ settings.register_profile(
     suppress_health_check=[HealthCheck.too_slow],
 )
 settings.register_profile("dev", parent=settings.get_profile("ci"), max_examples=20)
+settings.register_profile(
+    "faults",
+    parent=settings.get_profile("ci"),
+    max_examples=25,
+    phases=[Phase.explicit, Phase.generate],
+)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))

@@ -23,13 +23,17 @@ from dynx.agreement.sampling import Samples
 from dynx.backends.reference import ReferenceBackend
 from dynx.model.mechanism import ROOT
 from dynx.rbd.kinematics import ancestry, body_poses
+from dynx.spatial.inertia import RigidInertia
 from dynx.spatial.scalar import Floats
+from dynx.spatial.so3 import skew
 
 EPS = float(np.finfo(np.float64).eps)
 
 SLENDER = 1e-2
 """M_ii is one component of the inertia tensor of all that joint i carries. Rounding in the others
-reaches it, so it counts as at least this share of that tensor's size (a rod spun about its axis)."""
+reaches it, so it counts as at least this share of that tensor's size (a rod spun about its axis).
+Where the file states an inertia that no body has, M_ii may be the difference of large terms and even
+zero or negative; there it counts as the whole size."""
 
 
 class Magnitudes:
@@ -151,7 +155,7 @@ class Magnitudes:
         M_ii also counts as at least the rounding error of the largest M_jj.
         """
         diagonal = np.abs(np.diagonal(self.mass_matrix, axis1=-2, axis2=-1))
-        carried = SLENDER * (self._carried_tensor @ (self._S * self._S))
+        carried = self._carried @ (self._S * self._S)
         largest = np.max(diagonal, axis=-1, initial=0.0, keepdims=True)
         return np.asarray(np.sqrt(np.maximum(np.maximum(diagonal, carried), EPS * largest)))
 
@@ -238,29 +242,37 @@ class Magnitudes:
         return self._reference.bias_torque(self.samples.q, self.samples.v)
 
     @cached_property
-    def _carried_tensor(self) -> Floats:
-        """(n, nv of the tree) Size of the inertia, about each joint's origin, of all that it carries."""
+    def _carried(self) -> Floats:
+        """(n, nv of the tree) What M_ii of a turning joint counts as at least: see `SLENDER`."""
         mechanism, n = self._mechanism, len(self.samples)
         inertias = [mechanism.root, *(body.inertia for body in mechanism.bodies)]
-        poses = body_poses(mechanism, self._q_tree)
-        tensor = np.zeros((n, self._mechanism.nv))
         below: list[list[int]] = [[] for _ in inertias]
+        below[0].append(0)
         for index in range(len(mechanism.bodies)):
             for ancestor in [*ancestry(mechanism, index), ROOT]:
                 below[ancestor + 1].append(index + 1)
-        below[0].append(0)
         mass = np.array([float(abs(inertia.mass)) for inertia in inertias])
         spin = np.array([float(np.max(np.abs(inertia.second_moment))) for inertia in inertias])
+        share = np.array([SLENDER if _physical(inertia) else 1.0 for inertia in inertias])
+        poses = body_poses(mechanism, self._q_tree)
         origin = np.stack([np.broadcast_to(p, (n, 3)) for p in poses.p], axis=1)
         first = 6 if self._model.floating else 0
-        for body in range(len(inertias)):
-            column = first + body - 1
-            if body == 0 and not self._model.floating:
-                continue
-            arms = np.linalg.norm(origin[:, below[body]] - origin[:, [body]], axis=-1)
-            size = np.sum(spin[below[body]] + mass[below[body]] * arms**2, axis=-1)
-            if body == 0:
-                tensor[:, 3:6] = size[:, None]
-            elif self._turning[column]:
-                tensor[:, column] = size
-        return tensor
+        floor = np.zeros((n, mechanism.nv))
+        for body, carried in enumerate(below):
+            arms = np.linalg.norm(origin[:, carried] - origin[:, [body]], axis=-1)
+            size = np.max(share[carried]) * np.sum(spin[carried] + mass[carried] * arms**2, axis=-1)
+            if body > 0 and mechanism.bodies[body - 1].revolute:
+                floor[:, first + body - 1] = size
+            elif body == 0 and self._model.floating:
+                floor[:, 3:6] = size[:, None]
+        return floor
+
+
+def _physical(inertia: RigidInertia) -> bool:
+    """Whether no rotation about the mass centre has negative energy, to within rounding."""
+    size = float(np.max(np.abs(inertia.second_moment)))
+    if inertia.mass < 0.0:
+        return False
+    H = skew(inertia.first_moment)
+    central = inertia.second_moment + (H @ H / inertia.mass if inertia.mass > 0.0 else 0.0)
+    return float(np.linalg.eigvalsh(central)[0]) >= -4.0 * EPS * size

@@ -98,10 +98,12 @@ def _accepts(mass: float, lever: Floats, moments: Floats) -> bool:
     z + x >= y is not asked (btInverseDynamics, `isValidInertiaMatrix`, where the second test is the
     first once more). A body that meets one with equality must not depend on how Bullet rounds.
     """
-    x, y, z = moments
-    square_x, square_y, square_z = mass * lever * lever
-    x, y, z = x + square_z + square_y, y + square_x + square_z, z + square_x + square_y
-    exact = np.count_nonzero(lever) <= 1
+    squares = mass * lever * lever
+    # Dust that the other terms of a sum absorb.
+    squares[squares <= FLOAT64_EPS**2 * np.max(squares)] = 0.0
+    x, y, z = moments + (np.sum(squares) - squares)
+    # With the centre of mass on one of the axes both sides add the same number.
+    exact = np.count_nonzero(squares) <= 1
     margin = 0.0 if exact else 8 * FLOAT64_EPS * max(x, y, z)
     return bool(min(moments) >= 0.0 and x + y >= z + margin and y + z >= x + margin)
 

@@ -20,7 +20,7 @@ from dynx.backends.bullet_inertia import Ballast, PrincipalInertia, longdouble, 
 from dynx.model.mechanism import ROOT, Mechanism
 from dynx.spatial.inertia import RigidInertia
 from dynx.spatial.scalar import Array, Floats
-from dynx.spatial.so3 import rotate_back
+from dynx.spatial.so3 import rotate_back, rpy_from_rotation
 
 NOTHING = RigidInertia(longdouble(0.0), longdouble(np.zeros(3)), longdouble(np.zeros((3, 3))))
 
@@ -102,19 +102,6 @@ def locale_free(number: float) -> str:
     return f"{'-' if sign else ''}{''.join(map(str, digits))}e{exponent}"
 
 
-def stable_rpy(R: Array) -> Floats:
-    """Roll, pitch, yaw (3,) [rad] of R, to full precision at every attitude.
-
-    Near pitch = +-90 degrees roll and yaw are uncertain one by one; roll is therefore read off
-    Rz(yaw)^T R, with the yaw that was chosen.
-    """
-    yaw = np.arctan2(R[1, 0], R[0, 0])
-    s, c = np.sin(yaw), np.cos(yaw)
-    pitch = np.arctan2(-R[2, 0], c * R[0, 0] + s * R[1, 0])
-    roll = np.arctan2(s * R[0, 2] - c * R[1, 2], c * R[1, 1] - s * R[0, 1])
-    return np.array([roll, pitch, yaw], dtype=np.float64)
-
-
 def _in_units(inertia: PrincipalInertia, unit: float) -> PrincipalInertia:
     return replace(inertia, mass=inertia.mass / unit, moments=inertia.moments / unit)
 
@@ -130,7 +117,7 @@ def _link(name: str, mass: float, center: Array, axes: Array) -> list[str]:
 
 
 def _origin(p: Array, R: Array) -> str:
-    return f'<origin xyz="{_vector(p)}" rpy="{_vector(stable_rpy(R))}"/>'
+    return f'<origin xyz="{_vector(p)}" rpy="{_vector(rpy_from_rotation(R))}"/>'
 
 
 def _vector(numbers: Array) -> str:

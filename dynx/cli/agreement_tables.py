@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from dynx.cli.agreement_task import Entry, counts, verdict
+from dynx.cli.agreement_task import Entry, counts, label, verdict
 from dynx.cli.exits import one_line
 from dynx.cli.terminal import plain_table
 
@@ -35,10 +35,10 @@ _SHOWN_DIFFERENCES = 6
 def show_one(out: Console, entry: Entry) -> None:
     """The full report of one robot: quantities by pair, identities by backend, notes."""
     if verdict(entry) == "refused":
-        out.print(f"{one_line(entry['robot'])}: refused")
+        out.print(f"{label(entry)}: refused")
         return
     out.print(
-        f"{one_line(entry['robot'])}, {entry['base']} base, nq {entry['nq']}, nv {entry['nv']}, "
+        f"{label(entry)}, {entry['base']} base, nq {entry['nq']}, nv {entry['nv']}, "
         f"{entry['samples']} samples, seed {entry['seed']}  ({one_line(entry['source'])})",
         style="bold",
     )
@@ -75,14 +75,14 @@ def show_many(out: Console, entries: Sequence[Entry]) -> None:
         cells += [_worst([check for check in checks if _judge(check) == judge]) for judge in judges]
         refused = verdict(entry) == "refused"
         table.add_row(
-            one_line(entry["robot"]),
+            label(entry),
             "" if refused else str(entry["nv"]),
             *cells,
             _verdict_text(entry),
             "" if entry["seconds"] is None else f"{entry['seconds']:.1f}",
         )
     out.print(
-        "largest relative error over all quantities (inverse kinematics, solved to a tolerance, apart)",
+        "largest relative error over all quantities but inverse kinematics",
         style="bold",
     )
     out.print(table)
@@ -206,15 +206,13 @@ def _show_differences(out: Console, entry: Entry, limit: int | None) -> None:
     ]
     lines = [_difference(*each) for each in failed if not each[0]["agree"]]
     for line in lines[:limit]:
-        out.print(f"{one_line(entry['robot'])}: {line}", style="red")
+        out.print(f"{label(entry)}: {line}", style="red")
     if limit is not None and len(lines) > limit:
-        out.print(f"{one_line(entry['robot'])}: and {len(lines) - limit} more", style="red")
+        out.print(f"{label(entry)}: and {len(lines) - limit} more", style="red")
     for suspect in entry["suspects"][:limit]:
         evidence = one_line("; ".join(suspect["evidence"]))
         what = suspect["quantity"].replace("_", " ")
-        out.print(
-            f"{one_line(entry['robot'])}: suspect {suspect['backend']}, {what}: {evidence}", style="red"
-        )
+        out.print(f"{label(entry)}: suspect {suspect['backend']}, {what}: {evidence}", style="red")
 
 
 def _difference(check: Check, what: str, who: str, error: float | None) -> str:

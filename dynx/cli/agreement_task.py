@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from dynx._version import __version__
+from dynx.cli.exits import one_line
 from dynx.cli.workers import Failure
 from dynx.errors import DynxError, EngineError
 
@@ -73,6 +74,12 @@ def refused(task: AgreementTask, error: DynxError) -> Entry:
 def failed(task: AgreementTask, failure: Failure) -> Entry:
     """The entry of a robot whose worker process gave no answer."""
     return refused(task, _OF_KIND[failure.kind](failure.message))
+
+
+def label(entry: Entry) -> str:
+    """The robot of an entry as one short line: what names a robot may be anything."""
+    robot = one_line(entry["robot"])
+    return robot if len(robot) <= 200 else f"{robot[:60]}... ({len(robot)} characters)"
 
 
 def document(entries: Sequence[Entry], not_done: Sequence[str] = ()) -> dict[str, Any]:

@@ -17,7 +17,7 @@ import click
 
 from dynx.errors import DynxError
 
-DONE, ANSWER_IS_NO, BAD_INPUT, DEFECT, INTERRUPTED, TERMINATED = 0, 1, 2, 70, 130, 143
+DONE, ANSWER_IS_NO, BAD_INPUT, DEFECT, INTERRUPTED = 0, 1, 2, 70, 130
 
 TRACEBACK_VARIABLE = "DYNX_TRACEBACK"
 """Set to anything but 0 or nothing, this environment variable shows where an error was raised."""

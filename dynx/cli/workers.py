@@ -19,6 +19,8 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from dynx.cli.exits import traceback_wanted
+
 FailureKind = Literal["crash", "timeout", "defect"]
 
 _START = "import sys; sys.path[:] = sys.argv[1:]; from dynx.cli.workers import serve; serve()"
@@ -215,7 +217,7 @@ def _answer(target: Callable[[Any], Any], task: Any) -> tuple[Any] | Failure:
     except Exception as error:  # the boundary of the process: nothing may pass it but a reply
         import traceback
 
-        if os.environ.get("DYNX_TRACEBACK", "0") not in ("", "0"):
+        if traceback_wanted():
             traceback.print_exc()
         return Failure("defect", f"{type(error).__name__}: {error}")
 
@@ -224,7 +226,7 @@ def _silence() -> None:
     """Engines print to the C-level streams; standard output here carries pickles."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, 1)
-    if os.environ.get("DYNX_TRACEBACK", "0") in ("", "0"):
+    if not traceback_wanted():
         os.dup2(nowhere, 2)
     os.close(nowhere)
 

@@ -21,7 +21,7 @@ _SUFFIXES = (".urdf", ".xacro", ".xml")
 
 
 def load(
-    x: StrPath | bytes | Model,
+    x: StrPath | bytes | bytearray | Model,
     *,
     base: Base | None = None,
     lock: Mapping[str, float] | None = None,

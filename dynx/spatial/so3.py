@@ -59,13 +59,12 @@ def rotation_from_rpy(rpy: Array) -> Array:
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
-def rpy_from_rotation(R: Floats) -> Floats:
+def rpy_from_rotation(R: Array) -> Array:
     """The roll, pitch, yaw [rad] of R (..., 3, 3); at pitch = +-90 degrees, yaw is put to 0.
 
     Roll is taken from Rz(-yaw) R, so that it makes up for a yaw that is ill-determined near
-    pitch = +-90 degrees: the three always give R back to rounding.
+    pitch = +-90 degrees: the three always give R back to rounding, in long double too.
     """
-    R = np.asarray(R, dtype=float)
     locked = np.hypot(R[..., 0, 0], R[..., 1, 0]) < 4.0 * np.finfo(float).eps
     yaw = np.where(locked, 0.0, np.arctan2(R[..., 1, 0], R[..., 0, 0]))
     c, s = np.cos(yaw), np.sin(yaw)

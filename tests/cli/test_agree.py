@@ -46,9 +46,8 @@ def test_the_document_has_the_shape_of_the_schema() -> None:
     keys = "robot source base backends nq nv samples seed agree error seconds quantities"
     assert set(keys.split()) <= set(good)
     assert set(good) == set(bad)
-    assert set("quantity pair max_abs_error max_rel_error tolerance agree worst_sample".split()) <= set(
-        good["quantities"][0]
-    )
+    row = {"quantity", "pair", "max_abs_error", "max_rel_error", "tolerance", "agree", "worst_sample"}
+    assert row <= set(good["quantities"][0])
     assert good["agree"] is True
     assert good["error"] is None
     assert bad["agree"] is False
@@ -81,7 +80,7 @@ BAD_TEXTS = {
     "not XML": "garbage",
     "truncated": '<robot name="r"><link name="l">',
     "entity bomb": '<!DOCTYPE r [<!ENTITY a "aa">]><robot name="r"><link name="l"/></robot>',
-    "external entity": '<!DOCTYPE r [<!ENTITY a SYSTEM "/etc/passwd">]><robot name="&a;"><link name="l"/></robot>',
+    "external entity": '<!DOCTYPE r [<!ENTITY a SYSTEM "/etc/passwd">]><robot name="&a;"/>',
     "two roots": '<robot name="r"><link name="a"/><link name="b"/></robot>',
     "duplicate": '<robot name="r"><link name="a"/><link name="a"/></robot>',
     "cycle": '<robot name="r"><link name="a"/><link name="b"/>'
@@ -173,18 +172,21 @@ def test_all_is_the_whole_of_example_robot_data() -> None:
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_an_interrupted_run_writes_what_is_done(number: int, code: int, tmp_path: Path) -> None:
     target = tmp_path / "out.json"
-    command = [sys.executable, "-m", "dynx", "agree", *["ur5"] * 2000, *QUICK, "--json", str(target)]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    time.sleep(6.0)
-    process.send_signal(number)
-    out, err = process.communicate(timeout=60.0)
-    assert process.returncode == code
-    assert "Traceback" not in err
-    assert "interrupted" in err
-    made = json.loads(target.read_text())
-    assert len(made["results"]) + len(made["not_done"]) == 2000
+    command = [sys.executable, "-m", "dynx", "agree", *["ur5"] * 5000, *QUICK, "--json", str(target)]
+    for patience in (4.0, 16.0, 64.0):
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        time.sleep(patience)
+        process.send_signal(number)
+        out, err = process.communicate(timeout=60.0)
+        assert process.returncode == code
+        assert "Traceback" not in err
+        assert "interrupted" in err
+        assert "not done" in out
+        made = json.loads(target.read_text())
+        assert len(made["results"]) + len(made["not_done"]) == 5000
+        if made["results"]:
+            break
     assert made["summary"]["agree"] == len(made["results"]) > 0
-    assert "not done" in out
 
 
 def test_a_closed_pipe_is_no_error_message(tmp_path: Path) -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+_ENGINES = {"pybullet": ("pybullet", "bullet_"), "pinocchio": ("pinocchio",)}
+
 
 @dataclass(frozen=True)
 class Fault:
@@ -17,6 +19,14 @@ class Fault:
     right: str
     wrong: str
     caught_by: str
+
+    @property
+    def engine(self) -> str | None:
+        """The engine without which the fault, or the test that catches it, is not there."""
+        for engine, marks in _ENGINES.items():
+            if any(mark in self.module or mark in self.caught_by for mark in marks):
+                return engine
+        return None
 
     def planted(self, source: str) -> str:
         """The source with the fault in it."""

@@ -33,7 +33,13 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_text_bytes_and_files_give_equal_models(here: Path) -> None:
     path = here / "x.urdf"
     path.write_text(TEXT)
-    ways: list[str | bytes | os.PathLike[str]] = [TEXT, "\n \ufeff" + TEXT, path, str(path), "x.urdf"]
+    ways: list[str | bytes | bytearray | os.PathLike[str]] = [
+        TEXT,
+        "\n \ufeff" + TEXT,
+        path,
+        str(path),
+        "x.urdf",
+    ]
     ways += ["./x.urdf", TEXT.encode(), bytearray(TEXT.encode()), codecs.BOM_UTF8 + TEXT.encode()]
     assert len({load(way) for way in ways}) == 1
     assert load(TEXT).source == "<string>"

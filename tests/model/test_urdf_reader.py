@@ -313,6 +313,15 @@ def test_limits_that_are_absent_or_the_largest_float_are_none() -> None:
     assert limits == Limits(-math.inf, 1.0, math.inf, math.inf)
 
 
+@pytest.mark.parametrize(
+    ("limit", "ends"),
+    [("<limit/>", (0.0, 0.0)), ('<limit upper="1"/>', (0.0, 1.0)), ('<limit lower="-1"/>', (-1.0, 0.0))],
+)
+def test_an_end_that_is_absent_is_zero_as_the_format_says(limit: str, ends: tuple[float, float]) -> None:
+    limits = load(joint(limit=limit)).joints[0].limits
+    assert (limits.lower, limits.upper) == ends
+
+
 def test_numbers_of_an_impossible_inertia_are_used_as_they_stand() -> None:
     assert load(link(INERTIAL.replace("0.05", "-0.05"))).inertial("a").izz == -0.05
 

@@ -126,8 +126,10 @@ def _report(run: Run, json_path: str | None, quiet: bool) -> int:
 
 def _refusal(entry: Entry) -> str:
     """Why a robot was refused; most messages name its file already."""
-    robot, message = entry["robot"], entry["error"]["message"]
-    return message if robot in message else f"{robot}: {message}"
+    from dynx.cli.agreement_task import label
+
+    message: str = entry["error"]["message"]
+    return message if entry["robot"] in message else f"{label(entry)}: {message}"
 
 
 def _check_backends(names: tuple[str, ...]) -> None:

@@ -10,8 +10,8 @@
 
 What is drawn is valid by construction, never by filtering, so no health check fires and every
 failing example shrinks. Shrink targets: a model shrinks to the fewest links in a chain with a fixed
-base, standard gravity, revolute joints about z at the parent's origin, round numbers, no mimic
-joint, no limits and no dynamics; a configuration to the neutral one; velocities and wrenches to
+base, standard gravity, fixed or revolute joints about z at the parent's origin, round numbers, no
+mimic joint, no limits and no dynamics; a configuration to the neutral one; velocities and wrenches to
 zero; poses to the identity; text to the tidy spelling.
 
 Every argument is checked when the strategy is made, not when it is drawn from; a wrong one raises

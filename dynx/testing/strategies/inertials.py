@@ -18,7 +18,8 @@ KINDS: tuple[Kind, ...] = ("solid", "physical", "any")
 
 
 def inertials(kind: Kind = "physical") -> Strategy[Inertial | None]:
-    """What a link's ``<inertial>`` may say. Shrinks to a solid cube of 1 kg at the link's origin.
+    """What a link's ``<inertial>`` may say. Shrinks to none where that may occur, else to a cube of
+    1 kg at the link's origin.
 
     - ``"solid"``: positive mass and extent along every axis, so that any motion has inertia
     - ``"physical"``: also plates, rods, point masses, an explicit zero, and no inertial at all
@@ -34,7 +35,7 @@ def inertials(kind: Kind = "physical") -> Strategy[Inertial | None]:
     if kind == "solid":
         return solid
     thin = _bodies(st.sampled_from((0.0, 0.25)))
-    choices: list[Strategy[Inertial | None]] = [solid, thin, st.none(), st.just(Inertial())]
+    choices: list[Strategy[Inertial | None]] = [st.none(), solid, thin, st.just(Inertial())]
     if kind == "any":
         choices.append(_impossible())
     return st.one_of(choices)

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import replace
-from typing import Any, Literal, get_args
+from dataclasses import dataclass, replace
+from typing import Literal, TypeVar, get_args
 
 from hypothesis import strategies as st
 
 from dynx.errors import ArgumentError, DTypeError, UnknownNameError, nearest, shown
-from dynx.model import Joint, JointDynamics, Limits, Link, Mimic, Model
-from dynx.model.elements import INFINITY, JointType
-from dynx.model.model import STANDARD_GRAVITY
+from dynx.model import Inertial, Joint, JointDynamics, Limits, Link, Mimic, Model, Pose
+from dynx.model.elements import INFINITY, JointType, Vector
+from dynx.model.model import STANDARD_GRAVITY, Base
 from dynx.testing.strategies.geometry import (
     Strategy,
     numbers,
@@ -19,11 +19,11 @@ from dynx.testing.strategies.geometry import (
     unit_vectors,
     vectors,
 )
-from dynx.testing.strategies.inertials import Kind, inertials
+from dynx.testing.strategies.inertials import inertials
 
+T = TypeVar("T")
 BaseChoice = Literal["fixed", "floating", "either"]
 JOINT_TYPES: tuple[JointType, ...] = get_args(JointType)
-ORIGINS, FRAME_PLACEMENTS, AXES = origins(), origins(0.5), unit_vectors()
 MAX_LINKS = 64
 """A larger random robot shows no more, and makes one example as long as a hundred."""
 
@@ -34,6 +34,40 @@ NAMINGS = (
     ("part{}", "part{}"),
     ("arm/link {}", "arm/joint {}"),
     ("Glied_ä{}", "Gelenk_ö{}"),
+)
+
+
+def seldom(strategy: Strategy[T]) -> Strategy[T | None]:
+    """What the strategy draws, one time in six, or None."""
+    return st.integers(0, 5).flatmap(lambda n: strategy if n == 5 else st.none())
+
+
+def _limits(reach: float) -> Strategy[Limits]:
+    """None, of some width, of no width, or on one side."""
+    ends = st.tuples(numbers(reach), numbers(reach)).map(sorted)
+    finite = ends.map(lambda ends: Limits(ends[0], ends[1], velocity=2.0, effort=50.0))
+    return st.one_of(
+        st.just(Limits()),
+        finite,
+        finite.map(lambda limits: replace(limits, upper=limits.lower)),
+        finite.map(lambda limits: replace(limits, upper=INFINITY)),
+        finite.map(lambda limits: replace(limits, lower=-INFINITY)),
+    )
+
+
+# Made once: making a strategy takes longer than drawing from it.
+ORIGINS, AXES, BACK = origins(), unit_vectors(), st.integers(0, MAX_LINKS)
+FRAMES = st.lists(st.tuples(st.integers(0, MAX_LINKS), origins(0.5)), max_size=2)
+GRAVITIES = st.just(STANDARD_GRAVITY) | vectors(10.0)
+RATIOS = st.sampled_from((1.0, -1.0, 0.5, 2.0, 0.0)) | numbers(3.0)
+LIMITS: dict[JointType, Strategy[Limits]] = {
+    "revolute": _limits(3.0),
+    # Drawn and dropped, so that every moving joint takes equally many choices and shrinks to the first.
+    "continuous": _limits(3.0).map(lambda dropped: Limits()),
+    "prismatic": _limits(1.0),
+}
+DYNAMICS = seldom(st.builds(JointDynamics, *[numbers(1.0).map(abs)] * 3)).map(
+    lambda dynamics: dynamics or JointDynamics()
 )
 
 
@@ -65,8 +99,9 @@ def models(
     - `from_urdf`: only what a URDF file can say: standard gravity, no further frames, no locked
       joint
 
-    Shrinks to `min_links` links in a chain, with a fixed base if that is allowed, the first of
-    `joint_types` about z at the parent's origin, 1 kg cubes, and nothing that is optional.
+    Shrinks to `min_links` links in a chain, with a fixed base if that is allowed, joints that are
+    fixed or else the first of `joint_types` about z, at the parent's origin, and nothing that is
+    optional: massless links where they may occur, else 1 kg cubes.
     """
     _check_count("min_links", min_links, 1, MAX_LINKS)
     _check_count("max_links", max_links, 1, MAX_LINKS)
@@ -91,9 +126,26 @@ def models(
             raise DTypeError(f"{name} is {shown(flag)}; wanted True or False")
     if solvable and not physical:
         raise ArgumentError("solvable=True needs physical=True: other tensors may make M singular")
-    kind_of_inertial: Kind = "solid" if solvable else "physical" if physical else "any"
+    inertial = inertials("solid" if solvable else "physical" if physical else "any")
     allowed = tuple(kind for kind in JOINT_TYPES if kind in joint_types)
-    return _models(min_links, max_links, base, allowed, mimics, locks, inertials(kind_of_inertial), from_urdf)
+    limb = _limbs(allowed, inertial, mimics, locks and not from_urdf)
+    bases: tuple[Base, ...] = ("fixed", "floating") if base == "either" else (base,)
+    return _models(min_links, max_links, bases, limb, inertial, from_urdf)
+
+
+@dataclass(frozen=True)
+class _Limb:
+    """A link and the joint that carries it, before the robot is known; `back` and `driver` count."""
+
+    inertial: Inertial | None
+    type: JointType
+    back: int
+    origin: Pose
+    axis: Vector
+    limits: Limits
+    dynamics: JointDynamics
+    mimic: tuple[int, float, float] | None
+    lock: float | None
 
 
 @st.composite
@@ -101,91 +153,88 @@ def _models(
     draw: st.DrawFn,
     min_links: int,
     max_links: int,
-    base: BaseChoice,
-    joint_types: tuple[JointType, ...],
-    mimics: bool,
-    locks: bool,
-    inertial: Strategy[Any],
+    bases: tuple[Base, ...],
+    limb: Strategy[_Limb],
+    inertial: Strategy[Inertial | None],
     from_urdf: bool,
 ) -> Model:
-    n = draw(st.integers(min_links, max_links))
+    # What belongs to one link is drawn together, so that shrinking can take out a link at once.
+    limbs = draw(st.lists(limb, min_size=min_links - 1, max_size=max_links - 1))
     *root_name, link_name, joint_name = draw(st.sampled_from(NAMINGS))
-    link_names = [link_name.format(k) for k in range(n)]
-    link_names[0] = root_name[0] if root_name else link_names[0]
-    links = [Link(name, draw(inertial)) for name in link_names]
+    names = [*root_name, *(link_name.format(k) for k in range(len(root_name), len(limbs) + 1))]
+    links = [Link(names[0], draw(inertial))]
+    links += [Link(name, limb.inertial) for name, limb in zip(names[1:], limbs, strict=True)]
     joints = [
         Joint(
             joint_name.format(k),
-            draw(st.sampled_from(joint_types)),
-            # How far back, so that a chain is what it shrinks to.
-            link_names[k - 1 - draw(st.integers(0, k - 1))],
-            link_names[k],
-            origin=draw(ORIGINS),
-            axis=draw(AXES),
+            limb.type,
+            names[k - 1 - limb.back % k],
+            names[k],
+            limb.origin,
+            limb.axis,
+            limb.limits,
+            limb.dynamics,
         )
-        for k in range(1, n)
+        for k, limb in enumerate(limbs, start=1)
     ]
-    joints = [_equipped(draw, joint) for joint in joints]
-    if mimics:
-        joints = _with_mimics(draw, joints)
-    lock: dict[str, float] = {}
-    if locks and not from_urdf:
-        movable = [joint.name for joint in joints if joint.moves]
-        lock = {name: draw(numbers(1.0)) for name in movable if draw(_seldom())}
+    lock = {
+        joint.name: limb.lock
+        for joint, limb in zip(joints, limbs, strict=True)
+        if joint.moves and limb.lock is not None
+    }
+    joints = _with_mimics(joints, [limb.mimic for limb in limbs])
     if draw(st.booleans()):
         links, joints = draw(st.permutations(links)), draw(st.permutations(joints))
     model = Model.build(
         "random_robot",
         links,
         joints,
-        base=draw(st.sampled_from(("fixed", "floating") if base == "either" else (base,))),
-        gravity=STANDARD_GRAVITY if from_urdf else draw(st.just(STANDARD_GRAVITY) | vectors(10.0)),
+        base=draw(st.sampled_from(bases)),
+        gravity=STANDARD_GRAVITY if from_urdf else draw(GRAVITIES),
         lock=lock,
         source="<random>",
     )
-    if not from_urdf:
-        for k in range(draw(st.integers(0, 2))):
-            model = model.with_frame(f"frame{k}", draw(st.sampled_from(link_names)), draw(FRAME_PLACEMENTS))
+    for k, (link, placement) in enumerate([] if from_urdf else draw(FRAMES)):
+        model = model.with_frame(f"frame{k}", names[link % len(names)], placement)
     return model
 
 
-def _seldom() -> Strategy[bool]:
-    """True one time in six."""
-    return st.integers(0, 5).map(lambda n: n == 5)
+def _limbs(
+    joint_types: tuple[JointType, ...], inertial: Strategy[Inertial | None], mimics: bool, locks: bool
+) -> Strategy[_Limb]:
+    """The tip of a chain so far; shrinks to a massless link, fixed at its parent's origin."""
+    follow = st.tuples(st.integers(0, MAX_LINKS), RATIOS, numbers(1.0))
+
+    @st.composite
+    def limbs(draw: st.DrawFn) -> _Limb:
+        kind = draw(st.sampled_from(joint_types))
+        common = draw(inertial), kind, draw(BACK), draw(ORIGINS)
+        if kind == "fixed":
+            # It has neither limits nor dynamics, and its axis means nothing.
+            return _Limb(*common, (1.0, 0.0, 0.0), Limits(), JointDynamics(), None, None)
+        return _Limb(
+            *common,
+            draw(AXES),
+            draw(LIMITS[kind]),
+            draw(DYNAMICS),
+            draw(seldom(follow)) if mimics else None,
+            draw(seldom(numbers(1.0))) if locks else None,
+        )
+
+    return limbs()
 
 
-def _equipped(draw: st.DrawFn, joint: Joint) -> Joint:
-    """The joint with limits and dynamics; a fixed joint has neither, and its axis means nothing."""
-    if joint.type == "fixed":
-        return replace(joint, axis=(1.0, 0.0, 0.0))
-    reach = 1.0 if joint.type == "prismatic" else 3.0
-    limits = Limits()
-    if joint.type != "continuous" and draw(st.booleans()):
-        ends = sorted((draw(numbers(reach)), draw(numbers(reach))))
-        side = draw(st.integers(0, 3))
-        lower = -INFINITY if side == 2 else ends[0]
-        upper = INFINITY if side == 3 else ends[0] if side == 1 else ends[1]
-        limits = Limits(lower, upper, velocity=2.0, effort=50.0)
-    dynamics = JointDynamics()
-    if draw(_seldom()):
-        positive = numbers(1.0).map(abs)
-        dynamics = JointDynamics(draw(positive), draw(positive), draw(positive))
-    return replace(joint, limits=limits, dynamics=dynamics)
-
-
-def _with_mimics(draw: st.DrawFn, joints: list[Joint]) -> list[Joint]:
+def _with_mimics(joints: list[Joint], mimics: list[tuple[int, float, float] | None]) -> list[Joint]:
     """Some joints follow others. A driver comes earlier in `joints` or is free: no cycle can form."""
     moving = [k for k, joint in enumerate(joints) if joint.moves]
-    followers = [k for k in moving if draw(_seldom())]
+    followers = [k for k in moving if mimics[k] is not None]
     if len(followers) == len(moving):
         followers = followers[1:]
     followed = list(joints)
     for k in followers:
+        number, ratio, offset = mimics[k] or (0, 1.0, 0.0)
         drivers = [joints[other].name for other in moving if other < k or other not in followers]
-        ratio = draw(st.sampled_from((1.0, -1.0, 0.5, 2.0, 0.0)) | numbers(3.0))
-        followed[k] = replace(
-            joints[k], mimic=Mimic(draw(st.sampled_from(drivers)), ratio, draw(numbers(1.0)))
-        )
+        followed[k] = replace(joints[k], mimic=Mimic(drivers[number % len(drivers)], ratio, offset))
     return followed
 
 

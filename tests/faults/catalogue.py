@@ -1,0 +1,22 @@
+"""The catalogue: every planted fault. The score is that each is caught (`test_faults_are_caught`)."""
+
+from __future__ import annotations
+
+from tests.faults.catalogue_backends import INTERFACE_FAULTS, PINOCCHIO_FAULTS, PYBULLET_FAULTS
+from tests.faults.catalogue_model import MODEL_FAULTS, READER_FAULTS
+from tests.faults.catalogue_solving import AGREEMENT_FAULTS, IK_FAULTS
+from tests.faults.catalogue_spatial import RBD_FAULTS, SPATIAL_FAULTS
+from tests.faults.fault import Fault
+
+FAULTS_BY_AREA: dict[str, tuple[Fault, ...]] = {
+    "spatial": SPATIAL_FAULTS,
+    "rbd": RBD_FAULTS,
+    "model": MODEL_FAULTS,
+    "reader": READER_FAULTS,
+    "interface": INTERFACE_FAULTS,
+    "pinocchio": PINOCCHIO_FAULTS,
+    "pybullet": PYBULLET_FAULTS,
+    "ik": IK_FAULTS,
+    "agreement": AGREEMENT_FAULTS,
+}
+FAULTS: tuple[Fault, ...] = tuple(fault for faults in FAULTS_BY_AREA.values() for fault in faults)

@@ -1,0 +1,422 @@
+"""Faults in the model and in its reader and writer."""
+
+from __future__ import annotations
+
+from tests.faults.fault import Fault
+
+TOPOLOGY, LOCKING, ELEMENTS = "dynx.model.topology", "dynx.model.locking", "dynx.model.elements"
+MECHANISM, CONFIGURATION = "dynx.model.mechanism", "dynx.model.configuration"
+JOINTS, LINKS, VALUES = "dynx.model.urdf_joints", "dynx.model.urdf_links", "dynx.model.urdf_values"
+XML, XML_TEXT, WRITER = "dynx.model.xml_reading", "dynx.model.xml_text", "dynx.model.urdf_writer"
+
+COORDINATES = "tests/contract/test_coordinates.py"
+READER = "tests/model/test_urdf_reader.py"
+REFUSED = f"{READER}::test_a_bad_description_is_refused_with_line_and_reason"
+
+MODEL_FAULTS = (
+    Fault(
+        "joints_in_breadth_first_order",
+        TOPOLOGY,
+        right="joint = waiting.pop()",
+        wrong="joint = waiting.pop(0)",
+        caught_by=f"{COORDINATES}::test_order_is_depth_first_in_the_order_of_the_document",
+    ),
+    Fault(
+        "children_sorted_by_name",
+        TOPOLOGY,
+        right="waiting = children[roots[0].name][::-1]",
+        wrong="waiting = sorted(children[roots[0].name], key=lambda joint: joint.name, reverse=True)",
+        caught_by=f"{COORDINATES}::test_order_is_depth_first_in_the_order_of_the_document",
+    ),
+    Fault(
+        "children_in_reverse_order",
+        TOPOLOGY,
+        right="waiting.extend(reversed(children[joint.child]))",
+        wrong="waiting.extend(children[joint.child])",
+        caught_by=(
+            "tests/model/test_topology.py::"
+            "test_children_follow_their_parent_at_once_in_the_order_of_the_document"
+        ),
+    ),
+    Fault(
+        "two_roots_accepted",
+        TOPOLOGY,
+        right="if len(roots) > 1:",
+        wrong="if len(roots) > 2:",
+        caught_by=f"{REFUSED}[two root links]",
+    ),
+    Fault(
+        "cycle_not_noticed",
+        TOPOLOGY,
+        right="if len(ordered_links) < len(links):",
+        wrong="if not ordered_links:",
+        caught_by=f"{REFUSED}[a cycle beside a root]",
+    ),
+    Fault(
+        "duplicate_joint_names_accepted",
+        TOPOLOGY,
+        right='_refuse_duplicates("joint", joints, source)',
+        wrong='_refuse_duplicates("joint", [], source)',
+        caught_by=f"{REFUSED}[two joints of one name]",
+    ),
+    Fault(
+        "second_parent_accepted",
+        TOPOLOGY,
+        right="if joint.child in parent_joint:",
+        wrong="if joint is parent_joint.get(joint.child):",
+        caught_by=f"{REFUSED}[two parents]",
+    ),
+    Fault(
+        "offset_of_a_chain_of_mimics_not_scaled",
+        TOPOLOGY,
+        right="offset += scale * driver.mimic.offset",
+        wrong="offset += driver.mimic.offset",
+        caught_by="tests/model/test_topology.py::test_a_chain_of_mimics_becomes_one_step",
+    ),
+    Fault(
+        "follower_of_a_locked_joint_left_at_zero",
+        TOPOLOGY,
+        right="offset += scale * (driver.locked_at or 0.0)",
+        wrong="offset += 0.0 * scale",
+        caught_by=(
+            "tests/model/test_locking.py::test_followers_of_a_locked_joint_are_fixed_where_they_follow_to"
+        ),
+    ),
+    Fault(
+        "joint_locked_at_zero",
+        LOCKING,
+        right="fixed_at(joint, float(lock[joint.name]))",
+        wrong="fixed_at(joint, 0.0 * float(lock[joint.name]))",
+        caught_by=f"{COORDINATES}::TestLockedJoints::test_all_else_is_as_it_was[reference]",
+    ),
+    Fault(
+        "locked_slide_moved_in_the_parents_axes",
+        LOCKING,
+        right="T[:3, 3] + T[:3, :3] @ (axis * value)",
+        wrong="T[:3, 3] + axis * value",
+        caught_by=f"{COORDINATES}::TestLockedJoints::test_all_else_is_as_it_was[reference]",
+    ),
+    Fault(
+        "locked_hinge_turned_about_the_parents_axis",
+        LOCKING,
+        right="T[:3, :3] @ rotation_about(axis, np.array(value))",
+        wrong="rotation_about(axis, np.array(value)) @ T[:3, :3]",
+        caught_by="tests/model/test_locking.py::test_locking_is_holding",
+    ),
+    Fault(
+        "products_of_inertia_swapped",
+        ELEMENTS,
+        right="[self.ixx, self.ixy, self.ixz],\n"
+        "                [self.ixy, self.iyy, self.iyz],\n"
+        "                [self.ixz, self.iyz, self.izz],",
+        wrong="[self.ixx, self.ixz, self.ixy],\n"
+        "                [self.ixz, self.iyy, self.iyz],\n"
+        "                [self.ixy, self.iyz, self.izz],",
+        caught_by="tests/contract/test_masses.py::test_impossible_products_of_inertia[reference]",
+    ),
+    Fault(
+        "inertial_axes_ignored",
+        MECHANISM,
+        right="p_inertial, R_inertial, numbers(link.inertial.tensor)",
+        wrong="p_inertial, 0 * R_inertial + numbers(np.eye(3)), numbers(link.inertial.tensor)",
+        caught_by="tests/model/test_mechanism.py::test_frames_and_total_inertia_are_those_of_the_links",
+    ),
+    Fault(
+        "welded_link_lumped_where_its_body_is",
+        MECHANISM,
+        right="lumped[body] = lumped[body] + own.seen_from(R, p)",
+        wrong="lumped[body] = lumped[body] + own",
+        caught_by="tests/model/test_mechanism.py::test_frames_and_total_inertia_are_those_of_the_links",
+    ),
+    Fault(
+        "missing_inertial_given_a_kilogram",
+        MECHANISM,
+        right="if link.inertial is None:\n            continue\n",
+        wrong="if link.inertial is None:\n"
+        "            unit = RigidInertia(numbers(1.0), numbers(np.zeros(3)), numbers(np.eye(3)))\n"
+        "            lumped[here[link.name][0]] = lumped[here[link.name][0]] + unit\n"
+        "            continue\n",
+        caught_by="tests/contract/test_masses.py::test_a_massless_link_on_a_joint[reference-no inertial]",
+    ),
+    Fault(
+        "slide_taken_for_a_hinge",
+        MECHANISM,
+        right='revolute = joint.type != "prismatic"',
+        wrong='revolute = joint.type != "fixed"',
+        caught_by=(
+            f"{COORDINATES}::test_a_coordinate_moves_what_is_below_its_joint_along_its_axis[reference-fixed]"
+        ),
+    ),
+    Fault(
+        "frame_offset_in_the_axes_of_the_body",
+        MECHANISM,
+        right="frames.append(BodyFrame(frame.name, body, R @ R_frame, p + rotate(R, p_frame)))",
+        wrong="frames.append(BodyFrame(frame.name, body, R @ R_frame, p + p_frame))",
+        caught_by="tests/model/test_mechanism.py::test_frames_and_total_inertia_are_those_of_the_links",
+    ),
+    Fault(
+        "mimic_multiplier_dropped",
+        MECHANISM,
+        right="S[base + row, base + column] = scale",
+        wrong="S[base + row, base + column] = 1.0 if scale else 0.0",
+        caught_by=f"{COORDINATES}::TestMimicJoints::test_reduced_answers[reference-mass_matrix]",
+    ),
+    Fault(
+        "mimic_offset_dropped",
+        MECHANISM,
+        right="* np.array(self.scale) + np.array(self.offset)",
+        wrong="* np.array(self.scale)",
+        caught_by=f"{COORDINATES}::TestMimicJoints::test_reduced_answers[reference-forward_kinematics]",
+    ),
+    Fault(
+        "integrates_the_base_in_world_axes",
+        CONFIGURATION,
+        right="moved = q[..., :3] + rotate(rotation_from_quat(q[..., 3:7]), position)",
+        wrong="moved = q[..., :3] + position",
+        caught_by=f"{COORDINATES}::test_velocity_is_the_rate_of_the_pose[reference-floating]",
+    ),
+    Fault(
+        "integrates_the_attitude_in_world_axes",
+        CONFIGURATION,
+        right="turned = quat_product(q[..., 3:7], quat)",
+        wrong="turned = quat_product(quat, q[..., 3:7])",
+        caught_by=f"{COORDINATES}::test_velocity_is_the_rate_of_the_pose[reference-floating]",
+    ),
+    Fault(
+        "difference_without_the_conjugate",
+        CONFIGURATION,
+        right="conjugate = q0[..., 3:7] * np.array([-1.0, -1.0, -1.0, 1.0])",
+        wrong="conjugate = q0[..., 3:7] * np.array([1.0, 1.0, 1.0, 1.0])",
+        caught_by="tests/model/test_configuration.py::test_integrating_the_difference_arrives",
+    ),
+    Fault(
+        "random_beyond_the_limits",
+        CONFIGURATION,
+        right="if math.isfinite(high - low):\n        return low, high",
+        wrong="if math.isfinite(high - low):\n        return min(low, -reach), max(high, reach)",
+        caught_by=(
+            "tests/model/test_configuration.py::"
+            "test_random_configurations_are_valid_and_within_the_limits"
+        ),
+    ),
+    Fault(
+        "limits_of_followers_ignored",
+        CONFIGURATION,
+        right="if joint.mimic is None or joint.mimic.multiplier == 0.0:",
+        wrong="if joint.mimic is None or joint.mimic.multiplier != 0.0:",
+        caught_by="tests/model/test_configuration.py::test_limits_of_a_driver_are_narrowed_by_its_followers",
+    ),
+    Fault(
+        "clips_to_the_lower_limit_only",
+        CONFIGURATION,
+        right='np.clip(checked_array("q", q, model.nq), model.lower, model.upper)',
+        wrong='np.clip(checked_array("q", q, model.nq), model.lower, np.inf)',
+        caught_by=(
+            "tests/model/test_configuration.py::test_clipping_is_idempotent_and_moves_only_what_is_outside"
+        ),
+    ),
+    Fault(
+        "nan_accepted",
+        CONFIGURATION,
+        right="if not np.isfinite(array).all():",
+        wrong="if np.isinf(array).any():",
+        caught_by=(
+            "tests/contract/test_bad_input.py::test_an_array_that_cannot_be_used"
+            "[reference-forward_kinematics-NaN]"
+        ),
+    ),
+    Fault(
+        "too_many_numbers_accepted",
+        CONFIGURATION,
+        right="array.shape[-1] != length",
+        wrong="array.shape[-1] < length",
+        caught_by=(
+            "tests/contract/test_bad_input.py::test_an_array_that_cannot_be_used"
+            "[reference-mass_matrix-too long]"
+        ),
+    ),
+    Fault(
+        "quaternion_of_any_length_accepted",
+        CONFIGURATION,
+        right="np.any(np.abs(norm - 1.0) > 1e-6)",
+        wrong="np.any(norm < 1e-6)",
+        caught_by=(
+            "tests/contract/test_bad_input.py::test_a_quaternion_that_is_no_attitude"
+            "[reference-forward_kinematics]"
+        ),
+    ),
+)
+
+READER_FAULTS = (
+    Fault(
+        "document_type_accepted",
+        XML,
+        right="self._parser.StartDoctypeDeclHandler = self._doctype",
+        wrong="self._parser.StartDoctypeDeclHandler = None",
+        caught_by="tests/model/test_xml_reading.py::test_a_document_type_is_refused_with_its_line",
+    ),
+    Fault(
+        "line_number_off_by_one",
+        XML,
+        right="element = Element(tag, attributes, line)",
+        wrong="element = Element(tag, attributes, line - 1)",
+        caught_by=f"{REFUSED}[zero axis]",
+    ),
+    Fault(
+        "leading_blank_lines_not_counted",
+        XML_TEXT,
+        right=r'return stripped, len(re.findall(r"\r\n|\r|\n", front))',
+        wrong="return stripped, 0 * len(front)",
+        caught_by="tests/model/test_xml_reading.py::test_elements_know_their_tag_attributes_and_line",
+    ),
+    Fault(
+        "byte_order_mark_kept",
+        XML_TEXT,
+        right="return _strictly(data[len(mark) :], encoding, source)",
+        wrong="return _strictly(data, 'latin-1', source)",
+        caught_by=(
+            "tests/model/test_xml_reading.py::test_text_is_read_by_its_mark_its_declaration_or_as_utf8"
+        ),
+    ),
+    Fault(
+        "decimal_comma_accepted",
+        VALUES,
+        right="word = word.strip()",
+        wrong='word = word.strip().replace(",", ".")',
+        caught_by=f"{REFUSED}[decimal comma]",
+    ),
+    Fault(
+        "word_nan_accepted",
+        VALUES,
+        right="""        if _NUMBER.fullmatch(word):
+            value = float(word)
+            if math.isfinite(value):
+                return value
+""",
+        wrong="""        try:
+            return float(word)
+        except ValueError:
+            pass
+""",
+        caught_by=f"{REFUSED}[not a number]",
+    ),
+    Fault(
+        "overflowing_number_accepted",
+        VALUES,
+        right="if math.isfinite(value):",
+        wrong="if not math.isnan(value):",
+        caught_by=f"{REFUSED}[overflow]",
+    ),
+    Fault(
+        "position_and_attitude_exchanged",
+        VALUES,
+        right='return Pose(parts["xyz"], parts["rpy"])',
+        wrong='return Pose(parts["rpy"], parts["xyz"])',
+        caught_by=f"{READER}::test_everything_that_matters_is_read",
+    ),
+    Fault(
+        "vector_of_four_cut_to_three",
+        VALUES,
+        right="if len(words) != 3:",
+        wrong="words = words[:3]\n        if len(words) != 3:",
+        caught_by=f"{REFUSED}[four numbers]",
+    ),
+    Fault(
+        "zero_axis_accepted",
+        JOINTS,
+        right="if largest == 0.0:\n        raise reading.error(",
+        wrong="if largest == 0.0:\n        return (1.0, 0.0, 0.0)\n        raise reading.error(",
+        caught_by=f"{REFUSED}[zero axis]",
+    ),
+    Fault(
+        "axis_not_scaled_to_one",
+        JOINTS,
+        right="return (x / norm, y / norm, z / norm)",
+        wrong="return (x, y, z)",
+        caught_by=f"{READER}::test_an_axis_of_any_length_becomes_a_unit_vector",
+    ),
+    Fault(
+        "absent_axis_along_z",
+        JOINTS,
+        right="if axis is None:\n        return (1.0, 0.0, 0.0)",
+        wrong="if axis is None:\n        return (0.0, 0.0, 1.0)",
+        caught_by=f"{READER}::test_everything_that_matters_is_read",
+    ),
+    Fault(
+        "missing_limit_accepted",
+        JOINTS,
+        right='if kind in ("revolute", "prismatic"):',
+        wrong='if kind == "prismatic":',
+        caught_by=f"{REFUSED}[no limit]",
+    ),
+    Fault(
+        "mimic_dropped_by_the_reader",
+        JOINTS,
+        right="mimic=None if locked else _read_mimic(element, what, reading)",
+        wrong="mimic=None",
+        caught_by=f"{READER}::test_everything_that_matters_is_read",
+    ),
+    Fault(
+        "armature_not_read",
+        JOINTS,
+        right='for attribute in ("damping", "friction", "armature"):',
+        wrong='for attribute in ("damping", "friction"):',
+        caught_by=f"{READER}::test_everything_that_matters_is_read",
+    ),
+    Fault(
+        "planar_joint_read_as_fixed",
+        JOINTS,
+        right='"fixed": "fixed",\n}',
+        wrong='"fixed": "fixed",\n    "planar": "fixed",\n}',
+        caught_by=f"{READER}::test_joints_of_several_freedoms_are_refused_by_name[planar]",
+    ),
+    Fault(
+        "negative_mass_accepted",
+        LINKS,
+        right="if mass < 0.0:",
+        wrong="if mass < -1e9:",
+        caught_by=f"{REFUSED}[negative mass]",
+    ),
+    Fault(
+        "products_of_inertia_dropped",
+        LINKS,
+        right="for name in _MOMENTS}",
+        wrong='for name in ("ixx", "iyy", "izz")}',
+        caught_by=f"{READER}::test_everything_that_matters_is_read",
+    ),
+    Fault(
+        "inertial_origin_without_its_attitude",
+        LINKS,
+        right="Inertial(mass, reading.origin(element, what), **moments",
+        wrong="Inertial(mass, type(reading.origin(element, what))(reading.origin(element, what).xyz), **moments",
+        caught_by=f"{READER}::test_everything_that_matters_is_read",
+    ),
+    Fault(
+        "impossible_inertia_not_noted",
+        LINKS,
+        right="if small + middle < large - rounding:",
+        wrong="if small + middle < -large:",
+        caught_by=f"{READER}::test_what_could_surprise_is_noted_with_its_line[triangle]",
+    ),
+    Fault(
+        "writer_loses_a_digit",
+        WRITER,
+        right="return repr(max(-sys.float_info.max, min(sys.float_info.max, float(value))))",
+        wrong='return f"{max(-1e308, min(1e308, float(value))):.15g}"',
+        caught_by="tests/model/test_urdf_writer.py::test_a_random_model_is_read_back_equal",
+    ),
+    Fault(
+        "package_path_may_lead_out",
+        "dynx.model.package_paths",
+        right="if not found.is_relative_to(package):",
+        wrong="if not found.is_absolute():",
+        caught_by="tests/model/test_package_paths.py::test_what_leads_out_or_nowhere_is_refused",
+    ),
+    Fault(
+        "directory_opened_as_a_file",
+        "dynx.model.file_reading",
+        right="if stat.S_ISDIR(status.st_mode):",
+        wrong="if status.st_size < 0:",
+        caught_by="tests/model/test_file_reading.py::test_a_directory_is_refused",
+    ),
+)

@@ -1,0 +1,121 @@
+"""Runs tests with a fault planted, each run in a process of its own, forked from a warm one.
+
+``python -m tests.faults.warm`` imports what dynx and its tests need from elsewhere, but nothing of
+dynx, and then answers requests: a line of JSON ``[fault, test, ...]`` on stdin, a line of JSON
+``[exit code, output]`` on stdout. The imports take most of the time of a short test, so this is
+several times as fast as a new interpreter for each fault. Where there is no fork, `Runner` starts one.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from types import TracebackType
+
+ROOT = Path(__file__).resolve().parents[2]
+IMPORTED_BEFORE = (
+    *("pytest", "numpy", "scipy.spatial.transform", "scipy.linalg.lapack", "mpmath"),
+    *("hypothesis", "hypothesis.strategies", "hypothesis.extra.numpy", "pinocchio"),
+)
+OPTIONS = (
+    *("-x", "-q", "-p", "tests.faults.plant", "-p", "no:xdist", "-p", "no:benchmark"),
+    # What was imported before cannot have its assertions rewritten; none of it has any.
+    *("-W", "ignore::pytest.PytestAssertRewriteWarning"),
+)
+
+
+def environment(fault: str) -> dict[str, str]:
+    """What is set in the process that runs tests with the fault of that name; "" plants none."""
+    return {"DYNX_FAULT": fault, "HYPOTHESIS_PROFILE": "faults"}
+
+
+class Runner:
+    """Runs tests with faults planted; use it in a with block."""
+
+    def __init__(self) -> None:
+        self._warm: subprocess.Popen[str] | None = None
+
+    def __enter__(self) -> Runner:
+        if hasattr(os, "fork"):
+            self._warm = subprocess.Popen(
+                [sys.executable, "-m", "tests.faults.warm"],
+                cwd=ROOT,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                text=True,
+            )
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if self._warm is not None:
+            self._warm.communicate()
+
+    def run(self, tests: list[str], fault: str) -> tuple[int, str]:
+        """The exit code of pytest (1: tests ran and one failed) and what it said."""
+        if self._warm is None:
+            done = subprocess.run(
+                [sys.executable, "-m", "pytest", *OPTIONS, *tests],
+                cwd=ROOT,
+                env={**os.environ, **environment(fault)},
+                capture_output=True,
+                text=True,
+                check=False,
+            )
+            return done.returncode, done.stdout + done.stderr
+        assert self._warm.stdin is not None
+        assert self._warm.stdout is not None
+        self._warm.stdin.write(json.dumps([fault, *tests]) + "\n")
+        self._warm.stdin.flush()
+        code, output = json.loads(self._warm.stdout.readline())
+        return code, output
+
+
+def serve() -> None:
+    """Answer requests until stdin ends."""
+    for name in IMPORTED_BEFORE:
+        if find_spec(name.partition(".")[0]) is not None:
+            import_module(name)
+    assert not any(name == "dynx" or name.startswith("dynx.") for name in sys.modules)
+    for line in sys.stdin:
+        fault, *tests = json.loads(line)
+        with tempfile.TemporaryFile() as output:
+            child = os.fork()
+            if child == 0:
+                run_here(tests, fault, output.fileno())
+            _, status = os.waitpid(child, 0)
+            output.seek(0)
+            said = output.read().decode(errors="replace")
+        print(json.dumps([os.waitstatus_to_exitcode(status), said]), flush=True)
+
+
+def run_here(tests: list[str], fault: str, output: int) -> None:
+    """Run the tests in this process, writing to the file descriptor `output`, and end the process."""
+    code = 3
+    try:
+        nothing = os.open(os.devnull, os.O_RDONLY)
+        os.dup2(nothing, 0)
+        os.dup2(output, 1)
+        os.dup2(output, 2)
+        os.environ.update(environment(fault))
+        import pytest
+
+        code = int(pytest.main([*OPTIONS, *tests]))
+    finally:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)
+
+
+if __name__ == "__main__":
+    serve()
