@@ -121,9 +121,9 @@ class TestNames:
     @pytest.mark.parametrize("reference", ["WORLD", "worlds", "", 3, None, ["local"]])
     def test_reference(self, make: Make, reference: Any) -> None:
         engine, rest = make(FIXED), np.zeros(FIXED.nv)
-        with pytest.raises(UnknownNameError, match="world"):
+        with pytest.raises(UnknownNameError, match=r"local|world"):
             engine.jacobian(FIXED.neutral(), "tool", reference=reference)
-        with pytest.raises(UnknownNameError, match="world"):
+        with pytest.raises(UnknownNameError, match=r"local|world"):
             engine.inverse_dynamics(
                 FIXED.neutral(), rest, rest, external_forces={"tool": np.zeros(6)}, force_reference=reference
             )

@@ -6,6 +6,7 @@ from tests.faults.fault import Fault
 
 BASE, ARGUMENTS, EVALUATION = "dynx.backends.base", "dynx.backends.arguments", "dynx.backends.evaluation"
 HOOKS, JOINT_DYNAMICS = "dynx.backends.hooks", "dynx.backends.joint_dynamics"
+LIFE = "dynx.backends.lifecycle"
 PINOCCHIO, PYBULLET, REFERENCE = (
     "dynx.backends.pinocchio",
     "dynx.backends.pybullet",
@@ -40,8 +41,7 @@ INTERFACE_FAULTS = (
         right="tau = tau + self._force_torque(q, tau, external_forces, force_reference)",
         wrong="self._force_torque(q, tau, external_forces, force_reference)",
         caught_by=(
-            f"{FORCES}::TestExternalForces::"
-            "test_they_enter_by_the_transposed_jacobian[reference-local-fixed]"
+            f"{FORCES}::TestExternalForces::test_they_enter_by_the_transposed_jacobian[reference-local-fixed]"
         ),
     ),
     Fault(
@@ -106,14 +106,14 @@ INTERFACE_FAULTS = (
     ),
     Fault(
         "closed_backend_without_validation_still_answers",
-        BASE,
+        LIFE,
         right="            self._validate = True\n            self._arguments.closed = True",
         wrong="            self._arguments.closed = True",
         caught_by=f"{LIFECYCLE}::test_a_closed_backend_refuses[reference-False]",
     ),
     Fault(
         "pickle_forgets_the_options",
-        BASE,
+        LIFE,
         right="return _rebuild, (type(self), self.model, self._options)",
         wrong="return _rebuild, (type(self), self.model, {})",
         caught_by=f"{LIFECYCLE}::test_pickling_keeps_the_options[reference]",
@@ -130,7 +130,7 @@ INTERFACE_FAULTS = (
         HOOKS,
         right="if np.all(smallest > M.shape[-1] * np.finfo(np.float64).eps):",
         wrong="if smallest is not None:",
-        caught_by="tests/contract/test_masses.py::test_a_massless_link_on_a_joint[pybullet-no inertial]",
+        caught_by="tests/backends/test_hooks.py::test_a_matrix_singular_but_for_rounding_is_not_solved",
     ),
     Fault(
         "derived_mass_matrix_with_gravity_in_it",
@@ -180,7 +180,7 @@ INTERFACE_FAULTS = (
         ),
     ),
     Fault(
-        "nearest_names_not_offered",
+        "unknown_reference_taken_for_the_default",
         ARGUMENTS,
         right="return REFERENCES[reference]\n",
         wrong='return REFERENCES.get(reference, "local_world_aligned")\n',
@@ -224,7 +224,7 @@ PINOCCHIO_FAULTS = (
         PINOCCHIO,
         right="(T_carrier_link * _placement(inertial.origin)).act(own)",
         wrong="_placement(inertial.origin).act(own)",
-        caught_by=f"{NATIVE}[fixed-False]",
+        caught_by="tests/contract/test_bodies.py::test_mass_matrix_is_the_sum_over_the_links[pinocchio-fixed]",
     ),
     Fault(
         "pinocchio_state_not_set",
@@ -285,7 +285,10 @@ PINOCCHIO_FAULTS = (
         PINOCCHIO,
         right="return (self._moving_mass * moving + self._rest_moment) / self._total_mass",
         wrong="return moving",
-        caught_by=f"{NATIVE}[fixed-False]",
+        caught_by=(
+            "tests/contract/test_bodies.py::"
+            "test_centre_of_mass_and_gravity_are_those_of_the_links[pinocchio-fixed]"
+        ),
     ),
     Fault(
         "pinocchio_energy_of_what_moves_only",
@@ -398,8 +401,8 @@ PYBULLET_FAULTS = (
     Fault(
         "bullet_too_light_for_the_stepper",
         PYBULLET,
-        right="return a if a.all() else super()._forward_dynamics(q, v, tau)",
-        wrong="return a",
+        right="            if a.all():",
+        wrong="            if a is not None:",
         caught_by=f"{TEST_PYBULLET}::test_a_joint_too_light_for_the_stepper_still_moves",
     ),
     Fault(
@@ -493,9 +496,9 @@ PYBULLET_FAULTS = (
     ),
     Fault(
         "bullet_client_never_given_back",
-        PYBULLET,
-        right="self._robots.pop().close()",
-        wrong="self._robots.pop()",
+        CLIENT,
+        right="if engine.isConnected(client):\n        engine.disconnect(client)",
+        wrong="engine.isConnected(client)",
         caught_by=f"{TEST_PYBULLET}::test_a_closed_backend_refuses_and_holds_no_client",
     ),
 )

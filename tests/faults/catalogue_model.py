@@ -10,6 +10,7 @@ JOINTS, LINKS, VALUES = "dynx.model.urdf_joints", "dynx.model.urdf_links", "dynx
 XML, XML_TEXT, WRITER = "dynx.model.xml_reading", "dynx.model.xml_text", "dynx.model.urdf_writer"
 
 COORDINATES = "tests/contract/test_coordinates.py"
+BODIES = "tests/contract/test_bodies.py"
 READER = "tests/model/test_urdf_reader.py"
 REFUSED = f"{READER}::test_a_bad_description_is_refused_with_line_and_reason"
 
@@ -101,7 +102,10 @@ MODEL_FAULTS = (
         LOCKING,
         right="T[:3, :3] @ rotation_about(axis, np.array(value))",
         wrong="rotation_about(axis, np.array(value)) @ T[:3, :3]",
-        caught_by="tests/model/test_locking.py::test_locking_is_holding",
+        caught_by=(
+            f"{COORDINATES}::TestMimicJoints::"
+            "test_a_joint_that_follows_with_ratio_zero_stands_still[reference]"
+        ),
     ),
     Fault(
         "products_of_inertia_swapped",
@@ -119,14 +123,14 @@ MODEL_FAULTS = (
         MECHANISM,
         right="p_inertial, R_inertial, numbers(link.inertial.tensor)",
         wrong="p_inertial, 0 * R_inertial + numbers(np.eye(3)), numbers(link.inertial.tensor)",
-        caught_by="tests/model/test_mechanism.py::test_frames_and_total_inertia_are_those_of_the_links",
+        caught_by=f"{BODIES}::test_mass_matrix_is_the_sum_over_the_links[reference-fixed]",
     ),
     Fault(
         "welded_link_lumped_where_its_body_is",
         MECHANISM,
         right="lumped[body] = lumped[body] + own.seen_from(R, p)",
         wrong="lumped[body] = lumped[body] + own",
-        caught_by="tests/model/test_mechanism.py::test_frames_and_total_inertia_are_those_of_the_links",
+        caught_by=f"{BODIES}::test_centre_of_mass_and_gravity_are_those_of_the_links[reference-fixed]",
     ),
     Fault(
         "missing_inertial_given_a_kilogram",
@@ -152,7 +156,7 @@ MODEL_FAULTS = (
         MECHANISM,
         right="frames.append(BodyFrame(frame.name, body, R @ R_frame, p + rotate(R, p_frame)))",
         wrong="frames.append(BodyFrame(frame.name, body, R @ R_frame, p + p_frame))",
-        caught_by="tests/model/test_mechanism.py::test_frames_and_total_inertia_are_those_of_the_links",
+        caught_by=f"{COORDINATES}::test_frames_can_be_added[reference]",
     ),
     Fault(
         "mimic_multiplier_dropped",
@@ -195,8 +199,7 @@ MODEL_FAULTS = (
         right="if math.isfinite(high - low):\n        return low, high",
         wrong="if math.isfinite(high - low):\n        return min(low, -reach), max(high, reach)",
         caught_by=(
-            "tests/model/test_configuration.py::"
-            "test_random_configurations_are_valid_and_within_the_limits"
+            "tests/model/test_configuration.py::test_random_configurations_are_valid_and_within_the_limits"
         ),
     ),
     Fault(
@@ -267,7 +270,7 @@ READER_FAULTS = (
         XML_TEXT,
         right=r'return stripped, len(re.findall(r"\r\n|\r|\n", front))',
         wrong="return stripped, 0 * len(front)",
-        caught_by="tests/model/test_xml_reading.py::test_elements_know_their_tag_attributes_and_line",
+        caught_by="tests/model/test_xml_reading.py::test_what_is_not_xml_is_refused_with_its_line",
     ),
     Fault(
         "byte_order_mark_kept",

@@ -56,7 +56,9 @@ IK_FAULTS = (
         COORDINATES,
         right="value += TURN if value < low else -TURN if value > high else 0.0",
         wrong="value += TURN if value > high else 0.0",
-        caught_by=f"{SOLUTIONS}::test_angles_come_out_nearest_to_the_start",
+        caught_by=(
+            "tests/ik/test_coordinates.py::test_an_angle_that_would_pass_its_limit_comes_from_the_other_side"
+        ),
     ),
     Fault(
         "ik_restarts_without_the_seed",
@@ -164,6 +166,9 @@ AGREEMENT_FAULTS = (
         "dynx.agreement.solutions",
         right="for answer, verifier in zip(solutions, (second, first), strict=True):",
         wrong="for answer, verifier in zip(solutions, (first, second), strict=True):",
-        caught_by="tests/agreement/test_solutions.py",
+        caught_by=(
+            "tests/agreement/test_solutions.py::"
+            "test_a_configuration_that_reaches_the_target_by_its_own_poses_only_is_no_solution"
+        ),
     ),
 )
