@@ -195,6 +195,16 @@ class TestLockedJoints:
         M = whole.mass_matrix(q)[:, self.kept][:, :, self.kept]
         close.check("mass_matrix", locked.mass_matrix(state.q), M)
 
+    def test_a_locked_hinge_stays_where_its_angle_put_it(self, make: Make) -> None:
+        locked = load(self.whole, lock={"z_shoulder": 0.7, "b_elbow": -0.4})
+        state = random_state(locked, 29)
+        close = Closeness(samples_at(locked, state.q))
+        q = np.array([0.7, state.q[0], state.q[1], -0.4])
+        whole, held = make(self.whole), make(locked)
+        for frame in self.whole.frame_names:
+            pose = whole.forward_kinematics(q, frame)
+            close.check("forward_kinematics", held.forward_kinematics(state.q, frame), pose)
+
 
 class TestMimicJoints:
     """A mimic joint leaves q, and the robot obeys the reduced dynamics S' (...) S."""

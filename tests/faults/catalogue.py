@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
-from tests.faults.catalogue_backends import INTERFACE_FAULTS, PINOCCHIO_FAULTS, PYBULLET_FAULTS
-from tests.faults.catalogue_model import MODEL_FAULTS, READER_FAULTS
-from tests.faults.catalogue_solving import AGREEMENT_FAULTS, IK_FAULTS
-from tests.faults.catalogue_spatial import RBD_FAULTS, SPATIAL_FAULTS
+from tests.faults.catalogue_agreement import AGREEMENT_FAULTS
+from tests.faults.catalogue_ik import IK_FAULTS
+from tests.faults.catalogue_interface import INTERFACE_FAULTS
+from tests.faults.catalogue_model import MODEL_FAULTS
+from tests.faults.catalogue_pinocchio import PINOCCHIO_FAULTS
+from tests.faults.catalogue_pybullet import PYBULLET_FAULTS
+from tests.faults.catalogue_rbd import RBD_FAULTS
+from tests.faults.catalogue_reader import READER_FAULTS
+from tests.faults.catalogue_spatial import SPATIAL_FAULTS
 from tests.faults.fault import Fault
 
 FAULTS_BY_AREA: dict[str, tuple[Fault, ...]] = {

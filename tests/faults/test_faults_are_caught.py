@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.faults.catalogue import FAULTS, FAULTS_BY_AREA, Fault
+from tests.faults.catalogue import FAULTS, FAULTS_BY_AREA
+from tests.faults.fault import Fault
 from tests.faults.warm import Runner
 
 AT_LEAST = 150

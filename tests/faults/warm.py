@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 import sys
 import tempfile
@@ -19,6 +20,9 @@ from pathlib import Path
 from types import TracebackType
 
 ROOT = Path(__file__).resolve().parents[2]
+TIMEOUT = 300
+"""Longest run of the tests of one request [s]."""
+
 IMPORTED_BEFORE = (
     *("pytest", "numpy", "scipy.spatial.transform", "scipy.linalg.lapack", "mpmath"),
     *("hypothesis", "hypothesis.strategies", "hypothesis.extra.numpy", "pinocchio"),
@@ -70,6 +74,7 @@ class Runner:
                 env={**os.environ, **environment(fault)},
                 capture_output=True,
                 text=True,
+                timeout=TIMEOUT,
                 check=False,
             )
             return done.returncode, done.stdout + done.stderr
@@ -102,6 +107,8 @@ def serve() -> None:
 def run_here(tests: list[str], fault: str, output: int) -> None:
     """Run the tests in this process, writing to the file descriptor `output`, and end the process."""
     code = 3
+    # A fault may be one that never ends; the alarm ends the process, which is then no test failure.
+    signal.alarm(TIMEOUT)
     try:
         nothing = os.open(os.devnull, os.O_RDONLY)
         os.dup2(nothing, 0)
