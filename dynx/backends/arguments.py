@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from math import isfinite
+from math import hypot
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from dynx.errors import (
     shown,
 )
 from dynx.model import Model
-from dynx.model.configuration import checked_array, checked_q
+from dynx.model.configuration import TOO_LARGE, checked_array, checked_q
 from dynx.rbd.jacobians import REFERENCES, Reference
 from dynx.spatial.scalar import Floats
 
@@ -35,8 +35,8 @@ class Arguments:
         self._q_shape = (model.nq,)
         self._v_shape = (model.nv,)
 
-    # A sum of finite doubles is not finite only if it overflows, in which case the slow path
-    # decides; that makes one C loop over a list, several times faster than np.isfinite(q).all().
+    # The length of a vector is below a bound only if every entry is, and none is NaN: one C loop
+    # over a list, several times faster than NumPy at this size. Otherwise the slow path decides.
 
     def q(self, q: Any) -> Floats:
         """A configuration (..., nq), finite, with a unit quaternion for a floating base."""
@@ -44,7 +44,7 @@ class Arguments:
             raise ClosedError(f"this backend of {self._model.name} was closed; make a new one")
         if type(q) is np.ndarray and q.dtype is _FLOAT64 and q.shape == self._q_shape:
             values = q.tolist()
-            if isfinite(sum(values)):
+            if hypot(*values) < TOO_LARGE:
                 if not self._floating:
                     return q
                 x, y, z, w = values[3:7]
@@ -58,7 +58,7 @@ class Arguments:
             type(v) is np.ndarray
             and v.dtype is _FLOAT64
             and v.shape == self._v_shape
-            and isfinite(sum(v.tolist()))
+            and hypot(*v.tolist()) < TOO_LARGE
         ):
             return v
         return checked_array(name, v, self._v_shape[0])

@@ -19,7 +19,7 @@ import numpy as np
 from dynx.backends.bullet_inertia import Ballast, PrincipalInertia, longdouble, principal_inertia
 from dynx.model.mechanism import ROOT, Mechanism
 from dynx.spatial.inertia import RigidInertia
-from dynx.spatial.scalar import Array, Floats
+from dynx.spatial.scalar import Array
 from dynx.spatial.so3 import rotate_back, rpy_from_rotation
 
 NOTHING = RigidInertia(longdouble(0.0), longdouble(np.zeros(3)), longdouble(np.zeros((3, 3))))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -18,8 +17,13 @@ if TYPE_CHECKING:
     from dynx.model.model import Model
 
 
+TOO_LARGE = 1e70
+"""Bound on the entries of an array: a moment is a product of two lengths, two speeds and a mass, and it
+must not overflow, or an engine would answer infinity or NaN and say nothing."""
+
+
 def checked_array(name: str, value: ArrayLike, length: int) -> Floats:
-    """`value` as float64 with a last axis of `length` finite numbers, or an error that says why not."""
+    """`value` as float64 (..., length) of numbers below `TOO_LARGE`, or an error that says why not."""
     try:
         array = np.asarray(value)
     except ValueError as error:
@@ -33,6 +37,12 @@ def checked_array(name: str, value: ArrayLike, length: int) -> Floats:
         where = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         raise NotFiniteError(
             f"{name}[{', '.join(map(str, where))}] is {array[where]}; wanted a finite number"
+        )
+    if np.max(np.abs(array), initial=0.0) >= TOO_LARGE:
+        where = tuple(int(i) for i in np.argwhere(np.abs(array) >= TOO_LARGE)[0])
+        raise ArgumentError(
+            f"{name}[{', '.join(map(str, where))}] is {array[where]}; wanted less than {TOO_LARGE:g} "
+            "in size, for products of such numbers overflow"
         )
     return array
 
@@ -163,12 +173,12 @@ def clip(model: Model, q: ArrayLike) -> Floats:
 
 def _bounded(low: float, high: float, reach: float) -> tuple[float, float]:
     """Ends to draw between: those given, and within `reach` of 0 or of the one end where one is not."""
-    if math.isfinite(high - low):
+    bounded_below, bounded_above = low > -TOO_LARGE, high < TOO_LARGE
+    if bounded_below and bounded_above:
         return low, high
-    if math.isfinite(low) == math.isfinite(high):
-        # No ends, or two so far apart that their distance is no float; 0 is then between them.
-        return max(low, -reach), min(high, reach)
-    return (low, low + 2.0 * reach) if math.isfinite(low) else (high - 2.0 * reach, high)
+    if not (bounded_below or bounded_above):
+        return -reach, reach
+    return (low, low + 2.0 * reach) if bounded_below else (high - 2.0 * reach, high)
 
 
 def _join(*parts: Floats) -> Floats:

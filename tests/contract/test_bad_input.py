@@ -19,9 +19,11 @@ from dynx.errors import (
     DynxError,
     NotFiniteError,
     ShapeError,
+    SingularMassMatrixError,
     UnknownBackendError,
     UnknownNameError,
 )
+from dynx.model.configuration import TOO_LARGE
 from dynx.model.loading import load
 from tests.contract.conftest import Make
 from tests.contract.questions import QUESTIONS, Question, State, random_state
@@ -41,6 +43,7 @@ BAD_ARRAYS: dict[str, tuple[Callable[[np.ndarray], Any], type[DynxError], str]] 
     "ragged": (lambda x: [x.tolist(), [1.0]], ShapeError, "ragged"),
     "NaN": (lambda x: np.append(x[:-1], np.nan), NotFiniteError, r"\[\d+\] is nan"),
     "infinity": (lambda x: np.append(x[:-1], np.inf), NotFiniteError, r"\[\d+\] is inf"),
+    "too large": (lambda x: np.append(x[:-1], -1e160), ArgumentError, r"is -1e\+160; wanted less"),
     "NaN in a batch": (
         lambda x: np.stack([x, np.append(x[:-1], np.nan)]),
         NotFiniteError,
@@ -66,6 +69,23 @@ def test_an_array_that_cannot_be_used(make: Make, question: Question, kind: str)
         with pytest.raises(error, match=says) as caught:
             question.ask(engine, State(**fields))
         assert argument in str(caught.value)
+
+
+@each_question
+def test_the_largest_numbers_that_are_taken_overflow_nothing(make: Make, question: Question) -> None:
+    """A quaternion stays one; everything else is as large as the bound allows."""
+    engine = make(FLOATING)
+    large = 0.99 * TOO_LARGE
+    q = FLOATING.neutral()
+    q[:3], q[7:] = large, large
+    v = np.full(FLOATING.nv, large)
+    try:
+        answer = question.ask(engine, State(q, v, -v, v))
+    except SingularMassMatrixError:
+        # A body as far away as that leaves the joints' own inertia below its rounding error.
+        assert str(question) == "forward_dynamics"
+    else:
+        assert np.isfinite(answer).all()
 
 
 @each_question
