@@ -15,6 +15,7 @@ import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
 from benchmarks.conftest import Record
+from dynx.agreement.tolerances import BAR
 from dynx.backends import backend
 from dynx.model.loading import load
 from dynx.spatial.scalar import Floats
@@ -75,6 +76,6 @@ def test_call_overhead(benchmark: BenchmarkFixture, record: Record, quantity: st
     benchmark.group = f"{quantity}, UR5, one call"
     call, raw = calls()[quantity, way], calls()[quantity, "raw"]
     expected = raw()
-    np.testing.assert_allclose(call(), expected, rtol=0.0, atol=1e-12 * np.max(np.abs(expected)))
+    np.testing.assert_allclose(call(), expected, rtol=0.0, atol=BAR * np.max(np.abs(expected)))
     benchmark(call)
     record(quantity, way, benchmark)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from dynx.agreement import AgreementReport, agree
     from dynx.backends import Backend, backend, installed_backends, register
     from dynx.ik import IKResult
-    from dynx.model import Model
+    from dynx.model import Model, Pose
     from dynx.model.library import robots
     from dynx.model.loading import load
 
@@ -31,6 +31,7 @@ __all__ = [
     "Backend",
     "IKResult",
     "Model",
+    "Pose",
     "__version__",
     "agree",
     "backend",
@@ -46,6 +47,7 @@ _HOME = {
     "Backend": "dynx.backends",
     "IKResult": "dynx.ik",
     "Model": "dynx.model",
+    "Pose": "dynx.model",
     "agree": "dynx.agreement",
     "backend": "dynx.backends",
     "installed_backends": "dynx.backends",

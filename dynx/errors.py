@@ -120,6 +120,12 @@ def shown(text: object, limit: int = 80) -> str:
     return quoted if len(quoted) <= limit else f"{quoted[: limit - 20]}...' ({len(str(text))} characters)"
 
 
+def escaped(text: object, limit: int = 80) -> str:
+    """As `shown`, without the quotes: for a tag in angle brackets, or somebody else's sentence."""
+    inside = repr(str(text))[1:-1]
+    return inside if len(inside) <= limit else f"{inside[: limit - 20]}... ({len(str(text))} characters)"
+
+
 def nearest(name: str, known: Iterable[str]) -> str:
     """A clause such as ``; did you mean 'tool0'?`` or, for a short list, all that is known."""
     names = list(known)

@@ -83,7 +83,7 @@ class Closeness:
         """Assert that forward dynamics' `a` takes the torque that was asked for (backward error)."""
         a, tau_of_a, tau = np.atleast_2d(a), np.atleast_2d(tau_of_a), np.atleast_2d(tau)
         scale = self.sizes.solved_torque(a)[:, None]
-        tolerance = tolerances.solving(self.sizes.depth, self.samples.model.nv)
+        tolerance = tolerances.solving()
         self._assert_small("forward_dynamics", tau_of_a - tau, scale, tolerance, tau_of_a, tau)
 
     def _scale(self, quantity: str) -> Floats:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dynx.agreement.answers import Answers
+from dynx.agreement.answers import DERIVED, EXACT, Answers
 from dynx.agreement.comparison import Comparison, compare
 from dynx.agreement.identities import IdentityCheck, check_identities
 from dynx.agreement.magnitudes import Magnitudes
@@ -19,7 +19,7 @@ from dynx.agreement.referee import Referee
 from dynx.agreement.report import AgreementReport, refused_report
 from dynx.agreement.sampling import Samples, draw_samples
 from dynx.agreement.solutions import compare_forward_dynamics, compare_inverse_kinematics
-from dynx.agreement.suspects import DERIVED, EXACT, find_suspects
+from dynx.agreement.suspects import find_suspects
 from dynx.backends import (
     Backend,
     DerivedBackend,
@@ -139,7 +139,7 @@ def _compared(
         quantities=tuple(rows),
         identities=tuple(identities),
         suspects=find_suspects(rows, identities, names),
-        notes=_notes(model, names, samples),
+        notes=_notes(model, names),
         seconds=time.perf_counter() - started,
     )
 
@@ -167,7 +167,7 @@ def _self_compared(sizes: Magnitudes, name: str, engine: Backend) -> list[Compar
     return rows
 
 
-def _notes(model: Model, names: list[str], samples: Samples) -> tuple[str, ...]:
+def _notes(model: Model, names: list[str]) -> tuple[str, ...]:
     notes = [str(note) for note in model.notes]
     singular = singular_coordinates(model)
     if singular:

@@ -9,8 +9,14 @@ from typing import Any
 import numpy as np
 
 from dynx.agreement.sampling import Samples
-from dynx.errors import DynxError, SingularMassMatrixError
+from dynx.errors import DynxError, EngineError, SingularMassMatrixError
 from dynx.spatial.scalar import Array
+
+EXACT = "referee"
+"""Name of the answers in 50 digits."""
+
+DERIVED = "derived"
+"""Name of the answers that follow from an engine's own poses and inverse dynamics."""
 
 
 @dataclass(frozen=True)
@@ -40,8 +46,17 @@ class Answers:
     def of(self, name: str, evaluate: Callable[[Any, Samples], Array]) -> Array | Refusal:
         """The answer to the quantity `name`."""
         if name not in self._known:
-            try:
-                self._known[name] = np.asarray(evaluate(self.answerer, self.samples))
-            except DynxError as error:
-                self._known[name] = Refusal(error)
+            self._known[name] = self.attempt(evaluate)
         return self._known[name]
+
+    def attempt(self, evaluate: Callable[[Any, Samples], Array]) -> Array | Refusal:
+        """An answer that is not remembered."""
+        try:
+            return np.asarray(evaluate(self.answerer, self.samples))
+        except DynxError as error:
+            return Refusal(error)
+        except Exception as error:
+            # A backend from elsewhere may break any promise; it must not end the comparison.
+            broken = EngineError(f"{self.name} failed with {type(error).__name__}: {error}")
+            broken.__cause__ = error
+            return Refusal(broken)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from dynx.agreement.answers import Answers, Refusal
+from dynx.agreement.answers import DERIVED, Answers, Refusal
 from dynx.agreement.magnitudes import Magnitudes
 from dynx.agreement.quantities import Layout, Quantity, questions_of
 from dynx.agreement.sampling import Samples
@@ -102,7 +102,7 @@ def compare(quantity: Quantity, first: Answers, second: Answers, sizes: Magnitud
     if one.shape != other.shape:
         note = f"{first.name} gives shape {one.shape}, {second.name} {other.shape}"
         return unequal(quantity.name, first, second, tolerance, note)
-    derived = second.name == "derived" and quantity.derived_scale is not None
+    derived = second.name == DERIVED and quantity.derived_scale is not None
     scale = quantity.derived_scale(sizes) if derived and quantity.derived_scale else quantity.scale(sizes)
     verdict = judge(_difference(one, other), scale)
     return Comparison(
@@ -113,7 +113,14 @@ def compare(quantity: Quantity, first: Answers, second: Answers, sizes: Magnitud
         tolerance,
         verdict.relative <= tolerance,
         locate(verdict.position, quantity.layout, samples),
+        note=no_numbers((first, one), (second, other)),
     )
+
+
+def no_numbers(*answers: tuple[Answers, Array]) -> str | None:
+    """Who answers NaN or infinity, if anybody does."""
+    wild = [by.name for by, answer in answers if not np.isfinite(answer.astype(np.float64)).all()]
+    return f"{' and '.join(wild)}: NaN or infinity in the answer" if wild else None
 
 
 def pair_name(first: Answers, second: Answers) -> str:

@@ -12,13 +12,16 @@ from typing import Any, Literal
 import numpy as np
 
 from dynx.agreement import tolerances
-from dynx.agreement.magnitudes import Magnitudes
+from dynx.agreement.magnitudes import EPS, Magnitudes
 from dynx.agreement.sampling import FrameQuestion, Samples
 from dynx.spatial.scalar import Array, Floats
 
 Layout = Literal["samples", "frames", "every_frame", "derivatives"]
 """What the leading axes of an answer count: samples; samples, then frames; or a list of questions
 about frames, then the samples of each."""
+
+POINT = (0.3, -0.2, 0.1)
+"""The point [m], in the axes of the frame, at which a Jacobian is asked for beside the frames' origins."""
 
 
 @dataclass(frozen=True)
@@ -52,6 +55,12 @@ def _rounding(sizes: Magnitudes) -> float:
 
 def _component(sizes: Magnitudes) -> float:
     return tolerances.component(sizes.depth)
+
+
+def _component_scale(sizes: Magnitudes) -> Floats:
+    """(n, nv): no torque can be more exact than one rounding of the largest (a joint that carries a
+    point mass on its own axis takes none, but what is summed to none is as large as the others)."""
+    return np.maximum(sizes.torque, largest(sizes.torque) * (EPS / _component(sizes)))
 
 
 def largest(scale: Floats) -> Floats:
@@ -133,17 +142,16 @@ def pose_scale(sizes: Magnitudes) -> Floats:
 
 
 def _at_point(backend: Any, samples: Samples) -> Array:
-    point = np.array([0.3, -0.2, 0.1])
     frame = samples.wrench_frame
     by_reference = [
-        backend.jacobian(samples.q, frame, reference=reference, point=point)
+        backend.jacobian(samples.q, frame, reference=reference, point=POINT)
         for reference in ("local_world_aligned", "local")
     ]
     return np.concatenate(by_reference, axis=-2)
 
 
 def _at_point_scale(sizes: Magnitudes) -> Floats:
-    linear = sizes.linear_column + 0.4 * sizes.angular_column
+    linear = sizes.linear_column + np.linalg.norm(POINT) * sizes.angular_column
     return np.stack((([linear] * 3) + [sizes.angular_column] * 3) * 2, axis=1)
 
 
@@ -237,7 +245,7 @@ QUANTITIES: tuple[Quantity, ...] = (
     Quantity(
         "inverse_dynamics_component",
         lambda b, s: b.inverse_dynamics(s.q, s.v, s.a),
-        lambda s: s.torque,
+        _component_scale,
         _component,
         refereed=True,
     ),
@@ -321,4 +329,4 @@ QUANTITIES: tuple[Quantity, ...] = (
     ),
 )
 """All but forward dynamics and inverse kinematics, whose errors are not plain differences
-(`dynx.agreement.comparison`)."""
+(`dynx.agreement.solutions`)."""

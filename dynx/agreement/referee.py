@@ -16,6 +16,7 @@ import mpmath
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dynx.agreement.answers import EXACT
 from dynx.model import Model
 from dynx.model.mechanism import Mechanism, build_mechanism
 from dynx.rbd import centroidal, crba, jacobians, kinematics, rnea
@@ -37,7 +38,7 @@ class Referee:
     mpmath numbers is used as it stands.
     """
 
-    name = "referee"
+    name = EXACT
 
     def __init__(self, model: Model) -> None:
         self.model = model

@@ -1,6 +1,9 @@
 """The outcome of a comparison, and its JSON form (schema 1).
 
-    {"schema": 1, "dynx": version, "results": [...], "summary": {robots, agree, differ, refused}}
+    {"schema": 1, "dynx": version, "results": [...], "summary": {...}}
+
+``summary`` counts ``robots`` that have an entry and of them ``agree``, ``differ`` and ``refused``;
+``not_done`` (0 but for an interrupted ``dynx agree``) counts those that have none.
 
 One entry of ``results`` per robot:
 
@@ -30,7 +33,7 @@ from dynx._version import __version__
 from dynx.agreement.comparison import Comparison
 from dynx.agreement.identities import IdentityCheck
 from dynx.agreement.suspects import Suspect
-from dynx.errors import DynxError
+from dynx.errors import DynxError, UnknownNameError, nearest, shown
 
 SCHEMA = 1
 
@@ -43,7 +46,7 @@ class Failure:
     message: str
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class AgreementReport:
     """How well backends agree about one robot; true in a condition if they do.
 
@@ -81,9 +84,38 @@ class AgreementReport:
         return tuple(comparison for comparison in self.quantities if not comparison.agree)
 
     def worst(self, quantity: str) -> float:
-        """Largest relative error of a quantity over all pairs; 0 if it was not compared."""
-        found = (row.max_rel_error for row in self.quantities if row.quantity == quantity)
-        return max(found, default=0.0)
+        """Largest relative error of a quantity over all pairs.
+
+        Raises UnknownNameError for a quantity that was not compared.
+        """
+        found = [row.max_rel_error for row in self.quantities if row.quantity == quantity]
+        if not found:
+            compared = dict.fromkeys(row.quantity for row in self.quantities)
+            raise UnknownNameError(f"no quantity {shown(quantity)} was compared{nearest(quantity, compared)}")
+        return max(found)
+
+    def __str__(self) -> str:
+        """The verdict in a line, then a line for each difference, failed identity and suspect."""
+        head = f"{self.robot}, {self.base} base: " if self.base else f"{self.robot}: "
+        if self.error is not None:
+            return f"{head}refused ({self.error.type}: {self.error.message})"
+        lines = [head + ", ".join(self.backends) + (" agree" if self.agree else " do not agree")]
+        lines += [
+            f"  {row.quantity}, {row.pair}: error {row.max_rel_error:.1e}, tolerance {row.tolerance:.1e}"
+            + (f" ({row.note})" if row.note else "")
+            for row in self.differences
+        ]
+        lines += [
+            f"  {check.identity}, {check.backend}: "
+            f"error {check.max_error:.1e}, tolerance {check.tolerance:.1e}"
+            for check in self.identities
+            if not check.agree
+        ]
+        lines += [f"  suspect: {suspect.backend} in {suspect.quantity}" for suspect in self.suspects]
+        return "\n".join(lines)
+
+    def __repr__(self) -> str:
+        return f"<AgreementReport {str(self).splitlines()[0]}>"
 
     def to_dict(self) -> dict[str, Any]:
         """One entry of ``results``, of plain numbers, strings and lists."""
@@ -140,6 +172,7 @@ def results_document(reports: Iterable[AgreementReport]) -> dict[str, Any]:
             "agree": agreeing,
             "differ": len(results) - agreeing - refused,
             "refused": refused,
+            "not_done": 0,
         },
     }
 

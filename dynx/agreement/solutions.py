@@ -6,6 +6,7 @@ must hold is that the other engine finds the equation solved.
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,9 +17,11 @@ from dynx.agreement.comparison import (
     Comparison,
     Verdict,
     judge,
+    no_numbers,
     pair_name,
     refusals,
     state,
+    unequal,
 )
 from dynx.agreement.magnitudes import Magnitudes
 from dynx.agreement.sampling import Samples
@@ -26,6 +29,9 @@ from dynx.model import Model
 from dynx.rbd.kinematics import ancestry
 from dynx.spatial.scalar import Array, Floats
 from dynx.spatial.se3 import pose_error
+
+TARGETS = 2
+"""Targets of inverse kinematics; each costs hundreds of evaluations."""
 
 
 def regular_samples(sizes: Magnitudes) -> list[int]:
@@ -45,7 +51,7 @@ def compare_forward_dynamics(
     must take the torque asked for. With `both` it is done both ways round.
     """
     name, samples = "forward_dynamics", solver.samples
-    tolerance = tolerances.solving(sizes.depth, samples.model.nv)
+    tolerance = tolerances.solving()
     chosen = regular_samples(sizes)
 
     def solve(backend: Any, samples: Samples) -> Array:
@@ -57,13 +63,20 @@ def compare_forward_dynamics(
     if refused is not None:
         return refused
     worst = Verdict(0.0, 0.0, None)
-    for (_, judging), a in zip(ways, solutions, strict=True):
+    left_out = len(samples) - len(chosen)
+    notes = []
+    if left_out:
+        notes.append(f"without {left_out} of {len(samples)} samples, where the mass matrix is singular")
+    for (solving, judging), a in zip(ways, solutions, strict=True):
         assert not isinstance(a, Refusal)
-        verdict = _backward_error(a, judging, chosen, sizes)
+        tau = judging.attempt(partial(_torque_taken, a=a, chosen=chosen))
+        if isinstance(tau, Refusal):
+            return unequal(name, solver, verifier, tolerance, f"{judging.name} refuses: {tau}")
+        wild = no_numbers((solving, a), (judging, tau))
+        notes += [wild] if wild else []
+        verdict = _backward_error(a, tau, chosen, sizes)
         if verdict.relative > worst.relative or worst.position is None:
             worst = verdict
-    left_out = len(samples) - len(chosen)
-    note = f"without {left_out} of {len(samples)} samples, where the mass matrix is singular"
     return Comparison(
         name,
         pair_name(solver, verifier),
@@ -72,15 +85,21 @@ def compare_forward_dynamics(
         tolerance,
         worst.relative <= tolerance,
         None if worst.position is None else state(samples, chosen[worst.position[0]]),
-        note if left_out else None,
+        "; ".join(notes) or None,
     )
 
 
-def _backward_error(a: Array, judging: Answers, chosen: list[int], sizes: Magnitudes) -> Verdict:
-    samples = judging.samples
+def _torque_taken(backend: Any, samples: Samples, *, a: Array, chosen: list[int]) -> Array:
+    """The torque that the accelerations found really take; NaN for what is no acceleration."""
     if a.shape != (len(chosen), samples.model.nv) or not np.isfinite(a).all():
+        return np.full((len(chosen), samples.model.nv), np.nan)
+    return np.asarray(backend.inverse_dynamics(samples.q[chosen], samples.v[chosen], a))
+
+
+def _backward_error(a: Array, tau: Array, chosen: list[int], sizes: Magnitudes) -> Verdict:
+    samples = sizes.samples
+    if tau.shape != a.shape or not np.isfinite(tau.astype(np.float64)).all():
         return Verdict(np.inf, np.inf, (0,))
-    tau = judging.answerer.inverse_dynamics(samples.q[chosen], samples.v[chosen], a)
     everywhere = np.zeros_like(samples.tau)
     everywhere[chosen] = a
     return judge(tau - samples.tau[chosen], sizes.solved_torque(everywhere)[chosen, None])
@@ -111,7 +130,10 @@ def compare_inverse_kinematics(first: Answers, second: Answers, sizes: Magnitude
         assert not isinstance(answer, Refusal)
         q, target = answer[:, : samples.model.nq], answer[:, samples.model.nq :].reshape(-1, 4, 4)
         found = np.isfinite(q).all(axis=-1)
-        errors.append(_distance(target[found], verifier.answerer.forward_kinematics(q[found], frame)))
+        reached = verifier.attempt(partial(_poses, q=q[found], frame=frame))
+        if isinstance(reached, Refusal):
+            return unequal(name, first, second, tolerance, f"{verifier.name} refuses: {reached}")
+        errors.append(_distance(target[found], reached))
     searches = 2 * len(q_target)
     missed = searches - sum(len(error) for error in errors)
     verdict = judge(np.concatenate(errors), np.ones(1))
@@ -127,6 +149,10 @@ def compare_inverse_kinematics(first: Answers, second: Answers, sizes: Magnitude
     )
 
 
+def _poses(backend: Any, samples: Samples, *, q: Array, frame: str) -> Array:
+    return np.asarray(backend.forward_kinematics(q, frame))
+
+
 def deepest_frame(model: Model) -> str:
     """The frame that the most moving joints carry; the first of them."""
     mechanism = model.mechanism
@@ -137,7 +163,7 @@ def deepest_frame(model: Model) -> str:
 def _targets(samples: Samples) -> tuple[Floats, Floats]:
     """Configurations within limits, and starting points some tenths of a radian away from them."""
     model = samples.model
-    q = samples.q[: tolerances.KINEMATIC_TARGETS]
+    q = samples.q[:TARGETS]
     q_target = model.clip(q)
     return q_target, model.clip(model.integrate(q_target, 0.1 * samples.v[: len(q)]))
 

@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from dynx.agreement.answers import DERIVED, EXACT
 from dynx.agreement.comparison import Comparison
 from dynx.agreement.identities import IdentityCheck
-
-EXACT = "referee"
-DERIVED = "derived"
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from dynx.errors import (
     shown,
 )
 from dynx.model import Model
-from dynx.model.configuration import TOO_LARGE, checked_array, checked_q
+from dynx.model.configuration import TOO_LARGE, UNIT, checked_array, checked_q, checked_vector
 from dynx.rbd.jacobians import REFERENCES, Reference
 from dynx.spatial.scalar import Floats
 
@@ -48,7 +48,7 @@ class Arguments:
                 if not self._floating:
                     return q
                 x, y, z, w = values[3:7]
-                if abs(x * x + y * y + z * z + w * w - 1.0) < 1e-6:
+                if abs(x * x + y * y + z * z + w * w - 1.0) <= UNIT:
                     return q
         return checked_q(self._model, q)
 
@@ -94,10 +94,7 @@ class Arguments:
 
     def point(self, point: ArrayLike) -> Floats:
         """A point (3,) in the axes of a frame [m]."""
-        array = checked_array("point", point, 3)
-        if array.ndim != 1:
-            raise ArgumentError(f"point has shape {array.shape}; wanted (3,)")
-        return array
+        return checked_vector("point", point)
 
     def finite_acceleration(self, a: Floats) -> Floats:
         """What forward dynamics found, unless the mass matrix was singular there."""

@@ -106,14 +106,14 @@ class Backend(Lifecycle, EngineHooks):
         point: ArrayLike | None = None,
     ) -> Floats:
         """dJ/dt (..., 6, nv) along the motion `v`."""
-        q, v, reference = self._checked_motion(q, v, reference)
+        q, v, axes = self._checked_q(q), self._checked_v(v), self._checked_reference(reference)
         index = self._index(frame)
         dJ = self._evaluation(
             self._jacobian_derivative,
             (6, -1),
             q,
             v,
-            args=(index, reference),
+            args=(index, axes),
             reduce=self._evaluation.reduce_rows,
         )
         if point is None:
@@ -131,12 +131,12 @@ class Backend(Lifecycle, EngineHooks):
         point: ArrayLike | None = None,
     ) -> Floats:
         """J v (..., 6): linear [m/s] then angular [rad/s] velocity of the frame."""
-        q, v, reference = self._checked_motion(q, v, reference)
+        q, v, axes = self._checked_q(q), self._checked_v(v), self._checked_reference(reference)
         if point is not None:
             common_batch(q, v)
             return apply_matrix(self.jacobian(q, frame, reference=reference, point=point), v)
         index = self._index(frame)
-        return self._evaluation(self._frame_velocity, (6,), q, v, args=(index, reference))
+        return self._evaluation(self._frame_velocity, (6,), q, v, args=(index, axes))
 
     def frame_acceleration(
         self,
@@ -153,7 +153,7 @@ class Backend(Lifecycle, EngineHooks):
         In ``local_world_aligned`` that is the classical acceleration of the frame's origin; in
         ``local`` and ``world`` the spatial acceleration. Gravity has no part in it.
         """
-        q, v, reference = self._checked_motion(q, v, reference)
+        q, v, axes = self._checked_q(q), self._checked_v(v), self._checked_reference(reference)
         a = self._checked_v(a, "a")
         if point is not None:
             common_batch(q, v, a)
@@ -161,7 +161,7 @@ class Backend(Lifecycle, EngineHooks):
             dJ = self.jacobian_derivative(q, v, frame, reference=reference, point=point)
             return apply_matrix(J, a) + apply_matrix(dJ, v)
         index = self._index(frame)
-        return self._evaluation(self._frame_acceleration, (6,), q, v, a, args=(index, reference))
+        return self._evaluation(self._frame_acceleration, (6,), q, v, a, args=(index, axes))
 
     def inverse_kinematics(
         self, target: ArrayLike, frame: str, q0: ArrayLike | None = None, **options: Any
@@ -211,7 +211,7 @@ class Backend(Lifecycle, EngineHooks):
 
         Raises SingularMassMatrixError, which names the joints, where a joint moves no inertia.
         """
-        q, v, _ = self._checked_motion(q, v, LOCAL_WORLD_ALIGNED)
+        q, v = self._checked_q(q), self._checked_v(v)
         tau = self._checked_v(tau, "tau")
         common_batch(q, v, tau)
         self._solvability.refuse_singular(joint_dynamics)
@@ -245,7 +245,7 @@ class Backend(Lifecycle, EngineHooks):
         joint_dynamics: bool = False,
     ) -> Floats:
         """C v + g (..., nv): `inverse_dynamics` at zero acceleration."""
-        q, v, _ = self._checked_motion(q, v, LOCAL_WORLD_ALIGNED)
+        q, v = self._checked_q(q), self._checked_v(v)
         tau = self._evaluation(self._bias_torque, (-1,), q, v, reduce=self._evaluation.reduce_rows)
         if external_forces is not None:
             tau = tau - self._force_torque(q, tau, external_forces, force_reference)
@@ -258,7 +258,7 @@ class Backend(Lifecycle, EngineHooks):
 
     def coriolis_matrix(self, q: ArrayLike, v: ArrayLike) -> Floats:
         """C (..., nv, nv) with C v + g = bias and dM/dt - 2 C skew-symmetric (`dynx.rbd.coriolis`)."""
-        q, v, _ = self._checked_motion(q, v, LOCAL_WORLD_ALIGNED)
+        q, v = self._checked_q(q), self._checked_v(v)
         return self._evaluation(self._coriolis_matrix, (-1, -1), q, v, reduce=self._evaluation.reduce_both)
 
     # -- the whole body -----------------------------------------------------------------------
@@ -277,12 +277,12 @@ class Backend(Lifecycle, EngineHooks):
 
     def centroidal_momentum(self, q: ArrayLike, v: ArrayLike) -> Floats:
         """Linear [kg m/s] then angular [kg m^2/s] momentum about the centre of mass (..., 6)."""
-        q, v, _ = self._checked_motion(q, v, LOCAL_WORLD_ALIGNED)
+        q, v = self._checked_q(q), self._checked_v(v)
         return self._evaluation(self._centroidal_momentum, (6,), q, v)
 
     def kinetic_energy(self, q: ArrayLike, v: ArrayLike, *, joint_dynamics: bool = False) -> Floats:
         """v' M v / 2 (...,) [J]."""
-        q, v, _ = self._checked_motion(q, v, LOCAL_WORLD_ALIGNED)
+        q, v = self._checked_q(q), self._checked_v(v)
         energy = self._evaluation(self._kinetic_energy, (), q, v)
         if joint_dynamics:
             energy = energy + 0.5 * np.sum(v * self._joint_terms.rotor_torque(v), axis=-1)
@@ -304,13 +304,11 @@ class Backend(Lifecycle, EngineHooks):
     def _checked_q(self, q: Any) -> Floats:
         return self._arguments.q(q) if self._validate else q
 
-    def _checked_v(self, v: Any, name: str) -> Floats:
+    def _checked_v(self, v: Any, name: str = "v") -> Floats:
         return self._arguments.v(v, name) if self._validate else v
 
-    def _checked_motion(self, q: Any, v: Any, reference: str) -> tuple[Floats, Floats, Reference]:
-        if self._validate:
-            return self._arguments.q(q), self._arguments.v(v), self._arguments.reference(reference)
-        return q, v, reference  # type: ignore[return-value]
+    def _checked_reference(self, reference: Any) -> Reference:
+        return self._arguments.reference(reference) if self._validate else reference
 
     def _force_torque(self, q: Any, tau: Any, forces: Forces, reference: str) -> Floats:
         """J' w summed over the frames that a wrench acts on, to be added to or taken from `tau`."""

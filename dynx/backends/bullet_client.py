@@ -209,7 +209,9 @@ class BulletClient:
     def _check(self, *numbers: Sequence[float]) -> None:
         """Bullet is never given NaN or infinity: they survive a reset."""
         if not isfinite(sum(map(sum, numbers))) and not all(isfinite(x) for xs in numbers for x in xs):
-            raise NotFiniteError(f"Bullet was asked about {self._robot} with NaN; wanted finite numbers")
+            raise NotFiniteError(
+                f"Bullet was asked about {self._robot} with NaN or infinity; wanted finite numbers"
+            )
 
     def _ask(self, question: Callable[..., Any], *args: Any, **options: Any) -> Any:
         try:
@@ -293,7 +295,7 @@ class BulletClient:
             kind = self._engine.JOINT_REVOLUTE if link.revolute else self._engine.JOINT_PRISMATIC
             if (info[1], info[2], info[16]) != (f"j{k}".encode(), kind, link.parent):
                 self._misread(f"joint {k}")
-            _expect(self, "the axis", k, info[13], link.inertia.axes.T @ link.axis)
+            self._expect("the axis", k, info[13], link.inertia.axes.T @ link.axis)
             self._verify_inertia(k, link.inertia.mass, link.inertia.moments)
         self._verify_placements()
         if self._links or self._tree.floating:
@@ -317,18 +319,17 @@ class BulletClient:
             R_parent, p_parent = at[link.parent]
             R, p = R_parent @ link.R, p_parent + R_parent @ link.p
             at[k] = R, p
-            _expect(self, "the centre of mass", k, positions[k], p + R @ link.inertia.center)
-            _expect(self, "the principal axes", k, rotations[k], R @ link.inertia.axes)
+            self._expect("the centre of mass", k, positions[k], p + R @ link.inertia.center)
+            self._expect("the principal axes", k, rotations[k], R @ link.inertia.axes)
+
+    def _expect(self, what: str, link: int, got: Any, wanted: Any) -> None:
+        wanted = np.asarray(wanted, dtype=np.float64)
+        # A misread number is off in its leading digits; this is no measure of accuracy.
+        if not np.allclose(got, wanted, rtol=1e-6, atol=1e-6 * max(1.0, float(np.max(np.abs(wanted))))):
+            self._misread(f"{what} of link {link}")
 
     def _misread(self, what: str) -> None:
         raise EngineError(f"Bullet does not hold {what} of {self._robot} as it was written")
-
-
-def _expect(client: BulletClient, what: str, link: int, got: Any, wanted: Any) -> None:
-    wanted = np.asarray(wanted, dtype=np.float64)
-    # A misread number is off in its leading digits; this is no measure of accuracy.
-    if not np.allclose(got, wanted, rtol=1e-6, atol=1e-6 * max(1.0, float(np.max(np.abs(wanted))))):
-        client._misread(f"{what} of link {link}")
 
 
 def _disconnect(engine: ModuleType, client: int) -> None:

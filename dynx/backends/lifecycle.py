@@ -5,7 +5,6 @@ from __future__ import annotations
 from types import TracebackType
 from typing import Any, ClassVar, TypeVar
 
-from dynx._version import __version__
 from dynx.backends.arguments import Arguments
 from dynx.model import Model
 
@@ -19,10 +18,15 @@ class Lifecycle:
     """
 
     name: ClassVar[str]
-    """The name under which the registry finds the backend."""
+    """The name that reports and messages use; that of the class in lower case, if it says none."""
 
     model: Model
     """The robot."""
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        if not hasattr(cls, "name"):
+            cls.name = cls.__name__.lower()
 
     def __init__(self, model: Model, arguments: Arguments, *, validate: bool) -> None:
         self.model = model
@@ -33,8 +37,8 @@ class Lifecycle:
 
     @property
     def engine_version(self) -> str:
-        """Name and version of the engine behind."""
-        return f"dynx {__version__}"
+        """Name and version of the engine behind, as far as the backend knows them."""
+        return self.name
 
     @classmethod
     def require_engine(cls) -> None:

@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike
 from dynx.backends.base import Backend
 from dynx.backends.bullet_inertia import Ballast, ballast_for, longdouble
 from dynx.backends.bullet_robot import BulletRobot
-from dynx.errors import ArgumentError, ClosedError, NotInstalledError
+from dynx.errors import ArgumentError, ClosedError, EngineError, NotInstalledError
 from dynx.model import Model
 from dynx.model.configuration import checked_array
 from dynx.model.mechanism import build_mechanism
@@ -36,6 +36,9 @@ REFINE_ABOVE = 16 * float(np.finfo(np.float64).eps)
 
 REFINE_BELOW = 1e-6
 """Relative change above which a refinement is not one of rounding."""
+
+LOST = 1e-9
+"""Residual, relative to the terms it is the difference of, at which an acceleration is no answer."""
 
 _import_lock = Lock()
 
@@ -170,13 +173,22 @@ class PyBulletBackend(Backend):
 
         Under a root much lighter than what it carries, Bullet's inversion of the base's inertia
         loses digits (ten at a ratio of 1e-6). A step that changes more is not taken: then something
-        else is wrong, which refinement must not hide.
+        else is wrong, which refinement must not hide. Raises EngineError where too few digits are left.
         """
         left = tau - self._inverse_dynamics(q, v, a)
         if np.max(np.abs(left), initial=0.0) <= REFINE_ABOVE * np.max(np.abs(tau), initial=0.0):
             return a
         again = self._robot().forward_dynamics(q, v, tau + left)
-        return again if np.max(np.abs(again - a)) <= REFINE_BELOW * np.max(np.abs(a)) else a
+        if np.max(np.abs(again - a)) <= REFINE_BELOW * np.max(np.abs(a)):
+            return again
+        terms = np.max(np.abs(self._mass_matrix(q)) @ np.abs(a)) + np.max(np.abs(tau))
+        if np.max(np.abs(left)) > LOST * terms:
+            raise EngineError(
+                f"the stepper of pybullet loses its digits on {self.model.name}: the acceleration found "
+                f"misses the torque by {np.max(np.abs(left)) / terms:.1g}, relative "
+                "(are masses very unequal?)"
+            )
+        return a
 
     # -- life cycle ---------------------------------------------------------------------------
 

@@ -10,6 +10,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from dynx._version import __version__
 from dynx.backends.base import Backend
 from dynx.rbd import aba, centroidal, crba, kinematics, rnea
 from dynx.spatial.scalar import Floats
@@ -21,6 +22,11 @@ class ReferenceBackend(Backend):
 
     name: ClassVar[str] = "reference"
     vectorized: ClassVar[bool] = True
+
+    @property
+    def engine_version(self) -> str:
+        """``dynx`` and its version."""
+        return f"dynx {__version__}"
 
     def _frame_placements(self, q: Floats) -> Floats:
         return kinematics.frame_placements(self._mechanism, q)

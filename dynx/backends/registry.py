@@ -123,6 +123,12 @@ def _checked(name: str, loader: Callable[[], Any], provider: str) -> type[Backen
             f"the backend {shown(name)}, provided by {provider}, is {shown(kind)}, "
             "which is no subclass of dynx.Backend"
         )
+    if inspect.isabstract(kind):
+        missing = ", ".join(sorted(kind.__abstractmethods__))
+        raise BackendError(
+            f"the backend {shown(name)}, provided by {provider}, does not say how to answer: "
+            f"{kind.__name__} lacks {missing}"
+        )
     return kind
 
 

@@ -80,7 +80,9 @@ class Run:
             MofNCompleteColumn(),
             TimeElapsedColumn(),
         )
-        with Progress(*columns, console=console(err=True), transient=True) as progress:
+        screen = console(err=True)
+        screen.soft_wrap = False  # a bar that ran over the line could not be drawn again in place
+        with Progress(*columns, console=screen, transient=True) as progress:
             bar = progress.add_task("comparing", total=len(self.tasks), completed=len(self._entries))
 
             def advance() -> None:

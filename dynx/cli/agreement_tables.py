@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 from dynx.cli.agreement_task import Entry, counts, label, verdict
 from dynx.cli.exits import one_line
-from dynx.cli.terminal import plain_table
+from dynx.cli.tables import Table
+from dynx.cli.terminal import counted
 
 if TYPE_CHECKING:
     from rich.console import Console
-    from rich.table import Table
     from rich.text import Text
 
 Check = dict[str, Any]
@@ -39,7 +39,7 @@ def show_one(out: Console, entry: Entry) -> None:
         return
     out.print(
         f"{label(entry)}, {entry['base']} base, nq {entry['nq']}, nv {entry['nv']}, "
-        f"{entry['samples']} samples, seed {entry['seed']}  ({one_line(entry['source'])})",
+        f"{counted(entry['samples'], 'sample')}, seed {entry['seed']}  ({one_line(entry['source'])})",
         style="bold",
     )
     checks: list[Check] = entry["quantities"]
@@ -52,6 +52,7 @@ def show_one(out: Console, entry: Entry) -> None:
     if identities:
         out.print("\nerror of each engine in the laws of mechanics, relative", style="bold")
         out.print(_pivot(identities, "identity", "backend", "max_error"))
+    out.print()
     for note in dict.fromkeys(filter(None, (check["note"] for check in [*checks, *identities]))):
         out.print(f"* {one_line(note)}")
     for note in entry["notes"]:
@@ -66,9 +67,8 @@ def show_many(out: Console, entries: Sequence[Entry]) -> None:
     met = {_judge(check) for entry in entries for check in entry["quantities"]}
     judges = [judge for judge in _TITLES if judge is not None and judge in met]
     headings = [_heading(pair) for pair in pairs]
-    table = plain_table(
-        "robot", "nv", *headings, *judges, "verdict", "s", right=["nv", *headings, *judges, "s"]
-    )
+    right = ["nv", *headings, *judges, "s"]
+    table = Table("robot", "nv", *headings, *judges, "verdict", "s", right=right, keys=1)
     for entry in entries:
         checks: list[Check] = entry["quantities"]
         cells = [_worst([check for check in checks if check["pair"] == pair]) for pair in pairs]
@@ -86,6 +86,7 @@ def show_many(out: Console, entries: Sequence[Entry]) -> None:
         style="bold",
     )
     out.print(table)
+    out.print()
     for entry in entries:
         _show_differences(out, entry, _SHOWN_DIFFERENCES)
 
@@ -96,7 +97,7 @@ def show_summary(out: Console, entries: Sequence[Entry], seconds: float, left: i
     parts = [f"{count[word]} {word}" for word in ("agree", "differ", "refused")]
     if left:
         parts.append(f"{left} not done")
-    out.print(f"{count['robots']} robots: {', '.join(parts)}; {seconds:.1f} s")
+    out.print(f"{counted(count['robots'], 'robot')}: {', '.join(parts)}; {seconds:.1f} s")
 
 
 def _pivot(checks: Sequence[Check], row_key: str, column_key: str, error_key: str) -> Table:
@@ -104,7 +105,7 @@ def _pivot(checks: Sequence[Check], row_key: str, column_key: str, error_key: st
     columns = list(dict.fromkeys(check[column_key] for check in checks))
     headings = [_heading(column) for column in columns]
     right = [*headings, "tolerance", "digits"]
-    table = plain_table(row_key, *headings, "tolerance", "digits", "verdict", right=right)
+    table = Table(row_key, *headings, "tolerance", "digits", "verdict", right=right, keys=1)
     for row in dict.fromkeys(check[row_key] for check in checks):
         of_row = [check for check in checks if check[row_key] == row]
         by_column = {check[column_key]: check for check in of_row}
@@ -228,14 +229,21 @@ def _difference(check: Check, what: str, who: str, error: float | None) -> str:
 
 
 def _conclusion(entry: Entry) -> Text:
+    """Who agrees, and how well: the digits are those of what is solved neither by iteration nor by steps."""
     from rich.text import Text
 
     engines: list[str] = entry["backends"]
-    worst = max(_rounding_errors(entry["quantities"]), default=None)
-    digits = f"to {_digits(worst)} digits or more; {entry['seconds']:.1f} s"
+    agree: bool = entry["agree"]
     if len(engines) == 1:
-        words = "agrees" if entry["agree"] else "DIFFERS"
-        text = f"{engines[0]} alone {words} with the referee and the laws of mechanics"
+        words = "agrees with" if agree else "DIFFERS from"
+        text, whose = f"{engines[0]} alone {words} the referee and the laws of mechanics", "its"
     else:
-        text = f"{', '.join(engines[:-1])} and {engines[-1]} {'agree' if entry['agree'] else 'DIFFER'}"
-    return Text(f"{text}, {digits}", "bold green" if entry["agree"] else "bold red")
+        text = f"{', '.join(engines[:-1])} and {engines[-1]} {'agree' if agree else 'DIFFER'}"
+        whose = "their"
+    worst = max(_rounding_errors(entry["quantities"]), default=None)
+    if agree and worst is not None:
+        text += (
+            f"; {whose} answers to {_digits(worst)} digits or more "
+            "(inverse kinematics and numerical derivatives apart)"
+        )
+    return Text(f"{text}; {entry['seconds']:.1f} s", "bold green" if agree else "bold red")

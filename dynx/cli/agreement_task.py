@@ -87,7 +87,8 @@ def document(entries: Sequence[Entry], not_done: Sequence[str] = ()) -> dict[str
 
     A run that was interrupted also names the robots that it did not come to.
     """
-    results = {"schema": SCHEMA, "dynx": __version__, "results": list(entries), "summary": counts(entries)}
+    summary = {**counts(entries), "not_done": len(not_done)}
+    results = {"schema": SCHEMA, "dynx": __version__, "results": list(entries), "summary": summary}
     return {**results, "not_done": list(not_done)} if not_done else results
 
 
@@ -99,7 +100,7 @@ def verdict(entry: Entry) -> str:
 
 
 def counts(entries: Sequence[Entry]) -> dict[str, int]:
-    """How many entries there are, and of each verdict: the ``summary`` of the document."""
+    """How many entries there are, and of each verdict."""
     verdicts = [verdict(entry) for entry in entries]
     return {
         "robots": len(entries),

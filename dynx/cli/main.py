@@ -17,7 +17,7 @@ from dynx.cli.commands.evaluate import fd, fk, id_, jacobian, mass
 from dynx.cli.commands.ik import ik
 from dynx.cli.commands.info import info
 from dynx.cli.commands.robots import robots
-from dynx.cli.exits import DONE, TRACEBACK_VARIABLE, report_failure
+from dynx.cli.exits import DONE, TRACEBACK_VARIABLE, closed_pipe_raised, report_failure
 
 
 class CommandLine(click.Group):
@@ -26,6 +26,16 @@ class CommandLine(click.Group):
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Commands in the order in which they were added, the main one first."""
         return list(self.commands)
+
+    def make_context(self, *args: Any, **extra: Any) -> click.Context:
+        """Read the options of the group; ``--help`` writes here already."""
+        with closed_pipe_raised():
+            return super().make_context(*args, **extra)
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the command that is asked for."""
+        with closed_pipe_raised():
+            return super().invoke(ctx)
 
     def main(
         self,
@@ -71,7 +81,7 @@ def _show_traceback(ctx: click.Context, option: click.Parameter, wanted: bool) -
 
     \b
     Exit codes: 0 done (all agree), 1 the answer is no (some differ, target not reached),
-    2 some input cannot be used, 70 a defect of dynx.
+    2 some input cannot be used, 70 a defect of dynx, 74 the output cannot be written.
     """,
 )
 @click.version_option(__version__, prog_name="dynx", message="%(prog)s %(version)s")

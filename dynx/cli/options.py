@@ -78,3 +78,28 @@ def json_flag(command: F) -> F:
     return click.option(
         "--json", "as_json", is_flag=True, help="Write JSON to standard output instead of a table."
     )(command)
+
+
+def robot_options(command: F) -> F:
+    """ROBOT, ``--backend``, ``--base``, ``--lock`` and ``--json``."""
+    command = json_flag(command)
+    command = model_options(command)
+    command = click.option(
+        "--backend",
+        "backend_name",
+        metavar="NAME",
+        help="The engine to ask (default: pinocchio if installed, else reference).",
+    )(command)
+    return click.argument("robot")(command)
+
+
+def sample_option(name: str, what: str) -> Callable[[F], F]:
+    """An option such as ``--q`` that takes the numbers of one sample."""
+    return click.option(
+        f"--{name}", type=number_list, metavar="NUMBERS", help=f"{what}: 0,1.5,... or joint=value,..."
+    )
+
+
+frame_option = click.option(
+    "--frame", metavar="NAME", help="The frame (default: the end of the longest chain of moving joints)."
+)

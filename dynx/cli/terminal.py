@@ -2,45 +2,35 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import math
 import os
 import sys
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, TextIO
 
 import click
 
 if TYPE_CHECKING:
     from rich.console import Console
-    from rich.table import Table
 
 PIPE_WIDTH = 10_000
-"""Columns where nobody watches: nothing is wrapped or cut in a file or a pipe."""
+"""Columns where nobody watches: a table in a file or a pipe is never divided."""
 
 
 def console(*, err: bool = False) -> Console:
     """A console on standard output or error; `err` also sends tables away from JSON on stdout.
 
+    Lines are not wrapped, so that paths and numbers can be copied: a terminal does that for itself.
     Names of robots may hold anything, so neither markup nor emoji codes are read. NO_COLOR, TERM
     and COLUMNS are honoured.
     """
     from rich.console import Console
 
-    stream = sys.stderr if err else sys.stdout
+    stream = sys.stderr if err else _standard_output()
     width = None if stream.isatty() or "COLUMNS" in os.environ else PIPE_WIDTH
-    return Console(file=stream, width=width, markup=False, emoji=False, highlight=False)
-
-
-def plain_table(*columns: str, right: Sequence[str] = ()) -> Table:
-    """An empty table in the one style of dynx; columns named in `right` are aligned right."""
-    from rich import box
-    from rich.table import Table
-
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for column in columns:
-        table.add_column(column, justify="right" if column in right else "left", overflow="fold")
-    return table
+    return Console(file=stream, width=width, soft_wrap=True, markup=False, emoji=False, highlight=False)
 
 
 def json_text(document: object) -> str:
@@ -50,12 +40,24 @@ def json_text(document: object) -> str:
 
 def echo_json(document: object) -> None:
     """Write `document` to standard output."""
-    click.echo(json_text(document))
+    click.echo(json_text(document), file=_standard_output())
 
 
 def number(value: float) -> str:
     """A number of a table: nine significant digits, and zero as 0 whatever its sign."""
     return "0" if value == 0.0 else f"{value:.9g}"
+
+
+def counted(count: int, noun: str) -> str:
+    """``1 robot``, ``2 robots``."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def _standard_output() -> TextIO:
+    """Standard output; OSError where the process was started without one."""
+    if sys.stdout is None:
+        raise OSError(errno.EBADF, os.strerror(errno.EBADF))
+    return sys.stdout
 
 
 def _finite(value: Any) -> Any:

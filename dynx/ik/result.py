@@ -41,7 +41,9 @@ class IKResult:
         if self.success.ndim:
             return f"{int(self.success.sum())} of {self.success.size} reached, {worst}"
         if self.success:
-            return f"reached, {worst}, after {int(self.iterations)} steps and {int(self.restarts)} restarts"
+            restarts = "1 restart" if self.restarts == 1 else f"{int(self.restarts)} restarts"
+            steps = "1 step" if self.iterations == 1 else f"{int(self.iterations)} steps"
+            return f"reached, {worst}, after {steps} and {restarts}"
         return (
             f"not reached: the best of {int(self.restarts) + 1} starts is "
             f"{float(self.position_error):.3g} m and {float(self.rotation_error):.3g} rad off"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,8 +14,11 @@ from dynx.ik.result import IKResult
 from dynx.ik.search import Effort, Found, Kinematics, Search
 from dynx.ik.targets import checked_targets
 from dynx.model import Model
-from dynx.model.configuration import checked_array, checked_q
+from dynx.model.configuration import checked_q, checked_vector
 from dynx.spatial.scalar import Floats
+
+EngineSolver = Callable[[Floats, str, Floats], Floats]
+"""From a pose T_world_target (4, 4), a frame and q0 (nq,) to the engine's answer q (nq,)."""
 
 
 def inverse_kinematics(
@@ -61,7 +63,7 @@ def inverse_kinematics(
     targets = checked_targets(target)
     effort = _checked_effort(position_tolerance, rotation_tolerance, max_iterations, max_restarts)
     rng = _checked_rng(rng)
-    at = None if point is None else _checked_point(point)
+    at = None if point is None else checked_vector("point", point)
     start = _start(model, q0)
     try:
         batch = np.broadcast_shapes(targets.batch, start.shape[:-1])
@@ -127,8 +129,8 @@ def _start(model: Model, q0: ArrayLike | None) -> Floats:
     return q
 
 
-def _engine_solver(kinematics: Kinematics, restricted: bool) -> Callable[[Floats, str, Floats], Floats]:
-    solver: Any = getattr(kinematics, "engine_inverse_kinematics", None)
+def _engine_solver(kinematics: Kinematics, restricted: bool) -> EngineSolver:
+    solver = getattr(kinematics, "engine_inverse_kinematics", None)
     if solver is None:
         raise ArgumentError(
             f"method 'engine': {kinematics!r} has no solver of its own; use method 'dynx', "
@@ -136,14 +138,8 @@ def _engine_solver(kinematics: Kinematics, restricted: bool) -> Callable[[Floats
         )
     if restricted:
         raise ArgumentError("method 'engine' takes poses (..., 4, 4) of a frame only; use method 'dynx'")
-    return solver  # type: ignore[no-any-return]
-
-
-def _checked_point(point: ArrayLike) -> Floats:
-    array = checked_array("point", point, 3)
-    if array.ndim != 1:
-        raise ShapeError(f"point has shape {array.shape}; wanted (3,)")
-    return array
+    ask: EngineSolver = solver
+    return ask
 
 
 def _checked_effort(

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dynx.errors import ArgumentError, DTypeError, NotFiniteError, ShapeError
+from dynx.errors import ArgumentError, ShapeError
+from dynx.model.configuration import TOO_LARGE, checked_entries, real_array
 from dynx.spatial.scalar import Floats
 
 ORTHONORMALITY = 1e-6
@@ -48,7 +49,7 @@ def checked_targets(target: ArrayLike) -> Targets:
         and _is_rigid(target.tolist())
     ):
         return Targets(target[:3, 3], target[:3, :3])
-    array = _checked_numbers(target)
+    array = checked_entries("target", real_array("target", target))
     if array.ndim >= 1 and array.shape[-1] == 3:
         return Targets(array, None)
     if array.ndim < 2 or array.shape[-2:] != (4, 4):
@@ -59,7 +60,7 @@ def checked_targets(target: ArrayLike) -> Targets:
 def _is_rigid(T: list[list[float]]) -> bool:
     """Whether one pose needs no further look; in floats, as array code would take ten times as long."""
     a, b, c, bottom = T
-    if bottom != [0.0, 0.0, 0.0, 1.0] or not math.isfinite(a[3] + b[3] + c[3]):
+    if bottom != [0.0, 0.0, 0.0, 1.0] or not math.hypot(a[3], b[3], c[3]) < TOO_LARGE:
         return False
     departure = max(
         abs(_dot(a, a) - 1.0),
@@ -74,20 +75,6 @@ def _is_rigid(T: list[list[float]]) -> bool:
 
 def _dot(a: list[float], b: list[float]) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-def _checked_numbers(target: ArrayLike) -> Floats:
-    try:
-        array = np.asarray(target)
-    except ValueError as error:
-        raise ShapeError(f"target is ragged: {error}") from None
-    if array.dtype.kind not in "fiu":
-        raise DTypeError(f"target has dtype {array.dtype}; wanted real numbers (float64)")
-    array = np.asarray(array, dtype=np.float64)
-    if not np.isfinite(array).all():
-        where = ", ".join(str(i) for i in np.argwhere(~np.isfinite(array))[0])
-        raise NotFiniteError(f"target[{where}] is not finite; wanted finite numbers")
-    return array
 
 
 def _checked_rotations(T: Floats) -> Floats:

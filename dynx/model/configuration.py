@@ -24,15 +24,37 @@ must not overflow, or an engine would answer infinity or NaN and say nothing."""
 
 def checked_array(name: str, value: ArrayLike, length: int) -> Floats:
     """`value` as float64 (..., length) of numbers below `TOO_LARGE`, or an error that says why not."""
+    array = real_array(name, value)
+    if array.ndim == 0 or array.shape[-1] != length:
+        raise ShapeError(f"{name} has shape {array.shape}; wanted (..., {length})")
+    return checked_entries(name, array)
+
+
+def checked_vector(name: str, value: ArrayLike) -> Floats:
+    """One vector (3,), read as `checked_array` does, or an error that says why not."""
+    array = checked_array(name, value, 3)
+    if array.ndim != 1:
+        raise ShapeError(f"{name} has shape {array.shape}; wanted (3,)")
+    return array
+
+
+UNIT = 4 * float(np.finfo(np.float64).eps)
+"""How far from 1 rounding leaves the length of a unit quaternion."""
+
+
+def real_array(name: str, value: ArrayLike) -> Floats:
+    """`value` as a float64 array of any shape; ShapeError if it is ragged, DTypeError if not real."""
     try:
         array = np.asarray(value)
     except ValueError as error:
         raise ShapeError(f"{name} is ragged: {error}") from None
     if array.dtype.kind not in "fiu":
         raise DTypeError(f"{name} has dtype {array.dtype}; wanted real numbers (float64)")
-    if array.ndim == 0 or array.shape[-1] != length:
-        raise ShapeError(f"{name} has shape {array.shape}; wanted (..., {length})")
-    array = np.asarray(array, dtype=np.float64)
+    return np.asarray(array, dtype=np.float64)
+
+
+def checked_entries(name: str, array: Floats) -> Floats:
+    """`array` itself, or an error that names an entry which is not finite or not below `TOO_LARGE`."""
     if not np.isfinite(array).all():
         where = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         raise NotFiniteError(
@@ -48,31 +70,39 @@ def checked_array(name: str, value: ArrayLike, length: int) -> Floats:
 
 
 def checked_q(model: Model, q: ArrayLike, name: str = "q") -> Floats:
-    """A configuration (..., nq) whose quaternion, if it has one, is of unit length to 1e-6."""
+    """A configuration (..., nq) whose quaternion, if it has one, is of unit length to 1e-6.
+
+    A quaternion that is off by more than rounding is scaled to unit length, in a copy: engines would
+    each make something else of it.
+    """
     array = checked_array(name, q, model.nq)
-    if model.floating:
-        norm = np.linalg.norm(array[..., 3:7], axis=-1)
-        if np.any(np.abs(norm - 1.0) > 1e-6):
-            worst = float(np.ravel(norm)[np.argmax(np.abs(np.ravel(norm) - 1.0))])
-            raise ArgumentError(
-                f"{name}[3:7] is a quaternion (x, y, z, w) of length {worst:.9g}; wanted length 1"
-            )
+    if not model.floating:
+        return array
+    norm = np.linalg.norm(array[..., 3:7], axis=-1, keepdims=True)
+    off = np.abs(norm - 1.0)
+    if np.any(off > 1e-6):
+        worst = float(np.ravel(norm)[np.argmax(np.ravel(off))])
+        raise ArgumentError(
+            f"{name}[3:7] is a quaternion (x, y, z, w) of length {worst:.9g}; wanted length 1"
+        )
+    if np.any(off > UNIT):
+        array = np.array(array)
+        array[..., 3:7] /= norm
     return array
 
 
 def checked_base(base: str) -> Literal["fixed", "floating"]:
     """`base` itself, or an error for a word that is no kind of base."""
-    if base == "fixed" or base == "floating":
-        return base  # type: ignore[return-value]
+    if base == "fixed":
+        return "fixed"
+    if base == "floating":
+        return "floating"
     raise ArgumentError(f"base is {shown(base)}; wanted 'fixed' or 'floating'")
 
 
 def checked_gravity(gravity: ArrayLike) -> Vector:
     """Gravity as three finite floats [m/s^2]."""
-    array = checked_array("gravity", gravity, 3)
-    if array.ndim != 1:
-        raise ShapeError(f"gravity has shape {array.shape}; wanted (3,)")
-    x, y, z = array.tolist()
+    x, y, z = checked_vector("gravity", gravity).tolist()
     return (x, y, z)
 
 

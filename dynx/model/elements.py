@@ -11,16 +11,21 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from dynx.errors import ArgumentError, ShapeError, shown
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous
-from dynx.spatial.so3 import rotation_from_rpy
+from dynx.spatial.so3 import rotation_from_rpy, rpy_from_rotation
 
 JointType = Literal["revolute", "continuous", "prismatic", "fixed"]
 Vector = tuple[float, float, float]
 
 ZERO: Vector = (0.0, 0.0, 0.0)
 INFINITY = float("inf")
+
+RIGID = 1e-6
+"""How far from orthonormal a rotation that is given as a matrix may be."""
 
 
 @dataclass(frozen=True)
@@ -29,6 +34,26 @@ class Pose:
 
     xyz: Vector = ZERO
     rpy: Vector = ZERO
+
+    @classmethod
+    def from_matrix(cls, T: ArrayLike) -> Pose:
+        """The pose of a homogeneous matrix (4, 4), such as `forward_kinematics` returns.
+
+        Raises ArgumentError where T is not a rigid transform to 1e-6.
+        """
+        try:
+            array = np.asarray(T, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise ArgumentError(f"a pose is {shown(T)}; wanted a matrix (4, 4)") from None
+        if array.shape != (4, 4):
+            raise ShapeError(f"a pose has shape {array.shape}; wanted (4, 4)")
+        R = array[:3, :3]
+        off = max(float(np.max(np.abs(R.T @ R - np.eye(3)))), float(np.max(np.abs(array[3] - [0, 0, 0, 1]))))
+        if not off < RIGID or np.linalg.det(R) < 0 or not np.isfinite(array).all():
+            raise ArgumentError("a pose is not a rigid transform: wanted [[R, p], [0, 1]] with R a rotation")
+        x, y, z = (array[:3, 3] + 0.0).tolist()
+        roll, pitch, yaw = (rpy_from_rotation(R) + 0.0).tolist()
+        return cls((x, y, z), (roll, pitch, yaw))
 
     @cached_property
     def matrix(self) -> Floats:

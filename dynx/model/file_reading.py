@@ -27,11 +27,11 @@ def read_file(path: str) -> bytes:
             data = file.read(MAX_BYTES + 1)
     except FileNotFoundError:
         raise RobotNotFoundError(f"no such file: {shown(path, 300)}") from None
+    except DescriptionError:
+        raise
     except (OSError, ValueError) as error:
         # ValueError: a path with a null character, which no system call accepts.
         reason = getattr(error, "strerror", None) or str(error)
-        if isinstance(error, DescriptionError):
-            raise
         raise DescriptionError(f"cannot be read: {reason}", source=printable(path)) from None
     if len(data) > MAX_BYTES:
         raise _too_large(path)

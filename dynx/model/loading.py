@@ -13,9 +13,8 @@ from dynx.errors import ArgumentError, DescriptionError, RobotNotFoundError, nea
 from dynx.model.file_reading import printable, read_file
 from dynx.model.library import find, robots
 from dynx.model.model import STANDARD_GRAVITY, Base, Model
+from dynx.model.package_paths import StrPath
 from dynx.model.urdf_reader import read_urdf
-
-StrPath = str | os.PathLike[str]
 
 _SUFFIXES = (".urdf", ".xacro", ".xml")
 

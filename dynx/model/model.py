@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dynx.errors import UnknownNameError, nearest, shown
+from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
 from dynx.model import configuration, locking, topology
 from dynx.model.elements import IDENTITY, Frame, Inertial, Joint, Link, Note, Pose, Vector
 from dynx.model.mechanism import Mechanism, build_mechanism
@@ -222,11 +222,18 @@ class Model:
         """The same robot in another field of gravity (3,) [m/s^2]."""
         return replace(self, gravity=configuration.checked_gravity(gravity))
 
-    def with_frame(self, name: str, link: str, placement: Pose = IDENTITY) -> Model:
-        """The same robot with one more named frame, fixed to `link` (a tool tip, say)."""
+    def with_frame(self, name: str, link: str, placement: Pose | ArrayLike = IDENTITY) -> Model:
+        """The same robot with one more named frame, fixed to `link` (a tool tip, say).
+
+        `placement` is the pose of the frame in the link: a `Pose`, or a matrix T_link_frame (4, 4).
+        """
         self.link(link)
+        if not isinstance(name, str) or not name:
+            raise ArgumentError(f"a frame's name is {shown(name)}; wanted a str that is not empty")
+        if not isinstance(placement, Pose):
+            placement = Pose.from_matrix(placement)
         if name in self._frame_index:
-            raise UnknownNameError(f"frame {shown(name)} exists already in {self.name}")
+            raise ArgumentError(f"frame {shown(name)} exists already in {self.name}")
         return replace(self, extra_frames=(*self.extra_frames, Frame(name, link, placement)))
 
     def inertial(self, link: str) -> Inertial:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass
 
-from dynx.errors import nearest, shown
+from dynx.errors import escaped, nearest
 from dynx.model.elements import Frame, Joint, Link, Note
 from dynx.model.topology import MAX_LINKS
 from dynx.model.urdf_joints import FRAME_TAG, read_joint
@@ -65,12 +65,12 @@ def read_urdf(data: str | bytes, source: str) -> UrdfContent:
 def _require_robot(root: Element, reading: Reading) -> None:
     if root.tag != "robot":
         other = {"sdf": " (SDF is not read)", "mujoco": " (MJCF is not read)"}.get(root.tag, "")
-        raise reading.error(root, f"the root element is <{shown(root.tag)[1:-1]}>; wanted <robot>{other}")
+        raise reading.error(root, f"the root element is <{escaped(root.tag)}>; wanted <robot>{other}")
     for child in root.children:
         if child.tag.startswith("xacro:"):
             raise reading.unsupported(
                 child,
-                f"<{shown(child.tag)[1:-1]}> is xacro that was not expanded; expand the file, or load it "
+                f"<{escaped(child.tag)}> is xacro that was not expanded; expand the file, or load it "
                 "under its name in .xacro with the extra 'xacro' installed",
             )
         if child.tag.lower() in ("link", "joint") and child.tag not in ("link", "joint"):

@@ -8,7 +8,7 @@ import unicodedata
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from dynx.errors import DescriptionError, UnsupportedFeatureError, shown
+from dynx.errors import DescriptionError, UnsupportedFeatureError, escaped, shown
 from dynx.model.elements import ZERO, Note, Pose, Vector
 from dynx.model.xml_reading import Element
 
@@ -51,7 +51,7 @@ class Reading:
         for (inside, tag), (count, line) in self._ignored.items():
             times = "" if count == 1 else f" ({count} times)"
             self.notes.append(
-                Note(f"unknown element <{shown(tag)[1:-1]}> in <{inside}> was ignored{times}", line)
+                Note(f"unknown element <{escaped(tag)}> in <{inside}> was ignored{times}", line)
             )
 
     def only(self, parent: Element, tag: str) -> Element | None:

@@ -15,7 +15,7 @@ import sys
 from collections.abc import Iterable
 from pathlib import Path
 
-from dynx.errors import DescriptionError, NotInstalledError, shown
+from dynx.errors import DescriptionError, NotInstalledError, escaped
 from dynx.model.file_reading import printable, read_file
 from dynx.model.package_paths import StrPath, find_package
 
@@ -48,7 +48,7 @@ def expand_xacro(path: str, package_dirs: Iterable[StrPath] = ()) -> bytes:
     if done.returncode != 0:
         said = done.stderr.decode("utf-8", "replace").strip().splitlines() or ["no message"]
         reason = " ".join(said[-1].split())
-        raise DescriptionError(f"xacro failed: {shown(reason, 300)[1:-1]}", source=printable(path))
+        raise DescriptionError(f"xacro failed: {escaped(reason, 300)}", source=printable(path))
     return done.stdout
 
 

@@ -10,7 +10,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from xml.parsers import expat
 
-from dynx.errors import DescriptionError, shown
+from dynx.errors import DescriptionError, escaped
 from dynx.model.elements import Note
 from dynx.model.xml_text import decode, without_ends
 
@@ -123,7 +123,7 @@ class _TreeBuilder:
     def _doctype(self, name: str, system: str | None, public: str | None, internal: bool) -> None:
         line = self._first + self._parser.CurrentLineNumber
         raise self._error(
-            f"has a document type (<!DOCTYPE {shown(name)[1:-1]}>), which is refused: "
+            f"has a document type (<!DOCTYPE {escaped(name)}>), which is refused: "
             "it can define entities that expand without bound or fetch other files; remove it",
             line,
         )

@@ -7,12 +7,10 @@ import numpy as np
 from dynx.model.mechanism import ROOT, Mechanism, joint_motion
 from dynx.rbd.kinematics import joint_value
 from dynx.rbd.linear import solve_positive
-from dynx.rbd.rnea import body_wrench, carried, root_motion
+from dynx.rbd.rnea import Twist, body_wrench, carried, root_motion
 from dynx.spatial.inertia import RigidInertia
 from dynx.spatial.scalar import Array, along
 from dynx.spatial.so3 import cross, skew
-
-Twist = tuple[Array, Array]
 
 
 def forward_dynamics(mechanism: Mechanism, q: Array, v: Array, tau: Array) -> Array:

@@ -14,7 +14,7 @@ import numpy as np
 from dynx.model.mechanism import ROOT, Mechanism
 from dynx.rbd.kinematics import Poses, ancestry, body_twists, frame_pose, joint_axis
 from dynx.spatial.scalar import Array
-from dynx.spatial.so3 import cross, skew
+from dynx.spatial.so3 import cross, rotate, skew
 
 Reference = Literal["local_world_aligned", "local", "world"]
 LOCAL_WORLD_ALIGNED: Reference = "local_world_aligned"
@@ -70,7 +70,7 @@ def shift_jacobian(
     """J, or dJ/dt where it is given, moved to `point` (3,) given in the axes of the frame at (R, p)."""
     if reference == "world":
         return J if dJ is None else dJ
-    lever = point if reference == "local" else (R @ point[..., None])[..., 0]
+    lever = point if reference == "local" else rotate(R, point)
     arm = skew(lever)
     if dJ is None or v is None:
         return np.concatenate([J[..., :3, :] - arm @ J[..., 3:, :], J[..., 3:, :]], axis=-2)

@@ -11,8 +11,7 @@ from dynx.agreement.sampling import draw_samples
 from dynx.backends.reference import ReferenceBackend
 from dynx.errors import EngineError
 from dynx.spatial.scalar import Floats
-
-from .robots import Broken, arm
+from tests.agreement.robots import Broken, arm
 
 MASS = next(quantity for quantity in QUANTITIES if quantity.name == "mass_matrix")
 

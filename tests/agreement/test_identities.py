@@ -13,8 +13,7 @@ from dynx.backends.reference import ReferenceBackend
 from dynx.model import Inertial, Joint, Link, Model
 from dynx.model.model import Base
 from dynx.spatial.scalar import Floats
-
-from .robots import BODY, Broken, GravityUpsideDown, TransposedRotation, arm
+from tests.agreement.robots import BODY, Broken, GravityUpsideDown, TransposedRotation, arm
 
 
 def checked(backend: Backend) -> dict[str, IdentityCheck]:

@@ -8,8 +8,7 @@ from hypothesis import strategies as st
 from dynx.agreement import Referee
 from dynx.agreement.referee import DIGITS, exactly
 from dynx.backends.reference import ReferenceBackend
-
-from .robots import arm, pendulum
+from tests.agreement.robots import arm, pendulum
 
 numbers = st.floats(-10.0, 10.0)
 sizes = st.floats(0.125, 4.0)

@@ -8,8 +8,7 @@ from dynx._version import __version__
 from dynx.agreement import AgreementReport, Comparison, agree, refused_report, results_document
 from dynx.backends.reference import ReferenceBackend
 from dynx.errors import DescriptionError
-
-from .robots import GravityUpsideDown, arm
+from tests.agreement.robots import GravityUpsideDown, arm
 
 RESULT_KEYS = {
     "robot",
@@ -49,7 +48,7 @@ def test_the_document_has_the_form_that_is_documented() -> None:
     assert set(document) == {"schema", "dynx", "results", "summary"}
     assert document["schema"] == 1
     assert document["dynx"] == __version__
-    assert document["summary"] == {"robots": 3, "agree": 1, "differ": 1, "refused": 1}
+    assert document["summary"] == {"robots": 3, "agree": 1, "differ": 1, "refused": 1, "not_done": 0}
     for result in document["results"]:
         assert set(result) == RESULT_KEYS
         assert all(set(entry) == QUANTITY_KEYS for entry in result["quantities"])

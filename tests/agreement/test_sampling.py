@@ -10,8 +10,7 @@ from dynx.errors import ArgumentError
 from dynx.model import Joint, Limits, Link, Model
 from dynx.rbd.jacobians import REFERENCES
 from dynx.testing.strategies import models
-
-from .robots import arm
+from tests.agreement.robots import arm
 
 
 def test_half_of_the_samples_are_within_limits_and_every_kind_comes_up() -> None:

@@ -3,8 +3,7 @@ from __future__ import annotations
 import numpy as np
 
 from dynx.agreement.symmetry import turned
-
-from .robots import arm
+from tests.agreement.robots import arm
 
 
 def test_gravity_turns_and_keeps_its_strength() -> None:

@@ -7,13 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from dynx.agreement.tolerances import BAR
 from dynx.backends import Backend
 from dynx.model import Joint, JointDynamics, Link, Mimic, Model
 from dynx.model.elements import Inertial, JointType, Pose, Vector
 from dynx.spatial.scalar import Floats
-
-BAR = 1e-12
-"""What two ways to compute a quantity may differ by, relative to the size of its terms."""
 
 REFERENCES = ("local_world_aligned", "local", "world")
 S2, S3 = 1 / math.sqrt(2), 1 / math.sqrt(3)

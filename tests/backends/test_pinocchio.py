@@ -14,6 +14,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dynx.agreement.tolerances import BAR
 from dynx.backends import DerivedBackend, backend, backend_class, installed_backends, native_quantities
 from dynx.backends.derived import HOOK_OF_QUANTITY
 from dynx.backends.pinocchio import MAX_NV, PinocchioBackend
@@ -25,7 +26,6 @@ from dynx.model.loading import load
 from dynx.spatial.scalar import Floats
 from dynx.testing.strategies import models
 from tests.backends.robots import (
-    BAR,
     REFERENCES,
     all_quantities,
     assert_close,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from pathlib import Path
 
 import click
 import pytest
@@ -76,3 +77,51 @@ def test_python_dash_m() -> None:
     )
     assert done.returncode == 2
     assert done.stderr.startswith("dynx: error: ")
+
+
+def closed_pipe(*arguments: str) -> tuple[int, bytes]:
+    """Exit code and standard error of a command whose reader is gone before it writes."""
+    command = [sys.executable, "-m", "dynx", *arguments]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        process.stdout.close()
+        said = process.stderr.read()
+    return process.returncode, said
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no SIGPIPE")
+@pytest.mark.parametrize(
+    "arguments",
+    [["--help"], ["--version"], ["fk", "--help"], ["robots"], ["robots", "--json"], ["id", "ur5"]],
+)
+def test_a_closed_pipe_is_not_the_answer_no(arguments: list[str]) -> None:
+    assert closed_pipe(*arguments) == (141, b"")
+
+
+FULL = Path("/dev/full")
+
+
+@pytest.mark.skipif(not FULL.exists(), reason="no device that is always full")
+@pytest.mark.parametrize("arguments", [["--help"], ["info", "ur5"], ["info", "ur5", "--json"]])
+def test_output_that_cannot_be_written_is_no_defect(arguments: list[str]) -> None:
+    with FULL.open("w") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "dynx", *arguments],
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
+        )
+    assert done.returncode == 74
+    assert done.stderr.startswith("dynx: error: standard output cannot be written")
+    assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="a POSIX shell")
+@pytest.mark.parametrize("arguments", ["info ur5", "info ur5 --json"])
+def test_no_standard_output_at_all(arguments: str) -> None:
+    script = f'"{sys.executable}" -m dynx {arguments} >&-'
+    done = subprocess.run(["sh", "-c", script], stderr=subprocess.PIPE, text=True, check=False)
+    assert done.returncode == 74
+    assert done.stderr.count("\n") == 1

@@ -15,6 +15,7 @@ from dynx.backends import backend
 from dynx.cli.configuration_input import default_frame
 from dynx.cli.main import cli
 from dynx.cli.options import number_list
+from dynx.cli.terminal import counted
 from dynx.model.loading import load
 
 Q = [0.1, -1.5, 1.4, 0.2, 0.3, -0.4]
@@ -115,7 +116,18 @@ def test_ik_reaches_what_fk_gave_and_says_when_it_does_not() -> None:
 @pytest.mark.parametrize(
     ("arguments", "clue"),
     [
-        (["id", "ur5", "--q", "1,2"], "wanted"),
+        (["id", "ur5", "--q", "1,2"], "--q has 2 numbers; ur5 needs 6: shoulder_pan_joint, "),
+        (["id", "ur5", "--v", "1"], "--v has 1 number; ur5 needs 6: shoulder_pan_joint, "),
+        (["id", "ur5", "--a", "1,2,3,4,5,6,7"], "--a has 7 numbers; ur5 needs 6: "),
+        (
+            ["fd", "talos", "--base", "floating", "--tau", "1"],
+            "--tau has 1 number; talos needs 38: base vx, ",
+        ),
+        (["fk", "talos", "--base", "floating", "--q", "1"], "--q has 1 number; talos needs 39: x, y, z, qx"),
+        (["ik", "ur5", "--target", "0,0,0", "--q", "0,0,0"], "--q has 3 numbers; ur5 needs 6"),
+        (["ik", "ur5", "--target", "0,0,0", "--q", "1e80,0,0,0,0,0"], "--q[0]"),
+        (["fk", "panda", "--q", "panda_finger_joint2=0.01"], "it follows 'panda_finger_joint1'"),
+        (["id", "ur5", "--lock", "elbow_joint=1", "--v", "elbow_joint=1"], "it is locked"),
         (["id", "ur5", "--q", "0,nan,0,0,0,0"], "finite"),
         (["id", "ur5", "--q", "0,one,0,0,0,0"], "'one'"),
         (["id", "ur5", "--q", "elbow_joint=1,elbo=2"], "elbow_joint"),
@@ -135,3 +147,73 @@ def test_what_cannot_be_used_is_said_in_one_line(arguments: list[str], clue: str
     assert clue in result.stderr
     assert result.stderr.count("\n") == 1
     assert result.stdout == ""
+
+
+def test_a_position_has_no_rotation_error() -> None:
+    options = ["ur5", "--target", "0.4,0.2,0.3", "--backend", "reference"]
+    assert answer("ik", *options)["rotation_error"] is None
+    assert " rad" not in CliRunner().invoke(cli, ["ik", *options]).stdout
+    posed = answer("ik", "ur5", "--target", "0.4,0.2,0.3,0,0,0", "--backend", "reference")
+    assert 0.0 <= posed["rotation_error"] < 1e-6
+
+
+def test_what_was_counted_is_singular_or_plural() -> None:
+    assert [counted(count, "restart") for count in (0, 1, 2)] == ["0 restarts", "1 restart", "2 restarts"]
+
+
+@pytest.mark.parametrize("command", [["fk"], ["jacobian"], ["ik", "--target", "0.4,0.2,0.3"]])
+def test_the_frame_that_was_taken_by_default_is_said(command: list[str]) -> None:
+    arguments = [command[0], "ur5", *command[1:], "--backend", "reference"]
+    assert "tool0 ends" in CliRunner().invoke(cli, arguments).stdout
+    assert "--frame chooses" in CliRunner().invoke(cli, arguments).stdout
+    assert "--frame chooses" not in CliRunner().invoke(cli, [*arguments, "--frame", "tool0"]).stdout
+
+
+@pytest.mark.parametrize("width", [40, 60, 80, 120, None])
+@pytest.mark.parametrize("command", ["mass", "jacobian"])
+def test_a_wide_matrix_is_shown_whole(
+    command: str, width: int | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    arguments = [
+        command,
+        "talos",
+        "--base",
+        "floating",
+        "--backend",
+        "reference",
+        "--q",
+        "arm_left_4_joint=-1",
+    ]
+    found = answer(*arguments)
+    matrix = found["mass_matrix" if command == "mass" else "jacobian"]
+    if width is not None:
+        monkeypatch.setenv("COLUMNS", str(width))
+    lines = CliRunner().invoke(cli, arguments).stdout.splitlines()
+    names = found["velocity_names"]
+    rows = (
+        names if command == "mass" else [f"{kind} {axis}" for kind in ("linear", "angular") for axis in "xyz"]
+    )
+    for name, numbers in zip(rows, matrix, strict=True):
+        # The legend of the columns numbers the names, so no line of it starts with one.
+        shown = [line.removeprefix(f" {name} ").split() for line in lines if line.startswith(f" {name} ")]
+        assert [cell for part in shown for cell in part] == [f"{number + 0.0:.5g}" for number in numbers]
+    legend = " ".join(line.strip() for line in lines[lines.index("") :])
+    assert all(f"{k} {name}" in legend for k, name in enumerate(names))
+    if width is not None and width >= 60:
+        assert max(len(line) for line in lines[2:]) <= width
+
+
+@pytest.mark.parametrize(
+    "arguments", [["robots"], ["backends"], ["info", "panda"], ["mass", "ur5"], ["id", "ur5"], ["fk", "ur5"]]
+)
+def test_piped_lines_have_no_trailing_blanks(arguments: list[str]) -> None:
+    lines = CliRunner().invoke(cli, arguments).stdout.split("\n")
+    assert lines[0] != ""
+    assert [line for line in lines if line != line.rstrip()] == []
+
+
+@pytest.mark.parametrize("width", ["40", "60"])
+def test_no_name_of_a_tree_is_cut(width: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", width)
+    shown = CliRunner().invoke(cli, ["info", "talos"]).stdout
+    assert all(f"{joint.name} ({joint.type})" in shown for joint in load("talos").joints)

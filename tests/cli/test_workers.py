@@ -60,7 +60,7 @@ def test_an_engine_crash_is_an_entry_of_the_document() -> None:
     run = Run(tasks)
     run.measure(1, 120.0, show_progress=False, target=crash_on_panda)
     made = document(run.entries, run.not_done)
-    assert made["summary"] == {"robots": 3, "agree": 2, "differ": 0, "refused": 1}
+    assert made["summary"] == {"robots": 3, "agree": 2, "differ": 0, "refused": 1, "not_done": 0}
     assert [entry["robot"] for entry in made["results"]] == ["ur5", "panda", "z1"]
     assert made["results"][1]["error"]["type"] == "EngineCrash"
     assert "not_done" not in made

@@ -265,3 +265,20 @@ def test_frames_can_be_added(make: Make) -> None:
     wanted = engine.forward_kinematics(q, "tool") @ offset
     close = Closeness(samples_at(model, q))
     close.check("forward_kinematics", engine.forward_kinematics(q, "grip"), wanted)
+
+
+@pytest.mark.parametrize("off", [1e-15, 1e-9, -4e-7, 9e-7])
+def test_a_quaternion_almost_of_unit_length_means_the_attitude(make: Make, off: float) -> None:
+    model = branched().with_base("floating")
+    engine, state = make(model), random_state(model, 7, (3,))
+    close = Closeness(samples_at(model, state.q, state.v))
+    stretched = state.q.copy()
+    stretched[:, 3:7] *= 1.0 + off
+    given = stretched.copy()
+    poses = engine.forward_kinematics(given, "tool"), engine.forward_kinematics(state.q, "tool")
+    close.check("forward_kinematics", *poses)
+    close.check("mass_matrix", engine.mass_matrix(given), engine.mass_matrix(state.q))
+    close.check("bias_torque", engine.bias_torque(given, state.v), engine.bias_torque(state.q, state.v))
+    one_by_one = np.stack([engine.gravity_torque(q) for q in given])
+    close.check("gravity_torque", one_by_one, engine.gravity_torque(state.q))
+    np.testing.assert_array_equal(given, stretched)

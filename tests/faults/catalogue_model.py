@@ -11,8 +11,8 @@ MECHANISM = "dynx.model.mechanism"
 CONFIGURATION = "dynx.model.configuration"
 COORDINATES = "tests/contract/test_coordinates.py"
 BODIES = "tests/contract/test_bodies.py"
-READER = "tests/model/test_urdf_reader.py"
-REFUSED = f"{READER}::test_a_bad_description_is_refused_with_line_and_reason"
+REFUSALS = "tests/model/test_urdf_refusals.py"
+REFUSED = f"{REFUSALS}::test_a_bad_description_is_refused_with_line_and_reason"
 
 MODEL_FAULTS = (
     Fault(
@@ -195,8 +195,8 @@ MODEL_FAULTS = (
     Fault(
         "random_beyond_the_limits",
         CONFIGURATION,
-        right="if math.isfinite(high - low):\n        return low, high",
-        wrong="if math.isfinite(high - low):\n        return min(low, -reach), max(high, reach)",
+        right="if bounded_below and bounded_above:\n        return low, high",
+        wrong="if bounded_below and bounded_above:\n        return min(low, -reach), max(high, reach)",
         caught_by=(
             "tests/model/test_configuration.py::test_random_configurations_are_valid_and_within_the_limits"
         ),
@@ -240,7 +240,7 @@ MODEL_FAULTS = (
     Fault(
         "quaternion_of_any_length_accepted",
         CONFIGURATION,
-        right="np.any(np.abs(norm - 1.0) > 1e-6)",
+        right="np.any(off > 1e-6)",
         wrong="np.any(norm < 1e-6)",
         caught_by=(
             "tests/contract/test_bad_input.py::test_a_quaternion_that_is_no_attitude"

@@ -14,6 +14,8 @@ REFERENCES = "tests/contract/test_references.py"
 LIFECYCLE = "tests/contract/test_lifecycle.py"
 CLOSED_FORM = "tests/oracles/test_closed_forms.py::test_backend_matches_closed_form"
 TEST_PYBULLET = "tests/backends/test_pybullet.py"
+TEST_INERTIAS = "tests/backends/test_pybullet_inertias.py"
+TEST_LIFECYCLE = "tests/backends/test_pybullet_lifecycle.py"
 BULLET_FREE_BODY = f"{CLOSED_FORM}[free_body-pybullet]"
 STEPPER = f"{TEST_PYBULLET}::test_the_stepper_has_no_clamp_limits_motors_or_damping"
 
@@ -93,7 +95,7 @@ PYBULLET_FAULTS = (
         ROBOT,
         right="tau = tau / self._unit",
         wrong="tau = 1.0 * tau",
-        caught_by=f"{TEST_PYBULLET}::test_bodies_heavier_or_lighter_than_bullet_s_checks_foresee",
+        caught_by=f"{TEST_INERTIAS}::test_bodies_heavier_or_lighter_than_bullet_s_checks_foresee",
     ),
     Fault(
         "bullet_extrapolation_left_out",
@@ -107,7 +109,7 @@ PYBULLET_FAULTS = (
         PYBULLET,
         right="            if a.all():",
         wrong="            if a is not None:",
-        caught_by=f"{TEST_PYBULLET}::test_a_joint_too_light_for_the_stepper_still_moves",
+        caught_by=f"{TEST_INERTIAS}::test_a_joint_too_light_for_the_stepper_still_moves",
     ),
     Fault(
         "bullet_motors_left_on",
@@ -167,7 +169,7 @@ PYBULLET_FAULTS = (
         CLIENT,
         right="if not isfinite(sum(map(sum, numbers))) and not all(",
         wrong="if not self._robot and not all(",
-        caught_by=f"{TEST_PYBULLET}::test_nan_does_not_poison_the_engine",
+        caught_by=f"{TEST_LIFECYCLE}::test_nan_does_not_poison_the_engine",
     ),
     Fault(
         "bullet_principal_moments_with_the_wrong_steiner_sign",
@@ -204,6 +206,6 @@ PYBULLET_FAULTS = (
         CLIENT,
         right="if engine.isConnected(client):\n        engine.disconnect(client)",
         wrong="engine.isConnected(client)",
-        caught_by=f"{TEST_PYBULLET}::test_a_closed_backend_refuses_and_holds_no_client",
+        caught_by=f"{TEST_LIFECYCLE}::test_a_closed_backend_refuses_and_holds_no_client",
     ),
 )

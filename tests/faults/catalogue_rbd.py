@@ -198,7 +198,7 @@ RBD_FAULTS = (
     Fault(
         "point_taken_in_world_axes",
         JACOBIANS,
-        right='lever = point if reference == "local" else (R @ point[..., None])[..., 0]',
+        right='lever = point if reference == "local" else rotate(R, point)',
         wrong="lever = point + 0 * R[..., 0]",
         caught_by=f"{REFERENCES}::test_a_point_is_a_frame_at_that_point[reference-local_world_aligned-fixed]",
     ),

@@ -11,7 +11,8 @@ XML = "dynx.model.xml_reading"
 XML_TEXT = "dynx.model.xml_text"
 WRITER = "dynx.model.urdf_writer"
 READER = "tests/model/test_urdf_reader.py"
-REFUSED = f"{READER}::test_a_bad_description_is_refused_with_line_and_reason"
+REFUSALS = "tests/model/test_urdf_refusals.py"
+REFUSED = f"{REFUSALS}::test_a_bad_description_is_refused_with_line_and_reason"
 
 READER_FAULTS = (
     Fault(
@@ -134,7 +135,7 @@ READER_FAULTS = (
         JOINTS,
         right='"fixed": "fixed",\n}',
         wrong='"fixed": "fixed",\n    "planar": "fixed",\n}',
-        caught_by=f"{READER}::test_joints_of_several_freedoms_are_refused_by_name[planar]",
+        caught_by=f"{REFUSALS}::test_joints_of_several_freedoms_are_refused_by_name[planar]",
     ),
     Fault(
         "negative_mass_accepted",

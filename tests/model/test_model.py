@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 
-from dynx.errors import UnknownNameError
+from dynx.errors import ArgumentError, UnknownNameError
 from dynx.model import Link, Model, Pose
 from dynx.model.loading import load
 from dynx.testing.strategies import models
@@ -65,7 +65,6 @@ def test_any_change_makes_another_model(model: Model) -> None:
         (lambda m: m.frame_index("tool"), "did you mean 'tool0'"),
         (lambda m: m.frame_index("elbow_joint"), "the frame it moves is 'forearm_link'"),
         (lambda m: m.coordinate_index("ee_fixed_joint"), "has no coordinate: it is fixed"),
-        (lambda m: m.with_frame("tool0", "tool0"), "frame 'tool0' exists already"),
         (lambda m: m.with_frame("tip", "no_link", Pose()), "no link 'no_link'"),
         (lambda m: m.joint(["elbow_joint"]), "no joint .* a name is a str, not list"),
         (lambda m: m.link(None), "no link 'None'"),
@@ -76,6 +75,12 @@ def test_a_name_that_is_not_there_is_an_error_that_helps(ask: object, says: str)
     assert callable(ask)
     with pytest.raises(UnknownNameError, match=says):
         ask(load("ur5"))
+
+
+def test_a_frame_s_name_is_given_once() -> None:
+    with pytest.raises(ArgumentError, match="frame 'tool0' exists already") as caught:
+        load("ur5").with_frame("tool0", "tool0")
+    assert not isinstance(caught.value, UnknownNameError)
 
 
 def test_only_a_name_that_is_there_is_looked_up_by_case() -> None:

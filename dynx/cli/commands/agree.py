@@ -75,6 +75,7 @@ def agree(
     from dynx.cli.agreement_task import AgreementTask, refused
     from dynx.cli.inputs import expand
     from dynx.cli.interruption import interruptible
+    from dynx.cli.terminal import counted
 
     if json_path is not None and json_path != "-":
         check_writable(json_path)
@@ -89,7 +90,7 @@ def agree(
         try:
             run.measure(jobs or processors(), timeout or None, show_progress=not quiet)
         except KeyboardInterrupt:
-            complain(f"interrupted: {len(run.not_done)} of {len(run.tasks)} robots were not done")
+            complain(f"interrupted: {len(run.not_done)} of {counted(len(run.tasks), 'robot')} not done")
         interruption.finishing = True
         code = _report(run, json_path, quiet)
     return code if interruption.code is None else interruption.code

@@ -21,13 +21,14 @@ def backends(as_json: bool) -> None:
     """
     from dynx.backends.registry import backend_names
     from dynx.cli.exits import one_line
-    from dynx.cli.terminal import console, echo_json, plain_table
+    from dynx.cli.tables import Table
+    from dynx.cli.terminal import console, echo_json
 
     found = [_tried(name) for name in backend_names()]
     if as_json:
         echo_json({"schema": 1, "backends": found})
         return
-    table = plain_table("backend", "installed", "engine")
+    table = Table("backend", "installed", "engine")
     for each in found:
         mark = "yes" if each["installed"] else "no"
         table.add_row(each["name"], mark, one_line(each["version"] or each["reason"]))

@@ -2,46 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from dynx.cli.options import F, json_flag, model_options, number_list
+from dynx.cli.exits import one_line
+from dynx.cli.heading import head, title
+from dynx.cli.options import frame_option, robot_options, sample_option
 
 if TYPE_CHECKING:
     import numpy as np
 
-    from dynx.backends import Backend
     from dynx.cli.configuration_input import Numbers
     from dynx.model import Model
 
 
-def robot_options(command: F) -> F:
-    """ROBOT, ``--backend``, ``--base``, ``--lock`` and ``--json``."""
-    command = json_flag(command)
-    command = model_options(command)
-    command = click.option(
-        "--backend",
-        "backend_name",
-        metavar="NAME",
-        help="The engine to ask (default: pinocchio if installed, else reference).",
-    )(command)
-    return click.argument("robot")(command)
-
-
-def sample_option(name: str, what: str) -> Callable[[F], F]:
-    """An option such as ``--q`` that takes the numbers of one sample."""
-    return click.option(
-        f"--{name}", type=number_list, metavar="NUMBERS", help=f"{what}: 0,1.5,... or joint=value,..."
-    )
-
-
 q_option = sample_option("q", "Configuration (default: neutral)")
 v_option = sample_option("v", "Velocity (default: zero)")
-frame_option = click.option(
-    "--frame", metavar="NAME", help="The frame (default: the end of the longest chain of moving joints)."
-)
 
 
 @click.command(short_help="Forward kinematics: where a frame is.")
@@ -57,10 +35,11 @@ def fk(q: Numbers, frame: str | None, as_json: bool, **robot: Any) -> None:
       dynx fk panda --q panda_joint4=-1.5,panda_joint6=1.5 --json
     """
     from dynx.cli import terminal
-    from dynx.cli.configuration_input import configuration
+    from dynx.cli.configuration_input import chosen_frame, configuration, default_said, open_backend
+    from dynx.cli.tables import Table
     from dynx.spatial.so3 import quat_from_rotation, rpy_from_rotation
 
-    with opened(robot) as engine:
+    with open_backend(**robot) as engine:
         at, name = configuration(engine.model, q), chosen_frame(engine.model, frame)
         T = engine.forward_kinematics(at, name)
         result = {
@@ -76,9 +55,10 @@ def fk(q: Numbers, frame: str | None, as_json: bool, **robot: Any) -> None:
         terminal.echo_json(result)
         return
     out = terminal.console()
-    out.print(f"{title(result)}: pose of {name} in the world", style="bold")
-    table = terminal.plain_table("", "x", "y", "z", "w", right=("x", "y", "z", "w"))
-    table.show_header = False
+    out.print(f"{title(result)}: pose of {one_line(name)} in the world", style="bold")
+    if frame is None:
+        out.print(default_said(name))
+    table = Table("", "x", "y", "z", "w", right=("x", "y", "z", "w"), show_header=False)
     for key, unit in (("position", "m"), ("rpy", "rad"), ("quat_xyzw", "")):
         table.add_row(f"{key} {f'[{unit}]' if unit else ''}".strip(), *map(terminal.number, result[key]))
     for row, label in zip(result["T_world_frame"], ("T_world_frame", "", "", ""), strict=True):
@@ -106,9 +86,15 @@ def jacobian(q: Numbers, frame: str | None, reference: str, as_json: bool, **rob
       dynx jacobian panda --reference local --json
     """
     from dynx.cli import terminal
-    from dynx.cli.configuration_input import configuration
+    from dynx.cli.configuration_input import (
+        chosen_frame,
+        configuration,
+        default_said,
+        open_backend,
+        velocity_names,
+    )
 
-    with opened(robot) as engine:
+    with open_backend(**robot) as engine:
         at, name = configuration(engine.model, q), chosen_frame(engine.model, frame)
         J = engine.jacobian(at, name, reference=reference)
         result = {
@@ -116,14 +102,16 @@ def jacobian(q: Numbers, frame: str | None, reference: str, as_json: bool, **rob
             "frame": name,
             "reference": reference,
             "q": _listed(at),
-            "velocity_names": _velocity_names(engine.model),
+            "velocity_names": velocity_names(engine.model),
             "jacobian": J.tolist(),
         }
     if as_json:
         terminal.echo_json(result)
         return
     rows = ("linear x", "linear y", "linear z", "angular x", "angular y", "angular z")
-    _print_matrix(f"{title(result)}: Jacobian of {name}, {reference}", rows, result["velocity_names"], J)
+    heading = f"{title(result)}: Jacobian of {one_line(name)}, {reference}"
+    hint = default_said(name) if frame is None else None
+    _print_matrix(heading, rows, result["velocity_names"], J, hint)
 
 
 @click.command("id", short_help="Inverse dynamics: the torque that gives an acceleration.")
@@ -142,12 +130,16 @@ def id_(q: Numbers, v: Numbers, a: Numbers, joint_dynamics: bool, as_json: bool,
       dynx id ur5 --q 0,-1.57,1.57,0,0,0
       dynx id ur5 --q 0,-1,1,0,0,0 --v 0,0.1,0,0,0,0 --a 1,0,0,0,0,0 --json
     """
-    from dynx.cli.configuration_input import configuration, velocity
+    from dynx.cli.configuration_input import configuration, open_backend, velocity
 
-    with opened(robot) as engine:
+    with open_backend(**robot) as engine:
         model = engine.model
-        sample = {"q": configuration(model, q), "v": velocity(model, v), "a": velocity(model, a)}
-        tau = engine.inverse_dynamics(**sample, joint_dynamics=joint_dynamics)
+        sample = {
+            "q": configuration(model, q),
+            "v": velocity(model, v, "--v"),
+            "a": velocity(model, a, "--a"),
+        }
+        tau = engine.inverse_dynamics(*sample.values(), joint_dynamics=joint_dynamics)
         result = {**head(engine), **_vectors(model, sample), "tau": tau.tolist()}
     _report_vectors(result, as_json, "inverse dynamics", ("v", "a", "tau"))
 
@@ -166,12 +158,16 @@ def fd(q: Numbers, v: Numbers, tau: Numbers, joint_dynamics: bool, as_json: bool
       dynx fd ur5 --q 0,-1.57,1.57,0,0,0
       dynx fd ur5 --tau shoulder_pan_joint=10 --json
     """
-    from dynx.cli.configuration_input import configuration, velocity
+    from dynx.cli.configuration_input import configuration, open_backend, velocity
 
-    with opened(robot) as engine:
+    with open_backend(**robot) as engine:
         model = engine.model
-        sample = {"q": configuration(model, q), "v": velocity(model, v), "tau": velocity(model, tau)}
-        a = engine.forward_dynamics(**sample, joint_dynamics=joint_dynamics)
+        sample = {
+            "q": configuration(model, q),
+            "v": velocity(model, v, "--v"),
+            "tau": velocity(model, tau, "--tau"),
+        }
+        a = engine.forward_dynamics(*sample.values(), joint_dynamics=joint_dynamics)
         result = {**head(engine), **_vectors(model, sample), "a": a.tolist()}
     _report_vectors(result, as_json, "forward dynamics", ("v", "tau", "a"))
 
@@ -189,12 +185,12 @@ def mass(q: Numbers, joint_dynamics: bool, as_json: bool, **robot: Any) -> None:
       dynx mass solo12 --base floating --json
     """
     from dynx.cli import terminal
-    from dynx.cli.configuration_input import configuration
+    from dynx.cli.configuration_input import configuration, open_backend, velocity_names
 
-    with opened(robot) as engine:
+    with open_backend(**robot) as engine:
         at = configuration(engine.model, q)
         M = engine.mass_matrix(at, joint_dynamics=joint_dynamics)
-        names = _velocity_names(engine.model)
+        names = velocity_names(engine.model)
         result = {**head(engine), **_vectors(engine.model, {"q": at}), "mass_matrix": M.tolist()}
     if as_json:
         terminal.echo_json(result)
@@ -202,40 +198,10 @@ def mass(q: Numbers, joint_dynamics: bool, as_json: bool, **robot: Any) -> None:
         _print_matrix(f"{title(result)}: mass matrix", names, names, M)
 
 
-def opened(robot: dict[str, Any]) -> Backend:
-    from dynx.cli.configuration_input import open_backend
-
-    return open_backend(robot["robot"], robot["base"], robot["lock"], robot["backend_name"])
-
-
-def head(engine: Backend) -> dict[str, Any]:
-    return {
-        "schema": 1,
-        "robot": engine.model.name,
-        "base": engine.model.base,
-        "backend": engine.name,
-    }
-
-
-def title(result: dict[str, Any]) -> str:
-    from dynx.cli.exits import one_line
-
-    return f"{one_line(result['robot'])}, {result['base']} base, {result['backend']}"
-
-
-def chosen_frame(model: Model, given: str | None) -> str:
-    from dynx.cli.configuration_input import default_frame
-
-    return default_frame(model) if given is None else given
-
-
-def _velocity_names(model: Model) -> list[str]:
-    base = ["base vx", "base vy", "base vz", "base wx", "base wy", "base wz"] if model.floating else []
-    return [*base, *model.joint_names]
-
-
 def _vectors(model: Model, sample: dict[str, Any]) -> dict[str, Any]:
-    return {"velocity_names": _velocity_names(model), **{key: _listed(x) for key, x in sample.items()}}
+    from dynx.cli.configuration_input import velocity_names
+
+    return {"velocity_names": velocity_names(model), **{key: _listed(x) for key, x in sample.items()}}
 
 
 def _listed(numbers: Any) -> list[float]:
@@ -245,7 +211,7 @@ def _listed(numbers: Any) -> list[float]:
 def _report_vectors(result: dict[str, Any], as_json: bool, what: str, columns: Sequence[str]) -> None:
     """A table with one row for each entry of v."""
     from dynx.cli import terminal
-    from dynx.cli.exits import one_line
+    from dynx.cli.tables import Table
 
     if as_json:
         terminal.echo_json(result)
@@ -253,24 +219,31 @@ def _report_vectors(result: dict[str, Any], as_json: bool, what: str, columns: S
     out = terminal.console()
     out.print(f"{title(result)}: {what}", style="bold")
     out.print(f"q = {' '.join(map(terminal.number, result['q']))}")
-    table = terminal.plain_table("joint", *columns, right=columns)
+    table = Table("joint", *columns, right=columns, keys=1)
     for name, *values in zip(result["velocity_names"], *(result[key] for key in columns), strict=True):
         table.add_row(one_line(name), *map(terminal.number, values))
     out.print(table)
 
 
 def _print_matrix(
-    title: str, rows: Sequence[str], columns: Sequence[str], matrix: np.ndarray[Any, Any]
+    heading: str,
+    rows: Sequence[str],
+    columns: Sequence[str],
+    matrix: np.ndarray[Any, Any],
+    hint: str | None = None,
 ) -> None:
+    """A table under numbered columns, in blocks that fit the terminal, and the names of the columns."""
     from dynx.cli import terminal
-    from dynx.cli.exits import one_line
+    from dynx.cli.tables import Table, listing
 
     out = terminal.console()
-    out.print(title, style="bold")
+    out.print(heading, style="bold")
+    if hint is not None:
+        out.print(hint)
     numbers = [str(k) for k in range(len(columns))]
-    table = terminal.plain_table("", *numbers, right=numbers)
+    table = Table("", *numbers, right=numbers, keys=1)
     for name, row in zip(rows, matrix.tolist(), strict=True):
         table.add_row(one_line(name), *(f"{value + 0.0:.5g}" for value in row))
     out.print(table)
-    named = ", ".join(f"{k} {one_line(name)}" for k, name in enumerate(columns))
-    out.print(f"columns: {named}")
+    out.print()
+    out.print(listing("columns", (f"{k} {one_line(name)}" for k, name in enumerate(columns)), out.width))

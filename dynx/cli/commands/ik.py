@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from dynx.cli.commands.evaluate import frame_option, robot_options, sample_option
-from dynx.cli.options import number_list
+from dynx.cli.heading import head, title
+from dynx.cli.options import frame_option, number_list, robot_options, sample_option
 
 if TYPE_CHECKING:
     from dynx.cli.configuration_input import Numbers
@@ -38,12 +38,11 @@ def ik(target: Numbers, frame: str | None, q: Numbers, as_json: bool, **robot: A
       dynx ik ur5 --target 0.4,0.2,0.3,3.14,0,0 --frame tool0 --json
     """
     from dynx.cli import terminal
-    from dynx.cli.commands.evaluate import chosen_frame, head, opened, title
-    from dynx.cli.configuration_input import configuration
+    from dynx.cli.configuration_input import chosen_frame, configuration, default_said, open_backend
     from dynx.cli.exits import ANSWER_IS_NO, DONE
 
     wanted = _target(target)
-    with opened(robot) as engine:
+    with open_backend(**robot) as engine:
         model = engine.model
         name = chosen_frame(model, frame)
         start = None if q is None else configuration(model, q)
@@ -55,7 +54,7 @@ def ik(target: Numbers, frame: str | None, q: Numbers, as_json: bool, **robot: A
             "success": bool(found.success),
             "q": found.q.tolist(),
             "position_error": float(found.position_error),
-            "rotation_error": float(found.rotation_error),
+            "rotation_error": None if wanted.ndim == 1 else float(found.rotation_error),
             "iterations": int(found.iterations),
             "restarts": int(found.restarts),
         }
@@ -65,16 +64,32 @@ def ik(target: Numbers, frame: str | None, q: Numbers, as_json: bool, **robot: A
         terminal.echo_json(result)
         return code
     from dynx.cli.exits import one_line
+    from dynx.cli.tables import Table
 
     out = terminal.console()
     out.print(f"{title(result)}: {one_line(name)} to its target", style="bold")
-    out.print(one_line(found.message), style="green" if result["success"] else "red")
-    table = terminal.plain_table("joint", "q", right=("q",))
+    if frame is None:
+        out.print(default_said(name))
+    out.print(_outcome(result), style="green" if result["success"] else "red")
+    table = Table("joint", "q", right=("q",))
     for joint, value in joints.items():
         table.add_row(one_line(joint), terminal.number(value))
     out.print(table)
     out.print(f"--q {','.join(format(value, '.17g') for value in result['q'])}")
     return code
+
+
+def _outcome(result: dict[str, Any]) -> str:
+    """Whether the target was reached, how nearly, and after how much searching."""
+    from dynx.cli.terminal import counted
+
+    off = f"{result['position_error']:.3g} m"
+    if result["rotation_error"] is not None:
+        off += f" and {result['rotation_error']:.3g} rad"
+    steps, restarts = counted(result["iterations"], "step"), counted(result["restarts"], "restart")
+    if result["success"]:
+        return f"reached: {off} off, after {steps} and {restarts}"
+    return f"not reached: the best that was found is {off} off, after {steps} and {restarts}"
 
 
 def _target(given: Numbers) -> Floats:

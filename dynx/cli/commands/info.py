@@ -12,6 +12,7 @@ from dynx.cli.options import json_flag, model_options
 if TYPE_CHECKING:
     from rich.tree import Tree
 
+    from dynx.cli.tables import Table
     from dynx.model import Joint, Model
     from dynx.model.model import Base
 
@@ -94,18 +95,23 @@ def _joint_entry(joint: Joint) -> dict[str, Any]:
 
 def _show(model: Model) -> None:
     from dynx.cli.exits import one_line
-    from dynx.cli.terminal import console
+    from dynx.cli.terminal import PIPE_WIDTH, console, counted
 
     out = console()
     out.print(f"{one_line(model.name)}  ({one_line(model.source)})", style="bold")
     out.print(
-        f"{model.base} base, nq {model.nq}, nv {model.nv}, {len(model.links)} links, "
-        f"{len(model.frame_names)} frames, {model.total_mass:.6g} kg, gravity {_vector(model.gravity)} m/s^2"
+        f"{model.base} base, nq {model.nq}, nv {model.nv}, {counted(len(model.links), 'link')}, "
+        f"{counted(len(model.frame_names), 'frame')}, {model.total_mass:.6g} kg, "
+        f"gravity {_vector(model.gravity)} m/s^2"
     )
     out.print()
-    out.print(_tree(model))
+    wide = console()
+    wide.width = PIPE_WIDTH  # rich cuts the lines of a tree at the width, names and all
+    wide.print(_tree(model))
     if any(joint.moves for joint in model.joints):
+        out.print()
         out.print(_joint_table(model))
+        out.print()
     added = [frame.name for frame in model.extra_frames]
     if added:
         out.print(f"frames besides the links: {', '.join(map(one_line, added))}")
@@ -136,12 +142,12 @@ def _tree(model: Model) -> Tree:
     return branches[model.root]
 
 
-def _joint_table(model: Model) -> Any:
+def _joint_table(model: Model) -> Table:
     from dynx.cli.exits import one_line
-    from dynx.cli.terminal import plain_table
+    from dynx.cli.tables import Table
 
     right = ("q", "lower", "upper", "velocity", "effort")
-    table = plain_table("q", "joint", "type", "axis", *right[1:], "follows", right=right)
+    table = Table("q", "joint", "type", "axis", *right[1:], "follows", right=right, keys=2)
     index = {name: k + (7 if model.floating else 0) for k, name in enumerate(model.joint_names)}
     for joint in model.joints:
         if not joint.moves:

@@ -21,7 +21,8 @@ def robots(words: tuple[str, ...], as_json: bool) -> None:
       dynx robots ur talos
       dynx robots --json
     """
-    from dynx.cli.terminal import console, echo_json, plain_table
+    from dynx.cli.tables import Table
+    from dynx.cli.terminal import console, counted, echo_json
     from dynx.model.library import robots as library
 
     entries = [
@@ -45,8 +46,9 @@ def robots(words: tuple[str, ...], as_json: bool) -> None:
             }
         )
         return
-    table = plain_table("name", "from", "path")
+    table = Table("name", "from", "path")
     for entry in entries:
         table.add_row(entry.name, entry.source, str(entry.path))
-    console().print(table)
-    console().print(f"{len(entries)} robots")
+    out = console()
+    out.print(table)
+    out.print(f"\n{counted(len(entries), 'robot')}")

@@ -1,0 +1,132 @@
+"""Tables of text whose cells are never broken: one too wide for the terminal goes on in further blocks."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterable, Iterator, Sequence
+from typing import TYPE_CHECKING, Union
+
+if TYPE_CHECKING:
+    from rich.console import Console, ConsoleOptions
+    from rich.text import Text
+
+Cell = Union["str", "Text"]
+
+_GAP = 3
+"""Blanks between two columns; one more stands before the first."""
+
+_LARGEST_SHARE_OF_KEYS = 0.4
+"""Of the width, in a table that does not fit: wider keys are broken between words."""
+
+
+class Table:
+    """A table in the one style of dynx, for ``Console.print``.
+
+    Where it does not fit, its columns are printed in blocks that do, one below the other, each with
+    the first `keys` columns again (NumPy and Octave print wide matrices so). With no `keys` it is
+    never divided and its lines run over. Columns named in `right` are aligned right.
+    """
+
+    def __init__(
+        self, *columns: str, right: Sequence[str] = (), keys: int = 0, show_header: bool = True
+    ) -> None:
+        self._columns = columns
+        self._right = [column in right for column in columns]
+        self._keys = keys
+        self._show_header = show_header
+        self._rows: list[list[Text]] = []
+
+    def add_row(self, *cells: Cell) -> None:
+        """Add a row of cells; columns for which there is none stay empty."""
+        from rich.text import Text
+
+        filled = [*cells, *[""] * (len(self._columns) - len(cells))]
+        self._rows.append([Text(cell) if isinstance(cell, str) else cell for cell in filled])
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[Text]:
+        return self.lines(options.max_width, "-" if options.ascii_only else "─")
+
+    def lines(self, width: int, rule: str = "─") -> Iterator[Text]:
+        """The table as lines without trailing blanks, at most `width` wide where the cells allow it."""
+        from rich.text import Text
+
+        heads = [[Text(line, "bold") for line in column.split("\n")] for column in self._columns]
+        body = [[[cell] for cell in row] for row in self._rows]
+        widths = _widths([heads, *body])
+        if self._keys and _total(widths) > width:
+            limit = int(_LARGEST_SHARE_OF_KEYS * width)
+            for row in body:
+                row[: self._keys] = [_broken(cell[0], limit) for cell in row[: self._keys]]
+            widths = _widths([heads, *body])
+        for number, block in enumerate(self._blocks(widths, width)):
+            if number:
+                yield Text("")
+            if self._show_header:
+                depth = max(len(heads[column]) for column in block)
+                padded = [[Text("")] * (depth - len(head)) + head for head in heads]
+                yield from self._row(padded, block, widths)
+                yield Text(f" {rule * (_total([widths[column] for column in block]) - 1)}")
+            for row in body:
+                yield from self._row(row, block, widths)
+
+    def _blocks(self, widths: Sequence[int], width: int) -> list[list[int]]:
+        """The columns of each block; one has at least one besides the keys, and half of `width` for them."""
+        keys = list(range(self._keys))
+        if not keys:
+            return [list(range(len(widths)))]
+        allowed = max(width, _total(widths[: self._keys]) + width // 2)
+        blocks = [list(keys)]
+        for column in range(self._keys, len(widths)):
+            wider = [widths[each] for each in (*blocks[-1], column)]
+            if _total(wider) > allowed and len(blocks[-1]) > len(keys):
+                blocks.append(list(keys))
+            blocks[-1].append(column)
+        return blocks
+
+    def _row(
+        self, cells: Sequence[Sequence[Text]], block: Sequence[int], widths: Sequence[int]
+    ) -> Iterator[Text]:
+        """The lines of one row: cells of fewer lines than the longest are blank below."""
+        from rich.text import Text
+
+        for k in range(max(len(cells[column]) for column in block)):
+            line = Text()
+            for number, column in enumerate(block):
+                cell = cells[column][k] if k < len(cells[column]) else Text("")
+                blanks = " " * (widths[column] - cell.cell_len)
+                line.append(" " * (_GAP if number else 1))
+                line.append_text(Text.assemble(blanks, cell) if self._right[column] else cell + blanks)
+            line.rstrip()
+            yield line
+
+
+def listing(heading: str, items: Iterable[str], width: int) -> str:
+    """``heading: a, b, c`` in lines of at most `width` where the items, which stay whole, allow it."""
+    lines = [f"{heading}:"]
+    parts = list(items)
+    for number, item in enumerate(parts):
+        word = item if number == len(parts) - 1 else f"{item},"
+        if len(lines[-1]) + 1 + len(word) <= width:
+            lines[-1] += f" {word}"
+        else:
+            lines.append(f"  {word}")
+    return "\n".join(lines)
+
+
+def _broken(cell: Text, limit: int) -> list[Text]:
+    """A key in lines of at most `limit`, broken between words only."""
+    from rich.text import Text
+
+    lines = textwrap.wrap(
+        cell.plain, max(limit, 1), break_long_words=False, break_on_hyphens=False, subsequent_indent="  "
+    )
+    return [Text(line, cell.style) for line in lines] or [cell]
+
+
+def _widths(rows: Sequence[Sequence[Sequence[Text]]]) -> list[int]:
+    return [max(line.cell_len for cell in column for line in cell) for column in zip(*rows, strict=True)]
+
+
+def _total(widths: Sequence[int]) -> int:
+    """The length of a line of columns that wide."""
+    return 1 + sum(widths) + _GAP * (len(widths) - 1)
