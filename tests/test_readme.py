@@ -10,13 +10,18 @@ from pathlib import Path
 
 import pytest
 
+from dynx.backends import backend_names, unregister
+
 ROOT = Path(__file__).resolve().parents[1]
-README = (ROOT / "README.md").read_text(encoding="utf-8")
+PAGES = {
+    path.name: path.read_text(encoding="utf-8") for path in (ROOT / "README.md", *ROOT.glob("docs/*.md"))
+}
+README = PAGES["README.md"]
 
 
-def blocks(language: str) -> list[str]:
+def blocks(language: str, text: str = README) -> list[str]:
     """The fenced blocks of one language, in order."""
-    return re.findall(rf"^```{language}\n(.*?)^```$", README, flags=re.MULTILINE | re.DOTALL)
+    return re.findall(rf"^```{language}\n(.*?)^```$", text, flags=re.MULTILINE | re.DOTALL)
 
 
 def section(heading: str) -> str:
@@ -40,13 +45,28 @@ def shape(line: str) -> str:
     return re.sub(r"\s+", " ", re.sub(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?", "#", line)).strip()
 
 
-def test_python_blocks_run_in_order(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("page", [page for page, text in PAGES.items() if blocks("python", text)])
+def test_python_blocks_run_in_order(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    namespace: dict[str, object] = {"__name__": "readme"}
-    found = blocks("python")
-    assert found
-    for block in found:
-        exec(compile(block, "README.md", "exec"), namespace)
+    registered = backend_names()
+    namespace: dict[str, object] = {"__name__": "page"}
+    try:
+        for block in blocks("python", PAGES[page]):
+            exec(compile(block, page, "exec"), namespace)
+    finally:
+        for name in set(backend_names()) - set(registered):
+            unregister(name)
+
+
+def test_the_readme_has_python() -> None:
+    assert len(blocks("python")) >= 3
+
+
+@pytest.mark.parametrize("page", list(PAGES))
+def test_links_lead_somewhere(page: str) -> None:
+    home = ROOT if page == "README.md" else ROOT / "docs"
+    for target in re.findall(r"\]\(([^)#]+)\)", PAGES[page]):
+        assert target.startswith("https://") or (home / target).exists(), target
 
 
 @pytest.mark.parametrize(

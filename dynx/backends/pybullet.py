@@ -181,7 +181,11 @@ class PyBulletBackend(Backend):
         again = self._robot().forward_dynamics(q, v, tau + left)
         if np.max(np.abs(again - a)) <= REFINE_BELOW * np.max(np.abs(a)):
             return again
-        terms = np.max(np.abs(self._mass_matrix(q)) @ np.abs(a)) + np.max(np.abs(tau))
+        # Weight and velocity products may cancel; a bound on them is as good as themselves here.
+        fastest, gravity = np.max(np.abs(v)), np.linalg.norm(self._mechanism.gravity)
+        inertia = np.abs(self._mass_matrix(q))
+        unbalanced = np.max(inertia) * (fastest + fastest**2 + gravity)
+        terms = np.max(inertia @ np.abs(a)) + np.max(np.abs(tau)) + unbalanced
         if np.max(np.abs(left)) > LOST * terms:
             raise EngineError(
                 f"the stepper of pybullet loses its digits on {self.model.name}: the acceleration found "

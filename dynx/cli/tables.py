@@ -12,8 +12,8 @@ if TYPE_CHECKING:
 
 Cell = Union["str", "Text"]
 
-_GAP = 3
-"""Blanks between two columns; one more stands before the first."""
+_GAP, _NARROW_GAP = 3, 2
+"""Blanks between two columns, the second in a table that would not fit; one stands before the first."""
 
 _LARGEST_SHARE_OF_KEYS = 0.4
 """Of the width, in a table that does not fit: wider keys are broken between words."""
@@ -53,38 +53,41 @@ class Table:
         heads = [[Text(line, "bold") for line in column.split("\n")] for column in self._columns]
         body = [[[cell] for cell in row] for row in self._rows]
         widths = _widths([heads, *body])
-        if self._keys and _total(widths) > width:
+        gap = _GAP
+        if self._keys and _total(widths, gap) > width:
+            gap = _NARROW_GAP
+        if self._keys and _total(widths, gap) > width:
             limit = int(_LARGEST_SHARE_OF_KEYS * width)
             for row in body:
                 row[: self._keys] = [_broken(cell[0], limit) for cell in row[: self._keys]]
             widths = _widths([heads, *body])
-        for number, block in enumerate(self._blocks(widths, width)):
+        for number, block in enumerate(self._blocks(widths, width, gap)):
             if number:
                 yield Text("")
             if self._show_header:
                 depth = max(len(heads[column]) for column in block)
                 padded = [[Text("")] * (depth - len(head)) + head for head in heads]
-                yield from self._row(padded, block, widths)
-                yield Text(f" {rule * (_total([widths[column] for column in block]) - 1)}")
+                yield from self._row(padded, block, widths, gap)
+                yield Text(f" {rule * (_total([widths[column] for column in block], gap) - 1)}")
             for row in body:
-                yield from self._row(row, block, widths)
+                yield from self._row(row, block, widths, gap)
 
-    def _blocks(self, widths: Sequence[int], width: int) -> list[list[int]]:
+    def _blocks(self, widths: Sequence[int], width: int, gap: int) -> list[list[int]]:
         """The columns of each block; one has at least one besides the keys, and half of `width` for them."""
         keys = list(range(self._keys))
         if not keys:
             return [list(range(len(widths)))]
-        allowed = max(width, _total(widths[: self._keys]) + width // 2)
+        allowed = max(width, _total(widths[: self._keys], gap) + width // 2)
         blocks = [list(keys)]
         for column in range(self._keys, len(widths)):
             wider = [widths[each] for each in (*blocks[-1], column)]
-            if _total(wider) > allowed and len(blocks[-1]) > len(keys):
+            if _total(wider, gap) > allowed and len(blocks[-1]) > len(keys):
                 blocks.append(list(keys))
             blocks[-1].append(column)
         return blocks
 
     def _row(
-        self, cells: Sequence[Sequence[Text]], block: Sequence[int], widths: Sequence[int]
+        self, cells: Sequence[Sequence[Text]], block: Sequence[int], widths: Sequence[int], gap: int
     ) -> Iterator[Text]:
         """The lines of one row: cells of fewer lines than the longest are blank below."""
         from rich.text import Text
@@ -94,7 +97,7 @@ class Table:
             for number, column in enumerate(block):
                 cell = cells[column][k] if k < len(cells[column]) else Text("")
                 blanks = " " * (widths[column] - cell.cell_len)
-                line.append(" " * (_GAP if number else 1))
+                line.append(" " * (gap if number else 1))
                 line.append_text(Text.assemble(blanks, cell) if self._right[column] else cell + blanks)
             line.rstrip()
             yield line
@@ -127,6 +130,6 @@ def _widths(rows: Sequence[Sequence[Sequence[Text]]]) -> list[int]:
     return [max(line.cell_len for cell in column for line in cell) for column in zip(*rows, strict=True)]
 
 
-def _total(widths: Sequence[int]) -> int:
+def _total(widths: Sequence[int], gap: int) -> int:
     """The length of a line of columns that wide."""
-    return 1 + sum(widths) + _GAP * (len(widths) - 1)
+    return 1 + sum(widths) + gap * (len(widths) - 1)

@@ -64,6 +64,7 @@ class Model:
         ordered_links, ordered_joints = topology.depth_first(list(links), list(joints), source)
         ordered_joints = locking.lock_joints(ordered_joints, lock or {})
         ordered_joints = topology.resolve_mimics(ordered_joints, notes, source)
+        notes += _weightless(ordered_links, ordered_joints)
         return cls(
             name=name,
             links=tuple(ordered_links),
@@ -285,3 +286,16 @@ class Model:
             moved = f"; the joint that moves it is {shown(above[0])}" if above else ", the root"
             return f"{message}: that is a link{moved}"
         return message + nearest(name, known)
+
+
+def _weightless(links: Iterable[Link], joints: Iterable[Joint]) -> list[Note]:
+    """A note for each link that a joint moves though it has no inertial: some engines make 1 kg of it."""
+    moved = {joint.child: joint.name for joint in joints if joint.moves}
+    return [
+        Note(
+            f"link {shown(link.name)} has no <inertial>, so no mass, but {shown(moved[link.name])} moves it",
+            link.line,
+        )
+        for link in links
+        if link.inertial is None and link.name in moved
+    ]

@@ -62,7 +62,7 @@ def test_numbers_are_aligned_right_under_headings_of_two_lines() -> None:
 def test_a_long_key_is_broken_between_words_only() -> None:
     table = Table("law", "error", keys=1)
     table.add_row("momentum of it all", "1e-16")
-    assert shown(table, 20)[2:] == [" momentum   1e-16", "   of it", "   all"]
+    assert shown(table, 20)[2:] == [" momentum  1e-16", "   of it", "   all"]
 
 
 @given(st.lists(words, min_size=1), widths)

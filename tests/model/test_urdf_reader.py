@@ -43,7 +43,10 @@ def test_everything_that_matters_is_read() -> None:
     assert one.dynamics == JointDynamics(5.0, 6.0, 7.0)
     assert (two.type, two.mimic, two.axis) == ("continuous", Mimic("one", 8.0, 9.0), (1.0, 0.0, 0.0))
     assert model.name == "test"
-    assert model.notes == ()
+    assert [note.message for note in model.notes] == [
+        "link 'b' has no <inertial>, so no mass, but 'one' moves it",
+        "link 'c' has no <inertial>, so no mass, but 'two' moves it",
+    ]
 
 
 LIMIT = '<limit lower="-1" upper="2" velocity="1" effort="1"/>'
