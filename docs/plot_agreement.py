@@ -123,10 +123,10 @@ def main() -> None:
     axes.spines[["top", "right"]].set_visible(False)
     figure.tight_layout()
     figure.savefig(Path(__file__).with_name("agreement.svg"))
-    raw = np.array([row[1] for row in rows])
+    raw = np.array([row[1] for row in rows if not math.isnan(row[1])])
     ours = np.array([row[2] for row in rows])
-    print(f"{len(rows)} robots; directly: {np.sum(raw > 1e-6)} above 1e-6, worst {np.nanmax(raw):.1e};")
-    print(f"through dynx: worst {ours.max():.1e}")
+    print(f"directly: {len(raw)} robots, {np.sum(raw > 1e-6)} above 1e-6, worst {raw.max():.1e}")
+    print(f"through dynx: {len(ours)} robots, worst {ours.max():.1e}")
 
 
 if __name__ == "__main__":
