@@ -1,4 +1,8 @@
-"""Inverse kinematics: targets, a bounded Levenberg-Marquardt solver with restarts, checked results."""
+"""Inverse kinematics: targets, a bounded Levenberg-Marquardt solver with restarts, checked results.
+
+This package lies below `dynx.backends`: the solver knows a small protocol of poses and Jacobians and no
+engine, so that every backend can offer `inverse_kinematics` as one of its own quantities.
+"""
 
 from dynx.ik.result import IKResult
 from dynx.ik.search import Kinematics
