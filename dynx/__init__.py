@@ -6,6 +6,7 @@
     engine = dynx.backend("pinocchio", model)       # or "pybullet", "reference"
     tau = engine.inverse_dynamics(q, v, a)
     report = dynx.agree(model)                      # do all engines give the same answers?
+    report = dynx.diagnose("my.urdf")               # why do they differ when they load it themselves?
 
 Importing dynx imports no engine; each name below is imported when it is first used.
 """
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from dynx import errors
     from dynx.agreement import AgreementReport, agree
     from dynx.backends import Backend, backend, installed_backends, register
+    from dynx.doctor import DoctorReport, compare_as_loaded, diagnose
     from dynx.ik import IKResult
     from dynx.model import Model, Pose
     from dynx.model.library import robots
@@ -29,12 +31,15 @@ if TYPE_CHECKING:
 __all__ = [
     "AgreementReport",
     "Backend",
+    "DoctorReport",
     "IKResult",
     "Model",
     "Pose",
     "__version__",
     "agree",
     "backend",
+    "compare_as_loaded",
+    "diagnose",
     "errors",
     "installed_backends",
     "load",
@@ -45,11 +50,14 @@ __all__ = [
 _HOME = {
     "AgreementReport": "dynx.agreement",
     "Backend": "dynx.backends",
+    "DoctorReport": "dynx.doctor",
     "IKResult": "dynx.ik",
     "Model": "dynx.model",
     "Pose": "dynx.model",
     "agree": "dynx.agreement",
     "backend": "dynx.backends",
+    "compare_as_loaded": "dynx.doctor",
+    "diagnose": "dynx.doctor",
     "installed_backends": "dynx.backends",
     "load": "dynx.model.loading",
     "register": "dynx.backends",

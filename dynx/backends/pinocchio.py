@@ -23,18 +23,12 @@ from typing import Any, ClassVar, TypeVar, cast
 import numpy as np
 
 from dynx.backends.base import Backend
-from dynx.errors import ClosedError, DynxError, EngineError, EngineLimitError, NotInstalledError, shown
+from dynx.engines.pinocchio import pin
+from dynx.errors import ClosedError, DynxError, EngineError, EngineLimitError, shown
 from dynx.model import Model
 from dynx.model.elements import Inertial, Joint, Pose
 from dynx.rbd.jacobians import Reference
 from dynx.spatial.scalar import Floats
-
-try:
-    import pinocchio as pin
-except ImportError as error:
-    raise NotInstalledError(
-        f"the backend 'pinocchio' needs the package pin, which `pip install dynx` brings ({error})"
-    ) from error
 
 MAX_NV = 200
 """Most tree velocities (mimic joints count) that the backend accepts; see the head of this file."""

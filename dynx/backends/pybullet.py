@@ -2,20 +2,13 @@
 
 What it takes to get the same answers out of Bullet as out of other engines is in the modules beside
 this one: `bullet_inertia` (principal inertias, ballast), `bullet_urdf` (the file Bullet is given),
-`bullet_client` (loading and asking), `bullet_robot` (conventions). Only this file imports Bullet.
+`bullet_client` (loading and asking), `bullet_robot` (conventions).
 """
 
 from __future__ import annotations
 
-import ctypes
-import os
-import sys
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
-from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
-from threading import Lock, RLock
-from types import ModuleType
+from threading import RLock
 from typing import ClassVar
 
 import numpy as np
@@ -24,7 +17,8 @@ from numpy.typing import ArrayLike
 from dynx.backends.base import Backend
 from dynx.backends.bullet_inertia import Ballast, ballast_for, longdouble
 from dynx.backends.bullet_robot import BulletRobot
-from dynx.errors import ArgumentError, ClosedError, EngineError, NotInstalledError
+from dynx.engines.pybullet import bullet
+from dynx.errors import ArgumentError, ClosedError, EngineError
 from dynx.model import Model
 from dynx.model.configuration import checked_array
 from dynx.model.mechanism import build_mechanism
@@ -39,8 +33,6 @@ REFINE_BELOW = 1e-6
 
 LOST = 1e-9
 """Residual, relative to the terms it is the difference of, at which an acceleration is no answer."""
-
-_import_lock = Lock()
 
 
 class PyBulletBackend(Backend):
@@ -60,7 +52,7 @@ class PyBulletBackend(Backend):
 
     def __init__(self, model: Model, *, validate: bool = True) -> None:
         super().__init__(model, validate=validate)
-        engine = _bullet()
+        engine = bullet()
         self._lock = RLock()
         mechanism = build_mechanism(model, longdouble)
         self._ballast = ballast_for(mechanism)
@@ -76,7 +68,7 @@ class PyBulletBackend(Backend):
     @classmethod
     def require_engine(cls) -> None:
         """Raise NotInstalledError if PyBullet cannot be imported."""
-        _bullet()
+        bullet()
 
     @property
     def engine_version(self) -> str:
@@ -215,46 +207,3 @@ class PyBulletBackend(Backend):
             return answers[0]
         once, twice = answers
         return 2.0 * once - twice
-
-
-def _bullet() -> ModuleType:
-    """The engine, imported without the line that it prints."""
-    loaded = sys.modules.get("pybullet")
-    if loaded is not None:
-        return loaded
-    with _import_lock, _silence():
-        try:
-            return import_module("pybullet")
-        except ImportError as error:
-            raise NotInstalledError(
-                "the backend 'pybullet' needs PyBullet: pip install 'dynx[pybullet]' "
-                "(wheels exist up to Python 3.11; above, it builds from source)"
-            ) from error
-
-
-@contextmanager
-def _silence() -> Iterator[None]:
-    """Send what the process writes to stdout and stderr, C libraries included, nowhere for a moment."""
-    for stream in (sys.stdout, sys.stderr):
-        if not getattr(stream, "closed", True):
-            stream.flush()
-    _flush_c_streams()
-    with ExitStack() as undo:
-        nowhere = os.open(os.devnull, os.O_WRONLY)
-        undo.callback(os.close, nowhere)
-        for descriptor in (1, 2):
-            try:
-                kept = os.dup(descriptor)
-            except OSError:
-                continue  # the process runs without it
-            undo.callback(os.close, kept)
-            undo.callback(os.dup2, kept, descriptor)
-            os.dup2(nowhere, descriptor)
-        # Called first on the way out: what is in C's buffers must not come out after all.
-        undo.callback(_flush_c_streams)
-        yield
-
-
-def _flush_c_streams() -> None:
-    library = ctypes.cdll.msvcrt if sys.platform == "win32" else ctypes.CDLL(None)
-    library.fflush(None)

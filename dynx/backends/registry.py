@@ -31,6 +31,8 @@ _BUILT_IN = {
     "reference": "dynx.backends.reference:ReferenceBackend",
     "pinocchio": "dynx.backends.pinocchio:PinocchioBackend",
     "pybullet": "dynx.backends.pybullet:PyBulletBackend",
+    "mujoco": "dynx.backends.mujoco:MujocoBackend",
+    "drake": "dynx.backends.drake:DrakeBackend",
 }
 _registered: dict[str, Loader] = {}
 

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from dynx._version import __version__
-from dynx.cli.exits import one_line
+from dynx.cli.exits import short_line
+from dynx.cli.run import error_of
 from dynx.cli.workers import Failure
-from dynx.errors import DynxError, EngineError
+from dynx.errors import DynxError
 
 if TYPE_CHECKING:
     from dynx.model.model import Base
@@ -19,21 +20,6 @@ SCHEMA = 1
 
 Entry = dict[str, Any]
 """One of the ``results`` of the document that `dynx.agreement` describes."""
-
-
-class EngineCrash(EngineError):
-    """An engine ended the process it ran in."""
-
-
-class EngineTimeout(EngineError):
-    """An engine took longer than it was given."""
-
-
-class InternalError(DynxError):
-    """dynx raised what it should not have raised."""
-
-
-_OF_KIND = {"crash": EngineCrash, "timeout": EngineTimeout, "defect": InternalError}
 
 
 @dataclass(frozen=True)
@@ -73,13 +59,12 @@ def refused(task: AgreementTask, error: DynxError) -> Entry:
 
 def failed(task: AgreementTask, failure: Failure) -> Entry:
     """The entry of a robot whose worker process gave no answer."""
-    return refused(task, _OF_KIND[failure.kind](failure.message))
+    return refused(task, error_of(failure))
 
 
 def label(entry: Entry) -> str:
-    """The robot of an entry as one short line: what names a robot may be anything."""
-    robot = one_line(entry["robot"])
-    return robot if len(robot) <= 200 else f"{robot[:60]}... ({len(robot)} characters)"
+    """The robot of an entry as one short line."""
+    return short_line(entry["robot"])
 
 
 def document(entries: Sequence[Entry], not_done: Sequence[str] = ()) -> dict[str, Any]:

@@ -43,6 +43,12 @@ def one_line(text: object) -> str:
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in joined)
 
 
+def short_line(text: object) -> str:
+    """As `one_line`, and cut where it is very long: what names a robot may be anything."""
+    line = one_line(text)
+    return line if len(line) <= 200 else f"{line[:60]}... ({len(line)} characters)"
+
+
 def complain(message: str) -> None:
     """Say `message` on standard error, as one line."""
     # Where standard error cannot be written, the exit code is all that can still be said.

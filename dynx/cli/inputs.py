@@ -14,10 +14,14 @@ ALL = "all"
 
 @dataclass(frozen=True)
 class RobotInput:
-    """One robot to work on: what `dynx.load` takes, or why there is none."""
+    """One robot to work on: what `dynx.load` takes, or why there is none.
+
+    `folder` is the directory argument below which it was found, None where it was named itself.
+    """
 
     robot: str
     refusal: DynxError | None = None
+    folder: str | None = None
 
 
 def expand(arguments: Sequence[str]) -> list[RobotInput]:
@@ -31,7 +35,7 @@ def expand(arguments: Sequence[str]) -> list[RobotInput]:
     for argument in arguments:
         if argument == ALL:
             found += _library()
-        elif _is_directory(argument) and not _is_library_name(argument):
+        elif _is_directory(argument) and not is_library_name(argument):
             found += _below(argument)
         else:
             found.append(RobotInput(argument))
@@ -65,7 +69,7 @@ def _below(directory: str) -> list[RobotInput]:
         )
         return [RobotInput(directory, error)]
     # A bare file name could be read as a name of the library; a path with a separator never is.
-    return [RobotInput(path) for path in sorted(paths)] + refusals
+    return [RobotInput(path, folder=directory) for path in sorted(paths)] + refusals
 
 
 def _is_directory(argument: str) -> bool:
@@ -75,7 +79,8 @@ def _is_directory(argument: str) -> bool:
         return False
 
 
-def _is_library_name(argument: str) -> bool:
+def is_library_name(argument: str) -> bool:
+    """Whether `dynx.load` would look this up in the library, and find it."""
     from dynx.model.library import find
 
     if os.sep in argument or "/" in argument:

@@ -13,7 +13,9 @@ import click
 from dynx._version import __version__
 from dynx.cli.commands.agree import agree
 from dynx.cli.commands.backends import backends
+from dynx.cli.commands.doctor import doctor
 from dynx.cli.commands.evaluate import fd, fk, id_, jacobian, mass
+from dynx.cli.commands.explain import explain
 from dynx.cli.commands.ik import ik
 from dynx.cli.commands.info import info
 from dynx.cli.commands.robots import robots
@@ -76,6 +78,8 @@ def _show_traceback(ctx: click.Context, option: click.Parameter, wanted: bool) -
     Examples:
       dynx agree ur5               do the installed engines agree on the UR5?
       dynx agree all --json a.json every robot of example-robot-data
+      dynx doctor my.urdf          why do engines differ on my file, and how is it mended?
+      dynx explain DX101           what a cause means, and what each engine does
       dynx info panda              joints, limits, masses, frames
       dynx id ur5 --q 0,-1,1,0,0,0 torque that holds the arm there
 
@@ -103,7 +107,7 @@ def cli(ctx: click.Context) -> None:
         click.echo(ctx.get_help())
 
 
-for _command in (agree, info, robots, backends, fk, jacobian, id_, fd, mass, ik):
+for _command in (agree, doctor, explain, info, robots, backends, fk, jacobian, id_, fd, mass, ik):
     cli.add_command(_command)
 
 

@@ -35,6 +35,14 @@ def name_list(text: str) -> tuple[str, ...]:
     return names
 
 
+def choice_pair(word: str) -> tuple[str, str]:
+    """``rule=choice``, such as DX103=keep."""
+    rule, _, choice = (part.strip() for part in word.partition("="))
+    if not rule or not choice:
+        raise click.BadParameter(f"{shown(word)} is no rule=choice, such as DX103=keep")
+    return rule, choice
+
+
 def _pair(word: str) -> tuple[str, float]:
     """One ``joint=value``; the name may hold any sign but a comma or white space."""
     name, equals, text = word.rpartition("=")
@@ -70,6 +78,25 @@ def model_options(command: F) -> F:
         default="fixed",
         show_default=True,
         help="Whether the root link is bolted to the world or free.",
+    )(command)
+
+
+def run_options(command: F) -> F:
+    """``--jobs``, ``--timeout`` and ``--quiet``: of commands that do many robots in processes."""
+    command = click.option(
+        "--quiet", is_flag=True, help="No table and no progress: errors, files and exit code only."
+    )(command)
+    command = click.option(
+        "--timeout",
+        type=click.FloatRange(min=0.0),
+        default=600.0,
+        show_default=True,
+        help="Seconds after which a robot is given up; 0 for never.",
+    )(command)
+    return click.option(
+        "--jobs",
+        type=click.IntRange(min=1),
+        help="Robots at a time, each in a process of its own (default: one per processor).",
     )(command)
 
 

@@ -23,19 +23,35 @@ def check_writable(path: str) -> None:
     raise ArgumentError(f"{shown(path, 300)} {problem}")
 
 
+def make_folder(path: str) -> None:
+    """Make the directory of a file that is to be written, where there is none yet."""
+    folder = os.path.dirname(path) or "."
+    try:
+        os.makedirs(folder, exist_ok=True)
+    except OSError as error:
+        raise ArgumentError(f"{shown(folder, 300)} cannot be made: {error.strerror}") from error
+
+
 def write_text(path: str, text: str) -> None:
     """Write `text` (ASCII) to `path`: all of it, or an ArgumentError and the old file as it was."""
+    write_bytes(path, text.encode("ascii"))
+
+
+def write_bytes(path: str, data: bytes) -> None:
+    """Write `data` to `path`: all of it, or an ArgumentError and the old file as it was."""
     try:
         if os.path.lexists(path) and not stat.S_ISREG(os.lstat(path).st_mode):
             # A pipe, a device or a link is written through, not replaced.
-            with open(path, "w", encoding="ascii") as stream:
-                stream.write(text)
+            with open(path, "wb") as stream:
+                stream.write(data)
             return
-        handle, partial = tempfile.mkstemp(dir=os.path.dirname(path) or ".", prefix=".dynx-", suffix=".json")
+        handle, partial = tempfile.mkstemp(
+            dir=os.path.dirname(path) or ".", prefix=".dynx-", suffix=".partial"
+        )
         try:
-            with open(handle, "w", encoding="ascii") as stream:
-                stream.write(text)
-            os.chmod(partial, 0o666 & ~_umask())
+            with open(handle, "wb") as stream:
+                stream.write(data)
+            os.chmod(partial, _mode(path))
             os.replace(partial, path)
         except BaseException:
             os.unlink(partial)
@@ -44,7 +60,10 @@ def write_text(path: str, text: str) -> None:
         raise ArgumentError(f"{shown(path, 300)} cannot be written: {error.strerror}") from error
 
 
-def _umask() -> int:
+def _mode(path: str) -> int:
+    """The permissions of the file that is replaced, or those of a new one."""
+    if os.path.exists(path):
+        return stat.S_IMODE(os.stat(path).st_mode)
     mask = os.umask(0)
     os.umask(mask)
-    return mask
+    return 0o666 & ~mask

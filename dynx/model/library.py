@@ -19,6 +19,8 @@ from dynx.errors import RobotNotFoundError, nearest, shown
 
 EXAMPLE_ROBOT_DATA = "example-robot-data"
 OWN_MODELS = "dynx"
+TRAPS = "traps"
+"""Folder among dynx's own models whose files show one cause of disagreement each."""
 
 # The loaders' short names that differ from the stem of the file, by the file they load.
 _LOADER_NAMES = {
@@ -67,7 +69,7 @@ def robots() -> tuple[RobotEntry, ...]:
     Names are unique, and no alias is the name or the alias of another robot.
     """
     files = [(path, EXAMPLE_ROBOT_DATA, root) for root in _example_roots() for path in _urdf_files(root)]
-    files += [(path, OWN_MODELS, root) for root in _own_roots() for path in _urdf_files(root)]
+    files += [(path, OWN_MODELS, root) for root in own_roots() for path in _urdf_files(root)]
     relative = [path.relative_to(root).as_posix() for path, _, root in files]
     names: dict[str, int] = {}
     for index, inside in enumerate(relative):
@@ -113,7 +115,9 @@ def _free_name(stem: str, inside: str, source: str, taken: dict[str, int]) -> st
 def _urdf_files(root: Path) -> list[Path]:
     # Descriptions lie at most three folders deep; the meshes, far more files, lie elsewhere.
     found = {path for depth in ("*", "*/*", "*/*/*", "*/*/*/*") for path in root.glob(f"{depth}.urdf")}
-    return sorted(path for path in found if path.is_file())
+    # Traps are no robots but defects, one each; `dynx.rules.traps` knows them.
+    descriptions = (path for path in found if path.relative_to(root).parts[0] != TRAPS)
+    return sorted(path for path in descriptions if path.is_file())
 
 
 def _example_roots() -> list[Path]:
@@ -141,7 +145,8 @@ def _example_candidates() -> Iterator[Path]:
     yield Path(sys.prefix) / inside
 
 
-def _own_roots() -> list[Path]:
+def own_roots() -> list[Path]:
+    """The folder of dynx's own models, if there is one."""
     # In a wheel the models lie inside the package, in a source checkout beside it.
     package = Path(__file__).resolve().parent.parent
     for root in (package / "models", package.parent / "models"):

@@ -50,10 +50,19 @@ def load(
     """
     if isinstance(x, Model):
         return _changed(x, base, lock, gravity)
+    data, source, name = read_description(x, package_dirs)
+    return read_model(data, source, name, base=base, lock=lock, gravity=gravity)
+
+
+def read_description(
+    x: StrPath | bytes | bytearray, package_dirs: Iterable[StrPath] = ()
+) -> tuple[str | bytes, str, str | None]:
+    """The text that `load` would read: its bytes or characters, where it is from, and the name of the
+    file without suffixes (None for text). A .xacro file is expanded. Errors as in `load`."""
     if isinstance(x, bytes | bytearray | memoryview):
-        return _from_text(bytes(x), "<string>", None, base, lock, gravity)
+        return bytes(x), "<string>", None
     if isinstance(x, str) and x.lstrip("\ufeff \t\r\n").startswith("<"):
-        return _from_text(x, "<string>", None, base, lock, gravity)
+        return x, "<string>", None
     if not isinstance(x, str | os.PathLike):
         raise ArgumentError(f"cannot load {type(x).__name__}; wanted a path, URDF text, a name or a Model")
     path = _path_of(x)
@@ -61,10 +70,8 @@ def load(
     if path.endswith(".xacro"):
         from dynx.model.xacro_reading import expand_xacro
 
-        data: str | bytes = expand_xacro(path, package_dirs)
-    else:
-        data = read_file(path)
-    return _from_text(data, printable(path), name, base, lock, gravity)
+        return expand_xacro(path, package_dirs), printable(path), name
+    return read_file(path), printable(path), name
 
 
 def _path_of(x: StrPath) -> str:
@@ -95,14 +102,17 @@ def _exists(path: str) -> bool:
         return False
 
 
-def _from_text(
+def read_model(
     data: str | bytes,
     source: str,
-    name: str | None,
-    base: Base | None,
-    lock: Mapping[str, float] | None,
-    gravity: ArrayLike | None,
+    name: str | None = None,
+    *,
+    base: Base | None = None,
+    lock: Mapping[str, float] | None = None,
+    gravity: ArrayLike | None = None,
 ) -> Model:
+    """The model of URDF text that is already at hand; errors name `source`. A robot that has no name
+    in the text is called `name`. Otherwise as `load`."""
     content = read_urdf(data, source)
     model = Model.build(
         content.name or name or "robot",

@@ -1,16 +1,25 @@
-"""What dynx publishes for testing with Hypothesis: see `dynx.testing.strategies`.
+"""What dynx publishes for test suites.
 
-Needs the extra ``testing`` (``pip install "dynx[testing]"``).
+- `agreement_tests`: one line in a test file of yours, and your robot's agreement is tested
+- `dynx.testing.plugin`: the same for ``pytest --dynx-robot my.urdf``, without a test file
+- `dynx.testing.strategies`: Hypothesis strategies for robots and states (the extra ``testing``)
+
+Importing it imports neither Hypothesis nor an engine: pytest does so in every run, for the plugin.
 """
 
 from __future__ import annotations
 
-from importlib.util import find_spec
+from typing import TYPE_CHECKING, Any
 
-from dynx.errors import NotInstalledError
+if TYPE_CHECKING:
+    from dynx.testing.agreement_class import agreement_tests
 
-if find_spec("hypothesis") is None:
-    raise NotInstalledError(
-        "dynx.testing needs the package hypothesis, which is not installed; "
-        'pip install "dynx[testing]" brings it'
-    )
+__all__ = ["agreement_tests"]
+
+
+def __getattr__(name: str) -> Any:
+    if name == "agreement_tests":
+        from dynx.testing.agreement_class import agreement_tests
+
+        return agreement_tests
+    raise AttributeError(f"module 'dynx.testing' has no attribute {name!r}")

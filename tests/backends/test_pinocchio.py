@@ -232,6 +232,7 @@ def test_a_failure_to_build_is_an_engine_error(monkeypatch: pytest.MonkeyPatch) 
 def test_a_missing_engine_is_named_with_what_brings_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pinocchio", None)
     monkeypatch.delitem(sys.modules, "dynx.backends.pinocchio")
+    monkeypatch.delitem(sys.modules, "dynx.engines.pinocchio")
     with pytest.raises(NotInstalledError, match="pip install"):
         backend_class("pinocchio")
     assert "pinocchio" not in installed_backends()

@@ -22,7 +22,7 @@ from dynx.backends.reference import ReferenceBackend
 from dynx.errors import ArgumentError, BackendError, NotInstalledError, UnknownBackendError
 from tests.backends.robots import chain
 
-BUILT_IN = ("reference", "pinocchio", "pybullet")
+BUILT_IN = ("reference", "pinocchio", "pybullet", "mujoco", "drake")
 
 
 class Mine(ReferenceBackend):
@@ -75,15 +75,16 @@ def test_listing_imports_no_engine() -> None:
     assert found.stdout.strip() == "[]"
 
 
-@pytest.mark.parametrize("engine", ["pinocchio", "pybullet"])
+@pytest.mark.parametrize("engine", ["pinocchio", "pybullet", "mujoco"])
 def test_a_backend_without_its_engine_is_known_but_not_installed(
     engine: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, engine, None)
     monkeypatch.delitem(sys.modules, f"dynx.backends.{engine}", raising=False)
+    monkeypatch.delitem(sys.modules, f"dynx.engines.{engine}", raising=False)
     assert engine in backend_names()
     assert engine not in installed_backends()
-    with pytest.raises(NotInstalledError, match=f"the backend '{engine}' needs"):
+    with pytest.raises(NotInstalledError, match=f"the engine '{engine}' needs"):
         backend(engine, chain(1))
 
 
@@ -92,7 +93,7 @@ def test_a_backend_without_its_engine_is_known_but_not_installed(
     [
         ("pinochio", "did you mean 'pinocchio'"),
         ("Bullet", "did you mean 'pybullet'"),
-        ("drake", "known: reference, pinocchio, pybullet"),
+        ("gazebo", "known: reference, pinocchio, pybullet, mujoco, drake"),
         ("", "known: reference"),
         ("x" * 10_000, r"\(10000 characters\)"),
     ],

@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from dynx.cli.agreement_run import Run
+from dynx.cli.agreement_run import agreement_run
 from dynx.cli.agreement_task import AgreementTask, document
 from dynx.cli.workers import Failure, Workers
 from tests.cli.worker_targets import act, crash_on_panda
@@ -57,9 +57,9 @@ def test_leaving_ends_what_is_under_way() -> None:
 
 def test_an_engine_crash_is_an_entry_of_the_document() -> None:
     tasks = [AgreementTask(name, "fixed", (), ("reference",), 1, 0) for name in ("ur5", "panda", "z1")]
-    run = Run(tasks)
-    run.measure(1, 120.0, show_progress=False, target=crash_on_panda)
-    made = document(run.entries, run.not_done)
+    run = agreement_run(tasks, crash_on_panda)
+    run.measure(1, 120.0, show_progress=False)
+    made = document(run.results, run.not_done)
     assert made["summary"] == {"robots": 3, "agree": 2, "differ": 0, "refused": 1, "not_done": 0}
     assert [entry["robot"] for entry in made["results"]] == ["ur5", "panda", "z1"]
     assert made["results"][1]["error"]["type"] == "EngineCrash"

@@ -8,6 +8,9 @@ import time
 from typing import Any
 
 from dynx.cli.agreement_task import AgreementTask, Entry, measure
+from dynx.cli.doctor_task import DoctorTask
+from dynx.doctor.report import DoctorReport
+from tests.doctor.formats.reports import differing
 
 
 def act(task: Any) -> Any:
@@ -30,3 +33,13 @@ def crash_on_panda(task: AgreementTask) -> Entry:
     if task.robot == "panda":
         os.kill(os.getpid(), signal.SIGSEGV)
     return measure(task)
+
+
+def interrupt_at_a_pipe(task: DoctorTask) -> DoctorReport:
+    """A report made by hand; for a robot that is a FIFO, press Ctrl-C once something is written there."""
+    if task.robot.endswith(".fifo"):
+        with open(task.robot) as pipe:
+            pipe.read()
+        os.kill(os.getppid(), signal.SIGINT)
+        signal.pause()
+    return differing(task.robot)

@@ -45,7 +45,7 @@ def test_every_installed_file_has_exactly_one_name() -> None:
 
 def test_every_model_of_our_own_has_exactly_one_name() -> None:
     folder = Path(__file__).resolve().parents[2] / "models"
-    assert {entry.path for entry in OWN} == set(folder.rglob("*.urdf"))
+    assert {entry.path for entry in OWN} == set(folder.glob("*.urdf"))
     assert len(OWN) == len({entry.path for entry in OWN})
 
 
@@ -104,7 +104,7 @@ def test_an_unknown_name_offers_the_nearest() -> None:
 
 def test_an_empty_library_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(library, "_example_roots", list)
-    monkeypatch.setattr(library, "_own_roots", list)
+    monkeypatch.setattr(library, "own_roots", list)
     robots.cache_clear()
     try:
         assert robots() == ()

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 import click
 
 from dynx.cli.exits import ANSWER_IS_NO, BAD_INPUT, DONE, complain
-from dynx.cli.options import model_options, name_list
+from dynx.cli.options import model_options, name_list, run_options
 from dynx.cli.output_file import check_writable, write_text
 
 if TYPE_CHECKING:
-    from dynx.cli.agreement_run import Run
-    from dynx.cli.agreement_task import Entry
+    from dynx.cli.agreement_task import AgreementTask, Entry
+    from dynx.cli.run import Run
     from dynx.model.model import Base
 
 
@@ -24,28 +24,22 @@ if TYPE_CHECKING:
     metavar="A,B,C",
     help="The engines to compare (default: all that are installed).",
 )
+@click.option(
+    "--as-loaded",
+    is_flag=True,
+    help="Let each engine load the file itself, as its users do, and compare that.",
+)
 @model_options
 @click.option("--samples", type=click.IntRange(min=1), help="Random configurations per robot (default: 16).")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the samples.")
 @click.option(
-    "--jobs",
-    type=click.IntRange(min=1),
-    help="Robots at a time, each in a process of its own (default: one per processor).",
-)
-@click.option(
-    "--timeout",
-    type=click.FloatRange(min=0.0),
-    default=600.0,
-    show_default=True,
-    help="Seconds after which a robot is given up; 0 for never.",
-)
-@click.option(
     "--json", "json_path", metavar="FILE", help="Also write the results as JSON; - is standard output."
 )
-@click.option("--quiet", is_flag=True, help="No table and no progress: errors, JSON and exit code only.")
+@run_options
 def agree(
     robots: tuple[str, ...],
     backends: tuple[str, ...] | None,
+    as_loaded: bool,
     base: Base,
     lock: tuple[tuple[str, float], ...],
     samples: int | None,
@@ -60,6 +54,10 @@ def agree(
     ROBOT is a name (see `dynx robots`), a URDF file, a directory (every .urdf below it), or `all`:
     every robot of example-robot-data. One robot gives the full table, several give a line each.
 
+    With --as-loaded each engine reads the file itself by the call that its documentation gives, which
+    is printed, and --backends names engines; `dynx doctor` says why they differ. The JSON document is
+    then that of `dynx doctor`, with no findings.
+
     Exit code 0 if all agree, 1 if some differ, 2 if some could not be used (the others are done all
     the same). Ctrl-C ends the run with what is done so far, and 130. A robot that crashes an engine
     or takes too long is reported as refused.
@@ -70,39 +68,48 @@ def agree(
       dynx agree ur5 panda --base floating --samples 100
       dynx agree all --backends pinocchio,pybullet,reference --json all.json
       dynx agree path/to/urdfs --lock gripper_joint=0.02
+      dynx agree my.urdf --as-loaded
     """
-    from dynx.cli.agreement_run import Run, processors
+    if as_loaded:
+        from dynx.cli.doctor_as_loaded import compare
+
+        if lock:
+            raise click.UsageError("--lock changes the robot, and --as-loaded compares files as they are")
+        return compare(
+            robots,
+            base,
+            backends,
+            samples,
+            seed,
+            jobs=jobs,
+            timeout=timeout,
+            json_path=json_path,
+            quiet=quiet,
+        )
+    from dynx.cli.agreement_run import agreement_run
     from dynx.cli.agreement_task import AgreementTask, refused
     from dynx.cli.inputs import expand
-    from dynx.cli.interruption import interruptible
-    from dynx.cli.terminal import counted
+    from dynx.cli.run import carry_out
 
     if json_path is not None and json_path != "-":
         check_writable(json_path)
     if backends is not None:
         _check_backends(backends)
     inputs = expand(robots)
-    run = Run([AgreementTask(each.robot, base, lock, backends, samples, seed) for each in inputs])
+    run = agreement_run([AgreementTask(each.robot, base, lock, backends, samples, seed) for each in inputs])
     for index, each in enumerate(inputs):
         if each.refusal is not None:
             run.record(index, refused(run.tasks[index], each.refusal))
-    with interruptible() as interruption:
-        try:
-            run.measure(jobs or processors(), timeout or None, show_progress=not quiet)
-        except KeyboardInterrupt:
-            complain(f"interrupted: {len(run.not_done)} of {counted(len(run.tasks), 'robot')} not done")
-        interruption.finishing = True
-        code = _report(run, json_path, quiet)
-    return code if interruption.code is None else interruption.code
+    return carry_out(run, jobs, timeout, quiet, lambda: _report(run, json_path, quiet))
 
 
-def _report(run: Run, json_path: str | None, quiet: bool) -> int:
+def _report(run: Run[AgreementTask, Entry], json_path: str | None, quiet: bool) -> int:
     """Write the document, the tables and the errors; the exit code."""
     from dynx.cli.agreement_tables import show_many, show_one, show_summary
     from dynx.cli.agreement_task import counts, document
     from dynx.cli.terminal import console, echo_json, json_text
 
-    entries = run.entries
+    entries = run.results
     # First the document: a pipe that closes while the table is written must not lose it.
     if json_path == "-":
         echo_json(document(entries, run.not_done))

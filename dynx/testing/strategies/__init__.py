@@ -18,6 +18,16 @@ Every argument is checked when the strategy is made, not when it is drawn from; 
 an error of `dynx.errors`.
 """
 
+from importlib.util import find_spec
+
+from dynx.errors import NotInstalledError
+
+if find_spec("hypothesis") is None:
+    raise NotInstalledError(
+        "dynx.testing.strategies needs the package hypothesis, which is not installed; "
+        'pip install "dynx[testing]" brings it'
+    )
+
 from dynx.testing.strategies.configurations import (
     Sample,
     accelerations,

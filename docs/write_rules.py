@@ -1,0 +1,80 @@
+"""Write docs/rules.md: every rule of the catalogue on one page, with an anchor for each.
+
+    python docs/write_rules.py
+
+The text is that of the rules' modules, which ``dynx explain`` prints; tests/test_docs.py holds the page
+current. ``docs/rules.md#dx101`` is the address of a rule, in reports and elsewhere.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from dynx.rules import Rule, all_rules
+
+PAGE = Path(__file__).with_name("rules.md")
+
+HEAD = """<!-- Written by docs/write_rules.py from the modules of dynx/rules/catalogue; edit those. -->
+
+# Why engines differ on a file
+
+Every cause that `dynx doctor` knows. A rule of kind *difference* makes engines give different numbers, or
+makes one refuse the file; a rule of kind *practice* is bad practice or a matter of one engine alone, with no
+difference to measure. The versions of engines are those in which the rule was measured to hold; a
+test holds each against the engines installed. Each rule has a small robot in `models/traps` that shows it.
+"""
+
+GROUPS = {
+    "1": "Inertia",
+    "2": "Joints",
+    "3": "Joint dynamics",
+    "4": "Text",
+    "5": "Practice",
+}
+
+
+def page() -> str:
+    """The whole page."""
+    parts = [HEAD, _table()]
+    for digit, group in GROUPS.items():
+        rules = [rule for rule in all_rules() if rule.id[2] == digit]
+        if rules:
+            parts += [f"## {group}\n", *map(_section, rules)]
+    return "\n".join(parts)
+
+
+def _table() -> str:
+    rows = ["| rule | kind | engines | |", "|---|---|---|---|"]
+    for rule in all_rules():
+        engines = ", ".join(rule.engines) or "-"
+        link = f"[{rule.id}](#{rule.id.lower()}) {rule.name}"
+        rows.append(f"| {link} | {rule.kind} | {engines} | {_escaped(rule.title)} |")
+    return "\n".join([*rows, ""])
+
+
+def _section(rule: Rule) -> str:
+    _, _, body = rule.page().partition("\n")
+    facts = [f"- kind: {rule.kind}"]
+    if rule.engines:
+        named = ", ".join(f"{engine} `{versions}`" for engine, versions in rule.engines.items())
+        facts.append(f"- engines: {named}")
+    facts.append(f"- advice: {_escaped(rule.advice)}")
+    facts += [
+        f"- `--choose {rule.id}={choice}`: {_escaped(meaning)}" for choice, meaning in rule.choices.items()
+    ]
+    facts.append(f"- shown by: [{rule.trap()}](../models/traps/{rule.trap()})")
+    heading = f'<a id="{rule.id.lower()}"></a>\n\n### {rule.id} {rule.name}\n\n**{_escaped(rule.title)}**'
+    return "\n".join([heading, _escaped(body), "", *facts, ""])
+
+
+def _escaped(text: str) -> str:
+    """Markdown in which a tag outside of code is shown, not taken for HTML."""
+    parts = re.split(r"(``.*?``|`[^`]*`)", text, flags=re.DOTALL)
+    return "".join(
+        part if k % 2 else part.replace("<", "&lt;").replace("|", "\\|") for k, part in enumerate(parts)
+    )
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), encoding="utf-8")

@@ -1,0 +1,60 @@
+"""The mass matrix from MuJoCo's kinematics, where its own (`mj_crb`) loses digits.
+
+MuJoCo refers the inertia of every body to the centre of mass of the whole robot. For a finger of mass
+m at a distance d from there that adds m d^2 to an inertia that may be a thousandth of it, and takes it
+away again: on robots with hands the entries of its matrix are off by 1e-12 of sqrt(M_ii M_jj) (MuJoCo
+4.0). Here M is the sum of m Jp' Jp + Jr' I Jr over the bodies (Siciliano et al., Robotics, eq. 7.32),
+with levers from joint to body, which need no distant point.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from dynx.engines.mujoco import mujoco
+from dynx.spatial.scalar import Floats
+
+
+class MassMatrix:
+    """Which bodies weigh, and which coordinates move them: all that does not change with q."""
+
+    def __init__(self, engine: Any, *, floating: bool) -> None:
+        self._base = 6 if floating else 0
+        self._first = int(floating)
+        weighs = (engine.body_mass != 0.0) | engine.body_inertia.any(axis=1)
+        self._bodies = np.flatnonzero(weighs & (engine.body_weldid != 0))
+        self._mass: Floats = np.array(engine.body_mass[self._bodies])
+        self._moments: Floats = np.array(engine.body_inertia[self._bodies])
+        self._turns = engine.jnt_type[self._first :] == int(mujoco.mjtJoint.mjJNT_HINGE)
+        self._moves: Floats = np.zeros((len(self._bodies), engine.nv))
+        for row, body in enumerate(self._bodies):
+            while body:
+                first, n = engine.body_dofadr[body], engine.body_dofnum[body]
+                self._moves[row, first : first + n] = 1.0
+                body = engine.body_parentid[body]
+
+    def __call__(self, data: Any, R_root: Floats, p_root: Floats) -> Floats:
+        """M (nv, nv) with the base's velocity in base axes; `data` after `mj_kinematics`."""
+        axes, anchors = data.xaxis[self._first :], data.xanchor[self._first :]
+        linear = np.where(self._turns[:, None], 0.0, axes)
+        angular = np.where(self._turns[:, None], axes, 0.0)
+        if self._base:
+            zero = np.zeros((3, 3))
+            linear = np.concatenate([R_root.T, zero, linear])
+            angular = np.concatenate([zero, R_root.T, angular])
+            anchors = np.concatenate([np.tile(p_root, (6, 1)), anchors])
+        # (body, 3, coordinate): velocity of the centre of mass, and of turning about principal axes.
+        lever = data.xipos[self._bodies][:, None, :] - anchors
+        moves = self._moves[:, None, :]
+        Jp = np.swapaxes(linear + np.cross(angular, lever), 1, 2) * moves
+        Jr = (np.swapaxes(data.ximat[self._bodies].reshape(-1, 3, 3), 1, 2) @ angular.T) * moves
+        M: Floats = _weighted(Jp, np.repeat(self._mass, 3)) + _weighted(Jr, self._moments.ravel())
+        return np.asarray(0.5 * (M + M.T))
+
+
+def _weighted(J: Floats, weights: Floats) -> Floats:
+    """The sum of w J' J over the rows of all bodies."""
+    rows = J.reshape(len(weights), J.shape[-1])
+    return np.asarray(rows.T @ (weights[:, None] * rows))

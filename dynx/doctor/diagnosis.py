@@ -1,0 +1,363 @@
+"""The examination of a robot from beginning to end: measure, find causes, prove them, mend."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from itertools import combinations
+
+from dynx.agreement.tolerances import BAR
+from dynx.doctor.attribution import Attribution, Attributor
+from dynx.doctor.examination import QUANTITIES, TORQUE, Examination, Laboratory
+from dynx.doctor.given_file import without_meshes
+from dynx.doctor.mending import Mending, Place, detections, mend, place, readable
+from dynx.doctor.report import (
+    DoctorReport,
+    EngineResult,
+    Failure,
+    Finding,
+    PairError,
+    RunTimeCall,
+    Unexplained,
+)
+from dynx.doctor.truth import refereed
+from dynx.errors import ArgumentError, DynxError
+from dynx.loaded import ENGINES, installed_engines, loader_class
+from dynx.loaded.difference import model_difference
+from dynx.model import Model
+from dynx.model.configuration import checked_base
+from dynx.model.loading import read_description
+from dynx.model.model import Base
+from dynx.model.xml_source import XmlSource
+from dynx.rules import Case, Detection, Rule, all_rules
+from dynx.rules.choices import checked_choices
+
+DEFAULT_SAMPLES = 5
+
+MARGIN = 0.1
+"""Part of the tolerance that places without an effect of their own may use up together in a mended file:
+at other states they may add up to more."""
+
+COUNTEREXAMPLE_SECONDS = 20.0
+"""What looking for one smallest counterexample may take."""
+
+Progress = Callable[[str], None]
+Robot = str | os.PathLike[str] | bytes | Model
+
+
+def diagnose(
+    robot: Robot,
+    *,
+    base: Base = "fixed",
+    engines: Sequence[str] | None = None,
+    samples: int = DEFAULT_SAMPLES,
+    seed: int = 0,
+    tolerance: float = BAR,
+    choose: Mapping[str, str] | None = None,
+    counterexamples: bool = True,
+    progress: Progress | None = None,
+) -> DoctorReport:
+    """Why engines differ when they load this robot's file themselves, with proof, and the file mended.
+
+    `robot` is whatever `dynx.load` takes. `engines` are names of `dynx.loaded.ENGINES` (default: all that
+    are installed). Each loads the file by its documented call and is compared with the right answer at
+    `samples` random states that follow from `seed`, in tilted gravity; a relative error above `tolerance`
+    is a difference. `choose` maps rule ids to one of the rule's `choices`. `counterexamples` says whether
+    to look for the smallest robot that shows a difference which no rule explains. `progress` is called
+    with the name of each step.
+
+    A robot that cannot be read gives a report with `error` set. Raises ArgumentError,
+    UnknownBackendError, NotInstalledError and UnknownNameError for arguments that are right for no robot.
+    """
+    started = time.perf_counter()
+    laboratory = _laboratory(engines, samples, seed, tolerance)
+    settings = checked_choices((choose or {}).items())
+    checked_base(base)
+    say = progress or _silent
+    try:
+        case = open_case(robot, base, settings)
+        report = _diagnosed(case, laboratory, tolerance, counterexamples, seed, say)
+    except DynxError as error:
+        report = refused_report(str(_label(robot)), error, base=base)
+    return replace(report, samples=samples, seed=seed, seconds=time.perf_counter() - started)
+
+
+def compare_as_loaded(
+    robot: Robot,
+    *,
+    base: Base = "fixed",
+    engines: Sequence[str] | None = None,
+    samples: int = DEFAULT_SAMPLES,
+    seed: int = 0,
+    tolerance: float = BAR,
+) -> DoctorReport:
+    """How far apart engines are when they load the file themselves; no causes are looked for."""
+    started = time.perf_counter()
+    laboratory = _laboratory(engines, samples, seed, tolerance)
+    checked_base(base)
+    try:
+        case = open_case(robot, base, {})
+        before = laboratory.examine(case, truth=laboratory.truth(readable(case).case), describe=True)
+        report = _report(case, before, tolerance)
+    except DynxError as error:
+        report = refused_report(str(_label(robot)), error, base=base)
+    return replace(report, samples=samples, seed=seed, seconds=time.perf_counter() - started)
+
+
+def open_case(robot: Robot, base: Base, settings: Mapping[str, str]) -> Case:
+    """The document of a robot as a case; errors as `dynx.load` raises them."""
+    if isinstance(robot, Model):
+        return Case(XmlSource(robot.to_urdf(), robot.source), base, settings=settings)
+    data, source, _ = read_description(robot)
+    return Case(XmlSource(data, source), base, settings=settings)
+
+
+def refused_report(robot: str, error: DynxError, *, base: str | None = None) -> DoctorReport:
+    """The report of a robot that could not be examined."""
+    return DoctorReport(robot, base=base, error=Failure(type(error).__name__, str(error)))
+
+
+def _diagnosed(
+    case: Case,
+    laboratory: Laboratory,
+    tolerance: float,
+    counterexamples: bool,
+    seed: int,
+    say: Progress,
+) -> DoctorReport:
+    say("loading")
+    sound = readable(case).case
+    truth = laboratory.truth(sound)
+    before = laboratory.examine(case, truth=truth, describe=True)
+    rules = _rules_for(laboratory)
+    found = detections(case, rules)
+    report = _report(case, before, tolerance)
+    if report.alike:
+        return replace(report, findings=_findings(found, [], Mending(case)))
+    say("mending")
+    full = mend(case, rules)
+    after = laboratory.examine(full.case)
+    proofs = _proofs(case, rules, laboratory, before, after, tolerance, say)
+    mended, last = _least_mending(case, rules, full, after, proofs, laboratory, tolerance)
+    unexplained = _unexplained(last, tolerance)
+    if unexplained and counterexamples:
+        unexplained = _with_counterexamples(mended.case, unexplained, laboratory, tolerance, seed, say)
+    changed = mended.case.source.data != case.source.data
+    return replace(
+        _with_after(report, last),
+        findings=_findings(found, proofs, mended),
+        unexplained=unexplained,
+        choices=mended.choices,
+        calls=_calls(mended.case, laboratory),
+        mended=mended.case.source.text if changed else None,
+    )
+
+
+def _rules_for(laboratory: Laboratory) -> list[Rule]:
+    """The rules that hold for an engine in the laboratory, and those about practice."""
+    versions = {name: kind.engine_version() for name, kind in laboratory.engines.items()}
+    return [rule for rule in all_rules() if rule.kind == "practice" or rule.holds_for(versions)]
+
+
+def _proofs(
+    case: Case,
+    rules: Sequence[Rule],
+    laboratory: Laboratory,
+    before: Examination,
+    after: Examination,
+    tolerance: float,
+    say: Progress,
+) -> list[Attribution]:
+    """Every rule about differences, at every place, with its effect.
+
+    Rules about the text are taken away from the text as it is, rules about the robot from the text made
+    readable. Shapes that engines are not given anyway are left out from the start.
+    """
+    slim = case.with_source(without_meshes(case.source))
+    sound = readable(slim).case
+    readably = before if sound is slim else laboratory.examine(sound, truth=before.truth)
+    causes = [rule for rule in rules if rule.kind == "difference"]
+    by_text = Attributor(laboratory, slim, causes, before, after, tolerance, say)
+    by_robot = Attributor(laboratory, sound, causes, readably, after, tolerance, say)
+    found = detections(slim, causes)
+    proofs: list[Attribution] = []
+    for rule in dict.fromkeys(rule for rule, _ in found):
+        places = [each for other, each in found if other is rule]
+        proofs += (by_text if rule.stage == "reading" else by_robot).attribute(rule, places)
+    return proofs
+
+
+def _least_mending(
+    case: Case,
+    rules: Sequence[Rule],
+    full: Mending,
+    after: Examination,
+    proofs: Sequence[Attribution],
+    laboratory: Laboratory,
+    tolerance: float,
+) -> tuple[Mending, Examination]:
+    """The remedies that matter here and no others, where those do as much as all together."""
+    idle: set[Place] = {place(each.rule, each.detection) for each in proofs if not each.effects}
+    if not idle:
+        return full, after
+    least = mend(case, rules, lambda rule, detection: place(rule, detection) not in idle)
+    if not least.case.readable:
+        return full, after
+    result = laboratory.examine(least.case)
+    for engine in laboratory.engines:
+        if result.worst(engine) > max(MARGIN * tolerance, after.worst(engine)):
+            return full, after
+    return least, result
+
+
+def _unexplained(after: Examination, tolerance: float) -> tuple[Unexplained, ...]:
+    """What remains above the tolerance, the largest quantity of each engine that loads the file."""
+    remaining = []
+    for engine in after.answers:
+        errors = after.errors(engine)
+        quantity = max(errors, key=lambda name: errors[name], default=None)
+        if quantity is not None and errors[quantity] > tolerance:
+            joints = after.joint_errors(engine)
+            joint = max(joints, key=lambda name: joints[name], default=None) if quantity == TORQUE else None
+            remaining.append(Unexplained(engine, quantity, errors[quantity], joint))
+    return tuple(remaining)
+
+
+def _with_counterexamples(
+    case: Case,
+    unexplained: tuple[Unexplained, ...],
+    laboratory: Laboratory,
+    tolerance: float,
+    seed: int,
+    say: Progress,
+) -> tuple[Unexplained, ...]:
+    from dynx.doctor.counterexample import smallest
+    from dynx.doctor.single_state import difference_of
+
+    found = []
+    for each in unexplained:
+        say(f"counterexample for {each.engine}")
+        difference = difference_of(laboratory, each.engine, each.quantity)
+        example = smallest(case, difference, tolerance=tolerance, seed=seed, budget=COUNTEREXAMPLE_SECONDS)
+        found.append(replace(each, counterexample=example))
+    return tuple(found)
+
+
+def _report(case: Case, before: Examination, tolerance: float) -> DoctorReport:
+    """What there is to say before any cause is looked for."""
+    descriptions = [each.description for each in before.answers.values() if each.description is not None]
+    model = before.truth.model
+    return DoctorReport(
+        robot=model.name,
+        source=case.source.source,
+        base=case.base,
+        engines=tuple(_engine_result(case, name, before) for name in before.answers),
+        residual=_residual(before),
+        tolerance=tolerance,
+        pairs=_pairs(before),
+        referee=refereed(before.truth),
+        model_difference=tuple(model_difference(model, descriptions)),
+        text=case.source.text,
+    )
+
+
+def _with_after(report: DoctorReport, after: Examination) -> DoctorReport:
+    """The report with what the engines say of the mended file."""
+    engines = tuple(
+        replace(each, refused_after=after.answers[each.engine].refused, after=after.errors(each.engine))
+        for each in report.engines
+    )
+    return replace(report, engines=engines, residual=_residual(after))
+
+
+def _residual(examination: Examination) -> float:
+    """The largest error of the engines that load the file."""
+    errors = [examination.errors(engine) for engine in examination.answers]
+    return max((error for of_engine in errors for error in of_engine.values()), default=0.0)
+
+
+def _engine_result(case: Case, name: str, before: Examination) -> EngineResult:
+    kind = loader_class(name)
+    errors, refused = before.errors(name), before.answers[name].refused
+    return EngineResult(
+        engine=name,
+        version=kind.engine_version(),
+        call=kind.load_call(case.base == "floating"),
+        refused=refused,
+        refused_after=refused,
+        before=errors,
+        after=errors,
+    )
+
+
+def _pairs(examination: Examination) -> tuple[PairError, ...]:
+    loaded = [name for name, each in examination.answers.items() if each.refused is None]
+    return tuple(
+        PairError(
+            (one, other),
+            quantity,
+            examination.pair_error(one, other, quantity),
+            examination.joint_errors(one, other) if quantity == TORQUE else {},
+        )
+        for one, other in combinations(loaded, 2)
+        for quantity in QUANTITIES
+        if quantity in examination.errors(one)
+    )
+
+
+def _findings(
+    found: Sequence[tuple[Rule, Detection]], proofs: Sequence[Attribution], mended: Mending
+) -> tuple[Finding, ...]:
+    """Everything detected, with the effect where one was proved."""
+    proved: dict[Place, list[Attribution]] = {}
+    for each in proofs:
+        proved.setdefault(place(each.rule, each.detection), []).append(each)
+    done = {rule.id: remedy.changed for rule, remedy in mended.applied}
+    findings = []
+    for rule, detection in found:
+        # The same place twice (two fields of one link, say) has its proofs in the same order.
+        of_place = proved.get(place(rule, detection), [])
+        attribution = of_place.pop(0) if of_place else None
+        finding = Finding(
+            rule.id, rule.name, rule.kind, detection.link, detection.joint, detection.line, detection.message
+        )
+        if attribution is not None and attribution.effects:
+            finding = replace(
+                finding,
+                engines=tuple(attribution.effects),
+                effect=attribution.worst,
+                proved=attribution.proved,
+                remedy=done.get(rule.id),
+            )
+        findings.append(finding)
+    return tuple(sorted(findings, key=lambda finding: finding.kind))
+
+
+def _calls(case: Case, laboratory: Laboratory) -> tuple[RunTimeCall, ...]:
+    known = [(name, kind.CALLS) for name, kind in laboratory.engines.items()]
+    return tuple(
+        RunTimeCall(engine, calls[call]) for engine, calls in known for call in calls if call in case.calls
+    )
+
+
+def _laboratory(engines: Sequence[str] | None, samples: int, seed: int, tolerance: float) -> Laboratory:
+    for name, value, least in (("samples", samples, 1), ("seed", seed, 0)):
+        if isinstance(value, bool) or not isinstance(value, int) or value < least:
+            raise ArgumentError(f"{name} is {value!r}; wanted a whole number, at least {least}")
+    if not 0.0 < tolerance < 1.0:
+        raise ArgumentError(f"tolerance is {tolerance!r}; wanted a relative error between 0 and 1")
+    chosen = installed_engines() if engines is None else tuple(dict.fromkeys(engines))
+    if isinstance(engines, str) or not chosen:
+        raise ArgumentError(f"engines is {engines!r}; wanted names out of {', '.join(ENGINES)}")
+    return Laboratory(chosen, samples, seed)
+
+
+def _label(robot: object) -> str:
+    text = robot.name if isinstance(robot, Model) else str(robot)
+    return text if len(text) <= 200 and "\n" not in text else "<string>"
+
+
+def _silent(step: str) -> None:
+    """No one wants to know."""

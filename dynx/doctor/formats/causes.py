@@ -1,0 +1,116 @@
+"""The findings of a report by rule: what a reader is told first, and how alarming it is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from dynx.doctor.formats import wording
+from dynx.doctor.report import DoctorReport, Effect, Finding
+from dynx.rules.registry import all_rules
+from dynx.rules.rule import Kind, Rule
+
+Severity = Literal["error", "warning", "note"]
+"""``error``: answers differ by more than rounding. ``warning``: by rounding that piles up.
+``note``: nothing differs; bad practice, or a cause without effect on this base."""
+
+Status = Literal["alike", "explained", "unexplained", "refused"]
+"""``explained``: engines differ and every difference has a proved cause. ``refused``: not examined."""
+
+ROUNDING = 1e-9
+"""Relative error up to which a difference is the price of float64 or of a float32 step somewhere, and
+not another robot: what PyBullet's diagonalisation of inertias leaves on healthy files."""
+
+_ORDER: tuple[Severity, ...] = ("error", "warning", "note")
+
+
+@dataclass(frozen=True)
+class Cause:
+    """One rule of the catalogue and all places where it was found."""
+
+    rule: str
+    name: str
+    kind: Kind
+    findings: tuple[Finding, ...]
+
+    @property
+    def entry(self) -> Rule | None:
+        """The rule in the catalogue; None for one that this version of dynx does not have."""
+        return catalogue_entry(self.rule)
+
+    @property
+    def title(self) -> str:
+        """The cause in one sentence."""
+        return self.entry.title if self.entry is not None else wording.name(self.findings[0].message, 1000)
+
+    @property
+    def advice(self) -> str:
+        """What to do, in one sentence; what was done where the catalogue has none."""
+        said = self.entry.advice if self.entry is not None else ""
+        return said or next((wording.name(each.remedy, 1000) for each in self.findings if each.remedy), "")
+
+    @property
+    def remedies(self) -> tuple[str, ...]:
+        """What mending did about it, each sentence once."""
+        said = dict.fromkeys(each.remedy for each in self.findings if each.remedy)
+        return tuple(wording.name(remedy, 1000).rstrip(".") for remedy in said)
+
+    @property
+    def worst(self) -> Effect | None:
+        """The largest effect; None where the cause changes no answer."""
+        effects = [each.effect for each in self.findings if each.effect is not None]
+        return max(effects, key=lambda effect: effect.relative_error, default=None)
+
+    @property
+    def engines(self) -> tuple[str, ...]:
+        """The engines in which any of the findings shows."""
+        return tuple(dict.fromkeys(engine for each in self.findings for engine in each.engines))
+
+    @property
+    def proved(self) -> bool:
+        """Whether every finding that has an effect was proved."""
+        return all(each.proved for each in self.findings if each.effect is not None)
+
+    @property
+    def severity(self) -> Severity:
+        """How alarming the worst finding is."""
+        return min((severity(each) for each in self.findings), key=_ORDER.index)
+
+
+def causes(report: DoctorReport) -> list[Cause]:
+    """The rules found: the alarming first, of equals the largest effect, then by number; the places of
+    a rule by the size of their effect, then as in the file."""
+    groups: dict[str, list[Finding]] = {}
+    for finding in report.findings:
+        groups.setdefault(finding.rule, []).append(finding)
+    found = [
+        Cause(rule, each[0].name, each[0].kind, tuple(sorted(each, key=lambda one: -_size(one.effect))))
+        for rule, each in groups.items()
+    ]
+    return sorted(found, key=lambda cause: (_ORDER.index(cause.severity), -_size(cause.worst), cause.rule))
+
+
+def catalogue_entry(rule: str) -> Rule | None:
+    """The rule of that id; None where this version of dynx has none."""
+    return next((each for each in all_rules() if each.id == rule), None)
+
+
+def severity(finding: Finding) -> Severity:
+    """How alarming a finding is."""
+    if finding.effect is None:
+        return "note"
+    # Written so that an error that is no number counts as large.
+    return "warning" if finding.effect.relative_error <= ROUNDING else "error"
+
+
+def status(report: DoctorReport) -> Status:
+    """What became of a robot, in one word."""
+    if report.error is not None:
+        return "refused"
+    if report.alike:
+        return "alike"
+    return "explained" if report.explained else "unexplained"
+
+
+def _size(effect: Effect | None) -> float:
+    return -1.0 if effect is None else effect.relative_error

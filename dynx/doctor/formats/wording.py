@@ -1,0 +1,103 @@
+"""How sizes, quantities, places and values are said, alike in every format."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import PurePath
+from typing import Any
+
+from dynx.doctor.report import Effect, Finding
+from dynx.errors import escaped
+
+NAME_LENGTH = 120
+"""Characters of a name that are shown; a description may hold names of any length."""
+
+_PERCENT = 1e-3
+"""From here on an error is said in per cent, which everybody reads at once."""
+
+_DIGITS = (4, 6, 9, 12, 15, 17)
+"""Significant digits tried, the fewest first, until two values can be told apart."""
+
+
+def name(text: object, limit: int = NAME_LENGTH) -> str:
+    """A name as one line without control characters, cut where it is very long."""
+    return escaped(text, limit)
+
+
+def quantity(key: str) -> str:
+    """``mass_matrix`` as ``mass matrix``."""
+    return name(key.replace("_", " "))
+
+
+def relative(error: float) -> str:
+    """A relative error in two digits; ``none`` where an answer was missing."""
+    if not math.isfinite(error):
+        return "none"
+    return "0" if error == 0.0 else f"{error:.1e}"
+
+
+def size(error: float) -> str:
+    """A relative error in words: ``1900 %``, ``6e-06``, ``no answer``."""
+    if not math.isfinite(error):
+        return "no answer"
+    if error < _PERCENT or error >= 1e4:
+        return "0" if error == 0.0 else f"{error:.0e}"
+    percent = 100.0 * error
+    return f"{percent:.2g} %" if percent < 100.0 else f"{percent:.0f} %"
+
+
+def effect(each: Effect | None) -> str:
+    """``mass matrix off by 1900 %``, ``the file is refused``, or that a cause changes nothing."""
+    if each is None:
+        return "no effect on this base"
+    if not math.isfinite(each.relative_error):
+        return "the file is refused" if each.quantity == "loading" else f"no {quantity(each.quantity)}"
+    return f"{quantity(each.quantity)} off by {size(each.relative_error)}"
+
+
+def titles(robots: Sequence[str]) -> list[str]:
+    """What robots are called: those given as paths by their files' names, where that tells them apart."""
+    stems = [PurePath(robot).name.removesuffix(".urdf") or robot for robot in robots]
+    owners: dict[str, set[str]] = {}
+    for stem, robot in zip(stems, robots, strict=True):
+        owners.setdefault(stem, set()).add(robot)
+    return [
+        name(stem if len(owners[stem]) == 1 else robot, 200)
+        for stem, robot in zip(stems, robots, strict=True)
+    ]
+
+
+def part(finding: Finding) -> str:
+    """``link tool0``, ``joint elbow``, or ``robot``."""
+    if finding.link is not None:
+        return f"link {name(finding.link)}"
+    if finding.joint is not None:
+        return f"joint {name(finding.joint)}"
+    return "robot"
+
+
+def values(several: Sequence[Any]) -> list[str]:
+    """Values of one property side by side, in as few digits as tell different ones apart.
+
+    A value is a number, a text, None or a nested list of them.
+    """
+    distinct = {repr(each) for each in several}
+    for digits in _DIGITS[:-1]:
+        said = [_value(each, digits) for each in several]
+        if len(set(said)) == len(distinct):
+            return said
+    return [_value(each, _DIGITS[-1]) for each in several]
+
+
+def _value(value: Any, digits: int) -> str:
+    if value is None:
+        return "none"
+    if isinstance(value, bool) or not isinstance(value, int | float | list | tuple):
+        return name(value)
+    if isinstance(value, list | tuple):
+        inside = ("; " if value and isinstance(value[0], list | tuple) else ", ").join(
+            _value(each, digits) for each in value
+        )
+        return f"[{inside}]"
+    return "0" if value == 0 else f"{value:.{digits}g}"

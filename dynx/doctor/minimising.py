@@ -1,0 +1,47 @@
+"""Making as many changes as possible while something still holds: delta debugging.
+
+The minimising algorithm of Zeller and Hildebrandt, "Simplifying and isolating failure-inducing input"
+(IEEE Transactions on Software Engineering 28, 2002, section 3), with the complements left out: they pay
+where most changes must stay unmade, and of a robot that shows a difference most can be cut away.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TypeVar
+
+Change = TypeVar("Change")
+
+
+def most(changes: Sequence[Change], holds: Callable[[Sequence[Change]], bool]) -> list[Change]:
+    """Changes that can be made together with `holds` staying true, in their order; no other single one
+    of `changes` can be added to them.
+
+    `holds` is asked of sets of changes, large ones first; neighbours in the list are tried together.
+    """
+    made: set[int] = set()
+    size = len(changes)
+    while size:
+        found = _tried(changes, holds, made, size)
+        # A change may become possible only by another one, so single ones are tried until none is.
+        if not (size == 1 and found):
+            size //= 2
+    return _chosen(changes, made)
+
+
+def _tried(
+    changes: Sequence[Change], holds: Callable[[Sequence[Change]], bool], made: set[int], size: int
+) -> bool:
+    """Try the changes not made yet in chunks of `size`, and whether any could be made."""
+    waiting = [k for k in range(len(changes)) if k not in made]
+    found = False
+    for start in range(0, len(waiting), size):
+        chunk = waiting[start : start + size]
+        if holds(_chosen(changes, made.union(chunk))):
+            made.update(chunk)
+            found = True
+    return found
+
+
+def _chosen(changes: Sequence[Change], numbers: set[int]) -> list[Change]:
+    return [changes[k] for k in sorted(numbers)]

@@ -1,0 +1,28 @@
+"""PyBullet, imported when it is first asked for, and without the line that it prints."""
+
+from __future__ import annotations
+
+import sys
+from importlib import import_module
+from threading import Lock
+from types import ModuleType
+
+from dynx.engines.silence import silence
+from dynx.errors import NotInstalledError
+
+_import_lock = Lock()
+
+
+def bullet() -> ModuleType:
+    """The module `pybullet`; raises NotInstalledError with the way to install it."""
+    loaded = sys.modules.get("pybullet")
+    if loaded is not None:
+        return loaded
+    with _import_lock, silence():
+        try:
+            return import_module("pybullet")
+        except ImportError as error:
+            raise NotInstalledError(
+                "the engine 'pybullet' needs PyBullet: pip install 'dynx[pybullet]' "
+                "(wheels exist up to Python 3.11; above, it builds from source)"
+            ) from error

@@ -1,0 +1,134 @@
+"""What PyBullet makes of an ``<inertial>``: its diagonalisation and its checks, replayed in float64.
+
+The loader turns a tensor with products of inertia to its principal axes by Jacobi's method, and sets
+all moments to zero where one is negative or exceeds the sum of the others, to the last bit. The tree
+of inverse dynamics, made later, shifts the inertia to the origin of the link and checks it again
+(btMatrix3x3::diagonalize, URDF importer, btInverseDynamics isValidInertiaMatrix; pybullet 3.2.7).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from dynx.backends.bullet_inertia import FLOAT64_EPS, longdouble
+from dynx.model.elements import Inertial
+from dynx.spatial.scalar import Floats
+from dynx.spatial.so3 import rotation_from_rpy, skew
+
+_STOP = 1e-6
+"""Share of the trace at which one more rotation is the last."""
+
+_ABSOLUTE = 5 * FLOAT64_EPS
+"""How far below zero a leading minor may be, whatever the units [kg m^2 and its powers]."""
+
+_ROUNDING = 8 * FLOAT64_EPS
+"""Bound on the rounding of a sum of a few products, relative to the largest."""
+
+
+_MANY = 4096
+"""Inertials of which results are remembered: rules ask the same of every link, round after round."""
+
+
+@dataclass(frozen=True, eq=False)
+class BulletInertia:
+    """Moments (3,) about `axes` (3, 3), columns in the axes of the inertial, as the loader finds them."""
+
+    moments: Floats
+    axes: Floats
+
+    @property
+    def zeroed(self) -> bool:
+        """Whether the loader says "Bad inertia tensor properties" and takes zero instead."""
+        x, y, z = self.moments
+        return bool(x < 0 or y < 0 or z < 0 or x > y + z or y > x + z or z > x + y)
+
+
+@lru_cache(maxsize=_MANY)
+def read_by_bullet(inertial: Inertial) -> BulletInertia:
+    """The principal moments and axes that PyBullet's loader finds, before it checks them."""
+    tensor = inertial.tensor
+    if not (inertial.ixy or inertial.ixz or inertial.iyz):
+        return BulletInertia(np.diagonal(tensor).copy(), np.eye(3))
+    return BulletInertia(*_diagonalised(tensor))
+
+
+@lru_cache(maxsize=_MANY)
+def diagonalisation_error(inertial: Inertial) -> float:
+    """How far the tensor that PyBullet holds is from the file's, as a share of the largest moment."""
+    held = read_by_bullet(inertial)
+    axes, tensor = longdouble(held.axes), longdouble(inertial.tensor)
+    size = float(np.max(np.abs(tensor)))
+    if size == 0.0:
+        return 0.0
+    return float(np.max(np.abs((axes * longdouble(held.moments)) @ axes.T - tensor))) / size
+
+
+def tree_may_refuse(inertial: Inertial, *, welded: bool) -> bool:
+    """Whether the inertia is so near the edge that inverse dynamics may refuse the robot for it.
+
+    `welded` says that a fixed joint carries the link, of which no triangle inequality is asked.
+    """
+    held = read_by_bullet(inertial)
+    R = longdouble(rotation_from_rpy(np.array(inertial.origin.rpy))) @ longdouble(held.axes)
+    lever = R.T @ longdouble(inertial.origin.xyz)
+    arm = skew(lever)
+    about_origin = longdouble(np.diag(held.moments)) - longdouble(inertial.mass) * (arm @ arm)
+    x, y, z = (float(value) for value in np.diagonal(about_origin))
+    if not welded:
+        squares = np.asarray(inertial.mass * lever * lever, dtype=float)
+        # With the centre of mass on one of the axes both sides of a sum get the same number.
+        exact = np.count_nonzero(squares > FLOAT64_EPS**2 * np.max(squares)) <= 1
+        margin = 0.0 if exact else _ROUNDING * max(x, y, z)
+        if x + y < z + margin or y + z < x + margin:
+            return True
+    minor = float(about_origin[0, 0] * about_origin[1, 1] - about_origin[0, 1] ** 2)
+    determinant = float(
+        x * (about_origin[1, 1] * about_origin[2, 2] - about_origin[1, 2] ** 2)
+        - about_origin[0, 1]
+        * (about_origin[0, 1] * about_origin[2, 2] - about_origin[1, 2] * about_origin[0, 2])
+        + about_origin[0, 2]
+        * (about_origin[0, 1] * about_origin[1, 2] - about_origin[1, 1] * about_origin[0, 2])
+    )
+    mean = (x + y + z) / 3.0
+    return minor < _ROUNDING * x * y - _ABSOLUTE or determinant < _ROUNDING * mean**3 - _ABSOLUTE
+
+
+def _diagonalised(tensor: Floats) -> tuple[Floats, Floats]:
+    """Eigenvalues and eigenvectors by cyclic choice of the largest product, as Bullet does it."""
+    A, V = tensor.copy(), np.eye(3)
+    for step in range(30, 0, -1):
+        pairs = ((0, 1, 2), (0, 2, 1), (1, 2, 0))
+        p, q, r = max(pairs, key=lambda pair: abs(A[pair[0], pair[1]]))
+        largest = abs(A[p, q])
+        threshold = _STOP * (abs(A[0, 0]) + abs(A[1, 1]) + abs(A[2, 2]))
+        last = step == 1 or largest <= threshold
+        if largest <= FLOAT64_EPS * threshold:
+            break
+        tangent, cosine, sine = _rotation((A[q, q] - A[p, p]) / (2 * A[p, q]))
+        shift = tangent * A[p, q]
+        A[p, q] = A[q, p] = 0.0
+        A[p, p] -= shift
+        A[q, q] += shift
+        at_p, at_q = A[r, p], A[r, q]
+        A[r, p] = A[p, r] = cosine * at_p - sine * at_q
+        A[r, q] = A[q, r] = cosine * at_q + sine * at_p
+        V[:, p], V[:, q] = cosine * V[:, p] - sine * V[:, q], cosine * V[:, q] + sine * V[:, p]
+        if last:
+            break
+    return np.diagonal(A).copy(), V
+
+
+def _rotation(theta: float) -> tuple[float, float, float]:
+    square = theta * theta
+    if square * square < 10 / FLOAT64_EPS:
+        root = math.sqrt(1 + square)
+        tangent = 1 / (theta + root) if theta >= 0 else 1 / (theta - root)
+        cosine = 1 / math.sqrt(1 + tangent * tangent)
+    else:
+        tangent = 1 / (theta * (2 + 0.5 / square))
+        cosine = 1 - 0.5 * tangent * tangent
+    return tangent, cosine, cosine * tangent

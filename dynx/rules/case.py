@@ -1,0 +1,83 @@
+"""A file under examination: its text with places, what dynx reads in it, and the base it is meant for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+from dynx.errors import DynxError
+from dynx.model import Model
+from dynx.model.elements import Vector
+from dynx.model.loading import read_model
+from dynx.model.model import STANDARD_GRAVITY, Base
+from dynx.model.xml_source import SourceElement, XmlSource
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """The document `source`, meant for `base`, with the remedies at run time (`calls`) taken so far.
+
+    `settings` are the user's choices where a remedy has several, by rule id (see `Rule.choices`).
+    """
+
+    source: XmlSource
+    base: Base = "fixed"
+    gravity: Vector = STANDARD_GRAVITY
+    calls: frozenset[str] = frozenset()
+    settings: Mapping[str, str] | None = None
+
+    @cached_property
+    def reading(self) -> Model | DynxError:
+        """What `dynx.load` makes of the document: a model, or the error."""
+        try:
+            return read_model(self.source.text, self.source.source, base=self.base, gravity=self.gravity)
+        except DynxError as error:
+            return error
+
+    @property
+    def model(self) -> Model:
+        """What dynx reads; raises the error where it cannot."""
+        if isinstance(self.reading, Model):
+            return self.reading
+        raise self.reading
+
+    @property
+    def readable(self) -> bool:
+        """Whether dynx can read the document as it stands."""
+        return isinstance(self.reading, Model)
+
+    @cached_property
+    def links(self) -> dict[str, SourceElement]:
+        """The ``<link>`` elements by name, in document order; of two alike the first."""
+        return _by_name(self.source.root.all("link"))
+
+    @cached_property
+    def joints(self) -> dict[str, SourceElement]:
+        """The ``<joint>`` elements by name, in document order; of two alike the first."""
+        return _by_name(self.source.root.all("joint"))
+
+    def choice(self, rule: str, default: str) -> str:
+        """What the user chose for a rule, or the default."""
+        return (self.settings or {}).get(rule, default)
+
+    def with_source(self, source: XmlSource) -> Case:
+        """The same case with another text."""
+        return replace(self, source=source)
+
+    def with_calls(self, *calls: str) -> Case:
+        """The same case with further remedies at run time."""
+        return replace(self, calls=self.calls | set(calls))
+
+
+def end_of(joint: SourceElement, role: str) -> str:
+    """The link that a ``<joint>`` names as its ``parent`` or ``child``; empty where it names none."""
+    element = joint.first(role)
+    return "" if element is None else element.attributes.get("link", "")
+
+
+def _by_name(elements: list[SourceElement]) -> dict[str, SourceElement]:
+    found: dict[str, SourceElement] = {}
+    for element in elements:
+        found.setdefault(element.attributes.get("name", ""), element)
+    return found

@@ -1,0 +1,62 @@
+"""DX101 link-without-inertial: a link without <inertial> weighs 1 kg in one engine and nothing in another
+
+A link that only marks a place, such as a tool flange or a camera frame, is often written without an
+``<inertial>`` element. URDF does not say what such a link weighs.
+
+- Pinocchio 4.1.0 and Drake 1.51.1: nothing, and dynx reads it so.
+- PyBullet 3.2.7: 1 kg, with 1 kg m^2 about every axis, unless the link is named exactly ``world``. It
+  prints "No inertial data for link, using mass=1" where few people look.
+- MuJoCo 4.0.0: what the primitive collision shapes of the link weigh at 1000 kg/m^3; without such shapes
+  nothing.
+
+The effect is large: torques, mass matrices and accelerations are off by 10 % to many times their size
+wherever such a link moves. With the base free, the root counts too; with the base fixed, the root and
+what is welded to it stay where they are, and nothing follows from their mass.
+
+What to do: write down what the link weighs. If it is a mere frame, say so with an explicit zero.
+
+``dynx doctor --fix`` puts an ``<inertial>`` with mass 0 and moments 0 into each such link. All four
+engines then take the link for what it is in Pinocchio: a frame.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
+
+from dynx.rules.case import Case
+from dynx.rules.inertial_edits import zero_inertial
+from dynx.rules.rigid_groups import static_links
+from dynx.rules.rule import Detection, Remedy, Rule
+
+_UNTOUCHED = "world"
+"""The one name for which PyBullet takes a mass of zero."""
+
+
+class LinkWithoutInertial(Rule):
+    """DX101."""
+
+    id = "DX101"
+    name = "link-without-inertial"
+    title = "A link without <inertial> weighs 1 kg in PyBullet, its shapes' weight in MuJoCo, else nothing."
+    engines: ClassVar[Mapping[str, str]] = {"pybullet": ">=3.2.7", "mujoco": ">=4.0.0"}
+    advice = "Write an <inertial>: the true one, or one of zero where the link is a mere frame."
+
+    def detect(self, case: Case) -> Sequence[Detection]:
+        """Links that can move and have no ``<inertial>``."""
+        static = static_links(case)
+        message = "no <inertial>: 1 kg and 1 kg m^2 in PyBullet, nothing in Pinocchio and Drake"
+        return [
+            Detection(name, None, element.line, message)
+            for name, element in case.links.items()
+            if element.first("inertial") is None and name not in static and name != _UNTOUCHED
+        ]
+
+    def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy:
+        """An explicit zero inertial in each."""
+        source = case.source
+        links = [case.links[detection.link] for detection in detections if detection.link is not None]
+        edits = [source.inserting(link, zero_inertial(), first=True) for link in links]
+        many = f"{len(links)} links" if len(links) > 1 else "The link"
+        done = f"{many} without <inertial> got one with mass 0 and moments 0"
+        return Remedy(case.with_source(source.edited(*edits)), done)

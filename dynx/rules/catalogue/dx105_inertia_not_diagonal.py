@@ -1,0 +1,80 @@
+"""DX105 inertia-not-diagonal: PyBullet turns a tensor to its principal axes only roughly
+
+Bullet knows principal moments alone. Where ``ixy``, ``ixz`` or ``iyz`` is not zero, its loader turns the
+tensor to its principal axes by Jacobi's method and stops as soon as the products of inertia are below a
+millionth of the trace, after one more rotation. What is left of them is dropped.
+
+- PyBullet 3.2.7: the tensor it holds is off by 1e-14 to 1e-9 of its size, and by up to 2e-6 where principal
+  moments are nearly equal.
+- Pinocchio 4.1.0, MuJoCo 4.0.0 and Drake 1.51.1 are right to rounding.
+
+The effect: mass matrix and inverse dynamics are off by 1e-13 to 1e-9 of their size, accelerations by up to
+1e-8. No simulation will notice; a comparison of two engines to rounding will, and it hides there whatever
+else is wrong below that level. 46 of 69 public robots have this difference.
+
+What to do: nothing, if a millionth is good enough. To make engines agree to rounding, give the principal
+moments and turn the inertial frame instead.
+
+``dynx doctor --fix`` does that: the moments about the principal axes, no products of inertia, and the axes
+in the ``rpy`` of the inertial's origin, each with as many digits as a double has, calculated in extended
+precision. It is the same tensor. MuJoCo up to 3.13 ignored that ``rpy`` (DX112).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
+
+from dynx.rules.bullet_inertias import diagonalisation_error, read_by_bullet
+from dynx.rules.case import Case
+from dynx.rules.central_inertia import CentralInertia
+from dynx.rules.impossible_inertia import lifted
+from dynx.rules.inertial_edits import line_of, with_inertials
+from dynx.rules.physical_inertia import clear_fault, on_the_edge
+from dynx.rules.rigid_groups import rigid_groups
+from dynx.rules.rule import Detection, Remedy, Rule
+
+_NOTICEABLE = 1e-14
+"""Share of the tensor: a hundredth of what the comparison of engines can show."""
+
+
+class InertiaNotDiagonal(Rule):
+    """DX105."""
+
+    id = "DX105"
+    name = "inertia-not-diagonal"
+    title = "PyBullet turns a tensor with products of inertia to its principal axes only to a millionth."
+    engines: ClassVar[Mapping[str, str]] = {"pybullet": ">=3.2.7"}
+    advice = "Give the principal moments, with the axes in the rpy of the inertial."
+
+    def detect(self, case: Case) -> Sequence[Detection]:
+        """Links that can move and whose tensor PyBullet's diagonalisation does not reproduce."""
+        groups = rigid_groups(case)
+        found = []
+        for link in case.model.links:
+            inertial = link.inertial
+            if inertial is None or groups[link.name].static or read_by_bullet(inertial).zeroed:
+                continue
+            error = diagonalisation_error(inertial)
+            if error > _NOTICEABLE:
+                message = f"PyBullet's diagonalisation of the tensor is off by {error:.1e} of its size"
+                found.append(Detection(link.name, None, line_of(case, link.name, "inertia"), message))
+        return found
+
+    def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy:
+        """The same tensors in principal form."""
+        groups = rigid_groups(case)
+        old = {link.name: link.inertial for link in case.model.links}
+        new = {}
+        for detection in detections:
+            name = detection.link
+            inertial = None if name is None else old[name]
+            if name is None or inertial is None:
+                continue
+            turned = CentralInertia.of(inertial).inertial(inertial.origin.rpy)
+            root, welded = name == case.model.root, name in groups[name].parents
+            if clear_fault(inertial) is None and on_the_edge(turned, root=root, welded=welded):
+                turned = lifted(turned)
+            new[name] = turned
+        done = f"{len(new)} tensors are given by principal moments, with the axes in the inertial's rpy"
+        return Remedy(with_inertials(case, new), done.replace("1 tensors are", "One tensor is"))

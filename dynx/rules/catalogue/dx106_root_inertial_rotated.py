@@ -1,0 +1,65 @@
+"""DX106 root-inertial-rotated: on a fixed base PyBullet takes the root's inertial frame for the world
+
+The ``<inertial>`` of the root link has an ``rpy`` that is not zero. With the base fixed, nothing that the
+root weighs matters to the motion, so this ought to be without effect.
+
+- PyBullet 3.2.7 calculates inverse dynamics and Jacobians in the axes of that inertial frame: gravity pulls
+  in the wrong direction by just this rotation, and the rows of the Jacobian are turned. The kinematics and
+  the mass matrix are right, which makes it hard to see.
+- Pinocchio 4.1.0, MuJoCo 4.0.0 and Drake 1.51.1 are not affected.
+
+The effect is as large as the rotation: 2 sin(angle/2) of the weight. A turn by 90 degrees makes gravity
+horizontal. Products of inertia of the root, on the other hand, do no harm on a fixed base.
+
+What to do: give the root's tensor in the axes of its link.
+
+``dynx doctor --fix`` does that: the tensor is turned into the axes of the link and the ``rpy`` set to zero.
+It is the same body. Nothing is done for a floating base, where there is no such difference.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
+
+import numpy as np
+
+from dynx.rules.case import Case
+from dynx.rules.central_inertia import CentralInertia
+from dynx.rules.inertial_edits import line_of, with_inertials
+from dynx.rules.rule import Detection, Remedy, Rule
+from dynx.spatial.so3 import rotation_from_rpy
+
+_ROUNDING = 4.0 * float(np.finfo(float).eps)
+
+
+class RootInertialRotated(Rule):
+    """DX106."""
+
+    id = "DX106"
+    name = "root-inertial-rotated"
+    title = "On a fixed base PyBullet takes the axes of the root's inertial frame for those of the world."
+    engines: ClassVar[Mapping[str, str]] = {"pybullet": ">=3.2.7"}
+    advice = "Give the root's tensor in the axes of its link, with rpy zero."
+
+    def detect(self, case: Case) -> Sequence[Detection]:
+        """The root, on the fixed base, where its inertial frame is turned."""
+        model = case.model
+        inertial = next(link.inertial for link in model.links if link.name == model.root)
+        if case.base != "fixed" or inertial is None:
+            return []
+        turn = rotation_from_rpy(np.array(inertial.origin.rpy)) - np.eye(3)
+        if float(np.max(np.abs(turn))) <= _ROUNDING:
+            return []
+        rpy = " ".join(f"{angle:.6g}" for angle in inertial.origin.rpy)
+        message = f"the inertial frame of the root is turned by rpy {rpy}"
+        return [Detection(model.root, None, line_of(case, model.root, "origin"), message)]
+
+    def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy:
+        """The tensor in the axes of the link."""
+        model = case.model
+        old = {link.name: link.inertial for link in model.links}
+        found = {each.link: old[each.link] for each in detections if each.link is not None}
+        new = {name: CentralInertia.of(inertial).aligned() for name, inertial in found.items() if inertial}
+        done = "The tensor of the root is given in the axes of its link, with rpy zero"
+        return Remedy(with_inertials(case, new), done)

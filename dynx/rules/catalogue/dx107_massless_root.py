@@ -1,0 +1,85 @@
+"""DX107 massless-root: a root link of mass zero cannot float
+
+Many robots begin with a link that is only a name, ``base_link`` say, and carry their body on it by a fixed
+joint. With the base fixed this is harmless. With the base free, the root is the body that moves:
+
+- PyBullet 3.2.7 takes mass 0 for "nailed to the world", also with ``useFixedBase=False``: the robot hangs in
+  the air, and its base has no coordinates.
+- MuJoCo 4.0.0 lumps what is welded to the root into it and has no trouble; where nothing is, it refuses the
+  file ("mass and inertia of moving bodies must be larger than mjMINVAL").
+- Pinocchio 4.1.0 and Drake 1.51.1 have no trouble.
+
+The effect: in PyBullet there is no floating robot at all.
+
+What to do: give the root the mass of the body it stands for.
+
+``dynx doctor --fix`` lumps the heaviest link that is welded to the root (directly or by a chain of fixed
+joints) into it; that link gets a zero inertial and keeps its name and its place. It is the same rigid body.
+Where nothing welded to the root has mass, the root gets 2e-15 kg and 1.5e-14 kg m^2, which all engines take
+and no result shows; ``--choose DX107=keep`` leaves it. In a robot without any mass that counts
+as a change of the physics.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import ClassVar, Literal
+
+from dynx.rules.case import Case
+from dynx.rules.impossible_inertia import lumped_into
+from dynx.rules.inertial_edits import with_inertials
+from dynx.rules.massless_links import with_least_inertia
+from dynx.rules.rigid_groups import rigid_groups
+from dynx.rules.rule import Detection, Remedy, Rule
+
+
+class MasslessRoot(Rule):
+    """DX107."""
+
+    id = "DX107"
+    name = "massless-root"
+    title = "With a free base PyBullet nails a robot to the world if its root link has no mass."
+    engines: ClassVar[Mapping[str, str]] = {"pybullet": ">=3.2.7"}
+    advice = "Give the root link the mass of the body it stands for."
+    choices: ClassVar[Mapping[str, str]] = {
+        "lump": "lump the heaviest link welded to the root into it; without one, give it the least mass",
+        "keep": "leave the file as it is; PyBullet then nails the robot to the world",
+    }
+    trap_base: ClassVar[Literal["fixed", "floating"]] = "floating"
+
+    def detect(self, case: Case) -> Sequence[Detection]:
+        """The root, on the floating base, where the file says that its mass is zero."""
+        model = case.model
+        inertial = next(link.inertial for link in model.links if link.name == model.root)
+        # Without an <inertial> PyBullet takes 1 kg (DX101), but for a link named world.
+        weightless = model.root == "world" if inertial is None else inertial.mass == 0.0
+        if case.base != "floating" or not weightless:
+            return []
+        element = case.links[model.root]
+        line = element.line if inertial is None else inertial.line
+        body = self._body(case)
+        where = "nor has anything welded to it" if body is None else f"the body is the link {body}"
+        return [Detection(model.root, None, line, f"the root has no mass; {where}")]
+
+    def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy | None:
+        """The heaviest link that is welded to the root, lumped into it."""
+        root, body = case.model.root, self._body(case)
+        if case.choice(self.id, "lump") == "keep":
+            return None
+        if body is None:
+            choice = f"{self.id}=lump: {self.choices['lump']}; otherwise --choose {self.id}=keep"
+            weightless = not any(link.inertial and link.inertial.mass > 0.0 for link in case.model.links)
+            return Remedy(*with_least_inertia(case, [root]), choice, changes_physics=weightless)
+        bodies = lumped_into(case, rigid_groups(case)[root], (root, body), root)
+        return Remedy(with_inertials(case, bodies), f"The mass of {body} is lumped into the root {root}")
+
+    @staticmethod
+    def _body(case: Case) -> str | None:
+        model = case.model
+        welded = set(rigid_groups(case)[model.root].links)
+        masses = {
+            link.name: link.inertial.mass
+            for link in model.links
+            if link.name in welded and link.inertial is not None and link.inertial.mass > 0.0
+        }
+        return max(masses, key=lambda name: masses[name]) if masses else None

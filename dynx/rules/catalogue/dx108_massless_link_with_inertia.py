@@ -1,0 +1,77 @@
+"""DX108 massless-link-with-inertia: a link of mass zero has moments of inertia
+
+Matter that has moments of inertia has mass. A file can say otherwise: a foot or a sensor whose mass was set
+to zero while its tensor stayed.
+
+- Drake 1.51.1 makes the link weigh 1 kg, with a warning ("condition 'mass > 0' failed").
+- MuJoCo 4.0.0 drops the tensor where the link is welded to another (its default ``fusestatic``), and refuses
+  the file where a joint carries the link.
+- Pinocchio 4.1.0 and PyBullet 3.2.7 calculate with the numbers as they stand, and so does dynx.
+
+The effect: in Drake torques up to 23 times too large (bolt, whose feet these are), in MuJoCo as much as the
+tensor contributes (1e-4 on bolt).
+
+What to do: give the link its mass.
+
+``dynx doctor --fix`` adds the tensor to that of a link with mass that this one is welded to, its parent
+first; the massless link gets a zero tensor. That is the same rigid body. Where there is no such link, the
+link gets a mass of 2e-15 kg, which every engine takes for mass and no result shows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import ClassVar
+
+import numpy as np
+
+from dynx.rules.case import Case
+from dynx.rules.impossible_inertia import lumped_into
+from dynx.rules.inertial_edits import with_inertials
+from dynx.rules.physical_inertia import SMALLEST_MASS
+from dynx.rules.rigid_groups import rigid_groups
+from dynx.rules.rule import Detection, Remedy, Rule
+
+
+class MasslessLinkWithInertia(Rule):
+    """DX108."""
+
+    id = "DX108"
+    name = "massless-link-with-inertia"
+    title = "A link of mass zero has moments of inertia: Drake makes it 1 kg, MuJoCo drops or refuses it."
+    engines: ClassVar[Mapping[str, str]] = {"drake": ">=1.51.1", "mujoco": ">=4.0.0"}
+    advice = "Give the link its mass, or move the tensor into the link it is welded to."
+
+    def detect(self, case: Case) -> Sequence[Detection]:
+        """Links that can move, of mass zero, with a tensor that is not zero."""
+        groups = rigid_groups(case)
+        found = []
+        for link in case.model.links:
+            inertial = link.inertial
+            if inertial is None or inertial.mass != 0.0 or groups[link.name].static:
+                continue
+            largest = float(np.max(np.abs(inertial.tensor)))
+            if largest > 0.0:
+                message = f"the mass is zero, and the largest entry of the tensor {largest:.6g}"
+                found.append(Detection(link.name, None, inertial.line, message))
+        return found
+
+    def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy:
+        """The tensors put where there is mass."""
+        for name in (detection.link for detection in detections):
+            inertials = {link.name: link.inertial for link in case.model.links}
+            inertial = None if name is None else inertials[name]
+            if name is None or inertial is None:
+                continue
+            group = rigid_groups(case)[name]
+            parent = group.parents.get(name)
+            near = [*([parent] if parent else []), *group.children(name), *group.links]
+            heavy = [each for each in near if (body := inertials[each]) is not None and body.mass > 0.0]
+            if heavy:
+                case = with_inertials(case, lumped_into(case, group, (heavy[0], name), heavy[0]))
+            else:
+                case = with_inertials(case, {name: replace(inertial, mass=2.0 * SMALLEST_MASS)})
+        return Remedy(
+            case, "Tensors of links without mass are added to links with mass that they are welded to"
+        )

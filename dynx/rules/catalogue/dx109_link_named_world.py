@@ -1,0 +1,65 @@
+"""DX109 link-named-world: the name "world" has a meaning of its own
+
+URDF gives the name ``world`` no meaning. Engines do. As the root of a robot whose base is fixed it is what
+they expect and harmless. Elsewhere:
+
+- As the root with the base free: Drake 1.51.1 takes the link for the world itself and welds the robot to it.
+  PyBullet 3.2.7 takes the link's mass for zero if it has no ``<inertial>``, and then nails it to the world
+  (any other name would weigh 1 kg). MuJoCo 4.0.0 takes it for its world body, which
+  cannot have a free joint.
+- On a link that is not the root: Drake refuses the file ("form one or more loops"), and MuJoCo drops the
+  mass and the tensor of that link without a word.
+- Pinocchio 4.1.0 does not care.
+
+The effect: a robot that cannot move its base, or (MuJoCo) a mass matrix without that link.
+
+What to do: keep the name ``world`` for the root of a robot that is fixed, and call other links otherwise. If
+the link stands for the ground, load the robot with the base fixed.
+
+``dynx doctor --fix`` renames the link to ``world_link``, in the joints that name it and in ``<gazebo
+reference>`` too. Programs may ask for it by its old name: choose ``--choose DX109=keep`` to leave it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import ClassVar, Literal
+
+from dynx.rules.case import Case
+from dynx.rules.renaming import fresh_name, renaming_link
+from dynx.rules.rule import Detection, Remedy, Rule
+
+_WORLD = "world"
+
+
+class LinkNamedWorld(Rule):
+    """DX109."""
+
+    id = "DX109"
+    name = "link-named-world"
+    title = "A link that is not the ground is named world, which engines take for the ground."
+    engines: ClassVar[Mapping[str, str]] = {"drake": ">=1.51.1", "mujoco": ">=4.0.0"}
+    advice = "Give the link another name, or load the robot with the base fixed."
+    choices: ClassVar[Mapping[str, str]] = {
+        "rename": "give the link another name, wherever the document names it",
+        "keep": "leave the name; Drake and MuJoCo then do otherwise",
+    }
+    trap_base: ClassVar[Literal["fixed", "floating"]] = "floating"
+
+    def detect(self, case: Case) -> Sequence[Detection]:
+        """A link of that name, unless it is the root on the fixed base."""
+        element = case.links.get(_WORLD)
+        root = case.model.root
+        if element is None or (root == _WORLD and case.base == "fixed"):
+            return []
+        what = "the root, though the base is free," if root == _WORLD else f"a link below the root {root}"
+        return [Detection(_WORLD, None, element.line, f"{what} is named world")]
+
+    def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy | None:
+        """Another name that no link has."""
+        if case.choice(self.id, "rename") == "keep":
+            return None
+        name = fresh_name(f"{_WORLD}_link", case.links)
+        source = case.source.edited(*renaming_link(case.source, _WORLD, name))
+        choice = f"{self.id}=rename: {self.choices['rename']}; otherwise --choose {self.id}=keep"
+        return Remedy(case.with_source(source), f"The link {_WORLD} is called {name}", choice)

@@ -1,0 +1,53 @@
+"""DX119 inertia-scaled-for-contact: PyBullet multiplies the inertia of a link by ``<inertia_scaling>``
+
+``<contact><inertia_scaling value="3.0"/></contact>`` is an extension of PyBullet's, meant to make contacts of
+light links steadier. Many files that come with PyBullet, and files copied from them, have it.
+
+- PyBullet 3.2.7 multiplies the moments of inertia of the link by the value, also with
+  ``URDF_USE_INERTIA_FROM_FILE``, and in ``calculateInverseDynamics`` and ``calculateMassMatrix`` too. The
+  mass stays.
+- Pinocchio 4.1, MuJoCo 4.0 and Drake 1.51 do not know the tag. Neither does dynx: it is no property of the
+  robot.
+
+The effect is that of a wrong tensor: a few per cent of the mass matrix at a scale of 3, more for light links
+with reflected inertia.
+
+What to do: take the tag away wherever the dynamics matters. ``dynx doctor --fix`` does so and leaves the rest
+of ``<contact>`` in place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import ClassVar
+
+from dynx.model.xml_source import SourceElement
+from dynx.rules.case import Case
+from dynx.rules.editing import EditingRule, Place, found_at
+from dynx.rules.joint_elements import number_in
+
+
+class InertiaScaledForContact(EditingRule):
+    """DX119."""
+
+    id = "DX119"
+    name = "inertia-scaled-for-contact"
+    title = "A link has inertia_scaling, by which PyBullet alone multiplies its inertia."
+    advice = "Take <inertia_scaling> away."
+    engines: ClassVar[Mapping[str, str]] = {"pybullet": ">=3.2.7"}
+    changed = "took <inertia_scaling> away"
+
+    def places(self, case: Case) -> Iterable[Place]:
+        """Scales other than 1."""
+        for link in case.source.root.all("link"):
+            for contact in link.all("contact"):
+                for scaling in contact.all("inertia_scaling"):
+                    scale = _scale(scaling)
+                    if scale != 1.0:
+                        message = f"PyBullet multiplies the moments of inertia of the link by {scale:g}"
+                        yield Place(found_at(scaling, message), (case.source.removing(scaling),))
+
+
+def _scale(scaling: SourceElement) -> float:
+    """What PyBullet reads: 0 where it finds no number."""
+    return number_in(scaling, "value") or 0.0

@@ -1,0 +1,64 @@
+"""DX201 axis-not-unit: the axis of a joint is a vector whose length is not 1
+
+URDF says that ``<axis xyz="..."/>`` should have length 1. A wrong length says nothing about the direction,
+and most readers scale it away. Typical are axes such as ``0 0 -2`` or ``1 1 0``, and axes that were rounded
+to six digits, ``0.577350 0.577350 0.577350``, whose length is off by 1e-6.
+
+- PyBullet 3.2.7 keeps the axis as it is. A prismatic joint then moves by length times its coordinate, and
+  the positions of all links behind it are wrong in proportion. The simulation (``stepSimulation``) uses the
+  long axis for every type of joint: accelerations are wrong in proportion. ``calculateInverseDynamics``,
+  ``calculateMassMatrix`` and ``calculateJacobian`` scale it to 1, with a warning on stdout, so PyBullet
+  contradicts itself.
+- Pinocchio 4.1, MuJoCo 4.0 and Drake 1.51 scale it to 1. So does dynx.
+- An axis shorter than about 1e-6 counts as zero in MuJoCo and Drake, which refuse the file.
+
+The effect is the deviation of the length from 1: 1e-7 for a rounded axis, 1 for an axis of length 2.
+
+What to do: write unit axes with 17 digits. ``dynx doctor --fix`` writes the axis that dynx uses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import ClassVar
+
+import numpy as np
+
+from dynx.rules.attributes import vector_of
+from dynx.rules.case import Case
+from dynx.rules.editing import EditingRule, Place, found_at
+from dynx.rules.inertial_edits import number
+from dynx.rules.joint_elements import SINGLE, joints_of_type
+
+_ROUNDING = 1e-15
+"""How far from 1 the length of a unit vector can be after rounding; dynx leaves such an axis alone."""
+
+
+class AxisNotUnit(EditingRule):
+    """DX201."""
+
+    id = "DX201"
+    name = "axis-not-unit"
+    title = "The axis of a joint is not a unit vector."
+    advice = "Scale the axis to length 1 and write 17 digits."
+    engines: ClassVar[Mapping[str, str]] = {
+        "pybullet": ">=3.2.7",
+        "mujoco": ">=4.0.0",
+        "drake": ">=1.51.1",
+    }
+    changed = "scaled the axes of joints to length 1"
+
+    def places(self, case: Case) -> Iterable[Place]:
+        """Axes of revolute, continuous and prismatic joints."""
+        for joint in joints_of_type(case, SINGLE):
+            axis = joint.first("axis")
+            written = None if axis is None else vector_of(axis, "xyz")
+            if axis is None or written is None:
+                continue
+            largest = max(map(abs, written))
+            length = largest * float(np.linalg.norm(np.array(written) / largest))
+            if abs(length - 1.0) > _ROUNDING:
+                message = f"the axis {axis.attributes['xyz']} has length {length:.9g}"
+                unit = case.model.joint(joint.attributes["name"]).axis
+                edit = case.source.setting(axis, "xyz", " ".join(map(number, unit)))
+                yield Place(found_at(axis, message), (edit,))

@@ -1,0 +1,63 @@
+"""DX202 axis-without-direction: the axis of a joint that moves is zero, or says nothing
+
+``<axis xyz="0 0 0"/>`` and ``<axis/>`` give no direction to turn about or to slide along. Exporters write the
+first for fixed joints, where nobody looks at it; once the type is changed to ``revolute`` it matters. A joint
+without any ``<axis>`` is fine: URDF's default (1, 0, 0) is used by all engines alike.
+
+- Pinocchio 4.1 loads it. The joint has a coordinate that moves nothing: its row and column of the mass
+  matrix are zero, and forward dynamics gives NaN.
+- PyBullet 3.2.7 loads it. Positions behind the joint are NaN, inverse dynamics and mass matrix fail.
+- MuJoCo 4.0 refuses the file.
+- Drake 1.51 refuses the zero axis, and reads ``<axis/>`` as (1, 0, 0).
+
+What to do: write the direction. The file does not have it, so ``dynx doctor --fix`` takes URDF's default,
+(1, 0, 0). If the joint was never meant to move, ``--choose DX202=fixed`` makes it a fixed joint.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import ClassVar
+
+from dynx.rules.case import Case
+from dynx.rules.editing import EditingRule, Place, found_at
+from dynx.rules.joint_elements import SINGLE, joints_of_type
+from dynx.rules.number_text import is_number
+from dynx.rules.rule import Stage
+
+
+class AxisWithoutDirection(EditingRule):
+    """DX202."""
+
+    id = "DX202"
+    name = "axis-without-direction"
+    title = "The axis of a joint that moves is zero or empty."
+    stage: ClassVar[Stage] = "reading"
+    advice = "Write the direction of the axis, or make the joint fixed."
+    engines: ClassVar[Mapping[str, str]] = {
+        "pinocchio": ">=4.1.0",
+        "pybullet": ">=3.2.7",
+        "mujoco": ">=4.0.0",
+        "drake": ">=1.51.1",
+    }
+    choices: ClassVar[Mapping[str, str]] = {
+        "x": "an axis without direction was made (1, 0, 0), URDF's default",
+        "fixed": "a joint whose axis has no direction was made fixed",
+    }
+    changed = "gave joints without a direction to move in one, or fixed them"
+
+    def places(self, case: Case) -> Iterable[Place]:
+        """Axes of revolute, continuous and prismatic joints."""
+        for joint in joints_of_type(case, SINGLE):
+            axis = joint.first("axis")
+            if axis is None:
+                continue
+            words = axis.attributes.get("xyz", "").split()
+            if any(not is_number(word) or float(word) != 0.0 for word in words):
+                continue
+            if self.chosen(case) == "fixed":
+                edit = case.source.setting(joint, "type", "fixed")
+            else:
+                edit = case.source.setting(axis, "xyz", "1 0 0")
+            what = "is zero" if words else "has no numbers"
+            yield Place(found_at(axis, f"the axis of a {joint.attributes['type']} joint {what}"), (edit,))

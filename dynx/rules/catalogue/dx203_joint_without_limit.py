@@ -1,0 +1,58 @@
+"""DX203 joint-without-limit: a revolute or prismatic joint has no ``<limit>``
+
+URDF demands one: a joint that can turn for ever is called ``continuous``.
+
+- Pinocchio 4.1 and PyBullet 3.2.7 refuse the file.
+- MuJoCo 4.0 and Drake 1.51 read a joint without limits.
+
+A tag spelled wrongly, such as ``<Limit>``, has the same effect: readers do not know it.
+
+What to do: write the limits of the joint. They are not in the file, so ``dynx doctor --fix`` leaves the joint
+without any: a revolute joint becomes ``continuous``, a prismatic one gets the largest double for its limits.
+``--choose DX203=zero`` writes ``lower="0" upper="0"`` instead, the numbers that URDF has for a ``<limit>``
+in which they are not given; the joint then must not move in simulations that keep to limits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import ClassVar
+
+from dynx.model.xml_source import Edit, SourceElement
+from dynx.rules.case import Case
+from dynx.rules.editing import EditingRule, Place, found_at
+from dynx.rules.joint_elements import UNLIMITED, joints_of_type
+from dynx.rules.number_text import LARGEST
+from dynx.rules.rule import Stage
+
+_ZERO = f'<limit lower="0" upper="0" effort="{LARGEST}" velocity="{LARGEST}"/>'
+
+
+class JointWithoutLimit(EditingRule):
+    """DX203."""
+
+    id = "DX203"
+    name = "joint-without-limit"
+    title = "A revolute or prismatic joint has no limit."
+    stage: ClassVar[Stage] = "reading"
+    advice = 'Write the <limit> of the joint, or type="continuous".'
+    engines: ClassVar[Mapping[str, str]] = {"pinocchio": ">=4.1.0", "pybullet": ">=3.2.7"}
+    choices: ClassVar[Mapping[str, str]] = {
+        "unlimited": "joints without limit were left without: revolute ones are now continuous",
+        "zero": "joints without limit got lower and upper limits of 0",
+    }
+    changed = "made joints without limit continuous, or gave them one"
+
+    def places(self, case: Case) -> Iterable[Place]:
+        """Such joints."""
+        for joint in joints_of_type(case, ("revolute", "prismatic")):
+            if joint.first("limit") is None:
+                message = f"the joint is {joint.attributes['type']} and has no <limit>"
+                yield Place(found_at(joint, message), (self._mended(case, joint),))
+
+    def _mended(self, case: Case, joint: SourceElement) -> Edit:
+        if self.chosen(case) == "zero":
+            return case.source.inserting(joint, _ZERO)
+        if joint.attributes["type"] == "revolute":
+            return case.source.setting(joint, "type", "continuous")
+        return case.source.inserting(joint, UNLIMITED)

@@ -1,0 +1,58 @@
+"""DX205 lower-limit-above-upper: the lower limit of a joint is above its upper limit
+
+The two ends were exchanged, or the sign of one was lost.
+
+- Drake 1.51 refuses the file, whose author gets to see a failed condition in Drake's C++ sources. It does
+  so for continuous joints too, whose limits mean nothing.
+- MuJoCo 4.0 and PyBullet 3.2.7 take such limits for no limits at all.
+- Pinocchio 4.1 stores them as they are: random configurations and clamping then misbehave.
+
+The equations of motion do not depend on limits. dynx takes the smaller number for the lower limit.
+
+What to do: put the limits right. ``dynx doctor --fix`` exchanges them. ``--choose DX205=unlimited`` writes
+the largest double in place of both, which is what MuJoCo and PyBullet make of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import ClassVar
+
+from dynx.rules.case import Case
+from dynx.rules.editing import EditingRule, Place, found_at
+from dynx.rules.joint_elements import SINGLE, joints_of_type, number_in
+from dynx.rules.number_text import LARGEST
+from dynx.rules.rule import Stage
+
+
+class LowerLimitAboveUpper(EditingRule):
+    """DX205."""
+
+    id = "DX205"
+    name = "lower-limit-above-upper"
+    title = "The lower limit of a joint is above its upper limit."
+    stage: ClassVar[Stage] = "reading"
+    advice = "Exchange the limits, or correct the one that is wrong."
+    engines: ClassVar[Mapping[str, str]] = {"drake": ">=1.51.1"}
+    choices: ClassVar[Mapping[str, str]] = {
+        "exchange": "a lower limit above the upper was exchanged with it",
+        "unlimited": "limits of which the lower is above the upper were replaced by the largest double",
+    }
+    changed = "put limits in order whose lower was above the upper"
+
+    def places(self, case: Case) -> Iterable[Place]:
+        """Limits of joints that move."""
+        for joint in joints_of_type(case, SINGLE):
+            limit = joint.first("limit")
+            if limit is None:
+                continue
+            lower, upper = number_in(limit, "lower"), number_in(limit, "upper")
+            if lower is None or upper is None or lower <= upper:
+                continue
+            if self.chosen(case) == "unlimited":
+                written = (f"-{LARGEST}", LARGEST)
+            else:
+                written = (limit.attributes["upper"], limit.attributes["lower"])
+            setting = case.source.setting
+            edits = tuple(setting(limit, *each) for each in zip(("lower", "upper"), written, strict=True))
+            yield Place(found_at(limit, f"the lower limit {lower:g} is above the upper {upper:g}"), edits)

@@ -1,0 +1,59 @@
+"""DX206 negative-effort-or-velocity: the largest effort or speed of a joint is negative
+
+``-1`` for "no limit" is a habit from other formats; else a sign slipped in.
+
+- Pinocchio 4.1 refuses the file: "Some components of min_effort are greater than max_effort".
+- Drake 1.51 refuses a negative velocity with a failed condition in its C++ sources; a negative effort means
+  nothing to it.
+- PyBullet 3.2.7 and MuJoCo 4.0 read the file.
+
+The equations of motion do not depend on these limits. dynx reads the number with a note.
+
+What to do: write what was meant. ``dynx doctor --fix`` takes the sign away. Where ``-1`` stands for "no
+limit", ``--choose DX206=unlimited`` writes the largest double instead.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import ClassVar
+
+from dynx.rules.case import Case
+from dynx.rules.editing import EditingRule, Place, found_at
+from dynx.rules.joint_elements import SINGLE, joints_of_type, number_in
+from dynx.rules.number_text import LARGEST
+from dynx.rules.rule import Stage
+
+
+class NegativeEffortOrVelocity(EditingRule):
+    """DX206."""
+
+    id = "DX206"
+    name = "negative-effort-or-velocity"
+    title = "The largest effort or speed of a joint is negative."
+    stage: ClassVar[Stage] = "reading"
+    advice = "Write a limit of at least 0."
+    engines: ClassVar[Mapping[str, str]] = {"pinocchio": ">=4.1.0", "drake": ">=1.51.1"}
+    choices: ClassVar[Mapping[str, str]] = {
+        "absolute": "the sign of negative efforts and velocities was taken away",
+        "unlimited": "negative efforts and velocities were replaced by the largest double",
+    }
+    changed = "made the largest efforts and velocities of joints positive"
+
+    def places(self, case: Case) -> Iterable[Place]:
+        """Limits of joints that move."""
+        for joint in joints_of_type(case, SINGLE):
+            limit = joint.first("limit")
+            if limit is None:
+                continue
+            below = [name for name in ("effort", "velocity") if (number_in(limit, name) or 0.0) < 0.0]
+            if below:
+                said = " and ".join(f"{name}={limit.attributes[name].strip()}" for name in below)
+                edits = tuple(
+                    case.source.setting(limit, name, self._instead(case, limit.attributes[name]))
+                    for name in below
+                )
+                yield Place(found_at(limit, f"<limit> has {said}"), edits)
+
+    def _instead(self, case: Case, written: str) -> str:
+        return LARGEST if self.chosen(case) == "unlimited" else written.strip().removeprefix("-")

@@ -1,0 +1,40 @@
+"""DX207 safety-controller-without-gain: a ``<safety_controller>`` has no ``k_velocity``
+
+The element belongs to the PR2's controllers and to ROS; no engine simulates it. URDF demands its attribute
+``k_velocity`` and makes the others optional.
+
+- Pinocchio 4.1 refuses the file: "joint safety: no k_velocity".
+- PyBullet 3.2.7 and MuJoCo 4.0 do not look at it; Drake 1.51 says that it ignores it.
+
+What to do: take the element away unless a program of yours reads it, or complete it. ``dynx doctor --fix``
+adds ``k_velocity="0"``, with which the controller it describes does nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import ClassVar
+
+from dynx.rules.case import Case
+from dynx.rules.editing import EditingRule, Place, found_at
+from dynx.rules.rule import Stage
+
+
+class SafetyControllerWithoutGain(EditingRule):
+    """DX207."""
+
+    id = "DX207"
+    name = "safety-controller-without-gain"
+    title = "A safety controller has no k_velocity."
+    stage: ClassVar[Stage] = "reading"
+    advice = "Write k_velocity, or take the <safety_controller> away."
+    engines: ClassVar[Mapping[str, str]] = {"pinocchio": ">=4.1.0"}
+    changed = "gave safety controllers without k_velocity one of 0"
+
+    def places(self, case: Case) -> Iterable[Place]:
+        """The first safety controller of every joint."""
+        for joint in case.source.root.all("joint"):
+            controller = joint.first("safety_controller")
+            if controller is not None and "k_velocity" not in controller.attributes:
+                edit = case.source.setting(controller, "k_velocity", "0")
+                yield Place(found_at(controller, "<safety_controller> has no k_velocity"), (edit,))

@@ -1,0 +1,67 @@
+"""DX208 mimic-of-nothing: a ``<mimic>`` has nothing to follow
+
+It names no joint, a joint that is not there, or its own; or it belongs to a fixed joint.
+
+- Drake 1.51 refuses the file in all these cases, with the line.
+- Pinocchio 4.1 refuses a ``<mimic>`` without the attribute ``joint``, MuJoCo 4.0 that and a joint that
+  mimics itself.
+- Otherwise MuJoCo warns and lets the joint move freely, as Pinocchio and PyBullet 3.2.7 do with every mimic
+  joint unless they are told otherwise.
+
+dynx reads a joint that follows one which is not there as moving freely, and refuses one that follows itself.
+
+What to do: name the joint to follow, or take the tag away. ``dynx doctor --fix`` takes it away, so that the
+joint moves freely, as in the engines that load the file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import ClassVar
+
+from dynx.errors import shown
+from dynx.model.xml_source import SourceElement
+from dynx.rules.case import Case
+from dynx.rules.editing import EditingRule, Place, found_at
+from dynx.rules.joint_elements import SINGLE
+from dynx.rules.rule import Stage
+
+
+class MimicOfNothing(EditingRule):
+    """DX208."""
+
+    id = "DX208"
+    name = "mimic-of-nothing"
+    title = "A mimic joint has nothing to follow."
+    stage: ClassVar[Stage] = "reading"
+    advice = "Name the joint to follow, or take <mimic> away."
+    engines: ClassVar[Mapping[str, str]] = {
+        "pinocchio": ">=4.1.0",
+        "mujoco": ">=4.0.0",
+        "drake": ">=1.51.1",
+    }
+    changed = "took <mimic> away from joints that had nothing to follow"
+
+    def places(self, case: Case) -> Iterable[Place]:
+        """The first ``<mimic>`` of every joint."""
+        for joint in case.source.root.all("joint"):
+            mimic = joint.first("mimic")
+            if mimic is None:
+                continue
+            message = _why_nothing(case, joint, mimic)
+            if message is not None:
+                edits = tuple(case.source.removing(each) for each in joint.all("mimic"))
+                yield Place(found_at(mimic, message), edits)
+
+
+def _why_nothing(case: Case, joint: SourceElement, mimic: SourceElement) -> str | None:
+    followed = mimic.attributes.get("joint")
+    if not followed:
+        return "<mimic> names no joint"
+    if followed == joint.attributes.get("name"):
+        return "the joint mimics itself"
+    if followed not in case.joints:
+        return f"the joint mimics {shown(followed)}, which does not exist"
+    if joint.attributes.get("type") not in SINGLE:
+        return f"the joint mimics {shown(followed)} and is {joint.attributes.get('type', 'of no type')}"
+    return None

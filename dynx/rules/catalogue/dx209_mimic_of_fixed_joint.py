@@ -1,0 +1,73 @@
+"""DX209 mimic-of-fixed-joint: a joint follows one that cannot move
+
+The joint it follows was made fixed (a gripper that is not used, say) and the followers were forgotten. By
+what ``<mimic>`` means they cannot move either: their value is the offset.
+
+- Drake 1.51 refuses the file: a joint of one coordinate cannot mimic one of none.
+- MuJoCo 4.0 warns and lets the joint move freely.
+- Pinocchio 4.1 and PyBullet 3.2.7 let every mimic joint move freely unless they are told otherwise, and
+  Pinocchio told otherwise (``mimic=True``) refuses the file.
+
+dynx reads the joint as fixed at its offset. The effect of the freedom that the other engines see is one
+coordinate more in every vector and matrix.
+
+What to do: make the joint fixed. ``dynx doctor --fix`` does so, and moves its origin by the offset. If it was
+meant to move by itself, ``--choose DX209=free`` takes ``<mimic>`` away instead.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import ClassVar
+
+from dynx.errors import shown
+from dynx.model.elements import Joint
+from dynx.model.xml_source import Edit, SourceElement
+from dynx.rules.case import Case
+from dynx.rules.editing import EditingRule, Place, found_at
+from dynx.rules.inertial_edits import number
+from dynx.rules.joint_elements import SINGLE, joints_of_type
+
+
+class MimicOfFixedJoint(EditingRule):
+    """DX209."""
+
+    id = "DX209"
+    name = "mimic-of-fixed-joint"
+    title = "A mimic joint follows a joint that cannot move."
+    advice = "Make the follower fixed too."
+    engines: ClassVar[Mapping[str, str]] = {"drake": ">=1.51.1"}
+    choices: ClassVar[Mapping[str, str]] = {
+        "fixed": "a joint that mimics a fixed one was made fixed at its offset",
+        "free": "a joint that mimics a fixed one was made to move freely",
+    }
+    changed = "settled joints that mimic a fixed one"
+
+    def places(self, case: Case) -> Iterable[Place]:
+        """Joints that move by their type and have a ``<mimic>``, and are fixed to dynx."""
+        known = {joint.name: joint for joint in case.model.joints}
+        for element in joints_of_type(case, SINGLE):
+            mimic = element.first("mimic")
+            joint = known[element.attributes["name"]]
+            if mimic is None or joint.moves:
+                continue
+            message = f"the joint mimics {shown(mimic.attributes['joint'])}, which cannot move"
+            yield Place(found_at(mimic, message), tuple(self._edits(case, element, joint)))
+
+    def _edits(self, case: Case, element: SourceElement, joint: Joint) -> Iterable[Edit]:
+        source = case.source
+        for mimic in element.all("mimic"):
+            yield source.removing(mimic)
+        if self.chosen(case) == "free":
+            return
+        yield source.setting(element, "type", "fixed")
+        if not joint.locked_at:
+            return
+        texts = {name: " ".join(map(number, getattr(joint.origin, name))) for name in ("xyz", "rpy")}
+        origin = element.first("origin")
+        if origin is None:
+            words = " ".join(f'{name}="{text}"' for name, text in texts.items())
+            yield source.inserting(element, f"<origin {words}/>", first=True)
+        else:
+            for name, text in texts.items():
+                yield source.setting(origin, name, text)

@@ -1,0 +1,65 @@
+"""DX210 joint-of-several-freedoms: a joint is spherical, planar or floating
+
+URDF knows ``planar`` and ``floating``; ``spherical`` and ``ball`` are extensions. Readers differ more over
+them than over anything else:
+
+- ``spherical``: Pinocchio 4.1 and Drake 1.51 refuse the file. PyBullet 3.2.7 reads it; mass matrix and
+  inverse dynamics then have other coordinates than the joint states or fail. MuJoCo 4.0 reads it with
+  quaternions, and refuses the usual limits on it. ``ball`` is read by none.
+- ``planar``: Pinocchio has (x, y, cos, sin), MuJoCo and Drake three joints or coordinates; PyBullet
+  moves it but cannot do dynamics.
+- ``floating`` in the middle of a tree: Pinocchio has a quaternion; PyBullet makes the joint FIXED, with a
+  line on stdout; MuJoCo and Drake refuse it or leave the link free in the world.
+
+dynx has no such joint and refuses the file.
+
+What to do: write joints of one freedom each, with massless links between them. ``dynx doctor --fix`` does
+so: three turns for a spherical joint, two slides and a turn for a planar one, three slides and three turns
+for a floating one. The chain moves alike; its coordinates are angles, singular where the middle turn is
+at 90 degrees, and limits of the joint are dropped. MuJoCo refuses massless links that move; DX110 says what
+is done about that. ``--choose DX210=fixed`` makes the joint fixed instead.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import ClassVar
+
+from dynx.model.xml_source import Edit
+from dynx.rules.case import Case
+from dynx.rules.editing import EditingRule, Place, found_at
+from dynx.rules.joint_elements import joints_of_type
+from dynx.rules.joint_splitting import TYPES, splitting
+from dynx.rules.rule import Stage
+
+
+class JointOfSeveralFreedoms(EditingRule):
+    """DX210."""
+
+    id = "DX210"
+    name = "joint-of-several-freedoms"
+    title = "A joint is spherical, planar or floating."
+    stage: ClassVar[Stage] = "reading"
+    advice = "Write joints of one freedom each, with massless links between them."
+    engines: ClassVar[Mapping[str, str]] = {
+        "pinocchio": ">=4.1.0",
+        "pybullet": ">=3.2.7",
+        "drake": ">=1.51.1",
+    }
+    choices: ClassVar[Mapping[str, str]] = {
+        "split": "a joint of several freedoms was split into joints of one, without its limits",
+        "fixed": "a joint of several freedoms was made fixed",
+    }
+    changed = "replaced joints of several freedoms"
+
+    def places(self, case: Case) -> Iterable[Place]:
+        """Such joints, but for a floating one below an empty root, which DX211 is about."""
+        for joint in joints_of_type(case, TYPES):
+            kind = joint.attributes["type"]
+            if not joint.attributes.get("name") or (kind == "floating" and case.readable):
+                continue
+            if self.chosen(case) == "fixed":
+                edits: tuple[Edit, ...] = (case.source.setting(joint, "type", "fixed"),)
+            else:
+                edits = tuple(splitting(case.source, joint))
+            yield Place(found_at(joint, f"the joint is {kind}"), edits)

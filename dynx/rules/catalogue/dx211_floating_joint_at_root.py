@@ -1,0 +1,45 @@
+"""DX211 floating-joint-at-root: an empty root link carries the robot by a floating joint
+
+Some files say in this way that the robot moves freely: a link ``world`` without inertia, a joint of type
+``floating``, and the robot below it. Whether the base is fixed or free is then said twice, in the file and
+in the call that loads it.
+
+- PyBullet 3.2.7 makes the joint fixed, with a line on stdout. Then ``useFixedBase`` decides.
+- Pinocchio 4.1 gives the joint seven coordinates; ``JointModelFreeFlyer`` as a root joint gives seven more.
+  The other joints are right as long as the seven are held.
+- MuJoCo 4.0 makes it a free joint whatever is below.
+- Drake 1.51 does not know the type; it leaves the child free in the world and its quaternion at zero.
+
+dynx reads the joint as fixed and leaves the decision to ``base=``.
+
+What to do: say it in one place. ``dynx doctor --fix`` makes the joint fixed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import ClassVar
+
+from dynx.rules.case import Case
+from dynx.rules.editing import EditingRule, Place, found_at
+from dynx.rules.joint_elements import joints_of_type
+
+
+class FloatingJointAtRoot(EditingRule):
+    """DX211."""
+
+    id = "DX211"
+    name = "floating-joint-at-root"
+    title = "A floating joint below an empty root says that the base moves freely."
+    advice = "Make the joint fixed, and say in the loading call whether the base is free."
+    engines: ClassVar[Mapping[str, str]] = {
+        "mujoco": ">=4.0.0",
+        "drake": ">=1.51.1",
+    }
+    changed = "made the floating joint below the root fixed: the loading call says whether the base is free"
+
+    def places(self, case: Case) -> Iterable[Place]:
+        """The joint, of which there is at most one that dynx can read."""
+        for joint in joints_of_type(case, ("floating",)):
+            edit = case.source.setting(joint, "type", "fixed")
+            yield Place(found_at(joint, "the joint below the root is floating"), (edit,))

@@ -1,0 +1,96 @@
+"""DX212 too-many-joints: the robot has more joints than PyBullet can tell the state of
+
+PyBullet 3.2.7 has room for 127 joints, and counts fixed ones. From the 128th on ``getJointState`` and
+``getLinkState`` fail, so there are no positions; above 128 coordinates ``calculateInverseDynamics``,
+``calculateMassMatrix`` and ``calculateJacobian`` answer wrongly and say nothing (20 % at 129). Hands with
+sensors and robots with many named frames get there: ``tiago_dual`` of example-robot-data has 129 joints.
+
+Pinocchio 4.1, MuJoCo 4.0 and Drake 1.51 have no such bound.
+
+What to do: drop what PyBullet does not need. ``dynx doctor --fix`` takes links away that have no mass,
+nothing attached to them and a fixed joint: frames, in other words. It takes as few as are needed, those
+without shapes and at the end of the file first. The dynamics stays; programs that ask for these frames need
+the original file. ``--choose DX212=keep`` leaves them in, and PyBullet out. Where there are not enough of
+them, or too many joints move, nothing mends it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import ClassVar
+
+from dynx.model import Model
+from dynx.model.elements import Link
+from dynx.rules.case import Case
+from dynx.rules.rule import Detection, Remedy, Rule
+
+MOST = 127
+"""Joints, fixed ones included."""
+
+
+class TooManyJoints(Rule):
+    """DX212."""
+
+    id = "DX212"
+    name = "too-many-joints"
+    title = "The robot has more joints than PyBullet can tell the state of."
+    advice = "Drop links that are mere frames from the file for PyBullet."
+    engines: ClassVar[Mapping[str, str]] = {"pybullet": ">=3.2.7"}
+    choices: ClassVar[Mapping[str, str]] = {
+        "drop": "frames without mass at the ends of the robot were taken away until 127 joints were left",
+        "keep": "all links were kept, so PyBullet cannot hold the robot",
+    }
+
+    def detect(self, case: Case) -> Sequence[Detection]:
+        """The first joint too many, in document order."""
+        joints = case.source.root.all("joint")
+        if len(joints) <= MOST:
+            return []
+        message = f"the robot has {len(joints)} joints, fixed ones included; PyBullet holds {MOST}"
+        return [Detection(None, None, joints[MOST].line, message)]
+
+    def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy | None:
+        """Without as many frames as it has joints too many."""
+        excess = len(case.joints) - MOST
+        if case.choice(self.id, "drop") == "keep" or excess <= 0:
+            return None
+        dropped = _frames(case)[:excess]
+        if len(dropped) < excess:
+            return None
+        source, carriers = case.source, {joint.child: joint.name for joint in case.model.joints}
+        edits = []
+        for name in dropped:
+            edits += [source.removing(case.links[name]), source.removing(case.joints[carriers[name]])]
+        return Remedy(
+            case.with_source(source.edited(*edits)),
+            f"took {len(dropped)} links away that are mere frames",
+            f"{self.id} {self.name}: {self.choices['drop']} (otherwise: --choose {self.id}=keep)",
+        )
+
+
+def _frames(case: Case) -> list[str]:
+    """Links that can go, a link before the one that carries it; those without shapes first, then from the
+    end of the document."""
+    plain: list[str] = []
+    shaped: list[str] = []
+    for name in _massless_ends(case.model):
+        shapes = case.links[name].all("visual") + case.links[name].all("collision")
+        (shaped if shapes else plain).append(name)
+    return plain + shaped
+
+
+def _massless_ends(model: Model) -> Iterator[str]:
+    attached = dict.fromkeys((link.name for link in model.links), 0)
+    for joint in model.joints:
+        attached[joint.parent] += 1
+    links = {link.name: link for link in model.links}
+    # Depth-first order lists a link before what hangs on it, so backwards the ends come first.
+    for joint in reversed(model.joints):
+        if joint.type == "fixed" and not attached[joint.child] and not _has_inertia(links[joint.child]):
+            attached[joint.parent] -= 1
+            yield joint.child
+
+
+def _has_inertia(link: Link) -> bool:
+    inertial = link.inertial
+    return inertial is not None and (inertial.mass != 0.0 or bool(inertial.tensor.any()))

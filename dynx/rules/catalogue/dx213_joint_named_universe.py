@@ -1,0 +1,48 @@
+"""DX213 joint-named-universe: a fixed joint has the name that Pinocchio gives to the world
+
+Pinocchio 4.1 keeps a list of frames that begins with an entry ``universe``, which is the world. A fixed joint
+becomes a frame of its name, and is looked up by that name when the link behind it is attached: found is
+the world. The file loads without a word, and the robot has lost the mass behind the joint. The mass matrix
+was off by 40 % for a tool at the end of an arm.
+
+A joint of that name that moves does no harm to the model, but ``model.getJointId("universe")`` is the world
+and not that joint.
+
+PyBullet 3.2.7, MuJoCo 4.0 and Drake 1.51 read the file as it is meant. A link named ``universe`` is fine in
+all four.
+
+What to do: give the joint another name. ``dynx doctor --fix`` calls it ``universe_joint``, in mimic joints,
+transmissions and Gazebo references too; programs that look the joint up by its name must be changed
+with it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import ClassVar
+
+from dynx.rules.case import Case
+from dynx.rules.editing import EditingRule, Place, found_at
+from dynx.rules.renaming import fresh_name, renaming_joint
+
+_RESERVED = "universe"
+
+
+class JointNamedUniverse(EditingRule):
+    """DX213."""
+
+    id = "DX213"
+    name = "joint-named-universe"
+    title = "A fixed joint is named universe, which is Pinocchio's name for the world."
+    advice = "Give the joint another name."
+    engines: ClassVar[Mapping[str, str]] = {"pinocchio": ">=4.1.0"}
+    changed = "gave the joint named universe another name"
+
+    def places(self, case: Case) -> Iterable[Place]:
+        """The fixed joint of that name."""
+        joint = case.joints.get(_RESERVED)
+        if joint is None or joint.attributes.get("type") != "fixed":
+            return
+        new = fresh_name(f"{_RESERVED}_joint", case.joints)
+        edits = tuple(renaming_joint(case.source, _RESERVED, new))
+        yield Place(found_at(joint, "the joint has the name of Pinocchio's world"), edits)

@@ -1,0 +1,58 @@
+"""DX214 transmission-of-nothing: a ``<transmission>`` lacks a part, or is about a joint that is not there
+
+Transmissions belong to ROS and its controllers. Of the engines only Drake looks at them, and it is strict:
+
+- Drake 1.51 refuses the file where a transmission has no type, no ``<joint>`` or no ``<actuator>`` with a
+  name, or names a joint that the file does not have. It passes over types other than
+  ``SimpleTransmission``.
+- Pinocchio 4.1, PyBullet 3.2.7 and MuJoCo 4.0 pass transmissions over.
+
+What to do: complete the transmission or take it away. ``dynx doctor --fix`` takes it away; nothing in the
+dynamics depends on it. ROS controllers that were meant to use it need it completed instead.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import ClassVar
+
+from dynx.errors import shown
+from dynx.model.xml_source import SourceElement
+from dynx.rules.case import Case
+from dynx.rules.editing import EditingRule, Place, found_at
+from dynx.rules.rule import Stage
+from dynx.rules.transmissions import transmissions_drake_reads, type_of
+
+
+class TransmissionOfNothing(EditingRule):
+    """DX214."""
+
+    id = "DX214"
+    name = "transmission-of-nothing"
+    title = "A transmission lacks a part, or is about a joint that is not there."
+    stage: ClassVar[Stage] = "reading"
+    advice = "Complete the <transmission>, or take it away."
+    engines: ClassVar[Mapping[str, str]] = {"drake": ">=1.51.1"}
+    changed = "took transmissions away that lack a part or a joint"
+
+    def places(self, case: Case) -> Iterable[Place]:
+        """Such transmissions, of those that Drake reads."""
+        for transmission in transmissions_drake_reads(case):
+            message = _fault(case, transmission)
+            if message is not None:
+                yield Place(found_at(transmission, message), (case.source.removing(transmission),))
+
+
+def _fault(case: Case, transmission: SourceElement) -> str | None:
+    if type_of(case, transmission) is None:
+        return "<transmission> has no type"
+    for tag in ("actuator", "joint"):
+        part = transmission.first(tag)
+        if part is None:
+            return f"<transmission> has no <{tag}>"
+        name = part.attributes.get("name", "")
+        if not name:
+            return f"<{tag}> of <transmission> has no name"
+    return (
+        None if name in case.joints else f"<transmission> is about joint {shown(name)}, which does not exist"
+    )

@@ -1,0 +1,63 @@
+"""DX215 actuator-named-twice: the actuators of two transmissions have the same name
+
+Transmissions belong to ROS, where each stands by itself. Drake 1.51 reads them and makes an actuator of each,
+and its actuators need names of their own: it refuses the file, "already contains a joint actuator named".
+
+Pinocchio 4.1, PyBullet 3.2.7 and MuJoCo 4.0 pass transmissions over.
+
+Transmissions of fixed joints, and of other types than ``SimpleTransmission``, do not count.
+
+Copying a transmission and changing its joint alone is enough; ``xarm6_robot.urdf``, which comes with
+PyBullet, has two actuators ``motor3``.
+
+What to do: give each actuator a name of its own. ``dynx doctor --fix`` adds a number to the later ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import ClassVar
+
+from dynx.errors import shown
+from dynx.model.xml_source import SourceElement
+from dynx.rules.case import Case
+from dynx.rules.editing import EditingRule, Place, found_at
+from dynx.rules.renaming import fresh_name
+from dynx.rules.rule import Stage
+from dynx.rules.transmissions import transmissions_drake_reads
+
+
+class ActuatorNamedTwice(EditingRule):
+    """DX215."""
+
+    id = "DX215"
+    name = "actuator-named-twice"
+    title = "The actuators of two transmissions have the same name."
+    stage: ClassVar[Stage] = "reading"
+    advice = "Give each actuator a name of its own."
+    engines: ClassVar[Mapping[str, str]] = {"drake": ">=1.51.1"}
+    changed = "gave actuators of the same name different ones"
+
+    def places(self, case: Case) -> Iterable[Place]:
+        """Actuators, of those that Drake makes, whose name was there before."""
+        actuators = list(_actuators(case))
+        taken = {each.attributes["name"] for each in actuators}
+        seen = set()
+        for actuator in actuators:
+            name = actuator.attributes["name"]
+            if name in seen:
+                new = fresh_name(name, taken)
+                taken.add(new)
+                edit = case.source.setting(actuator, "name", new)
+                yield Place(found_at(actuator, f"a further actuator has the name {shown(name)}"), (edit,))
+            seen.add(name)
+
+
+def _actuators(case: Case) -> Iterator[SourceElement]:
+    for transmission in transmissions_drake_reads(case):
+        actuator, joint = transmission.first("actuator"), transmission.first("joint")
+        moved = case.joints.get("" if joint is None else joint.attributes.get("name", ""))
+        if actuator is None or "name" not in actuator.attributes:
+            continue
+        if moved is not None and moved.attributes.get("type") != "fixed":
+            yield actuator

@@ -1,0 +1,55 @@
+"""DX301 damping-in-inverse-dynamics: a joint has damping, which some engines add to the torque
+
+``<dynamics damping="0.5"/>`` resists the speed of a joint. Whether inverse dynamics contains it is a
+convention, and there are two:
+
+- Pinocchio 4.1 (``rnea``) and PyBullet 3.2.7 (``calculateInverseDynamics``): rigid bodies alone.
+- MuJoCo 4.0 (``mj_inverse``): damping times velocity is added.
+- Drake 1.51 (``CalcInverseDynamics`` with the plant's force elements): likewise.
+- Forward dynamics: PyBullet's ``stepSimulation``, MuJoCo and Drake damp, Pinocchio's ``aba`` does not.
+
+The effect is damping times velocity, often a few per cent of the torque, and all of it at low inertia.
+
+What to do: decide which one you want, and add ``damping * v`` to Pinocchio's torque or switch it off in the
+others. The file is right, so ``dynx doctor --fix`` does not change it. dynx gives the rigid-body answer
+unless asked for ``joint_dynamics=True``; doctor compares that, and prints the calls that make each engine
+leave damping out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
+
+from dynx.rules.case import Case
+from dynx.rules.editing import CallingRule, found_at
+from dynx.rules.joint_elements import SINGLE, joints_of_type, number_in
+from dynx.rules.rule import Detection
+
+
+class DampingInInverseDynamics(CallingRule):
+    """DX301."""
+
+    id = "DX301"
+    name = "damping-in-inverse-dynamics"
+    title = "A joint has damping, which some engines add to the torque and others do not."
+    advice = "Decide whether torques include damping, and tell each engine."
+    engines: ClassVar[Mapping[str, str]] = {
+        "pybullet": ">=3.2.7",
+        "mujoco": ">=4.0.0",
+        "drake": ">=1.51.1",
+    }
+    calls: ClassVar[tuple[str, ...]] = ("pybullet.no_damping", "mujoco.no_damping", "drake.no_damping")
+    changed = "compared without joint damping"
+
+    def detect(self, case: Case) -> Sequence[Detection]:
+        """Joints that move with a damping that is not zero; none once the calls are made."""
+        if case.calls.issuperset(self.calls):
+            return []
+        found = []
+        for joint in joints_of_type(case, SINGLE):
+            dynamics = joint.first("dynamics")
+            damping = None if dynamics is None else number_in(dynamics, "damping")
+            if dynamics is not None and damping:
+                found.append(found_at(dynamics, f"the joint has damping {damping:g}"))
+        return found

@@ -1,0 +1,49 @@
+"""DX302 friction-in-inverse-dynamics: a joint has dry friction, which MuJoCo adds to the torque
+
+``<dynamics friction="0.2"/>`` is a force against the motion, whatever the speed.
+
+- MuJoCo 4.0 reads it as ``frictionloss``, a constraint. ``mj_inverse`` adds what the constraint takes, up to
+  the friction times the sign of the velocity; at low speed, where the constraint can hold the joint, less.
+- Pinocchio 4.1 stores it and leaves it to the user. PyBullet 3.2.7 does not use it in inverse dynamics.
+  Drake 1.51 warns that it has no dry friction.
+
+The effect is the friction itself, a few per cent of the torque for a geared arm.
+
+What to do: decide which one you want. The file is right, so ``dynx doctor --fix`` does not change it. dynx
+gives the rigid-body answer unless asked for ``joint_dynamics=True``; doctor compares that, and prints the
+call that makes MuJoCo leave friction out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
+
+from dynx.rules.case import Case
+from dynx.rules.editing import CallingRule, found_at
+from dynx.rules.joint_elements import SINGLE, joints_of_type, number_in
+from dynx.rules.rule import Detection
+
+
+class FrictionInInverseDynamics(CallingRule):
+    """DX302."""
+
+    id = "DX302"
+    name = "friction-in-inverse-dynamics"
+    title = "A joint has dry friction, which MuJoCo adds to the torque and others do not."
+    advice = "Decide whether torques include friction, and tell MuJoCo."
+    engines: ClassVar[Mapping[str, str]] = {"mujoco": ">=4.0.0"}
+    calls: ClassVar[tuple[str, ...]] = ("mujoco.no_friction",)
+    changed = "compared without dry friction"
+
+    def detect(self, case: Case) -> Sequence[Detection]:
+        """Joints that move with a friction that is not zero; none once the call is made."""
+        if case.calls.issuperset(self.calls):
+            return []
+        found = []
+        for joint in joints_of_type(case, SINGLE):
+            dynamics = joint.first("dynamics")
+            friction = None if dynamics is None else number_in(dynamics, "friction")
+            if dynamics is not None and friction:
+                found.append(found_at(dynamics, f"the joint has dry friction {friction:g}"))
+        return found

@@ -1,0 +1,48 @@
+"""DX303 negative-damping: a joint's damping is negative, so it drives itself
+
+- Drake 1.51 refuses the file: "joint damping must be nonnegative".
+- MuJoCo 4.0 and PyBullet 3.2.7 simulate a joint that is faster the faster it is.
+- Pinocchio 4.1 stores the number and does not use it.
+
+Nothing in the rigid-body dynamics depends on it; with ``joint_dynamics=True`` dynx uses the number as it
+stands, with a note.
+
+What to do: correct the sign. ``dynx doctor --fix`` takes it away. ``--choose DX303=zero`` writes 0 instead.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import ClassVar
+
+from dynx.rules.case import Case
+from dynx.rules.editing import EditingRule, Place, found_at
+from dynx.rules.joint_elements import SINGLE, joints_of_type, number_in
+from dynx.rules.rule import Stage
+
+
+class NegativeDamping(EditingRule):
+    """DX303."""
+
+    id = "DX303"
+    name = "negative-damping"
+    title = "The damping of a joint is negative."
+    stage: ClassVar[Stage] = "reading"
+    advice = "Write a damping of at least 0."
+    engines: ClassVar[Mapping[str, str]] = {"drake": ">=1.51.1"}
+    choices: ClassVar[Mapping[str, str]] = {
+        "absolute": "the sign of a negative damping was taken away",
+        "zero": "a negative damping was made zero",
+    }
+    changed = "made the damping of joints positive or zero"
+
+    def places(self, case: Case) -> Iterable[Place]:
+        """Joints that move."""
+        for joint in joints_of_type(case, SINGLE):
+            dynamics = joint.first("dynamics")
+            if dynamics is None or (number_in(dynamics, "damping") or 0.0) >= 0.0:
+                continue
+            written = dynamics.attributes["damping"].strip()
+            instead = "0" if self.chosen(case) == "zero" else written.removeprefix("-")
+            edit = case.source.setting(dynamics, "damping", instead)
+            yield Place(found_at(dynamics, f"the joint has damping {written}"), (edit,))

@@ -1,0 +1,52 @@
+"""DX306 limits-as-forces: a joint has equal limits, so that it is beyond them wherever it is
+
+``<limit lower="-2" upper="2"/>`` says where a joint can be. What happens beyond is not in URDF, and a joint
+whose limits are equal, or not given (URDF then has 0 for both), is beyond them everywhere else.
+
+- Pinocchio 4.1 and Drake 1.51: nothing. Inverse and forward dynamics know of no limit (Drake's discrete
+  simulation does).
+- MuJoCo 4.0: a joint beyond its limit is pushed back by a constraint force, and ``mj_inverse`` adds that
+  force to the torque. It is not small: a hundred times the torque was measured.
+  MuJoCo takes equal limits for none, with a warning.
+- PyBullet 3.2.7: ``stepSimulation`` pushes the joint back to the limit, equal ones included;
+  ``calculateInverseDynamics`` knows of none.
+
+Within limits that leave a joint some room all engines agree, and doctor compares there. A joint with equal
+limits is compared anywhere, because the equations of motion have no limits.
+
+What to do: write the range of the joint, or ``type="fixed"`` (see DX508). Which of the two is not in the
+file, so ``dynx doctor --fix`` does not change it; doctor prints the calls that switch limits off.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
+
+from dynx.rules.case import Case
+from dynx.rules.editing import CallingRule, found_at
+from dynx.rules.rule import Detection
+
+
+class LimitsAsForces(CallingRule):
+    """DX306."""
+
+    id = "DX306"
+    name = "limits-as-forces"
+    title = "A joint has equal limits, to which some engines push it back."
+    advice = "Write the range of the joint, or switch its limits off."
+    engines: ClassVar[Mapping[str, str]] = {"pybullet": ">=3.2.7"}
+    calls: ClassVar[tuple[str, ...]] = ("pybullet.no_limits", "mujoco.no_limits")
+    changed = "compared without joint limits"
+
+    def detect(self, case: Case) -> Sequence[Detection]:
+        """Joints with limits and no room between them; none once the calls are made."""
+        if case.calls.issuperset(self.calls):
+            return []
+        found = []
+        for joint in case.model.joints:
+            limit = case.joints[joint.name].first("limit")
+            if limit is not None and joint.moves and joint.limits.lower == joint.limits.upper:
+                message = f"the lower and the upper limit of the joint are {joint.limits.lower:g}"
+                found.append(found_at(limit, message))
+        return found

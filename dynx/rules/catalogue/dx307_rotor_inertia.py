@@ -1,0 +1,54 @@
+"""DX307 rotor-inertia: an actuator has a rotor whose inertia Drake adds to the joint
+
+``<drake:rotor_inertia value="0.001"/>`` and ``<drake:gear_ratio value="10"/>`` in the ``<actuator>`` of a
+``<transmission>`` are an extension of Drake's. A rotor behind a gear of ratio n resists the joint with n^2
+times its own inertia.
+
+- Drake 1.51 adds that to the diagonal of the mass matrix and to inverse dynamics.
+- Pinocchio 4.1, PyBullet 3.2.7 and MuJoCo 4.0 do not know the tags. Neither does dynx.
+
+The effect is the reflected inertia: for a geared arm often as large as that of the links.
+
+What to do: decide whether the rotors belong to your robot. Pinocchio has ``model.armature`` for them, MuJoCo
+``dof_armature``, dynx ``<dynamics armature="...">``. The file is right, so ``dynx doctor --fix`` does not
+change it; doctor compares the links alone and prints the call that makes Drake leave rotors out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
+
+from dynx.rules.case import Case
+from dynx.rules.editing import CallingRule
+from dynx.rules.joint_elements import number_in
+from dynx.rules.rule import Detection
+
+_TAG = "drake:rotor_inertia"
+
+
+class RotorInertia(CallingRule):
+    """DX307."""
+
+    id = "DX307"
+    name = "rotor-inertia"
+    title = "An actuator has a rotor inertia, which Drake alone adds to its joint."
+    advice = "Decide whether rotors belong to the robot, and tell each engine."
+    engines: ClassVar[Mapping[str, str]] = {"drake": ">=1.51.1"}
+    calls: ClassVar[tuple[str, ...]] = ("drake.no_rotors",)
+    changed = "compared without rotors"
+
+    def detect(self, case: Case) -> Sequence[Detection]:
+        """Actuators with a rotor inertia that is not zero; none once the call is made."""
+        if case.calls.issuperset(self.calls):
+            return []
+        found = []
+        for transmission in case.source.root.all("transmission"):
+            joint = transmission.first("joint")
+            for actuator in transmission.all("actuator"):
+                for rotor in actuator.all(_TAG):
+                    inertia = number_in(rotor, "value")
+                    if inertia and joint is not None:
+                        message = f"the actuator of the joint has a rotor of {inertia:g} kg m2"
+                        found.append(Detection(None, joint.attributes.get("name"), rotor.line, message))
+        return found

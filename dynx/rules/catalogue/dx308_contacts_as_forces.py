@@ -1,0 +1,56 @@
+"""DX308 contacts-as-forces: links have collision shapes, whose contacts MuJoCo adds to the torque
+
+``<collision>`` says which shape a link has for contacts. Two links that touch, or overlap because their
+shapes are larger than the links, push each other apart in a simulation.
+
+- MuJoCo 4.0: ``mj_inverse`` finds the contacts of the configuration and adds their forces to the torque.
+  Shapes of a link and its parent are left out, those of other pairs are not. Where shapes overlap by
+  design, the torque is off by any amount.
+- Pinocchio 4.1 (``rnea``) and PyBullet 3.2.7 (``calculateInverseDynamics``) know of no contacts; PyBullet
+  simulates contacts of a robot with itself only when asked to by a flag. Drake 1.51 has them where a
+  scene graph is connected, and not in inverse dynamics.
+
+What to do: know whether your torques contain contacts. The file is right, so ``dynx doctor --fix`` does not
+change it; doctor compares without contacts and prints the call that makes MuJoCo leave them out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
+
+from dynx.model.xml_source import SourceElement
+from dynx.rules.case import Case
+from dynx.rules.editing import CallingRule
+from dynx.rules.rule import Detection
+
+
+class ContactsAsForces(CallingRule):
+    """DX308."""
+
+    id = "DX308"
+    name = "contacts-as-forces"
+    title = "Links have collision shapes, whose contacts MuJoCo adds to the torque."
+    advice = "Switch contacts off where the rigid-body answer is wanted."
+    engines: ClassVar[Mapping[str, str]] = {"mujoco": ">=4.0.0"}
+    calls: ClassVar[tuple[str, ...]] = ("mujoco.no_contacts",)
+    changed = "compared without contacts"
+
+    def detect(self, case: Case) -> Sequence[Detection]:
+        """The robot, where two of its links have shapes; none once the call is made."""
+        if case.calls.issuperset(self.calls):
+            return []
+        shaped = [link for link in case.source.root.all("link") if _shape(link) is not None]
+        first = _shape(shaped[0]) if len(shaped) > 1 else None
+        if first is None:
+            return []
+        message = f"{len(shaped)} links have collision shapes, which may touch"
+        return [Detection(None, None, first.line, message)]
+
+
+def _shape(link: SourceElement) -> SourceElement | None:
+    """The first collision of a link that is no mesh; doctor compares without meshes."""
+    for collision in link.all("collision"):
+        if not any(element.tag == "mesh" for element in collision.walk()):
+            return collision
+    return None

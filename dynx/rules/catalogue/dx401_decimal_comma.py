@@ -1,0 +1,63 @@
+"""DX401 decimal-comma: a number is written with a comma, as in ``<mass value="2,5"/>``
+
+URDF writes decimals with a point whatever the language of the computer, and so does XML Schema. Programs
+that print numbers by the locale in force (a CAD exporter on a German or French computer) write a comma.
+
+No two engines do the same with it:
+
+- Pinocchio 4.1: in an ``<inertial>`` the whole inertial is dropped with a line on stderr, so the link
+  weighs nothing; in a ``<joint>`` the file is refused.
+- PyBullet 3.2.7 reads up to the comma: ``2,5`` is 2, ``0,03`` is 0. It says nothing. In a vector it
+  does so with each of the three numbers.
+- MuJoCo 4.0 refuses the file and names the line.
+- Drake 1.51 reads up to the comma in a single number, as PyBullet does, and refuses a vector.
+
+The effect is as large as the digits behind the comma: a mass of 2 in place of 2.5 kg, an inertia of 0 in
+place of 0.03.
+
+What to do: write a point. ``dynx doctor --fix`` does so in every number of links and joints.
+
+The file can be meant otherwise in one way: ``1,250`` may be one thousand two hundred and fifty, written
+with a comma between thousands. dynx takes the comma for a decimal point unless it is told
+``--choose DX401=thousands``. A number with commas and a point, ``1,250.5``, leaves no choice.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+from dynx.rules.case import Case
+from dynx.rules.misspelled_numbers import MisspelledNumberRule
+from dynx.rules.number_text import Fault, Misspelling
+
+
+class DecimalComma(MisspelledNumberRule):
+    """DX401."""
+
+    id = "DX401"
+    name = "decimal-comma"
+    title = "A number is written with a comma in place of a decimal point."
+    advice = "Write decimals with a point."
+    engines: ClassVar[Mapping[str, str]] = {
+        "pinocchio": ">=4.1.0",
+        "pybullet": ">=3.2.7",
+        "mujoco": ">=4.0.0",
+        "drake": ">=1.51.1",
+    }
+    choices: ClassVar[Mapping[str, str]] = {
+        "decimal": "a comma in a number was read as its decimal point",
+        "thousands": "a comma in a number was read as standing between thousands",
+    }
+    changed = "wrote decimal points in place of commas"
+    fault: ClassVar[Fault] = "comma"
+
+    def said(self, written: str, meant: str) -> str:
+        """With the number meant."""
+        return f"with a comma where {meant} takes a point"
+
+    def text_for(self, case: Case, misspelling: Misspelling) -> str:
+        """By the user's choice."""
+        if self.chosen(case) == "thousands" and misspelling.otherwise is not None:
+            return misspelling.otherwise
+        return misspelling.meant

@@ -1,0 +1,53 @@
+"""DX403 text-after-number: something stands behind a number, as in ``lower="-1.57."`` or ``"2.5kg"``
+
+A second point, a unit, a Fortran exponent (``1.5d-3``), a hexadecimal number.
+
+- Pinocchio 4.1: in an ``<inertial>`` the whole inertial is dropped with a line on stderr, so the link
+  weighs nothing; in a ``<joint>`` the file is refused.
+- PyBullet 3.2.7 reads the number in front and passes over the rest, without a word. ``1.5d-3`` is
+  then 1.5, a thousand times too large.
+- MuJoCo 4.0 refuses the file and names the line, but reads hexadecimal numbers.
+- Drake 1.51 reads single numbers as PyBullet does and refuses vectors; a hexadecimal number is 0 to it.
+
+The effect is nothing at all (a limit that is not used) up to a link without mass. Of the files that come
+with PyBullet, ``biped/biped2d_pybullet.urdf`` has ``-1.57.``.
+
+What to do: write the bare number, in SI units. ``dynx doctor --fix`` keeps the number in front; a Fortran
+exponent is rewritten with ``e``, a hexadecimal number in decimals. It never converts units: ``25mm`` would
+become 25, so look at what it changed. Words with no number in front (``heavy``, ``${mass}``) are beyond
+mending and stay an error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+from dynx.rules.case import Case
+from dynx.rules.misspelled_numbers import MisspelledNumberRule
+from dynx.rules.number_text import Fault
+
+
+class TextAfterNumber(MisspelledNumberRule):
+    """DX403."""
+
+    id = "DX403"
+    name = "text-after-number"
+    title = "A number is followed by something that is no part of it."
+    advice = "Write the bare number, in SI units."
+    engines: ClassVar[Mapping[str, str]] = {
+        "pinocchio": ">=4.1.0",
+        "pybullet": ">=3.2.7",
+        "mujoco": ">=4.0.0",
+        "drake": ">=1.51.1",
+    }
+    changed = "kept the number where something stood behind it"
+    fault: ClassVar[Fault] = "rest"
+
+    def said(self, written: str, meant: str) -> str:
+        """With the number kept."""
+        return f"which is no decimal number; {meant} is what can be read of it"
+
+    def decision(self, case: Case) -> str | None:
+        """There is one reading; it is still a guess."""
+        return f"{self.id} {self.name}: the number in front was kept, units were not converted"

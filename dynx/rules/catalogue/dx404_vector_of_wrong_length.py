@@ -1,0 +1,66 @@
+"""DX404 vector-of-wrong-length: a position, direction or set of angles has not three numbers
+
+``rpy="-3.14159 1.57079 0 0"`` has one too many, ``xyz="0.2 0.1"`` one too few.
+
+- Pinocchio 4.1 refuses the file where the vector is in a ``<joint>``; in an ``<inertial>`` it drops the
+  whole inertial with a line on stderr, so the link weighs nothing.
+- PyBullet 3.2.7 takes the first three of four numbers without a word. With two it prints a warning and
+  uses zeros for all three; in an ``<axis>`` it refuses the file.
+- MuJoCo 4.0 and Drake 1.51 refuse the file.
+
+The effect of a vector that became zero is of order 1 in the positions of all links behind it. Of the files
+that come with PyBullet, ``quadruped/microtaur/microtaur.urdf`` has vectors of four numbers.
+
+What to do: find out which three numbers were meant. ``dynx doctor --fix`` keeps the first three, as PyBullet
+does, and adds zeros where numbers are missing, as a reader of the file would. With
+``--choose DX404=default`` it takes the attribute away instead, so that it counts as not given: zero for
+an origin, (1, 0, 0) for an axis.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+from dynx.model.xml_source import Edit
+from dynx.rules.case import Case
+from dynx.rules.misspelled_numbers import MisspelledNumberRule
+from dynx.rules.number_text import Fault, Misspelling
+from dynx.rules.numeric_attributes import NumericAttribute
+
+
+class VectorOfWrongLength(MisspelledNumberRule):
+    """DX404."""
+
+    id = "DX404"
+    name = "vector-of-wrong-length"
+    title = "A vector has more or fewer than three numbers."
+    advice = "Write three numbers."
+    engines: ClassVar[Mapping[str, str]] = {
+        "pinocchio": ">=4.1.0",
+        "pybullet": ">=3.2.7",
+        "mujoco": ">=4.0.0",
+        "drake": ">=1.51.1",
+    }
+    choices: ClassVar[Mapping[str, str]] = {
+        "first": "of a vector the first three numbers were kept, and zeros added where some are missing",
+        "default": "a vector without three numbers was taken away",
+    }
+    changed = "made vectors have three numbers"
+    fault: ClassVar[Fault] = "count"
+
+    def said(self, written: str, meant: str) -> str:
+        """With the count found."""
+        return f"which has {len(written.split())} numbers where three are wanted"
+
+    def applies(self, attribute: NumericAttribute) -> bool:
+        """Not to the size of a shape, which no default can replace."""
+        return attribute.element.tag in ("origin", "axis")
+
+    def mended(self, case: Case, attribute: NumericAttribute, misspelling: Misspelling) -> Edit:
+        """By the user's choice."""
+        if self.chosen(case) == "first":
+            return super().mended(case, attribute, misspelling)
+        if attribute.element.tag == "axis":
+            return case.source.removing(attribute.element)
+        return case.source.removing_attribute(attribute.element, attribute.name)

@@ -1,0 +1,41 @@
+"""DX406 tab-in-vector: the numbers of a vector are parted by a tab, a line break or an odd blank
+
+XML calls tabs and line breaks white space like blanks, and a vector that is broken over two lines looks
+well. Copied text can hold a blank that is not one, such as the no-break space U+00A0.
+
+- Pinocchio 4.1 parts at blanks alone. A tab in a vector of a ``<joint>`` makes it refuse the file; in an
+  ``<inertial>`` it drops the whole inertial with a line on stderr, so the link weighs nothing.
+- PyBullet 3.2.7 parts at blanks alone too. It finds one word where it wants three, prints a warning and
+  uses zeros. Where both blanks and line breaks are there it can find three words that are not the three
+  numbers. A tab in an ``<axis>`` makes it refuse the file.
+- MuJoCo 4.0 and Drake 1.51 read tabs and line breaks as meant, and refuse the no-break space.
+
+The effect is that of a missing offset: of order 1 in the positions of all links behind it, 0.1 in the mass
+matrix of a small arm.
+
+What to do: part numbers by blanks. ``dynx doctor --fix`` does so and changes no digit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+from dynx.rules.misspelled_numbers import MisspelledNumberRule
+from dynx.rules.number_text import Fault
+
+
+class TabInVector(MisspelledNumberRule):
+    """DX406."""
+
+    id = "DX406"
+    name = "tab-in-vector"
+    title = "The numbers of a vector are parted by a tab, a line break or an odd blank."
+    advice = "Part the numbers of a vector by blanks alone."
+    engines: ClassVar[Mapping[str, str]] = {"pinocchio": ">=4.1.0", "pybullet": ">=3.2.7"}
+    changed = "parted the numbers of vectors by blanks in place of tabs and line breaks"
+    fault: ClassVar[Fault] = "tab"
+
+    def said(self, written: str, meant: str) -> str:
+        """The same for all."""
+        return "with a tab, a line break or an odd blank among its numbers"

@@ -1,0 +1,44 @@
+"""DX407 infinite-limit: a limit is ``inf``, or a number too large for a double such as ``1e999``
+
+``<limit lower="-inf" upper="inf" effort="inf" velocity="inf"/>`` says what is meant, but URDF has no word
+for infinity, and what is no number to one engine is one to another.
+
+- Pinocchio 4.1 and Drake 1.51 refuse the file.
+- PyBullet 3.2.7 and MuJoCo 4.0 read an infinity; MuJoCo refuses ``1e999``.
+
+dynx refuses it too, because a file that half of the engines refuse is of no use.
+
+What to do: leave the limit away where that is allowed (``type="continuous"`` needs no lower and no upper),
+or write a number that no joint reaches. ``dynx doctor --fix`` writes the largest double,
+1.7976931348623157e+308, which all four engines read and which dynx reads as "no limit". Infinite masses,
+inertias and positions have no such substitute and stay an error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+from dynx.rules.misspelled_numbers import MisspelledNumberRule
+from dynx.rules.number_text import Fault
+from dynx.rules.numeric_attributes import NumericAttribute
+
+
+class InfiniteLimit(MisspelledNumberRule):
+    """DX407."""
+
+    id = "DX407"
+    name = "infinite-limit"
+    title = "A limit of a joint is infinite."
+    advice = "Write a large finite number, or leave the limit away."
+    engines: ClassVar[Mapping[str, str]] = {"pinocchio": ">=4.1.0", "drake": ">=1.51.1"}
+    changed = "wrote the largest double in place of infinite limits"
+    fault: ClassVar[Fault] = "infinite"
+
+    def said(self, written: str, meant: str) -> str:
+        """The same for all."""
+        return "which is no finite number"
+
+    def applies(self, attribute: NumericAttribute) -> bool:
+        """To limits alone."""
+        return attribute.element.tag == "limit"

@@ -1,0 +1,49 @@
+"""DX408 empty-vector: the position or the angles of an origin are there but empty, as in ``xyz=""``
+
+A template whose variable was empty, or an exporter that had nothing to say. URDF's default for what is not
+given is zero, and a reader of the file takes an empty vector for that.
+
+- Pinocchio 4.1 refuses the file where the origin is that of a ``<joint>``; in an ``<inertial>`` it drops
+  the whole inertial with a line on stderr, so the link weighs nothing.
+- Drake 1.51 refuses the file.
+- PyBullet 3.2.7 prints a warning and uses zeros; MuJoCo 4.0 uses zeros. So does dynx.
+
+The effect is a file that does not load, or a link without mass: of order 0.01 to 1 in the mass matrix.
+
+What to do: take the attribute away, or write ``0 0 0``. ``dynx doctor --fix`` takes it away.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+from dynx.model.xml_source import Edit
+from dynx.rules.case import Case
+from dynx.rules.misspelled_numbers import MisspelledNumberRule
+from dynx.rules.number_text import Fault, Misspelling
+from dynx.rules.numeric_attributes import NumericAttribute
+
+
+class EmptyVector(MisspelledNumberRule):
+    """DX408."""
+
+    id = "DX408"
+    name = "empty-vector"
+    title = "An origin has a position or angles without numbers."
+    advice = "Take the empty attribute away."
+    engines: ClassVar[Mapping[str, str]] = {"pinocchio": ">=4.1.0", "drake": ">=1.51.1"}
+    changed = "took empty vectors of origins away"
+    fault: ClassVar[Fault] = "empty"
+
+    def said(self, written: str, meant: str) -> str:
+        """The same for all."""
+        return "without any number"
+
+    def applies(self, attribute: NumericAttribute) -> bool:
+        """To origins; an empty axis is DX202's."""
+        return attribute.element.tag == "origin"
+
+    def mended(self, case: Case, attribute: NumericAttribute, misspelling: Misspelling) -> Edit:
+        """Without the attribute."""
+        return case.source.removing_attribute(attribute.element, attribute.name)

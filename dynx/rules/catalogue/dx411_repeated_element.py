@@ -1,0 +1,59 @@
+"""DX411 repeated-element: an element that can be there once is there twice, such as two ``<origin>``
+
+It happens when files are merged or templates expanded. Readers that ask for "the" origin of a joint find
+the first one.
+
+- MuJoCo 4.0 refuses the file: "repeated element", with the line.
+- Pinocchio 4.1, PyBullet 3.2.7 and Drake 1.51 use the first and pass over the others without a word. So
+  does dynx, with a note.
+
+The engines that read the file agree, but whoever edits the second of two elements edits nothing.
+
+What to do: find out which one was meant and take the other away. ``dynx doctor --fix`` keeps the first, which
+is what the engines use.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import ClassVar
+
+from dynx.model.xml_source import SourceElement
+from dynx.rules.case import Case
+from dynx.rules.editing import EditingRule, Place, found_at
+from dynx.rules.rule import Stage
+
+_ONCE = {
+    "link": ("inertial",),
+    "inertial": ("origin", "mass", "inertia"),
+    "joint": ("origin", "parent", "child", "axis", "limit", "dynamics", "mimic"),
+}
+
+
+class RepeatedElement(EditingRule):
+    """DX411."""
+
+    id = "DX411"
+    name = "repeated-element"
+    title = "An element that can be there once is there several times."
+    stage: ClassVar[Stage] = "reading"
+    advice = "Keep the one that is meant; engines use the first."
+    engines: ClassVar[Mapping[str, str]] = {"mujoco": ">=4.0.0"}
+    changed = "took away further elements of a kind of which engines use the first"
+
+    def places(self, case: Case) -> Iterable[Place]:
+        """Every element after the first of its kind."""
+        for part in case.source.root.children:
+            if part.tag in ("link", "joint"):
+                yield from _in(case, part)
+
+
+def _in(case: Case, part: SourceElement) -> Iterable[Place]:
+    seen = set()
+    for child in part.children:
+        if child.tag in seen and child.tag in _ONCE[part.tag]:
+            message = f"a further <{child.tag}> in the same <{part.tag}>; engines use the first"
+            yield Place(found_at(child, message), (case.source.removing(child),))
+        elif child.tag == "inertial":
+            yield from _in(case, child)
+        seen.add(child.tag)

@@ -1,0 +1,98 @@
+"""DX413 line-too-long: a line of more than 8191 bytes is cut by PyBullet in the middle of an element
+
+PyBullet 3.2.7 reads a file line by line into 8192 bytes, and puts a line break where a line does not fit.
+Between elements that does no harm. Inside an element it can: where the cut falls into ``value="2.5"``, what
+PyBullet reads is ``value="2<line break>.5"``, and the mass is 2. It says nothing. Inside the name of an
+attribute or a tag the file is refused.
+
+Files of one long line are written by programs that save white space: minified XML, or the output of
+serialisers that do not indent.
+
+Pinocchio 4.1, MuJoCo 4.0 and Drake 1.51 read lines of any length.
+
+The effect depends on which byte is the 8191st, so it comes and goes with every edit of the file: a mass off
+by its decimals, an offset that is zero, or nothing.
+
+What to do: write one element per line. ``dynx doctor --fix`` breaks the lines concerned in front of each
+element and changes nothing else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import ClassVar
+
+from dynx.model.xml_source import Edit, SourceElement, Span
+from dynx.rules.case import Case
+from dynx.rules.editing import EditingRule, Place, found_at
+from dynx.rules.rule import Stage
+
+LONGEST = 8191
+"""Bytes that PyBullet reads at once."""
+
+
+class LineTooLong(EditingRule):
+    """DX413."""
+
+    id = "DX413"
+    name = "line-too-long"
+    title = "PyBullet cuts a line of more than 8191 bytes, and the cut falls into an element."
+    stage: ClassVar[Stage] = "reading"
+    advice = "Write one element per line."
+    engines: ClassVar[Mapping[str, str]] = {"pybullet": ">=3.2.7"}
+    changed = "broke lines of more than 8191 bytes in front of their elements"
+
+    def places(self, case: Case) -> Iterable[Place]:
+        """Every element of which a tag is cut."""
+        long_lines = list(_long_lines(case.source.data))
+        if not long_lines:
+            return
+        elements = list(case.source.root.walk())
+        broken: set[int] = set()
+        for element in elements:
+            for line in long_lines:
+                cut = _cut(case.source.data, element, line)
+                if cut is None:
+                    continue
+                message = (
+                    f"a tag of <{element.tag}> is cut: its line has {line.end - line.start} bytes, "
+                    f"and byte {cut - line.start} of it falls into the tag"
+                )
+                edits = () if line.start in broken else tuple(_breaks(case.source.data, elements, line))
+                broken.add(line.start)
+                yield Place(found_at(element, message), edits)
+
+
+def _long_lines(data: bytes) -> Iterator[Span]:
+    start = 0
+    while start < len(data):
+        end = data.find(b"\n", start)
+        end = len(data) if end < 0 else end
+        if end - start > LONGEST:
+            yield Span(start, end)
+        start = end + 1
+
+
+def _cut(data: bytes, element: SourceElement, line: Span) -> int | None:
+    """The byte of a line before which a cut falls into the element's start or end tag."""
+    tags = [element.start_tag]
+    if not element.empty:
+        tags.append(Span(data.rindex(b"</", 0, element.span.end), element.span.end))
+    for tag in tags:
+        first = max(1, -(-(tag.start + 1 - line.start) // LONGEST))
+        cut = line.start + first * LONGEST
+        if tag.start < cut < min(tag.end, line.end):
+            return cut
+    return None
+
+
+def _breaks(data: bytes, elements: list[SourceElement], line: Span) -> Iterator[Edit]:
+    """Line breaks in front of the elements of a line, and of the attributes of a tag that is too long."""
+    for element in elements:
+        tag = element.start_tag
+        if line.start < tag.start < line.end and data[line.start : tag.start].strip():
+            yield Edit(tag.start, tag.start, "\n")
+        if tag.end - max(tag.start, line.start) > LONGEST:
+            for place in element.places.values():
+                if line.start < place.start < line.end:
+                    yield Edit(place.start, place.start, "\n")

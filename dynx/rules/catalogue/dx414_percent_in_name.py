@@ -1,0 +1,59 @@
+"""DX414 percent-in-name: the name of the robot, a link or a joint has a ``%`` in it
+
+PyBullet 3.2.7 puts names into the messages it prints, and uses some of them as the format of ``printf``:
+``%p`` prints what is in memory, ``%s`` and ``%n`` read or write it and can end the process. Whether that
+happens depends on which message is printed (one about a link without ``<inertial>``, say), so a file can
+load for years and crash on another day. dynx does not give such a file to PyBullet at all.
+
+Pinocchio 4.1, MuJoCo 4.0 and Drake 1.51 have no such trouble.
+
+What to do: use letters, digits and ``_`` in names. ``dynx doctor --fix`` writes ``_`` in place of ``%``
+in the name and wherever the document mentions it (ends of joints, mimic joints, Gazebo references); programs
+that look links or joints up by the old name must be changed with it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import ClassVar
+
+from dynx.errors import shown
+from dynx.rules.case import Case
+from dynx.rules.editing import EditingRule, Place, found_at
+from dynx.rules.renaming import fresh_name, renaming_joint, renaming_link
+from dynx.rules.rule import Stage
+
+
+class PercentInName(EditingRule):
+    """DX414."""
+
+    id = "DX414"
+    name = "percent-in-name"
+    title = "A name has a % in it, which PyBullet takes for a printf format."
+    stage: ClassVar[Stage] = "reading"
+    advice = "Use letters, digits and _ in names."
+    engines: ClassVar[Mapping[str, str]] = {"pybullet": ">=3.2.7"}
+    changed = "wrote _ in place of % in names"
+
+    def places(self, case: Case) -> Iterable[Place]:
+        """Robot, links and joints of such a name."""
+        source = case.source
+        root = source.root
+        if "%" in root.attributes.get("name", ""):
+            name = root.attributes["name"]
+            edit = source.setting(root, "name", name.replace("%", "_"))
+            yield Place(found_at(root, _message("robot", name)), (edit,))
+        for kind, named, rename in (
+            ("link", case.links, renaming_link),
+            ("joint", case.joints, renaming_joint),
+        ):
+            taken = set(named)
+            for name, element in named.items():
+                if "%" in name:
+                    new = fresh_name(name.replace("%", "_"), taken)
+                    taken.add(new)
+                    yield Place(found_at(element, _message(kind, name)), tuple(rename(source, name, new)))
+
+
+def _message(kind: str, name: str) -> str:
+    return f"the name of the {kind}, {shown(name)}, has a %"

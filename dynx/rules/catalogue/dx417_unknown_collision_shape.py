@@ -1,0 +1,52 @@
+"""DX417 unknown-collision-shape: a ``<collision>`` has a geometry that not every engine knows
+
+``<plane>`` and ``<cdf>`` are PyBullet's extensions to URDF, whose shapes are box, sphere, cylinder and mesh
+(and capsule in later versions).
+
+- MuJoCo 4.0 refuses the file: "visual geometry specification not found", also for a collision.
+- Pinocchio 4.1 drops the shape with a line on stderr; Drake 1.51 warns or passes it over.
+- PyBullet 3.2.7 reads it.
+
+The dynamics of a link that states its inertia does not depend on shapes; whether the file loads does.
+
+What to do: write the shape as a box or a mesh where you need it in other engines. ``dynx doctor --fix`` takes
+the ``<collision>`` away. ``--choose DX417=keep`` leaves it, and MuJoCo out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import ClassVar
+
+from dynx.rules.case import Case
+from dynx.rules.editing import EditingRule, Place, found_at
+from dynx.rules.rule import Stage
+
+_KNOWN = frozenset(["box", "sphere", "cylinder", "capsule", "mesh"])
+
+
+class UnknownCollisionShape(EditingRule):
+    """DX417."""
+
+    id = "DX417"
+    name = "unknown-collision-shape"
+    title = "A collision has a shape that not every engine knows."
+    stage: ClassVar[Stage] = "reading"
+    advice = "Write the shape as a box, sphere, cylinder or mesh."
+    engines: ClassVar[Mapping[str, str]] = {"mujoco": ">=4.0.0"}
+    choices: ClassVar[Mapping[str, str]] = {
+        "remove": "collisions of a shape that not every engine knows were taken away",
+        "keep": "collisions of unknown shape were kept, so MuJoCo cannot load the file",
+    }
+    changed = "took collisions of unknown shape away"
+
+    def places(self, case: Case) -> Iterable[Place]:
+        """Collisions whose first geometry holds no known shape."""
+        for link in case.source.root.all("link"):
+            for collision in link.all("collision"):
+                geometry = collision.first("geometry")
+                if geometry is None or any(child.tag in _KNOWN for child in geometry.children):
+                    continue
+                shapes = ", ".join(f"<{child.tag}>" for child in geometry.children) or "nothing"
+                edits = () if self.chosen(case) == "keep" else (case.source.removing(collision),)
+                yield Place(found_at(collision, f"the geometry of <collision> is {shapes}"), edits)

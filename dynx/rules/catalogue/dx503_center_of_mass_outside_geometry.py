@@ -1,0 +1,54 @@
+"""DX503 center-of-mass-outside-geometry: the centre of mass lies outside the box that holds the link
+
+Mass cannot be negative, so the centre of mass of a body lies within its convex hull, and so within any box
+that holds it. The rule takes the box, along the axes of the link frame, about all shapes of the link and
+of links welded to it, widened by a hundredth of its diagonal for shapes that are drawn a little small.
+
+The usual reasons: the ``<origin>`` of ``<inertial>`` is in millimetres; it is given in the frame of the CAD
+assembly or of the parent, not of the link; it was mirrored for the other side and lost a sign; the mesh was
+moved by the ``<origin>`` of ``<visual>`` and the inertial was not.
+
+All engines use the numbers as they stand: gravity torques are wrong alike in each of them.
+
+Nothing in the file says where the centre truly is, so there is no remedy by edit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+import numpy as np
+
+from dynx.rules.case import Case
+from dynx.rules.geometry import welded_extents
+from dynx.rules.rule import Detection, Kind, Rule
+
+_MARGIN = 0.01
+"""Share of the diagonal by which the box is widened."""
+
+
+class CenterOfMassOutsideGeometry(Rule):
+    """DX503."""
+
+    id = "DX503"
+    name = "center-of-mass-outside-geometry"
+    title = "The centre of mass lies outside the box that holds the link's shape."
+    kind: ClassVar[Kind] = "practice"
+    advice = "Give the origin of the inertial in metres and in the frame of its own link."
+
+    def detect(self, case: Case) -> Sequence[Detection]:
+        """Links whose centre of mass is outside, and by how much."""
+        found = []
+        for link, extent in welded_extents(case):
+            assert link.inertial is not None
+            low, high = extent.box()
+            center = link.inertial.origin.matrix[:3, 3]
+            outside = float(np.max(np.maximum(low - center, center - high)))
+            if outside > _MARGIN * extent.diagonal():
+                message = (
+                    f"the centre of mass is {outside:.3g} m outside the box of {extent.diagonal():.3g} m "
+                    "across that holds the link's shape"
+                )
+                found.append(Detection(link.name, None, link.inertial.line, message))
+        return found

@@ -1,0 +1,67 @@
+"""DX504 placeholder-inertia: numbers that were put in because the element was needed
+
+Two patterns are reported. A tensor that is exactly the unit matrix: 1 kg m^2 about every axis is the
+inertia of a steel ball of 0.15 m radius and 111 kg, and of hardly any link that has it in its file. And
+one tensor with three equal moments (0.001 in many tutorials) that at least three links share although
+their masses differ: balls of different mass have different sizes or different inertias.
+
+All engines use the numbers as they stand. With an identity tensor on a link of a few hundred grams the
+inertia of the whole arm is that of the placeholder: torques and the gains tuned on them mean nothing.
+
+Nothing in the file says what the true tensor is, so there is no remedy by edit. Inertias from the shapes,
+with mass spread evenly, are a better guess than any placeholder.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+from typing import ClassVar
+
+from dynx.model import Inertial
+from dynx.rules.case import Case
+from dynx.rules.rule import Detection, Kind, Rule
+
+_LINKS = 3
+"""How many links must share a tensor with equal moments."""
+
+
+class PlaceholderInertia(Rule):
+    """DX504."""
+
+    id = "DX504"
+    name = "placeholder-inertia"
+    title = "The inertia is a placeholder: the unit matrix, or one tensor for links of different mass."
+    kind: ClassVar[Kind] = "practice"
+    advice = "Compute the inertia from the CAD model or from the link's shape and mass."
+
+    def detect(self, case: Case) -> Sequence[Detection]:
+        """Links with mass whose tensor is the unit matrix, or shared as said above."""
+        masses = defaultdict(list)
+        for link in case.model.links:
+            if link.inertial is not None and (moment := _equal_moments(link.inertial)):
+                masses[moment].append(link.inertial.mass)
+        found = []
+        for link in case.model.links:
+            moment = None if link.inertial is None else _equal_moments(link.inertial)
+            if link.inertial is None or not moment:
+                continue
+            if moment == 1.0:
+                message = f"the inertia of {link.inertial.mass:.6g} kg is the unit matrix"
+            elif len(masses[moment]) >= _LINKS and len(set(masses[moment])) > 1:
+                message = (
+                    f"the inertia is {moment:.6g} kg m^2 about every axis, as on {len(masses[moment])} links "
+                    f"from {min(masses[moment]):.6g} to {max(masses[moment]):.6g} kg"
+                )
+            else:
+                continue
+            found.append(Detection(link.name, None, link.inertial.line, message))
+        return found
+
+
+def _equal_moments(inertial: Inertial) -> float | None:
+    """The one moment of a diagonal tensor with three equal moments on a link with mass."""
+    off_diagonal = (inertial.ixy, inertial.ixz, inertial.iyz)
+    if inertial.mass == 0.0 or any(off_diagonal) or not inertial.ixx == inertial.iyy == inertial.izz:
+        return None
+    return inertial.ixx

@@ -1,0 +1,86 @@
+"""DX513 angle-in-degrees: a number that is an angle in degrees, where URDF wants radians
+
+Two patterns are reported. An ``rpy`` angle beyond two turns, 12.57 rad: nobody writes an orientation so,
+while 45, 90 and 180 are what one writes in degrees. And the limits of a revolute joint that are both whole
+multiples of 5 between -360 and 360, at least one of them 30 or more: 30 rad are five turns, and 30
+degrees a usual stop. Limits of -100 and 100 are left alone, for they are often written for "none".
+
+All engines read radians: 90 is 14.3 turns. They agree, on a robot that is put together
+wrongly, or whose joint runs through its stops.
+
+That it is degrees is a guess, if a good one, so there is no remedy by edit; the message has the radians.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import ClassVar
+
+from dynx.errors import DescriptionError
+from dynx.model.xml_source import SourceElement
+from dynx.rules.attributes import origin_of
+from dynx.rules.case import Case
+from dynx.rules.rule import Detection, Kind, Rule
+
+_TWO_TURNS = 4.0 * math.pi
+_STEP, _SMALLEST, _LARGEST = 5.0, 30.0, 360.0
+_MEANING_NONE = (-100.0, 100.0)
+
+
+class AngleInDegrees(Rule):
+    """DX513."""
+
+    id = "DX513"
+    name = "angle-in-degrees"
+    title = "An angle seems to be written in degrees, where URDF reads radians."
+    kind: ClassVar[Kind] = "practice"
+    advice = "Write the angle in radians."
+
+    def detect(self, case: Case) -> Sequence[Detection]:
+        """``<origin>``s with such an angle and revolute joints with such limits."""
+        return sorted([*_origins(case), *_limits(case)], key=lambda detection: detection.line or 0)
+
+
+def _origins(case: Case) -> Iterator[Detection]:
+    for part in case.source.root.children:
+        if part.tag not in ("link", "joint"):
+            continue
+        for element in part.walk():
+            if element.tag != "origin" or element.parent is None:
+                continue
+            large = [angle for angle in _angles(element.parent) if abs(angle) > _TWO_TURNS]
+            if large:
+                name = part.attributes.get("name")
+                yield Detection(
+                    name if part.tag == "link" else None,
+                    name if part.tag == "joint" else None,
+                    element.line,
+                    f"rpy holds {large[0]:g}, read as radians; in degrees it is {_radians(large[0])}",
+                )
+
+
+def _limits(case: Case) -> Iterator[Detection]:
+    for joint in case.model.joints:
+        ends = (joint.limits.lower, joint.limits.upper)
+        if joint.type != "revolute" or tuple(sorted(ends)) == _MEANING_NONE:
+            continue
+        degrees = all(abs(end) <= _LARGEST and end % _STEP == 0.0 for end in ends)
+        if degrees and max(map(abs, ends)) >= _SMALLEST:
+            message = (
+                f"the limits {ends[0]:g} and {ends[1]:g} are read as radians; "
+                f"in degrees they are {_radians(ends[0])} and {_radians(ends[1])}"
+            )
+            limit = case.joints[joint.name].first("limit")
+            yield Detection(None, joint.name, joint.line if limit is None else limit.line, message)
+
+
+def _angles(parent: SourceElement) -> tuple[float, ...]:
+    try:
+        return origin_of(parent).rpy
+    except DescriptionError:  # of a <visual>, which dynx.load does not read
+        return ()
+
+
+def _radians(angle_deg: float) -> str:
+    return repr(math.radians(angle_deg))

@@ -1,0 +1,103 @@
+"""DX515 misspelled-word: an element or attribute that no reader knows, one letter from one that all know
+
+URDF readers skip what they do not know, mostly in silence: with ``<intertial>`` the link has no mass, with
+``<limit uper="1">`` the range ends at 0, with ``<dynamics dampng="1">`` nothing is damped. Reported are
+elements of ``<robot>``, ``<link>``, ``<joint>`` and ``<inertial>``, and attributes of elements that matter
+for dynamics, that are unknown and close to a known name which is not there.
+
+Extensions with names of their own (``<gazebo>``, ``<sensor>``, anything with a prefix) are near none of
+them.
+
+All engines skip the same words. Mending the word changes the robot, and whether its author then likes the
+numbers is not in the file, so there is no remedy by edit.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Collection, Iterator, Sequence
+from typing import ClassVar
+
+from dynx.model.xml_source import SourceElement
+from dynx.rules.case import Case
+from dynx.rules.rule import Detection, Kind, Rule
+
+_ELEMENTS = {
+    "robot": ("link", "joint", "material", "transmission"),
+    "link": ("inertial", "visual", "collision"),
+    "joint": ("origin", "parent", "child", "axis", "limit", "dynamics", "mimic", "calibration"),
+    "inertial": ("origin", "mass", "inertia"),
+}
+_ATTRIBUTES = {
+    "link": ("name",),
+    "joint": ("name", "type"),
+    "origin": ("xyz", "rpy"),
+    "mass": ("value",),
+    "inertia": ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"),
+    "axis": ("xyz",),
+    "parent": ("link",),
+    "child": ("link",),
+    "limit": ("lower", "upper", "effort", "velocity"),
+    "dynamics": ("damping", "friction", "armature"),
+    "mimic": ("joint", "multiplier", "offset"),
+}
+_CLOSE = 0.8
+"""Ratio of matching letters (difflib): one letter wrong, missing or doubled in a word of five or more."""
+
+
+class MisspelledWord(Rule):
+    """DX515."""
+
+    id = "DX515"
+    name = "misspelled-word"
+    title = "An element or attribute is spelled so that every reader skips it."
+    kind: ClassVar[Kind] = "practice"
+    advice = "Spell the word as URDF does, and look at what it then says."
+
+    def detect(self, case: Case) -> Sequence[Detection]:
+        """Every such word."""
+        found = []
+        for part in case.source.root.children:
+            where = part.attributes.get("name")
+            for element, message in _misspelled(part, case.source.root):
+                link = where if part.tag == "link" else None
+                joint = where if part.tag == "joint" else None
+                found.append(Detection(link, joint, element.line, message))
+        return found
+
+
+def _misspelled(part: SourceElement, root: SourceElement) -> Iterator[tuple[SourceElement, str]]:
+    meant = _meant(part.tag, _ELEMENTS["robot"], ())
+    if root.tag == "robot" and meant is not None:
+        yield part, f"<{part.tag}> is skipped; <{meant}> was meant"
+    if part.tag not in ("link", "joint"):
+        return
+    for element in _that_matter(part):
+        known = _ATTRIBUTES.get(element.tag, ())
+        for attribute in element.attributes:
+            meant = _meant(attribute, known, element.attributes)
+            if meant is not None:
+                yield element, f"{attribute} of <{element.tag}> is skipped; {meant} was meant"
+        for child in element.children:
+            present = {other.tag for other in element.children}
+            meant = _meant(child.tag, _ELEMENTS.get(element.tag, ()), present)
+            if meant is not None:
+                yield child, f"<{child.tag}> in <{element.tag}> is skipped; <{meant}> was meant"
+
+
+def _that_matter(part: SourceElement) -> Iterator[SourceElement]:
+    """A link or joint and what it holds for dynamics; shapes have words of their own."""
+    yield part
+    for child in part.children:
+        if child.tag in _ATTRIBUTES or child.tag == "inertial":
+            yield child
+            yield from (below for below in child.children if below.tag in _ATTRIBUTES)
+
+
+def _meant(word: str, known: Sequence[str], present: Collection[str]) -> str | None:
+    """The known word next to an unknown one, if it is not there besides."""
+    if word in known or ":" in word:
+        return None
+    absent = [other for other in known if other not in present]
+    close = difflib.get_close_matches(word.lower(), absent, n=1, cutoff=_CLOSE)
+    return close[0] if close else None

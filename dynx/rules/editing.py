@@ -1,0 +1,82 @@
+"""Rules that come down to places in the text, each with the edits that mend it."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+from dynx.model.xml_source import Edit, SourceElement
+from dynx.rules.case import Case
+from dynx.rules.rule import Detection, Remedy, Rule
+
+
+@dataclass(frozen=True)
+class Place:
+    """One place where a rule applies, and what to do there; without edits nothing mends it."""
+
+    detection: Detection
+    edits: tuple[Edit, ...] = ()
+
+
+def found_at(element: SourceElement, message: str) -> Detection:
+    """The detection in `element`: its line, and the link or joint of the robot that it belongs to."""
+    part = element
+    while part.parent is not None and part.parent.parent is not None:
+        part = part.parent
+    name = part.attributes.get("name")
+    link = name if part.tag == "link" else None
+    joint = name if part.tag == "joint" else None
+    return Detection(link, joint, element.line, message)
+
+
+class EditingRule(Rule):
+    """A rule that says its places once, for finding them and for mending them."""
+
+    changed: ClassVar[str]
+    """What the remedy does, one sentence for all places."""
+
+    changes_physics: ClassVar[bool] = False
+
+    @abstractmethod
+    def places(self, case: Case) -> Iterable[Place]:
+        """Every place, in document order."""
+
+    def decision(self, case: Case) -> str | None:
+        """What was chosen where the file can be meant in several ways, and how to choose otherwise."""
+        if not self.choices:
+            return None
+        chosen = self.chosen(case)
+        others = ", ".join(f"--choose {self.id}={name}" for name in self.choices if name != chosen)
+        return f"{self.id} {self.name}: {self.choices[chosen]} (otherwise: {others})"
+
+    def chosen(self, case: Case) -> str:
+        """The user's choice, or the first."""
+        return case.choice(self.id, next(iter(self.choices)))
+
+    def detect(self, case: Case) -> Sequence[Detection]:
+        """The places."""
+        return [place.detection for place in self.places(case)]
+
+    def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy | None:
+        """The edits of these places."""
+        wanted = set(detections)
+        edits = [edit for place in self.places(case) if place.detection in wanted for edit in place.edits]
+        if not edits:
+            return None
+        mended = case.with_source(case.source.edited(*edits))
+        return Remedy(mended, self.changed, self.decision(case), self.changes_physics)
+
+
+class CallingRule(Rule):
+    """A rule about what engines add at run time: no text mends it, calls do."""
+
+    calls: ClassVar[tuple[str, ...]]
+    """Ids of `LoadedRobot.CALLS`."""
+
+    changed: ClassVar[str]
+
+    def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy | None:
+        """The calls, which act on the whole robot."""
+        return Remedy(case.with_calls(*self.calls), self.changed)

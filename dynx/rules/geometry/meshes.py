@@ -1,0 +1,64 @@
+"""The box that holds a mesh: STL, OBJ and COLLADA, read for their corners alone."""
+
+from __future__ import annotations
+
+import re
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from dynx.errors import DynxError
+from dynx.model.file_reading import read_file
+from dynx.rules.geometry.collada import collada_points
+from dynx.spatial.scalar import Floats
+
+Box = tuple[tuple[float, float, float], tuple[float, float, float]]
+
+_STL_HEAD, _STL_FACET = 84, 50
+_STL_VERTEX = re.compile(rb"^\s*vertex\s+(\S+)\s+(\S+)\s+(\S+)", re.MULTILINE | re.IGNORECASE)
+_OBJ_VERTEX = re.compile(rb"^[ \t]*v[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)", re.MULTILINE)
+
+
+def mesh_box(path: Path) -> Box | None:
+    """Lowest and highest corner of a mesh in its own frame, unscaled; None where it cannot be read."""
+    try:
+        status = path.stat()
+    except OSError:
+        return None
+    return _box(path, status.st_mtime_ns, status.st_size)
+
+
+# Detection runs again after every remedy; the meshes of a robot stay as they are.
+@lru_cache(maxsize=4096)
+def _box(path: Path, changed: int, size: int) -> Box | None:
+    reader = {".stl": _stl_points, ".obj": _obj_points, ".dae": collada_points}.get(path.suffix.lower())
+    if reader is None:
+        return None
+    try:
+        points = reader(read_file(str(path)))
+    except (DynxError, ValueError):
+        return None
+    if points is None or len(points) == 0 or not np.isfinite(points).all():
+        return None
+    low, high = points.min(axis=0).tolist(), points.max(axis=0).tolist()
+    return (low[0], low[1], low[2]), (high[0], high[1], high[2])
+
+
+def _stl_points(data: bytes) -> Floats | None:
+    """Corners of the facets. A binary file is known by its length: some begin with "solid" as well."""
+    if len(data) >= _STL_HEAD:
+        count = int.from_bytes(data[80:84], "little")
+        if len(data) == _STL_HEAD + _STL_FACET * count:
+            facet = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+            corners = np.frombuffer(data, facet, count, _STL_HEAD)["corners"]
+            return corners.reshape(-1, 3).astype(np.float64)
+    return _matched(_STL_VERTEX, data) if data.lstrip()[:5].lower() == b"solid" else None
+
+
+def _obj_points(data: bytes) -> Floats | None:
+    return _matched(_OBJ_VERTEX, data)
+
+
+def _matched(pattern: re.Pattern[bytes], data: bytes) -> Floats:
+    return np.array(pattern.findall(data), dtype=np.float64).reshape(-1, 3)

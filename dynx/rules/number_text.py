@@ -1,0 +1,122 @@
+"""Numbers as people write them into a URDF though no engine, or not every engine, reads them so.
+
+A text is *plain* where it is what the format wants: one decimal number, or three with blanks between
+them. Anything else that can be understood has one fault, and the plain text that was meant.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from typing import Literal
+
+LARGEST = "1.7976931348623157e+308"
+"""The largest double: a number that every engine can read, and that stands for "no limit"."""
+
+Fault = Literal["comma", "separator", "rest", "count", "blank", "tab", "infinite", "empty"]
+"""``comma`` for a decimal point, ``separator`` between the numbers of a vector, ``rest`` behind a number,
+a wrong ``count``, a ``blank`` around a single number, a ``tab`` or line break in a vector, an
+``infinite`` number, an ``empty`` vector."""
+
+_NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+_COMMA = re.compile(r"[+-]?(?:[0-9]+,[0-9]*|,[0-9]+)(?:[eE][+-]?[0-9]+)?")
+_GROUPED = re.compile(r"([+-]?[0-9]{1,3}(?:,[0-9]{3})+)\.[0-9]*")
+_INFINITE = re.compile(r"([+-]?)inf(?:inity)?", re.IGNORECASE)
+_FORTRAN = re.compile(r"([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))[dD]([+-]?[0-9]+)")
+_HEXADECIMAL = re.compile(r"[+-]?0[xX][0-9a-fA-F]+")
+_UNEXPANDED = ("${", "$(")
+
+
+@dataclass(frozen=True)
+class Misspelling:
+    """A text with a fault: `meant` in plain text, `otherwise` where it can be understood differently."""
+
+    fault: Fault
+    meant: str
+    otherwise: str | None = None
+
+
+def is_number(text: str) -> bool:
+    """Whether every engine reads the text as one finite number, blanks around it apart."""
+    word = text.strip()
+    return _NUMBER.fullmatch(word) is not None and math.isfinite(float(word))
+
+
+def misspelled_number(text: str) -> Misspelling | None:
+    """The fault of a text that should be one number; None where it is plain or beyond understanding."""
+    word = text.strip()
+    if is_number(word):
+        return None if word == text else Misspelling("blank", word)
+    if sign := _overflowing(word):
+        return Misspelling("infinite", sign.removeprefix("+") + LARGEST)
+    return _misspelled_word(word)
+
+
+def misspelled_vector(text: str) -> Misspelling | None:
+    """The fault of a text that should be three numbers; None as above."""
+    words = text.split()
+    if not words:
+        return Misspelling("empty", "")
+    if any(mark in text for mark in _UNEXPANDED):
+        return None
+    if all(map(is_number, words)):
+        if len(words) != 3:
+            return Misspelling("count", " ".join([*words, "0", "0"][:3]))
+        odd = any(character.isspace() and character != " " for character in text)
+        return Misspelling("tab", " ".join(words)) if odd else None
+    if "," in text or ";" in text:
+        return _with_commas(words, text)
+    parts = [_mended(word) for word in words]
+    if len(words) != 3 or None in parts:
+        return None
+    return Misspelling("rest", " ".join(part.meant for part in parts if part is not None))
+
+
+def _misspelled_word(word: str) -> Misspelling | None:
+    if any(mark in word for mark in _UNEXPANDED):
+        return None
+    if _COMMA.fullmatch(word):
+        return Misspelling("comma", word.replace(",", "."), word.replace(",", ""))
+    if _GROUPED.fullmatch(word):
+        return Misspelling("comma", word.replace(",", ""), word.replace(",", ""))
+    if _HEXADECIMAL.fullmatch(word):
+        return Misspelling("rest", repr(float(int(word, 16))))
+    if exponent := _FORTRAN.fullmatch(word):
+        return Misspelling("rest", f"{exponent.group(1)}e{exponent.group(2)}")
+    front = _NUMBER.match(word)
+    # "1,2,3" or "1.5-2": what follows is a number again, so this is no number with a rest.
+    if front is None or re.match(r"[-+,;]\s*[0-9.]", word[front.end() :]):
+        return None
+    return Misspelling("rest", front.group())
+
+
+def _mended(word: str) -> Misspelling | None:
+    """A word of a vector: as it stands where it is plain."""
+    return Misspelling("rest", word) if is_number(word) else _misspelled_word(word)
+
+
+def _with_commas(words: list[str], text: str) -> Misspelling | None:
+    """A vector with commas in it: they are decimal where that leaves three numbers, one or more with one."""
+    bare = [word.rstrip(",;") for word in words]
+    if len(bare) == 3 and all(is_number(word) or _COMMA.fullmatch(word) for word in bare):
+        if all(map(is_number, bare)):
+            return Misspelling("separator", " ".join(bare))
+        return Misspelling(
+            "comma",
+            " ".join(word.replace(",", ".") for word in bare),
+            " ".join(word.replace(",", "") for word in bare),
+        )
+    parts = [part for part in re.split(r"[\s,;]+", text) if part]
+    if len(parts) == 3 and all(map(is_number, parts)):
+        return Misspelling("separator", " ".join(parts))
+    return None
+
+
+def _overflowing(word: str) -> str:
+    """The sign of an infinity, written out or by its size; empty for anything else."""
+    if found := _INFINITE.fullmatch(word):
+        return found.group(1) or "+"
+    if _NUMBER.fullmatch(word):
+        return "-" if word.startswith("-") else "+"
+    return ""

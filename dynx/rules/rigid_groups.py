@@ -1,0 +1,115 @@
+"""Links that fixed joints weld together, and where each sits in the others."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from types import MappingProxyType
+
+import numpy as np
+
+from dynx.backends.bullet_inertia import longdouble
+from dynx.model.mechanism import pose_arrays
+from dynx.rules.case import Case, end_of
+from dynx.spatial.scalar import Array
+
+
+@dataclass(frozen=True, eq=False)
+class RigidGroup:
+    """Links welded together; `head` is nearest to the root, and `static` says that the world holds it.
+
+    `links` are in depth-first order, the head first; `poses` has (R, p) of each in the head's frame, in
+    long double; `parents` names the link that each but the head is welded to.
+    """
+
+    head: str
+    static: bool
+    links: tuple[str, ...]
+    poses: dict[str, tuple[Array, Array]]
+    parents: dict[str, str]
+
+    def pose(self, link: str, frame: str) -> tuple[Array, Array]:
+        """(R, p) of one link of the group in the frame of another."""
+        R_frame, p_frame = self.poses[frame]
+        R_link, p_link = self.poses[link]
+        return R_frame.T @ R_link, R_frame.T @ (p_link - p_frame)
+
+    def children(self, link: str) -> tuple[str, ...]:
+        """The links that are welded to one from below, in document order."""
+        return tuple(child for child in self.links if self.parents.get(child) == link)
+
+    def below(self, link: str) -> tuple[str, ...]:
+        """All links of the group that hang on one, in depth-first order."""
+        found = {link}
+        for each in self.links:
+            if self.parents.get(each) in found:
+                found.add(each)
+        return tuple(each for each in self.links if each in found and each != link)
+
+
+# All rules ask it of one case before the first remedy makes another.
+@lru_cache(maxsize=8)
+def rigid_groups(case: Case) -> Mapping[str, RigidGroup]:
+    """The group of every link that dynx reads, by the link's name.
+
+    Welded is what the document calls ``fixed``: engines know nothing of joints that dynx holds still for
+    other reasons, such as one that follows a fixed joint.
+    """
+    model = case.model
+    heads = {model.root: model.root}
+    poses = {model.root: _nowhere()}
+    parents: dict[str, str] = {}
+    for joint in model.joints:
+        element = case.joints.get(joint.name)
+        welded = joint.type == "fixed" and (element is None or element.attributes.get("type") == "fixed")
+        if not welded:
+            heads[joint.child] = joint.child
+            poses[joint.child] = _nowhere()
+            continue
+        R_parent, p_parent = poses[joint.parent]
+        R, p = pose_arrays(joint.origin, longdouble)
+        heads[joint.child] = heads[joint.parent]
+        poses[joint.child] = (R_parent @ R, p_parent + R_parent @ p)
+        parents[joint.child] = joint.parent
+    members: dict[str, list[str]] = {}
+    for link in model.links:
+        members.setdefault(heads[link.name], []).append(link.name)
+    groups: dict[str, RigidGroup] = {}
+    for head, names in members.items():
+        group = RigidGroup(
+            head,
+            head == model.root and case.base == "fixed",
+            tuple(names),
+            {name: poses[name] for name in names},
+            {name: parents[name] for name in names if name != head},
+        )
+        groups.update(dict.fromkeys(names, group))
+    return MappingProxyType(groups)
+
+
+def static_links(case: Case) -> frozenset[str]:
+    """Names of the links that the world holds still: on the fixed base the root and what is welded to it.
+
+    Taken from the document, so links that dynx reads as frames are among them.
+    """
+    if case.base != "fixed":
+        return frozenset()
+    ends = [(end_of(joint, "parent"), end_of(joint, "child"), joint) for joint in case.joints.values()]
+    welded: dict[str, list[str]] = {}
+    for parent, child, joint in ends:
+        if joint.attributes.get("type") == "fixed":
+            welded.setdefault(parent, []).append(child)
+    below = {child for _, child, _ in ends}
+    waiting = [name for name in case.links if name not in below]
+    found: set[str] = set()
+    while waiting:
+        name = waiting.pop()
+        if name not in found:
+            found.add(name)
+            waiting += welded.get(name, [])
+    return frozenset(found)
+
+
+def _nowhere() -> tuple[Array, Array]:
+    return longdouble(np.eye(3)), longdouble(np.zeros(3))

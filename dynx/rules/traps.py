@@ -1,0 +1,32 @@
+"""Traps: small robots, one for each rule, that show its cause and nothing else."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from dynx.errors import RobotNotFoundError
+from dynx.model.library import TRAPS, own_roots
+from dynx.model.xml_source import XmlSource
+from dynx.rules.case import Case
+from dynx.rules.registry import find_rule
+from dynx.rules.rule import Rule
+
+
+def find_trap(rule: Rule | str) -> Path:
+    """The trap of a rule, or of its id or name, in the source tree or in the installed package.
+
+    Raises UnknownNameError where there is no such rule, RobotNotFoundError where its trap is missing.
+    """
+    found = find_rule(rule) if isinstance(rule, str) else rule
+    for root in own_roots():
+        path = root / TRAPS / found.trap()
+        if path.is_file():
+            return path
+    raise RobotNotFoundError(f"{found.id} has no trap: no file {TRAPS}/{found.trap()} among dynx's models")
+
+
+def trap_case(rule: Rule | str) -> Case:
+    """The trap of a rule as the rule sees it, on the base on which it shows the cause."""
+    found = find_rule(rule) if isinstance(rule, str) else rule
+    path = find_trap(found)
+    return Case(XmlSource(path.read_bytes(), str(path)), base=found.trap_base)

@@ -1,0 +1,56 @@
+"""Whether engines that load a robot's file themselves differ, beyond what a baseline knows."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from typing import Any
+
+from dynx.doctor import DoctorReport, Finding, diagnose
+from dynx.doctor.formats import Baseline
+from dynx.doctor.formats.baseline import Difference
+from dynx.errors import DynxError
+from dynx.model.model import Base
+from dynx.testing.robot_checks import Disagreement
+from dynx.testing.robot_plan import RobotPlan
+
+
+def require_same_loading(plan: RobotPlan, robot: str, label: str, base: Base) -> None:
+    """Raise Disagreement where engines differ in what the baseline of the plan does not know."""
+    chosen: dict[str, Any] = {} if plan.tolerance is None else {"tolerance": plan.tolerance}
+    head = f"{label}, {base} base, as engines load the file"
+    try:
+        report = diagnose(robot, base=base, engines=plan.engines, **chosen)
+    except DynxError as error:
+        raise Disagreement(f"{head}: not examined\n  {type(error).__name__}: {error}") from None
+    if report.error is not None:
+        raise Disagreement(f"{head}: not examined\n  {report.error.type}: {report.error.message}")
+    # A baseline knows a robot by its name or by its path.
+    baseline = plan.baseline or Baseline(os.curdir)
+    new = baseline.compare(replace(report, robot=robot)).new
+    if new:
+        lines = [f"{head}: {report.verdict}", *(line for each in new for line in _difference(each, report))]
+        tolerance = "" if plan.tolerance is None else f" --tolerance {plan.tolerance:g}"
+        lines.append(
+            f"  the proof, and the file mended: dynx doctor {label} --base {base}{tolerance} --fix OUT.urdf"
+        )
+        raise Disagreement("\n".join(lines))
+
+
+def _difference(each: Difference, report: DoctorReport) -> list[str]:
+    engines = ", ".join(sorted(each.engines))
+    lines = [f"  {each.place} ({engines}): relative error {each.relative_error:.2e}"]
+    return lines + [f"    {_where(found, report)}{found.message}" for found in _findings(each, report)]
+
+
+def _findings(each: Difference, report: DoctorReport) -> list[Finding]:
+    place = each.place
+    return [
+        found
+        for found in report.differences
+        if (found.rule, found.link, found.joint) == (place.rule, place.link, place.joint)
+    ]
+
+
+def _where(found: Finding, report: DoctorReport) -> str:
+    return "" if found.line is None else f"{report.source}:{found.line}: "

@@ -1,0 +1,131 @@
+"""Which robots a pytest run tests, on which bases, in which engines; checked before any test runs."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from dynx.backends.registry import backend_class
+from dynx.cli.inputs import ALL, expand, is_library_name
+from dynx.errors import DynxError, RobotNotFoundError, shown
+from dynx.loaded.registry import ENGINES
+from dynx.model.loading import load
+from dynx.model.model import Base
+
+if TYPE_CHECKING:
+    from dynx.doctor.formats import Baseline
+
+
+@dataclass(frozen=True)
+class PlannedRobot:
+    """A robot: what `dynx.load` takes, and what it is called in a report of tests."""
+
+    robot: str
+    label: str
+
+
+@dataclass(frozen=True)
+class RobotPlan:
+    """The robots of a run and how they are tested.
+
+    `backends` None means all that are installed. `as_loaded` says whether engines also load the files
+    themselves, differing by more than `tolerance` (None: as `dynx.doctor`) only as `baseline` knows.
+    """
+
+    robots: tuple[PlannedRobot, ...]
+    bases: tuple[Base, ...] = ("fixed",)
+    backends: tuple[str, ...] | None = None
+    as_loaded: bool = False
+    tolerance: float | None = None
+    baseline: Baseline | None = None
+
+    @property
+    def engines(self) -> tuple[str, ...] | None:
+        """The engines among the backends that load files; None for all that are installed."""
+        return tuple(name for name in self.backends or () if name in ENGINES) or None
+
+    @property
+    def header(self) -> str:
+        """One line for the head of a report."""
+        labels = [robot.label for robot in self.robots]
+        listed = ", ".join(labels[:5]) + (f" and {len(labels) - 5} more" if len(labels) > 5 else "")
+        engines = ", ".join(self.backends or ["all engines"])
+        return f"dynx: {listed}; {' and '.join(self.bases)} base; {engines}"
+
+
+def plan_robots(config: pytest.Config, asked: Sequence[tuple[str, Path]]) -> RobotPlan:
+    """The plan for the options of `config` and robots, each with the folder to which its path is
+    relative. Raises UsageError for what is wrong in them."""
+    option = config.option
+    try:
+        robots = dict.fromkeys(each for robot, folder in asked for each in _found(robot, folder, config))
+        return RobotPlan(
+            robots=tuple(robots),
+            bases=("fixed", "floating") if option.dynx_base == "both" else (option.dynx_base or "fixed",),
+            backends=None if option.dynx_backends is None else _backends(option.dynx_backends),
+            as_loaded=bool(option.dynx_as_loaded),
+            tolerance=option.dynx_tolerance,
+            baseline=_baseline(config),
+        )
+    except DynxError as error:
+        raise pytest.UsageError(str(error)) from error
+
+
+def path_or_name(robot: str, folder: Path) -> str:
+    """A robot as `dynx.load` takes it, a path in it being relative to `folder`."""
+    if robot == ALL or is_library_name(robot):
+        return robot
+    path = os.path.join(folder, os.path.expanduser(robot))
+    return path if os.path.lexists(path) else robot
+
+
+def _found(robot: str, folder: Path, config: pytest.Config) -> list[PlannedRobot]:
+    found = []
+    for each in expand([path_or_name(robot, folder)]):
+        if each.refusal is not None:
+            raise each.refusal
+        try:
+            load(each.robot)
+        except RobotNotFoundError:
+            raise
+        except DynxError:
+            pass  # what cannot be read is a failing test, not a wrong command
+        found.append(PlannedRobot(each.robot, _label(each.robot, config.rootpath)))
+    return found
+
+
+def _label(robot: str, root: Path) -> str:
+    if not os.path.isabs(robot):
+        return robot
+    inside = os.path.relpath(robot, root)
+    return Path(robot if inside.startswith(os.pardir) else inside).as_posix()
+
+
+def _backends(text: str) -> tuple[str, ...]:
+    names = tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
+    if not names:
+        raise pytest.UsageError(f"--dynx-backends is {shown(text)}; wanted names separated by commas")
+    for name in names:
+        backend_class(name).require_engine()
+    return names
+
+
+def _baseline(config: pytest.Config) -> Baseline | None:
+    option = config.option
+    if not option.dynx_as_loaded:
+        for value, flag in ((option.dynx_baseline, "baseline"), (option.dynx_tolerance, "tolerance")):
+            if value is not None:
+                raise pytest.UsageError(f"--dynx-{flag} is about what --dynx-as-loaded looks at; give both")
+        return None
+    if option.dynx_tolerance is not None and not 0.0 < option.dynx_tolerance < 1.0:
+        raise pytest.UsageError(f"--dynx-tolerance is {option.dynx_tolerance}; wanted it between 0 and 1")
+    if option.dynx_baseline is None:
+        return None
+    from dynx.cli.doctor_outputs import load_baseline
+
+    return load_baseline(os.path.join(config.invocation_params.dir, option.dynx_baseline))

@@ -1,0 +1,169 @@
+"""The page: well-formed, self-contained, complete, and unharmed by names."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dynx.doctor.formats import html_page, read_baseline
+from dynx.doctor.formats.html_changes import excerpt, lines_of
+from dynx.doctor.formats.html_elements import escape, name
+from dynx.doctor.formats.html_heat import NONE, SAME, STEPS, Step, heat_style, step_of
+from dynx.doctor.report import DoctorReport
+from dynx.rules.registry import all_rules
+from tests.doctor.formats.reports import HOSTILE, TEXT, alike, differing, hostile, refused
+
+VOID = {"meta", "br", "link", "img", "hr", "input"}
+
+ALLOWED = {
+    *("html", "head", "meta", "title", "style", "body", "header", "main", "footer", "article", "div", "span"),
+    *("h1", "h2", "h3", "h4", "p", "a", "br", "b", "i", "strong", "code", "pre", "details", "summary"),
+    *("table", "thead", "tbody", "tr", "th", "td", "ul", "li", "dl", "dt", "dd"),
+}
+"""Elements that fetch nothing and run nothing."""
+
+
+class Page(HTMLParser):
+    """What is on a page: its elements, its text, and whether every element is closed."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(convert_charrefs=True)
+        self.tags: list[str] = []
+        self.attributes: list[tuple[str, str]] = []
+        self.text = ""
+        self._open: list[str] = []
+        self.feed(text)
+        self.close()
+        assert not self._open
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+        self.attributes += [(key, value or "") for key, value in attrs]
+        if tag not in VOID:
+            self._open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self._open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        self.text += data
+
+
+REPORTS = [differing(), alike("ur5"), refused(), hostile(), differing(base="floating")]
+
+
+@pytest.mark.parametrize(
+    "reports", [[], *[[each] for each in REPORTS], REPORTS], ids=lambda reports: str(len(reports))
+)
+def test_the_page_is_well_formed_and_needs_nothing_else(reports: list[DoctorReport]) -> None:
+    text = html_page(reports, command="dynx doctor a.urdf")
+    page = Page(text)
+    assert text.isascii()
+    assert set(page.tags) <= ALLOWED
+    keys = {key for key, _ in page.attributes}
+    assert not {key for key in keys if key.startswith("on")} | (
+        keys & {"src", "srcset", "style", "action"}
+    ) - {"style"}
+    assert all(value.startswith("#") for key, value in page.attributes if key == "href")
+    assert not re.search(r"url\(|@import|https?:", text)
+
+
+def test_the_page_of_one_robot_says_everything() -> None:
+    page = Page(html_page([differing()], command="dynx doctor arm.urdf"))
+    report = differing()
+    wanted = [report.source, "DX901", "planted-cause", "mass matrix off by 1900 %", "off by 3e-11 (rounding)"]
+    wanted += ["1.9e+01", "line 3", '<link name="base"/>', "+    <inertial>", "p.changeDynamics(robot, link)"]
+    wanted += [
+        "--choose DX901=keep",
+        "inertia must be positive",
+        "It loads the mended file",
+        "pinocchio 4.1.0",
+    ]
+    wanted += [each.call for each in report.engines]
+    wanted += ["dynx doctor arm.urdf", "seed 0", "DX903", "q = [0.5]", "no mass matrix"]
+    assert [words for words in wanted if words is None or words not in page.text] == []
+
+
+def test_each_robot_of_many_has_a_row_that_leads_to_it() -> None:
+    page = Page(html_page(REPORTS))
+    targets = [value[1:] for key, value in page.attributes if key == "href"]
+    assert targets == [value for key, value in page.attributes if key == "id"]
+    assert len(targets) == len(REPORTS)
+
+
+def test_a_cause_leads_to_the_page_of_its_rule() -> None:
+    rule = all_rules()[0]
+    finding = replace(differing().findings[0], rule=rule.id, name=rule.name)
+    page = Page(html_page([replace(differing(), findings=(finding,))]))
+    assert rule.page() in page.text
+    anchor = f"rule-{rule.id.lower()}"
+    assert ("href", f"#{anchor}") in page.attributes
+    assert ("id", anchor) in page.attributes
+
+
+@given(st.text())
+def test_nothing_escapes_from_text(text: str) -> None:
+    for written in (escape(text), name(text)):
+        assert "<" not in written
+        assert '"' not in written
+        assert all(c.isprintable() or c in "\n\t" for c in written)
+
+
+@given(st.text(st.characters(exclude_characters="\r"), max_size=20))
+def test_a_name_of_any_kind_adds_no_element(text: str) -> None:
+    report = differing(text, link=text, joint=text, message=text)
+    plain = differing("x", link="y", joint="z", message="w")
+    assert Page(html_page([report])).tags == Page(html_page([plain])).tags
+
+
+def test_a_very_long_name_is_cut() -> None:
+    assert len(html_page([hostile()])) < len(html_page([differing()])) + 60 * len(HOSTILE[:200])
+    assert "x" * 1000 not in html_page([hostile()])
+
+
+def test_the_marked_line_is_the_one_that_is_meant() -> None:
+    for number, line in enumerate(TEXT.splitlines(), start=1):
+        marked = Page(excerpt(differing(), number))
+        here = re.search(r'<span class="here">.*?</span>(.*?)</span>', excerpt(differing(), number))
+        assert here is not None
+        assert here.group(1) == escape(line)
+        assert str(number) in marked.text
+
+
+@given(st.lists(st.sampled_from(["a", "\u2028", "\x0b", "\n", "\r\n", "\r"])))
+def test_lines_are_counted_as_xml_counts_them(pieces: list[str]) -> None:
+    text = "".join(pieces)
+    assert len(lines_of(text)) == text.replace("\r\n", "\n").replace("\r", "\n").count("\n") + 1
+
+
+def test_the_baseline_is_on_the_page() -> None:
+    known = read_baseline('{"schema": 1, "known": []}', "known.json")
+    assert "4 new, 0 known, 0 gone" in Page(html_page([differing()], baseline=known)).text
+
+
+def luminance(colour: str) -> float:
+    """Relative luminance of ``#rrggbb``, WCAG 2.1."""
+    parts = [int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5)]
+    linear = [part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in parts]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+@pytest.mark.parametrize("step", [SAME, *STEPS, NONE], ids=lambda step: step.label)
+def test_numbers_can_be_read_on_every_colour(step: Step) -> None:
+    for pair in (step.light, step.dark):
+        assert all(colour in heat_style() for colour in pair)
+        darker, lighter = sorted(map(luminance, pair))
+        assert (lighter + 0.05) / (darker + 0.05) >= 4.5  # what WCAG 2.1 AA asks of text
+
+
+@given(st.floats(min_value=0.0), st.floats(min_value=0.0))
+def test_a_larger_error_is_on_no_lower_step(one: float, other: float) -> None:
+    order = [SAME, *STEPS, NONE]
+    small, large = sorted((one, other))
+    assert order.index(step_of(small, 1e-12)) <= order.index(step_of(large, 1e-12))
+    assert (step_of(one, 1e-12) is SAME) == (one <= 1e-12)

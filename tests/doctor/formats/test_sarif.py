@@ -1,0 +1,131 @@
+"""SARIF 2.1.0: the constraints of the standard that code hosts check, and stable fingerprints."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dynx.doctor.formats import Baseline, sarif_document
+from dynx.doctor.formats.baseline import differences
+from dynx.doctor.report import DoctorReport
+from dynx.rules.registry import all_rules
+from tests.doctor.formats.reports import alike, differing, hostile, refused
+
+
+def require_valid(document: dict[str, Any]) -> None:
+    """The rules of SARIF 2.1.0 (OASIS, 27 March 2020) for what is used here; sections in comments."""
+    json.dumps(document, allow_nan=False)
+    assert document["version"] == "2.1.0"  # 3.13.2
+    [run] = document["runs"]  # 3.13.4
+    driver = run["tool"]["driver"]  # 3.18.2
+    assert driver["name"]  # 3.19.8
+    assert re.fullmatch(r"\d+\.\d+\.\d+[-+.\w]*", driver["semanticVersion"])  # 3.19.12
+    assert run["columnKind"] in ("utf16CodeUnits", "unicodeCodePoints")  # 3.14.17
+    rules = driver["rules"]
+    assert len({rule["id"] for rule in rules}) == len(rules)  # 3.19.23
+    for rule in rules:
+        assert set(rule) <= {
+            "id", "name", "shortDescription", "fullDescription", "help", "defaultConfiguration", "properties",
+        }  # fmt: skip
+        for key in ("shortDescription", "fullDescription", "help"):
+            assert key not in rule or rule[key]["text"]  # 3.12.3
+    for invocation in run["invocations"]:
+        assert isinstance(invocation["executionSuccessful"], bool)  # 3.20.14
+    for result in run["results"]:
+        assert rules[result["ruleIndex"]]["id"] == result["ruleId"]  # 3.27.6
+        assert result["level"] in ("none", "note", "warning", "error")  # 3.27.10
+        assert result["message"]["text"]  # 3.27.11
+        assert all(isinstance(value, str) for value in result["partialFingerprints"].values())  # 3.27.17
+        for place in result["locations"]:  # 3.27.12
+            uri = place["physicalLocation"]["artifactLocation"]["uri"]  # 3.4.3: a URI reference, RFC 3986
+            assert re.fullmatch(r"[A-Za-z0-9\-._~:/?#\[\]@!$&'()*+,;=%]+", uri)
+            urlsplit(uri)
+            region = place["physicalLocation"].get("region")
+            assert region is None or region["startLine"] >= 1  # 3.30.5
+            for logical in place.get("logicalLocations", ()):
+                assert logical["name"]  # 3.33.4
+
+
+def results(*reports: DoctorReport, baseline: Baseline | None = None) -> list[dict[str, Any]]:
+    """The results of the one run."""
+    document = sarif_document(reports, baseline)
+    require_valid(document)
+    found: list[dict[str, Any]] = document["runs"][0]["results"]
+    return found
+
+
+def prints(found: list[dict[str, Any]]) -> list[str]:
+    """The fingerprints of results."""
+    return [value for result in found for value in result["partialFingerprints"].values()]
+
+
+def test_levels_say_how_alarming_a_finding_is() -> None:
+    found = {(each["ruleId"], each["level"]) for each in results(differing(), alike(), refused())}
+    assert found == {
+        ("DX901", "error"),
+        ("DX902", "warning"),
+        ("DX903", "note"),
+        ("unexplained", "error"),
+    }
+
+
+def test_fingerprints_are_distinct_and_hold_no_line() -> None:
+    before, after = results(differing()), results(differing(line_shift=7))
+    assert len(set(prints(before))) == len(before) == 5
+    assert prints(before) == prints(after)
+    lines = [each["locations"][0]["physicalLocation"].get("region") for each in before]
+    moved = [each["locations"][0]["physicalLocation"].get("region") for each in after]
+    assert lines != moved
+
+
+def test_both_bases_are_one_result() -> None:
+    assert len(results(differing(), differing(base="floating"))) == len(results(differing()))
+
+
+def test_a_file_below_the_working_directory_is_relative(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "a b").mkdir()
+    (tmp_path / "a b" / "arm.urdf").write_text("<robot/>")
+    monkeypatch.chdir(tmp_path)
+    found = results(differing(str(tmp_path / "a b" / "arm")))
+    assert {each["locations"][0]["physicalLocation"]["artifactLocation"]["uri"] for each in found} == {
+        "a%20b/arm.urdf"
+    }
+    monkeypatch.chdir(tmp_path / "a b")
+    (tmp_path / "other.urdf").write_text("<robot/>")
+    [one, *_] = results(differing(str(tmp_path / "other")))
+    uri = one["locations"][0]["physicalLocation"]["artifactLocation"]["uri"]
+    assert uri == (tmp_path / "other.urdf").as_uri()
+
+
+def test_a_rule_of_the_catalogue_brings_its_page() -> None:
+    rule = all_rules()[0]
+    report = differing()
+    finding = report.findings[0]
+    known = DoctorReport(
+        "arm", findings=(type(finding)(**{**vars(finding), "rule": rule.id, "name": rule.name}),)
+    )
+    document = sarif_document([known])
+    require_valid(document)
+    [described] = document["runs"][0]["tool"]["driver"]["rules"]
+    assert described["help"]["text"] == rule.page()
+    assert described["shortDescription"]["text"] == rule.title
+
+
+def test_what_is_in_the_baseline_is_suppressed() -> None:
+    baseline = Baseline("", tuple(e for e in differences(differing(), "") if e.place.rule != "DX902"))
+    for result in results(differing(), baseline=baseline):
+        assert bool(result["suppressions"]) == (result["ruleId"] in ("DX901", "unexplained"))
+
+
+@given(st.text())
+def test_any_name_gives_a_valid_document(text: str) -> None:
+    results(differing(text, link=text, joint=text, message=text or "x"), hostile())

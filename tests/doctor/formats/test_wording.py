@@ -1,0 +1,69 @@
+"""Sizes and values in words: short, and never two different values alike."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dynx.doctor.formats import wording
+from dynx.doctor.formats.causes import ROUNDING, causes, severity, status
+from dynx.doctor.report import Effect
+from tests.doctor.formats.reports import alike, differing, refused
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        *((0.0, "0"), (3e-11, "3e-11"), (1.3e-2, "1.3 %"), (0.943, "94 %"), (19.0, "1900 %"), (1e9, "1e+09")),
+        *((math.inf, "no answer"), (math.nan, "no answer")),
+    ],
+)
+def test_a_size_is_said_as_people_say_it(error: float, said: str) -> None:
+    assert wording.size(error) == said
+
+
+def test_an_effect_names_its_quantity() -> None:
+    assert wording.effect(Effect("mass_matrix", 0.5)) == "mass matrix off by 50 %"
+    assert wording.effect(Effect("forward dynamics", math.inf)) == "no forward dynamics"
+    assert wording.effect(Effect("loading", math.inf)) == "the file is refused"
+
+
+@given(st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=2, max_size=5))
+def test_different_numbers_look_different(numbers: list[float]) -> None:
+    said = wording.values(numbers)
+    # -0.0 and 0.0 are one value to a reader.
+    assert len(set(said)) == len({number + 0.0 for number in numbers})
+
+
+def test_paths_are_called_by_their_files_where_that_tells_them_apart() -> None:
+    assert wording.titles(["a/arm.urdf", "a/arm.urdf", "ur5"]) == ["arm", "arm", "ur5"]
+    assert wording.titles(["a/arm.urdf", "b/arm.urdf"]) == ["a/arm.urdf", "b/arm.urdf"]
+    assert wording.titles(["", ".."]) == ["", ".."]
+
+
+@given(st.lists(st.text()))
+def test_different_robots_are_called_differently(robots: list[str]) -> None:
+    found = dict(zip(wording.titles(robots), robots, strict=True))
+    assert all(found[called] == robot for called, robot in zip(wording.titles(robots), robots, strict=True))
+
+
+def test_rounding_is_less_alarming_than_a_wrong_robot() -> None:
+    found = {cause.rule: cause.severity for cause in causes(differing())}
+    assert found == {"DX901": "error", "DX902": "warning", "DX903": "note"}
+    assert [cause.rule for cause in causes(differing())] == ["DX901", "DX902", "DX903"]
+    assert [each.link for each in causes(differing())[0].findings] == ["tool", "base"]
+    assert severity(differing().findings[2]) == "warning"
+    effect = differing().findings[2].effect
+    assert effect is not None
+    assert effect.relative_error < ROUNDING
+
+
+def test_the_status_of_a_report_in_one_word() -> None:
+    assert [status(report) for report in (alike(), differing(), refused())] == [
+        "alike",
+        "unexplained",
+        "refused",
+    ]

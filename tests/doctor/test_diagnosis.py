@@ -1,0 +1,200 @@
+"""The doctor from beginning to end: what differs, why, with proof, and the file mended."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import dynx
+from dynx.agreement.tolerances import BAR
+from dynx.doctor import DoctorReport, compare_as_loaded, diagnose, results_document
+from dynx.errors import ArgumentError, NotInstalledError, UnknownBackendError, UnknownNameError
+from dynx.loaded import ENGINES, installed_engines, loader_class, registry
+from dynx.model import Model
+from dynx.model.model import Base
+from dynx.rules import Rule, all_rules
+from dynx.rules.traps import find_trap, trap_case
+from dynx.testing.strategies import models
+
+BOTH = ["pinocchio", "pybullet"]
+TRAP = find_trap("DX101")
+
+
+def differing() -> list[Rule]:
+    """The rules about differences that hold for an engine installed here."""
+    versions = {engine: loader_class(engine).engine_version() for engine in installed_engines()}
+    return [rule for rule in all_rules() if rule.kind == "difference" and rule.holds_for(versions)]
+
+
+@pytest.mark.parametrize("rule", differing(), ids=lambda rule: rule.id)
+def test_each_trap_is_explained_by_its_rule(rule: Rule) -> None:
+    case = trap_case(rule)
+    report = diagnose(find_trap(rule), base=case.base, samples=3, counterexamples=False)
+    mine = [finding for finding in report.differences if finding.rule == rule.id]
+    assert report.error is None
+    assert not report.alike
+    assert report.explained, report.unexplained
+    if rule.remedy(case, rule.detect(case)) is not None:
+        assert mine, (report.verdict, report.findings)
+        assert all(finding.proved for finding in mine)
+
+
+def test_a_proved_cause_has_place_engine_effect_and_remedy() -> None:
+    report = diagnose(TRAP, engines=BOTH)
+    (finding,) = report.differences
+    assert (finding.rule, finding.engines, finding.proved) == ("DX101", ("pybullet",), True)
+    assert finding.effect is not None
+    assert finding.effect.relative_error > BAR
+    assert finding.line is not None
+    assert finding.link is not None
+    assert finding.link in TRAP.read_text(encoding="utf-8").splitlines()[finding.line - 1]
+    assert finding.remedy
+    assert report.residual <= BAR < max(report.engines[1].before.values())
+    assert report.referee <= BAR
+
+
+def test_the_mended_text_is_alike_and_needs_no_further_mending() -> None:
+    report = diagnose(TRAP)
+    assert report.mended is not None
+    again = diagnose(report.mended)
+    assert again.alike
+    assert again.mended is None
+    assert not again.differences
+
+
+def test_only_what_must_change_changes() -> None:
+    report = diagnose(TRAP, engines=BOTH)
+    assert report.mended is not None
+    before, after = report.text or "", report.mended
+    kept = [line for line in before.splitlines() if line.strip() in {x.strip() for x in after.splitlines()}]
+    assert len(kept) >= len(before.splitlines()) - 1
+
+
+@settings(max_examples=20)
+@given(st.data())
+def test_robots_without_a_cause_are_alike(data: st.DataObject) -> None:
+    model = data.draw(models(max_links=5))
+    first = diagnose(model, engines=BOTH, samples=2, counterexamples=False, base=model.base)
+    # What a random robot has of causes is taken away; then nothing may be left to find.
+    assert first.explained, first.unexplained
+    if first.mended is None:
+        return
+    second = diagnose(first.mended, engines=BOTH, samples=2, counterexamples=False, base=model.base)
+    assert second.explained
+    assert not [finding for finding in second.differences if finding.remedy and not second.calls]
+
+
+def test_a_report_is_the_same_again_and_is_plain_json() -> None:
+    one, two = (diagnose(TRAP, seed=3) for _ in range(2))
+    assert {**one.to_dict(), "seconds": 0} == {**two.to_dict(), "seconds": 0}
+    document = results_document([one])
+    assert json.loads(json.dumps(document, allow_nan=False)) == document
+    assert document["summary"] == {
+        "robots": 1,
+        "alike": 0,
+        "explained": 1,
+        "unexplained": 0,
+        "refused": 0,
+        "not_done": 0,
+    }
+
+
+def test_what_no_rule_explains_is_said_with_the_smallest_robot(monkeypatch: pytest.MonkeyPatch) -> None:
+    others = tuple(rule for rule in all_rules() if rule.id != "DX101")
+    monkeypatch.setattr("dynx.doctor.diagnosis.all_rules", lambda: others)
+    report = diagnose(TRAP, engines=BOTH)
+    assert not report.explained
+    assert not report.alike
+    (left,) = report.unexplained
+    assert left.engine == "pybullet"
+    assert left.counterexample is not None
+    small = dynx.load(left.counterexample.urdf)
+    whole = dynx.load(TRAP)
+    assert len(small.links) <= len(whole.links)
+    assert left.counterexample.moving_joints == len(small.joint_names) <= 1
+    assert left.counterexample.relative_error > BAR
+
+
+@pytest.mark.parametrize("base", ["fixed", "floating"])
+def test_as_loaded_is_the_same_measurement_without_causes(base: Base) -> None:
+    plain, full = compare_as_loaded(TRAP, base=base), diagnose(TRAP, base=base, counterexamples=False)
+    assert [each.before for each in plain.engines] == [each.before for each in full.engines]
+    assert plain.pairs == full.pairs
+    assert plain.findings == ()
+    assert plain.mended is None
+
+
+def test_a_choice_changes_what_is_done() -> None:
+    trap = find_trap("DX103")
+    rule = next(rule for rule in all_rules() if rule.id == "DX103")
+    texts = {choice: diagnose(trap, engines=BOTH, choose={"dx103": choice}).mended for choice in rule.choices}
+    assert len(set(texts.values())) > 1
+    assert diagnose(trap, engines=BOTH).choices
+
+
+def test_a_robot_that_cannot_be_read_gives_a_report_with_its_error(tmp_path: Path) -> None:
+    broken = tmp_path / "broken.urdf"
+    broken.write_text("<robot>\n<link></robot>", encoding="utf-8")
+    report = diagnose(broken)
+    assert report.error is not None
+    assert f"{broken}:2" in report.error.message
+    assert not report
+    assert "not examined" in report.verdict
+    missing = diagnose(tmp_path / "none.urdf")
+    assert missing.error is not None
+    assert missing.error.type == "RobotNotFoundError"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "said"),
+    [
+        ({"engines": ["pinochio"]}, UnknownBackendError, "did you mean 'pinocchio'"),
+        ({"engines": "pinocchio"}, ArgumentError, "wanted names"),
+        ({"engines": []}, ArgumentError, "wanted names"),
+        ({"samples": 0}, ArgumentError, "at least 1"),
+        ({"samples": True}, ArgumentError, "whole number"),
+        ({"seed": -1}, ArgumentError, "at least 0"),
+        ({"tolerance": 0.0}, ArgumentError, "between 0 and 1"),
+        ({"tolerance": math.nan}, ArgumentError, "between 0 and 1"),
+        ({"base": "flying"}, ArgumentError, "floating"),
+        ({"choose": {"DX999": "keep"}}, UnknownNameError, "no rule 'DX999'"),
+        ({"choose": {"DX103": "kep"}}, ArgumentError, "did you mean 'keep'"),
+        ({"choose": {"DX101": "keep"}}, ArgumentError, "leaves no choice"),
+    ],
+)
+def test_arguments_that_are_right_for_no_robot_are_refused(
+    arguments: dict[str, object], error: type[Exception], said: str
+) -> None:
+    with pytest.raises(error, match=said):
+        diagnose(TRAP, **arguments)  # type: ignore[arg-type]
+
+
+def test_a_missing_engine_is_named_when_asked_for_and_left_out_otherwise(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def missing(engine: str) -> type:
+        if engine in ("mujoco", "drake"):
+            raise NotInstalledError(f"pip install 'dynx[{engine}]'")
+        return known(engine)
+
+    known = registry.loader_class
+    monkeypatch.setattr(registry, "loader_class", missing)
+    monkeypatch.setattr("dynx.doctor.examination.loader_class", missing)
+    report = diagnose(TRAP, counterexamples=False)
+    assert [each.engine for each in report.engines] == [e for e in ENGINES if e not in ("mujoco", "drake")]
+    with pytest.raises(NotInstalledError, match=r"dynx\[drake\]"):
+        diagnose(TRAP, engines=["pinocchio", "drake"])
+
+
+def test_a_model_is_examined_as_the_file_it_writes() -> None:
+    model = dynx.load("panda")
+    report = diagnose(model, engines=BOTH, samples=2, counterexamples=False)
+    assert isinstance(model, Model)
+    assert isinstance(report, DoctorReport)
+    assert report.robot == model.name
+    assert report.explained

@@ -1,0 +1,239 @@
+"""The model difference: every deviation is listed, and nothing that is merely written otherwise."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dynx.loaded import LoadedInertial, LoadedJoint, LoadedModel
+from dynx.loaded.difference import ROUNDING, Deviation, model_difference
+from dynx.model import Inertial, Joint, JointDynamics, Limits, Link, Model, Pose
+from dynx.model.mechanism import build_mechanism
+from dynx.model.model import STANDARD_GRAVITY
+from dynx.spatial.so3 import rotation_from_rpy, skew
+from tests.loaded.files import TILTED, file_robots
+
+ENGINE = "some engine"
+BODY = Inertial(2.0, Pose((0.1, 0.2, 0.3), (0.3, 0.2, 0.1)), 0.2, 0.01, 0.02, 0.3, 0.03, 0.4)
+
+
+def held(model: Model) -> LoadedModel:
+    """What an engine holds that reads the file as dynx does and fuses nothing."""
+    links = {}
+    for link in model.links:
+        inertial = link.inertial or Inertial()
+        R = rotation_from_rpy(np.array(inertial.origin.rpy))
+        tensor = np.asarray(R @ inertial.tensor @ R.T)
+        links[link.name] = LoadedInertial(inertial.mass, np.array(inertial.origin.xyz), tensor)
+    joints = {
+        joint.name: LoadedJoint(
+            joint.type,
+            joint.origin.matrix,
+            np.array(joint.axis),
+            (joint.limits.lower, joint.limits.upper),
+            joint.limits.velocity,
+            joint.limits.effort,
+            joint.dynamics.damping,
+            joint.dynamics.friction,
+            joint.dynamics.armature,
+        )
+        for joint in model.joints
+        if joint.moves
+    }
+    return LoadedModel(ENGINE, links, joints, np.eye(4), np.array(STANDARD_GRAVITY))
+
+
+def fused(model: Model) -> LoadedModel:
+    """The same where the engine holds one inertial for all links that fixed joints hold together."""
+    mechanism = build_mechanism(model)
+    lumps = {}
+    places = {frame.name: frame.body for frame in mechanism.frames[: len(model.links)]}
+    for body, inertia in enumerate([*(each.inertia for each in mechanism.bodies), mechanism.root]):
+        number = body if body < len(mechanism.bodies) else -1
+        first, *others = [link.name for link in model.links if places[link.name] == number]
+        mass = float(inertia.mass)
+        center = inertia.first_moment / mass if mass else np.zeros(3)
+        arm = skew(center)
+        tensor = inertia.second_moment + mass * (arm @ arm)
+        lumps[first] = LoadedInertial(mass, np.asarray(center), np.asarray(tensor), tuple(others))
+    return replace(held(model), links=lumps)
+
+
+def rows(model: Model, engine: LoadedModel) -> list[tuple[str, str, str]]:
+    return [(row.part, row.name, row.property) for row in model_difference(model, [engine])]
+
+
+def robot() -> Model:
+    links = [Link(name, BODY) for name in ("base", "arm", "hand", "tool")]
+    limits = Limits(-1.0, 2.0, 3.0, 4.0)
+    joints = [
+        Joint("turn", "revolute", "base", "arm", Pose((0.1, 0.2, 0.3), (0.1, 0.2, 0.3)), limits=limits),
+        Joint("slide", "prismatic", "arm", "hand", limits=limits, dynamics=JointDynamics(0.1, 0.2, 0.3)),
+        Joint("weld", "fixed", "hand", "tool", Pose((0.4, 0.5, 0.6), (0.6, 0.5, 0.4))),
+    ]
+    return Model.build("robot", links, joints, base="floating", gravity=TILTED)
+
+
+@given(file_robots())
+def test_what_is_read_alike_does_not_deviate(model: Model) -> None:
+    assert rows(model, held(model)) == []
+
+
+@given(file_robots())
+def test_fused_links_are_compared_lump_with_lump(model: Model) -> None:
+    assert rows(model, fused(model)) == []
+
+
+def _link(name: str, **changes: Any) -> Callable[[LoadedModel], LoadedModel]:
+    return lambda engine: replace(
+        engine, links={**engine.links, name: replace(engine.links[name], **changes)}
+    )
+
+
+def _joint(name: str, **changes: Any) -> Callable[[LoadedModel], LoadedModel]:
+    return lambda engine: replace(
+        engine, joints={**engine.joints, name: replace(engine.joints[name], **changes)}
+    )
+
+
+def _without_link(name: str) -> Callable[[LoadedModel], LoadedModel]:
+    return lambda engine: replace(engine, links={k: x for k, x in engine.links.items() if k != name})
+
+
+def _without_joint(name: str) -> Callable[[LoadedModel], LoadedModel]:
+    return lambda engine: replace(engine, joints={k: x for k, x in engine.joints.items() if k != name})
+
+
+def _shifted(by: tuple[float, float, float]) -> Any:
+    T = robot().joint("turn").origin.matrix.copy()
+    T[:3, 3] += by
+    return T
+
+
+def _turned() -> Any:
+    T = robot().joint("turn").origin.matrix.copy()
+    T[:3, :3] = T[:3, :3] @ rotation_from_rpy(np.array([0.0, 0.0, 1e-9]))
+    return T
+
+
+DEVIATIONS: list[tuple[Callable[[LoadedModel], LoadedModel], tuple[str, str, str]]] = [
+    (_link("arm", mass=2.000001), ("link", "arm", "mass")),
+    (_link("arm", center=np.array([0.1, 0.2, 0.3 + 1e-9])), ("link", "arm", "center")),
+    (_link("arm", inertia=np.zeros((3, 3))), ("link", "arm", "inertia")),
+    (_without_link("arm"), ("link", "arm", "existence")),
+    (_without_joint("turn"), ("joint", "turn", "existence")),
+    (_joint("turn", type="prismatic"), ("joint", "turn", "type")),
+    (_joint("turn", type="floating"), ("joint", "turn", "type")),
+    (_joint("turn", placement=_shifted((0.0, 1e-9, 0.0))), ("joint", "turn", "position")),
+    (_joint("turn", placement=_turned()), ("joint", "turn", "rotation")),
+    (_joint("turn", axis=np.array([-1.0, 0.0, 0.0])), ("joint", "turn", "axis")),
+    (_joint("turn", axis=np.array([1.0000001, 0.0, 0.0])), ("joint", "turn", "axis")),
+    (_joint("turn", limits=(-1.5, 2.0)), ("joint", "turn", "lower")),
+    (_joint("turn", limits=(-1.0, np.inf)), ("joint", "turn", "upper")),
+    (_joint("turn", velocity=0.0), ("joint", "turn", "velocity")),
+    (_joint("turn", effort=np.inf), ("joint", "turn", "effort")),
+    (_joint("slide", damping=0.0), ("joint", "slide", "damping")),
+    (_joint("slide", friction=0.0), ("joint", "slide", "friction")),
+    (_joint("slide", armature=0.0), ("joint", "slide", "armature")),
+    (lambda engine: replace(engine, base_frame=_shifted((0.0, 0.0, 0.0))), ("base", "base", "position")),
+    (lambda engine: replace(engine, gravity=np.zeros(3)), ("gravity", "gravity", "default")),
+    (
+        lambda engine: replace(engine, links={**engine.links, "more": engine.links["arm"]}),
+        ("link", "more", "existence"),
+    ),
+    (
+        lambda engine: replace(engine, joints={**engine.joints, "more": engine.joints["turn"]}),
+        ("joint", "more", "existence"),
+    ),
+]
+
+
+@pytest.mark.parametrize(("change", "row"), DEVIATIONS, ids=[f"{d[1][1]}-{d[1][2]}" for d in DEVIATIONS])
+def test_each_deviation_is_listed_and_no_other(
+    change: Callable[[LoadedModel], LoadedModel], row: tuple[str, str, str]
+) -> None:
+    found = rows(robot(), change(held(robot())))
+    if row == ("base", "base", "position"):
+        assert found == [row, ("base", "base", "rotation")]
+    else:
+        assert found == [row]
+
+
+@given(st.data())
+def test_a_mass_off_by_more_than_rounding_is_listed(data: st.DataObject) -> None:
+    model = data.draw(file_robots("floating", solvable=True))
+    name = data.draw(st.sampled_from([link.name for link in model.links]))
+    engine, off = held(model), data.draw(st.sampled_from((4.0, -4.0, 1e3, 1e11)))
+    mass = engine.links[name].mass * (1.0 + off * ROUNDING)
+    assert rows(model, _link(name, mass=mass)(engine)) == [("link", name, "mass")]
+    mass = engine.links[name].mass * (1.0 + 0.25 * ROUNDING)
+    assert rows(model, _link(name, mass=mass)(engine)) == []
+
+
+SAME = [
+    (Limits(), {"limits": (-1e9, 1e9), "velocity": 0.0, "effort": 0.0}),
+    (Limits(), {"limits": (-np.inf, np.inf), "velocity": np.inf, "effort": 1e10}),
+    (Limits(-1e16, 1e16, 5.0, 5.0), {"limits": (-1e10, np.inf)}),
+    (Limits(-1.0, 1.0, 5.0, 5.0), {"velocity": None, "effort": None, "limits": None, "damping": None}),
+    (Limits(-1.0, 1.0, 5.0, 5.0), {"placement": None, "axis": None, "armature": None, "friction": None}),
+]
+
+
+@pytest.mark.parametrize(("limits", "changes"), SAME)
+def test_another_way_of_writing_is_no_deviation(limits: Limits, changes: dict[str, Any]) -> None:
+    joints = [replace(joint, limits=limits) for joint in robot().joints]
+    model = replace(robot(), joints=tuple(joints))
+    assert rows(model, _joint("turn", **changes)(held(model))) == []
+
+
+def test_a_continuous_joint_may_be_revolute_without_limits() -> None:
+    joints = (replace(robot().joints[0], type="continuous", limits=Limits()), *robot().joints[1:])
+    model = replace(robot(), joints=joints)
+    for limits in ((0.0, 0.0), (0.0, -1.0), (-np.inf, np.inf), None):
+        assert rows(model, _joint("turn", type="revolute", limits=limits)(held(model))) == []
+    found = rows(model, _joint("turn", type="revolute", limits=(-1.0, 1.0))(held(model)))
+    assert found == [("joint", "turn", "lower"), ("joint", "turn", "upper")]
+
+
+def test_a_deviation_among_fused_links_is_that_of_the_lump() -> None:
+    model = robot()
+    engine = fused(model)
+    assert engine.links["hand"].fused == ("tool",)
+    heavier = _link("hand", mass=engine.links["hand"].mass + 1.0)(engine)
+    assert rows(model, heavier) == [("link", "hand", "mass")]
+
+
+def test_a_fused_link_that_is_held_apart_too_is_judged_once() -> None:
+    # As Pinocchio does: the lump, and the link on the fixed joint by itself.
+    model = robot()
+    spoiled = replace(
+        model,
+        links=tuple(
+            replace(link, inertial=Inertial()) if link.name == "tool" else link for link in model.links
+        ),
+    )
+    engine = fused(spoiled)
+    engine = replace(engine, links={**engine.links, "tool": held(spoiled).links["tool"]})
+    assert rows(model, engine) == [("link", "tool", "mass"), ("link", "tool", "inertia")]
+
+
+def test_the_root_of_a_fixed_base_is_left_out() -> None:
+    model = robot().with_base("fixed")
+    nothing = LoadedInertial(0.0, np.zeros(3), np.zeros((3, 3)))
+    assert rows(model, _link("base", **vars(nothing))(held(model))) == []
+    assert rows(model, _without_link("base")(held(model))) == []
+    assert rows(robot(), _without_link("base")(held(robot()))) == [("link", "base", "existence")]
+
+
+def test_values_are_plain_and_none_where_there_is_no_limit() -> None:
+    engine = _joint("turn", limits=(-np.inf, 2.0), axis=np.array([0.0, 1.0, 0.0]))(held(robot()))
+    first, second = model_difference(robot(), [engine, engine])[:2]
+    assert first == Deviation(ENGINE, "joint", "turn", "axis", [1.0, 0.0, 0.0], [0.0, 1.0, 0.0])
+    assert second == Deviation(ENGINE, "joint", "turn", "lower", -1.0, None)
+    assert len(model_difference(robot(), [engine, engine])) == 4

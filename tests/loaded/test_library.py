@@ -1,0 +1,109 @@
+"""Every robot of example-robot-data, loaded from its own file by Pinocchio and by PyBullet."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dynx.agreement.tolerances import BAR
+from dynx.backends.reference import ReferenceBackend
+from dynx.doctor.given_file import without_meshes, written
+from dynx.errors import DynxError, EngineError
+from dynx.loaded.difference import model_difference
+from dynx.loaded.pinocchio import LoadedPinocchio
+from dynx.model import Model
+from dynx.model.library import EXAMPLE_ROBOT_DATA, robots
+from dynx.model.loading import load
+from dynx.model.model import Base
+from dynx.model.xml_source import XmlSource
+from tests.backends.robots import motion
+from tests.loaded.files import TILTED, assert_alike, error
+
+BASES: tuple[Base, ...] = ("fixed", "floating")
+
+
+def _readable() -> dict[str, XmlSource]:
+    sources = {}
+    for entry in robots():
+        if entry.source != EXAMPLE_ROBOT_DATA:
+            continue
+        source = XmlSource(entry.path.read_bytes(), entry.name)
+        try:
+            load(source.text)
+        except DynxError:
+            continue
+        sources[entry.name] = without_meshes(source)
+    return sources
+
+
+SOURCES = _readable()
+
+
+def in_tree_coordinates(source: XmlSource, base: Base) -> Model:
+    model = load(source.text, base=base, gravity=TILTED)
+    return replace(model, joints=tuple(replace(joint, mimic=None) for joint in model.joints))
+
+
+def test_there_is_one_robot_that_is_an_empty_shell() -> None:
+    all_of_them = [entry for entry in robots() if entry.source == EXAMPLE_ROBOT_DATA]
+    assert len(SOURCES) == len(all_of_them) - 1
+
+
+@pytest.mark.parametrize("base", BASES)
+@pytest.mark.parametrize("name", SOURCES)
+def test_pinocchio_loads_it_as_dynx_reads_it(name: str, base: Base) -> None:
+    model = in_tree_coordinates(SOURCES[name], base)
+    with written(SOURCES[name]) as path, LoadedPinocchio(path, model) as robot:
+        if model.nv:
+            assert_alike(robot, model, solve=False)
+        assert model_difference(model, [robot.describe()]) == ()
+
+
+@pytest.mark.parametrize("base", BASES)
+@pytest.mark.parametrize("name", SOURCES)
+def test_pybullet_differs_where_the_model_difference_says_so(name: str, base: Base) -> None:
+    pytest.importorskip("pybullet")
+    from dynx.loaded.pybullet import LoadedPyBullet
+
+    model = in_tree_coordinates(SOURCES[name], base)
+    reference = ReferenceBackend(model)
+    q, v, a = motion(model)
+    refusal = _refusal(model)
+    if refusal is not None:
+        with written(SOURCES[name]) as path, pytest.raises(EngineError, match=refusal):
+            LoadedPyBullet(path, model)
+        return
+    with written(SOURCES[name]) as path, LoadedPyBullet(path, model) as robot:
+        rows = model_difference(model, [robot.describe()])
+        poses = reference.forward_kinematics(q)[: len(model.links)]
+        assert error(robot.link_poses(q), poses) <= BAR
+        properties = {row.property for row in rows if row.part != "gravity"}
+        # Everything that PyBullet makes of these files; none of it moves a joint or a frame.
+        assert properties <= {"mass", "inertia", "axis", "lower", "upper"}
+        if model.nv and not properties & {"mass", "inertia", "axis"}:
+            assert error(robot.mass_matrix(q), reference.mass_matrix(q)) <= BAR
+            torque = reference.inverse_dynamics(q, v, a)
+            assert error(robot.inverse_dynamics(q, v, a), torque) <= BAR
+
+
+def _refusal(model: Model) -> str | None:
+    """Why the robot is refused: too many joints, or a free base whose root has no mass in PyBullet."""
+    if len(model.joints) > 127:
+        return "joints, fixed ones included"
+    inertial = model.link(model.root).inertial
+    massless = model.root == "world" if inertial is None else inertial.mass == 0.0
+    return "nails" if massless and model.floating else None
+
+
+def test_some_robots_are_loaded_alike_and_most_are_not() -> None:
+    bullet = pytest.importorskip("dynx.loaded.pybullet")
+    alike = []
+    for name in ("ur5", "solo12", "panda", "talos", "g1"):
+        model = in_tree_coordinates(SOURCES[name], "fixed")
+        q = model.random(0)
+        with written(SOURCES[name]) as path, bullet.LoadedPyBullet(path, model) as robot:
+            M = ReferenceBackend(model).mass_matrix(q)
+            alike.append(bool(np.max(np.abs(robot.mass_matrix(q) - M)) <= BAR * np.max(M)))
+    assert alike == [True, True, False, False, False]

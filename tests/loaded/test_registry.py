@@ -1,0 +1,67 @@
+"""The engines that load files, by name."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from dynx.errors import BackendError, NotInstalledError, UnknownBackendError
+from dynx.loaded import ENGINES, LoadedRobot, installed_engines, load_as, loader_class, registry
+from tests.backends.robots import chain
+
+
+def test_every_installed_engine_has_a_class_of_its_name() -> None:
+    assert "pinocchio" in installed_engines()
+    for name in installed_engines():
+        kind = loader_class(name)
+        assert issubclass(kind, LoadedRobot)
+        assert kind.name == name
+        assert kind.engine_version()[0].isdigit()
+        assert kind.load_call(True) != kind.load_call(False)
+        assert all(call.startswith(f"{name}.") for call in kind.CALLS)
+    assert set(installed_engines()) <= set(ENGINES)
+
+
+@pytest.mark.parametrize("name", installed_engines())
+def test_a_robot_is_loaded_by_the_engine_of_that_name(name: str, tmp_path: Path) -> None:
+    path = tmp_path / "robot.urdf"
+    path.write_text(chain(2).to_urdf())
+    with load_as(name, path, chain(2)) as robot:
+        assert robot.name == name
+        assert robot.mass_matrix(chain(2).neutral()).shape == (2, 2)
+
+
+def test_an_unknown_engine_is_named_with_the_nearest() -> None:
+    with pytest.raises(UnknownBackendError, match=r"no engine 'pinochio'.*did you mean 'pinocchio'"):
+        loader_class("pinochio")
+
+
+def test_an_engine_that_is_missing_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pybullet", None)
+    with pytest.raises(NotInstalledError, match=r"pip install 'dynx\[pybullet\]'"):
+        loader_class("pybullet")
+    assert "pybullet" not in installed_engines()
+    assert "pinocchio" in installed_engines()
+
+
+def test_an_engine_that_cannot_be_used_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(engine: str) -> type[LoadedRobot]:
+        raise BackendError(engine)
+
+    monkeypatch.setattr(registry, "loader_class", broken)
+    assert installed_engines() == ()
+
+
+PROGRAM = """
+import sys
+import dynx.loaded, dynx.loaded.difference
+assert not {"pinocchio", "pybullet", "mujoco", "pydrake"} & set(sys.modules), sorted(sys.modules)
+"""
+
+
+def test_importing_the_package_imports_no_engine() -> None:
+    run = subprocess.run([sys.executable, "-c", PROGRAM], capture_output=True, text=True, timeout=120)
+    assert (run.returncode, run.stderr) == (0, "")

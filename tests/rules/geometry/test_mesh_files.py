@@ -1,0 +1,78 @@
+"""Where meshes are looked for, and when somebody can say that one is missing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from dynx.rules.geometry import MeshNotFoundError, find_mesh
+
+
+@pytest.fixture
+def robot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A description in a ROS package, with one mesh."""
+    monkeypatch.delenv("ROS_PACKAGE_PATH", raising=False)
+    monkeypatch.delenv("AMENT_PREFIX_PATH", raising=False)
+    mesh = tmp_path / "arm_description/meshes/Base.stl"
+    mesh.parent.mkdir(parents=True)
+    mesh.write_bytes(b"")
+    robot = tmp_path / "arm_description/urdf/arm.urdf"
+    robot.parent.mkdir()
+    robot.write_text("<robot/>")
+    return robot
+
+
+def test_a_mesh_is_found_in_its_package_beside_the_description_and_by_its_path(robot: Path) -> None:
+    mesh = robot.parents[1] / "meshes/Base.stl"
+    for name in (
+        "package://arm_description/meshes/Base.stl",
+        "../meshes/Base.stl",
+        f"file://{mesh}",
+        str(mesh),
+    ):
+        found = find_mesh(name, str(robot))
+        assert found is not None
+        assert found.samefile(mesh)
+
+
+@pytest.mark.parametrize(
+    "name", ["package://arm_description/meshes/base.stl", "../meshes/base.stl", "file:///nowhere/base.stl"]
+)
+def test_a_mesh_that_is_not_there_is_missed_and_the_nearest_name_told(robot: Path, name: str) -> None:
+    if (robot.parents[1] / "meshes/base.stl").exists():
+        pytest.skip("this file system does not tell capitals apart")
+    with pytest.raises(MeshNotFoundError) as raised:
+        find_mesh(name, str(robot))
+    assert ("did you mean 'Base.stl'" in str(raised.value)) == ("nowhere" not in name)
+
+
+@pytest.mark.parametrize("name", ["package://hand/meshes/a.stl", "http://x/a.stl", "$(find a)/b.stl", ""])
+def test_what_may_be_elsewhere_is_neither_found_nor_missed(robot: Path, name: str) -> None:
+    assert find_mesh(name, str(robot)) is None
+
+
+def test_text_without_a_file_has_no_folder() -> None:
+    assert find_mesh("meshes/base.stl", "<string>") is None
+
+
+@pytest.mark.parametrize(("variable", "below"), [("ROS_PACKAGE_PATH", ""), ("AMENT_PREFIX_PATH", "share")])
+def test_packages_of_the_environment(
+    robot: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, variable: str, below: str
+) -> None:
+    prefix = tmp_path / "install"
+    mesh = prefix / below / "hand/a.stl"
+    mesh.parent.mkdir(parents=True)
+    mesh.write_bytes(b"")
+    monkeypatch.setenv(variable, str(prefix))
+    found = find_mesh("package://hand/a.stl", str(robot))
+    assert found is not None
+    assert found.samefile(mesh)
+    with pytest.raises(MeshNotFoundError, match=r"no file 'b\.stl' in package 'hand'"):
+        find_mesh("package://hand/b.stl", str(robot))
+
+
+def test_a_path_that_leaves_its_package_is_not_followed(robot: Path) -> None:
+    (robot.parents[2] / "other.stl").write_bytes(b"")
+    with pytest.raises(MeshNotFoundError):
+        find_mesh("package://arm_description/../other.stl", str(robot))

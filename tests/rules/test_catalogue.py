@@ -1,0 +1,188 @@
+"""Every rule of the catalogue: well formed, shown by its trap alone, and removed by its remedy."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+import pytest
+from packaging.specifiers import SpecifierSet
+
+from dynx.agreement.tolerances import BAR
+from dynx.doctor.truth import TILTED
+from dynx.errors import UnknownNameError
+from dynx.loaded import ENGINES
+from dynx.model.xml_source import SourceElement, XmlSource
+from dynx.rules import Case, Detection, Rule, all_rules, find_rule
+from dynx.rules.rigid_groups import rigid_groups
+from dynx.rules.traps import find_trap, trap_case
+from tests.rules.readings import distance
+
+RULES = all_rules()
+every_rule = pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.id)
+
+# Causes that cannot be shown without another: rule -> ids of difference rules its trap also has, and why.
+ALSO_IN_TRAP: dict[str, dict[str, str]] = {
+    "DX303": {"DX301": "a negative damping is a damping, however small"},
+    "DX508": {"DX306": "the range of no width is a limit"},
+    "DX511": {"DX304": "followers of a follower are followers"},
+    "DX512": {"DX304": "a follower that leaves its limits follows"},
+}
+
+# What may change outside of the links, joints and lines that a rule names: rule -> why.
+CHANGES_ELSEWHERE: dict[str, str] = {
+    "DX109": "a link has another name wherever the document names it",
+    "DX212": "frames are taken away, with the joints that hold them",
+    "DX414": "a link has another name wherever the document names it",
+}
+
+
+def test_numbers_and_names_are_unique() -> None:
+    assert len({rule.id for rule in RULES}) == len(RULES)
+    assert len({rule.name for rule in RULES}) == len(RULES)
+    assert len(RULES) >= 20
+
+
+@every_rule
+def test_a_rule_is_well_formed(rule: Rule) -> None:
+    assert re.fullmatch(r"DX[1-5][0-9]{2}", rule.id)
+    assert re.fullmatch(r"[a-z0-9]+(-[a-z0-9]+)+", rule.name)
+    assert type(rule).__module__.endswith(rule.trap().removesuffix(".urdf"))
+    assert (rule.id[2] == "5") == (rule.kind == "practice")
+    assert rule.kind == "practice" or rule.engines
+    assert find_rule(rule.id.lower()) is find_rule(rule.name) is rule
+
+
+@every_rule
+def test_title_and_advice_are_one_sentence(rule: Rule) -> None:
+    for sentence in (rule.title, rule.advice):
+        assert re.fullmatch(r"[A-Z<`\"].*[.]", sentence)
+        assert not re.search(r"[.!?] [A-Z]", sentence)
+        assert len(sentence) <= 120
+
+
+@every_rule
+def test_the_page_begins_with_the_rule(rule: Rule) -> None:
+    first, _, body = rule.page().partition("\n")
+    assert first.startswith(f"{rule.id} {rule.name}: ")
+    assert len(body.split()) >= 40
+    assert all(f"--choose {rule.id}={choice}" in body for choice in list(rule.choices)[1:])
+
+
+@every_rule
+def test_engines_are_known_and_have_versions(rule: Rule) -> None:
+    for engine, versions in rule.engines.items():
+        assert engine in ENGINES
+        assert str(SpecifierSet(versions))
+
+
+@every_rule
+def test_the_trap_is_in_the_rule_alone(rule: Rule) -> None:
+    case = trap_case(rule)
+    assert rule.detect(case)
+    others = {}
+    for other in RULES:
+        if other is rule or not (other.kind == "difference" or rule.kind == "practice"):
+            continue
+        if (other.stage == "reading" or case.readable) and (found := other.detect(case)):
+            others[other.id] = [each.message for each in found]
+    assert others.keys() == ALSO_IN_TRAP.get(rule.id, {}).keys(), others
+
+
+@every_rule
+def test_detections_say_where_and_what(rule: Rule) -> None:
+    case = trap_case(rule)
+    text = case.source.text.splitlines()
+    for each in rule.detect(case):
+        assert each.link is None or each.link in case.links
+        assert each.joint is None or each.joint in case.joints
+        assert each.line is None or 1 <= each.line <= len(text)
+        assert each.message
+        assert "\n" not in each.message
+
+
+def mended(rule: Rule) -> tuple[Case, Case, bool] | None:
+    """The trap, the trap after the remedy (by the last choice where the first does nothing), and
+    whether that changes the physics; None where nothing can remove the cause."""
+    for choice in [None, *rule.choices]:
+        trap = trap_case(rule)
+        settings = None if choice is None else {rule.id: choice}
+        case = Case(trap.source, trap.base, TILTED, settings=settings)
+        remedy = rule.remedy(case, rule.detect(case))
+        if remedy is not None:
+            assert remedy.changed
+            return case, remedy.case, remedy.changes_physics
+    return None
+
+
+@every_rule
+def test_the_remedy_removes_the_cause(rule: Rule) -> None:
+    cured = mended(rule)
+    if cured is not None:
+        case, after, _ = cured
+        assert not rule.detect(after)
+        assert after.source.data != case.source.data or after.calls != case.calls
+
+
+@every_rule
+def test_the_remedy_leaves_the_rest_of_the_text_as_it_is(rule: Rule) -> None:
+    cured = mended(rule)
+    if cured is None or rule.id in CHANGES_ELSEWHERE:
+        return
+    case, after, _ = cured
+    spared = untouched_lines(case, rule.detect(case))
+    remaining = iter(after.source.text.splitlines())
+    for line in spared:
+        assert line in remaining, f"lost or moved: {line}"
+
+
+@every_rule
+def test_the_mended_trap_is_the_same_robot(rule: Rule) -> None:
+    cured = mended(rule)
+    if cured is None or rule.stage == "reading":
+        return
+    case, after, changes_physics = cured
+    assert after.readable
+    if not changes_physics:
+        assert distance(case, after) <= BAR
+
+
+def untouched_lines(case: Case, detections: Sequence[Detection]) -> list[str]:
+    """The lines of a document that hold nothing of what the detections are about: links (and what is
+    welded to them), joints, and the parts of the robot in which they stand."""
+    names = {("link", each.link) for each in detections} | {("joint", each.joint) for each in detections}
+    if case.readable:
+        groups = rigid_groups(case)
+        named = [each.link for each in detections if each.link in groups]
+        names |= {("link", link) for name in named if name is not None for link in groups[name].links}
+    taken = {each.line for each in detections}
+    for element in case.source.root.children:
+        lines = set(lines_of(case.source, element))
+        if (element.tag, element.attributes.get("name")) in names or lines & taken:
+            taken |= lines
+    text = case.source.text.splitlines()
+    return [line for number, line in enumerate(text, start=1) if number not in taken]
+
+
+def lines_of(source: XmlSource, element: SourceElement) -> range:
+    """Numbers of the lines that an element covers."""
+    within = source.data[element.span.start : element.span.end].count(b"\n")
+    return range(element.line, element.line + within + 1)
+
+
+def test_a_rule_is_found_by_id_or_name_in_any_case() -> None:
+    for name in ("DX501", "dx501", "Inertia-Beyond-Geometry"):
+        assert find_rule(name).id == "DX501"
+    with pytest.raises(UnknownNameError, match="did you mean 'inertia-beyond-geometry'"):
+        find_rule("inertia-behind-geometry")
+
+
+def test_a_trap_is_found_by_its_rule() -> None:
+    path = find_trap("inertia-beyond-geometry")
+    assert path == find_trap("dx501") == find_trap(find_rule("DX501"))
+    assert path.name == "dx501_inertia_beyond_geometry.urdf"
+
+
+def test_every_trap_belongs_to_a_rule() -> None:
+    folder = find_trap("DX501").parent
+    assert {path.name for path in folder.iterdir()} == {rule.trap() for rule in RULES}

@@ -1,0 +1,239 @@
+"""Rules about joints: each finds its place in its trap, and mends it there and nowhere else."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dynx.backends.reference import ReferenceBackend
+from dynx.model import Model
+from dynx.model.loading import load
+from dynx.model.xml_source import XmlSource
+from dynx.rules import Case, find_rule
+from dynx.rules.joint_splitting import TYPES
+from dynx.spatial.so3 import rotation_from_rpy
+from dynx.testing.strategies import unit_vectors
+from tests.rules.trap_cases import assert_same_robot, changed_lines, mended, only, trap
+
+
+def arm() -> str:
+    from dynx.model.library import find
+
+    return find("six_axis_arm").read_text(encoding="utf-8")
+
+
+def test_an_axis_is_scaled_as_dynx_scales_it() -> None:
+    case = trap("DX201")
+    found, remedy = mended("DX201", case)
+    assert [each.joint for each in found] == ["elbow", "slide"]
+    assert remedy.case.model.joint("slide").axis == case.model.joint("slide").axis
+    assert_same_robot(case.model, remedy.case.model)
+    assert changed_lines(case, remedy.case) == ['<axis xyz="0 1e-9 0"/>', '<axis xyz="2 0 0"/>']
+
+
+@given(unit_vectors(), st.floats(1e-6, 1e6).filter(lambda x: abs(x - 1.0) > 1e-9))
+def test_any_length_is_found_and_scaled(direction: object, length: float) -> None:
+    axis = np.asarray(direction) * length
+    text = arm().replace('<axis xyz="0 0 1"/>', f'<axis xyz="{" ".join(map(repr, axis.tolist()))}"/>', 1)
+    case = Case(XmlSource(text))
+    found, remedy = mended("DX201", case)
+    assert only(found).joint == case.model.joint_names[0]
+    assert_same_robot(case.model, remedy.case.model)
+
+
+@given(unit_vectors())
+def test_a_unit_axis_is_left_alone(direction: object) -> None:
+    axis = " ".join(map(repr, np.asarray(direction).tolist()))
+    text = arm().replace('<axis xyz="0 0 1"/>', f'<axis xyz="{axis}"/>', 1)
+    model = load(text)
+    # A unit vector in doubles is unit to a rounding or two; what dynx scales is no unit vector to it.
+    if model.joints[0].axis == tuple(np.asarray(direction).tolist()):
+        assert not find_rule("DX201").detect(Case(XmlSource(text)))
+
+
+@pytest.mark.parametrize(
+    "written", ['<axis xyz="0 0 0"/>', '<axis xyz="0.0 -0 0e3"/>', "<axis/>", '<axis xyz=""/>']
+)
+def test_an_axis_without_direction(written: str) -> None:
+    text = trap("DX202").source.text.replace('<axis xyz="0 0 0"/>', written)
+    case = Case(XmlSource(text))
+    assert not case.readable
+    found, remedy = mended("DX202", case)
+    assert only(found).joint == "elbow"
+    assert remedy.case.model.joint("elbow").axis == (1.0, 0.0, 0.0)
+    fixed = mended("DX202", Case(XmlSource(text), settings={"DX202": "fixed"}))[1].case.model
+    assert fixed.joint_names == ("shoulder", "slide")
+
+
+def test_an_axis_that_is_not_there_or_of_a_fixed_joint_is_no_matter() -> None:
+    text = trap("DX202").source.text
+    assert not find_rule("DX202").detect(Case(XmlSource(text.replace('<axis xyz="0 0 0"/>', ""))))
+    fixed = text.replace('name="elbow" type="revolute"', 'name="elbow" type="fixed"')
+    assert not find_rule("DX202").detect(Case(XmlSource(fixed)))
+
+
+def test_a_joint_without_limit() -> None:
+    case = trap("DX203")
+    found, remedy = mended("DX203", case)
+    assert only(found).joint == "elbow"
+    assert remedy.case.model.joint("elbow").type == "continuous"
+    limits = mended("DX203", trap("DX203", DX203="zero"))[1].case.model.joint("elbow").limits
+    assert (limits.lower, limits.upper) == (0.0, 0.0)
+
+
+def test_a_prismatic_joint_without_limit_gets_one_without_end() -> None:
+    text = trap("DX204").source.text.replace('<limit lower="-1.5" upper="1.5" effort="20" velocity="2"/>', "")
+    found, remedy = mended("DX203", Case(XmlSource(text)))
+    assert only(found).joint == "slide"
+    assert remedy.case.model.joint("slide").limits.upper == math.inf
+
+
+@pytest.mark.parametrize("rule_id", ["DX204", "DX205", "DX206", "DX207"])
+def test_limits_are_mended_and_the_robot_stays(rule_id: str) -> None:
+    case = trap(rule_id)
+    found, remedy = mended(rule_id, case)
+    assert only(found).joint == "elbow"
+    assert_same_robot(case.model, remedy.case.model)
+    assert len(changed_lines(case, remedy.case)) == 1
+
+
+def test_limits_in_order() -> None:
+    limits = mended("DX205", trap("DX205"))[1].case.model.joint("elbow").limits
+    assert (limits.lower, limits.upper) == (-3.2, 3.2)
+    unlimited = mended("DX205", trap("DX205", DX205="unlimited"))[1].case.model.joint("elbow").limits
+    assert (unlimited.lower, unlimited.upper) == (-math.inf, math.inf)
+
+
+def test_negative_limits() -> None:
+    limits = mended("DX206", trap("DX206"))[1].case.model.joint("elbow").limits
+    assert (limits.effort, limits.velocity) == (1.0, 1.0)
+    unlimited = mended("DX206", trap("DX206", DX206="unlimited"))[1].case.model.joint("elbow").limits
+    assert (unlimited.effort, unlimited.velocity) == (math.inf, math.inf)
+
+
+@pytest.mark.parametrize(
+    ("mimic", "says"),
+    [
+        ('<mimic multiplier="0.5" offset="0.1"/>', "names no joint"),
+        ('<mimic joint="elbow"/>', "mimics itself"),
+        ('<mimic joint="wrist"/>', "does not exist"),
+    ],
+)
+def test_a_mimic_of_nothing_is_taken_away(mimic: str, says: str) -> None:
+    text = trap("DX208").source.text.replace('<mimic multiplier="0.5" offset="0.1"/>', mimic)
+    found, remedy = mended("DX208", Case(XmlSource(text)))
+    assert only(found).joint == "elbow"
+    assert says in only(found).message
+    assert remedy.case.model.joint_names == ("shoulder", "elbow", "slide")
+
+
+def test_a_follower_of_a_fixed_joint_is_fixed_where_dynx_has_it() -> None:
+    case = trap("DX209")
+    found, remedy = mended("DX209", case)
+    assert only(found).joint == "slide"
+    assert_same_robot(case.model, remedy.case.model)
+    free = mended("DX209", trap("DX209", DX209="free"))[1].case.model
+    assert free.joint_names == ("shoulder", "slide")
+
+
+def test_a_mimic_of_a_joint_that_moves_is_no_matter() -> None:
+    case = trap("DX304")
+    assert not find_rule("DX208").detect(case)
+    assert not find_rule("DX209").detect(case)
+
+
+@pytest.mark.parametrize("kind", TYPES)
+def test_a_joint_of_several_freedoms_is_split(kind: str) -> None:
+    text = trap("DX210").source.text.replace('type="planar"', f'type="{kind}"')
+    case = Case(XmlSource(text))
+    found, remedy = mended("DX210", case)
+    assert only(found).joint == "slide"
+    fixed = mended("DX210", Case(XmlSource(text), settings={"DX210": "fixed"}))[1].case.model
+    # With every coordinate of the chain at zero the robot is the one whose joint is fixed.
+    assert np.array_equal(_pose(remedy.case.model, np.zeros(remedy.case.model.nq)), _pose(fixed, np.zeros(2)))
+
+
+def test_three_turns_are_those_of_the_moving_axes() -> None:
+    text = trap("DX210").source.text.replace('type="planar"', 'type="spherical"')
+    model = mended("DX210", Case(XmlSource(text)))[1].case.model
+    zero = _pose(model, np.zeros(5))
+    angles = np.array([0.3, -0.4, 0.9])
+    turned = _pose(model, np.array([0.0, 0.0, *angles]))
+    x, y, z = (rotation_from_rpy(np.eye(3)[k] * angles[k]) for k in range(3))
+    wanted = zero[:3, :3] @ x @ y @ z
+    # Three products of rotations in another order of association: a few roundings of entries at most 1.
+    assert np.max(np.abs(turned[:3, :3] - wanted)) <= 16 * np.finfo(float).eps
+
+
+def test_a_planar_joint_slides_across_its_normal_and_turns_about_it() -> None:
+    model = mended("DX210", trap("DX210"))[1].case.model
+    slides = [np.array(model.joint(name).axis) for name in model.joint_names[2:]]
+    assert np.array_equal(slides[2], [1.0, 0.0, 0.0])
+    assert np.array_equal(np.cross(slides[0], slides[1]), slides[2])
+
+
+def test_a_floating_joint_at_the_root_is_made_what_dynx_reads() -> None:
+    case = trap("DX211")
+    found, remedy = mended("DX211", case)
+    assert only(found).joint == "free"
+    assert_same_robot(case.model, remedy.case.model)
+    assert not find_rule("DX210").detect(case)
+
+
+def test_frames_are_dropped_until_pybullet_can_hold_the_robot() -> None:
+    case = trap("DX212")
+    _, remedy = mended("DX212", case)
+    assert len(remedy.case.joints) == 127
+    assert set(case.links) - set(remedy.case.links) == {"frame_124"}
+    assert_same_robot(case.model, remedy.case.model)
+    kept = trap("DX212", DX212="keep")
+    assert find_rule("DX212").remedy(kept, find_rule("DX212").detect(kept)) is None
+
+
+def test_links_with_mass_are_never_dropped() -> None:
+    text = trap("DX212").source.text.replace('<mass value="0"/>', '<mass value="0.1"/>')
+    case = Case(XmlSource(text))
+    found = find_rule("DX212").detect(case)
+    assert len(found) == 1
+    assert find_rule("DX212").remedy(case, found) is None
+
+
+def test_the_joint_named_universe_is_renamed_everywhere() -> None:
+    case = trap("DX213")
+    found, remedy = mended("DX213", case)
+    assert only(found).joint == "universe"
+    assert "universe_joint" in remedy.case.joints
+    assert_same_robot(case.model, remedy.case.model)
+
+
+@pytest.mark.parametrize("rule_id", ["DX214", "DX215"])
+def test_transmissions(rule_id: str) -> None:
+    case = trap(rule_id)
+    found, remedy = mended(rule_id, case)
+    only(found)
+    assert case.model == remedy.case.model
+
+
+def test_transmissions_that_drake_passes_over_are_no_matter() -> None:
+    for rule_id in ("DX214", "DX215"):
+        text = trap(rule_id).source.text.replace("/SimpleTransmission", "/FourBarTransmission")
+        assert not find_rule(rule_id).detect(Case(XmlSource(text)))
+
+
+def test_inertia_scaling_is_taken_away() -> None:
+    case = trap("DX119")
+    found, remedy = mended("DX119", case)
+    assert only(found).link == "lower"
+    assert case.model == remedy.case.model
+    assert changed_lines(case, remedy.case) == ['<inertia_scaling value="3.0"/>']
+    harmless = case.source.text.replace('value="3.0"', 'value="1.0"')
+    assert not find_rule("DX119").detect(Case(XmlSource(harmless)))
+
+
+def _pose(model: Model, q: object) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+    with ReferenceBackend(model) as backend:
+        return np.asarray(backend.forward_kinematics(np.asarray(q, dtype=float), "slider"))

@@ -1,0 +1,73 @@
+"""Rules about what engines add to the rigid bodies: they name calls, and leave the file as it is."""
+
+from __future__ import annotations
+
+import pytest
+
+from dynx.loaded import ENGINES, loader_class
+from dynx.model.xml_source import XmlSource
+from dynx.rules import Case, find_rule
+from dynx.rules.editing import CallingRule
+from tests.rules.trap_cases import assert_same_robot, changed_lines, mended, only, trap
+
+CALLING = ("DX301", "DX302", "DX304", "DX306", "DX307", "DX308")
+
+
+@pytest.mark.parametrize("rule_id", CALLING)
+def test_the_remedy_is_a_call_that_the_engines_know(rule_id: str) -> None:
+    case = trap(rule_id)
+    found, remedy = mended(rule_id, case)
+    only(found)
+    assert remedy.case.source is case.source
+    rule = find_rule(rule_id)
+    assert isinstance(rule, CallingRule)
+    for call in rule.calls:
+        engine = call.partition(".")[0]
+        assert engine in ENGINES
+        assert call in loader_class(engine).CALLS
+
+
+@pytest.mark.parametrize("rule_id", ["DX301", "DX302", "DX304", "DX306", "DX307"])
+def test_the_joint_is_named(rule_id: str) -> None:
+    assert only(mended(rule_id, trap(rule_id))[0]).joint == "elbow"
+
+
+@pytest.mark.parametrize(("rule_id", "attribute"), [("DX301", 'damping="0.5"'), ("DX302", 'friction="0.2"')])
+def test_zero_is_no_matter_and_neither_is_a_fixed_joint(rule_id: str, attribute: str) -> None:
+    text = trap(rule_id).source.text
+    name = attribute.partition("=")[0]
+    assert not find_rule(rule_id).detect(Case(XmlSource(text.replace(attribute, f'{name}="0"'))))
+    fixed = text.replace('name="elbow" type="revolute"', 'name="elbow" type="fixed"')
+    assert not find_rule(rule_id).detect(Case(XmlSource(fixed)))
+
+
+def test_limits_with_room_between_them_are_no_matter() -> None:
+    text = trap("DX306").source.text.replace('upper="0.3"', 'upper="0.4"')
+    assert not find_rule("DX306").detect(Case(XmlSource(text)))
+
+
+def test_shapes_of_one_link_alone_and_meshes_are_no_matter() -> None:
+    text = trap("DX308").source.text
+    one = text.replace('<box size="0.8 0.8 0.8"/>', '<mesh filename="slider.stl"/>')
+    assert not find_rule("DX308").detect(Case(XmlSource(one)))
+
+
+@pytest.mark.parametrize("rule_id", ["DX303", "DX305"])
+def test_what_engines_refuse_is_edited(rule_id: str) -> None:
+    case = trap(rule_id)
+    found, remedy = mended(rule_id, case)
+    assert only(found).joint == "elbow"
+    assert_same_robot(case.model, remedy.case.model)
+    assert len(changed_lines(case, remedy.case)) == 1
+
+
+def test_negative_damping_can_be_made_positive_or_zero() -> None:
+    assert mended("DX303", trap("DX303"))[1].case.model.joint("elbow").dynamics.damping == 1e-300
+    zero = mended("DX303", trap("DX303", DX303="zero"))[1].case.model
+    assert zero.joint("elbow").dynamics.damping == 0.0
+
+
+def test_an_armature_alone_is_kept_beside_the_damping_that_is_added() -> None:
+    text = trap("DX305").source.text.replace("<dynamics/>", '<dynamics armature="0.01"/>')
+    model = mended("DX305", Case(XmlSource(text)))[1].case.model
+    assert model.joint("elbow").dynamics.armature == 0.01

@@ -1,0 +1,202 @@
+"""Rules about text: each fault is found where it stands and mended there and nowhere else."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dynx.model.library import find
+from dynx.model.loading import load
+from dynx.model.xml_source import XmlSource
+from dynx.rules import Case, all_rules, find_rule
+from dynx.rules.catalogue.dx413_line_too_long import LONGEST
+from dynx.rules.misspelled_numbers import MisspelledNumberRule
+from dynx.rules.numeric_attributes import NumericAttribute, numeric_attributes
+from dynx.testing.strategies import urdf_text
+from tests.rules.trap_cases import assert_same_robot, changed_lines, mended, only, trap
+
+READING = tuple(rule.id for rule in all_rules() if rule.stage == "reading")
+NUMBERS = tuple(rule.id for rule in all_rules() if isinstance(rule, MisspelledNumberRule))
+MENDED = {
+    "DX401": ("upper", None),
+    "DX402": (None, "elbow"),
+    "DX403": ("lower", None),
+    "DX404": (None, "elbow"),
+    "DX405": ("upper", None),
+    "DX406": (None, "elbow"),
+    "DX408": (None, "elbow"),
+    "DX409": ("lower", None),
+    "DX410": ("tool", None),
+    "DX411": (None, "elbow"),
+    "DX412": (None, None),
+    "DX413": ("upper", None),
+    "DX414": ("lower_50%", None),
+    "DX415": (None, None),
+    "DX416": (None, None),
+    "DX417": ("base", None),
+}
+SPEC = importlib.util.find_spec("pybullet_data")
+BULLET = Path(SPEC.origin).parent if SPEC is not None and SPEC.origin else None
+
+
+@pytest.mark.parametrize("rule_id", MENDED)
+def test_the_place_is_found_and_the_text_becomes_readable(rule_id: str) -> None:
+    case = trap(rule_id)
+    found, remedy = mended(rule_id, case)
+    assert (only(found).link, only(found).joint) == MENDED[rule_id]
+    line = case.source.text.splitlines()[(only(found).line or 0) - 1]
+    assert remedy.case.readable
+    assert line.strip() in changed_lines(case, remedy.case)
+    if case.readable and rule_id != "DX414":
+        assert_same_robot(case.model, remedy.case.model)
+
+
+def test_all_infinite_limits_of_a_joint_are_found() -> None:
+    found, remedy = mended("DX407", trap("DX407"))
+    assert {each.joint for each in found} == {"elbow"}
+    assert len(found) == 4
+    limits = remedy.case.model.joint("elbow").limits
+    assert limits == type(limits)()
+
+
+@pytest.mark.parametrize("rule_id", [*NUMBERS, "DX409", "DX411"])
+def test_one_line_changes(rule_id: str) -> None:
+    case = trap(rule_id)
+    assert len(changed_lines(case, mended(rule_id, case)[1].case)) == 1
+
+
+@given(urdf_text())
+def test_text_that_dynx_reads_means_the_same_after_every_remedy(text: str) -> None:
+    # `urdf_text` writes numbers among odd white space, leaves out efforts and velocities, and so on.
+    case = Case(XmlSource(text))
+    for rule in (find_rule(rule_id) for rule_id in READING):
+        remedy = rule.remedy(case, rule.detect(case))
+        if remedy is not None:
+            assert not rule.detect(remedy.case)
+            assert remedy.case.model == case.model, rule.id
+
+
+@given(st.sampled_from(["six_axis_arm", "cart_pole", "scara"]), st.data())
+def test_a_planted_fault_is_found_where_it_is(robot: str, data: st.DataObject) -> None:
+    source = XmlSource(find(robot).read_text(encoding="utf-8"))
+    place = data.draw(st.sampled_from(list(numeric_attributes(source))))
+    rule_id, written = data.draw(st.sampled_from(list(_faults(place, place.text_in(source)))))
+    planted = source.edited(source.setting(place.element, place.name, written))
+    case = Case(planted)
+    found, remedy = mended(rule_id, case)
+    part = place.element
+    while part.parent is not source.root and part.parent is not None:
+        part = part.parent
+    assert {each.link or each.joint for each in found} == {part.attributes["name"]}
+    assert remedy.case.model == load(source.text)
+    others = [each for each in NUMBERS if each != rule_id]
+    assert not any(find_rule(each).detect(case) for each in others)
+
+
+def _faults(place: NumericAttribute, text: str) -> list[tuple[str, str]]:
+    """Ways to write the same numbers badly, with the rule about each."""
+    if place.count == 1:
+        ways = [("DX405", f" {text}"), ("DX405", f"{text} "), ("DX403", f"{text} kg")]
+        return [*ways, ("DX401", text.replace(".", ","))] if "." in text else ways
+    words = text.split()
+    ways = [("DX402", ", ".join(words)), ("DX404", f"{text} 7"), ("DX402", "; ".join(words))]
+    return [*ways, ("DX401", text.replace(".", ","))] if "." in text else ways
+
+
+@pytest.mark.parametrize("blank", ["\t", "\n", "\r\n  ", "\u00a0"])
+def test_any_white_space_but_blanks(blank: str) -> None:
+    text = trap("DX406").source.text.replace("0.2\t-0.05\t0.25", blank.join(("0.2", "-0.05", "0.25")))
+    found, remedy = mended("DX406", Case(XmlSource(text)))
+    assert only(found).joint == "elbow"
+    assert 'xyz="0.2 -0.05 0.25"' in remedy.case.source.text
+
+
+@pytest.mark.parametrize(("choice", "mass"), [("decimal", 1.25), ("thousands", 1250.0)])
+def test_a_comma_is_read_by_choice(choice: str, mass: float) -> None:
+    text = trap("DX401").source.text.replace('"2,5"', '"1,250"')
+    remedy = mended("DX401", Case(XmlSource(text), settings={"DX401": choice}))[1]
+    assert remedy.case.model.inertial("upper").mass == mass
+    assert remedy.choice is not None
+
+
+def test_a_vector_of_wrong_length_can_count_as_not_given() -> None:
+    model = mended("DX404", trap("DX404", DX404="default"))[1].case.model
+    assert model.joint("elbow").origin.xyz == (0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(("choice", "mass"), [("point", 0.4), ("weightless", 0.0)])
+def test_an_inertial_without_tensor(choice: str, mass: float) -> None:
+    text = trap("DX410").source.text.replace("<mass>0.4</mass>", '<mass value="0.4"/>')
+    start = text.index("<inertia ", text.index('value="0.4"'))
+    text = text[:start] + text[text.index("/>", start) + 2 :]
+    found, remedy = mended("DX410", Case(XmlSource(text), settings={"DX410": choice}))
+    assert only(found).link == "tool"
+    assert remedy.case.model.inertial("tool").mass == mass
+    assert not remedy.case.model.inertial("tool").tensor.any()
+
+
+@pytest.mark.parametrize("mass", ["", "<mass/>", "<mass>heavy</mass>"])
+def test_an_inertial_without_mass_weighs_nothing(mass: str) -> None:
+    text = trap("DX410").source.text.replace("<mass>0.4</mass>", mass)
+    remedy = mended("DX410", Case(XmlSource(text)))[1]
+    assert remedy.case.model.inertial("tool").mass == 0.0
+
+
+@given(st.integers(0, 3 * LONGEST))
+def test_what_pybullet_cuts_is_found_and_mended(padding: int) -> None:
+    text = find("six_axis_arm").read_text(encoding="utf-8")
+    start = text.index("<link")
+    one_line = text[:start] + f"<!--{'x' * padding}-->" + " ".join(text[start:].split())
+    case = Case(XmlSource(one_line))
+    rule = find_rule("DX413")
+    found = rule.detect(case)
+    remedy = rule.remedy(case, found)
+    assert bool(found) == (_tags(_cut(case.source)) != _tags(case.source))
+    if remedy is not None:
+        assert not rule.detect(remedy.case)
+        assert remedy.case.model == case.model
+
+
+def _cut(source: XmlSource) -> XmlSource:
+    """The document as PyBullet has it: a line break behind every 8191 bytes of a line."""
+    lines = source.data.split(b"\n")
+    pieces = [line[k : k + LONGEST] for line in lines for k in range(0, max(len(line), 1), LONGEST)]
+    return _Torn(b"\n".join(pieces))
+
+
+class _Torn(XmlSource):
+    """Text that need not be XML any more."""
+
+    def __init__(self, data: bytes) -> None:
+        self.data = data
+
+
+def _tags(source: XmlSource) -> list[bytes]:
+    """What stands between each pair of angle brackets."""
+    pieces = source.data.split(b"<")
+    return [piece.partition(b">")[0] for piece in pieces if piece.strip()[:1] != b"!"]
+
+
+@pytest.mark.skipif(BULLET is None, reason="pybullet_data is not installed")
+@pytest.mark.parametrize(
+    "file",
+    [
+        "bicycle/bike.urdf",
+        "biped/biped2d_pybullet.urdf",
+        "humanoid/humanoid.urdf",
+        "quadruped/microtaur/microtaur.urdf",
+        "spherical_joint_limit.urdf",
+    ],
+)
+def test_files_of_pybullet_that_dynx_refuses_become_readable(file: str) -> None:
+    assert BULLET is not None
+    case = Case(XmlSource((BULLET / file).read_bytes(), file))
+    assert not case.readable
+    for rule in (find_rule(rule_id) for rule_id in READING):
+        remedy = rule.remedy(case, rule.detect(case))
+        case = case if remedy is None else remedy.case
+    assert case.readable, case.reading

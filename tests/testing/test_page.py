@@ -1,0 +1,102 @@
+"""docs/testing.md: its workflow is YAML, and its commands have the options that it uses."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from dynx.cli.commands.doctor import doctor
+from dynx.testing import plugin
+from tests.test_readme import ROOT, blocks
+
+PAGE = (ROOT / "docs" / "testing.md").read_text(encoding="utf-8")
+
+
+class Options:
+    """Takes the options of the plugin, as pytest does."""
+
+    def __init__(self) -> None:
+        self.flags: dict[str, dict[str, Any]] = {}
+        self.settings: list[str] = []
+        plugin.pytest_addoption(self)  # type: ignore[arg-type]
+
+    def getgroup(self, *_: str) -> Options:
+        return self
+
+    def addoption(self, flag: str, **how: Any) -> None:
+        self.flags[flag] = how
+
+    def addini(self, name: str, *_: str, **__: str) -> None:
+        self.settings.append(name)
+
+
+def workflow_commands() -> Iterator[str]:
+    yaml = pytest.importorskip("yaml")
+    (text,) = blocks("yaml", PAGE)
+    document = yaml.safe_load(text)
+    assert document["permissions"]["security-events"] == "write"
+    for job in document["jobs"].values():
+        for step in job["steps"]:
+            assert ("run" in step) != ("uses" in step)
+            if "run" in step:
+                yield from step["run"].splitlines()
+
+
+def commands() -> list[str]:
+    shown = [line for block in blocks("sh", PAGE) for line in block.splitlines()]
+    return [*shown, *workflow_commands()]
+
+
+def test_commands_have_the_options() -> None:
+    programs = set()
+    for command in commands():
+        program, *words = shlex.split(command)
+        programs.add(program)
+        if program == "dynx":
+            assert words[0] == "doctor"
+            doctor.make_context("doctor", words[1:])
+        elif program == "pytest":
+            flags = {word.partition("=")[0] for word in words if word.startswith("--dynx")}
+            assert flags <= Options().flags.keys()
+        else:
+            assert program == "pip"
+    assert programs == {"dynx", "pytest", "pip"}
+
+
+def test_extras_exist() -> None:
+    known = re.search(
+        r"^\[project.optional-dependencies\]\n(.*?)^\[",
+        (ROOT / "pyproject.toml").read_text(encoding="utf-8"),
+        flags=re.MULTILINE | re.DOTALL,
+    )
+    assert known
+    extras = re.findall(r"^(\w+) = ", known.group(1), flags=re.MULTILINE)
+    used = [extra for found in re.findall(r"dynx\[([\w,]+)\]", PAGE) for extra in found.split(",")]
+    assert used
+    assert set(used) <= set(extras)
+
+
+def test_the_sarif_that_is_written_is_the_one_uploaded() -> None:
+    (written,) = re.findall(r"--sarif (\S+)", PAGE)
+    (uploaded,) = re.findall(r"sarif_file: (\S+)", PAGE)
+    assert written == uploaded
+
+
+def test_every_option_is_on_the_page() -> None:
+    options = Options()
+    for flag in options.flags:
+        assert f"`{flag}" in PAGE, flag
+    for setting in options.settings:
+        assert setting in PAGE
+    (ini,) = blocks("toml", PAGE)
+    assert re.search(r"^dynx_robots = \[", ini, flags=re.MULTILINE)
+
+
+def test_the_plugin_is_an_entry_point() -> None:
+    text = (Path(ROOT) / "pyproject.toml").read_text(encoding="utf-8")
+    assert '[project.entry-points.pytest11]\ndynx = "dynx.testing.plugin"\n' in text

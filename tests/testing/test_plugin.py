@@ -1,0 +1,311 @@
+"""The pytest plugin, in runs of pytest of their own: as users run it, from a directory of theirs."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from importlib.metadata import entry_points
+from pathlib import Path
+
+import pytest
+
+from dynx.agreement import agree
+from dynx.doctor import diagnose
+from dynx.doctor.formats import baseline_document
+from dynx.model.library import find
+from dynx.testing import agreement_tests
+from dynx.testing.robot_checks import CHECKS
+
+ROOT = Path(__file__).resolve().parents[2]
+FEW = ("--dynx-backends", "reference,pinocchio")
+PENDULUM = find("pendulum").read_text(encoding="utf-8")
+
+MASSLESS_ELBOW = """\
+<robot name="mine">
+  <link name="base"/>
+  <link name="elbow"/>
+  <link name="hand">
+    <inertial>
+      <mass value="2"/>
+      <inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/>
+    </inertial>
+  </link>
+  <joint name="shoulder" type="continuous"><parent link="base"/><child link="elbow"/></joint>
+  <joint name="wrist" type="fixed">
+    <origin xyz="0 1 0"/><parent link="elbow"/><child link="hand"/>
+  </joint>
+</robot>
+"""
+
+WRONG = """
+import dynx
+from dynx.backends.reference import ReferenceBackend
+
+class Heavy(ReferenceBackend):
+    name = "heavy"
+    def _mass_matrix(self, q):
+        return super()._mass_matrix(q) * (1.0 + 1e-6)
+
+dynx.register("heavy", lambda: Heavy)
+"""
+
+COUNTING = """
+from pathlib import Path
+from dynx.testing import robot_checks
+
+agree = robot_checks.agree
+
+def counted(model, *rest):
+    with open(Path(__file__).with_name("measured.txt"), "a") as file:
+        file.write(f"{model.name} {model.base}\\n")
+    return agree(model, *rest)
+
+robot_checks.agree = counted
+"""
+
+HEAVY = {"numpy", "hypothesis", "pinocchio", "pybullet", "mujoco", "pydrake", "click", "dynx.model"}
+
+Run = Callable[..., "subprocess.CompletedProcess[str]"]
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Run:
+    """Runs pytest in an empty directory, or one below it, with the plugin installed."""
+    path = [str(ROOT)]
+    if not any(point.name == "dynx" for point in entry_points(group="pytest11")):
+        # A source tree that was never installed has no entry points: they are put beside it.
+        information = tmp_path / "site" / "dynx_plugin-0.dist-info"
+        information.mkdir(parents=True)
+        (information / "METADATA").write_text("Metadata-Version: 2.1\nName: dynx-plugin\nVersion: 0\n")
+        (information / "entry_points.txt").write_text("[pytest11]\ndynx = dynx.testing.plugin\n")
+        path.append(str(information.parent))
+    (tmp_path / "home").mkdir()
+
+    def run_pytest(*arguments: str, folder: str = ".") -> subprocess.CompletedProcess[str]:
+        inherited = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST")}
+        return subprocess.run(
+            [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", *arguments],
+            cwd=tmp_path / "home" / folder,
+            env={**inherited, "PYTHONPATH": os.pathsep.join(path)},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+
+    return run_pytest
+
+
+@pytest.fixture
+def home(tmp_path: Path) -> Path:
+    """The directory in which `run` runs."""
+    return tmp_path / "home"
+
+
+def outcome(result: subprocess.CompletedProcess[str]) -> dict[str, int]:
+    """How many passed, failed, ... as the last line says."""
+    last = result.stdout.strip().splitlines()[-1]
+    return {word: int(number) for number, word in re.findall(r"(\d+) (passed|failed|skipped|error)", last)}
+
+
+def test_without_a_test_file(run: Run, home: Path) -> None:
+    result = run("--dynx-robot", "pendulum", *FEW, "--strict-config", "--strict-markers", "-W", "error")
+    assert outcome(result) == {"passed": len(CHECKS)}, result.stdout + result.stderr
+    assert result.returncode == 0
+    assert "dynx: pendulum; fixed base; reference, pinocchio" in result.stdout
+    assert not [path.name for path in home.iterdir() if path.name != ".benchmarks"]
+
+
+def test_every_quantity_and_identity_is_a_test() -> None:
+    report = agree("pendulum", ["reference", "pinocchio"])
+    compared = {row.quantity for row in report.quantities} | {row.identity for row in report.identities}
+    assert compared == set(CHECKS)
+    assert len(set(CHECKS)) == len(CHECKS)
+
+
+def test_files_bases_and_names_of_tests(run: Run, home: Path) -> None:
+    (home / "robots").mkdir()
+    (home / "robots" / "mine.urdf").write_text(PENDULUM)
+    result = run("--dynx-robot=robots", "--dynx-robot", "ur5", "--dynx-base", "both", *FEW, "--co", "-q")
+    nodes = [line for line in result.stdout.splitlines() if "::" in line]
+    assert nodes == [
+        f"{robot}::{base}::{check}"
+        for robot in ("robots/mine.urdf", "ur5")
+        for base in ("fixed", "floating")
+        for check in CHECKS
+    ]
+
+
+def test_robots_of_the_ini_file(run: Run, home: Path) -> None:
+    (home / "mine.urdf").write_text(PENDULUM)
+    (home / "pytest.ini").write_text(
+        "[pytest]\naddopts = --strict-config\ndynx_robots =\n    mine.urdf\n    ur5\n"
+    )
+    (home / "tests").mkdir()
+    (home / "tests" / "test_own.py").write_text("def test_own(): pass\n")
+    everything = len(CHECKS) * 2 + 1
+    for folder, arguments in ((".", ()), (".", ("tests",)), ("tests", ())):
+        result = run("--co", "-q", *FEW, *arguments, folder=folder)
+        assert f"{everything} tests collected" in result.stdout, result.stdout + result.stderr
+    one_file = run("tests/test_own.py", *FEW)
+    assert outcome(one_file) == {"passed": 1}, one_file.stdout + one_file.stderr
+    asked_for = run("tests/test_own.py", "--dynx-robot", "pendulum", "--co", "-q")
+    assert f"{len(CHECKS) + 1} tests collected" in asked_for.stdout
+
+
+def test_a_difference_is_told(run: Run, home: Path) -> None:
+    (home / "conftest.py").write_text(WRONG)
+    result = run("--dynx-robot", "pendulum", "--dynx-backends", "reference,heavy")
+    assert result.returncode == 1
+    assert "mass_matrix of pendulum, fixed base" in result.stdout
+    told = re.search(
+        r"^  reference~heavy: relative error 1\.00e-06, tolerance (\S+)\n"
+        r"    worst sample: number \d+ \(\w+\)\n      q = \[\S+\]\n",
+        result.stdout,
+        flags=re.MULTILINE,
+    )
+    assert told
+    assert 0.0 < float(told.group(1)) < 1e-6
+    assert "suspect: heavy" in result.stdout
+    assert "dynx agree pendulum --base fixed --backends reference,heavy" in result.stdout
+    # Nothing of dynx's own code is shown, and kinematics is none of this engine's faults.
+    assert "robot_checks.py" not in result.stdout
+    assert "forward_kinematics of" not in result.stdout
+
+
+def test_in_a_test_file(run: Run, home: Path) -> None:
+    (home / "mine.urdf").write_text(PENDULUM)
+    (home / "test_mine.py").write_text(
+        "from dynx.testing import agreement_tests\n"
+        "TestMine = agreement_tests('mine.urdf', base='both', backends=['reference'])\n"
+    )
+    (home / "elsewhere").mkdir()
+    result = run("..", "-rs", folder="elsewhere")
+    # One engine alone is not compared on quantities that neither referee nor derivation gives.
+    assert result.returncode == 0, result.stdout
+    assert outcome(result)["passed"] + outcome(result)["skipped"] == 2 * len(CHECKS)
+    assert "nothing to compare (reference; nv 1)" in result.stdout
+    without_plugin = run("..", "-p", "no:dynx", folder="elsewhere")
+    assert outcome(without_plugin) == outcome(result)
+
+
+def test_a_class_for_no_such_base() -> None:
+    with pytest.raises(ValueError, match="did you mean 'floating'"):
+        agreement_tests("pendulum", base="floatin")  # type: ignore[arg-type]
+
+
+def test_a_class_for_a_robot_that_is_not_there(run: Run, home: Path) -> None:
+    (home / "test_mine.py").write_text(
+        "from dynx.testing import agreement_tests\nTestMine = agreement_tests('pendulun')\n"
+    )
+    result = run("-x")
+    assert outcome(result) == {"failed": 1}
+    assert "did you mean 'pendulum'" in result.stdout
+
+
+@pytest.mark.parametrize("distribution", ["load", "loadscope"])
+def test_with_xdist(run: Run, home: Path, distribution: str) -> None:
+    pytest.importorskip("xdist")
+    (home / "conftest.py").write_text(COUNTING)
+    result = run("--dynx-robot", "pendulum", "--dynx-base=both", *FEW, "-n", "2", "--dist", distribution)
+    assert outcome(result) == {"passed": 2 * len(CHECKS)}, result.stdout + result.stderr
+    measured = (home / "measured.txt").read_text().splitlines()
+    assert set(measured) == {"pendulum fixed", "pendulum floating"}
+    # Workers share nothing: each measures what it has tests of, once.
+    assert len(measured) <= (4 if distribution == "load" else 2)
+
+
+def test_a_robot_is_measured_once_and_only_for_tests_that_run(run: Run, home: Path) -> None:
+    (home / "conftest.py").write_text(COUNTING)
+    (home / "test_more.py").write_text(
+        "from dynx.testing import agreement_tests\n"
+        "TestMore = agreement_tests('pendulum', backends=['reference', 'pinocchio'])\n"
+    )
+    chosen = ("--dynx-robot", "pendulum", "--dynx-base=both", *FEW)
+    run(*chosen, "--collect-only")
+    assert not (home / "measured.txt").exists()
+    run(*chosen, "-k", "fixed")
+    assert (home / "measured.txt").read_text() == "pendulum fixed\n"
+    run(*chosen)
+    assert (home / "measured.txt").read_text() == "pendulum fixed\n" * 2 + "pendulum floating\n"
+
+
+def test_a_description_that_cannot_be_read_is_one_failing_test(run: Run, home: Path) -> None:
+    (home / "bad.urdf").write_text(PENDULUM.replace('<mass value="', '<mass value="heavy'))
+    (home / "test_own.py").write_text("def test_own(): pass\n")
+    result = run("--dynx-robot=bad.urdf", *FEW)
+    assert outcome(result) == {"failed": 1, "passed": 1}, result.stdout
+    assert "DescriptionError" in result.stdout
+    assert re.search(r"bad\.urdf:\d+: ", result.stdout)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--dynx-robot", "pendulun"), "did you mean 'pendulum'"),
+        (("--dynx-robot", "robots/none.urdf"), "no such file"),
+        (("--dynx-robot", "."), "has no .urdf file"),
+        (("--dynx-robot", "ur5", "--dynx-backends", "pinochio"), "did you mean 'pinocchio'"),
+        (("--dynx-robot", "ur5", "--dynx-backends", ","), "wanted names separated by commas"),
+        (("--dynx-robot", "ur5", "--dynx-base", "flying"), "invalid choice"),
+        (("--dynx-base", "both"), "use --dynx-robot"),
+        (("--dynx-robot", "ur5", "--dynx-tolerance", "1e-6"), "--dynx-as-loaded"),
+        (("--dynx-robot", "ur5", "--dynx-baseline", "known.json"), "--dynx-as-loaded"),
+        (("--dynx-robot", "ur5", "--dynx-as-loaded", "--dynx-tolerance=2"), "between 0 and 1"),
+        (("--dynx-robot", "ur5", "--dynx-as-loaded", "--dynx-baseline=known.json"), "no such file"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
+)
+def test_what_is_asked_wrongly(arguments: tuple[str, ...], said: str, run: Run) -> None:
+    result = run(*arguments)
+    assert result.returncode == pytest.ExitCode.USAGE_ERROR, result.stdout + result.stderr
+    assert said in result.stderr
+    assert "Traceback" not in result.stderr
+
+
+def test_as_loaded(run: Run, home: Path) -> None:
+    """A massless link on a joint is 1 kg to PyBullet; that it is so can be accepted."""
+    (home / "robots").mkdir()
+    (home / "robots" / "mine.urdf").write_text(MASSLESS_ELBOW)
+    chosen = (
+        "--dynx-robot",
+        "robots",
+        "--dynx-as-loaded",
+        "--dynx-backends",
+        "pinocchio,pybullet",
+        "-k",
+        "loaded",
+    )
+    refused = run(*chosen)
+    assert outcome(refused) == {"failed": 1}, refused.stdout + refused.stderr
+    assert "DX101 link 'elbow' (pybullet): relative error" in refused.stdout
+    line = MASSLESS_ELBOW[: MASSLESS_ELBOW.index('<link name="elbow"')].count("\n") + 1
+    assert f"mine.urdf:{line}: " in refused.stdout
+    assert "dynx doctor robots/mine.urdf --base fixed --fix OUT.urdf" in refused.stdout
+    where = str(home / "robots" / "mine.urdf")
+    report = diagnose(where, engines=["pinocchio", "pybullet"])
+    known = baseline_document([replace(report, robot=where)], str(home / "robots"))
+    (home / "robots" / "known.json").write_text(json.dumps(known))
+    accepted = run(*chosen, "--dynx-baseline", "robots/known.json")
+    assert outcome(accepted) == {"passed": 1}, accepted.stdout
+    tolerant = run(*chosen, "--dynx-tolerance", "0.999")
+    assert outcome(tolerant) == {"passed": 1}, tolerant.stdout
+
+
+def test_it_costs_nothing_when_it_is_not_used(run: Run, home: Path) -> None:
+    (home / "test_own.py").write_text(
+        "import sys\n\n"
+        "def test_own():\n"
+        "    assert 'dynx.testing.plugin' in sys.modules\n"
+        f"    assert not {HEAVY} & set(sys.modules)\n"
+    )
+    # Other plugins may import what they like, so only this one is there.
+    result = run(
+        "-p", "no:hypothesispytest", "-p", "no:benchmark", "-p", "no:xdist", "-W", "error", "test_own.py"
+    )
+    assert outcome(result) == {"passed": 1}, result.stdout + result.stderr
+    assert "dynx:" not in result.stdout
