@@ -2,7 +2,7 @@
 
     python docs/survey.py [--only erd|pybullet] [--engines a,b] [--jobs N] [--mended FOLDER]
 
-Fixed and floating base each. What `dynx.doctor` finds is written as a table, robot by cause by effect.
+Fixed and floating base each. What `dynx.diagnose` finds is written as a table, robot by cause by effect.
 `--mended FOLDER` keeps the files that it mended, with a list for `tests/doctor/raw_*.py` to check.
 """
 
@@ -106,7 +106,7 @@ def summary(entries: Sequence[dict[str, Any]]) -> None:
                 print(f"{group} {base}: {counts(of)}")
             for entry in of:
                 for line in remarks(entry):
-                    print(f"  {Path(entry['path']).name}: {line}")
+                    print(f"  {label(entry)}: {line}")
 
 
 def counts(entries: Sequence[dict[str, Any]]) -> str:
@@ -124,7 +124,7 @@ def counts(entries: Sequence[dict[str, Any]]) -> str:
 def remarks(entry: dict[str, Any]) -> Iterator[str]:
     """What is not as it should be about one file."""
     if entry["error"]:
-        yield f"refused: {entry['error']['message']}"
+        yield f"refused: {entry['error']['message'].replace(entry['path'], label(entry))}"
     for each in entry["unexplained"]:
         yield f"unexplained: {each['engine']} {each['quantity']} {each['relative_error']}"
     for rule in sorted({f["rule"] for f in entry["findings"] if f["effect"] and not f["proved"]}):

@@ -3,7 +3,7 @@
     import dynx
 
     model = dynx.load("ur5")                        # a path, URDF text, or a name (`dynx robots`)
-    engine = dynx.backend("pinocchio", model)       # or "pybullet", "reference"
+    engine = dynx.backend("pinocchio", model)       # "pybullet", "mujoco", "drake", "reference"
     tau = engine.inverse_dynamics(q, v, a)
     report = dynx.agree(model)                      # do all engines give the same answers?
     report = dynx.diagnose("my.urdf")               # why do they differ when they load it themselves?

@@ -78,7 +78,8 @@ def test_console_blocks_print_what_is_shown(command: str, shown: str) -> None:
     result = subprocess.run(
         [sys.executable, "-m", "dynx", *words[1:]], capture_output=True, text=True, cwd=ROOT, check=False
     )
-    assert result.returncode == 0, result.stderr
+    # The doctor's answer on a robot on which engines differ is no.
+    assert result.returncode == (1 if words[1] == "doctor" else 0), result.stderr
     printed = {shape(line) for line in result.stdout.splitlines()}
     for line in shown.splitlines():
         if shape(line) not in ("", "..."):

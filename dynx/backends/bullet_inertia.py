@@ -18,16 +18,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from dynx.model.mechanism import Mechanism
+from dynx.spatial.extended import FLOAT64_EPS, eigen, longdouble
 from dynx.spatial.inertia import RigidInertia
 from dynx.spatial.scalar import Array, Floats
 from dynx.spatial.so3 import skew
-
-FLOAT64_EPS = float(np.finfo(np.float64).eps)
-
-
-def longdouble(numbers: object) -> Array:
-    """The scalar in which inertias are lumped: 64 bits or more of mantissa where the platform has them."""
-    return np.asarray(numbers, dtype=np.longdouble)
 
 
 @dataclass(frozen=True)
@@ -106,34 +100,6 @@ def _accepts(mass: float, lever: Floats, moments: Floats) -> bool:
     exact = np.count_nonzero(squares) <= 1
     margin = 0.0 if exact else 8 * FLOAT64_EPS * max(x, y, z)
     return bool(min(moments) >= 0.0 and x + y >= z + margin and y + z >= x + margin)
-
-
-def eigen(symmetric: Array) -> tuple[Array, Array]:
-    """Eigenvalues (3,) and eigenvectors (3, 3), as columns, by Jacobi's method.
-
-    Works in the precision of `symmetric`, which LAPACK does not (Golub and Van Loan, Matrix
-    Computations, section 8.5).
-    """
-    A = np.array(symmetric)
-    V = np.eye(3, dtype=A.dtype)
-    floor = np.finfo(A.dtype).eps ** 2 * _size(A)
-    for _ in range(50):
-        if max(abs(A[0, 1]), abs(A[0, 2]), abs(A[1, 2])) <= floor:
-            break
-        for i, j in ((0, 1), (0, 2), (1, 2)):
-            if abs(A[i, j]) <= floor:
-                continue
-            ratio = (A[j, j] - A[i, i]) / (2 * A[i, j])
-            tangent = (1 if ratio >= 0 else -1) / (abs(ratio) + np.hypot(ratio, 1))
-            cosine = 1 / np.hypot(tangent, 1)
-            sine = tangent * cosine
-            turn = np.eye(3, dtype=A.dtype)
-            turn[i, i] = turn[j, j] = cosine
-            turn[i, j], turn[j, i] = sine, -sine
-            A = turn.T @ A @ turn
-            A[i, j] = A[j, i] = 0
-            V = V @ turn
-    return np.diagonal(A).copy(), V
 
 
 def ballast_for(mechanism: Mechanism) -> tuple[Ballast, ...]:

@@ -18,10 +18,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.backends.bullet_client import BulletClient
-from dynx.backends.bullet_inertia import Ballast, PrincipalInertia, longdouble
+from dynx.backends.bullet_inertia import Ballast, PrincipalInertia
 from dynx.backends.bullet_urdf import bullet_tree
 from dynx.model.mechanism import ROOT, BodyFrame, Mechanism
 from dynx.rbd.jacobians import Reference
+from dynx.spatial.extended import longdouble
 from dynx.spatial.scalar import Array, Floats
 from dynx.spatial.se3 import homogeneous
 from dynx.spatial.so3 import cross, quat_from_rotation, skew

@@ -16,8 +16,9 @@ from decimal import Decimal
 
 import numpy as np
 
-from dynx.backends.bullet_inertia import Ballast, PrincipalInertia, longdouble, principal_inertia
+from dynx.backends.bullet_inertia import Ballast, PrincipalInertia, principal_inertia
 from dynx.model.mechanism import ROOT, Mechanism
+from dynx.spatial.extended import longdouble
 from dynx.spatial.inertia import RigidInertia
 from dynx.spatial.scalar import Array
 from dynx.spatial.so3 import rotate_back, rpy_from_rotation

@@ -13,43 +13,25 @@ dynamics is Drake's articulated-body algorithm; where that refuses a body whose 
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import wraps
 from threading import local
-from typing import Any, ClassVar, TypeVar, cast
+from typing import Any, ClassVar
 
 import numpy as np
 
 from dynx.backends.base import Backend
 from dynx.backends.drake_plant import build_plant
+from dynx.backends.engine_errors import engine_errors
 from dynx.engines.drake import DRAKE_FAILURES, JacobianWrtVariable, MultibodyForces, drake_version, gist
-from dynx.errors import ClosedError, DynxError, EngineError
+from dynx.errors import DynxError, EngineError
 from dynx.model import Model
 from dynx.rbd.jacobians import Reference
 from dynx.spatial.scalar import Floats
-
-Hook = TypeVar("Hook", bound=Callable[..., Any])
 
 _V = JacobianWrtVariable.kV
 _HERE: Floats = np.zeros(3)
 _AT_WORLD = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
-
-def _mapped(hook: Hook) -> Hook:
-    """`hook` with the engine's exceptions turned into `EngineError`."""
-
-    @wraps(hook)
-    def call(self: DrakeBackend, *args: Any) -> Any:
-        try:
-            return hook(self, *args)
-        except DynxError:
-            raise
-        except DRAKE_FAILURES as error:
-            if self._arguments.closed:
-                raise ClosedError(f"this backend of {self.model.name} was closed during a call") from error
-            raise EngineError(f"drake failed on {self.model.name}: {gist(error)}") from error
-
-    return cast(Hook, call)
+_mapped = engine_errors("drake", gist, DRAKE_FAILURES)
 
 
 class _Workspace(local):

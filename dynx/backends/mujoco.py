@@ -14,57 +14,42 @@ thread's first call. MuJoCo lets go of the GIL in its calls.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import wraps
 from threading import local
-from typing import Any, ClassVar, TypeVar, cast
+from typing import Any, ClassVar
 
 import numpy as np
 
 from dynx.backends.base import Backend
+from dynx.backends.engine_errors import engine_errors
 from dynx.backends.mujoco_mass import MassMatrix
 from dynx.backends.mujoco_tree import ROOT, build_tree
-from dynx.engines.mujoco import mujoco
-from dynx.errors import ClosedError, DynxError, EngineError
+from dynx.engines.mujoco import mujoco, silent_data
+from dynx.errors import DynxError, EngineError
 from dynx.model import Model
 from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED, Reference
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import skew
 
-Hook = TypeVar("Hook", bound=Callable[..., Any])
-
 ORIGIN = np.zeros(3)
 ALMOST_SINGULAR = int(mujoco.mjtWarning.mjWARN_INERTIA)
 
 
-def _mapped(hook: Hook) -> Hook:
-    """`hook` with the engine's exceptions turned into `EngineError`."""
+def _gist(error: BaseException) -> str:
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    return f"{type(error).__name__}: {lines[0] if lines else 'no message'}"
 
-    @wraps(hook)
-    def call(self: MujocoBackend, *args: Any) -> Any:
-        try:
-            return hook(self, *args)
-        except DynxError:
-            raise
-        except Exception as error:
-            if self._arguments.closed:
-                raise ClosedError(f"this backend of {self.model.name} was closed during a call") from error
-            raise EngineError(f"mujoco failed on {self.model.name}: {_gist(error)}") from error
 
-    return cast(Hook, call)
+_mapped = engine_errors("mujoco", _gist)
 
 
 class _Workspace(local):
     """The engine's `MjData` and views into it, one for each thread that asks for it."""
 
     def __init__(self, engine: Any) -> None:
-        self.data = data = mujoco.MjData(engine)
+        self.data = data = silent_data(engine)
         self.q, self.v, self.a = data.qpos, data.qvel, data.qacc
         self.tau = data.qfrc_applied
         self.p, self.R = data.xpos, data.xmat.reshape(-1, 3, 3)
-        # The first warning of a kind is printed and written to a log file in the working directory;
-        # further ones are counted.
-        for warning in data.warning:
-            warning.number = 1
 
 
 class MujocoBackend(Backend):
@@ -73,7 +58,7 @@ class MujocoBackend(Backend):
     name: ClassVar[str] = "mujoco"
 
     def __init__(self, model: Model, *, validate: bool = True) -> None:
-        """Raises EngineLimitError for a model that the engine has not room for."""
+        """Raises EngineLimitError for a model that the engine has no room for."""
         super().__init__(model, validate=validate)
         try:
             tree = build_tree(model)
@@ -262,8 +247,3 @@ class MujocoBackend(Backend):
         if self._floating:
             J[:3, :3] = J[:3, :3] @ work.R[ROOT]
         return J
-
-
-def _gist(error: Exception) -> str:
-    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
-    return f"{type(error).__name__}: {lines[0] if lines else 'no message'}"

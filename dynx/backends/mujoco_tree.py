@@ -16,16 +16,13 @@ from typing import Any
 
 import numpy as np
 
-from dynx.backends.bullet_inertia import eigen, longdouble
-from dynx.engines.mujoco import mujoco
+from dynx.engines.mujoco import MAX_DEPTH, mujoco
 from dynx.errors import EngineError, EngineLimitError
 from dynx.model import Model
 from dynx.model.elements import Inertial, Pose
+from dynx.spatial.extended import eigen, longdouble
 from dynx.spatial.scalar import Array, Floats
 from dynx.spatial.so3 import quat_from_rotation, rotation_from_rpy
-
-MAX_DEPTH = 1000
-"""Most links in a row that are accepted: MuJoCo's compiler has a limit of 1,024 bodies (measured, 4.0)."""
 
 MAX_NV = 1000
 """Most tree velocities that are accepted: compiling a chain of as many takes 3 s, and time
@@ -51,7 +48,7 @@ class MujocoTree:
 
 
 def build_tree(model: Model) -> MujocoTree:
-    """The tree of a robot; raises EngineLimitError where MuJoCo has not room for it."""
+    """The tree of a robot; raises EngineLimitError where MuJoCo has no room for it."""
     mechanism = model.mechanism
     if mechanism.nv > MAX_NV:
         raise EngineLimitError(

@@ -15,16 +15,15 @@ proves it), and its mass matrix is symmetric: the binding fills the triangle tha
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import wraps
 from threading import local
-from typing import Any, ClassVar, TypeVar, cast
+from typing import Any, ClassVar
 
 import numpy as np
 
 from dynx.backends.base import Backend
+from dynx.backends.engine_errors import engine_errors
 from dynx.engines.pinocchio import pin
-from dynx.errors import ClosedError, DynxError, EngineError, EngineLimitError, shown
+from dynx.errors import DynxError, EngineError, EngineLimitError, shown
 from dynx.model import Model
 from dynx.model.elements import Inertial, Joint, Pose
 from dynx.rbd.jacobians import Reference
@@ -39,24 +38,15 @@ LEAST_MASS = float(np.finfo(float).eps)
 WORLD = 0
 """Pinocchio's joint 0, the universe: it carries what a fixed base carries."""
 
-Hook = TypeVar("Hook", bound=Callable[..., Any])
+
+def _gist(error: BaseException) -> str:
+    """What the engine says, without the C++ signatures before and after it."""
+    _, _, said = str(error).rpartition("message:\n")
+    lines = [line.strip() for line in said.splitlines() if line.strip()]
+    return f"{type(error).__name__}: {lines[0] if lines else 'no message'}"
 
 
-def _mapped(hook: Hook) -> Hook:
-    """`hook` with the engine's exceptions turned into `EngineError`."""
-
-    @wraps(hook)
-    def call(self: PinocchioBackend, *args: Any) -> Any:
-        try:
-            return hook(self, *args)
-        except DynxError:
-            raise
-        except Exception as error:
-            if self._arguments.closed:
-                raise ClosedError(f"this backend of {self.model.name} was closed during a call") from error
-            raise EngineError(f"pinocchio failed on {self.model.name}: {_gist(error)}") from error
-
-    return cast(Hook, call)
+_mapped = engine_errors("pinocchio", _gist)
 
 
 class _Workspace(local):
@@ -330,10 +320,3 @@ def _refuse_feather(mass: float, carrier: str) -> None:
             f"the bodies joined at {shown(carrier)} weigh {mass:.3g} kg together; the backend 'pinocchio' "
             f"adds bodies rightly only from {LEAST_MASS:.2g} kg up, or when they weigh nothing"
         )
-
-
-def _gist(error: Exception) -> str:
-    """What the engine says, without the C++ signatures before and after it."""
-    _, _, said = str(error).rpartition("message:\n")
-    lines = [line.strip() for line in said.splitlines() if line.strip()]
-    return f"{type(error).__name__}: {lines[0] if lines else 'no message'}"

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.backends.base import Backend
-from dynx.backends.bullet_inertia import Ballast, ballast_for, longdouble
+from dynx.backends.bullet_inertia import Ballast, ballast_for
 from dynx.backends.bullet_robot import BulletRobot
 from dynx.engines.pybullet import bullet
 from dynx.errors import ArgumentError, ClosedError, EngineError
@@ -23,6 +23,7 @@ from dynx.model import Model
 from dynx.model.configuration import checked_array
 from dynx.model.mechanism import build_mechanism
 from dynx.rbd.jacobians import Reference
+from dynx.spatial.extended import longdouble
 from dynx.spatial.scalar import Floats
 
 REFINE_ABOVE = 16 * float(np.finfo(np.float64).eps)

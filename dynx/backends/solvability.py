@@ -63,7 +63,10 @@ def _null_coordinates(M: Floats) -> list[int]:
     floor = 1e-14 * max(float(np.max(np.abs(diagonal))), np.finfo(float).tiny)
     massless = np.flatnonzero(diagonal <= floor * 1e-6)
     scale = 1.0 / np.sqrt(np.where(diagonal > floor * 1e-6, diagonal, 1.0))
-    values, vectors = np.linalg.eigh(M * scale[:, None] * scale[None, :])
+    scaled = M * scale[:, None] * scale[None, :]
+    if not np.isfinite(scaled).all():
+        return []  # numbers so large that nothing is known of it
+    values, vectors = np.linalg.eigh(scaled)
     null = vectors[:, np.abs(values) < len(M) * 4 * np.finfo(float).eps]
     mixed = np.flatnonzero(np.max(np.abs(null), axis=1, initial=0.0) > 1e-3)
     return sorted({*massless.tolist(), *mixed.tolist()})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shlex
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -44,6 +45,7 @@ def compare(
     outputs.check()
     check_engines(engines)
     inputs = expand(robots)
+    outputs.keep_apart((each.robot for each in inputs), (), None)
     run = doctor_run([DoctorTask(each.robot, base, engines, samples, seed, causes=False) for each in inputs])
     for index, each in enumerate(inputs):
         if each.refusal is not None:
@@ -149,7 +151,10 @@ def vote_lines(report: DoctorReport, found: Vote) -> list[str]:
     if not found.groups:
         return ["no engine loads the file"]
     lines = [f"{_and(group)} agree with each other" for group in found.groups if len(group) > 1]
-    lines += [f"{engine} stands alone" for engine in found.alone]
+    if len(found.alone) == len(found.groups) > 1:
+        lines.append("no two engines agree")
+    else:
+        lines += [f"{engine} stands alone" for engine in found.alone]
     lines += [f"{engine} does not load the file" for engine in found.refused]
     wrong = [
         each.engine for each in report.engines if each.refused is None and each.engine not in found.right
@@ -160,9 +165,10 @@ def vote_lines(report: DoctorReport, found: Vote) -> list[str]:
     for engine in report.engines:
         far = worst(engine)
         if engine.engine in wrong and far is not None:
-            lines.append(
-                f"{engine.engine} is off by up to {wording.size(far[1])} ({wording.quantity(far[0])})"
-            )
+            quantity, error = far
+            missing = f"gives no answer for {wording.quantity(quantity)}"
+            off = f"is off by up to {wording.size(error)} ({wording.quantity(quantity)})"
+            lines.append(f"{engine.engine} {off if math.isfinite(error) else missing}")
     if largest_error(report) <= report.tolerance:
         lines.append(f"nothing differs by more than {report.tolerance:g}")
     return lines

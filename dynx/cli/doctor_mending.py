@@ -8,7 +8,7 @@ from pathlib import PurePath
 from typing import TYPE_CHECKING
 
 from dynx.cli.inputs import RobotInput, is_library_name
-from dynx.cli.output_file import check_writable, make_folder, write_bytes
+from dynx.cli.output_file import check_writable, make_folder, require_apart, write_bytes
 from dynx.errors import ArgumentError, shown
 
 if TYPE_CHECKING:
@@ -48,8 +48,10 @@ def targets(inputs: Sequence[RobotInput], out: str) -> list[str]:
         if other != each.robot:
             both = f"{shown(other, 200)} and {shown(each.robot, 200)}"
             raise ArgumentError(f"{both} would both be written to {shown(path, 300)}")
-        for read in inputs:
-            require_other_file(path, read.robot)
+    try:
+        require_apart(paths, (each.robot for each in inputs), "the file that is read")
+    except ArgumentError as error:
+        raise ArgumentError(f"--fix: {error}; --in-place mends it there") from None
     return paths
 
 
@@ -62,6 +64,8 @@ def in_place_targets(inputs: Sequence[RobotInput]) -> list[str]:
             )
         if each.robot.endswith(".xacro"):
             raise ArgumentError(f"{shown(each.robot, 200)} is a program that makes a URDF: --fix writes that")
+        if each.refusal is None:
+            check_writable(each.robot)
     return [each.robot for each in inputs]
 
 
@@ -79,7 +83,8 @@ def write_mended(path: str, report: DoctorReport, *, over_input: bool) -> bool:
     """Write the mended description of a report; False where there is none to write.
 
     Where nothing in the text has to change it is written as it was read, so that the file is there in
-    any case. The encoding is the one that the document declares.
+    any case. The encoding, the byte-order mark and the line ends are those that were read. A file that
+    was changed since it was read is not written over.
     """
     from dynx.model.xml_source import XmlSource
 
@@ -90,9 +95,19 @@ def write_mended(path: str, report: DoctorReport, *, over_input: bool) -> bool:
         return False
     if not over_input and report.source is not None:
         require_other_file(path, report.source)
+    if over_input:
+        _require_unchanged(path, report)
     make_folder(path)
-    write_bytes(path, XmlSource(text, path).to_bytes())
+    write_bytes(path, (report.form or XmlSource(text, path).form).encode(text))
     return True
+
+
+def _require_unchanged(path: str, report: DoctorReport) -> None:
+    from dynx.model.file_reading import read_file
+    from dynx.model.xml_source import XmlSource
+
+    if XmlSource(read_file(path), path).text != report.text:
+        raise ArgumentError(f"{shown(path, 300)} was changed while it was examined, and is left as it is")
 
 
 def _name(each: RobotInput) -> str:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from dynx.cli.output_file import check_writable, make_folder, write_text
+from dynx.cli.output_file import check_writable, make_folder, require_apart, write_text
 from dynx.cli.terminal import echo_json, json_text
-from dynx.errors import ArgumentError
+from dynx.errors import ArgumentError, shown
 
 if TYPE_CHECKING:
     from dynx.doctor.formats.baseline import Baseline
@@ -37,6 +37,23 @@ class Outputs:
                 check_writable(path)
             if paths.count(path) > 1:
                 raise ArgumentError(f"two formats would be written to {path!r}")
+
+    def keep_apart(self, read: Iterable[str], mended: Iterable[str | None], baseline: str | None) -> None:
+        """Raise ArgumentError for a path at which a robot is read, a mended file goes or the baseline lies.
+
+        To write a new baseline over the one that is compared with is to accept what is new.
+        """
+        paths = [
+            path for path in (self.json, self.html, self.junit, self.sarif) if path not in (None, STDOUT)
+        ]
+        known = [] if baseline is None else [baseline]
+        every = paths if self.baseline is None else [*paths, self.baseline]
+        require_apart(every, read, "a robot that is read")
+        require_apart(paths, known, "the baseline")
+        targets = {os.path.realpath(path) for path in mended if path is not None}
+        for path in every:
+            if os.path.realpath(path) in targets:
+                raise ArgumentError(f"{shown(path, 300)} is where a mended file goes")
 
     @property
     def on_stdout(self) -> bool:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
 from dynx.cli.doctor_text import STYLES, block, heading, sentence
 from dynx.cli.exits import one_line, short_line
 from dynx.cli.tables import Table
 from dynx.cli.terminal import counted
 from dynx.doctor.formats import wording
-from dynx.doctor.formats.causes import ROUNDING, Cause, causes, severity, status
+from dynx.doctor.formats.causes import ROUNDING, Cause, Status, causes, severity, status
 from dynx.doctor.formats.vote import largest_error
 
 if TYPE_CHECKING:
@@ -55,17 +55,13 @@ def show_one(out: Console, report: DoctorReport, saved: Mapping[int, str], mende
 
 def show_verdict(out: Console, report: DoctorReport) -> None:
     """The first line: robot, base, verdict, and the file."""
-    style = {"alike": "bold green", "explained": "bold", "unexplained": "bold red", "refused": "yellow"}
-    where = "" if report.source is None else f"({short_line(report.source)})"
     if report.error is not None:  # whose words are said on standard error
         out.print(f"{short_line(report.robot)}, {report.base} base: not examined", style="yellow")
         return
-    out.print(
-        f"{short_line(report.robot)}, {report.base} base: {one_line(report.verdict)}",
-        style=style[status(report)],
-    )
-    if where:
-        out.print(where, style="dim")
+    style = "bold green" if report.alike else "bold" if report.explained else "bold red"
+    out.print(f"{short_line(report.robot)}, {report.base} base: {one_line(report.verdict)}", style=style)
+    if report.source is not None:
+        out.print(f"({short_line(report.source)})", style="dim")
 
 
 def show_engines(out: Console, report: DoctorReport) -> None:
@@ -129,8 +125,7 @@ def show_many(out: Console, reports: Sequence[DoctorReport]) -> None:
 def show_summary(out: Console, reports: Sequence[DoctorReport], seconds: float, left: int) -> None:
     """The last line: how many are alike, explained, unexplained, refused, and not done."""
     verdicts = [status(report) for report in reports]
-    words = {"alike": "alike", "explained": "explained", "unexplained": "unexplained", "refused": "refused"}
-    parts = [f"{verdicts.count(key)} {word}" for key, word in words.items()]  # type: ignore[arg-type]
+    parts = [f"{verdicts.count(word)} {word}" for word in get_args(Status)]
     if left:
         parts.append(f"{left} not done")
     bases = len({report.base for report in reports}) > 1

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class DoctorTask:
-    """A robot, and how it is to be examined; options that are None are left to `dynx.doctor`.
+    """A robot, and how it is to be examined; options that are None are left to `dynx.diagnose`.
 
     `causes` says whether causes are looked for, or only what differs (``agree --as-loaded``).
     """

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import stat
 import tempfile
+from collections.abc import Iterable
 
 from dynx.errors import ArgumentError, shown
 
@@ -21,6 +23,17 @@ def check_writable(path: str) -> None:
     else:
         return
     raise ArgumentError(f"{shown(path, 300)} {problem}")
+
+
+def require_apart(paths: Iterable[str], kept: Iterable[str], what: str) -> None:
+    """Raise ArgumentError where a path is one of the files `kept`, under whatever name: it would be lost.
+
+    `what` says what they are, as in ``a file that is read``.
+    """
+    files = {_identity(each) for each in kept} - {None}
+    for path in paths:
+        if _identity(path) in files:
+            raise ArgumentError(f"{shown(path, 300)} is {what}, and would be written over")
 
 
 def make_folder(path: str) -> None:
@@ -42,7 +55,7 @@ def write_bytes(path: str, data: bytes) -> None:
     try:
         if os.path.lexists(path) and not stat.S_ISREG(os.lstat(path).st_mode):
             # A pipe, a device or a link is written through, not replaced.
-            with open(path, "wb") as stream:
+            with open(path, "wb", opener=_unless_nobody_reads) as stream:
                 stream.write(data)
             return
         handle, partial = tempfile.mkstemp(
@@ -57,7 +70,25 @@ def write_bytes(path: str, data: bytes) -> None:
             os.unlink(partial)
             raise
     except OSError as error:
-        raise ArgumentError(f"{shown(path, 300)} cannot be written: {error.strerror}") from error
+        reason = "nobody reads from this pipe" if error.errno == errno.ENXIO else error.strerror
+        raise ArgumentError(f"{shown(path, 300)} cannot be written: {reason}") from error
+
+
+def _unless_nobody_reads(path: str, flags: int) -> int:
+    """Open a file; OSError ENXIO for a named pipe without a reader, for which `open` would wait forever."""
+    handle = os.open(path, flags | getattr(os, "O_NONBLOCK", 0), 0o666)
+    if hasattr(os, "O_NONBLOCK"):
+        os.set_blocking(handle, True)
+    return handle
+
+
+def _identity(path: str) -> tuple[int, int] | None:
+    """What tells a regular file from every other one, whatever it is called; None where there is none."""
+    try:
+        found = os.stat(path)
+    except (OSError, ValueError):
+        return None
+    return (found.st_dev, found.st_ino) if stat.S_ISREG(found.st_mode) else None
 
 
 def _mode(path: str) -> int:

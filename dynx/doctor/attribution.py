@@ -14,8 +14,9 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from dynx.doctor.examination import QUANTITIES, Examination, Laboratory, change
+from dynx.doctor.examination import LOADING, QUANTITIES, Examination, Laboratory, change
 from dynx.doctor.mending import Mending, mend, readable, treated
+from dynx.doctor.put_back import put_back
 from dynx.doctor.report import Effect
 from dynx.doctor.truth import Truth
 from dynx.rules import Case, Detection, Remedy, Rule
@@ -69,7 +70,7 @@ class Attributor:
         touched = self._alone(rule, found, named)
         untouched = [name for name in named if name not in touched and self._is_wrong(name)]
         if untouched:
-            touched |= self._among_the_mended(rule, untouched)
+            touched |= self._among_the_mended(rule, found, untouched)
         if len(found) == 1 or not touched:
             return [self._attribution(rule, each, touched) for each in found]
         return [self._attribution(rule, each, self._at(rule, each, touched)) for each in found]
@@ -99,11 +100,24 @@ class Attributor:
         )
         return self._effects(engines, before, after)
 
-    def _among_the_mended(self, rule: Rule, engines: Sequence[str]) -> dict[str, Effect]:
+    def _among_the_mended(
+        self, rule: Rule, found: Sequence[Detection], engines: Sequence[str]
+    ) -> dict[str, Effect]:
+        """What changes in each engine when the rule comes back into the mended file."""
         rest: Mending = mend(self._case, [other for other in self._rules if other is not rule])
         if not rest.case.readable:
             return {}
-        with_it = self._laboratory.examine(rest.case, engines)
+        if all(applied is not rule for applied, _ in rest.applied):
+            return self._effects(engines, self._laboratory.examine(rest.case, engines), self._after)
+        # Without this rule dynx itself could not read the file.
+        remedy = treated(self._case, rule, found)
+        mended = mend(self._case, self._rules).case
+        if remedy is None:
+            return {}
+        source = put_back(self._case.source, remedy.case.source, mended.source)
+        if source is None:
+            return {}
+        with_it = self._laboratory.examine(mended.with_source(source), engines, truth=self._after.truth)
         return self._effects(engines, with_it, self._after)
 
     def _is_wrong(self, engine: str) -> bool:
@@ -122,7 +136,7 @@ class Attributor:
         if other.refused is not None:
             return NOTHING
         if one.refused is not None:
-            return Effect("loading", float("inf"))
+            return Effect(LOADING, float("inf"))
         worst = NOTHING
         for quantity in QUANTITIES:
             if quantity in other.failed:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from xml.sax.saxutils import quoteattr
 
 from dynx.doctor.tree_cuts import Cuts
 from dynx.model.xml_source import Edit, SourceElement, XmlSource
+from dynx.rules.number_text import is_number
 
 DIGITS = (1, 2, 3)
 """Numbers are tried with so many significant digits."""
@@ -100,12 +100,9 @@ def complexity(word: str) -> int:
 
 def shortest(word: str) -> str:
     """A number as few characters as read back the same; other words as they are."""
-    try:
-        value = float(word)
-    except ValueError:
+    if not is_number(word):
         return word
-    if not math.isfinite(value):
-        return word
+    value = float(word)
     return repr(int(value)) if value == int(value) and abs(value) < 1e6 else repr(value)
 
 
@@ -160,7 +157,7 @@ def _numbers(source: XmlSource) -> Iterator[tuple[SourceElement, str, list[str]]
     for element in source.root.walk():
         for attribute in element.places:
             words = element.attributes[attribute].split()
-            if attribute not in _NAMING and words and all(_is_number(word) for word in words):
+            if attribute not in _NAMING and words and all(map(is_number, words)):
                 yield element, attribute, words
 
 
@@ -179,13 +176,6 @@ def _rewriting(source: XmlSource, chosen: Sequence[_Rounding]) -> Iterator[Edit]
 
 def _unit(word: str) -> str:
     return "-1" if float(word) < 0.0 else "1"
-
-
-def _is_number(word: str) -> bool:
-    try:
-        return math.isfinite(float(word))
-    except ValueError:
-        return False
 
 
 def _plain(element: SourceElement, attribute: str, word: str) -> str:

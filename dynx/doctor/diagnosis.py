@@ -4,28 +4,23 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
-from itertools import combinations
 
 from dynx.agreement.tolerances import BAR
 from dynx.doctor.attribution import Attribution, Attributor
-from dynx.doctor.examination import QUANTITIES, TORQUE, Examination, Laboratory
+from dynx.doctor.examination import LOADING, TORQUE, Examination, Laboratory
 from dynx.doctor.given_file import without_meshes
-from dynx.doctor.mending import Mending, Place, detections, mend, place, readable
+from dynx.doctor.given_lines import at_given_lines
+from dynx.doctor.mending import Mending, Place, all_but, detections, mend, place, readable, treated
 from dynx.doctor.report import (
     DoctorReport,
-    EngineResult,
     Failure,
-    Finding,
-    PairError,
-    RunTimeCall,
     Unexplained,
 )
-from dynx.doctor.truth import refereed
+from dynx.doctor.reporting import all_findings, first_report, run_time_calls, with_after
 from dynx.errors import ArgumentError, DynxError
-from dynx.loaded import ENGINES, installed_engines, loader_class
-from dynx.loaded.difference import model_difference
+from dynx.loaded import ENGINES, installed_engines
 from dynx.model import Model
 from dynx.model.configuration import checked_base
 from dynx.model.loading import read_description
@@ -100,7 +95,7 @@ def compare_as_loaded(
     try:
         case = open_case(robot, base, {})
         before = laboratory.examine(case, truth=laboratory.truth(readable(case).case), describe=True)
-        report = _report(case, before, tolerance)
+        report = first_report(case, before, tolerance)
     except DynxError as error:
         report = refused_report(str(_label(robot)), error, base=base)
     return replace(report, samples=samples, seed=seed, seconds=time.perf_counter() - started)
@@ -132,27 +127,32 @@ def _diagnosed(
     truth = laboratory.truth(sound)
     before = laboratory.examine(case, truth=truth, describe=True)
     rules = _rules_for(laboratory)
-    found = detections(case, rules)
-    report = _report(case, before, tolerance)
-    if report.alike:
-        return replace(report, findings=_findings(found, [], Mending(case)))
+    found = at_given_lines(detections(case, rules), case.source, sound.source)
+    report = first_report(case, before, tolerance)
+    if report.alike and not _chosen_practice(case, found):
+        return replace(report, findings=all_findings(found, [], Mending(case)))
     say("mending")
     full = mend(case, rules)
     after = laboratory.examine(full.case)
     proofs = _proofs(case, rules, laboratory, before, after, tolerance, say)
     mended, last = _least_mending(case, rules, full, after, proofs, laboratory, tolerance)
-    unexplained = _unexplained(last, tolerance)
+    unexplained = _unexplained(last, tolerance, _beyond_remedy(mended.case, rules))
     if unexplained and counterexamples:
         unexplained = _with_counterexamples(mended.case, unexplained, laboratory, tolerance, seed, say)
     changed = mended.case.source.data != case.source.data
     return replace(
-        _with_after(report, last),
-        findings=_findings(found, proofs, mended),
+        with_after(report, last),
+        findings=all_findings(found, proofs, mended),
         unexplained=unexplained,
         choices=mended.choices,
-        calls=_calls(mended.case, laboratory),
+        calls=run_time_calls(mended.case, laboratory),
         mended=mended.case.source.text if changed else None,
     )
+
+
+def _chosen_practice(case: Case, found: Sequence[tuple[Rule, Detection]]) -> bool:
+    """Whether the user chose a remedy for bad practice that is there."""
+    return any(rule.kind == "practice" and rule.id in (case.settings or {}) for rule, _ in found)
 
 
 def _rules_for(laboratory: Laboratory) -> list[Rule]:
@@ -198,24 +198,49 @@ def _least_mending(
     laboratory: Laboratory,
     tolerance: float,
 ) -> tuple[Mending, Examination]:
-    """The remedies that matter here and no others, where those do as much as all together."""
-    idle: set[Place] = {place(each.rule, each.detection) for each in proofs if not each.effects}
-    if not idle:
-        return full, after
-    least = mend(case, rules, lambda rule, detection: place(rule, detection) not in idle)
-    if not least.case.readable:
-        return full, after
-    result = laboratory.examine(least.case)
-    for engine in laboratory.engines:
-        if result.worst(engine) > max(MARGIN * tolerance, after.worst(engine)):
-            return full, after
-    return least, result
+    """The remedies that matter here and no others, where those do as much as all together.
+
+    First the places that have an effect of their own, then all places of the rules that have one
+    somewhere: places too small to be seen alone may add up. What shows at some states alone is always
+    taken away, and so is all that concerns an engine that refuses the file to the end: nothing of it can
+    be seen there.
+    """
+    blind = {engine for engine in laboratory.engines if after.answers[engine].refused is not None}
+    idle: set[Place] = {
+        place(each.rule, each.detection)
+        for each in proofs
+        if not (each.effects or each.rule.depends_on_state or blind.intersection(each.rule.engines))
+    }
+    busy = {each.rule.id for each in proofs if each.effects}
+    for left in (idle, {each for each in idle if each[0] not in busy}):
+        if not left:
+            break
+        least = mend(case, rules, all_but(left))
+        if not least.case.readable:
+            continue
+        result = laboratory.examine(least.case)
+        if all(
+            result.worst(engine) <= max(MARGIN * tolerance, after.worst(engine))
+            for engine in laboratory.engines
+        ):
+            return least, result
+    return full, after
 
 
-def _unexplained(after: Examination, tolerance: float) -> tuple[Unexplained, ...]:
-    """What remains above the tolerance, the largest quantity of each engine that loads the file."""
+def _beyond_remedy(mended: Case, rules: Sequence[Rule]) -> set[str]:
+    """The engines of which a cause is still there that nothing mends, or that the user chose to keep."""
+    causes = [rule for rule in rules if rule.kind == "difference"]
+    left = detections(mended, causes)
+    return {engine for rule, each in left if treated(mended, rule, [each]) is None for engine in rule.engines}
+
+
+def _unexplained(after: Examination, tolerance: float, known: Collection[str]) -> tuple[Unexplained, ...]:
+    """What remains above the tolerance, the largest quantity of each engine; ``loading`` for one that
+    refuses the file to the end and is not among those of which it is `known` why."""
     remaining = []
-    for engine in after.answers:
+    for engine, answers in after.answers.items():
+        if answers.refused is not None and engine not in known:
+            remaining.append(Unexplained(engine, LOADING, float("inf")))
         errors = after.errors(engine)
         quantity = max(errors, key=lambda name: errors[name], default=None)
         if quantity is not None and errors[quantity] > tolerance:
@@ -243,103 +268,6 @@ def _with_counterexamples(
         example = smallest(case, difference, tolerance=tolerance, seed=seed, budget=COUNTEREXAMPLE_SECONDS)
         found.append(replace(each, counterexample=example))
     return tuple(found)
-
-
-def _report(case: Case, before: Examination, tolerance: float) -> DoctorReport:
-    """What there is to say before any cause is looked for."""
-    descriptions = [each.description for each in before.answers.values() if each.description is not None]
-    model = before.truth.model
-    return DoctorReport(
-        robot=model.name,
-        source=case.source.source,
-        base=case.base,
-        engines=tuple(_engine_result(case, name, before) for name in before.answers),
-        residual=_residual(before),
-        tolerance=tolerance,
-        pairs=_pairs(before),
-        referee=refereed(before.truth),
-        model_difference=tuple(model_difference(model, descriptions)),
-        text=case.source.text,
-    )
-
-
-def _with_after(report: DoctorReport, after: Examination) -> DoctorReport:
-    """The report with what the engines say of the mended file."""
-    engines = tuple(
-        replace(each, refused_after=after.answers[each.engine].refused, after=after.errors(each.engine))
-        for each in report.engines
-    )
-    return replace(report, engines=engines, residual=_residual(after))
-
-
-def _residual(examination: Examination) -> float:
-    """The largest error of the engines that load the file."""
-    errors = [examination.errors(engine) for engine in examination.answers]
-    return max((error for of_engine in errors for error in of_engine.values()), default=0.0)
-
-
-def _engine_result(case: Case, name: str, before: Examination) -> EngineResult:
-    kind = loader_class(name)
-    errors, refused = before.errors(name), before.answers[name].refused
-    return EngineResult(
-        engine=name,
-        version=kind.engine_version(),
-        call=kind.load_call(case.base == "floating"),
-        refused=refused,
-        refused_after=refused,
-        before=errors,
-        after=errors,
-    )
-
-
-def _pairs(examination: Examination) -> tuple[PairError, ...]:
-    loaded = [name for name, each in examination.answers.items() if each.refused is None]
-    return tuple(
-        PairError(
-            (one, other),
-            quantity,
-            examination.pair_error(one, other, quantity),
-            examination.joint_errors(one, other) if quantity == TORQUE else {},
-        )
-        for one, other in combinations(loaded, 2)
-        for quantity in QUANTITIES
-        if quantity in examination.errors(one)
-    )
-
-
-def _findings(
-    found: Sequence[tuple[Rule, Detection]], proofs: Sequence[Attribution], mended: Mending
-) -> tuple[Finding, ...]:
-    """Everything detected, with the effect where one was proved."""
-    proved: dict[Place, list[Attribution]] = {}
-    for each in proofs:
-        proved.setdefault(place(each.rule, each.detection), []).append(each)
-    done = {rule.id: remedy.changed for rule, remedy in mended.applied}
-    findings = []
-    for rule, detection in found:
-        # The same place twice (two fields of one link, say) has its proofs in the same order.
-        of_place = proved.get(place(rule, detection), [])
-        attribution = of_place.pop(0) if of_place else None
-        finding = Finding(
-            rule.id, rule.name, rule.kind, detection.link, detection.joint, detection.line, detection.message
-        )
-        if attribution is not None and attribution.effects:
-            finding = replace(
-                finding,
-                engines=tuple(attribution.effects),
-                effect=attribution.worst,
-                proved=attribution.proved,
-                remedy=done.get(rule.id),
-            )
-        findings.append(finding)
-    return tuple(sorted(findings, key=lambda finding: finding.kind))
-
-
-def _calls(case: Case, laboratory: Laboratory) -> tuple[RunTimeCall, ...]:
-    known = [(name, kind.CALLS) for name, kind in laboratory.engines.items()]
-    return tuple(
-        RunTimeCall(engine, calls[call]) for engine, calls in known for call in calls if call in case.calls
-    )
 
 
 def _laboratory(engines: Sequence[str] | None, samples: int, seed: int, tolerance: float) -> Laboratory:

@@ -16,8 +16,11 @@ from dynx.loaded import LoadedModel, LoadedRobot, loader_class
 from dynx.rules.case import Case
 from dynx.spatial.scalar import Floats
 
-KINEMATICS, JACOBIAN = "forward kinematics", "jacobian"
-MASS, TORQUE, ACCELERATION = "mass matrix", "inverse dynamics", "forward dynamics"
+KINEMATICS, JACOBIAN = "forward_kinematics", "jacobian"
+MASS, TORQUE, ACCELERATION = "mass_matrix", "inverse_dynamics", "forward_dynamics"
+LOADING = "loading"
+"""In the place of a quantity, for an engine that refuses the file."""
+
 QUANTITIES = (KINEMATICS, JACOBIAN, MASS, TORQUE, ACCELERATION)
 """What is compared; forward dynamics by its backward error, the torque that the answer really takes."""
 
@@ -27,8 +30,9 @@ class Answers:
     """What one engine makes of one file.
 
     `deviation` maps a quantity to engine less truth: by link (n, 4, 4) or (n, 6, nv) for poses and
-    Jacobians, under "" (n, nv, nv) or (n, nv) for the rest. A quantity the engine failed to answer is
-    in `failed`, with its words; `refused` says why it did not load the file at all.
+    Jacobians, under "" (n, nv, nv) or (n, nv) for the rest, (n, 2, nv) for accelerations. A quantity
+    the engine failed to answer is in `failed`, with its words; `refused` says why it did not load the
+    file at all.
     """
 
     engine: str
@@ -84,7 +88,7 @@ class Examination:
         answers = self.answers[engine]
         if answers.refused is not None or quantity in answers.failed:
             return float("inf")
-        return _largest(answers.deviation.get(quantity, {})) / self.scale(quantity, engine)
+        return _number(_largest(answers.deviation.get(quantity, {})) / self.scale(quantity, engine))
 
     def errors(self, engine: str) -> dict[str, float]:
         """`error` of every quantity that was asked; empty where the file was refused."""
@@ -119,7 +123,7 @@ class Examination:
         if quantity in {*one.failed, *two.failed} or one.refused or two.refused:
             return float("inf")
         gap = change(one.deviation.get(quantity, {}), two.deviation.get(quantity, {}))
-        return gap / self.scale(quantity, engine)
+        return _number(gap / self.scale(quantity, engine))
 
 
 class Laboratory:
@@ -160,7 +164,8 @@ class Laboratory:
             ):
                 return _answers(engine, robot, truth, describe)
         except DynxError as error:
-            return Answers(engine, refused=str(error))
+            # The name of a passing file tells nobody anything, and is another one every time.
+            return Answers(engine, refused=str(error).replace(str(path), path.name))
 
 
 def _answers(engine: str, robot: LoadedRobot, truth: Truth, describe: bool) -> Answers:
@@ -206,12 +211,20 @@ def _jacobian_deviation(robot: LoadedRobot, truth: Truth) -> dict[str, Floats]:
 
 
 def _acceleration_deviation(robot: LoadedRobot, truth: Truth) -> Floats:
+    """For the torques of the states, and for those that accelerate the other way: a force that acts on
+    one side alone, as that of a limit, shows in one of the two."""
+    there = truth.states.tau
+    back = 2.0 * truth.bias - there
+    return np.stack([_backward_error(robot, truth, tau) for tau in (there, back)], axis=1)
+
+
+def _backward_error(robot: LoadedRobot, truth: Truth, tau: Floats) -> Floats:
     states = truth.states
-    found = _each(robot.forward_dynamics, states.q, states.v, states.tau)
+    found = _each(robot.forward_dynamics, states.q, states.v, tau)
     taken = truth.torque_taken(found)
     terms = np.einsum("nij,nj->ni", np.abs(truth.mass_matrix), np.abs(found))
-    terms = terms + np.abs(truth.bias) + np.abs(states.tau)
-    return np.asarray((taken - states.tau) / np.max(terms, axis=-1, initial=0.0, keepdims=True))
+    terms = terms + np.abs(truth.bias) + np.abs(tau)
+    return np.asarray((taken - tau) / np.max(terms, axis=-1, initial=0.0, keepdims=True))
 
 
 def change(before: Mapping[str, Floats], after: Mapping[str, Floats]) -> float:
@@ -231,6 +244,11 @@ def coordinate_names(truth: Truth) -> tuple[str, ...]:
     """A name for each entry of v."""
     base = ("base x", "base y", "base z", "base roll", "base pitch", "base yaw")
     return (base if truth.model.floating else ()) + truth.model.joint_names
+
+
+def _number(ratio: float) -> float:
+    """The ratio, infinite where it is none: what is too large to be compared is no agreement."""
+    return float("inf") if np.isnan(ratio) else ratio
 
 
 def _largest(parts: Mapping[str, Floats]) -> float:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
 
 from dynx.rules import Case, Detection, Remedy, Rule, all_rules
 
@@ -19,21 +19,21 @@ Wanted = Callable[[Rule, Detection], bool]
 
 @dataclass(frozen=True)
 class Mending:
-    """A case after remedies: what was applied, in order, and what nothing can remove."""
+    """A case after remedies, and what was applied, in order."""
 
     case: Case
     applied: tuple[tuple[Rule, Remedy], ...] = ()
-    incurable: tuple[tuple[Rule, Detection], ...] = field(default=())
-
-    @property
-    def changes_physics(self) -> bool:
-        """Whether a number of the file had to be changed by more than rounding."""
-        return any(remedy.changes_physics for _, remedy in self.applied)
 
     @property
     def choices(self) -> tuple[str, ...]:
-        """What was decided, one sentence each."""
-        return tuple(dict.fromkeys(remedy.choice for _, remedy in self.applied if remedy.choice))
+        """What was decided, one sentence each, and which remedies changed the physics of the robot."""
+        said = [remedy.choice for _, remedy in self.applied if remedy.choice]
+        said += [
+            f"{rule.id} changed the physics of the robot: {remedy.changed}"
+            for rule, remedy in self.applied
+            if remedy.changes_physics
+        ]
+        return tuple(dict.fromkeys(said))
 
 
 def place(rule: Rule, detection: Detection) -> Place:
@@ -67,8 +67,8 @@ def detections(case: Case, rules: Sequence[Rule]) -> list[tuple[Rule, Detection]
 
 
 def mend(case: Case, rules: Sequence[Rule] | None = None, wanted: Wanted | None = None) -> Mending:
-    """Apply the remedies of rules about differences, in the order of their numbers and those about the
-    text first, until none is left to apply.
+    """Apply the remedies of rules about differences, and of those about practice for which the user chose
+    one, in the order of their numbers and those about the text first, until none is left to apply.
 
     `rules` are those to choose from (default: the whole catalogue; text that dynx cannot read otherwise
     is mended by any rule), `wanted` says which detections to act on (default: all).
@@ -79,15 +79,21 @@ def mend(case: Case, rules: Sequence[Rule] | None = None, wanted: Wanted | None 
     for _ in range(ROUNDS):
         before = mended.case
         for rule in ordered:
-            if rule.kind != "difference" or (rule.stage == "model" and not mended.case.readable):
+            if not _is_asked_for(rule, case) or (rule.stage == "model" and not mended.case.readable):
                 continue
             chosen = [each for each in rule.detect(mended.case) if wanted is None or wanted(rule, each)]
             mended = _with(mended, rule, chosen)
         if not mended.case.readable:
-            mended = _joined(mended, readable(mended.case))
+            then = readable(mended.case)
+            mended = Mending(then.case, mended.applied + then.applied)
         if mended.case is before:
             break
     return mended
+
+
+def all_but(places: Collection[Place]) -> Wanted:
+    """Act on every detection but those about these places."""
+    return lambda rule, detection: place(rule, detection) not in places
 
 
 def treated(case: Case, rule: Rule, chosen: Sequence[Detection]) -> Remedy | None:
@@ -95,22 +101,18 @@ def treated(case: Case, rule: Rule, chosen: Sequence[Detection]) -> Remedy | Non
     return rule.remedy(case, chosen) if chosen else None
 
 
+def _is_asked_for(rule: Rule, case: Case) -> bool:
+    return rule.kind == "difference" or rule.id in (case.settings or {})
+
+
 def _with(mended: Mending, rule: Rule, chosen: Sequence[Detection]) -> Mending:
-    if not chosen:
-        return mended
-    remedy = rule.remedy(mended.case, chosen)
+    remedy = treated(mended.case, rule, chosen)
     if remedy is None:
-        known = {place(*each) for each in mended.incurable}
-        new = tuple((rule, each) for each in chosen if place(rule, each) not in known)
-        return Mending(mended.case, mended.applied, mended.incurable + new)
+        return mended
     same = remedy.case.source.data == mended.case.source.data and remedy.case.calls == mended.case.calls
     if same:
         return mended
-    return Mending(remedy.case, (*mended.applied, (rule, remedy)), mended.incurable)
-
-
-def _joined(first: Mending, then: Mending) -> Mending:
-    return Mending(then.case, first.applied + then.applied, first.incurable + then.incurable)
+    return Mending(remedy.case, (*mended.applied, (rule, remedy)))
 
 
 def _rules(stage: str) -> list[Rule]:

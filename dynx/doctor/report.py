@@ -1,4 +1,4 @@
-"""What `dynx.doctor` found out about one robot, and its JSON form (schema 1).
+"""What `dynx.diagnose` found out about one robot, and its JSON form (schema 1).
 
     {"schema": 1, "dynx": version, "results": [...], "summary": {...}}
 
@@ -18,7 +18,8 @@ One entry of ``results`` per robot and base:
     tolerance, samples, seed what counts as a difference, and the states compared
     referee                  largest relative error of the right answers themselves (mass matrix and inverse
                              dynamics at one state) against the 50-digit referee
-    choices                  sentences: what was decided where the file is ambiguous
+    choices                  sentences: what was decided where the file is ambiguous, and what was done
+                             that changes the physics of the robot
     calls                    [{engine, code}]: what only a call at run time can mend
     pairs                    [{engines: [a, b], quantity, relative_error, joints: {joint: error}}]
     model_difference         [{engine, part, name, property, file, engine_value}]: what an engine
@@ -39,6 +40,7 @@ from typing import Any
 
 from dynx._version import __version__
 from dynx.loaded.difference import Deviation
+from dynx.model.xml_text import TextForm
 from dynx.rules.rule import Kind
 
 SCHEMA = 1
@@ -160,6 +162,9 @@ class DoctorReport:
     """The URDF text that the engines load alike; None where nothing had to change or nothing helps."""
     text: str | None = field(default=None, compare=False)
     """The text that was examined: for excerpts."""
+    form: TextForm | None = field(default=None, compare=False)
+    """In what encoding, and between what ends, the text was read: the mended text is written likewise.
+    None for text that declares its encoding itself."""
     seconds: float = field(default=0.0, compare=False)
 
     @property
@@ -195,8 +200,12 @@ class DoctorReport:
         if self.unexplained:
             count = len(self.unexplained)
             return f"{count} difference{'s' * (count != 1)} without an explanation"
-        causes = len({finding.rule for finding in self.differences})
-        return f"engines differ, for {causes} cause{'s' * (causes != 1)}, all proved"
+        causes = {finding.rule for finding in self.differences}
+        if not causes:
+            return "engines differ, for a cause that is known and cannot be mended"
+        proved = causes - {finding.rule for finding in self.differences if not finding.proved}
+        share = "all" if proved == causes else f"{len(proved)} of them"
+        return f"engines differ, for {len(causes)} cause{'s' * (len(causes) != 1)}, {share} proved"
 
     def to_dict(self) -> dict[str, Any]:
         """One entry of ``results``, of plain numbers, strings and lists."""
@@ -248,7 +257,7 @@ class DoctorReport:
                 }
                 for pair in self.pairs
             ],
-            "model_difference": [dict(vars(each)) for each in self.model_difference],
+            "model_difference": [_plain(vars(each)) for each in self.model_difference],
             "error": None if self.error is None else dict(vars(self.error)),
             "seconds": round(self.seconds, 4),
         }
@@ -294,3 +303,12 @@ def _unexplained(each: Unexplained) -> dict[str, Any]:
 def _number(value: float) -> float | None:
     """JSON has no infinity and no NaN."""
     return value if math.isfinite(value) else None
+
+
+def _plain(value: Any) -> Any:
+    """Numbers, texts, lists and objects with null in the place of every number that JSON does not have."""
+    if isinstance(value, Mapping):
+        return {key: _plain(each) for key, each in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(each) for each in value]
+    return _number(value) if isinstance(value, float) else value

@@ -10,7 +10,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from dynx.model.xml_source import Edit, SourceElement, XmlSource
+from dynx.model.xml_source import Edit, XmlSource
+from dynx.rules.case import end_of
 
 
 @dataclass(frozen=True)
@@ -47,7 +48,7 @@ class _Tree:
     def __init__(self, source: XmlSource) -> None:
         self._source = source
         self._joints = source.root.all("joint")
-        self._ends = [[_end(joint, "parent"), _end(joint, "child")] for joint in self._joints]
+        self._ends = [[end_of(joint, "parent"), end_of(joint, "child")] for joint in self._joints]
         self._gone_joints: set[int] = set()
         self._gone_links: set[str] = set()
 
@@ -90,15 +91,10 @@ class _Tree:
                 edits.append(source.removing(joint))
                 continue
             for role, name in zip(("parent", "child"), self._ends[k], strict=True):
-                if name != _end(joint, role):
+                if name != end_of(joint, role):
                     element = joint.first(role)
                     assert element is not None
                     edits.append(source.setting(element, "link", name))
         links = source.root.all("link")
         gone = [link for link in links if link.attributes.get("name") in self._gone_links]
         return source.edited(*edits, *(source.removing(link) for link in gone))
-
-
-def _end(joint: SourceElement, role: str) -> str:
-    element = joint.first(role)
-    return "" if element is None else element.attributes.get("link", "")

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dynx.agreement.referee import Referee
+from dynx.agreement.tolerances import BAR
 from dynx.backends.reference import ReferenceBackend
 from dynx.backends.solvability import singular_coordinates
 from dynx.model import Model
@@ -27,6 +28,10 @@ TILTED: Vector = (0.3, -0.7, -9.81)
 
 MOST_TIPS = 4
 """Jacobians are compared at the ends of up to so many branches."""
+
+FARTHEST = 100.0
+"""Limits beyond which a joint [rad or m] is compared near to zero all the same: so far from there the
+rounding of its coordinate would be what is compared."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,8 +51,10 @@ class States:
 class Truth:
     """The answers for `model` at `states`.
 
-    `poses` (n, n_links, 4, 4), `jacobians` (n, 6, nv) by link, `mass_matrix` (n, nv, nv), `torque`
-    (n, nv). `solvable` says whether forward dynamics has an answer at all.
+    `poses` (n, n_links, 4, 4) of the links in the world; by link `jacobians` (n, 6, nv) of its frame, linear
+    rows first, in axes of the world; `mass_matrix` (n, nv, nv); `torque` (n, nv) for the accelerations of
+    `states`, and `bias` (n, nv) the part of it without acceleration. `solvable` says whether forward dynamics
+    has an answer at all.
     """
 
     model: Model
@@ -87,7 +94,7 @@ def free_model(source: XmlSource, base: Base) -> Model:
 
 def draw_states(model: Model, count: int, seed: int) -> States:
     """Random states: the middle four fifths of what limits allow, elsewhere any angle and lengths up to
-    1 m; velocities and accelerations up to 2.
+    1 m, or as much from the limit nearest to zero; velocities and accelerations up to 2.
 
     Engines that step meet a limit with a force, and no limit is to be met within a step. A range
     without width leaves no middle, so there a joint may be anywhere.
@@ -98,7 +105,10 @@ def draw_states(model: Model, count: int, seed: int) -> States:
     turning = np.array([joint.type != "prismatic" for joint in model.coordinate_joints], dtype=bool)
     reach = np.where(turning, np.pi, 1.0)
     lower, upper = model.lower[base:], model.upper[base:]
-    low, high = np.maximum(lower, -reach), np.minimum(upper, reach)
+    # What is near to zero may be beyond the limits: then it is what is near to the limits.
+    near = np.clip(0.0, lower, np.maximum(upper, lower))
+    near = np.where((np.abs(near) < reach) | (np.abs(near) > FARTHEST), 0.0, near)
+    low, high = np.maximum(lower, near - reach), np.minimum(upper, near + reach)
     room = low < high
     low, high = np.where(room, low, -reach), np.where(room, high, reach)
     q[:, base:] = low + (high - low) * rng.uniform(0.1, 0.9, (count, model.nq - base))
@@ -114,16 +124,17 @@ def find_truth(model: Model, states: States) -> Truth:
         poses = reference.forward_kinematics(states.q)[:, : len(model.links)]
         bias = reference.bias_torque(states.q, states.v)
         torque = reference.inverse_dynamics(states.q, states.v, states.a)
+        mass_matrix = reference.mass_matrix(states.q)
         tips = _tips(model)
         return Truth(
             model=model,
             states=States(states.q, states.v, states.a, _shuffled(torque)),
             poses=poses,
             jacobians={tip: reference.jacobian(states.q, tip) for tip in tips},
-            mass_matrix=reference.mass_matrix(states.q),
+            mass_matrix=mass_matrix,
             torque=torque,
             bias=bias,
-            solvable=bool(model.nv) and not singular_coordinates(model),
+            solvable=bool(model.nv) and not singular_coordinates(model) and _is_regular(mass_matrix),
         )
 
 
@@ -136,6 +147,20 @@ def refereed(truth: Truth) -> float:
     exact_M = referee.mass_matrix(states.q[:1])
     gaps = [(exact - truth.torque[:1], truth.torque), (exact_M - truth.mass_matrix[:1], truth.mass_matrix)]
     return max(_ratio(gap.astype(np.float64), right) for gap, right in gaps)
+
+
+def _is_regular(mass_matrix: Floats) -> bool:
+    """Whether the mass matrices (n, nv, nv) stay regular under the errors that engines are allowed.
+
+    Scaled to a unit diagonal, each has its eigenvalues further from zero than `BAR`: nearer ones leave
+    no digit of the acceleration, as on a floating base of 1e-15 kg that carries an arm.
+    """
+    diagonal = np.abs(np.einsum("nii->ni", mass_matrix))
+    if not np.isfinite(mass_matrix).all() or not diagonal.all():
+        return False
+    scale = 1.0 / np.sqrt(diagonal)
+    values = np.linalg.eigvalsh(mass_matrix * scale[:, :, None] * scale[:, None, :])
+    return bool(np.all(np.abs(values) > BAR))
 
 
 def _ratio(gap: Floats, right: Floats) -> float:

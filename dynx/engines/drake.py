@@ -24,7 +24,7 @@ try:
     _tree: Any = import_module("pydrake.multibody.tree")
     _plant: Any = import_module("pydrake.multibody.plant")
     _parsing: Any = import_module("pydrake.multibody.parsing")
-except ImportError as error:
+except (ImportError, OSError) as error:
     raise NotInstalledError(
         "the engine 'drake' needs Drake: pip install 'dynx[drake]' "
         f"(wheels exist for Linux and macOS, 64 bit) ({error})"

@@ -32,7 +32,7 @@ from dynx.loaded.description import LoadedModel
 from dynx.loaded.drake_description import describe_joint, describe_link, remarks
 from dynx.loaded.drake_refusals import require_harmless
 from dynx.loaded.drake_settings import CALLS, set_before_finalize, set_in_context
-from dynx.loaded.robot import LoadedRobot
+from dynx.loaded.robot import LoadedRobot, lacking_joints
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
 
@@ -56,7 +56,7 @@ class LoadedDrake(LoadedRobot):
             plant.mutable_gravity_field().set_gravity_vector(np.array(model.gravity))
             self._bodies = self._find_bodies(instances)
             if model.root not in self._bodies:
-                raise EngineError(f"drake has not the root link {shown(model.root)} of {model.name}")
+                raise EngineError(f"drake lacks the root link {shown(model.root)} of {model.name}")
             if not model.floating and model.root != "world":
                 plant.WeldFrames(plant.world_frame(), self._bodies[model.root].body_frame())
             set_before_finalize(plant, calls)
@@ -128,11 +128,7 @@ class LoadedDrake(LoadedRobot):
         """The port ``generalized_acceleration``; where a joint that the model lacks is held, solved from
         ``CalcMassMatrix`` and ``CalcInverseDynamics``."""
         if self._model.nv < self._plant.num_velocities():
-            bias = self.inverse_dynamics(q, v, np.zeros_like(v))
-            try:
-                return np.asarray(np.linalg.solve(self.mass_matrix(q), tau - bias))
-            except np.linalg.LinAlgError:
-                return np.full(len(tau), np.nan)
+            return self._solved_acceleration(q, v, tau)
         with self._mapped("answer forward dynamics of"):
             R = self._place(q)
             self._plant.SetVelocities(self._context, self._coordinates.velocities(R, v))
@@ -199,11 +195,11 @@ class LoadedDrake(LoadedRobot):
         """Where the coordinates of dynx are among those of the plant."""
         plant, model = self._plant, self._model
         wanted = [self._joints.get(name) for name in model.joint_names]
-        wrong = [
-            f"{shown(name)} ({'not there' if joint is None else joint.type_name()})"
+        wrong = {
+            name: "not there" if joint is None else str(joint.type_name())
             for name, joint in zip(model.joint_names, wanted, strict=True)
             if joint is None or joint.num_velocities() != 1
-        ]
+        }
         free = {
             str(joint.child_body().name()): joint
             for joint in map(plant.get_joint, plant.GetJointIndices())
@@ -211,12 +207,9 @@ class LoadedDrake(LoadedRobot):
         }
         floating = free.pop(model.root, None) if model.floating else None
         # A joint of six degrees of freedom cannot be held at zero: zero is no attitude.
-        wrong += [f"{shown(name)} (free)" for name in free]
+        wrong |= dict.fromkeys(free, "free")
         if wrong:
-            raise EngineError(
-                f"drake has not these joints of {model.name} with one degree of freedom: "
-                f"{', '.join(wrong[:5])}"
-            )
+            raise lacking_joints(self.name, model, wrong)
         if model.floating and floating is None:
             raise EngineError(f"drake does not let the base of {model.name} float")
         base = None if floating is None else (floating.position_start(), floating.velocity_start())

@@ -7,6 +7,7 @@ that ends the process; pydrake makes ``SystemExit`` of it, so a program ends tha
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -14,7 +15,7 @@ from dynx.errors import EngineError, ModelError, located, shown
 from dynx.loaded.opening import require_file
 from dynx.model import Model
 from dynx.model.file_reading import read_file
-from dynx.model.xml_reading import Element, read_xml
+from dynx.model.xml_source import SourceElement, XmlSource
 
 MAX_LINKS = 2000
 """Most links: the time to load grows with the square of their number and nothing can stop it."""
@@ -29,10 +30,10 @@ def require_harmless(path: Path, model: Model) -> None:
         raise EngineError(f"{model.name} has {len(model.links)} links; drake is given at most {MAX_LINKS}")
     _require_own_world(model)
     try:
-        root = read_xml(read_file(str(path)), str(path), [])
+        source = XmlSource(read_file(str(path)), str(path))
     except ModelError as error:
         raise EngineError(f"drake is not given what is no XML: {error}") from error
-    for message, line in _fatal(root):
+    for message, line in _fatal(source):
         raise EngineError(located(f"drake would end the process: {message}", str(path), line))
 
 
@@ -51,9 +52,15 @@ def _require_own_world(model: Model) -> None:
         )
 
 
-def _fatal(root: Element) -> Iterator[tuple[str, int]]:
+def _fatal(source: XmlSource) -> Iterator[tuple[str, int]]:
+    root = source.root
     if root.attributes.get("name") == "":
         yield "the robot's name is empty", root.line
+    for transmission in root.all("transmission"):
+        kind = transmission.first("type")
+        # Its text is taken without a look whether there is any.
+        if kind is not None and "type" not in transmission.attributes and not _begins_with_text(source, kind):
+            yield "the <type> of a <transmission> has no text", kind.line
     for joint in root.all("joint"):
         if joint.attributes.get("type") not in _MOVING:
             continue
@@ -68,7 +75,18 @@ def _fatal(root: Element) -> Iterator[tuple[str, int]]:
                     yield f"joint {name} has a negative limit, {bound} {value:g}", limit.line
 
 
-def _number(element: Element, attribute: str, default: float) -> float:
+def _begins_with_text(source: XmlSource, element: SourceElement) -> bool:
+    """Whether text, of more than blanks, stands in an element before any other; comments do not count."""
+    if element.empty:
+        return False
+    end = (
+        element.children[0].span.start if element.children else source.data.rindex(b"</", 0, element.span.end)
+    )
+    inside = source.data[element.start_tag.end : end]
+    return bool(re.sub(rb"<!--.*?-->", b"", inside, flags=re.DOTALL).strip())
+
+
+def _number(element: SourceElement, attribute: str, default: float) -> float:
     """The attribute as a number; the default where there is none, or none that Drake would take."""
     try:
         value = float(element.attributes.get(attribute, default))

@@ -16,12 +16,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from dynx.engines.mujoco import mujoco
-from dynx.errors import EngineError, shown
+from dynx.engines.mujoco import mujoco, silence_warnings
 from dynx.loaded.description import LoadedModel
 from dynx.loaded.mujoco_contents import WORLD, describe_model
 from dynx.loaded.mujoco_file import CALLS, FIXED, FLOATING, load_file
-from dynx.loaded.robot import LoadedRobot
+from dynx.loaded.robot import LoadedRobot, lacking_joints
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
 
@@ -138,10 +137,7 @@ class LoadedMujoco(LoadedRobot):
         """Everything as it was after loading, but for the state."""
         data, base = self._data, 7 if self._model.floating else 0
         mujoco.mj_resetData(self._loaded, data)
-        # A first warning is printed, and written to a log file in the working directory; further
-        # ones are only counted.
-        for warning in data.warning:
-            warning.number = 1
+        silence_warnings(data)
         data.qpos[self._q] = q[base:]
         if self._model.floating:
             x, y, z, w = q[3:7]
@@ -169,5 +165,6 @@ class LoadedMujoco(LoadedRobot):
         number = int(mujoco.mj_name2id(self._loaded, mujoco.mjtObj.mjOBJ_JOINT, name))
         one = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
         if number < 0 or self._loaded.jnt_type[number] not in [int(kind) for kind in one]:
-            raise EngineError(f"mujoco has no joint {shown(name)} of one degree of freedom")
+            there = "not there" if number < 0 else "of several degrees"
+            raise lacking_joints(self.name, self._model, {name: there})
         return number

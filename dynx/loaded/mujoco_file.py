@@ -8,15 +8,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from dynx.engines.mujoco import mujoco
+from dynx.engines.mujoco import MAX_DEPTH, mujoco
 from dynx.engines.silence import silence
 from dynx.errors import EngineError, shown
 from dynx.loaded.opening import require_file
 from dynx.model import Model
-
-MAX_DEPTH = 1000
-"""Links in a row up to which MuJoCo is asked. Its compiler has a limit of 1,024; its reader goes down
-the tree by recursion, and ends the process where the stack of the thread does (measured, 4.0)."""
 
 CALLS: Mapping[str, str] = {
     "mujoco.no_damping": "model.dof_damping[:] = 0",

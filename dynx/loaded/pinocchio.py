@@ -16,10 +16,10 @@ import numpy as np
 
 from dynx.engines.pinocchio import pin
 from dynx.engines.silence import overhear
-from dynx.errors import EngineError, shown
+from dynx.errors import EngineError
 from dynx.loaded.description import LoadedInertial, LoadedJoint, LoadedModel
 from dynx.loaded.opening import require_file
-from dynx.loaded.robot import LoadedRobot
+from dynx.loaded.robot import LoadedRobot, lacking_joints
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
 
@@ -130,11 +130,7 @@ class LoadedPinocchio(LoadedRobot):
     def forward_dynamics(self, q: Floats, v: Floats, tau: Floats) -> Floats:
         """``aba``; where a joint that the model lacks is held, solved from ``crba`` and ``rnea``."""
         if len(self._v) < self._engine.nv:
-            bias = self.inverse_dynamics(q, v, np.zeros_like(v))
-            try:
-                return np.asarray(np.linalg.solve(self.mass_matrix(q), tau - bias))
-            except np.linalg.LinAlgError:
-                return np.full(len(tau), np.nan)
+            return self._solved_acceleration(q, v, tau)
         with self._mapped("aba"):
             a = pin.aba(
                 self._engine, self._data, self._configuration(q), self._velocity(v), self._velocity(tau)
@@ -222,13 +218,13 @@ class LoadedPinocchio(LoadedRobot):
         """The engine's joint for each coordinate of dynx."""
         known = {name: self._engine.joints[number] for number, name in enumerate(self._engine.names)}
         names = self._model.joint_names
-        missing = [name for name in names if name not in known or known[name].nv != 1]
-        if missing:
-            kinds = {name: known[name].shortname() for name in missing if name in known}
-            what = ", ".join(f"{shown(name)} ({kinds.get(name, 'not there')})" for name in missing[:5])
-            raise EngineError(
-                f"pinocchio has not these joints of {self._model.name} with one degree of freedom: {what}"
-            )
+        wrong = {
+            name: str(known[name].shortname()) if name in known else "not there"
+            for name in names
+            if name not in known or known[name].nv != 1
+        }
+        if wrong:
+            raise lacking_joints(self.name, self._model, wrong)
         return [known[name] for name in names]
 
     def _configuration(self, q: Floats) -> Floats:

@@ -29,7 +29,7 @@ from dynx.loaded.bullet_file import require_harmless
 from dynx.loaded.bullet_settings import CALLS, set_inertias
 from dynx.loaded.bullet_world import ROOT, BulletWorld
 from dynx.loaded.description import LoadedModel
-from dynx.loaded.robot import LoadedRobot
+from dynx.loaded.robot import LoadedRobot, lacking_joints
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous, inverse
@@ -221,8 +221,7 @@ class LoadedPyBullet(LoadedRobot):
         if not self._coordinates:
             return np.zeros(0)
         if len(self._order) < len(self._world.moving):
-            bias = self.inverse_dynamics(q, v, np.zeros_like(v))
-            return np.asarray(np.linalg.solve(self.mass_matrix(q), tau - bias))
+            return self._solved_acceleration(q, v, tau)
         if not self._model.floating:
             gravity = list(self._model.gravity)
             step = self._world.velocity_step(self._joints(q), self._spread(v), self._spread(tau), gravity)
@@ -250,12 +249,8 @@ class LoadedPyBullet(LoadedRobot):
         if missing:
             words = {engine.JOINT_SPHERICAL: "spherical", engine.JOINT_PLANAR: "planar"}
             words[engine.JOINT_FIXED] = "fixed"
-            what = ", ".join(
-                f"{shown(name)} ({words.get(kinds.get(name), 'not there')})" for name in missing[:5]
-            )
-            raise EngineError(
-                f"pybullet has not these joints of {self._model.name} with one degree of freedom: {what}"
-            )
+            instead = {name: words.get(kinds.get(name), "not there") for name in missing}
+            raise lacking_joints(self.name, self._model, instead)
         place = {_text(world.joints[k][1]): n for n, k in enumerate(world.moving)}
         return [place[name] for name in names]
 

@@ -7,6 +7,9 @@ from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import ClassVar, TypeVar
 
+import numpy as np
+
+from dynx.errors import EngineError, shown
 from dynx.loaded.description import LoadedModel
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
@@ -77,8 +80,28 @@ class LoadedRobot(ABC):
     def close(self) -> None:
         """Release what the engine holds."""
 
+    def _solved_acceleration(self, q: Floats, v: Floats, tau: Floats) -> Floats:
+        """a (nv,) from the engine's mass matrix and inverse dynamics; NaN where the matrix is singular.
+
+        For an engine whose own forward dynamics would let a joint move that the model lacks.
+        """
+        bias = self.inverse_dynamics(q, v, np.zeros_like(v))
+        try:
+            return np.asarray(np.linalg.solve(self.mass_matrix(q), tau - bias))
+        except np.linalg.LinAlgError:
+            return np.full(len(tau), np.nan)
+
     def __enter__(self: Self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def lacking_joints(engine: str, model: Model, instead: Mapping[str, str]) -> EngineError:
+    """The error of an engine in which joints of `model` do not have one degree of freedom.
+
+    `instead` says what each of them is there, by name.
+    """
+    listed = ", ".join(f"{shown(name)} ({kind})" for name, kind in list(instead.items())[:5])
+    return EngineError(f"{engine} lacks joints of {model.name} with one degree of freedom: {listed}")

@@ -16,9 +16,11 @@ from xml.sax.saxutils import quoteattr
 
 from dynx.model.elements import Note
 from dynx.model.xml_reading import read_xml
-from dynx.model.xml_text import decode, without_ends
+from dynx.model.xml_text import TextForm, decoded, without_ends
 
 _DECLARED = re.compile(r"""<\?xml[^>]*?\bencoding\s*=\s*["']([A-Za-z0-9._-]+)["']""")
+_LINE_END = re.compile(rb"\r\n|\r|\n")
+_BARE_FEED = re.compile(rb"(?<!\r)\n")
 _ATTRIBUTE = re.compile(rb"""\s+([^\s=/>]+)\s*=\s*("[^"]*"|'[^']*')""")
 
 
@@ -88,15 +90,21 @@ class XmlSource:
         notes: list[Note] = []
         # For its limits and its errors; the walk below relies on well-formed text.
         read_xml(data, source, notes)
-        text = decode(data, source, notes) if isinstance(data, bytes) else data
-        text, self._lines_before = without_ends(text, notes)
+        whole, encoding = decoded(data, source, notes) if isinstance(data, bytes) else (data, None)
+        text, self._lines_before = without_ends(whole, notes)
+        if encoding is None:
+            self.form = TextForm(_declared_encoding(text))
+        else:
+            front, _, end = whole.partition(text)
+            self.form = TextForm(encoding, front, end)
         self.source = source
         self.data = text.encode("utf-8")
 
     def _with_data(self, data: bytes) -> XmlSource:
         """The same document with other text: made by edits of well-formed text, so it is not checked."""
         new = object.__new__(XmlSource)
-        new.data, new.source, new._lines_before = data, self.source, self._lines_before
+        new.data, new.source, new.form = data, self.source, self.form
+        new._lines_before = self._lines_before
         return new
 
     @property
@@ -105,12 +113,11 @@ class XmlSource:
         return self.data.decode("utf-8")
 
     def to_bytes(self) -> bytes:
-        """The document in the encoding that it declares, else in UTF-8."""
-        declared = _DECLARED.match(self.text)
-        try:
-            return self.text.encode(declared.group(1) if declared else "utf-8", "xmlcharrefreplace")
-        except LookupError:
-            return self.data
+        """The document as it would be in a file: in the encoding and between the ends that it was read in.
+
+        What was read from text has the encoding that it declares, else UTF-8.
+        """
+        return self.form.encode(self.text)
 
     @cached_property
     def root(self) -> SourceElement:
@@ -123,7 +130,8 @@ class XmlSource:
         for edit in sorted(edits, key=lambda edit: (edit.start, edit.end)):
             if edit.start < at:
                 raise ValueError(f"edits overlap at byte {edit.start} of {self.source}")
-            parts += [self.data[at : edit.start], edit.text.encode("utf-8")]
+            text = _BARE_FEED.sub(self._line_end, edit.text.encode("utf-8"))
+            parts += [self.data[at : edit.start], text]
             at = edit.end
         return self._with_data(b"".join([*parts, self.data[at:]]))
 
@@ -197,9 +205,19 @@ class XmlSource:
 
     def excerpt(self, line: int, around: int = 1) -> list[tuple[int, str]]:
         """The lines about `line` with their numbers, for showing."""
-        lines = self.data.decode("utf-8").splitlines()
+        lines = _LINE_END.split(self.data)
         numbers = range(line - self._lines_before - around, line - self._lines_before + around + 1)
-        return [(n + self._lines_before, lines[n - 1]) for n in numbers if 1 <= n <= len(lines)]
+        return [
+            (n + self._lines_before, lines[n - 1].decode("utf-8")) for n in numbers if 1 <= n <= len(lines)
+        ]
+
+    @cached_property
+    def _line_end(self) -> bytes:
+        """How the document ends its first line: what is put in ends its lines likewise."""
+        feed = self.data.find(b"\n")
+        if feed >= 0:
+            return b"\r\n" if self.data[:feed].endswith(b"\r") else b"\n"
+        return b"\r" if b"\r" in self.data else b"\n"
 
     def _indented(self, text: str, indent: str) -> str:
         return text.replace("\n", f"\n{indent}")
@@ -250,3 +268,14 @@ class _Walk:
             return
         end = self._data.index(b">", self._parser.CurrentByteIndex) + 1
         element.span = Span(element.span.start, end)
+
+
+def _declared_encoding(text: str) -> str:
+    """The encoding that text declares, where Python can write it so; else UTF-8."""
+    declared = _DECLARED.match(text)
+    encoding = declared.group(1) if declared else "utf-8"
+    try:
+        text.encode(encoding, "xmlcharrefreplace")
+    except (LookupError, UnicodeError):
+        return "utf-8"
+    return encoding

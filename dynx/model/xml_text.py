@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import codecs
 import re
+from dataclasses import dataclass
 
 from dynx.errors import DescriptionError, shown
 from dynx.model.elements import Note
@@ -22,29 +23,47 @@ _NOT_CHARACTER_SETS = frozenset(
 )
 
 
+@dataclass(frozen=True)
+class TextForm:
+    """What a document is besides its text: its encoding, and what stands in front of the text and behind."""
+
+    encoding: str = "utf-8"
+    front: str = ""
+    end: str = ""
+
+    def encode(self, text: str) -> bytes:
+        """The bytes of a document of this form; characters that its encoding lacks become references."""
+        return f"{self.front}{text}{self.end}".encode(self.encoding, "xmlcharrefreplace")
+
+
 def decode(data: bytes, source: str, notes: list[Note]) -> str:
     """The text of `data`, by its byte-order mark, its declared encoding, or as UTF-8.
 
     Text that is not UTF-8 though it should be is read as Latin-1, with a note: such bytes are found
     in comments of old files, which every engine reads.
     """
+    return decoded(data, source, notes)[0].removeprefix("\ufeff")
+
+
+def decoded(data: bytes, source: str, notes: list[Note]) -> tuple[str, str]:
+    """The text as `decode` gives it, but with its byte-order mark, and the encoding that it is in."""
     for mark, encoding in _MARKS:
         if data.startswith(mark):
-            return _strictly(data[len(mark) :], encoding, source)
+            return "\ufeff" + _strictly(data[len(mark) :], encoding, source), encoding
     for start, encoding in ((b"<\0", "utf-16-le"), (b"\0<", "utf-16-be")):
         if data.startswith(start):
-            return _strictly(data, encoding, source)
+            return _strictly(data, encoding, source), encoding
     declared = _DECLARED.match(data)
     name = declared.group(1).decode("ascii").lower().replace("_", "-") if declared else "utf-8"
     # The declaration itself was read as ASCII, so the text cannot be in 16 or 32 bits.
     if name in ("utf8", "utf-8", "ascii", "us-ascii") or name.startswith(_WIDE):
         try:
-            return data.decode("utf-8")
+            return data.decode("utf-8"), "utf-8"
         except UnicodeDecodeError as error:
             line = data.count(b"\n", 0, error.start) + 1
             notes.append(Note("not valid UTF-8; read as Latin-1", line))
-            return data.decode("latin-1")
-    return _strictly(data, name, source)
+            return data.decode("latin-1"), "latin-1"
+    return _strictly(data, name, source), name
 
 
 def without_ends(text: str, notes: list[Note]) -> tuple[str, int]:

@@ -6,16 +6,23 @@ from dynx.model.elements import Pose, Vector
 from dynx.model.urdf_values import Reading
 from dynx.model.xml_reading import Element
 from dynx.model.xml_source import SourceElement
+from dynx.rules.number_text import is_number
 
 
 def number_of(element: SourceElement, attribute: str) -> float | None:
     """The finite number that an attribute holds; None where it is absent.
 
-    Raises DescriptionError for anything else, as the two below do.
+    Raises DescriptionError for anything else, as `vector_of` and `origin_of` do.
     """
     if attribute not in element.attributes:
         return None
     return Reading("<string>").number(_plain(element), attribute, "this file")
+
+
+def number_or_none(element: SourceElement, attribute: str) -> float | None:
+    """The number that an attribute holds; None where it is absent or no finite number."""
+    text = element.attributes.get(attribute, "")
+    return float(text) if is_number(text) else None
 
 
 def vector_of(element: SourceElement, attribute: str) -> Vector | None:

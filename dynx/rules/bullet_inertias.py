@@ -14,8 +14,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from dynx.backends.bullet_inertia import FLOAT64_EPS, longdouble
 from dynx.model.elements import Inertial
+from dynx.spatial.extended import FLOAT64_EPS, longdouble
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import rotation_from_rpy, skew
 
@@ -28,8 +28,7 @@ _ABSOLUTE = 5 * FLOAT64_EPS
 _ROUNDING = 8 * FLOAT64_EPS
 """Bound on the rounding of a sum of a few products, relative to the largest."""
 
-
-_MANY = 4096
+MANY = 4096
 """Inertials of which results are remembered: rules ask the same of every link, round after round."""
 
 
@@ -47,7 +46,7 @@ class BulletInertia:
         return bool(x < 0 or y < 0 or z < 0 or x > y + z or y > x + z or z > x + y)
 
 
-@lru_cache(maxsize=_MANY)
+@lru_cache(maxsize=MANY)
 def read_by_bullet(inertial: Inertial) -> BulletInertia:
     """The principal moments and axes that PyBullet's loader finds, before it checks them."""
     tensor = inertial.tensor
@@ -56,7 +55,7 @@ def read_by_bullet(inertial: Inertial) -> BulletInertia:
     return BulletInertia(*_diagonalised(tensor))
 
 
-@lru_cache(maxsize=_MANY)
+@lru_cache(maxsize=MANY)
 def diagonalisation_error(inertial: Inertial) -> float:
     """How far the tensor that PyBullet holds is from the file's, as a share of the largest moment."""
     held = read_by_bullet(inertial)
@@ -94,7 +93,7 @@ def tree_may_refuse(inertial: Inertial, *, welded: bool) -> bool:
         * (about_origin[0, 1] * about_origin[1, 2] - about_origin[1, 1] * about_origin[0, 2])
     )
     mean = (x + y + z) / 3.0
-    return minor < _ROUNDING * x * y - _ABSOLUTE or determinant < _ROUNDING * mean**3 - _ABSOLUTE
+    return minor < _ROUNDING * x * y - _ABSOLUTE or determinant < _ROUNDING * mean * mean * mean - _ABSOLUTE
 
 
 def _diagonalised(tensor: Floats) -> tuple[Floats, Floats]:

@@ -8,7 +8,7 @@ from functools import cached_property
 
 from dynx.errors import DynxError
 from dynx.model import Model
-from dynx.model.elements import Vector
+from dynx.model.elements import Inertial, Vector
 from dynx.model.loading import read_model
 from dynx.model.model import STANDARD_GRAVITY, Base
 from dynx.model.xml_source import SourceElement, XmlSource
@@ -56,6 +56,11 @@ class Case:
     def joints(self) -> dict[str, SourceElement]:
         """The ``<joint>`` elements by name, in document order; of two alike the first."""
         return _by_name(self.source.root.all("joint"))
+
+    @cached_property
+    def inertials(self) -> Mapping[str, Inertial | None]:
+        """What dynx reads in the ``<inertial>`` of each link, by the link's name, in depth-first order."""
+        return {link.name: link.inertial for link in self.model.links}
 
     def choice(self, rule: str, default: str) -> str:
         """What the user chose for a rule, or the default."""

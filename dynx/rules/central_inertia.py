@@ -11,8 +11,8 @@ from itertools import permutations
 
 import numpy as np
 
-from dynx.backends.bullet_inertia import eigen, longdouble
 from dynx.model.elements import Inertial, Pose, Vector
+from dynx.spatial.extended import eigen, longdouble
 from dynx.spatial.scalar import Array
 from dynx.spatial.so3 import rotation_from_rpy, rpy_from_rotation
 

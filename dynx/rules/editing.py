@@ -35,25 +35,13 @@ class EditingRule(Rule):
     """A rule that says its places once, for finding them and for mending them."""
 
     changed: ClassVar[str]
-    """What the remedy does, one sentence for all places."""
+    """What the remedy did, said once for all places; see `Remedy.changed`."""
 
     changes_physics: ClassVar[bool] = False
 
     @abstractmethod
     def places(self, case: Case) -> Iterable[Place]:
         """Every place, in document order."""
-
-    def decision(self, case: Case) -> str | None:
-        """What was chosen where the file can be meant in several ways, and how to choose otherwise."""
-        if not self.choices:
-            return None
-        chosen = self.chosen(case)
-        others = ", ".join(f"--choose {self.id}={name}" for name in self.choices if name != chosen)
-        return f"{self.id} {self.name}: {self.choices[chosen]} (otherwise: {others})"
-
-    def chosen(self, case: Case) -> str:
-        """The user's choice, or the first."""
-        return case.choice(self.id, next(iter(self.choices)))
 
     def detect(self, case: Case) -> Sequence[Detection]:
         """The places."""
@@ -76,6 +64,14 @@ class CallingRule(Rule):
     """Ids of `LoadedRobot.CALLS`."""
 
     changed: ClassVar[str]
+
+    @abstractmethod
+    def occurrences(self, case: Case) -> Iterable[Detection]:
+        """Every place that makes engines add something, in document order, whatever was called."""
+
+    def detect(self, case: Case) -> Sequence[Detection]:
+        """The occurrences; none once the calls are made."""
+        return [] if case.calls.issuperset(self.calls) else list(self.occurrences(case))
 
     def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy | None:
         """The calls, which act on the whole robot."""

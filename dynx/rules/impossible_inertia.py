@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -11,12 +10,13 @@ import numpy as np
 from dynx.model.elements import Inertial
 from dynx.rules.case import Case
 from dynx.rules.central_inertia import CentralInertia
-from dynx.rules.inertial_edits import line_of, lumped, with_inertials, without_mass
+from dynx.rules.inertial_edits import line_of, with_inertials
+from dynx.rules.lumping import lumped_into
 from dynx.rules.physical_inertia import (
     ENOUGH,
     Fault,
     clear_fault,
-    lift_inside,
+    lifted,
     nearest_moments,
     on_the_edge,
     principal_moments,
@@ -24,8 +24,8 @@ from dynx.rules.physical_inertia import (
 from dynx.rules.rigid_groups import RigidGroup, rigid_groups
 from dynx.rules.rule import Detection, Remedy, Rule
 
-SET_INERTIAS = "pybullet.set_inertias"
-"""The call at run time that gives PyBullet the numbers of the file."""
+NUMBERS_OF_THE_FILE = ("pybullet.set_inertias", "pybullet.extrapolate_inertias", "drake.set_inertias")
+"""The calls at run time that make engines calculate with the numbers of the file."""
 
 
 class ImpossibleInertia(Rule):
@@ -38,12 +38,12 @@ class ImpossibleInertia(Rule):
         "fuse": "lump the link with links welded to it where that makes a body, which changes no equation "
         "of motion; else as nearest",
         "nearest": "put the nearest tensor that a body can have in its place",
-        "keep": "leave the numbers and give them to PyBullet after loading; MuJoCo and Drake cannot follow",
+        "keep": "leave the numbers and give them to PyBullet and Drake after loading; MuJoCo cannot follow",
     }
 
     def detect(self, case: Case) -> Sequence[Detection]:
         """Links whose tensor has the fault, static ones too: MuJoCo refuses the file for them."""
-        kept = case.choice(self.id, "fuse") == "keep" and SET_INERTIAS in case.calls
+        kept = self.chosen(case) == "keep" and case.calls.issuperset(NUMBERS_OF_THE_FILE)
         groups = rigid_groups(case)
         found = []
         for link in case.model.links:
@@ -63,15 +63,12 @@ class ImpossibleInertia(Rule):
     def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy | None:
         """Lump, replace or keep, as chosen; the default lumps where that is enough."""
         names = [detection.link for detection in detections if detection.link is not None]
-        chosen = case.choice(self.id, "fuse")
+        decision, chosen = self.decision(case), self.chosen(case)
         if chosen == "keep":
-            inertials = {link.name: link.inertial for link in case.model.links}
             moving = [name for name in names if not rigid_groups(case)[name].static]
-            turned = {name: _with_largest_on_y(found) for name in moving if (found := inertials[name])}
-            mended = with_inertials(case, turned).with_calls(SET_INERTIAS)
-            return Remedy(
-                mended, "PyBullet is given the moments of the file after loading", self._say(chosen)
-            )
+            turned = {name: _with_largest_on_y(found) for name in moving if (found := case.inertials[name])}
+            mended = with_inertials(case, turned).with_calls(*NUMBERS_OF_THE_FILE)
+            return Remedy(mended, "gave PyBullet and Drake the numbers of the file after loading", decision)
         fused: list[str] = []
         if chosen == "fuse":
             for name in names:
@@ -79,52 +76,24 @@ class ImpossibleInertia(Rule):
                 if bodies is not None:
                     case = with_inertials(case, bodies)
                     fused.append(name)
-        inertials = {link.name: link.inertial for link in case.model.links}
         replaced: dict[str, Inertial] = {}
         for name in names:
-            inertial = inertials[name]
+            inertial = case.inertials[name]
             if inertial is not None and clear_fault(inertial) == self.fault:
                 replaced[name] = _nearest(case, inertial, name)
         case = with_inertials(case, replaced)
         parts = []
         if fused:
-            parts.append(f"the inertia of {_listed(fused)} is lumped with that of links welded to it")
+            parts.append(f"lumped the inertia of {_listed(fused)} with that of links welded to it")
         if replaced:
-            parts.append(f"the tensor of {_listed(replaced)} is the nearest that a body can have")
-        what = "; ".join(parts)
-        return Remedy(case, what[:1].upper() + what[1:], self._say(chosen), changes_physics=bool(replaced))
-
-    def _say(self, chosen: str) -> str:
-        others = ", ".join(f"--choose {self.id}={each}" for each in self.choices if each != chosen)
-        return f"{self.id}={chosen}: {self.choices[chosen]}; otherwise {others}"
+            parts.append(f"put the nearest that a body can have for the tensor of {_listed(replaced)}")
+        return Remedy(case, " and ".join(parts), decision, changes_physics=bool(replaced))
 
     def _message(self, inertial: Inertial) -> str:
         small, middle, large = (float(value) for value in principal_moments(inertial))
         if self.fault == "negative":
             return f"the principal moment {small:.6g} is negative"
         return f"the principal moment {large:.6g} exceeds the sum of the others, {small:.6g} and {middle:.6g}"
-
-
-def written(case: Case, link: str, body: CentralInertia, old: Inertial | None = None) -> Inertial:
-    """A body as the ``<inertial>`` of a link: in principal form, but for the root on the fixed base.
-
-    There PyBullet takes the attitude of the inertial frame for that of the base (DX106).
-    """
-    if case.base == "fixed" and link == case.model.root:
-        return body.aligned()
-    return body.inertial(near=(0.0, 0.0, 0.0) if old is None else old.origin.rpy)
-
-
-def lumped_into(case: Case, group: RigidGroup, links: Sequence[str], into: str) -> dict[str, Inertial]:
-    """New inertials for some links of a group: all in the link `into`, nothing in the others."""
-    old = {link.name: link.inertial for link in case.model.links}
-    body = lumped(case, group, links, into)
-    bodies = {into: written(case, into, body, old[into])}
-    for name in links:
-        inertial = old[name]
-        if name != into and inertial is not None:
-            bodies[name] = without_mass(inertial)
-    return bodies
 
 
 def _fused(case: Case, group: RigidGroup, name: str) -> dict[str, Inertial] | None:
@@ -139,6 +108,9 @@ def _fused(case: Case, group: RigidGroup, name: str) -> dict[str, Inertial] | No
     if len(group.links) > 1:
         ways.append((group.links, group.head))
     for links, into in ways:
+        # A link without mass is another rule's matter, which must not vanish under the hands of this one.
+        if not case.model.inertial(into).mass > 0.0:
+            continue
         bodies = lumped_into(case, group, links, into)
         new = bodies[into]
         if new.mass > 0.0 and clear_fault(new) is None:
@@ -147,12 +119,6 @@ def _fused(case: Case, group: RigidGroup, name: str) -> dict[str, Inertial] | No
                 bodies[into] = lifted(new)
             return bodies
     return None
-
-
-def lifted(inertial: Inertial, floor: float = 0.0) -> Inertial:
-    """The inertial with all moments raised to where no check fails by rounding, and to `floor` at least."""
-    added = lift_inside(inertial, floor)
-    return replace(inertial, ixx=inertial.ixx + added, iyy=inertial.iyy + added, izz=inertial.izz + added)
 
 
 def _nearest(case: Case, inertial: Inertial, name: str) -> Inertial:

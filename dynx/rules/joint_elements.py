@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterator
 
 from dynx.model.xml_source import Edit, SourceElement, XmlSource
 from dynx.rules.case import Case
-from dynx.rules.number_text import LARGEST, is_number
+from dynx.rules.number_text import LARGEST
 
 SINGLE = ("revolute", "continuous", "prismatic")
 """Types of joints with one coordinate."""
@@ -22,10 +22,14 @@ def joints_of_type(case: Case, types: Collection[str]) -> Iterator[SourceElement
             yield joint
 
 
-def number_in(element: SourceElement, attribute: str) -> float | None:
-    """The number an attribute holds; None where it is absent or no number."""
-    text = element.attributes.get(attribute, "")
-    return float(text) if is_number(text) else None
+def elements_in_joints(
+    case: Case, tag: str, types: Collection[str] | None = None
+) -> Iterator[tuple[SourceElement, SourceElement]]:
+    """Each joint of these types (default: of any) that has such an element, with the first of them."""
+    for joint in case.source.root.all("joint"):
+        element = joint.first(tag)
+        if element is not None and (types is None or joint.attributes.get("type") in types):
+            yield joint, element
 
 
 def putting_axis(source: XmlSource, joint: SourceElement, xyz: str) -> Edit:

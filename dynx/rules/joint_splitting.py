@@ -1,4 +1,4 @@
-"""A joint of several freedoms as a chain of joints of one, with massless links between them.
+"""A joint of several freedoms as a chain of joints of one, with the least of links between them.
 
 A spherical joint is three turns about x, y and z, a planar one two slides in the plane and a turn about its
 normal, a floating one three slides and three turns. The chain reaches the same poses; its coordinates
@@ -15,9 +15,9 @@ import numpy as np
 
 from dynx.model.xml_source import Edit, SourceElement, XmlSource
 from dynx.rules.case import end_of
-from dynx.rules.inertial_edits import number, zero_inertial
 from dynx.rules.joint_elements import UNLIMITED, putting_axis
-from dynx.rules.number_text import is_number
+from dynx.rules.massless_links import least_inertial
+from dynx.rules.number_text import decimal, is_number
 from dynx.rules.renaming import fresh_name
 
 TYPES = ("spherical", "ball", "planar", "floating")
@@ -75,8 +75,8 @@ def splitting(source: XmlSource, joint: SourceElement) -> Iterator[Edit]:
         yield source.inserting(joint, UNLIMITED)
     lines = []
     for own, each, parent, below in zip(names[1:], rest, links, [*links[1:], child], strict=True):
-        zero = "\n".join(f"{source.unit}{line}" for line in zero_inertial().split("\n"))
-        lines.append(f"<link name={quoteattr(parent)}>\n{zero}\n</link>")
+        least = "\n".join(f"{source.unit}{line}" for line in least_inertial().split("\n"))
+        lines.append(f"<link name={quoteattr(parent)}>\n{least}\n</link>")
         inside = [f"<parent link={quoteattr(parent)}/>", f"<child link={quoteattr(below)}/>"]
         inside.append(f'<axis xyz="{each.axis}"/>')
         if each.type == "prismatic":
@@ -97,5 +97,5 @@ def _plane(joint: SourceElement) -> tuple[str, str, str]:
     across = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
     across /= np.linalg.norm(across)
     along = np.cross(across, normal)
-    first, second, third = (" ".join(map(number, vector)) for vector in (along, across, normal))
+    first, second, third = (" ".join(map(decimal, vector)) for vector in (along, across, normal))
     return first, second, third

@@ -8,6 +8,7 @@ from dataclasses import replace
 from dynx.model.elements import IDENTITY, Inertial
 from dynx.rules.case import Case
 from dynx.rules.inertial_edits import with_inertials
+from dynx.rules.number_text import decimal
 from dynx.rules.physical_inertia import ENOUGH, SMALLEST_MASS
 from dynx.rules.rigid_groups import rigid_groups
 
@@ -42,14 +43,28 @@ def with_least_inertia(case: Case, names: Sequence[str]) -> tuple[Case, str]:
 
     A tensor that is not zero stays.
     """
-    old = {link.name: link.inertial for link in case.model.links}
     new = {}
     for name in names:
-        inertial = old[name]
+        inertial = case.inertials[name]
         origin = IDENTITY if inertial is None else inertial.origin
         if inertial is not None and inertial.tensor.any():
             new[name] = replace(inertial, mass=_MASS)
         else:
             new[name] = Inertial(_MASS, origin, ixx=ENOUGH, iyy=ENOUGH, izz=ENOUGH)
-    many = "A link without mass" if len(new) == 1 else f"{len(new)} links without mass"
-    return with_inertials(case, new), f"{many} got {_MASS:g} kg and {ENOUGH:g} kg m^2 about every axis"
+    many = "a link without mass" if len(new) == 1 else f"{len(new)} links without mass"
+    return with_inertials(case, new), f"gave {many} {_MASS:g} kg and {ENOUGH:g} kg m^2 about every axis"
+
+
+def least_inertial() -> str:
+    """The text of an ``<inertial>`` with the least mass and moments that every engine takes."""
+    moments = " ".join(f'i{axis}{axis}="{decimal(ENOUGH)}"' for axis in "xyz")
+    products = " ".join(f'{name}="0"' for name in ("ixy", "ixz", "iyz"))
+    return f'<inertial>\n  <mass value="{decimal(_MASS)}"/>\n  <inertia {moments} {products}/>\n</inertial>'
+
+
+def heaviest_welded_to_root(case: Case) -> str | None:
+    """The heaviest link that fixed joints weld to the root, itself included; None where none has mass."""
+    model = case.model
+    welded = rigid_groups(case)[model.root].links
+    masses = {name: mass for name in welded if (mass := model.inertial(name).mass) > 0.0}
+    return max(masses, key=lambda name: masses[name]) if masses else None

@@ -43,6 +43,11 @@ def is_number(text: str) -> bool:
     return _NUMBER.fullmatch(word) is not None and math.isfinite(float(word))
 
 
+def decimal(value: float) -> str:
+    """The shortest decimal that reads back as the same double; engines read no ``-0``."""
+    return repr(float(value) + 0.0)
+
+
 def misspelled_number(text: str) -> Misspelling | None:
     """The fault of a text that should be one number; None where it is plain or beyond understanding."""
     word = text.strip()

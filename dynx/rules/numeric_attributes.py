@@ -6,12 +6,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from dynx.model.xml_source import SourceElement, XmlSource
+from dynx.rules.inertial_edits import MOMENTS
 
 _ORIGIN = {"xyz": 3, "rpy": 3}
 _IN_INERTIAL = {
     "origin": _ORIGIN,
     "mass": {"value": 1},
-    "inertia": dict.fromkeys(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), 1),
+    "inertia": dict.fromkeys(MOMENTS, 1),
 }
 _IN_SHAPE = {"origin": _ORIGIN}
 _IN_GEOMETRY = {

@@ -7,16 +7,17 @@ in float64, each in its own way; a body on the edge, such as a thin plate, passe
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 from itertools import combinations
 from typing import Literal
 
 import numpy as np
 
-from dynx.backends.bullet_inertia import FLOAT64_EPS, longdouble
 from dynx.model.elements import Inertial
-from dynx.rules.bullet_inertias import read_by_bullet, tree_may_refuse
+from dynx.rules.bullet_inertias import MANY, read_by_bullet, tree_may_refuse
 from dynx.rules.central_inertia import CentralInertia
+from dynx.spatial.extended import FLOAT64_EPS, longdouble
 from dynx.spatial.scalar import Array
 
 SMALLEST_MOMENT = 1e-14
@@ -37,10 +38,8 @@ _EDGE = 4.0 * FLOAT64_EPS
 _MARGIN = 16.0 * FLOAT64_EPS
 """How far inside the edge a body is put."""
 
-MANY = 4096
-"""Inertials of which results are remembered: rules ask the same of every link, round after round."""
-
 Fault = Literal["negative", "triangle"]
+"""Of principal moments: one is negative, or exceeds the sum of the others."""
 
 
 @lru_cache(maxsize=MANY)
@@ -94,6 +93,12 @@ def lift_inside(inertial: Inertial, floor: float = 0.0) -> float:
     small, middle, large = (float(value) for value in principal_moments(inertial))
     added = max(0.0, _MARGIN * size - min(small + middle - large, small))
     return max(added, floor - small)
+
+
+def lifted(inertial: Inertial, floor: float = 0.0) -> Inertial:
+    """The inertial with all moments raised to where no check fails by rounding, and to `floor` at least."""
+    added = lift_inside(inertial, floor)
+    return replace(inertial, ixx=inertial.ixx + added, iyy=inertial.iyy + added, izz=inertial.izz + added)
 
 
 def nearest_moments(moments: Array) -> Array:

@@ -9,9 +9,9 @@ from types import MappingProxyType
 
 import numpy as np
 
-from dynx.backends.bullet_inertia import longdouble
 from dynx.model.mechanism import pose_arrays
 from dynx.rules.case import Case, end_of
+from dynx.spatial.extended import longdouble
 from dynx.spatial.scalar import Array
 
 

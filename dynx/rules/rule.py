@@ -14,7 +14,8 @@ from dynx.rules.case import Case
 
 Kind = Literal["difference", "practice"]
 """``difference``: engines give different numbers, or one refuses. ``practice``: bad practice, or a
-matter of one engine alone, with nothing for a comparison of numbers to find."""
+matter of one engine alone, with nothing for a comparison of numbers to find, and mended only where the
+user chose so."""
 
 Stage = Literal["reading", "model"]
 """``reading``: the text itself is doubtful, and dynx may refuse it until it is mended; such rules are
@@ -35,9 +36,9 @@ class Detection:
 class Remedy:
     """A case with the cause removed, and what was decided where there was a choice.
 
-    `changed` says what was done, one sentence for the whole; `choice` is None or says what was chosen
-    and how to choose otherwise (``--choose DX103=keep``). `changes_physics` is true where the numbers of
-    the file had to be changed by more than rounding.
+    `changed` says what was done to the whole, such as "took <mimic> away"; `choice` is None or says what was
+    chosen and how to choose otherwise (``--choose DX103=keep``). `changes_physics` is true where the numbers
+    of the file had to be changed by more than rounding.
     """
 
     case: Case
@@ -70,10 +71,14 @@ class Rule(ABC):
     """What to do, in one sentence."""
 
     choices: ClassVar[Mapping[str, str]] = {}
-    """Ways to remove the cause where there are several, the first being the default: name -> meaning."""
+    """Ways to remove the cause where there are several, the first being the default: name -> what it does,
+    in the imperative."""
 
     trap_base: ClassVar[Literal["fixed", "floating"]] = "fixed"
     """The base on which the trap shows the difference."""
+
+    depends_on_state: ClassVar[bool] = False
+    """Whether the difference shows at some configurations alone, so that not to see it proves nothing."""
 
     @abstractmethod
     def detect(self, case: Case) -> Sequence[Detection]:
@@ -82,6 +87,18 @@ class Rule(ABC):
     def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy | None:
         """The case without the cause in these places; None where nothing can remove it."""
         return None
+
+    def chosen(self, case: Case) -> str:
+        """The user's choice among `choices`, or the first of them."""
+        return case.choice(self.id, next(iter(self.choices)))
+
+    def decision(self, case: Case) -> str | None:
+        """What was chosen, and how to choose otherwise; None where there is no choice."""
+        if not self.choices:
+            return None
+        chosen = self.chosen(case)
+        others = " or ".join(f"--choose {self.id}={name}" for name in self.choices if name != chosen)
+        return f"{self.id}={chosen}: {self.choices[chosen]}; otherwise {others}"
 
     @classmethod
     def holds_for(cls, versions: Mapping[str, str]) -> bool:

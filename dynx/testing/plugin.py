@@ -2,7 +2,7 @@
 
 Each robot and base becomes one test per quantity and per law of mechanics that `dynx.agree` looks at;
 no test file is needed. ``--dynx-as-loaded`` adds one test in which every engine loads the file itself
-(`dynx.doctor`). In an ini file, ``dynx_robots`` lists robots for every run. See ``docs/testing.md``.
+(`dynx.diagnose`). In an ini file, ``dynx_robots`` lists robots for every run. See ``docs/testing.md``.
 
 pytest imports this module in every run of everybody who has dynx installed, so it imports nothing that
 takes time and does nothing unless it is asked to.

@@ -34,7 +34,7 @@ class RobotPlan:
     """The robots of a run and how they are tested.
 
     `backends` None means all that are installed. `as_loaded` says whether engines also load the files
-    themselves, differing by more than `tolerance` (None: as `dynx.doctor`) only as `baseline` knows.
+    themselves, differing by more than `tolerance` (None: as `dynx.diagnose`) only as `baseline` knows.
     """
 
     robots: tuple[PlannedRobot, ...]

@@ -7,10 +7,11 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from dynx.backends.bullet_inertia import ballast_for, longdouble
+from dynx.backends.bullet_inertia import ballast_for
 from dynx.backends.bullet_urdf import bullet_tree, locale_free, write_bullet_urdf
 from dynx.model import Model
 from dynx.model.mechanism import build_mechanism
+from dynx.spatial.extended import longdouble
 from dynx.spatial.so3 import rotation_from_quat, rotation_from_rpy, rpy_from_rotation
 from dynx.testing.strategies import models
 from tests.backends.robots import mixed_robot

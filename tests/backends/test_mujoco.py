@@ -28,7 +28,8 @@ from tests.closeness import Closeness, samples_at
 mujoco = pytest.importorskip("mujoco")
 
 from dynx.backends.mujoco import MujocoBackend  # noqa: E402
-from dynx.backends.mujoco_tree import MAX_DEPTH, MAX_NV  # noqa: E402
+from dynx.backends.mujoco_tree import MAX_NV  # noqa: E402
+from dynx.engines.mujoco import MAX_DEPTH  # noqa: E402
 
 BASES: tuple[Base, ...] = ("fixed", "floating")
 BOX = Inertial(1.0, Pose((0.1, 0.02, 0.03), (0.3, 0.2, 0.1)), ixx=0.02, iyy=0.03, izz=0.04)

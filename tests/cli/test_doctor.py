@@ -12,8 +12,10 @@ import pytest
 from click.testing import CliRunner, Result
 
 from dynx.agreement.tolerances import BAR
+from dynx.cli.doctor_mending import write_mended
 from dynx.cli.main import cli
-from dynx.doctor.diagnosis import DEFAULT_SAMPLES
+from dynx.doctor.diagnosis import DEFAULT_SAMPLES, diagnose
+from dynx.errors import ArgumentError
 from tests.doctor.formats.test_sarif import require_valid
 
 QUICK = ["--engines", "pinocchio,pybullet", "--samples", "2", "--jobs", "1"]
@@ -152,6 +154,9 @@ def test_several_robots_and_bases(arm: Path, tmp_path: Path) -> None:
         (["--sarif", "nosuch/x.sarif"], "nosuch"),
         (["--tolerance", "-1"], "--tolerance"),
         (["panda", "--fix", "arm.urdf"], "arm.urdf"),
+        (["--json", "arm.urdf"], "a robot that is read"),
+        (["--write-baseline", "./arm.urdf"], "a robot that is read"),
+        (["--fix", "x.urdf", "--html", "./x.urdf"], "where a mended file goes"),
     ],
 )
 def test_arguments_that_cannot_be_used_cost_no_work(arguments: list[str], clue: str, arm: Path) -> None:
@@ -160,6 +165,50 @@ def test_arguments_that_cannot_be_used_cost_no_work(arguments: list[str], clue: 
     assert clue in result.stderr
     assert result.stderr.count("\n") == 1
     assert sorted(os.listdir()) == ["arm.urdf"]
+
+
+def test_a_baseline_is_written_over_by_a_baseline_alone(arm: Path) -> None:
+    known = ["arm.urdf", "--baseline", "known.json", "--quiet"]
+    assert doctor("arm.urdf", "--write-baseline", "known.json", "--quiet").exit_code == 0
+    assert doctor(*known, "--write-baseline", "known.json").exit_code == 0
+    refused = doctor(*known, "--json", "known.json")
+    assert refused.exit_code == 2
+    assert "the baseline" in refused.stderr
+    assert doctor(*known).exit_code == 0
+
+
+def test_as_loaded_is_not_written_over_what_is_read(arm: Path) -> None:
+    for way in ([], ["--as-loaded"]):
+        result = CliRunner().invoke(cli, ["agree", "arm.urdf", *way, "--json", "arm.urdf"])
+        assert result.exit_code == 2
+        assert "a robot that is read" in result.stderr
+    assert arm.read_bytes() == ARM.encode("latin-1")
+
+
+def test_what_is_write_protected_is_not_mended_in_place(arm: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    # A new file could be put in its place, for which the permissions of the directory suffice.
+    monkeypatch.setattr(os, "access", lambda path, mode: mode != os.W_OK or Path(path).name != "arm.urdf")
+    result = doctor("arm.urdf", "--in-place", "--quiet")
+    assert result.exit_code == 2
+    assert "permission denied" in result.stderr
+    assert arm.read_bytes() == ARM.encode("latin-1")
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
+def test_a_pipe_that_nobody_reads_is_not_waited_for(arm: Path) -> None:
+    os.mkfifo("pipe")
+    result = doctor("arm.urdf", "--fix", "pipe", "--quiet")
+    assert result.exit_code == 2
+    assert "nobody reads from this pipe" in result.stderr
+
+
+def test_a_file_that_changed_meanwhile_is_left_as_it_is(arm: Path) -> None:
+    report = diagnose(str(arm), engines=["pinocchio", "pybullet"], samples=2)
+    newer = arm.read_bytes().replace(b"0.5", b"0.6")
+    arm.write_bytes(newer)
+    with pytest.raises(ArgumentError, match="changed while it was examined"):
+        write_mended(str(arm), report, over_input=True)
+    assert arm.read_bytes() == newer
 
 
 def test_the_help_states_the_defaults_of_the_library() -> None:

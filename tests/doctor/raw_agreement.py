@@ -6,11 +6,15 @@ import json
 import subprocess
 import sys
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 
+from dynx.agreement.tolerances import BAR
+from dynx.doctor.given_file import without_meshes
 from dynx.doctor.truth import TILTED, draw_states, free_model
 from dynx.model.model import Base
 from dynx.model.xml_source import XmlSource
@@ -81,3 +85,47 @@ def difference(one: Any, other: Any) -> float:
         gap = float(np.max(np.abs(mine - theirs), initial=0.0))
         worst = max(worst, gap / size if size else gap)
     return worst
+
+
+def checked(entries: Sequence[dict[str, Any]], folder: Path, shapes: bool) -> list[tuple[float, str]]:
+    """How far the engines are apart on each mended file, and what they said where one refused it."""
+    tasks = []
+    for number, entry in enumerate(entries):
+        source = XmlSource(Path(entry["mended"]).read_bytes(), entry["path"])
+        data = (source if shapes else without_meshes(source)).to_bytes()
+        place = beside(Path(entry["path"]), data, folder / f"{number}-{shapes}")
+        tasks.append(task(place, entry["base"]))
+    with ThreadPoolExecutor(2) as pool:
+        one, other = pool.map(lambda engine: answers(engine, tasks, folder), SCRIPTS)
+    said = [[each["error"] for each in pair if "error" in each] for pair in zip(one, other, strict=True)]
+    return [
+        (difference(first, second), "; ".join(words))
+        for first, second, words in zip(one, other, said, strict=True)
+    ]
+
+
+def main() -> None:
+    """Check every file that ``python docs/survey.py --json SURVEY --mended FOLDER`` mended.
+
+    A file whose meshes are not in its collection, which PyBullet refuses before and after, is checked
+    without them.
+    """
+    entries = [entry for entry in json.loads(Path(sys.argv[1]).read_text("utf-8")) if entry.get("mended")]
+    with TemporaryDirectory(prefix="dynx-") as folder:
+        found = checked(entries, Path(folder), shapes=True)
+        refused = [k for k, (gap, _) in enumerate(found) if not np.isfinite(gap)]
+        again = checked([entries[k] for k in refused], Path(folder), shapes=False)
+    for k, result in zip(refused, again, strict=True):
+        name = Path(entries[k]["path"]).name
+        print(f"{name}, {entries[k]['base']}: {found[k][1]}; without meshes: {result[0]:.1e} {result[1]}")
+        found[k] = result
+    apart = [gap for gap, _ in found]
+    for entry, (gap, words) in zip(entries, found, strict=True):
+        if not gap <= BAR:
+            print(f"DIFFERS: {Path(entry['path']).name}, {entry['base']}: {gap:.1e} {words}")
+    print(f"{sum(gap <= BAR for gap in apart)} of {len(apart)} agree within {BAR:g}")
+    print(f"worst of those: {max(gap for gap in apart if gap <= BAR):.1e}")
+
+
+if __name__ == "__main__":
+    main()

@@ -123,8 +123,8 @@ PINOCCHIO_FAULTS = (
     ),
     Fault(
         "pinocchio_exception_unmapped",
-        PINOCCHIO,
-        right='raise EngineError(f"pinocchio failed on {self.model.name}: {_gist(error)}") from error',
+        "dynx.backends.engine_errors",
+        right='raise EngineError(f"{engine} failed on {self.model.name}: {gist(error)}") from error',
         wrong="raise",
         caught_by=f"{TEST_PINOCCHIO}::test_what_the_engine_raises_becomes_an_engine_error",
     ),

@@ -39,8 +39,8 @@ READER_FAULTS = (
     Fault(
         "byte_order_mark_kept",
         XML_TEXT,
-        right="return _strictly(data[len(mark) :], encoding, source)",
-        wrong="return _strictly(data, 'latin-1', source)",
+        right='return "\\ufeff" + _strictly(data[len(mark) :], encoding, source), encoding',
+        wrong="return _strictly(data, 'latin-1', source), 'latin-1'",
         caught_by=(
             "tests/model/test_xml_reading.py::test_text_is_read_by_its_mark_its_declaration_or_as_utf8"
         ),

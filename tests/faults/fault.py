@@ -4,7 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-_ENGINES = {"pybullet": ("pybullet", "bullet_"), "pinocchio": ("pinocchio",)}
+_ENGINES = {
+    "pybullet": ("pybullet", "bullet_"),
+    "pinocchio": ("pinocchio",),
+    "mujoco": ("mujoco",),
+    "pydrake": ("drake",),
+}
+"""Top-level module of an engine -> what marks a module or a test as needing it."""
 
 
 @dataclass(frozen=True)

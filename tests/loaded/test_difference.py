@@ -176,6 +176,22 @@ def test_a_mass_off_by_more_than_rounding_is_listed(data: st.DataObject) -> None
     assert rows(model, _link(name, mass=mass)(engine)) == []
 
 
+def test_what_is_no_number_deviates() -> None:
+    for value in (float("nan"), float("inf")):
+        assert rows(robot(), _link("arm", mass=value)(held(robot()))) == [("link", "arm", "mass")]
+        inertia = np.diag([0.2, 0.3, value])
+        assert rows(robot(), _link("arm", inertia=inertia)(held(robot()))) == [("link", "arm", "inertia")]
+
+
+def test_a_deviation_of_a_light_link_is_listed() -> None:
+    feather = Inertial(1e-15, BODY.origin, ixx=1e-15, iyy=1e-15, izz=1e-15)
+    links = tuple(replace(each, inertial=feather) if each.name == "arm" else each for each in robot().links)
+    model = replace(robot(), links=links)
+    assert rows(model, held(model)) == []
+    found = rows(model, _link("arm", mass=1.5e-15, inertia=np.zeros((3, 3)))(held(model)))
+    assert found == [("link", "arm", "mass"), ("link", "arm", "inertia")]
+
+
 SAME = [
     (Limits(), {"limits": (-1e9, 1e9), "velocity": 0.0, "effort": 0.0}),
     (Limits(), {"limits": (-np.inf, np.inf), "velocity": np.inf, "effort": 1e10}),

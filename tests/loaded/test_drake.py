@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 import dynx
 from dynx.errors import EngineError
 from dynx.loaded import LoadedRobot
-from dynx.loaded.difference import model_difference
+from dynx.loaded.difference import Deviation, model_difference
 from dynx.model import Inertial, Joint, JointDynamics, Limits, Link, Model, Pose
 from dynx.model.model import Base
 from tests.backends.robots import chain, motion
@@ -59,10 +59,10 @@ def test_clean_robots_are_loaded_as_dynx_reads_them(data: st.DataObject) -> None
     model = dynx.load(text, base=drawn.base, gravity=TILTED)
     with loaded(LoadedDrake, model) as robot:
         assert_alike(robot, model, data.draw(st.integers(0, 99)))
-        assert {(row.kind, row.what) for row in _differences(model, robot)} <= {("joint", "friction")}
+        assert {(row.part, row.property) for row in _differences(model, robot)} <= {("joint", "friction")}
 
 
-def _differences(model: Model, robot: LoadedRobot) -> list[Any]:
+def _differences(model: Model, robot: LoadedRobot) -> list[Deviation]:
     return list(model_difference(model, [robot.describe()]))
 
 
@@ -265,6 +265,11 @@ def test_another_link_named_world_is_refused(base: Base) -> None:
 FATAL = {
     "is empty": ('name="forked"', 'name=""'),
     "lower limit 2 above its upper limit 0.7": ('lower="-0.3"', 'lower="2"'),
+    "has no text": (
+        "</robot>",
+        '<transmission name="t"><type> <!-- none --> </type><joint name="a"/><actuator name="m"/>'
+        "</transmission></robot>",
+    ),
     "negative limit, velocity -2": ('velocity="2.0"', 'velocity="-2"'),
     "negative limit, drake:acceleration -1": ('velocity="2.0"', 'velocity="2" drake:acceleration="-1"'),
 }

@@ -27,8 +27,9 @@ from tests.loaded.files import TILTED, clean_robots, error, loaded
 
 pytest.importorskip("mujoco")
 
+from dynx.engines.mujoco import MAX_DEPTH
 from dynx.loaded.mujoco import LoadedMujoco
-from dynx.loaded.mujoco_file import CALLS, MAX_DEPTH
+from dynx.loaded.mujoco_file import CALLS
 
 BASES: tuple[Base, ...] = ("fixed", "floating")
 NO_LOSSES = JointDynamics()
@@ -164,6 +165,13 @@ def test_links_that_are_fused_have_no_frame(base: Base) -> None:
     with loaded(LoadedMujoco, model, with_tags(model, KEPT)) as robot:
         assert robot.describe().missing_links == ()
         assert np.isfinite(robot.link_poses(model.neutral())).all()
+
+
+@pytest.mark.parametrize("base", BASES)
+def test_links_fused_or_not_the_answers_are_those_of_the_file(base: Base) -> None:
+    model = forked(base)
+    for text in (None, with_tags(model, KEPT)):
+        assert worst(model, text) <= BAR
 
 
 def test_a_fixed_root_named_world_is_the_world() -> None:
@@ -322,7 +330,7 @@ def test_chains_that_end_the_process_are_not_tried() -> None:
 
 def test_a_joint_that_it_lacks() -> None:
     model = forked()
-    with pytest.raises(EngineError, match="no joint 'a_joint' of one degree of freedom"):
+    with pytest.raises(EngineError, match=r"mujoco lacks joints .*: 'a_joint' \(not there\)"):
         worst(model, model.to_urdf().replace('name="a_joint"', 'name="other"'))
 
 

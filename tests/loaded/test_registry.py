@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from dynx.errors import BackendError, NotInstalledError, UnknownBackendError
 from dynx.loaded import ENGINES, LoadedRobot, installed_engines, load_as, loader_class, registry
+from dynx.model import Inertial
+from dynx.model.loading import load
 from tests.backends.robots import chain
 
 
@@ -32,6 +37,21 @@ def test_a_robot_is_loaded_by_the_engine_of_that_name(name: str, tmp_path: Path)
     with load_as(name, path, chain(2)) as robot:
         assert robot.name == name
         assert robot.mass_matrix(chain(2).neutral()).shape == (2, 2)
+
+
+@pytest.mark.parametrize("name", ["pinocchio", "pybullet", "drake"])
+def test_a_joint_that_is_held_and_one_that_moves_nothing_have_no_acceleration(
+    name: str, tmp_path: Path
+) -> None:
+    if name not in installed_engines():
+        pytest.skip(f"{name} is not installed")
+    whole = chain(3)
+    links = (*whole.links[:-1], replace(whole.links[-1], inertial=Inertial()))
+    path = tmp_path / "robot.urdf"
+    path.write_text(replace(whole, links=links).to_urdf())
+    model = load(str(path), lock={"joint0": 0.0})
+    with load_as(name, path, model) as robot:
+        assert np.isnan(robot.forward_dynamics(model.neutral(), np.zeros(2), np.ones(2))).all()
 
 
 def test_an_unknown_engine_is_named_with_the_nearest() -> None:
@@ -65,3 +85,12 @@ assert not {"pinocchio", "pybullet", "mujoco", "pydrake"} & set(sys.modules), so
 def test_importing_the_package_imports_no_engine() -> None:
     run = subprocess.run([sys.executable, "-c", PROGRAM], capture_output=True, text=True, timeout=120)
     assert (run.returncode, run.stderr) == (0, "")
+
+
+def test_an_engine_that_cannot_be_imported_leaves_the_others_usable() -> None:
+    program = "from dynx.loaded import installed_engines; print(*installed_engines())"
+    environment = {**os.environ, "MUJOCO_GL": "nonsense"}
+    done = subprocess.run(
+        [sys.executable, "-c", program], env=environment, capture_output=True, check=True, text=True
+    )
+    assert done.stdout.split() == [name for name in installed_engines() if name != "mujoco"]

@@ -112,6 +112,23 @@ def test_an_element_alone_on_its_line_goes_with_its_line() -> None:
     assert source.edited(source.removing(source.root.children[0])).text == "<r>\n  <b/>\n</r>"
 
 
+def test_what_stands_behind_an_element_stays() -> None:
+    source = XmlSource("<r>\n  <a/> <!-- why -->\n  <b/><c/>\n</r>")
+    a, b, c = source.root.children
+    assert source.edited(source.removing(a)).text == "<r>\n   <!-- why -->\n  <b/><c/>\n</r>"
+    assert source.edited(source.removing(b)).text == "<r>\n  <a/> <!-- why -->\n  <c/>\n</r>"
+    assert source.edited(source.removing(c)).text == "<r>\n  <a/> <!-- why -->\n  <b/>\n</r>"
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+def test_line_ends_are_kept(end: str) -> None:
+    source = XmlSource(end.join(["<r>", "  <a/>", "</r>"]))
+    (a,) = source.root.children
+    edited = source.edited(source.inserting(a, "<b>\n  <c/>\n</b>"))
+    lines = ["<r>", "  <a>", "    <b>", "      <c/>", "    </b>", "  </a>", "</r>"]
+    assert edited.text == end.join(lines)
+
+
 def test_edits_that_overlap_are_a_mistake_of_the_program() -> None:
     source = XmlSource("<r><a/></r>")
     with pytest.raises(ValueError, match="overlap"):

@@ -24,7 +24,6 @@ every_rule = pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.id)
 # Causes that cannot be shown without another: rule -> ids of difference rules its trap also has, and why.
 ALSO_IN_TRAP: dict[str, dict[str, str]] = {
     "DX303": {"DX301": "a negative damping is a damping, however small"},
-    "DX508": {"DX306": "the range of no width is a limit"},
     "DX511": {"DX304": "followers of a follower are followers"},
     "DX512": {"DX304": "a follower that leaves its limits follows"},
 }
@@ -67,6 +66,21 @@ def test_the_page_begins_with_the_rule(rule: Rule) -> None:
     assert first.startswith(f"{rule.id} {rule.name}: ")
     assert len(body.split()) >= 40
     assert all(f"--choose {rule.id}={choice}" in body for choice in list(rule.choices)[1:])
+
+
+@every_rule
+def test_a_decision_says_what_was_chosen_and_how_to_choose_otherwise(rule: Rule) -> None:
+    trap = trap_case(rule)
+    for choice, meaning in rule.choices.items():
+        case = Case(trap.source, trap.base, settings={rule.id: choice})
+        decision = rule.decision(case)
+        assert decision is not None
+        assert decision.startswith(f"{rule.id}={choice}: {meaning}; otherwise ")
+        assert {other for other in rule.choices if f"--choose {rule.id}={other}" in decision} == {
+            *rule.choices
+        } - {choice}
+        remedy = rule.remedy(case, rule.detect(case))
+        assert remedy is None or remedy.choice in (None, decision)
 
 
 @every_rule

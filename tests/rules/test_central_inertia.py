@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from hypothesis import given
 
-from dynx.backends.bullet_inertia import longdouble
 from dynx.model.elements import Inertial, Pose
 from dynx.model.mechanism import pose_arrays
 from dynx.rules.central_inertia import CentralInertia
+from dynx.spatial.extended import longdouble
 from dynx.spatial.inertia import RigidInertia, inertia_about_origin
 from dynx.spatial.scalar import Array, Floats
 from dynx.testing.strategies import inertials, poses

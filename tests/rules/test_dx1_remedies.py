@@ -156,6 +156,41 @@ def test_the_root_becomes_the_body_it_carries_through_a_chain_of_fixed_joints() 
     assert_same_robot(case.model, after.model, done)
 
 
+def test_a_root_without_inertial_gets_that_of_the_body_welded_to_it() -> None:
+    case = case_of(
+        *('<link name="root"/>', '<link name="frame"/>', '<link name="tool"/>'),
+        *(link("body", mass=3.0, center=(0.1, 0.2, 0.3)), link("arm")),
+        joint("one", "root", "frame", '<origin xyz="0.3 0 0.1" rpy="1 0 0.5"/>', type="fixed"),
+        joint("two", "frame", "body", '<origin xyz="0 0.2 0.1" rpy="0 1 0.5"/>', type="fixed"),
+        joint("three", "body", "arm"),
+        joint("four", "arm", "tool", type="fixed"),
+        base="floating",
+    )
+    rule = find_rule("DX101")
+    assert [each.link for each in rule.detect(case)] == ["root", "frame", "tool"]
+    remedy = rule.remedy(case, rule.detect(case))
+    assert remedy is not None
+    masses = {each.name: each.inertial.mass for each in remedy.case.model.links if each.inertial}
+    assert masses == {"root": 3.0, "frame": 0.0, "body": 0.0, "arm": 1.0, "tool": 0.0}
+    assert_same_robot(case.model, remedy.case.model, [("DX101", remedy)])
+
+
+def test_a_body_on_the_edge_is_put_inside_by_what_nobody_can_measure() -> None:
+    clean = case_of(link("a"), link("b"), joint("ab", "a", "b"))
+    case = planted(clean, "b", PLANTS["DX102"])
+    rule = find_rule("DX102")
+    remedy = rule.remedy(case, rule.detect(case))
+    assert remedy is not None
+    before, after = case.inertials["b"], remedy.case.inertials["b"]
+    assert before is not None
+    assert after is not None
+    added = [getattr(after, name) - getattr(before, name) for name in ("ixx", "iyy", "izz")]
+    # The largest moment about the origin of the link is 0.14, and each sum is rounded once.
+    assert all(0.0 < each <= 32 * EPS * 0.14 for each in added)
+    assert max(added) - min(added) <= EPS * 0.01
+    assert_same_robot(case.model, remedy.case.model, [("DX102", remedy)])
+
+
 def test_a_tensor_without_mass_goes_to_the_link_it_is_welded_to() -> None:
     case = case_of(*(link(n) for n in "abc"), joint("ab", "a", "b"), joint("bc", "b", "c", type="fixed"))
     case = planted(case, "c", PLANTS["DX108"])

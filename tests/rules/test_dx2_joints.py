@@ -35,6 +35,15 @@ def test_an_axis_is_scaled_as_dynx_scales_it() -> None:
     assert changed_lines(case, remedy.case) == ['<axis xyz="0 1e-9 0"/>', '<axis xyz="2 0 0"/>']
 
 
+@pytest.mark.parametrize("index", [0, 1])
+def test_one_axis_of_two_is_scaled_where_that_is_asked(index: int) -> None:
+    case, rule = trap("DX201"), find_rule("DX201")
+    found = list(rule.detect(case))
+    remedy = rule.remedy(case, [found[index]])
+    assert remedy is not None
+    assert list(rule.detect(remedy.case)) == [found[1 - index]]
+
+
 @given(unit_vectors(), st.floats(1e-6, 1e6).filter(lambda x: abs(x - 1.0) > 1e-9))
 def test_any_length_is_found_and_scaled(direction: object, length: float) -> None:
     axis = np.asarray(direction) * length

@@ -41,6 +41,14 @@ def test_zero_is_no_matter_and_neither_is_a_fixed_joint(rule_id: str, attribute:
     assert not find_rule(rule_id).detect(Case(XmlSource(fixed)))
 
 
+def test_a_call_for_one_engine_is_not_enough() -> None:
+    case, rule = trap("DX301"), find_rule("DX301")
+    assert isinstance(rule, CallingRule)
+    for call in rule.calls:
+        assert len(rule.detect(case.with_calls(call))) == 1
+    assert not rule.detect(case.with_calls(*rule.calls))
+
+
 def test_limits_with_room_between_them_are_no_matter() -> None:
     text = trap("DX306").source.text.replace('upper="0.3"', 'upper="0.4"')
     assert not find_rule("DX306").detect(Case(XmlSource(text)))

@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 
 from dynx.model.elements import Inertial, Pose
 from dynx.rules.central_inertia import CentralInertia
-from dynx.rules.impossible_inertia import lifted
-from dynx.rules.physical_inertia import ENOUGH, clear_fault, nearest_moments, on_the_edge
+from dynx.rules.physical_inertia import ENOUGH, clear_fault, lifted, nearest_moments, on_the_edge
 from dynx.testing.strategies import inertials
 
 EPS = float(np.finfo(float).eps)

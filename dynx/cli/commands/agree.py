@@ -8,7 +8,7 @@ import click
 
 from dynx.cli.exits import ANSWER_IS_NO, BAD_INPUT, DONE, complain
 from dynx.cli.options import model_options, name_list, run_options
-from dynx.cli.output_file import check_writable, write_text
+from dynx.cli.output_file import check_writable, require_apart, write_text
 
 if TYPE_CHECKING:
     from dynx.cli.agreement_task import AgreementTask, Entry
@@ -96,6 +96,8 @@ def agree(
     if backends is not None:
         _check_backends(backends)
     inputs = expand(robots)
+    if json_path is not None:
+        require_apart([json_path], (each.robot for each in inputs), "a robot that is read")
     run = agreement_run([AgreementTask(each.robot, base, lock, backends, samples, seed) for each in inputs])
     for index, each in enumerate(inputs):
         if each.refusal is not None:

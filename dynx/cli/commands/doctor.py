@@ -114,6 +114,7 @@ def doctor(
     inputs = expand(robots)
     bases: tuple[Base, ...] = ("fixed", "floating") if base == "both" else (base,)
     targets = planned_targets(inputs, fix, in_place=in_place, bases=len(bases))
+    outputs.keep_apart((each.robot for each in inputs), () if in_place else targets, baseline_path)
     run = doctor_run(
         [
             DoctorTask(each.robot, one, engines, samples, seed, tolerance, choices)

@@ -16,7 +16,9 @@ what is welded to it stay where they are, and nothing follows from their mass.
 What to do: write down what the link weighs. If it is a mere frame, say so with an explicit zero.
 
 ``dynx doctor --fix`` puts an ``<inertial>`` with mass 0 and moments 0 into each such link. All four
-engines then take the link for what it is in Pinocchio: a frame.
+engines then take the link for what it is in Pinocchio: a frame. On the floating base a root without
+``<inertial>`` gets that of the heaviest link welded to it instead, for PyBullet nails a root without
+mass to the world (DX107); that changes no equation of motion.
 """
 
 from __future__ import annotations
@@ -25,8 +27,10 @@ from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 from dynx.rules.case import Case
-from dynx.rules.inertial_edits import zero_inertial
-from dynx.rules.rigid_groups import static_links
+from dynx.rules.inertial_edits import with_inertials, zero_inertial
+from dynx.rules.lumping import lumped_into
+from dynx.rules.massless_links import heaviest_welded_to_root
+from dynx.rules.rigid_groups import rigid_groups, static_links
 from dynx.rules.rule import Detection, Remedy, Rule
 
 _UNTOUCHED = "world"
@@ -53,10 +57,19 @@ class LinkWithoutInertial(Rule):
         ]
 
     def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy:
-        """An explicit zero inertial in each."""
+        """An explicit zero inertial in each; in a root that floats the heaviest body welded to it, since
+        PyBullet nails a root without mass to the world (DX107)."""
+        names = [detection.link for detection in detections if detection.link is not None]
+        many = f"{len(names)} links" if len(names) > 1 else "the link"
+        done = f"gave {many} without <inertial> one with mass 0 and moments 0"
+        body = heaviest_welded_to_root(case) if case.base == "floating" and case.readable else None
+        if body is not None and case.model.root in names:
+            root = case.model.root
+            lumped = lumped_into(case, rigid_groups(case)[root], (root, body), root)
+            case = with_inertials(case, lumped)
+            names.remove(root)
+            done = f"gave the root {root} the <inertial> of {body}, which is welded to it"
+            done += f", and {len(names)} other links without <inertial> one of zero" if names else ""
         source = case.source
-        links = [case.links[detection.link] for detection in detections if detection.link is not None]
-        edits = [source.inserting(link, zero_inertial(), first=True) for link in links]
-        many = f"{len(links)} links" if len(links) > 1 else "The link"
-        done = f"{many} without <inertial> got one with mass 0 and moments 0"
+        edits = [source.inserting(case.links[name], zero_inertial(), first=True) for name in names]
         return Remedy(case.with_source(source.edited(*edits)), done)

@@ -28,9 +28,9 @@ from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 from dynx.rules.case import Case
-from dynx.rules.impossible_inertia import lifted, lumped_into
 from dynx.rules.inertial_edits import line_of, with_inertials
-from dynx.rules.physical_inertia import on_the_edge, principal_moments
+from dynx.rules.lumping import lumped_into
+from dynx.rules.physical_inertia import lifted, on_the_edge, principal_moments
 from dynx.rules.rigid_groups import rigid_groups
 from dynx.rules.rule import Detection, Remedy, Rule
 
@@ -78,12 +78,11 @@ class InertiaBrokenByRounding(Rule):
             detections = self.detect(case)
             if not detections:
                 break
-        return Remedy(case, "Moments on the edge of what a body can have are raised by a few 1e-15 of them")
+        return Remedy(case, "raised moments on the edge of what a body can have by a few 1e-15 of them")
 
 
 def _moved_inside(case: Case, name: str) -> Case:
-    inertial = {link.name: link.inertial for link in case.model.links}[name]
-    group = rigid_groups(case)[name]
+    inertial, group = case.inertials[name], rigid_groups(case)[name]
     if inertial is None:
         return case
     if name in group.parents and not inertial.tensor.any():

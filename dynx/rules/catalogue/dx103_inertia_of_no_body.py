@@ -18,7 +18,7 @@ What to do: find the true tensor. No engine can be right with this one.
 the inertia is lumped, which changes no equation of motion. Otherwise the tensor nearest to the one in the
 file that a body can have takes its place, and the report says that the physics changed. Choose otherwise
 with ``--choose DX103=nearest`` (never lump) or ``--choose DX103=keep``: the numbers stay, and the report
-prints the line that gives them to PyBullet after loading; MuJoCo and Drake then cannot follow.
+prints the lines that give them to PyBullet and Drake after loading; MuJoCo then cannot follow.
 """
 
 from __future__ import annotations

@@ -17,8 +17,8 @@ What to do: find the true tensor. No engine can be right with this one.
 the inertia is lumped, which changes no equation of motion. Otherwise the tensor nearest to the one in the
 file that a body can have takes its place, and the report says that the physics changed. Choose otherwise
 with ``--choose DX104=nearest`` (never lump) or ``--choose DX104=keep``: the numbers stay, and the report
-prints the line that gives them to PyBullet after loading. PyBullet's inverse dynamics may still refuse them,
-and MuJoCo and Drake cannot follow.
+prints the lines that give them to PyBullet and Drake after loading. Where PyBullet's inverse dynamics refuses
+them all the same, its answers are extrapolated from those for two robots that it takes. MuJoCo cannot follow.
 """
 
 from __future__ import annotations

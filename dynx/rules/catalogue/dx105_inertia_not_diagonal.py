@@ -28,9 +28,8 @@ from typing import ClassVar
 from dynx.rules.bullet_inertias import diagonalisation_error, read_by_bullet
 from dynx.rules.case import Case
 from dynx.rules.central_inertia import CentralInertia
-from dynx.rules.impossible_inertia import lifted
 from dynx.rules.inertial_edits import line_of, with_inertials
-from dynx.rules.physical_inertia import clear_fault, on_the_edge
+from dynx.rules.physical_inertia import clear_fault, lifted, on_the_edge
 from dynx.rules.rigid_groups import rigid_groups
 from dynx.rules.rule import Detection, Remedy, Rule
 
@@ -64,11 +63,10 @@ class InertiaNotDiagonal(Rule):
     def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy:
         """The same tensors in principal form."""
         groups = rigid_groups(case)
-        old = {link.name: link.inertial for link in case.model.links}
         new = {}
         for detection in detections:
             name = detection.link
-            inertial = None if name is None else old[name]
+            inertial = None if name is None else case.inertials[name]
             if name is None or inertial is None:
                 continue
             turned = CentralInertia.of(inertial).inertial(inertial.origin.rpy)
@@ -76,5 +74,6 @@ class InertiaNotDiagonal(Rule):
             if clear_fault(inertial) is None and on_the_edge(turned, root=root, welded=welded):
                 turned = lifted(turned)
             new[name] = turned
-        done = f"{len(new)} tensors are given by principal moments, with the axes in the inertial's rpy"
-        return Remedy(with_inertials(case, new), done.replace("1 tensors are", "One tensor is"))
+        many = "one tensor" if len(new) == 1 else f"{len(new)} tensors"
+        done = f"gave {many} by principal moments, with the axes in the inertial's rpy"
+        return Remedy(with_inertials(case, new), done)

@@ -45,7 +45,7 @@ class RootInertialRotated(Rule):
     def detect(self, case: Case) -> Sequence[Detection]:
         """The root, on the fixed base, where its inertial frame is turned."""
         model = case.model
-        inertial = next(link.inertial for link in model.links if link.name == model.root)
+        inertial = case.inertials[model.root]
         if case.base != "fixed" or inertial is None:
             return []
         turn = rotation_from_rpy(np.array(inertial.origin.rpy)) - np.eye(3)
@@ -57,9 +57,7 @@ class RootInertialRotated(Rule):
 
     def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy:
         """The tensor in the axes of the link."""
-        model = case.model
-        old = {link.name: link.inertial for link in model.links}
-        found = {each.link: old[each.link] for each in detections if each.link is not None}
+        found = {each.link: case.inertials[each.link] for each in detections if each.link is not None}
         new = {name: CentralInertia.of(inertial).aligned() for name, inertial in found.items() if inertial}
-        done = "The tensor of the root is given in the axes of its link, with rpy zero"
+        done = "gave the tensor of the root in the axes of its link, with rpy zero"
         return Remedy(with_inertials(case, new), done)

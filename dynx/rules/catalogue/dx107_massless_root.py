@@ -26,9 +26,9 @@ from collections.abc import Mapping, Sequence
 from typing import ClassVar, Literal
 
 from dynx.rules.case import Case
-from dynx.rules.impossible_inertia import lumped_into
 from dynx.rules.inertial_edits import with_inertials
-from dynx.rules.massless_links import with_least_inertia
+from dynx.rules.lumping import lumped_into
+from dynx.rules.massless_links import heaviest_welded_to_root, with_least_inertia
 from dynx.rules.rigid_groups import rigid_groups
 from dynx.rules.rule import Detection, Remedy, Rule
 
@@ -50,36 +50,25 @@ class MasslessRoot(Rule):
     def detect(self, case: Case) -> Sequence[Detection]:
         """The root, on the floating base, where the file says that its mass is zero."""
         model = case.model
-        inertial = next(link.inertial for link in model.links if link.name == model.root)
+        inertial = case.inertials[model.root]
         # Without an <inertial> PyBullet takes 1 kg (DX101), but for a link named world.
         weightless = model.root == "world" if inertial is None else inertial.mass == 0.0
         if case.base != "floating" or not weightless:
             return []
         element = case.links[model.root]
         line = element.line if inertial is None else inertial.line
-        body = self._body(case)
+        body = heaviest_welded_to_root(case)
         where = "nor has anything welded to it" if body is None else f"the body is the link {body}"
         return [Detection(model.root, None, line, f"the root has no mass; {where}")]
 
     def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy | None:
         """The heaviest link that is welded to the root, lumped into it."""
-        root, body = case.model.root, self._body(case)
-        if case.choice(self.id, "lump") == "keep":
+        root, body = case.model.root, heaviest_welded_to_root(case)
+        if self.chosen(case) == "keep":
             return None
         if body is None:
-            choice = f"{self.id}=lump: {self.choices['lump']}; otherwise --choose {self.id}=keep"
             weightless = not any(link.inertial and link.inertial.mass > 0.0 for link in case.model.links)
-            return Remedy(*with_least_inertia(case, [root]), choice, changes_physics=weightless)
+            least = with_least_inertia(case, [root])
+            return Remedy(*least, self.decision(case), changes_physics=weightless)
         bodies = lumped_into(case, rigid_groups(case)[root], (root, body), root)
-        return Remedy(with_inertials(case, bodies), f"The mass of {body} is lumped into the root {root}")
-
-    @staticmethod
-    def _body(case: Case) -> str | None:
-        model = case.model
-        welded = set(rigid_groups(case)[model.root].links)
-        masses = {
-            link.name: link.inertial.mass
-            for link in model.links
-            if link.name in welded and link.inertial is not None and link.inertial.mass > 0.0
-        }
-        return max(masses, key=lambda name: masses[name]) if masses else None
+        return Remedy(with_inertials(case, bodies), f"lumped the mass of {body} into the root {root}")

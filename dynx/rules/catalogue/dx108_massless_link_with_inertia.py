@@ -27,8 +27,8 @@ from typing import ClassVar
 import numpy as np
 
 from dynx.rules.case import Case
-from dynx.rules.impossible_inertia import lumped_into
 from dynx.rules.inertial_edits import with_inertials
+from dynx.rules.lumping import lumped_into
 from dynx.rules.physical_inertia import SMALLEST_MASS
 from dynx.rules.rigid_groups import rigid_groups
 from dynx.rules.rule import Detection, Remedy, Rule
@@ -60,18 +60,15 @@ class MasslessLinkWithInertia(Rule):
     def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy:
         """The tensors put where there is mass."""
         for name in (detection.link for detection in detections):
-            inertials = {link.name: link.inertial for link in case.model.links}
-            inertial = None if name is None else inertials[name]
+            inertial = None if name is None else case.inertials[name]
             if name is None or inertial is None:
                 continue
             group = rigid_groups(case)[name]
             parent = group.parents.get(name)
             near = [*([parent] if parent else []), *group.children(name), *group.links]
-            heavy = [each for each in near if (body := inertials[each]) is not None and body.mass > 0.0]
+            heavy = [each for each in near if (body := case.inertials[each]) is not None and body.mass > 0.0]
             if heavy:
                 case = with_inertials(case, lumped_into(case, group, (heavy[0], name), heavy[0]))
             else:
                 case = with_inertials(case, {name: replace(inertial, mass=2.0 * SMALLEST_MASS)})
-        return Remedy(
-            case, "Tensors of links without mass are added to links with mass that they are welded to"
-        )
+        return Remedy(case, "added tensors of links without mass to links with mass that they are welded to")

@@ -57,9 +57,9 @@ class LinkNamedWorld(Rule):
 
     def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy | None:
         """Another name that no link has."""
-        if case.choice(self.id, "rename") == "keep":
+        if self.chosen(case) == "keep":
             return None
         name = fresh_name(f"{_WORLD}_link", case.links)
         source = case.source.edited(*renaming_link(case.source, _WORLD, name))
-        choice = f"{self.id}=rename: {self.choices['rename']}; otherwise --choose {self.id}=keep"
-        return Remedy(case.with_source(source), f"The link {_WORLD} is called {name}", choice)
+        done = f"renamed the link {_WORLD} to {name}"
+        return Remedy(case.with_source(source), done, self.decision(case))

@@ -50,9 +50,7 @@ class MasslessMovingLink(Rule):
 
     def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy | None:
         """The least that MuJoCo takes."""
-        chosen = case.choice(self.id, "least")
-        if chosen == "keep":
+        if self.chosen(case) == "keep":
             return None
         names = [detection.link for detection in detections if detection.link is not None]
-        choice = f"{self.id}=least: {self.choices['least']}; otherwise --choose {self.id}=keep"
-        return Remedy(*with_least_inertia(case, names), choice)
+        return Remedy(*with_least_inertia(case, names), self.decision(case))

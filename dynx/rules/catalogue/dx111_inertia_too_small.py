@@ -19,7 +19,7 @@ micrometres change the unit of length or mass.
 ``dynx doctor --fix`` lumps such a link with what it is welded to, which is the same rigid body; where that is
 not enough the moments are raised to 1.5e-14 kg m^2. The report says that the physics changed where that is
 more than rounding of the robot's largest inertia. Nothing is done where it would be more than a thousandth
-of the body's own.
+of that.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ import numpy as np
 from dynx.model.elements import Inertial
 from dynx.rules.case import Case
 from dynx.rules.central_inertia import CentralInertia
-from dynx.rules.impossible_inertia import lifted, lumped_into, written
 from dynx.rules.inertial_edits import line_of, with_inertials
+from dynx.rules.lumping import lumped_into, written
 from dynx.rules.physical_inertia import (
     ENOUGH,
     ROUNDING,
@@ -41,6 +41,7 @@ from dynx.rules.physical_inertia import (
     SMALLEST_MOMENT,
     clear_fault,
     lift_inside,
+    lifted,
     nearest_moments,
     principal_moments,
 )
@@ -48,7 +49,7 @@ from dynx.rules.rigid_groups import RigidGroup, rigid_groups
 from dynx.rules.rule import Detection, Remedy, Rule
 
 _NEGLIGIBLE = 1e-3
-"""Share of a body's own inertia that may be added to it without asking."""
+"""Share of the robot's largest inertia that may be added to a body of it."""
 
 
 class InertiaTooSmall(Rule):
@@ -63,10 +64,9 @@ class InertiaTooSmall(Rule):
     def detect(self, case: Case) -> Sequence[Detection]:
         """Links with such a tensor, and moving links that are points or rods with what is welded to them."""
         groups = rigid_groups(case)
-        inertials = {link.name: link.inertial for link in case.model.links}
-        found = {}
+        inertials, found = case.inertials, {}
         for name, inertial in inertials.items():
-            if inertial is not None and _small(inertial):
+            if inertial is not None and _small(inertial, static=groups[name].static):
                 smallest = float(principal_moments(inertial)[0])
                 found[name] = f"the principal moment {smallest:.3g} is below {SMALLEST_MOMENT:g} kg m^2"
         for group in dict.fromkeys(groups.values()):
@@ -87,24 +87,22 @@ class InertiaTooSmall(Rule):
             if name is None:
                 continue
             group = rigid_groups(case)[name]
-            inertials = {link.name: link.inertial for link in case.model.links}
-            heavy = [
-                each for each in group.links if (body := inertials[each]) is not None and body.mass > 0.0
-            ]
+            heavy = [each for each in group.links if case.model.inertial(each).mass > 0.0]
             into = group.head
             if name != into or (len(heavy) > 1 and not group.static):
                 links = (into, name) if group.static else tuple(dict.fromkeys((into, *heavy)))
                 bodies = lumped_into(case, group, links, into)
                 case = with_inertials(case, bodies)
                 lumps += 1
-            held = {link.name: link.inertial for link in case.model.links}[into]
-            if held is None or not (_small(held) or (_is_point(held) and not group.static)):
+            held = case.inertials[into]
+            if held is None or not (
+                _small(held, static=group.static) or (_is_point(held) and not group.static)
+            ):
                 continue
             central = CentralInertia.of(held)
             moments, axes = central.principal(held.origin.rpy)
             near = central.about(nearest_moments(moments), axes)
-            own = float(np.max(np.diagonal(central.about_origin())))
-            if lift_inside(near, ENOUGH) > _NEGLIGIBLE * own and own > 0.0 and not group.static:
+            if lift_inside(near, ENOUGH) > _NEGLIGIBLE * _largest_inertia(before) and not group.static:
                 continue
             largest = max(largest, lift_inside(near, ENOUGH))
             case = with_inertials(
@@ -113,17 +111,17 @@ class InertiaTooSmall(Rule):
             raised += 1
         if not (lumps or raised):
             return None
-        parts = [f"{lumps} links are lumped with links they are welded to"] if lumps else []
-        parts += [f"moments of {raised} links are raised to {ENOUGH:g} kg m^2"] if raised else []
-        what = "; ".join(parts)
-        return Remedy(
-            case, what[:1].upper() + what[1:], changes_physics=largest > ROUNDING * _largest_inertia(before)
-        )
+        parts = [f"lumped {lumps} links with links they are welded to"] if lumps else []
+        parts += [f"raised moments of {raised} links to {ENOUGH:g} kg m^2"] if raised else []
+        changes_physics = largest > ROUNDING * _largest_inertia(before)
+        return Remedy(case, " and ".join(parts), changes_physics=changes_physics)
 
 
-def _small(inertial: Inertial) -> bool:
-    """Whether MuJoCo refuses the tensor by itself."""
-    if inertial.mass == 0.0 or not inertial.tensor.any() or clear_fault(inertial) is not None:
+def _small(inertial: Inertial, *, static: bool) -> bool:
+    """Whether MuJoCo refuses the tensor by itself; of a link that moves without mass DX108 speaks."""
+    if inertial.mass == 0.0 and not static:
+        return False
+    if not inertial.tensor.any() or clear_fault(inertial) is not None:
         return False
     return bool(principal_moments(inertial)[0] < SMALLEST_MOMENT)
 

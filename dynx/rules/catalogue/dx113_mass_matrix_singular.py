@@ -55,8 +55,7 @@ class MassMatrixSingular(Rule):
 
     def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy | None:
         """The least that all engines take, unless the user wants the file kept."""
-        if case.choice(self.id, "least") == "keep":
+        if self.chosen(case) == "keep":
             return None
         names = [detection.link for detection in detections if detection.link is not None]
-        choice = f"{self.id}=least: {self.choices['least']}; otherwise --choose {self.id}=keep"
-        return Remedy(*with_least_inertia(case, names), choice, changes_physics=True)
+        return Remedy(*with_least_inertia(case, names), self.decision(case), changes_physics=True)

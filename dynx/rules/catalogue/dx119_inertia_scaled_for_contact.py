@@ -22,9 +22,9 @@ from collections.abc import Iterable, Mapping
 from typing import ClassVar
 
 from dynx.model.xml_source import SourceElement
+from dynx.rules.attributes import number_or_none
 from dynx.rules.case import Case
 from dynx.rules.editing import EditingRule, Place, found_at
-from dynx.rules.joint_elements import number_in
 
 
 class InertiaScaledForContact(EditingRule):
@@ -50,4 +50,4 @@ class InertiaScaledForContact(EditingRule):
 
 def _scale(scaling: SourceElement) -> float:
     """What PyBullet reads: 0 where it finds no number."""
-    return number_in(scaling, "value") or 0.0
+    return number_or_none(scaling, "value") or 0.0

@@ -27,8 +27,8 @@ import numpy as np
 from dynx.rules.attributes import vector_of
 from dynx.rules.case import Case
 from dynx.rules.editing import EditingRule, Place, found_at
-from dynx.rules.inertial_edits import number
-from dynx.rules.joint_elements import SINGLE, joints_of_type
+from dynx.rules.joint_elements import SINGLE, elements_in_joints
+from dynx.rules.number_text import decimal
 
 _ROUNDING = 1e-15
 """How far from 1 the length of a unit vector can be after rounding; dynx leaves such an axis alone."""
@@ -50,15 +50,14 @@ class AxisNotUnit(EditingRule):
 
     def places(self, case: Case) -> Iterable[Place]:
         """Axes of revolute, continuous and prismatic joints."""
-        for joint in joints_of_type(case, SINGLE):
-            axis = joint.first("axis")
-            written = None if axis is None else vector_of(axis, "xyz")
-            if axis is None or written is None:
+        for joint, axis in elements_in_joints(case, "axis", SINGLE):
+            written = vector_of(axis, "xyz")
+            if written is None:
                 continue
             largest = max(map(abs, written))
             length = largest * float(np.linalg.norm(np.array(written) / largest))
             if abs(length - 1.0) > _ROUNDING:
                 message = f"the axis {axis.attributes['xyz']} has length {length:.9g}"
                 unit = case.model.joint(joint.attributes["name"]).axis
-                edit = case.source.setting(axis, "xyz", " ".join(map(number, unit)))
+                edit = case.source.setting(axis, "xyz", " ".join(map(decimal, unit)))
                 yield Place(found_at(axis, message), (edit,))

@@ -21,7 +21,7 @@ from typing import ClassVar
 
 from dynx.rules.case import Case
 from dynx.rules.editing import EditingRule, Place, found_at
-from dynx.rules.joint_elements import SINGLE, joints_of_type
+from dynx.rules.joint_elements import SINGLE, elements_in_joints
 from dynx.rules.number_text import is_number
 from dynx.rules.rule import Stage
 
@@ -41,17 +41,14 @@ class AxisWithoutDirection(EditingRule):
         "drake": ">=1.51.1",
     }
     choices: ClassVar[Mapping[str, str]] = {
-        "x": "an axis without direction was made (1, 0, 0), URDF's default",
-        "fixed": "a joint whose axis has no direction was made fixed",
+        "x": "make an axis without direction (1, 0, 0), URDF's default",
+        "fixed": "make a joint whose axis has no direction fixed",
     }
     changed = "gave joints without a direction to move in one, or fixed them"
 
     def places(self, case: Case) -> Iterable[Place]:
         """Axes of revolute, continuous and prismatic joints."""
-        for joint in joints_of_type(case, SINGLE):
-            axis = joint.first("axis")
-            if axis is None:
-                continue
+        for joint, axis in elements_in_joints(case, "axis", SINGLE):
             words = axis.attributes.get("xyz", "").split()
             if any(not is_number(word) or float(word) != 0.0 for word in words):
                 continue

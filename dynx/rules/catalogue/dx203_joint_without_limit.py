@@ -38,8 +38,8 @@ class JointWithoutLimit(EditingRule):
     advice = 'Write the <limit> of the joint, or type="continuous".'
     engines: ClassVar[Mapping[str, str]] = {"pinocchio": ">=4.1.0", "pybullet": ">=3.2.7"}
     choices: ClassVar[Mapping[str, str]] = {
-        "unlimited": "joints without limit were left without: revolute ones are now continuous",
-        "zero": "joints without limit got lower and upper limits of 0",
+        "unlimited": "leave joints without limit unlimited: revolute ones become continuous",
+        "zero": "give joints without limit lower and upper limits of 0",
     }
     changed = "made joints without limit continuous, or gave them one"
 

@@ -20,6 +20,7 @@ from typing import ClassVar
 
 from dynx.rules.case import Case
 from dynx.rules.editing import EditingRule, Place, found_at
+from dynx.rules.joint_elements import elements_in_joints
 from dynx.rules.number_text import LARGEST
 from dynx.rules.rule import Stage
 
@@ -37,10 +38,7 @@ class LimitWithoutEffortOrVelocity(EditingRule):
 
     def places(self, case: Case) -> Iterable[Place]:
         """The first limit of every joint, moving or not."""
-        for joint in case.source.root.all("joint"):
-            limit = joint.first("limit")
-            if limit is None:
-                continue
+        for _, limit in elements_in_joints(case, "limit"):
             missing = [name for name in ("effort", "velocity") if name not in limit.attributes]
             if missing:
                 edits = tuple(case.source.setting(limit, name, LARGEST) for name in missing)

@@ -18,9 +18,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import ClassVar
 
+from dynx.rules.attributes import number_or_none
 from dynx.rules.case import Case
 from dynx.rules.editing import EditingRule, Place, found_at
-from dynx.rules.joint_elements import SINGLE, joints_of_type, number_in
+from dynx.rules.joint_elements import SINGLE, elements_in_joints
 from dynx.rules.number_text import LARGEST
 from dynx.rules.rule import Stage
 
@@ -35,18 +36,15 @@ class LowerLimitAboveUpper(EditingRule):
     advice = "Exchange the limits, or correct the one that is wrong."
     engines: ClassVar[Mapping[str, str]] = {"drake": ">=1.51.1"}
     choices: ClassVar[Mapping[str, str]] = {
-        "exchange": "a lower limit above the upper was exchanged with it",
-        "unlimited": "limits of which the lower is above the upper were replaced by the largest double",
+        "exchange": "exchange a lower limit above the upper with it",
+        "unlimited": "write the largest double for both limits where the lower is above the upper",
     }
     changed = "put limits in order whose lower was above the upper"
 
     def places(self, case: Case) -> Iterable[Place]:
         """Limits of joints that move."""
-        for joint in joints_of_type(case, SINGLE):
-            limit = joint.first("limit")
-            if limit is None:
-                continue
-            lower, upper = number_in(limit, "lower"), number_in(limit, "upper")
+        for _, limit in elements_in_joints(case, "limit", SINGLE):
+            lower, upper = number_or_none(limit, "lower"), number_or_none(limit, "upper")
             if lower is None or upper is None or lower <= upper:
                 continue
             if self.chosen(case) == "unlimited":

@@ -18,9 +18,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import ClassVar
 
+from dynx.rules.attributes import number_or_none
 from dynx.rules.case import Case
 from dynx.rules.editing import EditingRule, Place, found_at
-from dynx.rules.joint_elements import SINGLE, joints_of_type, number_in
+from dynx.rules.joint_elements import SINGLE, elements_in_joints
 from dynx.rules.number_text import LARGEST
 from dynx.rules.rule import Stage
 
@@ -35,18 +36,15 @@ class NegativeEffortOrVelocity(EditingRule):
     advice = "Write a limit of at least 0."
     engines: ClassVar[Mapping[str, str]] = {"pinocchio": ">=4.1.0", "drake": ">=1.51.1"}
     choices: ClassVar[Mapping[str, str]] = {
-        "absolute": "the sign of negative efforts and velocities was taken away",
-        "unlimited": "negative efforts and velocities were replaced by the largest double",
+        "absolute": "take the sign of negative efforts and velocities away",
+        "unlimited": "write the largest double for negative efforts and velocities",
     }
     changed = "made the largest efforts and velocities of joints positive"
 
     def places(self, case: Case) -> Iterable[Place]:
         """Limits of joints that move."""
-        for joint in joints_of_type(case, SINGLE):
-            limit = joint.first("limit")
-            if limit is None:
-                continue
-            below = [name for name in ("effort", "velocity") if (number_in(limit, name) or 0.0) < 0.0]
+        for _, limit in elements_in_joints(case, "limit", SINGLE):
+            below = [name for name in ("effort", "velocity") if (number_or_none(limit, name) or 0.0) < 0.0]
             if below:
                 said = " and ".join(f"{name}={limit.attributes[name].strip()}" for name in below)
                 edits = tuple(

@@ -17,6 +17,7 @@ from typing import ClassVar
 
 from dynx.rules.case import Case
 from dynx.rules.editing import EditingRule, Place, found_at
+from dynx.rules.joint_elements import elements_in_joints
 from dynx.rules.rule import Stage
 
 
@@ -33,8 +34,7 @@ class SafetyControllerWithoutGain(EditingRule):
 
     def places(self, case: Case) -> Iterable[Place]:
         """The first safety controller of every joint."""
-        for joint in case.source.root.all("joint"):
-            controller = joint.first("safety_controller")
-            if controller is not None and "k_velocity" not in controller.attributes:
+        for _, controller in elements_in_joints(case, "safety_controller"):
+            if "k_velocity" not in controller.attributes:
                 edit = case.source.setting(controller, "k_velocity", "0")
                 yield Place(found_at(controller, "<safety_controller> has no k_velocity"), (edit,))

@@ -23,7 +23,7 @@ from dynx.errors import shown
 from dynx.model.xml_source import SourceElement
 from dynx.rules.case import Case
 from dynx.rules.editing import EditingRule, Place, found_at
-from dynx.rules.joint_elements import SINGLE
+from dynx.rules.joint_elements import SINGLE, elements_in_joints
 from dynx.rules.rule import Stage
 
 
@@ -44,10 +44,7 @@ class MimicOfNothing(EditingRule):
 
     def places(self, case: Case) -> Iterable[Place]:
         """The first ``<mimic>`` of every joint."""
-        for joint in case.source.root.all("joint"):
-            mimic = joint.first("mimic")
-            if mimic is None:
-                continue
+        for joint, mimic in elements_in_joints(case, "mimic"):
             message = _why_nothing(case, joint, mimic)
             if message is not None:
                 edits = tuple(case.source.removing(each) for each in joint.all("mimic"))

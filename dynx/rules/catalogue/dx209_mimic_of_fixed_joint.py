@@ -25,8 +25,8 @@ from dynx.model.elements import Joint
 from dynx.model.xml_source import Edit, SourceElement
 from dynx.rules.case import Case
 from dynx.rules.editing import EditingRule, Place, found_at
-from dynx.rules.inertial_edits import number
-from dynx.rules.joint_elements import SINGLE, joints_of_type
+from dynx.rules.joint_elements import SINGLE, elements_in_joints
+from dynx.rules.number_text import decimal
 
 
 class MimicOfFixedJoint(EditingRule):
@@ -38,21 +38,19 @@ class MimicOfFixedJoint(EditingRule):
     advice = "Make the follower fixed too."
     engines: ClassVar[Mapping[str, str]] = {"drake": ">=1.51.1"}
     choices: ClassVar[Mapping[str, str]] = {
-        "fixed": "a joint that mimics a fixed one was made fixed at its offset",
-        "free": "a joint that mimics a fixed one was made to move freely",
+        "fixed": "make a joint that mimics a fixed one fixed at its offset",
+        "free": "let a joint that mimics a fixed one move freely",
     }
     changed = "settled joints that mimic a fixed one"
 
     def places(self, case: Case) -> Iterable[Place]:
         """Joints that move by their type and have a ``<mimic>``, and are fixed to dynx."""
         known = {joint.name: joint for joint in case.model.joints}
-        for element in joints_of_type(case, SINGLE):
-            mimic = element.first("mimic")
+        for element, mimic in elements_in_joints(case, "mimic", SINGLE):
             joint = known[element.attributes["name"]]
-            if mimic is None or joint.moves:
-                continue
-            message = f"the joint mimics {shown(mimic.attributes['joint'])}, which cannot move"
-            yield Place(found_at(mimic, message), tuple(self._edits(case, element, joint)))
+            if not joint.moves:
+                message = f"the joint mimics {shown(mimic.attributes['joint'])}, which cannot move"
+                yield Place(found_at(mimic, message), tuple(self._edits(case, element, joint)))
 
     def _edits(self, case: Case, element: SourceElement, joint: Joint) -> Iterable[Edit]:
         source = case.source
@@ -63,7 +61,7 @@ class MimicOfFixedJoint(EditingRule):
         yield source.setting(element, "type", "fixed")
         if not joint.locked_at:
             return
-        texts = {name: " ".join(map(number, getattr(joint.origin, name))) for name in ("xyz", "rpy")}
+        texts = {name: " ".join(map(decimal, getattr(joint.origin, name))) for name in ("xyz", "rpy")}
         origin = element.first("origin")
         if origin is None:
             words = " ".join(f'{name}="{text}"' for name, text in texts.items())

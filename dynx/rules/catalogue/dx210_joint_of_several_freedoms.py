@@ -16,8 +16,8 @@ dynx has no such joint and refuses the file.
 What to do: write joints of one freedom each, with massless links between them. ``dynx doctor --fix`` does
 so: three turns for a spherical joint, two slides and a turn for a planar one, three slides and three turns
 for a floating one. The chain moves alike; its coordinates are angles, singular where the middle turn is
-at 90 degrees, and limits of the joint are dropped. MuJoCo refuses massless links that move; DX110 says what
-is done about that. ``--choose DX210=fixed`` makes the joint fixed instead.
+at 90 degrees, and limits of the joint are dropped. MuJoCo refuses massless links that move (DX110), so the
+links in between weigh 2e-15 kg. ``--choose DX210=fixed`` makes the joint fixed instead.
 """
 
 from __future__ import annotations
@@ -25,8 +25,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import ClassVar
 
-from dynx.model.xml_source import Edit
-from dynx.rules.case import Case
+from dynx.model.xml_source import Edit, SourceElement
+from dynx.rules.attributes import number_or_none
+from dynx.rules.case import Case, end_of
 from dynx.rules.editing import EditingRule, Place, found_at
 from dynx.rules.joint_elements import joints_of_type
 from dynx.rules.joint_splitting import TYPES, splitting
@@ -47,8 +48,8 @@ class JointOfSeveralFreedoms(EditingRule):
         "drake": ">=1.51.1",
     }
     choices: ClassVar[Mapping[str, str]] = {
-        "split": "a joint of several freedoms was split into joints of one, without its limits",
-        "fixed": "a joint of several freedoms was made fixed",
+        "split": "split a joint of several freedoms into joints of one, without its limits",
+        "fixed": "make a joint of several freedoms fixed",
     }
     changed = "replaced joints of several freedoms"
 
@@ -56,10 +57,26 @@ class JointOfSeveralFreedoms(EditingRule):
         """Such joints, but for a floating one below an empty root, which DX211 is about."""
         for joint in joints_of_type(case, TYPES):
             kind = joint.attributes["type"]
-            if not joint.attributes.get("name") or (kind == "floating" and case.readable):
+            if not joint.attributes.get("name") or (kind == "floating" and _is_the_base(case, joint)):
                 continue
             if self.chosen(case) == "fixed":
                 edits: tuple[Edit, ...] = (case.source.setting(joint, "type", "fixed"),)
             else:
                 edits = tuple(splitting(case.source, joint))
             yield Place(found_at(joint, f"the joint is {kind}"), edits)
+
+
+def _is_the_base(case: Case, joint: SourceElement) -> bool:
+    """Whether a floating joint carries the robot on an empty root, which may be so in a file that dynx
+    refuses for another reason."""
+    parent = end_of(joint, "parent")
+    ends = [(end_of(each, "parent"), end_of(each, "child")) for each in case.source.root.all("joint")]
+    carried = [child for above, child in ends if above == parent]
+    is_root = parent in case.links and all(child != parent for _, child in ends)
+    return case.readable or (is_root and len(carried) == 1 and _is_empty(case.links[parent]))
+
+
+def _is_empty(link: SourceElement) -> bool:
+    inertial = link.first("inertial")
+    mass = None if inertial is None else inertial.first("mass")
+    return inertial is None or (mass is not None and number_or_none(mass, "value") == 0.0)

@@ -19,13 +19,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import ClassVar
 
+from dynx.loaded.bullet_file import MAX_JOINTS
 from dynx.model import Model
 from dynx.model.elements import Link
 from dynx.rules.case import Case
 from dynx.rules.rule import Detection, Remedy, Rule
-
-MOST = 127
-"""Joints, fixed ones included."""
 
 
 class TooManyJoints(Rule):
@@ -37,22 +35,22 @@ class TooManyJoints(Rule):
     advice = "Drop links that are mere frames from the file for PyBullet."
     engines: ClassVar[Mapping[str, str]] = {"pybullet": ">=3.2.7"}
     choices: ClassVar[Mapping[str, str]] = {
-        "drop": "frames without mass at the ends of the robot were taken away until 127 joints were left",
-        "keep": "all links were kept, so PyBullet cannot hold the robot",
+        "drop": "take frames without mass at the ends of the robot away until 127 joints are left",
+        "keep": "keep all links; PyBullet then cannot hold the robot",
     }
 
     def detect(self, case: Case) -> Sequence[Detection]:
         """The first joint too many, in document order."""
         joints = case.source.root.all("joint")
-        if len(joints) <= MOST:
+        if len(joints) <= MAX_JOINTS:
             return []
-        message = f"the robot has {len(joints)} joints, fixed ones included; PyBullet holds {MOST}"
-        return [Detection(None, None, joints[MOST].line, message)]
+        message = f"the robot has {len(joints)} joints, fixed ones included; PyBullet holds {MAX_JOINTS}"
+        return [Detection(None, None, joints[MAX_JOINTS].line, message)]
 
     def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy | None:
         """Without as many frames as it has joints too many."""
-        excess = len(case.joints) - MOST
-        if case.choice(self.id, "drop") == "keep" or excess <= 0:
+        excess = len(case.joints) - MAX_JOINTS
+        if self.chosen(case) == "keep" or excess <= 0:
             return None
         dropped = _frames(case)[:excess]
         if len(dropped) < excess:
@@ -64,7 +62,7 @@ class TooManyJoints(Rule):
         return Remedy(
             case.with_source(source.edited(*edits)),
             f"took {len(dropped)} links away that are mere frames",
-            f"{self.id} {self.name}: {self.choices['drop']} (otherwise: --choose {self.id}=keep)",
+            self.decision(case),
         )
 
 

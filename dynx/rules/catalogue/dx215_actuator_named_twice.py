@@ -5,7 +5,8 @@ and its actuators need names of their own: it refuses the file, "already contain
 
 Pinocchio 4.1, PyBullet 3.2.7 and MuJoCo 4.0 pass transmissions over.
 
-Transmissions of fixed joints, and of other types than ``SimpleTransmission``, do not count.
+Transmissions of fixed joints, of joints with an effort limit of 0, and of other types than
+``SimpleTransmission`` do not count.
 
 Copying a transmission and changing its joint alone is enough; ``xarm6_robot.urdf``, which comes with
 PyBullet, has two actuators ``motor3``.
@@ -24,7 +25,7 @@ from dynx.rules.case import Case
 from dynx.rules.editing import EditingRule, Place, found_at
 from dynx.rules.renaming import fresh_name
 from dynx.rules.rule import Stage
-from dynx.rules.transmissions import transmissions_drake_reads
+from dynx.rules.transmissions import moves_by_actuator, transmissions_drake_reads
 
 
 class ActuatorNamedTwice(EditingRule):
@@ -55,9 +56,6 @@ class ActuatorNamedTwice(EditingRule):
 
 def _actuators(case: Case) -> Iterator[SourceElement]:
     for transmission in transmissions_drake_reads(case):
-        actuator, joint = transmission.first("actuator"), transmission.first("joint")
-        moved = case.joints.get("" if joint is None else joint.attributes.get("name", ""))
-        if actuator is None or "name" not in actuator.attributes:
-            continue
-        if moved is not None and moved.attributes.get("type") != "fixed":
+        actuator = transmission.first("actuator")
+        if actuator is not None and "name" in actuator.attributes and moves_by_actuator(case, transmission):
             yield actuator

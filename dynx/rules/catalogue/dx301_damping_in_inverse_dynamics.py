@@ -18,12 +18,13 @@ leave damping out.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from typing import ClassVar
 
+from dynx.rules.attributes import number_or_none
 from dynx.rules.case import Case
 from dynx.rules.editing import CallingRule, found_at
-from dynx.rules.joint_elements import SINGLE, joints_of_type, number_in
+from dynx.rules.joint_elements import SINGLE, elements_in_joints
 from dynx.rules.rule import Detection
 
 
@@ -42,14 +43,8 @@ class DampingInInverseDynamics(CallingRule):
     calls: ClassVar[tuple[str, ...]] = ("pybullet.no_damping", "mujoco.no_damping", "drake.no_damping")
     changed = "compared without joint damping"
 
-    def detect(self, case: Case) -> Sequence[Detection]:
-        """Joints that move with a damping that is not zero; none once the calls are made."""
-        if case.calls.issuperset(self.calls):
-            return []
-        found = []
-        for joint in joints_of_type(case, SINGLE):
-            dynamics = joint.first("dynamics")
-            damping = None if dynamics is None else number_in(dynamics, "damping")
-            if dynamics is not None and damping:
-                found.append(found_at(dynamics, f"the joint has damping {damping:g}"))
-        return found
+    def occurrences(self, case: Case) -> Iterable[Detection]:
+        """Joints that move with a damping that is not zero."""
+        for _, dynamics in elements_in_joints(case, "dynamics", SINGLE):
+            if damping := number_or_none(dynamics, "damping"):
+                yield found_at(dynamics, f"the joint has damping {damping:g}")

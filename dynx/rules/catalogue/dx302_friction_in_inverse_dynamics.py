@@ -16,12 +16,13 @@ call that makes MuJoCo leave friction out.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from typing import ClassVar
 
+from dynx.rules.attributes import number_or_none
 from dynx.rules.case import Case
 from dynx.rules.editing import CallingRule, found_at
-from dynx.rules.joint_elements import SINGLE, joints_of_type, number_in
+from dynx.rules.joint_elements import SINGLE, elements_in_joints
 from dynx.rules.rule import Detection
 
 
@@ -36,14 +37,8 @@ class FrictionInInverseDynamics(CallingRule):
     calls: ClassVar[tuple[str, ...]] = ("mujoco.no_friction",)
     changed = "compared without dry friction"
 
-    def detect(self, case: Case) -> Sequence[Detection]:
-        """Joints that move with a friction that is not zero; none once the call is made."""
-        if case.calls.issuperset(self.calls):
-            return []
-        found = []
-        for joint in joints_of_type(case, SINGLE):
-            dynamics = joint.first("dynamics")
-            friction = None if dynamics is None else number_in(dynamics, "friction")
-            if dynamics is not None and friction:
-                found.append(found_at(dynamics, f"the joint has dry friction {friction:g}"))
-        return found
+    def occurrences(self, case: Case) -> Iterable[Detection]:
+        """Joints that move with a friction that is not zero."""
+        for _, dynamics in elements_in_joints(case, "dynamics", SINGLE):
+            if friction := number_or_none(dynamics, "friction"):
+                yield found_at(dynamics, f"the joint has dry friction {friction:g}")

@@ -15,9 +15,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import ClassVar
 
+from dynx.rules.attributes import number_or_none
 from dynx.rules.case import Case
 from dynx.rules.editing import EditingRule, Place, found_at
-from dynx.rules.joint_elements import SINGLE, joints_of_type, number_in
+from dynx.rules.joint_elements import SINGLE, elements_in_joints
 from dynx.rules.rule import Stage
 
 
@@ -31,16 +32,15 @@ class NegativeDamping(EditingRule):
     advice = "Write a damping of at least 0."
     engines: ClassVar[Mapping[str, str]] = {"drake": ">=1.51.1"}
     choices: ClassVar[Mapping[str, str]] = {
-        "absolute": "the sign of a negative damping was taken away",
-        "zero": "a negative damping was made zero",
+        "absolute": "take the sign of a negative damping away",
+        "zero": "make a negative damping zero",
     }
     changed = "made the damping of joints positive or zero"
 
     def places(self, case: Case) -> Iterable[Place]:
         """Joints that move."""
-        for joint in joints_of_type(case, SINGLE):
-            dynamics = joint.first("dynamics")
-            if dynamics is None or (number_in(dynamics, "damping") or 0.0) >= 0.0:
+        for _, dynamics in elements_in_joints(case, "dynamics", SINGLE):
+            if (number_or_none(dynamics, "damping") or 0.0) >= 0.0:
                 continue
             written = dynamics.attributes["damping"].strip()
             instead = "0" if self.chosen(case) == "zero" else written.removeprefix("-")

@@ -20,7 +20,7 @@ right, so ``dynx doctor --fix`` does not change it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from typing import ClassVar
 
 from dynx.errors import shown
@@ -40,13 +40,9 @@ class MimicAsConstraint(CallingRule):
     calls: ClassVar[tuple[str, ...]] = ("mujoco.no_mimic", "drake.free_mimics")
     changed = "compared with mimic joints free"
 
-    def detect(self, case: Case) -> Sequence[Detection]:
-        """Joints that follow one that moves; none once the calls are made."""
-        if case.calls.issuperset(self.calls):
-            return []
-        found = []
+    def occurrences(self, case: Case) -> Iterable[Detection]:
+        """Joints that follow one that moves."""
         for joint in case.model.joints:
             mimic = case.joints[joint.name].first("mimic")
             if joint.mimic is not None and mimic is not None:
-                found.append(found_at(mimic, f"the joint mimics {shown(mimic.attributes['joint'])}"))
-        return found
+                yield found_at(mimic, f"the joint mimics {shown(mimic.attributes['joint'])}")

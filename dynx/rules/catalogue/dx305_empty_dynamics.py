@@ -18,6 +18,7 @@ from typing import ClassVar
 
 from dynx.rules.case import Case
 from dynx.rules.editing import EditingRule, Place, found_at
+from dynx.rules.joint_elements import elements_in_joints
 from dynx.rules.rule import Stage
 
 
@@ -34,8 +35,7 @@ class EmptyDynamics(EditingRule):
 
     def places(self, case: Case) -> Iterable[Place]:
         """The first ``<dynamics>`` of every joint, moving or not."""
-        for joint in case.source.root.all("joint"):
-            dynamics = joint.first("dynamics")
-            if dynamics is not None and not {"damping", "friction"} & set(dynamics.attributes):
+        for _, dynamics in elements_in_joints(case, "dynamics"):
+            if not {"damping", "friction"} & set(dynamics.attributes):
                 edit = case.source.setting(dynamics, "damping", "0")
                 yield Place(found_at(dynamics, "<dynamics> has neither damping nor friction"), (edit,))

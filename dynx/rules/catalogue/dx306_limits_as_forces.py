@@ -1,7 +1,7 @@
 """DX306 limits-as-forces: a joint has equal limits, so that it is beyond them wherever it is
 
 ``<limit lower="-2" upper="2"/>`` says where a joint can be. What happens beyond is not in URDF, and a joint
-whose limits are equal, or not given (URDF then has 0 for both), is beyond them everywhere else.
+whose limits are equal is beyond them everywhere else.
 
 - Pinocchio 4.1 and Drake 1.51: nothing. Inverse and forward dynamics know of no limit (Drake's discrete
   simulation does).
@@ -9,7 +9,7 @@ whose limits are equal, or not given (URDF then has 0 for both), is beyond them 
   force to the torque. It is not small: a hundred times the torque was measured.
   MuJoCo takes equal limits for none, with a warning.
 - PyBullet 3.2.7: ``stepSimulation`` pushes the joint back to the limit, equal ones included;
-  ``calculateInverseDynamics`` knows of none.
+  ``calculateInverseDynamics`` knows of none. A limit without ``upper``, for which URDF has 0, is none.
 
 Within limits that leave a joint some room all engines agree, and doctor compares there. A joint with equal
 limits is compared anywhere, because the equations of motion have no limits.
@@ -20,7 +20,7 @@ file, so ``dynx doctor --fix`` does not change it; doctor prints the calls that 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from typing import ClassVar
 
 from dynx.rules.case import Case
@@ -39,14 +39,12 @@ class LimitsAsForces(CallingRule):
     calls: ClassVar[tuple[str, ...]] = ("pybullet.no_limits", "mujoco.no_limits")
     changed = "compared without joint limits"
 
-    def detect(self, case: Case) -> Sequence[Detection]:
-        """Joints with limits and no room between them; none once the calls are made."""
-        if case.calls.issuperset(self.calls):
-            return []
-        found = []
+    def occurrences(self, case: Case) -> Iterable[Detection]:
+        """Joints with limits and no room between them."""
         for joint in case.model.joints:
             limit = case.joints[joint.name].first("limit")
-            if limit is not None and joint.moves and joint.limits.lower == joint.limits.upper:
+            if limit is None or "upper" not in limit.attributes:
+                continue
+            if joint.moves and joint.limits.lower == joint.limits.upper:
                 message = f"the lower and the upper limit of the joint are {joint.limits.lower:g}"
-                found.append(found_at(limit, message))
-        return found
+                yield found_at(limit, message)

@@ -16,13 +16,14 @@ change it; doctor compares the links alone and prints the call that makes Drake 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from typing import ClassVar
 
+from dynx.rules.attributes import number_or_none
 from dynx.rules.case import Case
 from dynx.rules.editing import CallingRule
-from dynx.rules.joint_elements import number_in
 from dynx.rules.rule import Detection
+from dynx.rules.transmissions import moves_by_actuator
 
 _TAG = "drake:rotor_inertia"
 
@@ -38,17 +39,13 @@ class RotorInertia(CallingRule):
     calls: ClassVar[tuple[str, ...]] = ("drake.no_rotors",)
     changed = "compared without rotors"
 
-    def detect(self, case: Case) -> Sequence[Detection]:
-        """Actuators with a rotor inertia that is not zero; none once the call is made."""
-        if case.calls.issuperset(self.calls):
-            return []
-        found = []
+    def occurrences(self, case: Case) -> Iterable[Detection]:
+        """Actuators with a rotor inertia that is not zero."""
         for transmission in case.source.root.all("transmission"):
-            joint = transmission.first("joint")
+            joint = transmission.first("joint") if moves_by_actuator(case, transmission) else None
             for actuator in transmission.all("actuator"):
                 for rotor in actuator.all(_TAG):
-                    inertia = number_in(rotor, "value")
+                    inertia = number_or_none(rotor, "value")
                     if inertia and joint is not None:
-                        message = f"the actuator of the joint has a rotor of {inertia:g} kg m2"
-                        found.append(Detection(None, joint.attributes.get("name"), rotor.line, message))
-        return found
+                        message = f"the actuator of the joint has a rotor of {inertia:g} kg m^2"
+                        yield Detection(None, joint.attributes.get("name"), rotor.line, message)

@@ -16,7 +16,7 @@ change it; doctor compares without contacts and prints the call that makes MuJoC
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from typing import ClassVar
 
 from dynx.model.xml_source import SourceElement
@@ -33,19 +33,17 @@ class ContactsAsForces(CallingRule):
     title = "Links have collision shapes, whose contacts MuJoCo adds to the torque."
     advice = "Switch contacts off where the rigid-body answer is wanted."
     engines: ClassVar[Mapping[str, str]] = {"mujoco": ">=4.0.0"}
+    depends_on_state = True
     calls: ClassVar[tuple[str, ...]] = ("mujoco.no_contacts",)
     changed = "compared without contacts"
 
-    def detect(self, case: Case) -> Sequence[Detection]:
-        """The robot, where two of its links have shapes; none once the call is made."""
-        if case.calls.issuperset(self.calls):
-            return []
+    def occurrences(self, case: Case) -> Iterable[Detection]:
+        """The robot, where two of its links have shapes."""
         shaped = [link for link in case.source.root.all("link") if _shape(link) is not None]
         first = _shape(shaped[0]) if len(shaped) > 1 else None
-        if first is None:
-            return []
-        message = f"{len(shaped)} links have collision shapes, which may touch"
-        return [Detection(None, None, first.line, message)]
+        if first is not None:
+            message = f"{len(shaped)} links have collision shapes, which may touch"
+            yield Detection(None, None, first.line, message)
 
 
 def _shape(link: SourceElement) -> SourceElement | None:

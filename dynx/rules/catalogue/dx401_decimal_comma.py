@@ -46,8 +46,8 @@ class DecimalComma(MisspelledNumberRule):
         "drake": ">=1.51.1",
     }
     choices: ClassVar[Mapping[str, str]] = {
-        "decimal": "a comma in a number was read as its decimal point",
-        "thousands": "a comma in a number was read as standing between thousands",
+        "decimal": "read a comma in a number as its decimal point",
+        "thousands": "read a comma in a number as standing between thousands",
     }
     changed = "wrote decimal points in place of commas"
     fault: ClassVar[Fault] = "comma"

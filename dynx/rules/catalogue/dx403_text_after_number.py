@@ -50,4 +50,4 @@ class TextAfterNumber(MisspelledNumberRule):
 
     def decision(self, case: Case) -> str | None:
         """There is one reading; it is still a guess."""
-        return f"{self.id} {self.name}: the number in front was kept, units were not converted"
+        return f"{self.id}: the number in front was kept, and no unit converted"

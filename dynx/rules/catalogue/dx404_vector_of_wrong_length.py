@@ -43,8 +43,8 @@ class VectorOfWrongLength(MisspelledNumberRule):
         "drake": ">=1.51.1",
     }
     choices: ClassVar[Mapping[str, str]] = {
-        "first": "of a vector the first three numbers were kept, and zeros added where some are missing",
-        "default": "a vector without three numbers was taken away",
+        "first": "keep the first three numbers of a vector, and add zeros where some are missing",
+        "default": "take a vector without three numbers away",
     }
     changed = "made vectors have three numbers"
     fault: ClassVar[Fault] = "count"

@@ -25,7 +25,7 @@ from dynx.model.xml_source import Edit, SourceElement
 from dynx.rules.case import Case
 from dynx.rules.editing import EditingRule, Place, found_at
 from dynx.rules.element_text import text_in
-from dynx.rules.inertial_edits import MOMENTS, zero_inertial
+from dynx.rules.inertial_edits import ZERO_TENSOR, zero_inertial
 from dynx.rules.number_text import is_number
 from dynx.rules.rule import Stage
 
@@ -45,8 +45,8 @@ class IncompleteInertial(EditingRule):
         "drake": ">=1.51.1",
     }
     choices: ClassVar[Mapping[str, str]] = {
-        "point": "an inertial without mass was made zero, one without tensor a point mass",
-        "weightless": "an inertial without mass or tensor was made zero",
+        "point": "make an inertial without mass zero, one without tensor a point mass",
+        "weightless": "make an inertial without mass or tensor zero",
     }
     changed = "completed inertials that had no mass or no tensor"
 
@@ -76,5 +76,4 @@ class IncompleteInertial(EditingRule):
     def _without_tensor(self, case: Case, inertial: SourceElement) -> tuple[Edit, ...]:
         if self.chosen(case) == "weightless":
             return (case.source.replacing(inertial, zero_inertial()),)
-        zeros = " ".join(f'{name}="0"' for name in MOMENTS)
-        return (case.source.inserting(inertial, f"<inertia {zeros}/>"),)
+        return (case.source.inserting(inertial, ZERO_TENSOR),)

@@ -35,8 +35,8 @@ class UnknownCollisionShape(EditingRule):
     advice = "Write the shape as a box, sphere, cylinder or mesh."
     engines: ClassVar[Mapping[str, str]] = {"mujoco": ">=4.0.0"}
     choices: ClassVar[Mapping[str, str]] = {
-        "remove": "collisions of a shape that not every engine knows were taken away",
-        "keep": "collisions of unknown shape were kept, so MuJoCo cannot load the file",
+        "remove": "take collisions of a shape that not every engine knows away",
+        "keep": "keep them; MuJoCo then refuses the file",
     }
     changed = "took collisions of unknown shape away"
 

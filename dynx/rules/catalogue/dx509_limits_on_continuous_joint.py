@@ -5,13 +5,14 @@ Pinocchio and MuJoCo pass them over, PyBullet reports them in ``getJointInfo`` a
 Drake 1.51 makes them the limits of the joint. The equations of motion are the same with all, and somebody
 who reads the file believes the range.
 
-The remedy takes the two attributes away: every engine then has a joint without end. If it does have ends,
-write ``type="revolute"`` instead and keep them.
+What to do: if the joint does have ends, write ``type="revolute"`` and keep them. Else take the two attributes
+away, so that every engine has a joint without end; ``dynx doctor --fix`` does so with
+``--choose DX509=drop``, and by default leaves them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 from dynx.rules.case import Case
@@ -29,6 +30,11 @@ class LimitsOnContinuousJoint(Rule):
     kind: ClassVar[Kind] = "practice"
     advice = 'Take the range away, or write type="revolute" if the joint does have ends.'
 
+    choices: ClassVar[Mapping[str, str]] = {
+        "keep": "leave the limits of continuous joints, which mean nothing",
+        "drop": "take the lower and upper limits of continuous joints away",
+    }
+
     def detect(self, case: Case) -> Sequence[Detection]:
         """Continuous joints with `lower` or `upper`."""
         found = []
@@ -43,7 +49,9 @@ class LimitsOnContinuousJoint(Rule):
         return found
 
     def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy | None:
-        """The two attributes taken away."""
+        """The two attributes taken away, if that was chosen."""
+        if self.chosen(case) == "keep":
+            return None
         edits = []
         for detection in detections:
             limit = case.joints[detection.joint or ""].first("limit")
@@ -52,4 +60,5 @@ class LimitsOnContinuousJoint(Rule):
         return Remedy(
             case.with_source(case.source.edited(*edits)),
             "took the lower and upper limits of continuous joints away",
+            self.decision(case),
         )

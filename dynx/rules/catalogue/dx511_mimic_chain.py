@@ -6,16 +6,18 @@ refuses such a file with ``mimic=True`` ("Mimicking and mimicked configuration s
 sizes"); without it, as by default, and in PyBullet all the joints are free. MuJoCo makes one equality
 constraint for each follower, which its solver satisfies softly, one on top of the other.
 
-The remedy lets each follower name the first joint of its chain, with the product of the multipliers and the
+What to do: let each follower name the first joint of its chain, with the product of the multipliers and the
 offsets carried along: value = m2 (m1 x + b1) + b2 = (m2 m1) x + (m2 b1 + b2). It is the same robot.
+``dynx doctor --fix`` does so with ``--choose DX511=direct``, and by default leaves the chain.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 from dynx.rules.case import Case
+from dynx.rules.number_text import decimal
 from dynx.rules.rule import Detection, Kind, Remedy, Rule
 
 
@@ -27,6 +29,11 @@ class MimicChain(Rule):
     title = "A mimic joint follows a joint that is itself a mimic joint."
     kind: ClassVar[Kind] = "practice"
     advice = "Let every mimic joint name the joint that is driven."
+
+    choices: ClassVar[Mapping[str, str]] = {
+        "keep": "leave followers that follow a follower",
+        "direct": "let every follower name the joint that is driven, with the factors multiplied",
+    }
 
     def detect(self, case: Case) -> Sequence[Detection]:
         """Mimic joints that name a mimic joint."""
@@ -42,7 +49,9 @@ class MimicChain(Rule):
         return found
 
     def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy | None:
-        """Every follower named after the joint that is driven."""
+        """Every follower named after the joint that is driven, if that was chosen."""
+        if self.chosen(case) == "keep":
+            return None
         edits = []
         for detection in detections:
             resolved = case.model.joint(detection.joint or "").mimic
@@ -50,9 +59,10 @@ class MimicChain(Rule):
             assert resolved is not None
             assert mimic is not None
             edits.append(case.source.setting(mimic, "joint", resolved.joint))
-            edits.append(case.source.setting(mimic, "multiplier", repr(resolved.multiplier)))
-            edits.append(case.source.setting(mimic, "offset", repr(resolved.offset)))
+            edits.append(case.source.setting(mimic, "multiplier", decimal(resolved.multiplier)))
+            edits.append(case.source.setting(mimic, "offset", decimal(resolved.offset)))
         return Remedy(
             case.with_source(case.source.edited(*edits)),
             "let mimic joints follow the driven joint directly, with the factors multiplied",
+            self.decision(case),
         )

@@ -21,6 +21,7 @@ from dynx.errors import DescriptionError
 from dynx.model.xml_source import SourceElement
 from dynx.rules.attributes import origin_of
 from dynx.rules.case import Case
+from dynx.rules.editing import found_at
 from dynx.rules.rule import Detection, Kind, Rule
 
 _TWO_TURNS = 4.0 * math.pi
@@ -51,13 +52,8 @@ def _origins(case: Case) -> Iterator[Detection]:
                 continue
             large = [angle for angle in _angles(element.parent) if abs(angle) > _TWO_TURNS]
             if large:
-                name = part.attributes.get("name")
-                yield Detection(
-                    name if part.tag == "link" else None,
-                    name if part.tag == "joint" else None,
-                    element.line,
-                    f"rpy holds {large[0]:g}, read as radians; in degrees it is {_radians(large[0])}",
-                )
+                message = f"rpy holds {large[0]:g}, read as radians; in degrees it is {_radians(large[0])}"
+                yield found_at(element, message)
 
 
 def _limits(case: Case) -> Iterator[Detection]:

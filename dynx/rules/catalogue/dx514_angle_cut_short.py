@@ -8,14 +8,14 @@ up to a full turn, rounded or cut to two or three decimals.
 
 All engines read the number as it stands.
 
-By default the numbers are kept, for a calibrated robot may have them by right; with ``--choose DX514=full``
-the remedy writes the multiple of pi/4 in full, which moves the links behind the joint by that little.
+What to do: write the angles in full, unless they were calibrated. ``dynx doctor --fix`` does so with
+``--choose DX514=full``, which moves the links behind the joint by that little, and by default keeps them.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import ClassVar
 
 from dynx.model.xml_source import SourceElement
@@ -31,7 +31,7 @@ class AngleCutShort(Rule):
     title = "An angle is a multiple of pi/4 with only two or three decimals, such as 1.57."
     kind: ClassVar[Kind] = "practice"
     advice = "Write angles in full: 1.5707963267948966."
-    choices: ClassVar = {
+    choices: ClassVar[Mapping[str, str]] = {
         "keep": "keep the angles as they are written",
         "full": "write multiples of pi/4 in full",
     }
@@ -50,7 +50,7 @@ class AngleCutShort(Rule):
 
     def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy | None:
         """The angles in full, if that was chosen."""
-        if case.choice(self.id, "keep") != "full":
+        if self.chosen(case) != "full":
             return None
         joints = {detection.joint for detection in detections}
         edits = []
@@ -61,7 +61,7 @@ class AngleCutShort(Rule):
         return Remedy(
             case.with_source(case.source.edited(*edits)),
             "wrote multiples of pi/4 in full",
-            choice=f"angles such as 1.57 are multiples of pi/4 (--choose {self.id}=keep leaves them)",
+            choice=self.decision(case),
             changes_physics=True,
         )
 

@@ -20,6 +20,8 @@ from typing import ClassVar
 
 from dynx.model.xml_source import SourceElement
 from dynx.rules.case import Case
+from dynx.rules.editing import found_at
+from dynx.rules.inertial_edits import MOMENTS
 from dynx.rules.rule import Detection, Kind, Rule
 
 _ELEMENTS = {
@@ -33,7 +35,7 @@ _ATTRIBUTES = {
     "joint": ("name", "type"),
     "origin": ("xyz", "rpy"),
     "mass": ("value",),
-    "inertia": ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"),
+    "inertia": MOMENTS,
     "axis": ("xyz",),
     "parent": ("link",),
     "child": ("link",),
@@ -56,14 +58,8 @@ class MisspelledWord(Rule):
 
     def detect(self, case: Case) -> Sequence[Detection]:
         """Every such word."""
-        found = []
-        for part in case.source.root.children:
-            where = part.attributes.get("name")
-            for element, message in _misspelled(part, case.source.root):
-                link = where if part.tag == "link" else None
-                joint = where if part.tag == "joint" else None
-                found.append(Detection(link, joint, element.line, message))
-        return found
+        root = case.source.root
+        return [found_at(*each) for part in root.children for each in _misspelled(part, root)]
 
 
 def _misspelled(part: SourceElement, root: SourceElement) -> Iterator[tuple[SourceElement, str]]:

@@ -62,36 +62,36 @@ def differing(robot: str = "arm", base: str = "fixed", line_shift: int = 0, **na
         engines=(
             EngineResult(
                 "pinocchio", "4.1.0", "model = pinocchio.buildModelFromUrdf(path)", None, None,
-                {"mass matrix": 1e-16, "inverse dynamics": 2e-16},
-                {"mass matrix": 1e-16, "inverse dynamics": 2e-16},
+                {"mass_matrix": 1e-16, "inverse_dynamics": 2e-16},
+                {"mass_matrix": 1e-16, "inverse_dynamics": 2e-16},
             ),
             EngineResult(
                 "pybullet", "3.2.7", "robot = p.loadURDF(path, useFixedBase=True)", None, None,
-                {"mass matrix": 19.0, "inverse dynamics": 3e-11},
-                {"mass matrix": 4e-16, "inverse dynamics": 0.25},
+                {"mass_matrix": 19.0, "inverse_dynamics": 3e-11},
+                {"mass_matrix": 4e-16, "inverse_dynamics": 0.25},
             ),
             EngineResult(
                 "mujoco", "4.0.0", "model = mujoco.MjModel.from_xml_path(path)",
                 "inertia must be positive", None,
-                {}, {"mass matrix": 4e-16},
+                {}, {"mass_matrix": 4e-16},
             ),
         ),
         findings=(
             Finding(
                 "DX901", "planted-cause", "difference", link, None, 3 + line_shift, message, ("pybullet",),
-                Effect("mass matrix", 19.0), True, "write an explicit zero inertial",
+                Effect("mass_matrix", 19.0), True, "write an explicit zero inertial",
             ),
             Finding(
                 "DX901", "planted-cause", "difference", "tool", None, 5 + line_shift, message,
-                ("pybullet", "mujoco"), Effect("mass matrix", math.inf), True, "write one",
+                ("pybullet", "mujoco"), Effect("mass_matrix", math.inf), True, "write one",
             ),
             Finding(
                 "DX902", "planted-rounding", "difference", "tool", None, 8 + line_shift, "is not diagonal",
-                ("pybullet",), Effect("inverse dynamics", 3e-11), True, "diagonalise",
+                ("pybullet",), Effect("inverse_dynamics", 3e-11), True, "diagonalise",
             ),
             Finding("DX903", "planted-practice", "practice", None, joint, 15 + line_shift, "has effort 0"),
         ),
-        unexplained=(Unexplained("pybullet", "inverse dynamics", 0.25, joint, found),),
+        unexplained=(Unexplained("pybullet", "inverse_dynamics", 0.25, joint, found),),
         residual=0.25,
         tolerance=1e-12,
         samples=6,
@@ -99,8 +99,8 @@ def differing(robot: str = "arm", base: str = "fixed", line_shift: int = 0, **na
         choices=("DX901: zero was written for the inertia (--choose DX901=keep keeps it)",),
         calls=(RunTimeCall("pybullet", "for link in range(n):\n    p.changeDynamics(robot, link)"),),
         pairs=(
-            PairError(("pinocchio", "pybullet"), "mass matrix", 19.0, {joint: 19.0}),
-            PairError(("pinocchio", "pybullet"), "inverse dynamics", 3e-11, {joint: 3e-11}),
+            PairError(("pinocchio", "pybullet"), "mass_matrix", 19.0, {joint: 19.0}),
+            PairError(("pinocchio", "pybullet"), "inverse_dynamics", 3e-11, {joint: 3e-11}),
         ),
         model_difference=(
             Deviation("pybullet", "link", link, "mass", 0.0, 1.0),
@@ -114,7 +114,7 @@ def differing(robot: str = "arm", base: str = "fixed", line_shift: int = 0, **na
 
 def alike(robot: str = "arm") -> DoctorReport:
     """All engines load the file alike."""
-    small = {"mass matrix": 1e-16}
+    small = {"mass_matrix": 1e-16}
     return DoctorReport(
         robot=robot,
         source=f"{robot}.urdf",
@@ -123,7 +123,7 @@ def alike(robot: str = "arm") -> DoctorReport:
             EngineResult("pinocchio", "4.1.0", "load", None, None, small, small),
             EngineResult("pybullet", "3.2.7", "load", None, None, small, small),
         ),
-        pairs=(PairError(("pinocchio", "pybullet"), "mass matrix", 3e-16),),
+        pairs=(PairError(("pinocchio", "pybullet"), "mass_matrix", 3e-16),),
         tolerance=1e-12,
         text=TEXT,
     )  # fmt: skip

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -87,6 +88,15 @@ def test_fingerprints_are_distinct_and_hold_no_line() -> None:
 
 def test_both_bases_are_one_result() -> None:
     assert len(results(differing(), differing(base="floating"))) == len(results(differing()))
+
+
+def test_of_two_bases_the_more_alarming_is_told() -> None:
+    worse = differing()
+    milder = replace(worse, base="floating", findings=tuple(replace(f, effect=None) for f in worse.findings))
+    for reports in ((worse, milder), (milder, worse)):
+        levels = {each["ruleId"]: each["level"] for each in results(*reports)}
+        assert levels["DX901"] == "error"
+        assert levels["DX902"] == "warning"
 
 
 def test_a_file_below_the_working_directory_is_relative(

@@ -1,0 +1,115 @@
+"""What examinations and proofs say, as the parts of a report."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import combinations
+
+from dynx.doctor.attribution import Attribution
+from dynx.doctor.examination import QUANTITIES, TORQUE, Examination, Laboratory
+from dynx.doctor.mending import Mending, Place, place
+from dynx.doctor.report import DoctorReport, EngineResult, Finding, PairError, RunTimeCall
+from dynx.doctor.truth import refereed
+from dynx.loaded import loader_class
+from dynx.loaded.difference import model_difference
+from dynx.rules import Case, Detection, Rule
+
+
+def first_report(case: Case, before: Examination, tolerance: float) -> DoctorReport:
+    """What there is to say of a case, as engines load it, before any cause is looked for."""
+    descriptions = [each.description for each in before.answers.values() if each.description is not None]
+    model = before.truth.model
+    return DoctorReport(
+        robot=model.name,
+        source=case.source.source,
+        base=case.base,
+        engines=tuple(_engine_result(case, name, before) for name in before.answers),
+        residual=_residual(before),
+        tolerance=tolerance,
+        pairs=_pairs(before),
+        referee=refereed(before.truth),
+        model_difference=tuple(model_difference(model, descriptions)),
+        text=case.source.text,
+        form=case.source.form,
+    )
+
+
+def with_after(report: DoctorReport, after: Examination) -> DoctorReport:
+    """The report with what the engines say of the mended file."""
+    engines = tuple(
+        replace(each, refused_after=after.answers[each.engine].refused, after=after.errors(each.engine))
+        for each in report.engines
+    )
+    return replace(report, engines=engines, residual=_residual(after))
+
+
+def _residual(examination: Examination) -> float:
+    """The largest error of the engines that load the file."""
+    errors = [examination.errors(engine) for engine in examination.answers]
+    return max((error for of_engine in errors for error in of_engine.values()), default=0.0)
+
+
+def _engine_result(case: Case, name: str, before: Examination) -> EngineResult:
+    kind = loader_class(name)
+    errors, refused = before.errors(name), before.answers[name].refused
+    return EngineResult(
+        engine=name,
+        version=kind.engine_version(),
+        call=kind.load_call(case.base == "floating"),
+        refused=refused,
+        refused_after=refused,
+        before=errors,
+        after=errors,
+    )
+
+
+def _pairs(examination: Examination) -> tuple[PairError, ...]:
+    loaded = [name for name, each in examination.answers.items() if each.refused is None]
+    return tuple(
+        PairError(
+            (one, other),
+            quantity,
+            examination.pair_error(one, other, quantity),
+            examination.joint_errors(one, other) if quantity == TORQUE else {},
+        )
+        for one, other in combinations(loaded, 2)
+        for quantity in QUANTITIES
+        if quantity in examination.errors(one)
+    )
+
+
+def all_findings(
+    found: Sequence[tuple[Rule, Detection]], proofs: Sequence[Attribution], mended: Mending
+) -> tuple[Finding, ...]:
+    """Everything detected, with the effect where one was proved."""
+    proved: dict[Place, list[Attribution]] = {}
+    for each in proofs:
+        proved.setdefault(place(each.rule, each.detection), []).append(each)
+    done = {rule.id: remedy.changed for rule, remedy in mended.applied}
+    findings = []
+    for rule, detection in found:
+        # The same place twice (two fields of one link, say) has its proofs in the same order.
+        of_place = proved.get(place(rule, detection), [])
+        attribution = of_place.pop(0) if of_place else None
+        finding = Finding(
+            rule.id, rule.name, rule.kind, detection.link, detection.joint, detection.line, detection.message
+        )
+        if attribution is not None and attribution.effects:
+            finding = replace(
+                finding,
+                engines=tuple(attribution.effects),
+                effect=attribution.worst,
+                proved=attribution.proved,
+                remedy=done.get(rule.id),
+            )
+        findings.append(finding)
+    return tuple(sorted(findings, key=lambda finding: finding.kind))
+
+
+def run_time_calls(case: Case, laboratory: Laboratory) -> tuple[RunTimeCall, ...]:
+    """The code behind the remedies at run time that the mended case relies on."""
+    known = [(name, kind.CALLS) for name, kind in laboratory.engines.items()]
+    return tuple(
+        RunTimeCall(engine, calls[call]) for engine, calls in known for call in calls if call in case.calls
+    )

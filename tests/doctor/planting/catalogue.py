@@ -1,0 +1,15 @@
+"""Every planter by the id of its rule, and the rules that have none."""
+
+from __future__ import annotations
+
+from tests.doctor.planting import dynamics, inertia, joints, text
+from tests.doctor.planting.site import Planter
+
+PLANTERS: dict[str, Planter] = {
+    planter.rule: planter for family in (inertia, joints, dynamics, text) for planter in family.PLANTERS
+}
+
+EXEMPT: dict[str, str] = {
+    "DX112": "MuJoCo up to 3.13 alone; no engine version that is installed has the defect",
+}
+"""Rules that nothing can show here, and why."""

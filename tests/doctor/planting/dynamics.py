@@ -1,0 +1,98 @@
+"""DX3: what engines add to the rigid bodies, planted."""
+
+from __future__ import annotations
+
+from tests.doctor.planting.joints import SINGLE, driven, limited, moving, transmission
+from tests.doctor.planting.site import NotHere, Planted, Planter, Site
+
+
+def damping(site: Site) -> Planted:
+    """Viscous friction identified on the machine."""
+    return _dynamics(site, "DX301", damping=site.rng.choice(["0.5", "0.01", "12.0"]))
+
+
+def friction(site: Site) -> Planted:
+    """Dry friction identified on the machine."""
+    return _dynamics(site, "DX302", friction=site.rng.choice(["0.2", "0.03", "5.0"]))
+
+
+def negative_damping(site: Site) -> Planted:
+    """A sign slipped in. What is negative is a damping all the same: it enters torques as one does."""
+    return _dynamics(site, "DX303", also=["DX301"], damping=site.rng.choice(["-0.1", "-2.0"]))
+
+
+def mimic(site: Site) -> Planted:
+    """One joint follows another, as the fingers of a gripper do."""
+    joint, element = site.pick_joint(moving, "joint that moves")
+    followed, _ = site.pick_joint(lambda each: moving(each) and each is not joint, "joint to follow")
+    multiplier = site.rng.choice(["1", "-1", "0.5"])
+    text = f'<mimic joint="{followed.name}" multiplier="{multiplier}" offset="0"/>'
+    return site.planted(
+        "DX304", site.source.inserting(element, text), joint=joint.name, touched=[followed.name]
+    )
+
+
+def empty_dynamics(site: Site) -> Planted:
+    """The element of a template whose numbers were not known."""
+    joint, element = site.pick_joint(lambda each: each.type in SINGLE, "joint that moves")
+    edit = site.source.inserting(element, "<dynamics/>")
+    return site.planted("DX305", edit, joint=joint.name)
+
+
+def no_room(site: Site) -> Planted:
+    """A range of zero width; PyBullet takes one without an upper end for none."""
+    joint, element = site.pick_joint(limited, "joint with a limit")
+    value = site.rng.choice(["0", "0.0", "0.3"])
+    edits = site.setting_in(element, "limit", lower=value, upper=value)
+    return site.planted("DX306", *edits, joint=joint.name)
+
+
+def rotor(site: Site) -> Planted:
+    """The rotor of a geared motor, as Drake's extension has it."""
+    joint, _ = site.pick_joint(driven, "joint that moves")
+    inside = (
+        f'  <joint name="{joint.name}"/>\n  <actuator name="motor_of_{joint.name}">\n'
+        '    <drake:rotor_inertia value="0.0003"/>\n    <drake:gear_ratio value="50"/>\n  </actuator>'
+    )
+    text = transmission(f"gear_of_{joint.name}", inside)
+    return site.planted("DX307", site.source.inserting(site.source.root, text), joint=joint.name)
+
+
+def contacts(site: Site) -> Planted:
+    """Shapes larger than the links, on a link and on what hangs two joints below it.
+
+    Off centre: between points of two axes that meet the distance stays, and a contact there does no work.
+    """
+    skeleton = site.skeleton
+    upper = {joint.child: joint.parent for joint in site.model.joints}
+    pairs = []
+    for link in upper:
+        between = upper.get(skeleton.heads[link])
+        if between is None or skeleton.heads[between] not in upper:
+            continue
+        far = upper[skeleton.heads[between]]
+        if site.free(link, far):
+            pairs.append((far, link))
+    first, second = site.pick(pairs, "links with two joints between them")
+    shape = '<collision>\n  <origin xyz="0.3 0.2 -0.1"/>\n  <geometry>\n    <sphere radius="1.5"/>\n  </geometry>\n</collision>'
+    edits = [site.source.inserting(site.element("link", name), shape) for name in (first, second)]
+    return site.planted("DX308", *edits, touched=[first, second], sign="<collision>")
+
+
+def _dynamics(site: Site, rule: str, also: tuple[str, ...] | list[str] = (), **words: str) -> Planted:
+    joint, element = site.pick_joint(moving, "joint that moves")
+    if element.first("dynamics") is not None:
+        raise NotHere("the joint has dynamics")
+    return site.planted(rule, *site.setting_in(element, "dynamics", **words), joint=joint.name, also=also)
+
+
+PLANTERS = (
+    Planter("DX301", damping),
+    Planter("DX302", friction),
+    Planter("DX303", negative_damping),
+    Planter("DX304", mimic),
+    Planter("DX305", empty_dynamics),
+    Planter("DX306", no_room),
+    Planter("DX307", rotor),
+    Planter("DX308", contacts),
+)

@@ -1,0 +1,227 @@
+"""DX2: what can be wrong with joints, planted."""
+
+from __future__ import annotations
+
+from dynx.model.elements import Joint
+from tests.doctor.planting.inertia import ZERO, not_new
+from tests.doctor.planting.site import NotHere, Planted, Planter, Site
+
+TURNING = ("revolute", "continuous")
+SINGLE = (*TURNING, "prismatic")
+
+
+def axis_not_unit(site: Site) -> Planted:
+    """An axis of the wrong length, or rounded to six digits."""
+    joint, element = site.pick_joint(moving, "joint that moves")
+    factor = site.rng.choice([2.0, -1.5, 10.0, 0.5, 1.000001, 0.999998])
+    words = " ".join(f"{factor * value + 0.0:.9g}" for value in joint.axis)
+    return site.planted("DX201", *site.setting_in(element, "axis", xyz=words), joint=joint.name)
+
+
+def axis_without_direction(site: Site) -> Planted:
+    """The zero axis that exporters write for fixed joints."""
+    joint, element = site.pick_joint(moving, "joint that moves")
+    words = site.rng.choice(["0 0 0", "0.0 0.0 0.0", ""])
+    return site.planted("DX202", *site.setting_in(element, "axis", xyz=words), joint=joint.name)
+
+
+def without_limit(site: Site) -> Planted:
+    """The limit forgotten, or commented out."""
+    joint, element = site.pick_joint(limited, "joint with a limit")
+    limit = element.first("limit")
+    assert limit is not None
+    text = site.source.data[limit.span.start : limit.span.end].decode()
+    plain = site.rng.random() < 0.5 or "--" in text
+    edit = site.source.removing(limit) if plain else site.source.replacing(limit, f"<!-- {text} -->")
+    return site.planted("DX203", edit, joint=joint.name)
+
+
+def without_effort(site: Site) -> Planted:
+    """A limit that says where, and not how hard or how fast."""
+    joint, element = site.pick_joint(limited, "joint with a limit")
+    limit = element.first("limit")
+    assert limit is not None
+    names = [name for name in ("effort", "velocity") if name in limit.attributes]
+    gone = names if site.rng.random() < 0.5 else [site.pick(names, "effort or velocity")]
+    edits = [site.source.removing_attribute(limit, name) for name in gone]
+    return site.planted("DX204", *edits, joint=joint.name)
+
+
+def limits_exchanged(site: Site) -> Planted:
+    """Lower and upper the wrong way round."""
+    joint, element = site.pick_joint(
+        lambda each: limited(each) and each.limits.lower < each.limits.upper, "joint with room"
+    )
+    limit = element.first("limit")
+    assert limit is not None
+    lower, upper = (limit.attributes.get(name, "0") for name in ("lower", "upper"))
+    edits = site.setting_in(element, "limit", lower=upper, upper=lower)
+    return site.planted("DX205", *edits, joint=joint.name)
+
+
+def negative_effort(site: Site) -> Planted:
+    """-1 for no limit, or a sign that slipped in."""
+    joint, element = site.pick_joint(limited, "joint with a limit")
+    limit = element.first("limit")
+    assert limit is not None
+    name = site.rng.choice(["effort", "velocity"])
+    old = limit.attributes.get(name, "0").strip()
+    wanted = "-1" if float(old) == 0.0 or site.rng.random() < 0.5 else f"-{old}"
+    return site.planted("DX206", *site.setting_in(element, "limit", **{name: wanted}), joint=joint.name)
+
+
+def safety_without_gain(site: Site) -> Planted:
+    """Soft limits copied without the gain that URDF demands."""
+    joint, element = site.pick_joint(moving, "joint that moves")
+    text = '<safety_controller soft_lower_limit="-1.5" soft_upper_limit="1.5" k_position="15"/>'
+    return site.planted("DX207", site.source.inserting(element, text), joint=joint.name)
+
+
+def mimic_of_nothing(site: Site) -> Planted:
+    """The joint to follow misspelled, gone, or the follower itself."""
+    joint, element = site.pick_joint(moving, "joint that moves")
+    words = site.rng.choice([f'joint="{joint.name}_left"', 'joint="gripper_finger"', f'joint="{joint.name}"'])
+    text = f'<mimic {words} multiplier="1" offset="0"/>'
+    return site.planted("DX208", site.source.inserting(element, text), joint=joint.name)
+
+
+def mimic_of_fixed(site: Site) -> Planted:
+    """The joint to follow was made fixed."""
+    joint, element = site.pick_joint(moving, "joint that moves")
+    followed, _ = site.pick_joint(lambda each: each.type == "fixed", "fixed joint")
+    offset = site.rng.choice(["0", "0.1"])
+    text = f'<mimic joint="{followed.name}" multiplier="1" offset="{offset}"/>'
+    return site.planted(
+        "DX209", site.source.inserting(element, text), joint=joint.name, touched=[followed.name]
+    )
+
+
+def several_freedoms(site: Site) -> Planted:
+    """A ball joint or the like, which some readers know; a floating one below an empty root is DX211's."""
+    joint, element = site.pick_joint(moving, "joint that moves")
+    below_mount = joint.parent == site.model.root and site.skeleton.mass(joint.parent) == 0.0
+    kind = site.rng.choice(["spherical", "planar", *([] if below_mount else ["floating"])])
+    return site.planted(
+        "DX210", site.source.setting(element, "type", kind), joint=joint.name, touched=[joint.child]
+    )
+
+
+def floating_at_root(site: Site) -> Planted:
+    """A frame that carries the robot by a floating joint: its base is meant to be free.
+
+    A root named world would be a second defect below another root, and so would one without mass on
+    a joint that is not fixed.
+    """
+    root = site.model.root
+    if not site.free(root) or root == "world":
+        raise NotHere("the root is taken, or is the world")
+    if not any(site.skeleton.mass(each) > 0.0 for each in site.skeleton.welded(root)):
+        raise NotHere("nothing at the root has mass")
+    name = site.rng.choice(["odom", "map", "ground"])
+    if not_new(site, name):
+        raise NotHere(f"has a link {name}")
+    edit = site.source.inserting(
+        site.source.root,
+        f'<link name="{name}">\n{ZERO}</link>\n<joint name="free_joint" type="floating">\n'
+        f'  <parent link="{name}"/>\n  <child link="{root}"/>\n</joint>',
+        first=True,
+    )
+    return site.planted("DX211", edit, joint="free_joint", touched=[root, name])
+
+
+def too_many(site: Site) -> Planted:
+    """A skin of sensors, each with a frame of its own."""
+    parent, _ = site.pick_link(lambda each: site.skeleton.mass(each) > 0.0, "heavy link")
+    missing = 128 + site.rng.randint(0, 3) - len(site.source.root.all("joint"))
+    parts = [
+        f'<link name="taxel_{k}">\n{ZERO}</link>\n<joint name="taxel_{k}_fixed" type="fixed">\n'
+        f'  <origin xyz="0.01 0 {k}e-3" rpy="0 0 0"/>\n'
+        f'  <parent link="{parent}"/>\n  <child link="taxel_{k}"/>\n</joint>'
+        for k in range(missing)
+    ]
+    edit = site.source.inserting(site.source.root, "\n".join(parts))
+    return site.planted("DX212", edit, touched=[parent], sign="taxel_")
+
+
+def named_universe(site: Site) -> Planted:
+    """The joint to a payload named as somebody liked it."""
+    skeleton = site.skeleton
+    parent, _ = site.pick_link(
+        lambda each: skeleton.moves(each) and skeleton.ranks[each] > 0 and skeleton.mass(each) > 1e-3,
+        "heavy link that turns",
+    )
+    if not_new(site, "payload"):
+        raise NotHere("has a payload")
+    mass = round(skeleton.mass(parent) * site.rng.uniform(0.1, 0.5), 6)
+    moment = f"{mass * 0.01:.6g}"
+    inertial = (
+        f'  <inertial>\n    <origin xyz="0.01 0.02 0.03" rpy="0 0 0"/>\n    <mass value="{mass}"/>\n'
+        f'    <inertia ixx="{moment}" ixy="0" ixz="0" iyy="{moment}" iyz="0" izz="{moment}"/>\n'
+        "  </inertial>\n"
+    )
+    edit = site.attached("payload", parent, inertial=inertial, joint="universe")
+    return site.planted("DX213", edit, joint="universe", touched=[parent, "payload"])
+
+
+def transmission_of_nothing(site: Site) -> Planted:
+    """A transmission that lost its actuator, or whose joint was renamed."""
+    joint, _ = site.pick_joint(moving, "joint that moves")
+    if site.rng.random() < 0.5:
+        inside = f'  <joint name="{joint.name}"/>'
+    else:
+        inside = f'  <joint name="{joint.name}_old"/>\n  <actuator name="motor_of_{joint.name}"/>'
+    text = transmission(f"drive_of_{joint.name}", inside)
+    edit = site.source.inserting(site.source.root, text)
+    return site.planted("DX214", edit, touched=[joint.name], sign=f"drive_of_{joint.name}")
+
+
+def actuator_twice(site: Site) -> Planted:
+    """A transmission copied, and its joint alone changed."""
+    first, _ = site.pick_joint(driven, "joint that moves")
+    second, _ = site.pick_joint(lambda each: driven(each) and each is not first, "second joint that moves")
+    text = "\n".join(
+        transmission(f"twin_{k}", f'  <joint name="{joint.name}"/>\n  <actuator name="twin_motor"/>')
+        for k, joint in enumerate((first, second))
+    )
+    edit = site.source.inserting(site.source.root, text)
+    return site.planted("DX215", edit, touched=[first.name, second.name], sign="twin_motor")
+
+
+def transmission(name: str, inside: str) -> str:
+    """The text of a ``<transmission>`` of the usual type."""
+    kind = "<type>transmission_interface/SimpleTransmission</type>"
+    return f'<transmission name="{name}">\n  {kind}\n{inside}\n</transmission>'
+
+
+def moving(joint: Joint) -> bool:
+    """Whether it has a coordinate."""
+    return joint.type in SINGLE and joint.moves
+
+
+def driven(joint: Joint) -> bool:
+    """Whether a motor can move it: Drake makes no actuator for an effort limit of 0."""
+    return moving(joint) and joint.limits.effort > 0.0
+
+
+def limited(joint: Joint) -> bool:
+    """Whether URDF demands a limit."""
+    return joint.type in ("revolute", "prismatic")
+
+
+PLANTERS = (
+    Planter("DX201", axis_not_unit),
+    Planter("DX202", axis_without_direction),
+    Planter("DX203", without_limit),
+    Planter("DX204", without_effort),
+    Planter("DX205", limits_exchanged),
+    Planter("DX206", negative_effort),
+    Planter("DX207", safety_without_gain),
+    Planter("DX208", mimic_of_nothing),
+    Planter("DX209", mimic_of_fixed),
+    Planter("DX210", several_freedoms),
+    Planter("DX211", floating_at_root, ("fixed",)),
+    Planter("DX212", too_many),
+    Planter("DX213", named_universe),
+    Planter("DX214", transmission_of_nothing),
+    Planter("DX215", actuator_twice),
+)

@@ -1,0 +1,107 @@
+"""Robots that every installed engine loads alike, made from real files, into which defects are planted.
+
+A file is freed of what is no defect and still parts engines (damping, friction, mimic joints, limits
+without room, primitive collision shapes), and the rest is mended by the remedies of the catalogue.
+Formatting and comments stay as they are.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+from dynx.doctor.mending import mend
+from dynx.model.library import find
+from dynx.model.loading import read_model
+from dynx.model.model import Base
+from dynx.model.xml_source import Edit, SourceElement, XmlSource
+from dynx.rules import Case
+from tests.doctor.planting.skeleton import Skeleton
+
+BASES: tuple[Base, ...] = ("fixed", "floating")
+
+REAL = (
+    "a1",
+    "anymal",
+    "asr_twodof",
+    "bolt",
+    "double_pendulum",
+    "go2",
+    "hextilt",
+    "kinova",
+    "panda",
+    "so100",
+    "solo12",
+    "talos_arm",
+    "ur5",
+    "z1",
+)
+"""Robots of example-robot-data: arms, quadrupeds, a biped, a flying arm."""
+
+OWN = (
+    "cart_pole",
+    "dynx_double_pendulum",
+    "pendulum",
+    "planar_2r",
+    "planar_3r",
+    "scara",
+    "seven_axis_arm",
+    "six_axis_arm",
+)
+"""Of the models that come with dynx those with a joint."""
+
+ROBOTS = (*REAL, *OWN)
+
+QUICK = (*OWN, "asr_twodof", "double_pendulum", "hextilt", "kinova", "so100", "ur5")
+"""Those that take the doctor the shortest time."""
+
+
+def bases(name: str) -> tuple[Base, ...]:
+    """Those on which the robot has a mass matrix worth the name: not free where its root is a mere mount."""
+    return BASES if _has_free_body(name) else ("fixed",)
+
+
+_STRIPPED = ("dynamics", "mimic", "safety_controller")
+
+
+@cache
+def clean_text(name: str, base: Base) -> str:
+    """The URDF of a robot on a base, without anything that parts engines."""
+    return mend(Case(_stripped(name), base)).case.source.text
+
+
+@cache
+def clean_skeleton(name: str, base: Base) -> Skeleton:
+    """What dynx reads in it, and how it hangs together."""
+    return Skeleton.of(read_model(clean_text(name, base), name, base=base))
+
+
+@cache
+def _has_free_body(name: str) -> bool:
+    skeleton = Skeleton.of(read_model(_stripped(name).text, name, base="floating"))
+    return any(skeleton.mass(each) > 0.0 for each in skeleton.welded(skeleton.model.root))
+
+
+def _stripped(name: str) -> XmlSource:
+    path = find(name)
+    source = XmlSource(path.read_bytes(), path.name)
+    return source.edited(*(edit for part in source.root.children for edit in _stripping(source, part)))
+
+
+def _stripping(source: XmlSource, part: SourceElement) -> list[Edit]:
+    if part.tag == "link":
+        return [source.removing(each) for each in part.all("collision") if not _is_mesh(each)]
+    if part.tag != "joint":
+        return []
+    edits = [source.removing(each) for each in part.children if each.tag in _STRIPPED]
+    limit = part.first("limit")
+    if limit is not None and part.attributes.get("type") == "revolute" and _without_room(limit):
+        edits.append(source.setting(part, "type", "continuous"))
+    return edits
+
+
+def _is_mesh(collision: SourceElement) -> bool:
+    return any(element.tag == "mesh" for element in collision.walk())
+
+
+def _without_room(limit: SourceElement) -> bool:
+    return float(limit.attributes.get("lower", "0")) == float(limit.attributes.get("upper", "0"))

@@ -1,0 +1,155 @@
+"""Where a defect is planted: a robot's text, what may still be touched in it, and the luck of the draw."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from random import Random
+from typing import TypeVar
+
+from dynx.model import Model
+from dynx.model.elements import Joint
+from dynx.model.model import Base
+from dynx.model.xml_source import Edit, SourceElement, XmlSource
+from tests.doctor.planting.skeleton import Skeleton
+
+Place = tuple[str, "str | None", "str | None"]
+"""Rule, link and joint, as a finding names them."""
+
+T = TypeVar("T")
+
+
+class NotHere(Exception):
+    """The defect cannot be planted into this robot, and why."""
+
+
+@dataclass(frozen=True)
+class Planted:
+    """A defect in a text, and where a diagnosis has to put it.
+
+    `touched` are the links and joints that took part. `sign` is text that stands in the line of the
+    defect, for rules whose place is no link and no joint. `also` are further findings that are true of
+    the same defect at the same place: see `Site.planted`.
+    """
+
+    source: XmlSource
+    place: Place
+    touched: frozenset[str]
+    sign: str = ""
+    also: frozenset[Place] = frozenset()
+
+
+@dataclass(frozen=True)
+class Site:
+    """A text in which `taken` links and joints hold a defect already.
+
+    `skeleton` is that of the clean robot: the text itself need not be readable any more.
+    """
+
+    source: XmlSource
+    skeleton: Skeleton
+    rng: Random
+    taken: frozenset[str] = field(default_factory=frozenset)
+
+    @property
+    def model(self) -> Model:
+        """The clean robot."""
+        return self.skeleton.model
+
+    # -- choosing -----------------------------------------------------------------------------
+
+    def pick(self, candidates: Sequence[T], wanted: str) -> T:
+        """One of them at random; NotHere where there is none."""
+        if not candidates:
+            raise NotHere(f"no {wanted}")
+        return self.rng.choice(candidates)
+
+    def free(self, *names: str) -> bool:
+        """Whether nothing was planted there yet, and the text still has them by these names."""
+        here = {part.attributes.get("name") for part in self.source.root.children}
+        return not self.taken.intersection(names) and here.issuperset(names)
+
+    def pick_joint(self, fits: Callable[[Joint], bool], wanted: str) -> tuple[Joint, SourceElement]:
+        """A joint of the robot, and its element in the text."""
+        joint = self.pick([each for each in self.model.joints if self.free(each.name) and fits(each)], wanted)
+        return joint, self.element("joint", joint.name)
+
+    def pick_link(self, fits: Callable[[str], bool], wanted: str) -> tuple[str, SourceElement]:
+        """The name of a link, and its element in the text."""
+        names = [each.name for each in self.model.links]
+        name = self.pick([each for each in names if self.free(each) and fits(each)], wanted)
+        return name, self.element("link", name)
+
+    def element(self, tag: str, name: str) -> SourceElement:
+        """The link or joint of that name in the text."""
+        found = [each for each in self.source.root.all(tag) if each.attributes.get("name") == name]
+        if not found:
+            raise NotHere(f"the text has no {tag} {name} any more")
+        return found[0]
+
+    # -- planting -----------------------------------------------------------------------------
+
+    def planted(
+        self,
+        rule: str,
+        *edits: Edit,
+        link: str | None = None,
+        joint: str | None = None,
+        touched: Sequence[str] = (),
+        sign: str = "",
+        also: Sequence[str] = (),
+    ) -> Planted:
+        """The text with the edits; `also` are ids of rules about the very same words of the same place."""
+        own = [name for name in (link, joint) if name is not None]
+        return Planted(
+            self.source.edited(*edits),
+            (rule, link, joint),
+            self.taken | {*own, *touched},
+            sign,
+            frozenset((each, link, joint) for each in also),
+        )
+
+    def attached(self, name: str, parent: str, *, inertial: str = "", joint: str | None = None) -> Edit:
+        """A further link on a fixed joint, at the end of the robot."""
+        x, y, z = (round(self.rng.uniform(-0.1, 0.1), 3) for _ in range(3))
+        link = f'<link name="{name}">\n{inertial}</link>' if inertial else f'<link name="{name}"/>'
+        text = (
+            f'{link}\n<joint name="{joint or name + "_joint"}" type="fixed">\n'
+            f'  <origin xyz="{x} {y} {z}" rpy="0 0 0"/>\n'
+            f'  <parent link="{parent}"/>\n  <child link="{name}"/>\n</joint>'
+        )
+        return self.source.inserting(self.source.root, text)
+
+    def setting_in(self, part: SourceElement, tag: str, **attributes: str) -> list[Edit]:
+        """Attributes of the first element `tag` of a part, which is made where there is none."""
+        element = part.first(tag)
+        if element is not None:
+            return [self.source.setting(element, name, value) for name, value in attributes.items()]
+        words = " ".join(f'{name}="{value}"' for name, value in attributes.items())
+        return [self.source.inserting(part, f"<{tag} {words}/>")]
+
+    def renaming(self, tag: str, old: str, new: str) -> list[Edit]:
+        """Another name for a link or joint, wherever the document mentions it."""
+        mentions = {"link": {"parent": "link", "child": "link"}, "joint": {"mimic": "joint", "joint": "name"}}
+        edits = []
+        for element in self.source.root.walk():
+            name = "name" if element.tag == tag else mentions[tag].get(element.tag)
+            name = "reference" if element.tag == "gazebo" else name
+            if name is not None and element.attributes.get(name) == old:
+                edits.append(self.source.setting(element, name, new))
+        return edits
+
+    def writing(self, element: SourceElement, name: str, text: str) -> Edit:
+        """The text of an attribute as it stands, tabs and line breaks too."""
+        place = element.places[name]
+        old = self.source.data[place.start : place.end].decode("utf-8")
+        return Edit(place.start, place.end, f'{old[: old.index(name)]}{name}="{text}"')
+
+
+@dataclass(frozen=True)
+class Planter:
+    """Plants the defect of one rule; `bases` are those on which it is one."""
+
+    rule: str
+    plant: Callable[[Site], Planted]
+    bases: tuple[Base, ...] = ("fixed", "floating")

@@ -1,0 +1,101 @@
+"""How a robot hangs together: what is welded to what, what moves, and what carries what.
+
+Written afresh, from the model alone: planters must not see robots by the eyes of the rules they test.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from dynx.backends.reference import ReferenceBackend
+from dynx.model import Model
+from dynx.model.elements import Inertial
+from dynx.spatial.scalar import Floats
+from dynx.spatial.so3 import rotation_from_rpy
+
+
+@dataclass(frozen=True, eq=False)
+class Skeleton:
+    """`heads` names the first of the links welded to a link; `ranks` counts the independent directions
+    about which a link turns, in the zero position."""
+
+    model: Model
+    heads: dict[str, str]
+    ranks: dict[str, int]
+
+    @staticmethod
+    def of(model: Model) -> Skeleton:
+        """The skeleton of a model."""
+        heads = {model.root: model.root}
+        rotations: dict[str, Floats] = {model.root: np.eye(3)}
+        axes: dict[str, list[Floats]] = {model.root: list(np.eye(3)) if model.floating else []}
+        for joint in model.joints:  # depth first: a parent comes before its children
+            heads[joint.child] = heads[joint.parent] if joint.type == "fixed" else joint.child
+            rotation = rotations[joint.parent] @ rotation_from_rpy(np.array(joint.origin.rpy))
+            rotations[joint.child] = rotation
+            turning = [rotation @ np.array(joint.axis)] if joint.type in ("revolute", "continuous") else []
+            axes[joint.child] = axes[joint.parent] + turning
+        ranks = {
+            name: int(np.linalg.matrix_rank(np.array(found), tol=1e-6)) if found else 0
+            for name, found in axes.items()
+        }
+        return Skeleton(model, heads, ranks)
+
+    def inertial(self, link: str) -> Inertial | None:
+        """What the file says of the link."""
+        return next(each.inertial for each in self.model.links if each.name == link)
+
+    def mass(self, link: str) -> float:
+        """[kg]"""
+        inertial = self.inertial(link)
+        return 0.0 if inertial is None else inertial.mass
+
+    def solid(self, link: str) -> bool:
+        """Whether the link has a mass and three moments worth the name."""
+        inertial = self.inertial(link)
+        if inertial is None or inertial.mass < 1e-6:
+            return False
+        return min(inertial.ixx, inertial.iyy, inertial.izz) > 1e-9
+
+    def size(self, link: str) -> float:
+        """The largest moment of the link [kg m^2]."""
+        inertial = self.inertial(link)
+        return 0.0 if inertial is None else max(inertial.ixx, inertial.iyy, inertial.izz)
+
+    @cached_property
+    def largest_inertia(self) -> float:
+        """The largest entry of the mass matrix at one pose: what errors are measured against."""
+        model = self.model
+        with ReferenceBackend(model) as reference:
+            return float(np.max(np.abs(reference.mass_matrix(model.random(0))), initial=0.0))
+
+    def moves(self, link: str) -> bool:
+        """Whether anything moves it."""
+        return self.model.floating or self.heads[link] != self.model.root
+
+    def welded(self, link: str) -> list[str]:
+        """All that is welded to the link, and the link."""
+        return [each for each, head in self.heads.items() if head == self.heads[link]]
+
+    def carried(self, link: str) -> list[str]:
+        """The links that joints hold on it, fixed ones too."""
+        return [joint.child for joint in self.model.joints if joint.parent == link]
+
+    def alone(self, link: str) -> bool:
+        """Whether a joint carries the link, and nothing welded to it has mass."""
+        carried = self.heads[link] == link and link != self.model.root
+        return carried and all(self.mass(each) < 1e-6 for each in self.welded(link) if each != link)
+
+    def beyond(self, link: str) -> list[str]:
+        """Heads of what moving joints carry beyond all that is welded to the link."""
+        group = set(self.welded(link))
+        found: list[str] = []
+        for joint in self.model.joints:
+            if joint.parent in group and joint.child not in group:
+                found.append(joint.child)
+                group.add(joint.child)
+                group.update(self.welded(joint.child))
+        return found

@@ -1,0 +1,94 @@
+"""An engine made of the reference, with faults on purpose: what the doctor must say of it is known."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+
+from dynx.backends.reference import ReferenceBackend
+from dynx.doctor.examination import Examination, Laboratory
+from dynx.doctor.truth import free_model
+from dynx.errors import EngineError
+from dynx.loaded import LoadedModel, LoadedRobot
+from dynx.model import Inertial, Model
+from dynx.model.xml_source import XmlSource
+from dynx.rules import Case
+from dynx.spatial.scalar import Floats
+
+NAME = "pybullet"
+"""What it is called: a name by which rules know an engine."""
+
+SECRET = "secret"
+"""It refuses a file that holds this word."""
+
+HEAVY = Inertial(1.0, ixx=1.0, iyy=1.0, izz=1.0)
+"""What a link without ``<inertial>`` weighs to it, as to PyBullet (DX101)."""
+
+
+class WilfulEngine(LoadedRobot):
+    """Right but for links without ``<inertial>``; subclasses spoil more."""
+
+    name: ClassVar[str] = NAME
+    CALLS: ClassVar[Mapping[str, str]] = {}
+
+    def __init__(self, path: Path, model: Model, calls: Collection[str] = ()) -> None:
+        text = path.read_bytes()
+        if SECRET.encode() in text:
+            raise EngineError(f"{path.name} is a {SECRET}")
+        read = free_model(XmlSource(text), model.base)
+        links = tuple(replace(link, inertial=link.inertial or HEAVY) for link in read.links)
+        self.model, self.right = model, ReferenceBackend(replace(read, links=links))
+
+    @classmethod
+    def engine_version(cls) -> str:
+        """A version for which the rules hold."""
+        return "3.2.7"
+
+    @classmethod
+    def load_call(cls, floating: bool) -> str:
+        """No call."""
+        return "load(path)"
+
+    def describe(self) -> LoadedModel:
+        """Nothing."""
+        return LoadedModel(NAME, {}, {}, np.eye(4), np.array([0.0, 0.0, -9.80665]))
+
+    def link_poses(self, q: Floats) -> Floats:
+        """Of the reference."""
+        return self.right.forward_kinematics(q)[: len(self.model.links)]
+
+    def jacobian(self, q: Floats, link: str) -> Floats:
+        """Of the reference."""
+        return self.right.jacobian(q, link)
+
+    def mass_matrix(self, q: Floats) -> Floats:
+        """Of the reference."""
+        return self.right.mass_matrix(q)
+
+    def inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
+        """Of the reference."""
+        return self.right.inverse_dynamics(q, v, a)
+
+    def forward_dynamics(self, q: Floats, v: Floats, tau: Floats) -> Floats:
+        """Of the reference."""
+        return self.right.forward_dynamics(q, v, tau)
+
+    def close(self) -> None:
+        """Close the reference."""
+        self.right.close()
+
+
+def laboratory(engine: type[LoadedRobot] = WilfulEngine, samples: int = 3) -> Laboratory:
+    """A laboratory with that engine alone."""
+    made = Laboratory((), samples, 0)
+    made.engines[NAME] = engine
+    return made
+
+
+def examined(case: Case, engine: type[LoadedRobot] = WilfulEngine, samples: int = 3) -> Examination:
+    """The engine's answers to a case."""
+    return laboratory(engine, samples).examine(case)
