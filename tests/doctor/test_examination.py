@@ -23,7 +23,7 @@ class Weak(WilfulEngine):
     """All torques and mass matrices one in a hundred too large."""
 
     def mass_matrix(self, q: Floats) -> Floats:
-        return 1.01 * super().mass_matrix(q)
+        return np.asarray(1.01 * super().mass_matrix(q))
 
     def inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
         return 1.01 * super().inverse_dynamics(q, v, a)
@@ -33,14 +33,14 @@ class Fast(WilfulEngine):
     """All accelerations one in a hundred too large."""
 
     def forward_dynamics(self, q: Floats, v: Floats, tau: Floats) -> Floats:
-        return 1.01 * super().forward_dynamics(q, v, tau)
+        return np.asarray(1.01 * super().forward_dynamics(q, v, tau))
 
 
 class Stop(WilfulEngine):
     """A stop that holds the first joint from turning backwards."""
 
     def forward_dynamics(self, q: Floats, v: Floats, tau: Floats) -> Floats:
-        a = super().forward_dynamics(q, v, tau).copy()
+        a: Floats = super().forward_dynamics(q, v, tau).copy()
         a[0] = max(a[0], 0.0)
         return a
 
@@ -49,7 +49,7 @@ class Lost(WilfulEngine):
     """No numbers for dynamics; one link fused away, one without a place."""
 
     def link_poses(self, q: Floats) -> Floats:
-        T = super().link_poses(q).copy()
+        T: Floats = super().link_poses(q).copy()
         T[0], T[2, 0, 3] = np.nan, np.nan
         return T
 

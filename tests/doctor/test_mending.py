@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from dynx.agreement.tolerances import BAR
@@ -9,6 +11,8 @@ from dynx.doctor.examination import Laboratory
 from dynx.doctor.mending import all_but, mend, place
 from dynx.loaded import installed_engines
 from dynx.rules import find_rule
+from tests.doctor.test_attribution import Replaced
+from tests.rules.documents import case_of, link
 from tests.rules.trap_cases import trap
 
 
@@ -19,6 +23,19 @@ def test_bad_practice_is_mended_where_the_user_chose_so(rule_id: str, choice: st
     mended = mend(trap(rule_id, **{rule_id: choice}))
     assert not rule.detect(mended.case)
     assert f"{rule_id}={choice}: {rule.choices[choice]}" in mended.choices[0]
+
+
+class Opinion(Replaced):
+    """A rule about practice that would edit if it were asked."""
+
+    kind = "practice"
+
+
+def test_practice_is_left_alone_whatever_its_rule_could_do() -> None:
+    rule, case = Opinion("old", "new"), case_of(link("base"), "<!-- old -->")
+    assert mend(case, [rule]).case is case
+    asked = mend(replace(case, settings={rule.id: "edit"}), [rule])
+    assert "<!-- new -->" in asked.case.source.text
 
 
 def test_a_change_of_the_physics_is_said() -> None:

@@ -175,7 +175,7 @@ DOCTOR_FAULTS = (
         MENDING,
         right='return rule.kind == "difference" or rule.id in (case.settings or {})',
         wrong="return True",
-        caught_by=f"{TEST_MENDING}::test_bad_practice_is_mended_where_the_user_chose_so",
+        caught_by=f"{TEST_MENDING}::test_practice_is_left_alone_whatever_its_rule_could_do",
     ),
     Fault(
         "mending_more_than_is_needed",

@@ -97,7 +97,7 @@ RULES_FAULTS = (
         DX105,
         right="_NOTICEABLE = 1e-14",
         wrong="_NOTICEABLE = 1e-6",
-        caught_by=f"{DETECTIONS}::test_a_planted_tensor_is_found_alone_on_its_link_and_line[six_axis_arm-DX105]",
+        caught_by=f"{DETECTIONS}::test_a_tensor_is_found_where_what_bullet_makes_of_it_could_show",
     ),
     Fault(
         "dx105_products_stay",
@@ -136,11 +136,11 @@ RULES_FAULTS = (
         caught_by=f"{JOINTS}::test_an_axis_is_scaled_as_dynx_scales_it",
     ),
     Fault(
-        "dx201_fifteen_digits",
+        "numbers_of_fifteen_digits",
         NUMBERS,
         right="return repr(float(value) + 0.0)",
         wrong='return f"{value:.15g}"',
-        caught_by=f"{JOINTS}::test_any_length_is_found_and_scaled",
+        caught_by="tests/rules/test_number_text.py::test_a_number_is_written_as_it_was",
     ),
     Fault(
         "dx301_damping_of_zero_is_damping",
@@ -210,8 +210,8 @@ RULES_FAULTS = (
     Fault(
         "source_attribute_set_twice",
         SOURCE,
-        right="[span.end for span in element.places.values()]",
-        wrong="[span.start for span in element.places.values()]",
+        right="place = element.places.get(name)",
+        wrong="place = element.places.get(value)",
         caught_by=f"{TEST_SOURCE}::test_an_attribute_is_set_and_all_else_stays",
     ),
     Fault(

@@ -25,7 +25,8 @@ TIMEOUT = 300
 
 IMPORTED_BEFORE = (
     *("pytest", "numpy", "scipy.spatial.transform", "scipy.linalg.lapack", "mpmath"),
-    *("hypothesis", "hypothesis.strategies", "hypothesis.extra.numpy", "pinocchio"),
+    *("hypothesis", "hypothesis.strategies", "hypothesis.extra.numpy"),
+    *("pinocchio", "mujoco", "pydrake.multibody.parsing"),
 )
 OPTIONS = (
     *("-x", "-q", "-p", "tests.faults.plant", "-p", "no:xdist", "-p", "no:benchmark"),

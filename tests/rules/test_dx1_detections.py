@@ -6,11 +6,13 @@ from collections.abc import Callable
 
 import pytest
 
+from dynx.agreement.tolerances import BAR
 from dynx.model.elements import Inertial, Pose
 from dynx.model.library import OWN_MODELS, robots
 from dynx.model.model import Base
 from dynx.model.xml_source import Edit, XmlSource
 from dynx.rules import Case, all_rules, find_rule
+from dynx.rules.bullet_inertias import diagonalisation_error
 from dynx.rules.impossible_inertia import NUMBERS_OF_THE_FILE
 from dynx.rules.inertial_edits import inertial_edits, with_inertials
 from dynx.rules.rigid_groups import rigid_groups
@@ -76,6 +78,17 @@ def test_a_planted_tensor_is_found_alone_on_its_link_and_line(name: str, rule: s
         assert element is not None
         inner = element.first(TENSOR_TAG.get(rule, "inertia")) or element
         assert findings(case) == [(rule, link_name, inner.line)]
+
+
+@pytest.mark.parametrize("product", [1e-5, 1e-4, 5e-4, 1e-3, 2e-3, 3e-3, 0.0])
+def test_a_tensor_is_found_where_what_bullet_makes_of_it_could_show(product: float) -> None:
+    tensor = Inertial(1.5, SOLID.origin, 0.02, product, -product / 3.0, 0.03, product / 7.0, 0.025)
+    error = diagonalisation_error(tensor)
+    case = with_inertials(robot("six_axis_arm", "fixed"), {"forearm": tensor})
+    found = [entry[:2] for entry in findings(case)]
+    # A tenth of what counts as a difference: torques are sums over the links beyond a joint.
+    assert found == [("DX105", "forearm")] if error > 0.1 * BAR else found in ([], [("DX105", "forearm")])
+    assert product or not found
 
 
 @pytest.mark.parametrize("name", [path.stem for path in OWN])

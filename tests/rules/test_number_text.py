@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dynx.rules.number_text import is_number, misspelled_number, misspelled_vector
+from dynx.rules.number_text import decimal, is_number, misspelled_number, misspelled_vector
 
 numbers = st.floats(allow_nan=False, allow_infinity=False)
 decimals = numbers.map(repr).filter(lambda text: "." in text)
@@ -17,6 +17,13 @@ def test_a_plain_number_has_no_fault(x: float) -> None:
     assert is_number(repr(x))
     assert misspelled_number(repr(x)) is None
     assert misspelled_number(f"+{abs(x)!r}") is None
+
+
+@given(numbers)
+def test_a_number_is_written_as_it_was(x: float) -> None:
+    assert float(decimal(x)) == x
+    assert is_number(decimal(x))
+    assert decimal(-0.0) == "0.0"
 
 
 @given(st.lists(numbers, min_size=3, max_size=3), st.sampled_from([" ", "  "]))

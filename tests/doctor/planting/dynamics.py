@@ -74,7 +74,8 @@ def contacts(site: Site) -> Planted:
         if site.free(link, far):
             pairs.append((far, link))
     first, second = site.pick(pairs, "links with two joints between them")
-    shape = '<collision>\n  <origin xyz="0.3 0.2 -0.1"/>\n  <geometry>\n    <sphere radius="1.5"/>\n  </geometry>\n</collision>'
+    place, sphere = '<origin xyz="0.3 0.2 -0.1"/>', '<sphere radius="1.5"/>'
+    shape = f"<collision>\n  {place}\n  <geometry>\n    {sphere}\n  </geometry>\n</collision>"
     edits = [site.source.inserting(site.element("link", name), shape) for name in (first, second)]
     return site.planted("DX308", *edits, touched=[first, second], sign="<collision>")
 

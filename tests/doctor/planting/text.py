@@ -10,6 +10,8 @@ from tests.doctor.planting.inertia import MOMENTS, PRODUCTS
 from tests.doctor.planting.joints import limited, moving
 from tests.doctor.planting.site import NotHere, Planted, Planter, Site
 
+LIMITS = ("lower", "upper", "effort", "velocity")
+
 LINE = 8191
 """Bytes of a line that PyBullet reads at once."""
 
@@ -272,7 +274,8 @@ def _limits(site: Site) -> list[Number]:
         if limited(joint) and site.free(joint.name):
             limit = site.element("joint", joint.name).first("limit")
             if limit is not None:
-                found += [Number(limit, word, joint=joint.name) for word in limit.attributes]
+                words = [word for word in LIMITS if word in limit.attributes]
+                found += [Number(limit, word, joint=joint.name) for word in words]
     return found
 
 
