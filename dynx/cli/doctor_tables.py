@@ -85,8 +85,9 @@ def show_errors(out: Console, report: DoctorReport, *, mended: bool = True) -> N
     if not rows:
         return
     mended = mended and report.mended is not None
-    title = "relative error against what the file says"
-    heading(out, f"{title}: as loaded -> mended" if mended else f"{title}, as loaded")
+    title = "error against what the file says"
+    calls = " with the calls below" if report.calls else ""
+    heading(out, f"{title}: as loaded -> mended{calls}" if mended else f"{title}, as loaded")
     names = [each.engine for each in asked]
     table = Table("quantity", *names, right=names, keys=1)
     for key in rows:
@@ -94,6 +95,8 @@ def show_errors(out: Console, report: DoctorReport, *, mended: bool = True) -> N
             wording.quantity(key), *(_change(each, key, report.tolerance, mended) for each in asked)
         )
     out.print(table)
+    if "inverse_dynamics" in rows and "forward_dynamics" not in rows:
+        sentence(out, "forward dynamics is not compared: the mass matrix is singular", 1, "dim")
     known = f", what the file says known to {report.referee:.0e}" if report.referee else ""
     out.print(
         f" tolerance {report.tolerance:g}, {counted(report.samples, 'sample')}, seed {report.seed}{known}",
@@ -141,18 +144,15 @@ def _show_causes(out: Console, title: str, found: Sequence[Cause]) -> None:
         out.print(_cause_line(cause))
         sentence(out, one_line(cause.title), 6)
         out.print(f"      {_extent(cause)}")
-        if cause.worst is not None:
-            _show_places(out, cause)
-        elif cause.findings[0].line is not None:
-            sentence(out, _place(cause.findings[0]), 6, "dim")
+        _show_places(out, cause)
         if cause.advice and (cause.worst is not None or cause.kind == "practice"):
             sentence(out, f"-> {one_line(cause.advice)}", 6)
 
 
 def _show_places(out: Console, cause: Cause) -> None:
     for finding in cause.findings[:_SHOWN_PLACES]:
-        said = "" if finding.effect is None else f": {wording.size(finding.effect.relative_error)}"
-        sentence(out, f"{_place(finding)}{said}", 6, "dim")
+        said = [each for each in (wording.effects(finding), wording.name(finding.message, 300)) if each]
+        sentence(out, f"{_place(finding)}: {'; '.join(said)}", 6, "dim")
     if len(cause.findings) > _SHOWN_PLACES:
         out.print(f"      and {len(cause.findings) - _SHOWN_PLACES} more", style="dim")
 

@@ -68,21 +68,38 @@ class Attributor:
         self._progress(f"{rule.id} {rule.name}")
         named = [engine for engine in self._laboratory.engines if engine in rule.engines]
         touched = self._alone(rule, found, named)
+        loading = [name for name, effect in touched.items() if effect.quantity == LOADING]
         untouched = [name for name in named if name not in touched and self._is_wrong(name)]
         if untouched:
             touched |= self._among_the_mended(rule, found, untouched)
         if len(found) == 1 or not touched:
             return [self._attribution(rule, each, touched) for each in found]
-        return [self._attribution(rule, each, self._at(rule, each, touched)) for each in found]
+        proofs = []
+        for each in found:
+            effects = self._alone(rule, [each], touched, STATES_AT_A_PLACE)
+            others = [other for other in found if other is not each]
+            # Of places that each make an engine refuse the file, none shows while another is there.
+            refusing = [engine for engine in loading if engine not in effects]
+            effects |= self._refused_with(rule, others, refusing)
+            for engine, effect in touched.items():
+                refused = self._before.answers[engine].refused is not None
+                if refused and engine not in effects and engine not in loading:
+                    effects[engine] = effect
+            proofs.append(self._attribution(rule, each, effects))
+        return proofs
 
-    def _at(self, rule: Rule, each: Detection, touched: Mapping[str, Effect]) -> dict[str, Effect]:
-        """The effect at one place of a rule that has an effect on the engines `touched`."""
-        effects = self._alone(rule, [each], touched, STATES_AT_A_PLACE)
-        # One place of many that each make an engine refuse: only together do they show.
-        for engine, effect in touched.items():
-            if engine not in effects and self._before.answers[engine].refused is not None:
-                effects[engine] = effect
-        return effects
+    def _refused_with(
+        self, rule: Rule, others: Sequence[Detection], engines: Sequence[str]
+    ) -> dict[str, Effect]:
+        """The engines that refuse the file for the one place left when the rule is gone from all others."""
+        remedy = treated(self._case, rule, others) if engines else None
+        if remedy is None:
+            return {}
+        truth = self._truth_of(remedy).take(1)
+        found = self._laboratory.examine(remedy.case, engines, truth=truth).answers
+        return {
+            engine: Effect(LOADING, float("inf")) for engine in engines if found[engine].refused is not None
+        }
 
     def _alone(
         self, rule: Rule, found: Sequence[Detection], engines: Collection[str], states: int | None = None

@@ -9,9 +9,11 @@ One entry of ``results`` per robot and base:
                              and `after` the mending are {quantity: relative error} against the answer
                              dynx gives for the file (null: no number); `refused` is null or the
                              engine's words
-    findings                 [{rule, name, kind, link, joint, line, message, engines, effect, proved,
-                             remedy}]; `effect` is null or {quantity, relative_error}; `relative_error`
-                             is null where the engine gives no number at all (it refuses the file)
+    findings                 [{rule, name, kind, link, joint, line, message, engines, effect, effects,
+                             proved, remedy}]; `effect` is null or {quantity, relative_error}, the largest
+                             of `effects`, {engine: {quantity, relative_error}}; `relative_error` is null
+                             where the engine gives no number at all (quantity ``loading``: it refuses
+                             the file)
     explained                whether no difference above `tolerance` remains after mending
     residual                 the largest relative error that remains (null: an answer without number)
     unexplained              [{engine, quantity, relative_error, joint, counterexample}]
@@ -74,6 +76,8 @@ class Finding:
     effect: Effect | None = None
     proved: bool = False
     remedy: str | None = None
+    effects: Mapping[str, Effect] = field(default_factory=dict)
+    """The effect on each of the `engines`; `effect` is the largest of them."""
 
 
 @dataclass(frozen=True)
@@ -225,20 +229,7 @@ class DoctorReport:
                 }
                 for each in self.engines
             ],
-            "findings": [
-                {
-                    **{
-                        key: value for key, value in vars(finding).items() if key not in ("effect", "engines")
-                    },
-                    "engines": list(finding.engines),
-                    "effect": finding.effect
-                    and {
-                        "quantity": finding.effect.quantity,
-                        "relative_error": _number(finding.effect.relative_error),
-                    },
-                }
-                for finding in self.findings
-            ],
+            "findings": [_finding(finding) for finding in self.findings],
             "explained": self.explained,
             "residual": _number(self.residual),
             "unexplained": [_unexplained(each) for each in self.unexplained],
@@ -279,6 +270,19 @@ def results_document(reports: Iterable[DoctorReport], not_done: int = 0) -> dict
             "not_done": not_done,
         },
     }
+
+
+def _finding(each: Finding) -> dict[str, Any]:
+    return {
+        **vars(each),
+        "engines": list(each.engines),
+        "effect": None if each.effect is None else _effect(each.effect),
+        "effects": {engine: _effect(effect) for engine, effect in each.effects.items()},
+    }
+
+
+def _effect(each: Effect) -> dict[str, Any]:
+    return {"quantity": each.quantity, "relative_error": _number(each.relative_error)}
 
 
 def _unexplained(each: Unexplained) -> dict[str, Any]:

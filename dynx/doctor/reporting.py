@@ -100,6 +100,7 @@ def all_findings(
                 finding,
                 engines=tuple(attribution.effects),
                 effect=attribution.worst,
+                effects=dict(attribution.effects),
                 proved=attribution.proved,
                 remedy=done.get(rule.id),
             )

@@ -128,7 +128,7 @@ def test_one_robot_is_told_in_the_order_of_importance() -> None:
         ),
         *("1.9e+01 -> 4.0e-16", "DX901 planted-cause", "2 places in pybullet, mujoco"),
         *(
-            "line 5, link tool: no answer",
+            "line 5, link tool: no mass matrix",
             "line 3, link base: 1900 %",
             "DX902 planted-rounding",
             "(rounding)",

@@ -31,11 +31,15 @@ def beside(original: Path, data: bytes, folder: Path) -> Path:
     top = tops[0] if tops else original.parent
     here, copy = top, folder
     for step in original.relative_to(top).parts:
-        copy.mkdir(exist_ok=True)
-        for entry in here.iterdir():
-            if entry.name != step and not (copy / entry.name).exists():
+        if copy.is_symlink():
+            copy.unlink()
+        if not copy.exists():
+            copy.mkdir()
+            for entry in here.iterdir():
                 (copy / entry.name).symlink_to(entry)
         here, copy = here / step, copy / step
+    if copy.is_symlink():
+        copy.unlink()
     copy.write_bytes(data)
     return copy
 
@@ -90,10 +94,10 @@ def difference(one: Any, other: Any) -> float:
 def checked(entries: Sequence[dict[str, Any]], folder: Path, shapes: bool) -> list[tuple[float, str]]:
     """How far the engines are apart on each mended file, and what they said where one refused it."""
     tasks = []
-    for number, entry in enumerate(entries):
+    for entry in entries:
         source = XmlSource(Path(entry["mended"]).read_bytes(), entry["path"])
         data = (source if shapes else without_meshes(source)).to_bytes()
-        place = beside(Path(entry["path"]), data, folder / f"{number}-{shapes}")
+        place = beside(Path(entry["path"]), data, folder / f"{entry['base']}-{shapes}")
         tasks.append(task(place, entry["base"]))
     with ThreadPoolExecutor(2) as pool:
         one, other = pool.map(lambda engine: answers(engine, tasks, folder), SCRIPTS)

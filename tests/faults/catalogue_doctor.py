@@ -132,8 +132,8 @@ DOCTOR_FAULTS = (
     Fault(
         "every_place_has_the_effect_of_all",
         ATTRIBUTION,
-        right="self._at(rule, each, touched)) for each in found]",
-        wrong="touched) for each in found]",
+        right="proofs.append(self._attribution(rule, each, effects))",
+        wrong="proofs.append(self._attribution(rule, each, touched))",
         caught_by=(
             f"{TEST_ATTRIBUTION}::test_a_cause_that_explains_all_is_proved_at_each_place_with_its_own_effect"
         ),

@@ -56,6 +56,24 @@ def effect(each: Effect | None) -> str:
     return f"{quantity(each.quantity)} off by {size(each.relative_error)}"
 
 
+def effects(finding: Finding) -> str:
+    """``54 % in pybullet, refused by mujoco``: the effect at a place, alike for all engines or by engine."""
+    if finding.effect is None:
+        return ""
+    by_size: dict[str, list[str]] = {}
+    for engine, each in finding.effects.items():
+        by_size.setdefault(_at_place(each), []).append(name(engine))
+    if len(by_size) < 2:
+        return _at_place(finding.effect).removesuffix(" by").removesuffix(" in")
+    return ", ".join(f"{said} {' and '.join(engines)}" for said, engines in by_size.items())
+
+
+def _at_place(each: Effect) -> str:
+    if math.isfinite(each.relative_error):
+        return f"{size(each.relative_error)} in"
+    return "refused by" if each.quantity == "loading" else f"no {quantity(each.quantity)} in"
+
+
 def titles(robots: Sequence[str]) -> list[str]:
     """What robots are called: those given as paths by their files' names, where that tells them apart."""
     stems = [PurePath(robot).name.removesuffix(".urdf") or robot for robot in robots]
