@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shlex
 import subprocess
@@ -76,7 +77,12 @@ def test_console_blocks_print_what_is_shown(command: str, shown: str) -> None:
     words = shlex.split(command, comments=True)
     assert words[0] == "dynx", f"a console block of README.md starts with {words[0]!r}"
     result = subprocess.run(
-        [sys.executable, "-m", "dynx", *words[1:]], capture_output=True, text=True, cwd=ROOT, check=False
+        [sys.executable, "-m", "dynx", *words[1:]],
+        capture_output=True,
+        text=True,
+        cwd=ROOT,
+        check=False,
+        env={**os.environ, "COLUMNS": "80"},
     )
     # The doctor's answer on a robot on which engines differ is no.
     assert result.returncode == (1 if words[1] == "doctor" else 0), result.stderr
