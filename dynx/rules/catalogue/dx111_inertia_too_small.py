@@ -87,6 +87,12 @@ class InertiaTooSmall(Rule):
             if name is None:
                 continue
             group = rigid_groups(case)[name]
+            still = case.inertials[name]
+            if group.static and still is not None and still.mass == 0.0:
+                # What the world holds and has no mass has no use for a tensor either.
+                case = with_inertials(case, {name: Inertial(0.0, still.origin)})
+                raised += 1
+                continue
             heavy = [each for each in group.links if case.model.inertial(each).mass > 0.0]
             into = group.head
             if name != into or (len(heavy) > 1 and not group.static):
