@@ -1,9 +1,9 @@
-"""The backend `mujoco`: MuJoCo's kinematics, Jacobians, recursive Newton-Euler and LDL' solver.
+"""The backend `mujoco`: MuJoCo's kinematics, Jacobians, accelerations and LDL' solver.
 
 The engine's model is built from the links and joints of the `Model` (`mujoco_tree`), independently of
 `dynx.model.mechanism`; there are no limits, contacts, damping or actuators in it, so that nothing is
-left for MuJoCo's constraint solver. The mass matrix is put together from MuJoCo's poses, axes and
-inertias, for `mj_crb` loses digits on robots with hands (`mujoco_mass`). Tree coordinates are
+left for MuJoCo's constraint solver. Mass matrix and torques are put together from MuJoCo's poses, axes,
+accelerations and inertias, for `mj_crb` and `mj_rne` lose digits (`mujoco_mass`). Tree coordinates are
 MuJoCo's own but for a floating base: its quaternion is (w, x, y, z), and its linear velocity is in
 world axes.
 
@@ -21,7 +21,7 @@ import numpy as np
 
 from dynx.backends.base import Backend
 from dynx.backends.engine_errors import engine_errors
-from dynx.backends.mujoco_mass import MassMatrix
+from dynx.backends.mujoco_mass import ProjectedDynamics
 from dynx.backends.mujoco_tree import ROOT, build_tree
 from dynx.engines.mujoco import mujoco, silent_data
 from dynx.errors import DynxError, EngineError
@@ -70,7 +70,7 @@ class MujocoBackend(Backend):
             raise EngineError(f"mujoco cannot hold {model.name}: {_gist(error)}") from error
         self._nv = self._mechanism.nv
         self._floating = model.floating
-        self._mass = MassMatrix(self._engine, floating=model.floating)
+        self._dynamics = ProjectedDynamics(self._engine, floating=model.floating)
         self._masses_add = tree.masses_add
         self._total_mass = float(self._engine.body_subtreemass[ROOT])
 
@@ -146,11 +146,8 @@ class MujocoBackend(Backend):
         work.a[:] = a
         if self._floating:
             work.a[:3] = work.R[ROOT] @ (a[:3] + np.cross(v[3:6], v[:3]))
-        tau = np.zeros(self._nv)
-        mujoco.mj_rne(self._engine, work.data, 1, tau)
-        if self._floating:
-            tau[:3] = work.R[ROOT].T @ tau[:3]
-        return tau
+        mujoco.mj_rnePostConstraint(self._engine, work.data)
+        return self._dynamics.torque(work.data, work.R[ROOT], work.p[ROOT])
 
     @_mapped
     def _forward_dynamics(self, q: Floats, v: Floats, tau: Floats) -> Floats:
@@ -173,7 +170,7 @@ class MujocoBackend(Backend):
     @_mapped
     def _mass_matrix(self, q: Floats) -> Floats:
         work = self._placed(q)
-        return self._mass(work.data, work.R[ROOT], work.p[ROOT])
+        return self._dynamics.mass_matrix(work.data, work.R[ROOT], work.p[ROOT])
 
     # -- the whole body -----------------------------------------------------------------------
 

@@ -33,18 +33,11 @@ Base = Literal["fixed", "floating"]
 each_base = pytest.mark.parametrize("base", ["fixed", "floating"])
 
 
-ROUNDS_ZERO = ("mujoco",)
-"""MuJoCo refers every body to the centre of mass of the whole robot, so a torque that is exactly zero (a
-point mass on its own axis) comes out as a rounding of the largest one; such robots are drawn here. It is
-held to the same tolerances on real robots below, and in the contract suite."""
-
-
 @contextmanager
-def backends_of(model: Model, without: tuple[str, ...] = ()) -> Iterator[list[Backend]]:
-    """Every installed backend of a model but some, closed at the end."""
+def backends_of(model: Model) -> Iterator[list[Backend]]:
+    """Every installed backend of a model, closed at the end."""
     with ExitStack() as stack:
-        names = [name for name in installed_backends() if name not in without]
-        yield [stack.enter_context(backend(name, model)) for name in names]
+        yield [stack.enter_context(backend(name, model)) for name in installed_backends()]
 
 
 def assert_agree(engines: list[Backend], states: Samples) -> None:
@@ -83,7 +76,7 @@ def test_random_robots(base: Base, data: st.DataObject) -> None:
     """Thin bodies, massless links, mimic joints and locked joints among them."""
     model, states = data.draw(robots_in_states(base))
     note(model.to_urdf())
-    with backends_of(model, without=ROUNDS_ZERO) as engines:
+    with backends_of(model) as engines:
         assert_agree(engines, states)
 
 
