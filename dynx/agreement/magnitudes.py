@@ -185,8 +185,11 @@ class Magnitudes:
         size = np.where(self.root_inertia > 0.0, self.root_inertia, 1.0)
         strongest = np.max(np.abs(products) / size, axis=-1, initial=0.0)
         Mv = np.einsum("nij,nj->ni", self.mass_matrix, self.samples.v)
-        turned = self.turning_speed * np.sqrt(np.abs(np.sum(Mv * self.samples.v, axis=-1)))
-        return np.asarray(self.gravity_torque + self.root_inertia * (strongest + turned)[:, None])
+        vMv = np.abs(np.sum(Mv * self.samples.v, axis=-1))
+        turned = self.turning_speed * np.sqrt(vMv)
+        # The moment v x m v of a body that slides is zero, as the difference of terms of this size.
+        slid = self.angular_column * vMv[:, None]
+        return np.asarray(self.gravity_torque + self.root_inertia * (strongest + turned)[:, None] + slid)
 
     @cached_property
     def torque(self) -> Floats:

@@ -195,8 +195,15 @@ def _derived_mass_scale(sizes: Magnitudes) -> Floats:
 
 
 def coriolis_scale(sizes: Magnitudes) -> Floats:
-    """(n, nv, nv): the bound on M times the bound on the rate at which bodies turn."""
-    return np.asarray(sizes.inertia_bound * _turning(sizes)[:, None, None])
+    """(n, nv, nv): m Jp' dJp + Jr' I dJr, either factor the one that changes, each by its bound.
+
+    Not the bound on M times a rate of turning: a robot that slides without turning has levers that grow
+    and shrink by its speed, which cancel (a point mass on the axis of a joint of a sliding base).
+    """
+    L, rate, A = sizes.linear_column, sizes.linear_column_rate, sizes.angular_column
+    linear = sizes.mass * (L[:, :, None] * rate[:, None, :] + rate[:, :, None] * L[:, None, :])
+    turned = sizes.turning_inertia * _turning(sizes)[:, None, None] * A[:, :, None] * A[:, None, :]
+    return np.asarray(linear + turned)
 
 
 def _derived_energy_scale(sizes: Magnitudes) -> Floats:

@@ -3,7 +3,7 @@
 The engine's model is built from the links and joints of the `Model` (`mujoco_tree`), independently of
 `dynx.model.mechanism`; there are no limits, contacts, damping or actuators in it, so that nothing is
 left for MuJoCo's constraint solver. Mass matrix and torques are put together from MuJoCo's poses, axes,
-accelerations and inertias, for `mj_crb` and `mj_rne` lose digits (`mujoco_mass`). Tree coordinates are
+accelerations and inertias, for `mj_crb` and `mj_rne` lose digits (`mujoco_projection`). Tree coordinates are
 MuJoCo's own but for a floating base: its quaternion is (w, x, y, z), and its linear velocity is in
 world axes.
 
@@ -21,7 +21,7 @@ import numpy as np
 
 from dynx.backends.base import Backend
 from dynx.backends.engine_errors import engine_errors
-from dynx.backends.mujoco_mass import ProjectedDynamics
+from dynx.backends.mujoco_projection import ProjectedDynamics
 from dynx.backends.mujoco_tree import ROOT, build_tree
 from dynx.engines.mujoco import mujoco, silent_data
 from dynx.errors import DynxError, EngineError
@@ -202,13 +202,6 @@ class MujocoBackend(Backend):
         mujoco.mj_subtreeVel(self._engine, data)
         linear = self._total_mass * data.subtree_linvel[ROOT]
         return np.concatenate([linear, data.subtree_angmom[ROOT]])
-
-    @_mapped
-    def _kinetic_energy(self, q: Floats, v: Floats) -> Floats:
-        data = self._moving(q, v).data
-        mujoco.mj_crb(self._engine, data)
-        mujoco.mj_energyVel(self._engine, data)
-        return np.array(data.energy[1])
 
     @_mapped
     def _potential_energy(self, q: Floats) -> Floats:

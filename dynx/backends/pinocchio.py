@@ -64,18 +64,8 @@ class PinocchioBackend(Backend):
     def __init__(self, model: Model, *, validate: bool = True) -> None:
         """Raises EngineLimitError for a model that the engine cannot hold without harm."""
         super().__init__(model, validate=validate)
-        if self._mechanism.nv > MAX_NV:
-            raise EngineLimitError(
-                f"{model.name} has {self._mechanism.nv} degrees of freedom; the backend 'pinocchio' "
-                f"takes at most {MAX_NV}, for the engine's memory grows with their cube"
-            )
-        try:
-            self._engine, self._frame_ids = _build(model)
-            self._workspace = _Workspace(self._engine)
-        except DynxError:
-            raise
-        except Exception as error:
-            raise EngineError(f"pinocchio cannot hold {model.name}: {_gist(error)}") from error
+        self._engine, self._frame_ids = engine_model(model)
+        self._workspace = _Workspace(self._engine)
         self._axes = {
             "local_world_aligned": pin.LOCAL_WORLD_ALIGNED,
             "local": pin.LOCAL,
@@ -228,8 +218,27 @@ class PinocchioBackend(Backend):
         return np.asarray(moving + self._rest_energy)
 
 
+def engine_model(model: Model) -> tuple[Any, list[int]]:
+    """Pinocchio's own model of `model`, and the number it gave to each frame of `model.frame_names`.
+
+    Its coordinates are those of the tree: a mimic joint is one more. Raises EngineLimitError for a
+    model that the engine cannot hold without harm, EngineError where it refuses.
+    """
+    nv = model.mechanism.nv
+    if nv > MAX_NV:
+        raise EngineLimitError(
+            f"{model.name} has {nv} degrees of freedom; the backend 'pinocchio' "
+            f"takes at most {MAX_NV}, for the engine's memory grows with their cube"
+        )
+    try:
+        return _build(model)
+    except DynxError:
+        raise
+    except Exception as error:
+        raise EngineError(f"pinocchio cannot hold {model.name}: {_gist(error)}") from error
+
+
 def _build(model: Model) -> tuple[Any, list[int]]:
-    """The engine's model, and the number it gave to each frame of `model.frame_names`."""
     engine = pin.Model()
     engine.name = model.name
     engine.gravity.linear = np.array(model.gravity)

@@ -68,11 +68,11 @@ def diagnose(
     """
     started = time.perf_counter()
     laboratory = _laboratory(engines, samples, seed, tolerance)
-    settings = checked_choices((choose or {}).items())
+    choices = checked_choices((choose or {}).items())
     checked_base(base)
     say = progress or _silent
     try:
-        case = open_case(robot, base, settings)
+        case = open_case(robot, base, choices)
         report = _diagnosed(case, laboratory, tolerance, counterexamples, seed, say)
     except DynxError as error:
         report = refused_report(str(_label(robot)), error, base=base)
@@ -101,12 +101,12 @@ def compare_as_loaded(
     return replace(report, samples=samples, seed=seed, seconds=time.perf_counter() - started)
 
 
-def open_case(robot: Robot, base: Base, settings: Mapping[str, str]) -> Case:
+def open_case(robot: Robot, base: Base, choices: Mapping[str, str]) -> Case:
     """The document of a robot as a case; errors as `dynx.load` raises them."""
     if isinstance(robot, Model):
-        return Case(XmlSource(robot.to_urdf(), robot.source), base, settings=settings)
+        return Case(XmlSource(robot.to_urdf(), robot.source), base, choices=choices)
     data, source, _ = read_description(robot)
-    return Case(XmlSource(data, source), base, settings=settings)
+    return Case(XmlSource(data, source), base, choices=choices)
 
 
 def refused_report(robot: str, error: DynxError, *, base: str | None = None) -> DoctorReport:
@@ -152,7 +152,7 @@ def _diagnosed(
 
 def _chosen_practice(case: Case, found: Sequence[tuple[Rule, Detection]]) -> bool:
     """Whether the user chose a remedy for bad practice that is there."""
-    return any(rule.kind == "practice" and rule.id in (case.settings or {}) for rule, _ in found)
+    return any(rule.kind == "practice" and rule.id in (case.choices or {}) for rule, _ in found)
 
 
 def _rules_for(laboratory: Laboratory) -> list[Rule]:

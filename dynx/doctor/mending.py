@@ -102,7 +102,7 @@ def treated(case: Case, rule: Rule, chosen: Sequence[Detection]) -> Remedy | Non
 
 
 def _is_asked_for(rule: Rule, case: Case) -> bool:
-    return rule.kind == "difference" or rule.id in (case.settings or {})
+    return rule.kind == "difference" or rule.id in (case.choices or {})
 
 
 def _with(mended: Mending, rule: Rule, chosen: Sequence[Detection]) -> Mending:

@@ -20,10 +20,8 @@ CALLS: Mapping[str, str] = {
     "mujoco.no_limits": "model.jnt_limited[:] = 0",
     "mujoco.no_mimic": "model.eq_active0[:] = 0",
     "mujoco.no_contacts": "model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT",
-    "mujoco.no_constraints": "model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT",
 }
-"""Remedies at run time: id -> the line of code, which comes after loading and before `mujoco.MjData`.
-The last is friction, limits, mimic joints and contacts in one."""
+"""Remedies at run time: id -> the line of code, which comes after loading and before `mujoco.MjData`."""
 
 FIXED = "model = mujoco.MjModel.from_xml_path(path)"
 FLOATING = (

@@ -7,7 +7,7 @@ the coordinates of dynx, by the names of the joints.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, ClassVar
@@ -36,19 +36,11 @@ class LoadedPinocchio(LoadedRobot):
     """A robot as Pinocchio loads it; see `LoadedRobot`."""
 
     name: ClassVar[str] = "pinocchio"
-    CALLS: ClassVar[Mapping[str, str]] = {
-        # The joint of a free base is "root_joint" otherwise, and takes the child of one of that name.
-        "pinocchio.name_root_joint": (
-            'model = pinocchio.buildModelFromUrdf(path, pinocchio.JointModelFreeFlyer(), "free_flyer")'
-        )
-    }
 
     def __init__(self, path: Path, model: Model, calls: Collection[str] = ()) -> None:
         require_file(path)
         self._model = model
         root = [pin.JointModelFreeFlyer()] if model.floating else []
-        if root and "pinocchio.name_root_joint" in calls:
-            root.append("free_flyer")
         said: list[str] = []
         with self._mapped("buildModelFromUrdf"):
             with overhear(said):

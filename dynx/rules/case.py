@@ -18,14 +18,14 @@ from dynx.model.xml_source import SourceElement, XmlSource
 class Case:
     """The document `source`, meant for `base`, with the remedies at run time (`calls`) taken so far.
 
-    `settings` are the user's choices where a remedy has several, by rule id (see `Rule.choices`).
+    `choices` are the user's choices where a remedy has several, by rule id (see `Rule.choices`).
     """
 
     source: XmlSource
     base: Base = "fixed"
     gravity: Vector = STANDARD_GRAVITY
     calls: frozenset[str] = frozenset()
-    settings: Mapping[str, str] | None = None
+    choices: Mapping[str, str] | None = None
 
     @cached_property
     def reading(self) -> Model | DynxError:
@@ -64,7 +64,7 @@ class Case:
 
     def choice(self, rule: str, default: str) -> str:
         """What the user chose for a rule, or the default."""
-        return (self.settings or {}).get(rule, default)
+        return (self.choices or {}).get(rule, default)
 
     def with_source(self, source: XmlSource) -> Case:
         """The same case with another text."""

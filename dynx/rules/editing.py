@@ -1,4 +1,4 @@
-"""Rules that come down to places in the text, each with the edits that mend it."""
+"""Rules that come down to corrections: places in the text, each with the edits that mend it."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from typing import ClassVar
 
 from dynx.model.xml_source import Edit, SourceElement
 from dynx.rules.case import Case
-from dynx.rules.rule import Detection, Remedy, Rule
+from dynx.rules.rule import Detection, Kind, Remedy, Rule
 
 
 @dataclass(frozen=True)
-class Place:
+class Correction:
     """One place where a rule applies, and what to do there; without edits nothing mends it."""
 
     detection: Detection
@@ -32,7 +32,7 @@ def found_at(element: SourceElement, message: str) -> Detection:
 
 
 class EditingRule(Rule):
-    """A rule that says its places once, for finding them and for mending them."""
+    """A rule that says its corrections once, for finding their places and for mending them."""
 
     changed: ClassVar[str]
     """What the remedy did, said once for all places; see `Remedy.changed`."""
@@ -40,21 +40,33 @@ class EditingRule(Rule):
     changes_physics: ClassVar[bool] = False
 
     @abstractmethod
-    def places(self, case: Case) -> Iterable[Place]:
-        """Every place, in document order."""
+    def corrections(self, case: Case) -> Iterable[Correction]:
+        """One for every place where the rule applies, in document order."""
 
     def detect(self, case: Case) -> Sequence[Detection]:
-        """The places."""
-        return [place.detection for place in self.places(case)]
+        """The places of the corrections."""
+        return [each.detection for each in self.corrections(case)]
 
     def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy | None:
         """The edits of these places."""
         wanted = set(detections)
-        edits = [edit for place in self.places(case) if place.detection in wanted for edit in place.edits]
+        edits = [edit for each in self.corrections(case) if each.detection in wanted for edit in each.edits]
         if not edits:
             return None
         mended = case.with_source(case.source.edited(*edits))
         return Remedy(mended, self.changed, self.decision(case), self.changes_physics)
+
+
+class OptionalEditingRule(EditingRule):
+    """An editing rule about practice: the text stays as it is unless the user chose a way to mend it."""
+
+    kind: ClassVar[Kind] = "practice"
+    KEEP: ClassVar[str] = "keep"
+    """The first of `choices`, which leaves the text."""
+
+    def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy | None:
+        """The edits of these places, if they were chosen."""
+        return None if self.chosen(case) == self.KEEP else super().remedy(case, detections)
 
 
 class CallingRule(Rule):

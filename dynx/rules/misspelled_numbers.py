@@ -9,7 +9,7 @@ from typing import ClassVar
 from dynx.errors import shown
 from dynx.model.xml_source import Edit
 from dynx.rules.case import Case
-from dynx.rules.editing import EditingRule, Place, found_at
+from dynx.rules.editing import Correction, EditingRule, found_at
 from dynx.rules.number_text import Fault, Misspelling, misspelled_number, misspelled_vector
 from dynx.rules.numeric_attributes import NumericAttribute, numeric_attributes
 from dynx.rules.rule import Stage
@@ -37,7 +37,7 @@ class MisspelledNumberRule(EditingRule):
         """The edit that writes it."""
         return case.source.setting(attribute.element, attribute.name, self.text_for(case, misspelling))
 
-    def places(self, case: Case) -> Iterable[Place]:
+    def corrections(self, case: Case) -> Iterable[Correction]:
         """Every attribute with the fault."""
         for attribute in numeric_attributes(case.source):
             find = misspelled_number if attribute.count == 1 else misspelled_vector
@@ -48,4 +48,4 @@ class MisspelledNumberRule(EditingRule):
             what = f"{attribute.name} of <{attribute.element.tag}> is {shown(text)}"
             end = self.said(text, self.text_for(case, misspelling))
             edit = self.mended(case, attribute, misspelling)
-            yield Place(found_at(attribute.element, f"{what}, {end}"), (edit,))
+            yield Correction(found_at(attribute.element, f"{what}, {end}"), (edit,))

@@ -16,7 +16,7 @@ LARGEST = "1.7976931348623157e+308"
 
 Fault = Literal["comma", "separator", "rest", "count", "blank", "tab", "infinite", "empty"]
 """``comma`` for a decimal point, ``separator`` between the numbers of a vector, ``rest`` behind a number,
-a wrong ``count``, a ``blank`` around a single number, a ``tab`` or line break in a vector, an
+a wrong ``count``, a ``blank`` behind a single number, a ``tab`` or line break in a vector, an
 ``infinite`` number, an ``empty`` vector."""
 
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
@@ -25,6 +25,9 @@ _GROUPED = re.compile(r"([+-]?[0-9]{1,3}(?:,[0-9]{3})+)\.[0-9]*")
 _INFINITE = re.compile(r"([+-]?)inf(?:inity)?", re.IGNORECASE)
 _FORTRAN = re.compile(r"([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))[dD]([+-]?[0-9]+)")
 _HEXADECIMAL = re.compile(r"[+-]?0[xX][0-9a-fA-F]+")
+_BLANKS = " \t\r\n"
+"""The white space of XML, over which every engine passes in front of a number and not every one behind it."""
+
 _UNEXPANDED = ("${", "$(")
 
 
@@ -52,7 +55,7 @@ def misspelled_number(text: str) -> Misspelling | None:
     """The fault of a text that should be one number; None where it is plain or beyond understanding."""
     word = text.strip()
     if is_number(word):
-        return None if word == text else Misspelling("blank", word)
+        return None if text.lstrip(_BLANKS) == word else Misspelling("blank", word)
     if sign := _overflowing(word):
         return Misspelling("infinite", sign.removeprefix("+") + LARGEST)
     return _misspelled_word(word)

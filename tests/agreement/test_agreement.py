@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -146,15 +147,17 @@ def test_a_backend_given_ready_is_left_open() -> None:
 
 
 def test_arguments_that_suit_no_robot_are_refused() -> None:
-    for samples in (0, -1, True, 2.5):
+    counts: tuple[Any, ...] = (0, -1, True, 2.5)
+    for samples in counts:
         with pytest.raises(ArgumentError, match="samples"):
-            agree(arm(), ["reference"], samples=samples)  # type: ignore[arg-type]
+            agree(arm(), ["reference"], samples=samples)
     with pytest.raises(ArgumentError, match="seed"):
         agree(arm(), ["reference"], seed=-1)
     with pytest.raises(ArgumentError, match="at least one"):
         agree(arm(), [])
+    number: Any = 3
     with pytest.raises(ArgumentError, match="wanted a name or a Backend"):
-        agree(arm(), [3])  # type: ignore[list-item]
+        agree(arm(), [number])
     with pytest.raises(ArgumentError, match="another model"):
         agree(arm(), [ReferenceBackend(rock())])
     with pytest.raises(UnknownBackendError, match="pinocchio"):

@@ -11,8 +11,11 @@ from dynx.agreement.tolerances import BAR
 from dynx.backends import Backend
 from dynx.model import Joint, JointDynamics, Link, Mimic, Model
 from dynx.model.elements import Inertial, JointType, Pose, Vector
+from dynx.model.model import Base
 from dynx.spatial.scalar import Floats
 
+BASES: tuple[Base, ...] = ("fixed", "floating")
+BOX = Inertial(1.0, Pose((0.1, 0.02, 0.03), (0.3, 0.2, 0.1)), ixx=0.02, iyy=0.03, izz=0.04)
 REFERENCES = ("local_world_aligned", "local", "world")
 S2, S3 = 1 / math.sqrt(2), 1 / math.sqrt(3)
 
@@ -68,6 +71,17 @@ def chain(n: int, kind: JointType = "revolute") -> Model:
         for k in range(n)
     ]
     return Model.build("chain", links, joints)
+
+
+def pair(root: Inertial | None, tip: Inertial | None, base: Base, prismatic: bool = False) -> Model:
+    """A root, a link that carries the inertial in question, and a sound one beyond it."""
+    kind: JointType = "prismatic" if prismatic else "revolute"
+    joints = [
+        Joint("a", kind, "root", "tip", Pose((0.1, 0.2, 0.3), (0.4, 0.5, 0.6)), (0.6, 0.0, 0.8)),
+        Joint("b", "revolute", "tip", "end", Pose((0.0, 0.3, 0.1)), (0.0, 1.0, 0.0)),
+    ]
+    links = [Link("root", root), Link("tip", tip), Link("end", BOX)]
+    return Model.build("pair", links, joints, base=base, gravity=(0.3, -0.7, -9.81))
 
 
 def motion(model: Model, seed: int = 0, size: tuple[int, ...] = ()) -> tuple[Floats, Floats, Floats]:

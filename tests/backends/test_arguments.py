@@ -27,8 +27,8 @@ FLOATING = PinocchioBackend(chain(3).with_base("floating"))
 ZERO = np.zeros(3)
 
 
-def _at(position: int, value: object, dtype: object = float) -> Any:
-    array = np.zeros(3, dtype=dtype)  # type: ignore[call-overload]
+def _at(position: int, value: object, dtype: Any = float) -> Any:
+    array = np.zeros(3, dtype=dtype)
     array[position] = value
     return array
 
@@ -138,8 +138,9 @@ def test_an_unknown_frame_is_named_with_the_nearest(bad: str) -> None:
 
 
 def test_forward_kinematics_wants_names() -> None:
+    number: Any = 3
     with pytest.raises(ArgumentError, match="frame is of type int"):
-        ENGINE.forward_kinematics(ZERO, 3)  # type: ignore[arg-type]
+        ENGINE.forward_kinematics(ZERO, number)
     with pytest.raises(UnknownNameError, match="no frame 'lnik1'"):
         ENGINE.forward_kinematics(ZERO, "lnik1")
 

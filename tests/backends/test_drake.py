@@ -18,6 +18,7 @@ from dynx.errors import ClosedError, EngineError, NotInstalledError, SingularMas
 from dynx.model import Inertial, Joint, Link, Model, Pose
 from dynx.model.elements import JointType
 from dynx.spatial.scalar import Floats
+from tests.backends.independence import check_answers_belong_to_the_caller
 from tests.backends.robots import all_quantities, assert_close, assert_same, chain, mixed_robot, motion
 from tests.closeness import Closeness, samples_at
 
@@ -133,19 +134,7 @@ def test_names_of_the_engine_are_free_for_robots() -> None:
 
 @pytest.mark.parametrize("base", BASES)
 def test_no_order_of_calls_changes_an_answer_and_answers_are_the_callers(base: str) -> None:
-    model = mixed_robot(base)
-    engine = DrakeBackend(model)
-    first, second = motion(model, seed=1), motion(model, seed=2)
-    before = tuple(x.copy() for x in first)
-    answers = all_quantities(engine, *first)
-    kept = {quantity: answer.copy() for quantity, answer in answers.items()}
-    all_quantities(engine, *second)
-    assert_same(answers, kept)
-    for answer in answers.values():
-        answer[...] = np.nan
-    assert_same(all_quantities(engine, *first), kept)
-    for given_array, original in zip(first, before, strict=True):
-        np.testing.assert_array_equal(given_array, original)
+    check_answers_belong_to_the_caller(DrakeBackend(mixed_robot(base)))
 
 
 def test_each_thread_has_a_context_of_its_own() -> None:

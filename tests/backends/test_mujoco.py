@@ -1,14 +1,11 @@
 from __future__ import annotations
 
 import os
-import pickle
-import sys
 import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -18,36 +15,44 @@ from dynx.backends.derived import HOOK_OF_QUANTITY
 from dynx.backends.reference import ReferenceBackend
 from dynx.errors import ClosedError, EngineError, EngineLimitError, SingularMassMatrixError
 from dynx.model import Inertial, Joint, Link, Model, Pose
-from dynx.model.elements import JointType
 from dynx.model.loading import load
 from dynx.model.model import Base
 from dynx.spatial.scalar import Floats
-from tests.backends.robots import all_quantities, assert_close, assert_same, chain, mixed_robot, motion
+from tests.backends.independence import (
+    check_answers_belong_to_the_caller,
+    check_pickle_makes_the_same,
+    check_threads_get_what_one_gets,
+)
+from tests.backends.robots import (
+    BASES,
+    BOX,
+    all_quantities,
+    assert_close,
+    assert_same,
+    chain,
+    mixed_robot,
+    motion,
+    pair,
+)
 from tests.closeness import Closeness, samples_at
 
-mujoco = pytest.importorskip("mujoco")
+pytest.importorskip("mujoco")
+import mujoco
 
-from dynx.backends.mujoco import MujocoBackend  # noqa: E402
-from dynx.backends.mujoco_tree import MAX_NV  # noqa: E402
-from dynx.engines.mujoco import MAX_DEPTH  # noqa: E402
-
-BASES: tuple[Base, ...] = ("fixed", "floating")
-BOX = Inertial(1.0, Pose((0.1, 0.02, 0.03), (0.3, 0.2, 0.1)), ixx=0.02, iyy=0.03, izz=0.04)
-
-
-def pair(root: Inertial | None, tip: Inertial | None, base: Base, prismatic: bool = False) -> Model:
-    """A root, a link that carries the inertial in question, and a sound one beyond it."""
-    kind: JointType = "prismatic" if prismatic else "revolute"
-    joints = [
-        Joint("a", kind, "root", "tip", Pose((0.1, 0.2, 0.3), (0.4, 0.5, 0.6)), (0.6, 0.0, 0.8)),
-        Joint("b", "revolute", "tip", "end", Pose((0.0, 0.3, 0.1)), (0.0, 1.0, 0.0)),
-    ]
-    links = [Link("root", root), Link("tip", tip), Link("end", BOX)]
-    return Model.build("pair", links, joints, base=base, gravity=(0.3, -0.7, -9.81))
+from dynx.backends.mujoco import MujocoBackend
+from dynx.backends.mujoco_tree import MAX_NV
+from dynx.engines.mujoco import MAX_DEPTH
 
 
 def test_what_the_engine_computes() -> None:
-    derived = {"bias_torque", "gravity_torque", "coriolis_matrix", "frame_acceleration"}
+    derived = {
+        "bias_torque",
+        "gravity_torque",
+        "coriolis_matrix",
+        "frame_acceleration",
+        "kinetic_energy",
+        "inertial_regressor",
+    }
     assert native_quantities(MujocoBackend) == set(HOOK_OF_QUANTITY) - derived
 
 
@@ -246,16 +251,7 @@ def test_the_longest_chain_that_it_takes_in_a_small_stack() -> None:
 
 @pytest.mark.parametrize("base", BASES)
 def test_answers_belong_to_the_caller(base: Base) -> None:
-    model = mixed_robot(base)
-    engine = MujocoBackend(model)
-    first, second = motion(model, seed=1), motion(model, seed=2)
-    answers = all_quantities(engine, *first)
-    kept = {quantity: answer.copy() for quantity, answer in answers.items()}
-    all_quantities(engine, *second)
-    assert_same(answers, kept)
-    for answer in answers.values():
-        answer[...] = np.nan
-    assert_same(all_quantities(engine, *first), kept)
+    check_answers_belong_to_the_caller(MujocoBackend(mixed_robot(base)))
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
@@ -273,35 +269,11 @@ def test_what_is_not_finite_leaves_nothing_behind(bad: float) -> None:
 
 
 def test_eight_threads_get_what_one_gets() -> None:
-    model = mixed_robot("floating")
-    engine = MujocoBackend(model)
-    samples = [motion(model, seed) for seed in range(32)]
-    expected = [all_quantities(engine, *sample) for sample in samples]
-    together = threading.Barrier(8)
-
-    def work(worker: int) -> list[dict[str, Floats]]:
-        together.wait()
-        return [all_quantities(engine, *sample) for sample in samples[worker:] + samples[:worker]]
-
-    interval = sys.getswitchinterval()
-    sys.setswitchinterval(1e-6)
-    try:
-        with ThreadPoolExecutor(8) as pool:
-            found = list(pool.map(work, range(8)))
-    finally:
-        sys.setswitchinterval(interval)
-    for worker, answers in enumerate(found):
-        for answer, wanted in zip(answers, expected[worker:] + expected[:worker], strict=True):
-            assert_same(answer, wanted)
+    check_threads_get_what_one_gets(MujocoBackend(mixed_robot("floating")), samples=32)
 
 
 def test_pickle_makes_the_same_backend() -> None:
-    model = mixed_robot("floating")
-    engine = MujocoBackend(model, validate=False)
-    copy: Any = pickle.loads(pickle.dumps(engine))
-    assert type(copy) is MujocoBackend
-    assert copy._validate is False
-    assert_same(all_quantities(copy, *motion(model)), all_quantities(engine, *motion(model)))
+    check_pickle_makes_the_same(MujocoBackend(mixed_robot("floating"), validate=False))
 
 
 @pytest.mark.parametrize("validate", [True, False])
@@ -334,7 +306,7 @@ def test_what_the_engine_raises_becomes_an_engine_error(
         raise raised("the engine is out of order\nsecond line")
 
     engine = MujocoBackend(chain(2))
-    monkeypatch.setattr(mujoco, "mj_rne", fail)
+    monkeypatch.setattr(mujoco, "mj_rnePostConstraint", fail)
     with pytest.raises(EngineError, match=r"chain: \w+: the engine is out of order$") as caught:
         engine.inverse_dynamics(np.zeros(2), np.zeros(2), np.zeros(2))
     assert type(caught.value.__cause__) is raised

@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import pickle
 import sys
 import threading
 from collections.abc import Callable
@@ -25,6 +24,11 @@ from dynx.model.elements import Inertial, Pose
 from dynx.model.loading import load
 from dynx.spatial.scalar import Floats
 from dynx.testing.strategies import models
+from tests.backends.independence import (
+    check_answers_belong_to_the_caller,
+    check_pickle_makes_the_same,
+    check_threads_get_what_one_gets,
+)
 from tests.backends.robots import (
     REFERENCES,
     all_quantities,
@@ -83,19 +87,7 @@ def test_mass_matrix_is_symmetric_to_the_last_bit(data: st.DataObject) -> None:
 
 @pytest.mark.parametrize("base", BASES)
 def test_answers_belong_to_the_caller(base: str) -> None:
-    model = mixed_robot(base)
-    engine = PinocchioBackend(model)
-    first, second = motion(model, seed=1), motion(model, seed=2)
-    before = tuple(x.copy() for x in first)
-    answers = all_quantities(engine, *first)
-    kept = {quantity: answer.copy() for quantity, answer in answers.items()}
-    all_quantities(engine, *second)
-    assert_same(answers, kept)
-    for answer in answers.values():
-        answer[...] = np.nan
-    assert_same(all_quantities(engine, *first), kept)
-    for given_array, original in zip(first, before, strict=True):
-        np.testing.assert_array_equal(given_array, original)
+    check_answers_belong_to_the_caller(PinocchioBackend(mixed_robot(base)))
 
 
 def _reversed_view(x: Floats) -> Floats:
@@ -131,26 +123,7 @@ def test_memory_layout_of_the_arguments_does_not_matter(laid_out: Any) -> None:
 
 
 def test_eight_threads_get_what_one_gets() -> None:
-    model = mixed_robot("floating")
-    engine = PinocchioBackend(model)
-    samples = [motion(model, seed) for seed in range(64)]
-    expected = [all_quantities(engine, *sample) for sample in samples]
-    together = threading.Barrier(8)
-
-    def work(worker: int) -> list[dict[str, Floats]]:
-        together.wait()
-        return [all_quantities(engine, *sample) for sample in samples[worker:] + samples[:worker]]
-
-    interval = sys.getswitchinterval()
-    sys.setswitchinterval(1e-6)
-    try:
-        with ThreadPoolExecutor(8) as pool:
-            found = list(pool.map(work, range(8)))
-    finally:
-        sys.setswitchinterval(interval)
-    for worker, answers in enumerate(found):
-        for answer, wanted in zip(answers, expected[worker:] + expected[:worker], strict=True):
-            assert_same(answer, wanted)
+    check_threads_get_what_one_gets(PinocchioBackend(mixed_robot("floating")), samples=64)
 
 
 def test_each_thread_has_a_workspace_of_its_own() -> None:
@@ -162,13 +135,7 @@ def test_each_thread_has_a_workspace_of_its_own() -> None:
 
 
 def test_pickle_makes_the_same_backend() -> None:
-    model = mixed_robot("floating")
-    engine = PinocchioBackend(model, validate=False)
-    copy: Any = pickle.loads(pickle.dumps(engine))
-    assert type(copy) is PinocchioBackend
-    assert copy.model == model
-    assert copy._validate is False
-    assert_same(all_quantities(copy, *motion(model)), all_quantities(engine, *motion(model)))
+    check_pickle_makes_the_same(PinocchioBackend(mixed_robot("floating"), validate=False))
 
 
 @pytest.mark.parametrize("validate", [True, False])

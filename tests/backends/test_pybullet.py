@@ -18,8 +18,8 @@ from dynx.model.loading import load
 from dynx.model.model import Base
 from dynx.spatial.so3 import quat_from_rotation, rotation_from_rpy
 from dynx.testing.strategies import models
-from tests.backends.bullet_robots import BASES, BOX, assert_agrees, assert_solves, pair
-from tests.backends.robots import all_quantities, assert_close, chain, mixed_robot, motion
+from tests.backends.bullet_robots import assert_agrees, assert_solves
+from tests.backends.robots import BASES, BOX, all_quantities, assert_close, chain, mixed_robot, motion, pair
 from tests.closeness import Closeness, samples_at
 
 pytest.importorskip("pybullet")

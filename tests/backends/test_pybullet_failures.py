@@ -15,8 +15,8 @@ from dynx.backends.bullet_urdf import write_bullet_urdf
 from dynx.backends.pybullet import PyBulletBackend
 from dynx.errors import EngineError, NotInstalledError
 from dynx.model import Inertial
-from tests.backends.bullet_robots import BOX, clients, pair
-from tests.backends.robots import all_quantities, chain, mixed_robot, motion
+from tests.backends.bullet_robots import clients
+from tests.backends.robots import BOX, all_quantities, chain, mixed_robot, motion, pair
 
 bullet = pytest.importorskip("pybullet")
 

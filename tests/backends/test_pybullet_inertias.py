@@ -12,8 +12,8 @@ from dynx.backends.reference import ReferenceBackend
 from dynx.errors import EngineError
 from dynx.model import Inertial, Joint, Link, Model, Pose
 from dynx.model.model import Base
-from tests.backends.bullet_robots import BASES, BOX, assert_agrees, assert_solves, pair
-from tests.backends.robots import assert_close, motion
+from tests.backends.bullet_robots import assert_agrees, assert_solves
+from tests.backends.robots import BASES, BOX, assert_close, motion, pair
 
 pytest.importorskip("pybullet")
 

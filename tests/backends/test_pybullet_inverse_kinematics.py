@@ -11,8 +11,7 @@ from dynx.errors import ArgumentError, NotFiniteError
 from dynx.model.loading import load
 from dynx.model.model import Base
 from dynx.spatial.se3 import pose_error
-from tests.backends.bullet_robots import BASES
-from tests.backends.robots import chain, mixed_robot, motion
+from tests.backends.robots import BASES, chain, mixed_robot, motion
 
 pytest.importorskip("pybullet")
 

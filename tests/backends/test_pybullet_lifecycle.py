@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import gc
-import pickle
-import sys
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -19,8 +16,23 @@ from dynx.backends.reference import ReferenceBackend
 from dynx.errors import ClosedError, EngineError, NotFiniteError
 from dynx.model import Inertial
 from dynx.model.model import Base
-from tests.backends.bullet_robots import BASES, BOX, clients, pair
-from tests.backends.robots import all_quantities, assert_close, assert_same, chain, mixed_robot, motion
+from tests.backends.bullet_robots import clients
+from tests.backends.independence import (
+    check_answers_belong_to_the_caller,
+    check_pickle_makes_the_same,
+    check_threads_get_what_one_gets,
+)
+from tests.backends.robots import (
+    BASES,
+    BOX,
+    all_quantities,
+    assert_close,
+    assert_same,
+    chain,
+    mixed_robot,
+    motion,
+    pair,
+)
 
 bullet = pytest.importorskip("pybullet")
 
@@ -105,44 +117,20 @@ def test_overflow_does_not_poison_the_engine() -> None:
 
 @pytest.mark.parametrize("base", BASES)
 def test_answers_belong_to_the_caller(base: Base) -> None:
-    model = mixed_robot(base)
-    engine = PyBulletBackend(model)
-    first, second = motion(model, seed=1), motion(model, seed=2)
-    answers = all_quantities(engine, *first)
-    kept = {quantity: answer.copy() for quantity, answer in answers.items()}
-    all_quantities(engine, *second)
-    assert_same(answers, kept)
-    for answer in answers.values():
-        answer[...] = NAN
-    assert_same(all_quantities(engine, *first), kept)
+    check_answers_belong_to_the_caller(PyBulletBackend(mixed_robot(base)))
 
 
 def test_eight_threads_get_what_one_gets() -> None:
-    model = mixed_robot("floating")
-    engine = PyBulletBackend(model)
-    samples = [motion(model, seed) for seed in range(16)]
-    alone = [all_quantities(engine, *sample) for sample in samples]
-    interval = sys.getswitchinterval()
-    sys.setswitchinterval(1e-6)
-    try:
-        with ThreadPoolExecutor(8) as pool:
-            together = list(pool.map(lambda sample: all_quantities(engine, *sample), samples * 4))
-    finally:
-        sys.setswitchinterval(interval)
-    for answers, wanted in zip(together, alone * 4, strict=True):
-        assert_same(answers, wanted)
+    check_threads_get_what_one_gets(PyBulletBackend(mixed_robot("floating")), samples=8)
 
 
 # -- life cycle ----------------------------------------------------------------------------------------
 
 
 def test_pickle_makes_the_same_backend() -> None:
-    model = mixed_robot("floating")
-    engine = PyBulletBackend(model, validate=False)
-    copy: Any = pickle.loads(pickle.dumps(engine))
-    assert type(copy) is PyBulletBackend
+    engine = PyBulletBackend(mixed_robot("floating"), validate=False)
+    copy = check_pickle_makes_the_same(engine)
     assert not set(clients(copy)) & set(clients(engine))
-    assert_same(all_quantities(copy, *motion(model)), all_quantities(engine, *motion(model)))
 
 
 @pytest.mark.parametrize("validate", [True, False])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -168,10 +169,10 @@ def test_a_robot_that_cannot_be_read_gives_a_report_with_its_error(tmp_path: Pat
     ],
 )
 def test_arguments_that_are_right_for_no_robot_are_refused(
-    arguments: dict[str, object], error: type[Exception], said: str
+    arguments: dict[str, Any], error: type[Exception], said: str
 ) -> None:
     with pytest.raises(error, match=said):
-        diagnose(TRAP, **arguments)  # type: ignore[arg-type]
+        diagnose(TRAP, **arguments)
 
 
 def test_a_missing_engine_is_named_when_asked_for_and_left_out_otherwise(

@@ -34,7 +34,7 @@ class Opinion(Replaced):
 def test_practice_is_left_alone_whatever_its_rule_could_do() -> None:
     rule, case = Opinion("old", "new"), case_of(link("base"), "<!-- old -->")
     assert mend(case, [rule]).case is case
-    asked = mend(replace(case, settings={rule.id: "edit"}), [rule])
+    asked = mend(replace(case, choices={rule.id: "edit"}), [rule])
     assert "<!-- new -->" in asked.case.source.text
 
 

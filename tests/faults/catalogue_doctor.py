@@ -173,7 +173,7 @@ DOCTOR_FAULTS = (
     Fault(
         "mending_practice_unasked",
         MENDING,
-        right='return rule.kind == "difference" or rule.id in (case.settings or {})',
+        right='return rule.kind == "difference" or rule.id in (case.choices or {})',
         wrong="return True",
         caught_by=f"{TEST_MENDING}::test_practice_is_left_alone_whatever_its_rule_could_do",
     ),

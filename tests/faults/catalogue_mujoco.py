@@ -6,7 +6,7 @@ from tests.faults.fault import Fault
 
 MUJOCO = "dynx.backends.mujoco"
 TREE = "dynx.backends.mujoco_tree"
-MASS = "dynx.backends.mujoco_mass"
+PROJECTION = "dynx.backends.mujoco_projection"
 LOADED = "dynx.loaded.mujoco"
 LOADED_FILE = "dynx.loaded.mujoco_file"
 CONTENTS = "dynx.loaded.mujoco_contents"
@@ -60,14 +60,14 @@ MUJOCO_FAULTS = (
     ),
     Fault(
         "mujoco_masses_out_of_step_with_rows",
-        MASS,
+        PROJECTION,
         right="np.repeat(self._mass, 3)",
         wrong="np.tile(self._mass, 3)",
         caught_by=f"{NATIVE}[fixed-False]",
     ),
     Fault(
         "mujoco_lever_from_the_body_to_the_joint",
-        MASS,
+        PROJECTION,
         right="lever = data.xipos[self._bodies][:, None, :] - anchors",
         wrong="lever = anchors - data.xipos[self._bodies][:, None, :]",
         caught_by=f"{NATIVE}[floating-False]",

@@ -9,6 +9,8 @@ DX105 = "dynx.rules.catalogue.dx105_inertia_not_diagonal"
 DX106 = "dynx.rules.catalogue.dx106_root_inertial_rotated"
 DX107 = "dynx.rules.catalogue.dx107_massless_root"
 DX201 = "dynx.rules.catalogue.dx201_axis_not_unit"
+DX216 = "dynx.rules.catalogue.dx216_upper_limit_missing"
+DX217 = "dynx.rules.catalogue.dx217_joint_named_root_joint"
 DX301 = "dynx.rules.catalogue.dx301_damping_in_inverse_dynamics"
 DX401 = "dynx.rules.catalogue.dx401_decimal_comma"
 IMPOSSIBLE = "dynx.rules.impossible_inertia"
@@ -23,7 +25,10 @@ DETECTIONS = "tests/rules/test_dx1_detections.py"
 REMEDIES = "tests/rules/test_dx1_remedies.py"
 JOINTS = "tests/rules/test_dx2_joints.py"
 DYNAMICS = "tests/rules/test_dx3_joint_dynamics.py"
+MISSING_LIMITS = "tests/rules/test_missing_limits.py"
 TEXT = "tests/rules/test_dx4_text.py"
+NUMBER_TEXT = "tests/rules/test_number_text.py"
+OPTIONAL = "tests/rules/test_dx51.py"
 TEST_DIFFERENCE = "tests/loaded/test_difference.py"
 TEST_SOURCE = "tests/model/test_xml_source.py"
 
@@ -166,9 +171,44 @@ RULES_FAULTS = (
     Fault(
         "remedy_at_every_place",
         EDITING,
-        right="if place.detection in wanted for edit",
+        right="if each.detection in wanted for edit",
         wrong="if wanted for edit",
         caught_by=f"{JOINTS}::test_one_axis_of_two_is_scaled_where_that_is_asked",
+    ),
+    Fault(
+        "dx216_every_limit_without_upper",
+        DX216,
+        right="lower is None or lower > _UPPER_OF_PYBULLET",
+        wrong="lower is None",
+        caught_by=f"{MISSING_LIMITS}::test_a_range_that_no_motion_shows_is_no_matter",
+    ),
+    Fault(
+        "dx216_writes_what_pybullet_has",
+        DX216,
+        right='"upper", "0"',
+        wrong='"upper", "-1"',
+        caught_by=f"{MISSING_LIMITS}::test_the_end_that_urdf_has_is_written_and_the_robot_stays",
+    ),
+    Fault(
+        "dx217_on_the_fixed_base",
+        DX217,
+        right='case.base != "floating" or joint is None',
+        wrong="joint is None",
+        caught_by=f"{JOINTS}::test_the_joint_named_root_joint_is_renamed_where_the_base_floats",
+    ),
+    Fault(
+        "dx405_blank_in_front",
+        NUMBERS,
+        right="text.lstrip(_BLANKS) == word",
+        wrong="text == word",
+        caught_by=f"{NUMBER_TEXT}::test_a_plain_number_has_no_fault",
+    ),
+    Fault(
+        "practice_mended_unasked",
+        EDITING,
+        right="return None if self.chosen(case) == self.KEEP else super().remedy(case, detections)",
+        wrong="return super().remedy(case, detections)",
+        caught_by=f"{OPTIONAL}::test_multiples_of_a_quarter_turn_cut_short",
     ),
     # -- descriptions --------------------------------------------------------------------------
     Fault(

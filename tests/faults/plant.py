@@ -12,7 +12,7 @@ import importlib.util
 import os
 import sys
 from collections.abc import Sequence
-from types import ModuleType
+from types import CodeType, ModuleType
 
 from tests.faults.catalogue import FAULTS
 from tests.faults.fault import Fault
@@ -25,7 +25,7 @@ class FaultyLoader(importlib.machinery.SourceFileLoader):
         super().__init__(fullname, path)
         self.fault = fault
 
-    def get_code(self, fullname: str) -> object:  # type: ignore[override]
+    def get_code(self, fullname: str) -> CodeType:
         with open(self.path, encoding="utf-8") as file:
             source = file.read()
         return compile(self.fault.planted(source), self.path, "exec", dont_inherit=True)

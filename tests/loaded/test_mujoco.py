@@ -17,24 +17,24 @@ from dynx.backends.reference import ReferenceBackend
 from dynx.errors import EngineError
 from dynx.loaded import load_as
 from dynx.loaded.difference import model_difference
-from dynx.model import Inertial, Joint, JointDynamics, Limits, Link, Mimic, Model, Pose
+from dynx.model import Inertial, JointDynamics, Link, Mimic, Model
 from dynx.model.loading import load
 from dynx.model.model import Base
 from dynx.spatial.scalar import Floats
 from dynx.testing.strategies.geometry import Strategy
 from tests.backends.robots import chain, motion
+from tests.loaded import fork
 from tests.loaded.files import TILTED, clean_robots, error, loaded
+from tests.loaded.fork import BASES, BODY, LOSSES, NO_LOSSES
 
 pytest.importorskip("mujoco")
+import mujoco
 
 from dynx.engines.mujoco import MAX_DEPTH
 from dynx.loaded.mujoco import LoadedMujoco
 from dynx.loaded.mujoco_file import CALLS
 
-BASES: tuple[Base, ...] = ("fixed", "floating")
-NO_LOSSES = JointDynamics()
 KEPT = '<mujoco><compiler fusestatic="false"/></mujoco>'
-BODY = Inertial(1.5, Pose((0.1, 0.2, 0.3), (0.3, 0.2, 0.1)), 0.2, 0.01, 0.02, 0.3, 0.03, 0.4)
 BALL = '<collision><geometry><sphere radius="0.3"/></geometry></collision>'
 
 
@@ -93,25 +93,8 @@ def worst(
 
 
 def forked(base: Base = "fixed", dynamics: JointDynamics = NO_LOSSES) -> Model:
-    """Two arms, one of them prismatic, and a tool welded to the other."""
-    links = [Link(name, BODY) for name in ("trunk", "z", "a", "tool")]
-    joints = [
-        Joint(
-            "z_joint",
-            "revolute",
-            "trunk",
-            "z",
-            Pose((0.5, 0.0, 0.1), (0.1, 0.2, 0.3)),
-            (0.0, 0.6, 0.8),
-            Limits(-9.0, 9.0, 3.0, 40.0),
-            dynamics,
-        ),
-        Joint(
-            "a_joint", "prismatic", "trunk", "a", Pose((0.0, 0.4, 0.1)), limits=Limits(-9.0, 9.0, 2.0, 9.0)
-        ),
-        Joint("weld", "fixed", "z", "tool", Pose((0.1, 0.2, 0.3), (0.4, 0.5, 0.6))),
-    ]
-    return Model.build("forked", links, joints, base=base, gravity=TILTED)
+    """The fork with limits that MuJoCo, which turns them into forces, never meets."""
+    return fork.forked(base, dynamics, wide=True)
 
 
 # -- what it answers ------------------------------------------------------------------------------
@@ -183,7 +166,7 @@ def test_a_fixed_root_named_world_is_the_world() -> None:
 
 @pytest.mark.parametrize("base", BASES)
 def test_no_order_of_calls_changes_an_answer(base: Base) -> None:
-    model = forked(base, JointDynamics(0.5, 0.25))
+    model = forked(base, LOSSES)
     q, v, a = motion(model)
     others = motion(model, 1)
     with loaded(LoadedMujoco, model) as robot:
@@ -207,12 +190,11 @@ def test_no_order_of_calls_changes_an_answer(base: Base) -> None:
 
 
 def test_damping_and_friction_are_in_the_torque() -> None:
-    model = forked(dynamics=JointDynamics(0.5, 0.25))
+    model = forked(dynamics=LOSSES)
     q, v, a = motion(model)
     tau = ReferenceBackend(model).inverse_dynamics(q, v, a)
     extra = {(): 0.5 * v[0] + 0.25 * np.sign(v[0]), ("mujoco.no_damping",): 0.25 * np.sign(v[0])}
     extra[("mujoco.no_friction",)] = 0.5 * v[0]
-    extra[("mujoco.no_constraints",)] = 0.5 * v[0]
     extra[("mujoco.no_damping", "mujoco.no_friction")] = 0.0
     for calls, wanted in extra.items():
         with loaded(LoadedMujoco, model, None, calls) as robot:
@@ -223,8 +205,7 @@ def test_a_limit_that_is_violated_pushes_back() -> None:
     model = forked()
     tight = model.to_urdf().replace('lower="-9.0" upper="9.0"', 'lower="-0.001" upper="0.001"')
     assert worst(model, tight) > 1e-3
-    for call in ("mujoco.no_limits", "mujoco.no_constraints"):
-        assert worst(model, tight, [call]) <= BAR
+    assert worst(model, tight, ["mujoco.no_limits"]) <= BAR
 
 
 def test_mimic_is_an_equality_constraint() -> None:
@@ -239,8 +220,7 @@ def test_mimic_is_an_equality_constraint() -> None:
     with loaded(LoadedMujoco, free, text) as robot:
         assert any("mimic" in remark for remark in robot.describe().remarks)
     assert worst(free, text) > 1e-3
-    for call in ("mujoco.no_mimic", "mujoco.no_constraints"):
-        assert worst(free, text, [call]) <= BAR
+    assert worst(free, text, ["mujoco.no_mimic"]) <= BAR
 
 
 def test_shapes_that_touch_push_each_other() -> None:
@@ -249,8 +229,7 @@ def test_shapes_that_touch_push_each_other() -> None:
     with loaded(LoadedMujoco, model, touching) as robot:
         assert any("touch" in remark for remark in robot.describe().remarks)
     assert worst(model, touching) > 1e-3
-    for call in ("mujoco.no_contacts", "mujoco.no_constraints"):
-        assert worst(model, touching, [call]) <= BAR
+    assert worst(model, touching, ["mujoco.no_contacts"]) <= BAR
 
 
 def test_the_inertia_of_a_massless_welded_link_is_lost_by_fusing() -> None:
@@ -364,7 +343,6 @@ def test_it_prints_nothing_and_writes_no_file(
 
 
 def test_the_call_that_is_shown_is_a_call_that_loads(tmp_path: Path) -> None:
-    mujoco = pytest.importorskip("mujoco")
     path = tmp_path / "robot.urdf"
     path.write_text(forked().to_urdf())
     for floating, nv in ((False, 2), (True, 8)):
@@ -376,7 +354,6 @@ def test_the_call_that_is_shown_is_a_call_that_loads(tmp_path: Path) -> None:
 
 
 def test_it_is_found_by_name_and_closes(tmp_path: Path) -> None:
-    mujoco = pytest.importorskip("mujoco")
     path = tmp_path / "robot.urdf"
     model = forked()
     path.write_text(model.to_urdf())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -28,7 +29,7 @@ NOTHING = Inertial()
 
 
 def arm(
-    tip: Inertial | None = BOX, root: Inertial | None = BOX, base: Base = "floating", **changes: object
+    tip: Inertial | None = BOX, root: Inertial | None = BOX, base: Base = "floating", **changes: Any
 ) -> Model:
     """A root and two links behind it; `tip` is the inertial of the last, `changes` are for its joint."""
     last = Joint(
@@ -42,7 +43,7 @@ def arm(
     )
     joints = [
         Joint("first", "continuous", "root", "upper", Pose((0.2, 0.1, 0.3)), (0.0, 0.0, 1.0)),
-        replace(last, **changes),  # type: ignore[arg-type]
+        replace(last, **changes),
     ]
     links = [Link("root", root), Link("upper", BOX), Link("tip", tip)]
     return Model.build("arm", links, joints, base=base, gravity=TILTED)

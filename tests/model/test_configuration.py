@@ -70,7 +70,6 @@ def test_two_halves_of_a_motion_are_the_whole(data: st.DataObject) -> None:
 
 @given(st.data())
 def test_the_floating_base_moves_as_pinocchios_free_flyer(data: st.DataObject) -> None:
-    pytest.importorskip("pinocchio")
     pinocchio: Any = importlib.import_module("pinocchio")
     engine = pinocchio.Model()
     engine.addJoint(0, pinocchio.JointModelFreeFlyer(), pinocchio.SE3.Identity(), "base")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import codecs
 import os
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -116,9 +117,9 @@ def test_a_broken_link_is_not_found(here: Path) -> None:
 
 
 @pytest.mark.parametrize("x", [None, 3, ["ur5"], object()])
-def test_what_can_be_no_description_is_an_argument_error(x: object) -> None:
+def test_what_can_be_no_description_is_an_argument_error(x: Any) -> None:
     with pytest.raises(ArgumentError, match="wanted a path, URDF text, a name or a Model"):
-        load(x)  # type: ignore[arg-type]
+        load(x)
 
 
 @pytest.mark.parametrize("data", [b"", b"ur5", b"\0\0", b"\xff\xfe"])
@@ -135,8 +136,10 @@ def test_base_gravity_and_locks_are_as_asked() -> None:
 
 
 def test_wrong_arguments_are_named() -> None:
+    free: Any = "free"
+    shut: Any = "shut"
     with pytest.raises(ArgumentError, match="wanted 'fixed' or 'floating'"):
-        load(TEXT, base="free")  # type: ignore[arg-type]
+        load(TEXT, base=free)
     with pytest.raises(NotFiniteError, match="gravity"):
         load(TEXT, gravity=(0, 0, float("nan")))
     with pytest.raises(ArgumentError, match="gravity has shape"):
@@ -144,7 +147,7 @@ def test_wrong_arguments_are_named() -> None:
     with pytest.raises(UnknownNameError, match="cannot lock 'k': no such joint"):
         load(TEXT, lock={"k": 0.0})
     with pytest.raises(DTypeError, match="cannot lock 'j' at 'shut'"):
-        load(TEXT, lock={"j": "shut"})  # type: ignore[dict-item]
+        load(TEXT, lock={"j": shut})
     with pytest.raises(NotFiniteError, match="cannot lock 'j' at inf"):
         load(TEXT, lock={"j": float("inf")})
 

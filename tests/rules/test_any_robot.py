@@ -29,7 +29,7 @@ def test_a_remedy_removes_its_cause_from_any_robot(text: str, base: Base) -> Non
 
 def with_choice(case: Case, rule: Rule, choice: str) -> Case:
     """The case with what a user chose for one rule."""
-    return Case(case.source, case.base, case.gravity, settings={rule.id: choice})
+    return Case(case.source, case.base, case.gravity, choices={rule.id: choice})
 
 
 def check_remedy(rule: Rule, case: Case) -> None:

@@ -72,7 +72,7 @@ def test_the_page_begins_with_the_rule(rule: Rule) -> None:
 def test_a_decision_says_what_was_chosen_and_how_to_choose_otherwise(rule: Rule) -> None:
     trap = trap_case(rule)
     for choice, meaning in rule.choices.items():
-        case = Case(trap.source, trap.base, settings={rule.id: choice})
+        case = Case(trap.source, trap.base, choices={rule.id: choice})
         decision = rule.decision(case)
         assert decision is not None
         assert decision.startswith(f"{rule.id}={choice}: {meaning}; otherwise ")
@@ -120,8 +120,8 @@ def mended(rule: Rule) -> tuple[Case, Case, bool] | None:
     whether that changes the physics; None where nothing can remove the cause."""
     for choice in [None, *rule.choices]:
         trap = trap_case(rule)
-        settings = None if choice is None else {rule.id: choice}
-        case = Case(trap.source, trap.base, TILTED, settings=settings)
+        choices = None if choice is None else {rule.id: choice}
+        case = Case(trap.source, trap.base, TILTED, choices=choices)
         remedy = rule.remedy(case, rule.detect(case))
         if remedy is not None:
             assert remedy.changed

@@ -116,17 +116,19 @@ def test_tensors_that_mujoco_refuses_are_found_in_static_links_too(rule: str, pl
 
 def test_the_rotation_of_the_root_counts_on_the_fixed_base_alone() -> None:
     turned = Inertial(1.5, Pose((0.1, 0.02, 0.05), (0.0, 0.0, 0.3)), ixx=0.02, iyy=0.03, izz=0.025)
-    for base, wanted in (("fixed", ["DX106"]), ("floating", ["DX112"])):
-        case = robot("six_axis_arm", base)  # type: ignore[arg-type]
+    expected: dict[Base, list[str]] = {"fixed": ["DX106"], "floating": ["DX112"]}
+    for base, wanted in expected.items():
+        case = robot("six_axis_arm", base)
         case = with_inertials(case, {case.model.root: turned})
         assert [entry[:2] for entry in findings(case)] == [(rule, case.model.root) for rule in wanted]
 
 
 def test_a_massless_root_counts_on_the_floating_base_alone() -> None:
-    for base, wanted in (("fixed", []), ("floating", [("DX107", "a")])):
+    expected: dict[Base, list[tuple[str, str]]] = {"fixed": [], "floating": [("DX107", "a")]}
+    for base, wanted in expected.items():
         weld = joint("ab", "a", "b", type="fixed")
         bodies = (link("a", mass=0.0, moments=(0.0, 0.0, 0.0)), link("b"))
-        case = case_of(*bodies, weld, base=base)  # type: ignore[arg-type]
+        case = case_of(*bodies, weld, base=base)
         assert [entry[:2] for entry in findings(case)] == wanted
 
 
@@ -198,7 +200,7 @@ def test_a_body_that_is_kept_is_not_found_again() -> None:
     case = robot("six_axis_arm", "fixed")
     moving = next(joint.child for joint in case.model.joints if joint.moves)
     case = with_inertials(case, {moving: PLANTS["DX103"]})
-    kept = Case(case.source, settings={"DX103": "keep"})
+    kept = Case(case.source, choices={"DX103": "keep"})
     rule = find_rule("DX103")
     mended = rule.remedy(kept, rule.detect(kept))
     assert mended is not None
@@ -210,7 +212,7 @@ def test_a_body_that_is_kept_is_not_found_again() -> None:
 def test_tensors_of_two_rules_are_both_kept() -> None:
     bodies = case_of(*(link(name) for name in "abc"), joint("ab", "a", "b"), joint("bc", "b", "c"))
     source = with_inertials(bodies, {"b": PLANTS["DX103"], "c": PLANTS["DX104"]}).source
-    case = Case(source, settings={"DX103": "keep", "DX104": "keep"})
+    case = Case(source, choices={"DX103": "keep", "DX104": "keep"})
     for name in ("DX103", "DX104"):
         rule = find_rule(name)
         remedy = rule.remedy(case, rule.detect(case))

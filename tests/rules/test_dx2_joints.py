@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -74,7 +75,7 @@ def test_an_axis_without_direction(written: str) -> None:
     found, remedy = mended("DX202", case)
     assert only(found).joint == "elbow"
     assert remedy.case.model.joint("elbow").axis == (1.0, 0.0, 0.0)
-    fixed = mended("DX202", Case(XmlSource(text), settings={"DX202": "fixed"}))[1].case.model
+    fixed = mended("DX202", Case(XmlSource(text), choices={"DX202": "fixed"}))[1].case.model
     assert fixed.joint_names == ("shoulder", "slide")
 
 
@@ -161,7 +162,7 @@ def test_a_joint_of_several_freedoms_is_split(kind: str) -> None:
     case = Case(XmlSource(text))
     found, remedy = mended("DX210", case)
     assert only(found).joint == "slide"
-    fixed = mended("DX210", Case(XmlSource(text), settings={"DX210": "fixed"}))[1].case.model
+    fixed = mended("DX210", Case(XmlSource(text), choices={"DX210": "fixed"}))[1].case.model
     # With every coordinate of the chain at zero the robot is the one whose joint is fixed.
     assert np.array_equal(_pose(remedy.case.model, np.zeros(remedy.case.model.nq)), _pose(fixed, np.zeros(2)))
 
@@ -219,6 +220,42 @@ def test_the_joint_named_universe_is_renamed_everywhere() -> None:
     assert_same_robot(case.model, remedy.case.model)
 
 
+def test_the_joint_named_root_joint_is_renamed_where_the_base_floats() -> None:
+    case = trap("DX217")
+    found, remedy = mended("DX217", case)
+    assert only(found).joint == "root_joint"
+    assert "root_joint_1" in remedy.case.joints
+    assert remedy.case.source.text.replace("root_joint_1", "root_joint") == case.source.text
+    assert find_rule("DX217").detect(replace(case, base="fixed")) == []
+
+
+def test_a_fixed_joint_or_a_link_named_root_joint_is_no_matter() -> None:
+    text = trap("DX217").source.text
+    fixed = text.replace('name="root_joint" type="revolute"', 'name="root_joint" type="fixed"')
+    link = text.replace('name="root_joint"', 'name="elbow"').replace('"lower"', '"root_joint"')
+    for harmless in (fixed, link):
+        assert harmless != text
+        assert find_rule("DX217").detect(Case(XmlSource(harmless), "floating")) == []
+
+
+def test_pinocchio_welds_the_child_of_a_root_joint_to_the_base() -> None:
+    pin = pytest.importorskip("pinocchio")
+    case = trap("DX217")
+    mended_text = mended("DX217", case)[1].case.source.text
+    free = pin.JointModelFreeFlyer()
+
+    def mass_matrix(text: str, *name: str) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+        model = pin.buildModelFromXML(text, free, *name)
+        upper = np.triu(pin.crba(model, model.createData(), pin.neutral(model)))
+        return np.asarray(upper + np.triu(upper, 1).T)
+
+    right = mass_matrix(mended_text)
+    lost = mass_matrix(case.source.text)
+    assert np.max(np.abs(lost - right)) > 0.1 * np.max(np.abs(right))
+    # The page names this way to keep the name of the joint.
+    assert np.array_equal(mass_matrix(case.source.text, "free_flyer"), right)
+
+
 @pytest.mark.parametrize("rule_id", ["DX214", "DX215"])
 def test_transmissions(rule_id: str) -> None:
     case = trap(rule_id)
@@ -234,13 +271,13 @@ def test_transmissions_that_drake_passes_over_are_no_matter() -> None:
 
 
 def test_inertia_scaling_is_taken_away() -> None:
-    case = trap("DX119")
-    found, remedy = mended("DX119", case)
+    case = trap("DX114")
+    found, remedy = mended("DX114", case)
     assert only(found).link == "lower"
     assert case.model == remedy.case.model
     assert changed_lines(case, remedy.case) == ['<inertia_scaling value="3.0"/>']
     harmless = case.source.text.replace('value="3.0"', 'value="1.0"')
-    assert not find_rule("DX119").detect(Case(XmlSource(harmless)))
+    assert not find_rule("DX114").detect(Case(XmlSource(harmless)))
 
 
 def _pose(model: Model, q: object) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:

@@ -100,7 +100,7 @@ def test_a_planted_fault_is_found_where_it_is(robot: str, data: st.DataObject) -
 def _faults(place: NumericAttribute, text: str) -> list[tuple[str, str]]:
     """Ways to write the same numbers badly, with the rule about each."""
     if place.count == 1:
-        ways = [("DX405", f" {text}"), ("DX405", f"{text} "), ("DX403", f"{text} kg")]
+        ways = [("DX405", f"\u00a0{text}"), ("DX405", f" {text} "), ("DX403", f"{text} kg")]
         return [*ways, ("DX401", text.replace(".", ","))] if "." in text else ways
     words = text.split()
     ways = [("DX402", ", ".join(words)), ("DX404", f"{text} 7"), ("DX402", "; ".join(words))]
@@ -118,7 +118,7 @@ def test_any_white_space_but_blanks(blank: str) -> None:
 @pytest.mark.parametrize(("choice", "mass"), [("decimal", 1.25), ("thousands", 1250.0)])
 def test_a_comma_is_read_by_choice(choice: str, mass: float) -> None:
     text = trap("DX401").source.text.replace('"2,5"', '"1,250"')
-    remedy = mended("DX401", Case(XmlSource(text), settings={"DX401": choice}))[1]
+    remedy = mended("DX401", Case(XmlSource(text), choices={"DX401": choice}))[1]
     assert remedy.case.model.inertial("upper").mass == mass
     assert remedy.choice is not None
 
@@ -133,7 +133,7 @@ def test_an_inertial_without_tensor(choice: str, mass: float) -> None:
     text = trap("DX410").source.text.replace("<mass>0.4</mass>", '<mass value="0.4"/>')
     start = text.index("<inertia ", text.index('value="0.4"'))
     text = text[:start] + text[text.index("/>", start) + 2 :]
-    found, remedy = mended("DX410", Case(XmlSource(text), settings={"DX410": choice}))
+    found, remedy = mended("DX410", Case(XmlSource(text), choices={"DX410": choice}))
     assert only(found).link == "tool"
     assert remedy.case.model.inertial("tool").mass == mass
     assert not remedy.case.model.inertial("tool").tensor.any()

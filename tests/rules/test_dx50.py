@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dynx.model.xml_source import XmlSource
-from dynx.rules import Case, find_rule
+from dynx.rules import Case, Rule, find_rule
 from dynx.spatial.so3 import rotation_from_rpy
 from tests.rules.documents import case_of, joint, link, visual
 
@@ -107,11 +107,11 @@ def test_a_center_of_mass_beside_the_box(center: tuple[float, float, float], fou
 
 
 @pytest.mark.parametrize("rule", [BEYOND, BELOW, OUTSIDE])
-def test_without_a_known_shape_nothing_is_said(rule: object) -> None:
+def test_without_a_known_shape_nothing_is_said(rule: Rule) -> None:
     lost = visual('<mesh filename="gone.stl"/>')
     for shapes in ((), (BOX, lost)):
         case = case_of(link("base", *shapes, moments=(1e9, 1e9, 1e-9), center=(9.0, 9.0, 9.0)))
-        assert rule.detect(case) == []  # type: ignore[attr-defined]
+        assert rule.detect(case) == []
 
 
 def test_the_unit_matrix_is_a_placeholder() -> None:

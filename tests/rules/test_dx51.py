@@ -72,7 +72,7 @@ def test_absent_limits_are_zero_and_said_to_be_absent() -> None:
 @pytest.mark.parametrize("written", ['lower="-1" upper="1"', 'upper="1"', ""])
 def test_a_continuous_joint_loses_its_range_and_nothing_else(written: str) -> None:
     case = arm(limit=f'<limit effort="7" {written} velocity="3"/>', type="continuous")
-    case = Case(case.source, settings={"DX509": "drop"})
+    case = Case(case.source, choices={"DX509": "drop"})
     rule = find_rule("DX509")
     detections = rule.detect(case)
     assert len(detections) == bool(written)
@@ -96,7 +96,7 @@ def test_the_followers_of_a_chain_follow_its_head(chain: list[tuple[float, float
         numbers = f'multiplier="{scale!r}" offset="{offset!r}" ' if written else ""
         mimic = f'<mimic {numbers}joint="joint{k - 1}"/>'
         joints.append(joint(f"joint{k}", f"link{k}", f"link{k + 1}", mimic))
-    case = Case(case_of(*links, *joints).source, settings={"DX511": "direct"})
+    case = Case(case_of(*links, *joints).source, choices={"DX511": "direct"})
     rule = find_rule("DX511")
     detections = rule.detect(case)
     assert [each.joint for each in detections] == [f"joint{k}" for k in range(2, count + 1)]
@@ -170,7 +170,7 @@ def test_multiples_of_a_quarter_turn_cut_short(count: int, decimals: int, cut: b
     case = arm(f'<origin xyz="1 2 3" rpy="0 {word} 0.3"/>')
     assert found("DX514", case) == ["elbow"]
     rule = find_rule("DX514")
-    chosen = Case(case.source, settings={"DX514": "full"})
+    chosen = Case(case.source, choices={"DX514": "full"})
     remedy = rule.remedy(chosen, rule.detect(chosen))
     assert remedy is not None
     whole = -meant if sign == "-" else meant

@@ -56,7 +56,7 @@ def cured(rule: Rule) -> Case | None:
     """The trap with the cause removed, by the first choice that removes anything; None where none does."""
     trap = trap_case(rule)
     for choice in [None, *rule.choices]:
-        case = Case(trap.source, trap.base, settings=None if choice is None else {rule.id: choice})
+        case = Case(trap.source, trap.base, choices=None if choice is None else {rule.id: choice})
         remedy = rule.remedy(case, rule.detect(case))
         if remedy is not None:
             return remedy.case

@@ -17,6 +17,7 @@ def test_a_plain_number_has_no_fault(x: float) -> None:
     assert is_number(repr(x))
     assert misspelled_number(repr(x)) is None
     assert misspelled_number(f"+{abs(x)!r}") is None
+    assert misspelled_number(f" \t\n{x!r}") is None
 
 
 @given(numbers)
@@ -76,7 +77,9 @@ def test_odd_white_space_of_a_vector(words: list[str], blank: str) -> None:
 @pytest.mark.parametrize(
     ("written", "fault", "meant"),
     [
-        (" 2.5", "blank", "2.5"),
+        ("2.5 ", "blank", "2.5"),
+        (" 2.5\n", "blank", "2.5"),
+        ("\u00a02.5", "blank", "2.5"),
         ("inf", "infinite", "1.7976931348623157e+308"),
         ("-Infinity", "infinite", "-1.7976931348623157e+308"),
         ("1e999", "infinite", "1.7976931348623157e+308"),

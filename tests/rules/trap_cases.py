@@ -15,11 +15,11 @@ from dynx.rules import Case, Detection, Remedy, find_rule
 TRAPS = Path(__file__).parents[2] / "models" / "traps"
 
 
-def trap(rule_id: str, **settings: str) -> Case:
+def trap(rule_id: str, **choices: str) -> Case:
     """The trap of a rule, with the user's choices by rule id."""
     rule = find_rule(rule_id)
     path = TRAPS / rule.trap()
-    return Case(XmlSource(path.read_bytes(), str(path)), rule.trap_base, settings=settings)
+    return Case(XmlSource(path.read_bytes(), str(path)), rule.trap_base, choices=choices)
 
 
 def mended(rule_id: str, case: Case) -> tuple[list[Detection], Remedy]:

@@ -81,8 +81,9 @@ def test_something_that_is_no_model(strategy: Any) -> None:
 
 
 def test_arguments_that_cannot_be() -> None:
+    text: Any = "yes"
     with pytest.raises(DTypeError, match="within_limits"):
-        configurations(ARM, within_limits="yes")  # type: ignore[arg-type]
+        configurations(ARM, within_limits=text)
     with pytest.raises(ArgumentError, match="reach"):
         velocities(ARM, reach=-1.0)
     with pytest.raises(NotFiniteError, match="reach"):

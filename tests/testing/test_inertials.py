@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import find, given
@@ -64,5 +66,6 @@ def test_shrink_targets() -> None:
 
 
 def test_unknown_kind() -> None:
+    misspelt: Any = "solids"
     with pytest.raises(UnknownNameError, match="did you mean 'solid'"):
-        inertials("solids")  # type: ignore[arg-type]
+        inertials(misspelt)

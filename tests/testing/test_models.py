@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -58,11 +59,12 @@ def test_what_a_file_can_say(model: Model) -> None:
     assert all(joint.locked_at is None for joint in model.joints)
 
 
+def _has_joint(kind: str, model: Model) -> bool:
+    return any(joint.type == kind for joint in model.joints)
+
+
 SORTS: dict[str, Callable[[Model], bool]] = {
-    **{
-        kind: lambda model, kind=kind: any(joint.type == kind for joint in model.joints)  # type: ignore[misc]
-        for kind in ("revolute", "continuous", "prismatic", "fixed")
-    },
+    **{kind: partial(_has_joint, kind) for kind in ("revolute", "continuous", "prismatic", "fixed")},
     "floating": lambda model: model.floating,
     "branching": lambda model: len({joint.parent for joint in model.joints}) < len(model.joints),
     "mimic": lambda model: any(joint.mimic is not None for joint in model.joints),

@@ -5,10 +5,9 @@ from __future__ import annotations
 import re
 import shlex
 from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
 from typing import Any
-
-import pytest
 
 from dynx.cli.commands.doctor import doctor
 from dynx.testing import plugin
@@ -23,7 +22,8 @@ class Options:
     def __init__(self) -> None:
         self.flags: dict[str, dict[str, Any]] = {}
         self.settings: list[str] = []
-        plugin.pytest_addoption(self)  # type: ignore[arg-type]
+        parser: Any = self
+        plugin.pytest_addoption(parser)
 
     def getgroup(self, *_: str) -> Options:
         return self
@@ -36,7 +36,7 @@ class Options:
 
 
 def workflow_commands() -> Iterator[str]:
-    yaml = pytest.importorskip("yaml")
+    yaml = import_module("yaml")
     (text,) = blocks("yaml", PAGE)
     document = yaml.safe_load(text)
     assert document["permissions"]["security-events"] == "write"

@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 import json
-import os
 import re
-import subprocess
-import sys
-from collections.abc import Callable
 from dataclasses import replace
-from importlib.metadata import entry_points
 from pathlib import Path
+from typing import Any, Protocol
 
 import pytest
 
@@ -20,8 +16,8 @@ from dynx.doctor.formats import baseline_document
 from dynx.model.library import find
 from dynx.testing import agreement_tests
 from dynx.testing.robot_checks import CHECKS
+from tests.testing.pytest_runs import PytestRun, python_path, run_forked, run_started
 
-ROOT = Path(__file__).resolve().parents[2]
 FEW = ("--dynx-backends", "reference,pinocchio")
 PENDULUM = find("pendulum").read_text(encoding="utf-8")
 
@@ -70,52 +66,39 @@ robot_checks.agree = counted
 
 HEAVY = {"numpy", "hypothesis", "pinocchio", "pybullet", "mujoco", "pydrake", "click", "dynx.model"}
 
-Run = Callable[..., "subprocess.CompletedProcess[str]"]
 
+class Run(Protocol):
+    """Runs pytest with the plugin installed, in `home` or in a folder of it."""
 
-@pytest.fixture
-def run(tmp_path: Path) -> Run:
-    """Runs pytest in an empty directory, or one below it, with the plugin installed."""
-    path = [str(ROOT)]
-    if not any(point.name == "dynx" for point in entry_points(group="pytest11")):
-        # A source tree that was never installed has no entry points: they are put beside it.
-        information = tmp_path / "site" / "dynx_plugin-0.dist-info"
-        information.mkdir(parents=True)
-        (information / "METADATA").write_text("Metadata-Version: 2.1\nName: dynx-plugin\nVersion: 0\n")
-        (information / "entry_points.txt").write_text("[pytest11]\ndynx = dynx.testing.plugin\n")
-        path.append(str(information.parent))
-    (tmp_path / "home").mkdir()
-
-    def run_pytest(*arguments: str, folder: str = ".") -> subprocess.CompletedProcess[str]:
-        inherited = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST")}
-        return subprocess.run(
-            [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", *arguments],
-            cwd=tmp_path / "home" / folder,
-            env={**inherited, "PYTHONPATH": os.pathsep.join(path)},
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-
-    return run_pytest
+    def __call__(self, *arguments: str, folder: str = ".") -> PytestRun: ...
 
 
 @pytest.fixture
 def home(tmp_path: Path) -> Path:
-    """The directory in which `run` runs."""
-    return tmp_path / "home"
+    """The directory in which `run` and `start` run pytest, empty at first."""
+    folder = tmp_path / "home"
+    folder.mkdir()
+    return folder
 
 
-def outcome(result: subprocess.CompletedProcess[str]) -> dict[str, int]:
-    """How many passed, failed, ... as the last line says."""
-    last = result.stdout.strip().splitlines()[-1]
-    return {word: int(number) for number, word in re.findall(r"(\d+) (passed|failed|skipped|error)", last)}
+@pytest.fixture
+def run(tmp_path: Path, home: Path) -> Run:
+    """In a process forked from a warm one."""
+    path = python_path(tmp_path / "site")
+    return lambda *arguments, folder=".": run_forked(arguments, home / folder, path)
 
 
-def test_without_a_test_file(run: Run, home: Path) -> None:
-    result = run("--dynx-robot", "pendulum", *FEW, "--strict-config", "--strict-markers", "-W", "error")
-    assert outcome(result) == {"passed": len(CHECKS)}, result.stdout + result.stderr
-    assert result.returncode == 0
+@pytest.fixture
+def start(tmp_path: Path, home: Path) -> Run:
+    """In an interpreter of its own, as users do."""
+    path = python_path(tmp_path / "site")
+    return lambda *arguments, folder=".": run_started(arguments, home / folder, path)
+
+
+def test_without_a_test_file(start: Run, home: Path) -> None:
+    result = start("--dynx-robot", "pendulum", *FEW, "--strict-config", "--strict-markers", "-W", "error")
+    assert result.outcome == {"passed": len(CHECKS)}, result.said
+    assert result.code == 0
     assert "dynx: pendulum; fixed base; reference, pinocchio" in result.stdout
     assert not [path.name for path in home.iterdir() if path.name != ".benchmarks"]
 
@@ -150,9 +133,9 @@ def test_robots_of_the_ini_file(run: Run, home: Path) -> None:
     everything = len(CHECKS) * 2 + 1
     for folder, arguments in ((".", ()), (".", ("tests",)), ("tests", ())):
         result = run("--co", "-q", *FEW, *arguments, folder=folder)
-        assert f"{everything} tests collected" in result.stdout, result.stdout + result.stderr
+        assert f"{everything} tests collected" in result.stdout, result.said
     one_file = run("tests/test_own.py", *FEW)
-    assert outcome(one_file) == {"passed": 1}, one_file.stdout + one_file.stderr
+    assert one_file.outcome == {"passed": 1}, one_file.said
     asked_for = run("tests/test_own.py", "--dynx-robot", "pendulum", "--co", "-q")
     assert f"{len(CHECKS) + 1} tests collected" in asked_for.stdout
 
@@ -160,7 +143,7 @@ def test_robots_of_the_ini_file(run: Run, home: Path) -> None:
 def test_a_difference_is_told(run: Run, home: Path) -> None:
     (home / "conftest.py").write_text(WRONG)
     result = run("--dynx-robot", "pendulum", "--dynx-backends", "reference,heavy")
-    assert result.returncode == 1
+    assert result.code == 1
     assert "mass_matrix of pendulum, fixed base" in result.stdout
     told = re.search(
         r"^  reference~heavy: relative error 1\.00e-06, tolerance (\S+)\n"
@@ -186,16 +169,17 @@ def test_in_a_test_file(run: Run, home: Path) -> None:
     (home / "elsewhere").mkdir()
     result = run("..", "-rs", folder="elsewhere")
     # One engine alone is not compared on quantities that neither referee nor derivation gives.
-    assert result.returncode == 0, result.stdout
-    assert outcome(result)["passed"] + outcome(result)["skipped"] == 2 * len(CHECKS)
+    assert result.code == 0, result.stdout
+    assert result.outcome["passed"] + result.outcome["skipped"] == 2 * len(CHECKS)
     assert "nothing to compare (reference; nv 1)" in result.stdout
     without_plugin = run("..", "-p", "no:dynx", folder="elsewhere")
-    assert outcome(without_plugin) == outcome(result)
+    assert without_plugin.outcome == result.outcome
 
 
 def test_a_class_for_no_such_base() -> None:
+    misspelt: Any = "floatin"
     with pytest.raises(ValueError, match="did you mean 'floating'"):
-        agreement_tests("pendulum", base="floatin")  # type: ignore[arg-type]
+        agreement_tests("pendulum", base=misspelt)
 
 
 def test_a_class_for_a_robot_that_is_not_there(run: Run, home: Path) -> None:
@@ -203,16 +187,21 @@ def test_a_class_for_a_robot_that_is_not_there(run: Run, home: Path) -> None:
         "from dynx.testing import agreement_tests\nTestMine = agreement_tests('pendulun')\n"
     )
     result = run("-x")
-    assert outcome(result) == {"failed": 1}
+    assert result.outcome == {"failed": 1}
     assert "did you mean 'pendulum'" in result.stdout
 
 
 @pytest.mark.parametrize("distribution", ["load", "loadscope"])
-def test_with_xdist(run: Run, home: Path, distribution: str) -> None:
-    pytest.importorskip("xdist")
+def test_with_xdist(start: Run, home: Path, distribution: str) -> None:
     (home / "conftest.py").write_text(COUNTING)
-    result = run("--dynx-robot", "pendulum", "--dynx-base=both", *FEW, "-n", "2", "--dist", distribution)
-    assert outcome(result) == {"passed": 2 * len(CHECKS)}, result.stdout + result.stderr
+    chosen = ("--dynx-robot", "pendulum", "--dynx-base=both", "--dynx-backends", "reference")
+    # Three interpreters start, so they load no plugin that they do not need.
+    lean = ("-p", "no:hypothesispytest", "-p", "no:benchmark")
+    result = start(*chosen, *lean, "-n", "2", "--dist", distribution)
+    assert result.code == 0, result.said
+    # One engine alone is not compared on quantities that neither referee nor derivation gives.
+    assert result.outcome["passed"] + result.outcome["skipped"] == 2 * len(CHECKS), result.said
+    assert result.outcome["passed"] > result.outcome["skipped"]
     measured = (home / "measured.txt").read_text().splitlines()
     assert set(measured) == {"pendulum fixed", "pendulum floating"}
     # Workers share nothing: each measures what it has tests of, once.
@@ -238,7 +227,7 @@ def test_a_description_that_cannot_be_read_is_one_failing_test(run: Run, home: P
     (home / "bad.urdf").write_text(PENDULUM.replace('<mass value="', '<mass value="heavy'))
     (home / "test_own.py").write_text("def test_own(): pass\n")
     result = run("--dynx-robot=bad.urdf", *FEW)
-    assert outcome(result) == {"failed": 1, "passed": 1}, result.stdout
+    assert result.outcome == {"failed": 1, "passed": 1}, result.stdout
     assert "DescriptionError" in result.stdout
     assert re.search(r"bad\.urdf:\d+: ", result.stdout)
 
@@ -262,7 +251,7 @@ def test_a_description_that_cannot_be_read_is_one_failing_test(run: Run, home: P
 )
 def test_what_is_asked_wrongly(arguments: tuple[str, ...], said: str, run: Run) -> None:
     result = run(*arguments)
-    assert result.returncode == pytest.ExitCode.USAGE_ERROR, result.stdout + result.stderr
+    assert result.code == pytest.ExitCode.USAGE_ERROR, result.said
     assert said in result.stderr
     assert "Traceback" not in result.stderr
 
@@ -281,7 +270,7 @@ def test_as_loaded(run: Run, home: Path) -> None:
         "loaded",
     )
     refused = run(*chosen)
-    assert outcome(refused) == {"failed": 1}, refused.stdout + refused.stderr
+    assert refused.outcome == {"failed": 1}, refused.said
     assert "DX101 link 'elbow' (pybullet): relative error" in refused.stdout
     line = MASSLESS_ELBOW[: MASSLESS_ELBOW.index('<link name="elbow"')].count("\n") + 1
     assert f"mine.urdf:{line}: " in refused.stdout
@@ -291,12 +280,12 @@ def test_as_loaded(run: Run, home: Path) -> None:
     known = baseline_document([replace(report, robot=where)], str(home / "robots"))
     (home / "robots" / "known.json").write_text(json.dumps(known))
     accepted = run(*chosen, "--dynx-baseline", "robots/known.json")
-    assert outcome(accepted) == {"passed": 1}, accepted.stdout
+    assert accepted.outcome == {"passed": 1}, accepted.stdout
     tolerant = run(*chosen, "--dynx-tolerance", "0.999")
-    assert outcome(tolerant) == {"passed": 1}, tolerant.stdout
+    assert tolerant.outcome == {"passed": 1}, tolerant.stdout
 
 
-def test_it_costs_nothing_when_it_is_not_used(run: Run, home: Path) -> None:
+def test_it_costs_nothing_when_it_is_not_used(start: Run, home: Path) -> None:
     (home / "test_own.py").write_text(
         "import sys\n\n"
         "def test_own():\n"
@@ -304,8 +293,8 @@ def test_it_costs_nothing_when_it_is_not_used(run: Run, home: Path) -> None:
         f"    assert not {HEAVY} & set(sys.modules)\n"
     )
     # Other plugins may import what they like, so only this one is there.
-    result = run(
+    result = start(
         "-p", "no:hypothesispytest", "-p", "no:benchmark", "-p", "no:xdist", "-W", "error", "test_own.py"
     )
-    assert outcome(result) == {"passed": 1}, result.stdout + result.stderr
+    assert result.outcome == {"passed": 1}, result.said
     assert "dynx:" not in result.stdout

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 from hypothesis import find, given
 from hypothesis import strategies as st
@@ -71,5 +73,6 @@ def test_models_that_text_cannot_say() -> None:
         urdf_text(ARM.with_frame("tip", "b"))
     with pytest.raises(ArgumentError, match="turn of arm is locked"):
         urdf_text(load(ARM, lock={"turn": 0.5}))
+    name: Any = "ur5"
     with pytest.raises(DTypeError, match="wanted a dynx Model"):
-        urdf_text("ur5")  # type: ignore[arg-type]
+        urdf_text(name)

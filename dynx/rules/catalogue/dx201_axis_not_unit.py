@@ -26,7 +26,7 @@ import numpy as np
 
 from dynx.rules.attributes import vector_of
 from dynx.rules.case import Case
-from dynx.rules.editing import EditingRule, Place, found_at
+from dynx.rules.editing import Correction, EditingRule, found_at
 from dynx.rules.joint_elements import SINGLE, elements_in_joints
 from dynx.rules.number_text import decimal
 
@@ -48,7 +48,7 @@ class AxisNotUnit(EditingRule):
     }
     changed = "scaled the axes of joints to length 1"
 
-    def places(self, case: Case) -> Iterable[Place]:
+    def corrections(self, case: Case) -> Iterable[Correction]:
         """Axes of revolute, continuous and prismatic joints."""
         for joint, axis in elements_in_joints(case, "axis", SINGLE):
             written = vector_of(axis, "xyz")
@@ -60,4 +60,4 @@ class AxisNotUnit(EditingRule):
                 message = f"the axis {axis.attributes['xyz']} has length {length:.9g}"
                 unit = case.model.joint(joint.attributes["name"]).axis
                 edit = case.source.setting(axis, "xyz", " ".join(map(decimal, unit)))
-                yield Place(found_at(axis, message), (edit,))
+                yield Correction(found_at(axis, message), (edit,))

@@ -20,7 +20,8 @@ from collections.abc import Iterable, Mapping
 from typing import ClassVar
 
 from dynx.rules.case import Case
-from dynx.rules.editing import EditingRule, Place, found_at
+from dynx.rules.editing import Correction, EditingRule, found_at
+from dynx.rules.engine_versions import EVERY_ENGINE
 from dynx.rules.joint_elements import SINGLE, elements_in_joints
 from dynx.rules.number_text import is_number
 from dynx.rules.rule import Stage
@@ -34,19 +35,14 @@ class AxisWithoutDirection(EditingRule):
     title = "The axis of a joint that moves is zero or empty."
     stage: ClassVar[Stage] = "reading"
     advice = "Write the direction of the axis, or make the joint fixed."
-    engines: ClassVar[Mapping[str, str]] = {
-        "pinocchio": ">=4.1.0",
-        "pybullet": ">=3.2.7",
-        "mujoco": ">=4.0.0",
-        "drake": ">=1.51.1",
-    }
+    engines: ClassVar[Mapping[str, str]] = EVERY_ENGINE
     choices: ClassVar[Mapping[str, str]] = {
         "x": "make an axis without direction (1, 0, 0), URDF's default",
         "fixed": "make a joint whose axis has no direction fixed",
     }
     changed = "gave joints without a direction to move in one, or fixed them"
 
-    def places(self, case: Case) -> Iterable[Place]:
+    def corrections(self, case: Case) -> Iterable[Correction]:
         """Axes of revolute, continuous and prismatic joints."""
         for joint, axis in elements_in_joints(case, "axis", SINGLE):
             words = axis.attributes.get("xyz", "").split()
@@ -57,4 +53,6 @@ class AxisWithoutDirection(EditingRule):
             else:
                 edit = case.source.setting(axis, "xyz", "1 0 0")
             what = "is zero" if words else "has no numbers"
-            yield Place(found_at(axis, f"the axis of a {joint.attributes['type']} joint {what}"), (edit,))
+            yield Correction(
+                found_at(axis, f"the axis of a {joint.attributes['type']} joint {what}"), (edit,)
+            )

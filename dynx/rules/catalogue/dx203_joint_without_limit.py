@@ -20,7 +20,7 @@ from typing import ClassVar
 
 from dynx.model.xml_source import Edit, SourceElement
 from dynx.rules.case import Case
-from dynx.rules.editing import EditingRule, Place, found_at
+from dynx.rules.editing import Correction, EditingRule, found_at
 from dynx.rules.joint_elements import UNLIMITED, joints_of_type
 from dynx.rules.number_text import LARGEST
 from dynx.rules.rule import Stage
@@ -43,12 +43,12 @@ class JointWithoutLimit(EditingRule):
     }
     changed = "made joints without limit continuous, or gave them one"
 
-    def places(self, case: Case) -> Iterable[Place]:
+    def corrections(self, case: Case) -> Iterable[Correction]:
         """Such joints."""
         for joint in joints_of_type(case, ("revolute", "prismatic")):
             if joint.first("limit") is None:
                 message = f"the joint is {joint.attributes['type']} and has no <limit>"
-                yield Place(found_at(joint, message), (self._mended(case, joint),))
+                yield Correction(found_at(joint, message), (self._mended(case, joint),))
 
     def _mended(self, case: Case, joint: SourceElement) -> Edit:
         if self.chosen(case) == "zero":

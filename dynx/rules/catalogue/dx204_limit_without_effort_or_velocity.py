@@ -19,7 +19,7 @@ from collections.abc import Iterable, Mapping
 from typing import ClassVar
 
 from dynx.rules.case import Case
-from dynx.rules.editing import EditingRule, Place, found_at
+from dynx.rules.editing import Correction, EditingRule, found_at
 from dynx.rules.joint_elements import elements_in_joints
 from dynx.rules.number_text import LARGEST
 from dynx.rules.rule import Stage
@@ -36,10 +36,10 @@ class LimitWithoutEffortOrVelocity(EditingRule):
     engines: ClassVar[Mapping[str, str]] = {"pinocchio": ">=4.1.0"}
     changed = "wrote the largest double for efforts and velocities that were not given"
 
-    def places(self, case: Case) -> Iterable[Place]:
+    def corrections(self, case: Case) -> Iterable[Correction]:
         """The first limit of every joint, moving or not."""
         for _, limit in elements_in_joints(case, "limit"):
             missing = [name for name in ("effort", "velocity") if name not in limit.attributes]
             if missing:
                 edits = tuple(case.source.setting(limit, name, LARGEST) for name in missing)
-                yield Place(found_at(limit, f"<limit> has no {' and no '.join(missing)}"), edits)
+                yield Correction(found_at(limit, f"<limit> has no {' and no '.join(missing)}"), edits)

@@ -20,7 +20,7 @@ from typing import ClassVar
 
 from dynx.rules.attributes import number_or_none
 from dynx.rules.case import Case
-from dynx.rules.editing import EditingRule, Place, found_at
+from dynx.rules.editing import Correction, EditingRule, found_at
 from dynx.rules.joint_elements import SINGLE, elements_in_joints
 from dynx.rules.number_text import LARGEST
 from dynx.rules.rule import Stage
@@ -41,7 +41,7 @@ class LowerLimitAboveUpper(EditingRule):
     }
     changed = "put limits in order whose lower was above the upper"
 
-    def places(self, case: Case) -> Iterable[Place]:
+    def corrections(self, case: Case) -> Iterable[Correction]:
         """Limits of joints that move."""
         for _, limit in elements_in_joints(case, "limit", SINGLE):
             lower, upper = number_or_none(limit, "lower"), number_or_none(limit, "upper")
@@ -53,4 +53,6 @@ class LowerLimitAboveUpper(EditingRule):
                 written = (limit.attributes["upper"], limit.attributes["lower"])
             setting = case.source.setting
             edits = tuple(setting(limit, *each) for each in zip(("lower", "upper"), written, strict=True))
-            yield Place(found_at(limit, f"the lower limit {lower:g} is above the upper {upper:g}"), edits)
+            yield Correction(
+                found_at(limit, f"the lower limit {lower:g} is above the upper {upper:g}"), edits
+            )

@@ -3,9 +3,10 @@
 ``-1`` for "no limit" is a habit from other formats; else a sign slipped in.
 
 - Pinocchio 4.1 refuses the file: "Some components of min_effort are greater than max_effort".
-- Drake 1.51 refuses a negative velocity with a failed condition in its C++ sources; a negative effort means
-  nothing to it.
-- PyBullet 3.2.7 and MuJoCo 4.0 read the file.
+- Drake 1.51 refuses a negative velocity with a failed condition in its C++ sources. A negative effort means
+  nothing to it, unless a ``<transmission>`` gives the joint an actuator: then it refuses the file too, "which
+  has a negative effort limit".
+- PyBullet 3.2.7 reads both as they stand. MuJoCo 4.0 reads no velocity, and takes the sign off an effort.
 
 The equations of motion do not depend on these limits. dynx reads the number with a note.
 
@@ -20,7 +21,7 @@ from typing import ClassVar
 
 from dynx.rules.attributes import number_or_none
 from dynx.rules.case import Case
-from dynx.rules.editing import EditingRule, Place, found_at
+from dynx.rules.editing import Correction, EditingRule, found_at
 from dynx.rules.joint_elements import SINGLE, elements_in_joints
 from dynx.rules.number_text import LARGEST
 from dynx.rules.rule import Stage
@@ -41,7 +42,7 @@ class NegativeEffortOrVelocity(EditingRule):
     }
     changed = "made the largest efforts and velocities of joints positive"
 
-    def places(self, case: Case) -> Iterable[Place]:
+    def corrections(self, case: Case) -> Iterable[Correction]:
         """Limits of joints that move."""
         for _, limit in elements_in_joints(case, "limit", SINGLE):
             below = [name for name in ("effort", "velocity") if (number_or_none(limit, name) or 0.0) < 0.0]
@@ -51,7 +52,7 @@ class NegativeEffortOrVelocity(EditingRule):
                     case.source.setting(limit, name, self._instead(case, limit.attributes[name]))
                     for name in below
                 )
-                yield Place(found_at(limit, f"<limit> has {said}"), edits)
+                yield Correction(found_at(limit, f"<limit> has {said}"), edits)
 
     def _instead(self, case: Case, written: str) -> str:
         return LARGEST if self.chosen(case) == "unlimited" else written.strip().removeprefix("-")

@@ -16,7 +16,7 @@ from collections.abc import Iterable, Mapping
 from typing import ClassVar
 
 from dynx.rules.case import Case
-from dynx.rules.editing import EditingRule, Place, found_at
+from dynx.rules.editing import Correction, EditingRule, found_at
 from dynx.rules.joint_elements import elements_in_joints
 from dynx.rules.rule import Stage
 
@@ -32,9 +32,9 @@ class SafetyControllerWithoutGain(EditingRule):
     engines: ClassVar[Mapping[str, str]] = {"pinocchio": ">=4.1.0"}
     changed = "gave safety controllers without k_velocity one of 0"
 
-    def places(self, case: Case) -> Iterable[Place]:
+    def corrections(self, case: Case) -> Iterable[Correction]:
         """The first safety controller of every joint."""
         for _, controller in elements_in_joints(case, "safety_controller"):
             if "k_velocity" not in controller.attributes:
                 edit = case.source.setting(controller, "k_velocity", "0")
-                yield Place(found_at(controller, "<safety_controller> has no k_velocity"), (edit,))
+                yield Correction(found_at(controller, "<safety_controller> has no k_velocity"), (edit,))

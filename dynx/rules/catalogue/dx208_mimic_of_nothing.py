@@ -22,7 +22,7 @@ from typing import ClassVar
 from dynx.errors import shown
 from dynx.model.xml_source import SourceElement
 from dynx.rules.case import Case
-from dynx.rules.editing import EditingRule, Place, found_at
+from dynx.rules.editing import Correction, EditingRule, found_at
 from dynx.rules.joint_elements import SINGLE, elements_in_joints
 from dynx.rules.rule import Stage
 
@@ -42,13 +42,13 @@ class MimicOfNothing(EditingRule):
     }
     changed = "took <mimic> away from joints that had nothing to follow"
 
-    def places(self, case: Case) -> Iterable[Place]:
+    def corrections(self, case: Case) -> Iterable[Correction]:
         """The first ``<mimic>`` of every joint."""
         for joint, mimic in elements_in_joints(case, "mimic"):
             message = _why_nothing(case, joint, mimic)
             if message is not None:
                 edits = tuple(case.source.removing(each) for each in joint.all("mimic"))
-                yield Place(found_at(mimic, message), edits)
+                yield Correction(found_at(mimic, message), edits)
 
 
 def _why_nothing(case: Case, joint: SourceElement, mimic: SourceElement) -> str | None:

@@ -24,7 +24,7 @@ from dynx.errors import shown
 from dynx.model.elements import Joint
 from dynx.model.xml_source import Edit, SourceElement
 from dynx.rules.case import Case
-from dynx.rules.editing import EditingRule, Place, found_at
+from dynx.rules.editing import Correction, EditingRule, found_at
 from dynx.rules.joint_elements import SINGLE, elements_in_joints
 from dynx.rules.number_text import decimal
 
@@ -43,14 +43,14 @@ class MimicOfFixedJoint(EditingRule):
     }
     changed = "settled joints that mimic a fixed one"
 
-    def places(self, case: Case) -> Iterable[Place]:
+    def corrections(self, case: Case) -> Iterable[Correction]:
         """Joints that move by their type and have a ``<mimic>``, and are fixed to dynx."""
         known = {joint.name: joint for joint in case.model.joints}
         for element, mimic in elements_in_joints(case, "mimic", SINGLE):
             joint = known[element.attributes["name"]]
             if not joint.moves:
                 message = f"the joint mimics {shown(mimic.attributes['joint'])}, which cannot move"
-                yield Place(found_at(mimic, message), tuple(self._edits(case, element, joint)))
+                yield Correction(found_at(mimic, message), tuple(self._edits(case, element, joint)))
 
     def _edits(self, case: Case, element: SourceElement, joint: Joint) -> Iterable[Edit]:
         source = case.source

@@ -28,7 +28,7 @@ from typing import ClassVar
 from dynx.model.xml_source import Edit, SourceElement
 from dynx.rules.attributes import number_or_none
 from dynx.rules.case import Case, end_of
-from dynx.rules.editing import EditingRule, Place, found_at
+from dynx.rules.editing import Correction, EditingRule, found_at
 from dynx.rules.joint_elements import joints_of_type
 from dynx.rules.joint_splitting import TYPES, splitting
 from dynx.rules.rule import Stage
@@ -53,7 +53,7 @@ class JointOfSeveralFreedoms(EditingRule):
     }
     changed = "replaced joints of several freedoms"
 
-    def places(self, case: Case) -> Iterable[Place]:
+    def corrections(self, case: Case) -> Iterable[Correction]:
         """Such joints, but for a floating one below an empty root, which DX211 is about."""
         for joint in joints_of_type(case, TYPES):
             kind = joint.attributes["type"]
@@ -63,7 +63,7 @@ class JointOfSeveralFreedoms(EditingRule):
                 edits: tuple[Edit, ...] = (case.source.setting(joint, "type", "fixed"),)
             else:
                 edits = tuple(splitting(case.source, joint))
-            yield Place(found_at(joint, f"the joint is {kind}"), edits)
+            yield Correction(found_at(joint, f"the joint is {kind}"), edits)
 
 
 def _is_the_base(case: Case, joint: SourceElement) -> bool:

@@ -21,7 +21,7 @@ from collections.abc import Iterable, Mapping
 from typing import ClassVar
 
 from dynx.rules.case import Case
-from dynx.rules.editing import EditingRule, Place, found_at
+from dynx.rules.editing import Correction, EditingRule, found_at
 from dynx.rules.joint_elements import joints_of_type
 
 
@@ -38,8 +38,8 @@ class FloatingJointAtRoot(EditingRule):
     }
     changed = "made the floating joint below the root fixed: the loading call says whether the base is free"
 
-    def places(self, case: Case) -> Iterable[Place]:
+    def corrections(self, case: Case) -> Iterable[Correction]:
         """The joint, of which there is at most one that dynx can read."""
         for joint in joints_of_type(case, ("floating",)):
             edit = case.source.setting(joint, "type", "fixed")
-            yield Place(found_at(joint, "the joint below the root is floating"), (edit,))
+            yield Correction(found_at(joint, "the joint below the root is floating"), (edit,))

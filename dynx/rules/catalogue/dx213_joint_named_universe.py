@@ -22,7 +22,7 @@ from collections.abc import Iterable, Mapping
 from typing import ClassVar
 
 from dynx.rules.case import Case
-from dynx.rules.editing import EditingRule, Place, found_at
+from dynx.rules.editing import Correction, EditingRule, found_at
 from dynx.rules.renaming import fresh_name, renaming_joint
 
 _RESERVED = "universe"
@@ -38,11 +38,11 @@ class JointNamedUniverse(EditingRule):
     engines: ClassVar[Mapping[str, str]] = {"pinocchio": ">=4.1.0"}
     changed = "gave the joint named universe another name"
 
-    def places(self, case: Case) -> Iterable[Place]:
+    def corrections(self, case: Case) -> Iterable[Correction]:
         """The fixed joint of that name."""
         joint = case.joints.get(_RESERVED)
         if joint is None or joint.attributes.get("type") != "fixed":
             return
         new = fresh_name(f"{_RESERVED}_joint", case.joints)
         edits = tuple(renaming_joint(case.source, _RESERVED, new))
-        yield Place(found_at(joint, "the joint has the name of Pinocchio's world"), edits)
+        yield Correction(found_at(joint, "the joint has the name of Pinocchio's world"), edits)

@@ -19,7 +19,7 @@ from typing import ClassVar
 from dynx.errors import shown
 from dynx.model.xml_source import SourceElement
 from dynx.rules.case import Case
-from dynx.rules.editing import EditingRule, Place, found_at
+from dynx.rules.editing import Correction, EditingRule, found_at
 from dynx.rules.rule import Stage
 from dynx.rules.transmissions import transmissions_drake_reads, type_of
 
@@ -35,12 +35,12 @@ class TransmissionOfNothing(EditingRule):
     engines: ClassVar[Mapping[str, str]] = {"drake": ">=1.51.1"}
     changed = "took transmissions away that lack a part or a joint"
 
-    def places(self, case: Case) -> Iterable[Place]:
+    def corrections(self, case: Case) -> Iterable[Correction]:
         """Such transmissions, of those that Drake reads."""
         for transmission in transmissions_drake_reads(case):
             message = _fault(case, transmission)
             if message is not None:
-                yield Place(found_at(transmission, message), (case.source.removing(transmission),))
+                yield Correction(found_at(transmission, message), (case.source.removing(transmission),))
 
 
 def _fault(case: Case, transmission: SourceElement) -> str | None:

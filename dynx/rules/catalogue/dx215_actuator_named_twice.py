@@ -22,7 +22,7 @@ from typing import ClassVar
 from dynx.errors import shown
 from dynx.model.xml_source import SourceElement
 from dynx.rules.case import Case
-from dynx.rules.editing import EditingRule, Place, found_at
+from dynx.rules.editing import Correction, EditingRule, found_at
 from dynx.rules.renaming import fresh_name
 from dynx.rules.rule import Stage
 from dynx.rules.transmissions import moves_by_actuator, transmissions_drake_reads
@@ -39,7 +39,7 @@ class ActuatorNamedTwice(EditingRule):
     engines: ClassVar[Mapping[str, str]] = {"drake": ">=1.51.1"}
     changed = "gave actuators of the same name different ones"
 
-    def places(self, case: Case) -> Iterable[Place]:
+    def corrections(self, case: Case) -> Iterable[Correction]:
         """Actuators, of those that Drake makes, whose name was there before."""
         actuators = list(_actuators(case))
         taken = {each.attributes["name"] for each in actuators}
@@ -50,7 +50,9 @@ class ActuatorNamedTwice(EditingRule):
                 new = fresh_name(name, taken)
                 taken.add(new)
                 edit = case.source.setting(actuator, "name", new)
-                yield Place(found_at(actuator, f"a further actuator has the name {shown(name)}"), (edit,))
+                yield Correction(
+                    found_at(actuator, f"a further actuator has the name {shown(name)}"), (edit,)
+                )
             seen.add(name)
 
 

@@ -17,7 +17,7 @@ from typing import ClassVar
 
 from dynx.rules.attributes import number_or_none
 from dynx.rules.case import Case
-from dynx.rules.editing import EditingRule, Place, found_at
+from dynx.rules.editing import Correction, EditingRule, found_at
 from dynx.rules.joint_elements import SINGLE, elements_in_joints
 from dynx.rules.rule import Stage
 
@@ -37,7 +37,7 @@ class NegativeDamping(EditingRule):
     }
     changed = "made the damping of joints positive or zero"
 
-    def places(self, case: Case) -> Iterable[Place]:
+    def corrections(self, case: Case) -> Iterable[Correction]:
         """Joints that move."""
         for _, dynamics in elements_in_joints(case, "dynamics", SINGLE):
             if (number_or_none(dynamics, "damping") or 0.0) >= 0.0:
@@ -45,4 +45,4 @@ class NegativeDamping(EditingRule):
             written = dynamics.attributes["damping"].strip()
             instead = "0" if self.chosen(case) == "zero" else written.removeprefix("-")
             edit = case.source.setting(dynamics, "damping", instead)
-            yield Place(found_at(dynamics, f"the joint has damping {written}"), (edit,))
+            yield Correction(found_at(dynamics, f"the joint has damping {written}"), (edit,))

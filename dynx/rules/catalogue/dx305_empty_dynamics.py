@@ -17,7 +17,7 @@ from collections.abc import Iterable, Mapping
 from typing import ClassVar
 
 from dynx.rules.case import Case
-from dynx.rules.editing import EditingRule, Place, found_at
+from dynx.rules.editing import Correction, EditingRule, found_at
 from dynx.rules.joint_elements import elements_in_joints
 from dynx.rules.rule import Stage
 
@@ -33,9 +33,9 @@ class EmptyDynamics(EditingRule):
     engines: ClassVar[Mapping[str, str]] = {"pinocchio": ">=4.1.0", "pybullet": ">=3.2.7"}
     changed = "wrote a damping of 0 into <dynamics> without damping and friction"
 
-    def places(self, case: Case) -> Iterable[Place]:
+    def corrections(self, case: Case) -> Iterable[Correction]:
         """The first ``<dynamics>`` of every joint, moving or not."""
         for _, dynamics in elements_in_joints(case, "dynamics"):
             if not {"damping", "friction"} & set(dynamics.attributes):
                 edit = case.source.setting(dynamics, "damping", "0")
-                yield Place(found_at(dynamics, "<dynamics> has neither damping nor friction"), (edit,))
+                yield Correction(found_at(dynamics, "<dynamics> has neither damping nor friction"), (edit,))

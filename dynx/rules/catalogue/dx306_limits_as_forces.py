@@ -9,7 +9,8 @@ whose limits are equal is beyond them everywhere else.
   force to the torque. It is not small: a hundred times the torque was measured.
   MuJoCo takes equal limits for none, with a warning.
 - PyBullet 3.2.7: ``stepSimulation`` pushes the joint back to the limit, equal ones included;
-  ``calculateInverseDynamics`` knows of none. A limit without ``upper``, for which URDF has 0, is none.
+  ``calculateInverseDynamics`` knows of none. A limit of ``lower="0"`` without ``upper``, for which URDF has
+  0, is none (see DX216 for other limits without ``upper``).
 
 Within limits that leave a joint some room all engines agree, and doctor compares there. A joint with equal
 limits is compared anywhere, because the equations of motion have no limits.

@@ -5,8 +5,9 @@ that print numbers by the locale in force (a CAD exporter on a German or French 
 
 No two engines do the same with it:
 
-- Pinocchio 4.1: in an ``<inertial>`` the whole inertial is dropped with a line on stderr, so the link
-  weighs nothing; in a ``<joint>`` the file is refused.
+- Pinocchio 4.1: with such a ``<mass>`` or ``<origin>`` of an ``<inertial>`` the whole inertial is dropped, so
+  the link weighs nothing; with such an ``<inertia>`` the tensor alone is, so the link is a point mass. A line
+  on stderr says so. In a ``<joint>`` the file is refused.
 - PyBullet 3.2.7 reads up to the comma: ``2,5`` is 2, ``0,03`` is 0. It says nothing. In a vector it
   does so with each of the three numbers.
 - MuJoCo 4.0 refuses the file and names the line.
@@ -28,6 +29,7 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 from dynx.rules.case import Case
+from dynx.rules.engine_versions import EVERY_ENGINE
 from dynx.rules.misspelled_numbers import MisspelledNumberRule
 from dynx.rules.number_text import Fault, Misspelling
 
@@ -39,12 +41,7 @@ class DecimalComma(MisspelledNumberRule):
     name = "decimal-comma"
     title = "A number is written with a comma in place of a decimal point."
     advice = "Write decimals with a point."
-    engines: ClassVar[Mapping[str, str]] = {
-        "pinocchio": ">=4.1.0",
-        "pybullet": ">=3.2.7",
-        "mujoco": ">=4.0.0",
-        "drake": ">=1.51.1",
-    }
+    engines: ClassVar[Mapping[str, str]] = EVERY_ENGINE
     choices: ClassVar[Mapping[str, str]] = {
         "decimal": "read a comma in a number as its decimal point",
         "thousands": "read a comma in a number as standing between thousands",

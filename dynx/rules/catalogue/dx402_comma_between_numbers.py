@@ -21,6 +21,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar
 
+from dynx.rules.engine_versions import EVERY_ENGINE
 from dynx.rules.misspelled_numbers import MisspelledNumberRule
 from dynx.rules.number_text import Fault
 
@@ -32,12 +33,7 @@ class CommaBetweenNumbers(MisspelledNumberRule):
     name = "comma-between-numbers"
     title = "The numbers of a vector are parted by commas in place of blanks."
     advice = "Part the numbers of a vector by blanks alone."
-    engines: ClassVar[Mapping[str, str]] = {
-        "pinocchio": ">=4.1.0",
-        "pybullet": ">=3.2.7",
-        "mujoco": ">=4.0.0",
-        "drake": ">=1.51.1",
-    }
+    engines: ClassVar[Mapping[str, str]] = EVERY_ENGINE
     changed = "parted the numbers of vectors by blanks in place of commas"
     fault: ClassVar[Fault] = "separator"
 

@@ -2,8 +2,9 @@
 
 A second point, a unit, a Fortran exponent (``1.5d-3``), a hexadecimal number.
 
-- Pinocchio 4.1: in an ``<inertial>`` the whole inertial is dropped with a line on stderr, so the link
-  weighs nothing; in a ``<joint>`` the file is refused.
+- Pinocchio 4.1: with such a ``<mass>`` or ``<origin>`` of an ``<inertial>`` the whole inertial is dropped, so
+  the link weighs nothing; with such an ``<inertia>`` the tensor alone is, so the link is a point mass. A line
+  on stderr says so. In a ``<joint>`` the file is refused.
 - PyBullet 3.2.7 reads the number in front and passes over the rest, without a word. ``1.5d-3`` is
   then 1.5, a thousand times too large.
 - MuJoCo 4.0 refuses the file and names the line, but reads hexadecimal numbers.
@@ -24,6 +25,7 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 from dynx.rules.case import Case
+from dynx.rules.engine_versions import EVERY_ENGINE
 from dynx.rules.misspelled_numbers import MisspelledNumberRule
 from dynx.rules.number_text import Fault
 
@@ -35,12 +37,7 @@ class TextAfterNumber(MisspelledNumberRule):
     name = "text-after-number"
     title = "A number is followed by something that is no part of it."
     advice = "Write the bare number, in SI units."
-    engines: ClassVar[Mapping[str, str]] = {
-        "pinocchio": ">=4.1.0",
-        "pybullet": ">=3.2.7",
-        "mujoco": ">=4.0.0",
-        "drake": ">=1.51.1",
-    }
+    engines: ClassVar[Mapping[str, str]] = EVERY_ENGINE
     changed = "kept the number where something stood behind it"
     fault: ClassVar[Fault] = "rest"
 

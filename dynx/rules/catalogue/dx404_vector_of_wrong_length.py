@@ -24,6 +24,7 @@ from typing import ClassVar
 
 from dynx.model.xml_source import Edit
 from dynx.rules.case import Case
+from dynx.rules.engine_versions import EVERY_ENGINE
 from dynx.rules.misspelled_numbers import MisspelledNumberRule
 from dynx.rules.number_text import Fault, Misspelling
 from dynx.rules.numeric_attributes import NumericAttribute
@@ -36,12 +37,7 @@ class VectorOfWrongLength(MisspelledNumberRule):
     name = "vector-of-wrong-length"
     title = "A vector has more or fewer than three numbers."
     advice = "Write three numbers."
-    engines: ClassVar[Mapping[str, str]] = {
-        "pinocchio": ">=4.1.0",
-        "pybullet": ">=3.2.7",
-        "mujoco": ">=4.0.0",
-        "drake": ">=1.51.1",
-    }
+    engines: ClassVar[Mapping[str, str]] = EVERY_ENGINE
     choices: ClassVar[Mapping[str, str]] = {
         "first": "keep the first three numbers of a vector, and add zeros where some are missing",
         "default": "take a vector without three numbers away",

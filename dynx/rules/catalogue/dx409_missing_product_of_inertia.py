@@ -1,14 +1,13 @@
 """DX409 missing-product-of-inertia: an ``<inertia>`` has no ``ixy``, ``ixz`` or ``iyz``
 
 Whoever writes a tensor by hand leaves out the products of inertia that are zero. URDF wants all six numbers,
-and what engines do without them ranges from nothing to dropping the link's mass.
+and what engines do without them ranges from nothing to refusing the file.
 
-- Pinocchio 4.1 says on stderr that ``ixy`` is missing and drops the whole inertial: the link weighs
-  nothing.
+- Pinocchio 4.1 says on stderr that ``ixy`` is missing and drops the whole tensor: the link is a point mass.
 - MuJoCo 4.0 refuses the file and names the line.
 - PyBullet 3.2.7 and Drake 1.51 read zero.
 
-The effect is a link without mass and inertia in Pinocchio: of order 0.01 to 1 in the mass matrix.
+The effect is a link without moments of inertia in Pinocchio: of order 0.01 to 1 in the mass matrix.
 
 What to do: write the products that are zero as ``0``. ``dynx doctor --fix`` does so; that a product which is
 not there was meant to be zero is the one reading that two engines share. A missing moment (``ixx``, ``iyy``,
@@ -21,7 +20,7 @@ from collections.abc import Iterable, Mapping
 from typing import ClassVar
 
 from dynx.rules.case import Case
-from dynx.rules.editing import EditingRule, Place, found_at
+from dynx.rules.editing import Correction, EditingRule, found_at
 from dynx.rules.rule import Stage
 
 _MOMENTS = ("ixx", "iyy", "izz")
@@ -39,7 +38,7 @@ class MissingProductOfInertia(EditingRule):
     engines: ClassVar[Mapping[str, str]] = {"pinocchio": ">=4.1.0", "mujoco": ">=4.0.0"}
     changed = "wrote the products of inertia that were missing as 0"
 
-    def places(self, case: Case) -> Iterable[Place]:
+    def corrections(self, case: Case) -> Iterable[Correction]:
         """Tensors with all three moments and not all products."""
         for link in case.source.root.all("link"):
             for inertial in link.all("inertial"):
@@ -48,4 +47,4 @@ class MissingProductOfInertia(EditingRule):
                     if missing and all(name in tensor.attributes for name in _MOMENTS):
                         message = f"<inertia> has no {' and no '.join(missing)}"
                         edits = tuple(case.source.setting(tensor, name, "0") for name in missing)
-                        yield Place(found_at(tensor, message), edits)
+                        yield Correction(found_at(tensor, message), edits)

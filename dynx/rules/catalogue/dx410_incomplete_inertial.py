@@ -3,7 +3,8 @@
 ``<inertial>`` needs both ``<mass value="..."/>`` and ``<inertia .../>``. Often ``<mass>2.5</mass>`` was
 written, which looks right and is not read by anybody.
 
-- Pinocchio 4.1 says so on stderr and drops the whole inertial: the link weighs nothing.
+- Pinocchio 4.1 says so on stderr. Without a mass it drops the whole inertial, so the link weighs nothing;
+  without a tensor the link is a point mass.
 - PyBullet 3.2.7 and MuJoCo 4.0 refuse the file.
 - Drake 1.51 takes what is missing for zero: a link with a mass and no tensor is a point mass. One with a
   tensor and no mass is a body that cannot be; Drake warns and makes something else of it.
@@ -12,8 +13,8 @@ The effect is a file that does not load, or a link without its mass: of order 0.
 
 What to do: complete it. ``dynx doctor --fix`` can only guess, and says so: a number between the tags,
 ``<mass>2.5</mass>``, is the mass; a tensor without mass is dropped, so that the link weighs nothing; a mass
-without tensor stays as a point mass at the origin of the inertial. ``--choose DX410=weightless`` drops that
-mass too, as Pinocchio does.
+without tensor stays as a point mass at the origin of the inertial, as in Pinocchio and Drake.
+``--choose DX410=weightless`` drops that mass too.
 """
 
 from __future__ import annotations
@@ -23,8 +24,9 @@ from typing import ClassVar
 
 from dynx.model.xml_source import Edit, SourceElement
 from dynx.rules.case import Case
-from dynx.rules.editing import EditingRule, Place, found_at
+from dynx.rules.editing import Correction, EditingRule, found_at
 from dynx.rules.element_text import text_in
+from dynx.rules.engine_versions import EVERY_ENGINE
 from dynx.rules.inertial_edits import ZERO_TENSOR, zero_inertial
 from dynx.rules.number_text import is_number
 from dynx.rules.rule import Stage
@@ -38,40 +40,35 @@ class IncompleteInertial(EditingRule):
     title = "An inertial has no mass or no tensor of inertia."
     stage: ClassVar[Stage] = "reading"
     advice = "Give every <inertial> a <mass value> and an <inertia>."
-    engines: ClassVar[Mapping[str, str]] = {
-        "pinocchio": ">=4.1.0",
-        "pybullet": ">=3.2.7",
-        "mujoco": ">=4.0.0",
-        "drake": ">=1.51.1",
-    }
+    engines: ClassVar[Mapping[str, str]] = EVERY_ENGINE
     choices: ClassVar[Mapping[str, str]] = {
         "point": "make an inertial without mass zero, one without tensor a point mass",
         "weightless": "make an inertial without mass or tensor zero",
     }
     changed = "completed inertials that had no mass or no tensor"
 
-    def places(self, case: Case) -> Iterable[Place]:
+    def corrections(self, case: Case) -> Iterable[Correction]:
         """The first inertial of each link, where it lacks something."""
         for link in case.source.root.all("link"):
             inertial = link.first("inertial")
             if inertial is not None:
                 yield from self._in(case, inertial)
 
-    def _in(self, case: Case, inertial: SourceElement) -> Iterable[Place]:
+    def _in(self, case: Case, inertial: SourceElement) -> Iterable[Correction]:
         mass, tensor = inertial.first("mass"), inertial.first("inertia")
         if mass is not None and "value" in mass.attributes:
             if tensor is None:
-                yield Place(
+                yield Correction(
                     found_at(inertial, "<inertial> has no <inertia>"), self._without_tensor(case, inertial)
                 )
             return
         inside = "" if mass is None else text_in(case.source, mass)
         if mass is None or not is_number(inside):
             message = "<inertial> has no <mass>" if mass is None else "<mass> has no value"
-            yield Place(found_at(inertial, message), (case.source.replacing(inertial, zero_inertial()),))
+            yield Correction(found_at(inertial, message), (case.source.replacing(inertial, zero_inertial()),))
         else:
             edit = case.source.replacing(mass, f'<mass value="{inside}"/>')
-            yield Place(found_at(mass, f"<mass> has {inside} between its tags and no value"), (edit,))
+            yield Correction(found_at(mass, f"<mass> has {inside} between its tags and no value"), (edit,))
 
     def _without_tensor(self, case: Case, inertial: SourceElement) -> tuple[Edit, ...]:
         if self.chosen(case) == "weightless":

@@ -20,7 +20,7 @@ from typing import ClassVar
 
 from dynx.model.xml_source import SourceElement
 from dynx.rules.case import Case
-from dynx.rules.editing import EditingRule, Place, found_at
+from dynx.rules.editing import Correction, EditingRule, found_at
 from dynx.rules.rule import Stage
 
 _ONCE = {
@@ -41,19 +41,19 @@ class RepeatedElement(EditingRule):
     engines: ClassVar[Mapping[str, str]] = {"mujoco": ">=4.0.0"}
     changed = "took away further elements of a kind of which engines use the first"
 
-    def places(self, case: Case) -> Iterable[Place]:
+    def corrections(self, case: Case) -> Iterable[Correction]:
         """Every element after the first of its kind."""
         for part in case.source.root.children:
             if part.tag in ("link", "joint"):
                 yield from _in(case, part)
 
 
-def _in(case: Case, part: SourceElement) -> Iterable[Place]:
+def _in(case: Case, part: SourceElement) -> Iterable[Correction]:
     seen = set()
     for child in part.children:
         if child.tag in seen and child.tag in _ONCE[part.tag]:
             message = f"a further <{child.tag}> in the same <{part.tag}>; engines use the first"
-            yield Place(found_at(child, message), (case.source.removing(child),))
+            yield Correction(found_at(child, message), (case.source.removing(child),))
         elif child.tag == "inertial":
             yield from _in(case, child)
         seen.add(child.tag)

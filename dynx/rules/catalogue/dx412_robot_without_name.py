@@ -18,7 +18,7 @@ from pathlib import PurePath
 from typing import ClassVar
 
 from dynx.rules.case import Case
-from dynx.rules.editing import EditingRule, Place, found_at
+from dynx.rules.editing import Correction, EditingRule, found_at
 from dynx.rules.rule import Stage
 
 
@@ -37,7 +37,7 @@ class RobotWithoutName(EditingRule):
     }
     changed = "gave the robot a name"
 
-    def places(self, case: Case) -> Iterable[Place]:
+    def corrections(self, case: Case) -> Iterable[Correction]:
         """The root element."""
         root = case.source.root
         if root.tag != "robot" or root.attributes.get("name"):
@@ -45,6 +45,6 @@ class RobotWithoutName(EditingRule):
         what = "an empty name" if "name" in root.attributes else "no name"
         source = PurePath(case.source.source)
         name = source.name.split(".")[0] if source.suffix in (".urdf", ".xacro", ".xml") else ""
-        yield Place(
+        yield Correction(
             found_at(root, f"<robot> has {what}"), (case.source.setting(root, "name", name or "robot"),)
         )

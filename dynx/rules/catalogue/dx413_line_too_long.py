@@ -24,7 +24,7 @@ from typing import ClassVar
 
 from dynx.model.xml_source import Edit, SourceElement, Span
 from dynx.rules.case import Case
-from dynx.rules.editing import EditingRule, Place, found_at
+from dynx.rules.editing import Correction, EditingRule, found_at
 from dynx.rules.rule import Stage
 
 LONGEST = 8191
@@ -42,7 +42,7 @@ class LineTooLong(EditingRule):
     engines: ClassVar[Mapping[str, str]] = {"pybullet": ">=3.2.7"}
     changed = "broke lines of more than 8191 bytes in front of their elements"
 
-    def places(self, case: Case) -> Iterable[Place]:
+    def corrections(self, case: Case) -> Iterable[Correction]:
         """Every element of which a tag is cut."""
         long_lines = list(_long_lines(case.source.data))
         if not long_lines:
@@ -60,7 +60,7 @@ class LineTooLong(EditingRule):
                 )
                 edits = () if line.start in broken else tuple(_breaks(case.source.data, elements, line))
                 broken.add(line.start)
-                yield Place(found_at(element, message), edits)
+                yield Correction(found_at(element, message), edits)
 
 
 def _long_lines(data: bytes) -> Iterator[Span]:

@@ -19,7 +19,7 @@ from typing import ClassVar
 
 from dynx.errors import shown
 from dynx.rules.case import Case
-from dynx.rules.editing import EditingRule, Place, found_at
+from dynx.rules.editing import Correction, EditingRule, found_at
 from dynx.rules.renaming import fresh_name, renaming_joint, renaming_link
 from dynx.rules.rule import Stage
 
@@ -35,14 +35,14 @@ class PercentInName(EditingRule):
     engines: ClassVar[Mapping[str, str]] = {"pybullet": ">=3.2.7"}
     changed = "wrote _ in place of % in names"
 
-    def places(self, case: Case) -> Iterable[Place]:
+    def corrections(self, case: Case) -> Iterable[Correction]:
         """Robot, links and joints of such a name."""
         source = case.source
         root = source.root
         if "%" in root.attributes.get("name", ""):
             name = root.attributes["name"]
             edit = source.setting(root, "name", name.replace("%", "_"))
-            yield Place(found_at(root, _message("robot", name)), (edit,))
+            yield Correction(found_at(root, _message("robot", name)), (edit,))
         for kind, named, rename in (
             ("link", case.links, renaming_link),
             ("joint", case.joints, renaming_joint),
@@ -52,7 +52,9 @@ class PercentInName(EditingRule):
                 if "%" in name:
                     new = fresh_name(name.replace("%", "_"), taken)
                     taken.add(new)
-                    yield Place(found_at(element, _message(kind, name)), tuple(rename(source, name, new)))
+                    yield Correction(
+                        found_at(element, _message(kind, name)), tuple(rename(source, name, new))
+                    )
 
 
 def _message(kind: str, name: str) -> str:

@@ -18,7 +18,7 @@ from typing import ClassVar
 
 from dynx.errors import shown
 from dynx.rules.case import Case
-from dynx.rules.editing import EditingRule, Place, found_at
+from dynx.rules.editing import Correction, EditingRule, found_at
 from dynx.rules.rule import Stage
 
 
@@ -33,12 +33,12 @@ class MaterialDefinedTwice(EditingRule):
     engines: ClassVar[Mapping[str, str]] = {"pinocchio": ">=4.1.0", "drake": ">=1.51.1"}
     changed = "took further definitions of materials away"
 
-    def places(self, case: Case) -> Iterable[Place]:
+    def corrections(self, case: Case) -> Iterable[Correction]:
         """Materials directly in the robot whose name was there before."""
         seen = set()
         for material in case.source.root.all("material"):
             name = material.attributes.get("name", "")
             if name in seen:
                 message = f"material {shown(name)} is defined a further time"
-                yield Place(found_at(material, message), (case.source.removing(material),))
+                yield Correction(found_at(material, message), (case.source.removing(material),))
             seen.add(name)

@@ -17,7 +17,7 @@ from typing import ClassVar
 
 from dynx.errors import shown
 from dynx.rules.case import Case
-from dynx.rules.editing import EditingRule, Place, found_at
+from dynx.rules.editing import Correction, EditingRule, found_at
 from dynx.rules.rule import Stage
 
 _KNOWN = ("1.0", "1.1", "1.2")
@@ -34,10 +34,10 @@ class UnknownUrdfVersion(EditingRule):
     engines: ClassVar[Mapping[str, str]] = {"pinocchio": ">=4.1.0"}
     changed = "took the version of the robot away"
 
-    def places(self, case: Case) -> Iterable[Place]:
+    def corrections(self, case: Case) -> Iterable[Correction]:
         """The root element."""
         root = case.source.root
         version = root.attributes.get("version")
         if root.tag == "robot" and version is not None and version not in _KNOWN:
             edit = case.source.removing_attribute(root, "version")
-            yield Place(found_at(root, f"<robot> has version {shown(version)}"), (edit,))
+            yield Correction(found_at(root, f"<robot> has version {shown(version)}"), (edit,))

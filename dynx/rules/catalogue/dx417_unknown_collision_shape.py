@@ -19,7 +19,7 @@ from collections.abc import Iterable, Mapping
 from typing import ClassVar
 
 from dynx.rules.case import Case
-from dynx.rules.editing import EditingRule, Place, found_at
+from dynx.rules.editing import Correction, EditingRule, found_at
 from dynx.rules.rule import Stage
 
 _KNOWN = frozenset(["box", "sphere", "cylinder", "capsule", "mesh"])
@@ -40,7 +40,7 @@ class UnknownCollisionShape(EditingRule):
     }
     changed = "took collisions of unknown shape away"
 
-    def places(self, case: Case) -> Iterable[Place]:
+    def corrections(self, case: Case) -> Iterable[Correction]:
         """Collisions whose first geometry holds no known shape."""
         for link in case.source.root.all("link"):
             for collision in link.all("collision"):
@@ -49,4 +49,4 @@ class UnknownCollisionShape(EditingRule):
                     continue
                 shapes = ", ".join(f"<{child.tag}>" for child in geometry.children) or "nothing"
                 edits = () if self.chosen(case) == "keep" else (case.source.removing(collision),)
-                yield Place(found_at(collision, f"the geometry of <collision> is {shapes}"), edits)
+                yield Correction(found_at(collision, f"the geometry of <collision> is {shapes}"), edits)

@@ -12,53 +12,34 @@ away, so that every engine has a joint without end; ``dynx doctor --fix`` does s
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from typing import ClassVar
 
 from dynx.rules.case import Case
-from dynx.rules.rule import Detection, Kind, Remedy, Rule
+from dynx.rules.editing import Correction, OptionalEditingRule, found_at
+from dynx.rules.joint_elements import elements_in_joints
 
 _RANGE = ("lower", "upper")
 
 
-class LimitsOnContinuousJoint(Rule):
+class LimitsOnContinuousJoint(OptionalEditingRule):
     """DX509."""
 
     id = "DX509"
     name = "limits-on-continuous-joint"
     title = "A continuous joint has a lower or an upper limit, which has no meaning there."
-    kind: ClassVar[Kind] = "practice"
     advice = 'Take the range away, or write type="revolute" if the joint does have ends.'
-
     choices: ClassVar[Mapping[str, str]] = {
         "keep": "leave the limits of continuous joints, which mean nothing",
         "drop": "take the lower and upper limits of continuous joints away",
     }
+    changed = "took the lower and upper limits of continuous joints away"
 
-    def detect(self, case: Case) -> Sequence[Detection]:
+    def corrections(self, case: Case) -> Iterable[Correction]:
         """Continuous joints with `lower` or `upper`."""
-        found = []
-        for name, joint in case.joints.items():
-            limit = joint.first("limit")
-            if joint.attributes.get("type") != "continuous" or limit is None:
-                continue
-            written = [f'{end}="{limit.attributes[end]}"' for end in _RANGE if end in limit.attributes]
+        for _, limit in elements_in_joints(case, "limit", ("continuous",)):
+            written = [end for end in _RANGE if end in limit.attributes]
             if written:
-                message = f"{' and '.join(written)} on a joint that turns for ever"
-                found.append(Detection(None, name, limit.line, message))
-        return found
-
-    def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy | None:
-        """The two attributes taken away, if that was chosen."""
-        if self.chosen(case) == "keep":
-            return None
-        edits = []
-        for detection in detections:
-            limit = case.joints[detection.joint or ""].first("limit")
-            assert limit is not None
-            edits += [case.source.removing_attribute(limit, end) for end in _RANGE if end in limit.places]
-        return Remedy(
-            case.with_source(case.source.edited(*edits)),
-            "took the lower and upper limits of continuous joints away",
-            self.decision(case),
-        )
+                said = " and ".join(f'{end}="{limit.attributes[end]}"' for end in written)
+                edits = tuple(case.source.removing_attribute(limit, end) for end in written)
+                yield Correction(found_at(limit, f"{said} on a joint that turns for ever"), edits)

@@ -13,56 +13,39 @@ offsets carried along: value = m2 (m1 x + b1) + b2 = (m2 m1) x + (m2 b1 + b2). I
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from typing import ClassVar
 
 from dynx.rules.case import Case
+from dynx.rules.editing import Correction, OptionalEditingRule, found_at
 from dynx.rules.number_text import decimal
-from dynx.rules.rule import Detection, Kind, Remedy, Rule
 
 
-class MimicChain(Rule):
+class MimicChain(OptionalEditingRule):
     """DX511."""
 
     id = "DX511"
     name = "mimic-chain"
     title = "A mimic joint follows a joint that is itself a mimic joint."
-    kind: ClassVar[Kind] = "practice"
     advice = "Let every mimic joint name the joint that is driven."
-
     choices: ClassVar[Mapping[str, str]] = {
         "keep": "leave followers that follow a follower",
         "direct": "let every follower name the joint that is driven, with the factors multiplied",
     }
+    changed = "let mimic joints follow the driven joint directly, with the factors multiplied"
 
-    def detect(self, case: Case) -> Sequence[Detection]:
-        """Mimic joints that name a mimic joint."""
-        found = []
+    def corrections(self, case: Case) -> Iterable[Correction]:
+        """Mimic joints that name a mimic joint; dynx's own reading has the factors of the whole chain."""
         for joint in case.model.joints:
-            if joint.mimic is None:
+            resolved, mimic = joint.mimic, case.joints[joint.name].first("mimic")
+            if resolved is None or mimic is None:
                 continue
-            mimic = case.joints[joint.name].first("mimic")
-            leader = "" if mimic is None else mimic.attributes.get("joint", "")
-            if mimic is not None and leader != joint.mimic.joint:
-                message = f"follows {leader}, which follows {joint.mimic.joint} in the end"
-                found.append(Detection(None, joint.name, mimic.line, message))
-        return found
-
-    def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy | None:
-        """Every follower named after the joint that is driven, if that was chosen."""
-        if self.chosen(case) == "keep":
-            return None
-        edits = []
-        for detection in detections:
-            resolved = case.model.joint(detection.joint or "").mimic
-            mimic = case.joints[detection.joint or ""].first("mimic")
-            assert resolved is not None
-            assert mimic is not None
-            edits.append(case.source.setting(mimic, "joint", resolved.joint))
-            edits.append(case.source.setting(mimic, "multiplier", decimal(resolved.multiplier)))
-            edits.append(case.source.setting(mimic, "offset", decimal(resolved.offset)))
-        return Remedy(
-            case.with_source(case.source.edited(*edits)),
-            "let mimic joints follow the driven joint directly, with the factors multiplied",
-            self.decision(case),
-        )
+            leader = mimic.attributes.get("joint", "")
+            if leader != resolved.joint:
+                message = f"follows {leader}, which follows {resolved.joint} in the end"
+                edits = (
+                    case.source.setting(mimic, "joint", resolved.joint),
+                    case.source.setting(mimic, "multiplier", decimal(resolved.multiplier)),
+                    case.source.setting(mimic, "offset", decimal(resolved.offset)),
+                )
+                yield Correction(found_at(mimic, message), edits)

@@ -15,66 +15,40 @@ What to do: write the angles in full, unless they were calibrated. ``dynx doctor
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from typing import ClassVar
 
-from dynx.model.xml_source import SourceElement
 from dynx.rules.case import Case
-from dynx.rules.rule import Detection, Kind, Remedy, Rule
+from dynx.rules.editing import Correction, OptionalEditingRule, found_at
+from dynx.rules.joint_elements import elements_in_joints
 
 
-class AngleCutShort(Rule):
+class AngleCutShort(OptionalEditingRule):
     """DX514."""
 
     id = "DX514"
     name = "angle-cut-short"
     title = "An angle is a multiple of pi/4 with only two or three decimals, such as 1.57."
-    kind: ClassVar[Kind] = "practice"
     advice = "Write angles in full: 1.5707963267948966."
     choices: ClassVar[Mapping[str, str]] = {
         "keep": "keep the angles as they are written",
         "full": "write multiples of pi/4 in full",
     }
+    changed = "wrote multiples of pi/4 in full"
+    changes_physics = True
 
-    def detect(self, case: Case) -> Sequence[Detection]:
+    def corrections(self, case: Case) -> Iterable[Correction]:
         """Joints with such an angle in their origin."""
-        found = []
-        for name, origin in _origins(case):
-            short = [(word, angle) for word in _words(origin) if (angle := _meant(word)) is not None]
+        for _, origin in elements_in_joints(case, "origin"):
+            words = origin.attributes.get("rpy", "").split()
+            short = [(word, angle) for word in words if (angle := _meant(word)) is not None]
             if short:
                 word, angle = max(short, key=lambda pair: abs(float(pair[0]) - pair[1]))
                 off = abs(float(word) - angle)
                 message = f"rpy holds {word}, {off:.2g} rad from {angle!r}: {1e3 * off:.2g} mm at one metre"
-                found.append(Detection(None, name, origin.line, message))
-        return found
-
-    def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy | None:
-        """The angles in full, if that was chosen."""
-        if self.chosen(case) != "full":
-            return None
-        joints = {detection.joint for detection in detections}
-        edits = []
-        for name, origin in _origins(case):
-            if name in joints:
-                words = [word if (angle := _meant(word)) is None else repr(angle) for word in _words(origin)]
-                edits.append(case.source.setting(origin, "rpy", " ".join(words)))
-        return Remedy(
-            case.with_source(case.source.edited(*edits)),
-            "wrote multiples of pi/4 in full",
-            choice=self.decision(case),
-            changes_physics=True,
-        )
-
-
-def _origins(case: Case) -> Iterator[tuple[str, SourceElement]]:
-    for name, joint in case.joints.items():
-        origin = joint.first("origin")
-        if origin is not None:
-            yield name, origin
-
-
-def _words(origin: SourceElement) -> list[str]:
-    return origin.attributes.get("rpy", "").split()
+                full = [word if (angle := _meant(word)) is None else repr(angle) for word in words]
+                edit = case.source.setting(origin, "rpy", " ".join(full))
+                yield Correction(found_at(origin, message), (edit,))
 
 
 def _meant(word: str) -> float | None:

@@ -210,7 +210,7 @@ def scaled(site: Site) -> Planted:
     else:
         text = f'<contact>\n  <lateral_friction value="1.0"/>\n  {scaling}\n</contact>'
         edit = site.source.inserting(link, text)
-    return site.planted("DX119", edit, link=name)
+    return site.planted("DX114", edit, link=name)
 
 
 # -- what the planters share --------------------------------------------------------------------
@@ -277,5 +277,5 @@ PLANTERS = (
     Planter("DX110", massless_moving),
     Planter("DX111", too_small),
     Planter("DX113", singular),
-    Planter("DX119", scaled),
+    Planter("DX114", scaled),
 )

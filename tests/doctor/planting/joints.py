@@ -187,6 +187,26 @@ def actuator_twice(site: Site) -> Planted:
     return site.planted("DX215", edit, touched=[first.name, second.name], sign="twin_motor")
 
 
+def upper_missing(site: Site) -> Planted:
+    """Half a range: little of it is within what PyBullet makes of it, so that any few states show it."""
+    joint, element = site.pick_joint(lambda each: limited(each) and each.moves, "joint with a limit")
+    lower = site.rng.choice(["-1", "-1.0", "-1.05", "-1.1"])
+    edits = site.setting_in(element, "limit", lower=lower)
+    limit = element.first("limit")
+    if limit is not None and "upper" in limit.attributes:
+        edits.append(site.source.removing_attribute(limit, "upper"))
+    return site.planted("DX216", *edits, joint=joint.name)
+
+
+def named_root_joint(site: Site) -> Planted:
+    """The joint that carries the robot's first body named as what it is."""
+    joint, _ = site.pick_joint(moving, "joint that moves")
+    if any(each.name == "root_joint" for each in site.model.joints):
+        raise NotHere("has a root_joint")
+    edits = site.renaming("joint", joint.name, "root_joint")
+    return site.planted("DX217", *edits, joint="root_joint", touched=[joint.name, joint.child])
+
+
 def transmission(name: str, inside: str) -> str:
     """The text of a ``<transmission>`` of the usual type."""
     kind = "<type>transmission_interface/SimpleTransmission</type>"
@@ -224,4 +244,6 @@ PLANTERS = (
     Planter("DX213", named_universe),
     Planter("DX214", transmission_of_nothing),
     Planter("DX215", actuator_twice),
+    Planter("DX216", upper_missing),
+    Planter("DX217", named_root_joint, ("floating",)),
 )

@@ -65,7 +65,7 @@ def wrong_length(site: Site) -> Planted:
     return _rewritten(site, "DX404", number, " ".join(words))
 
 
-def blank_around(site: Site) -> Planted:
+def blank_after(site: Site) -> Planted:
     """A blank left over from a template; one in front alone is read by all."""
     number = _pick(site, [*_in_bodies(site), *_limits(site)])
     left, right = site.rng.choice([("", " "), (" ", " "), ("", "\n    ")])
@@ -304,7 +304,7 @@ PLANTERS = (
     Planter("DX402", commas_between),
     Planter("DX403", text_after),
     Planter("DX404", wrong_length),
-    Planter("DX405", blank_around),
+    Planter("DX405", blank_after),
     Planter("DX406", tab_in_vector),
     Planter("DX407", infinite),
     Planter("DX408", empty_vector),

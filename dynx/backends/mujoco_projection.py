@@ -1,12 +1,12 @@
-"""Mass matrix and torques from MuJoCo's kinematics, where its own (`mj_crb`, `mj_rne`) lose digits.
+"""Mass matrix and torques projected from MuJoCo's kinematics, where its own ones lose digits.
 
-MuJoCo refers the inertia of every body to the centre of mass of the whole robot. For a finger of mass
-m at a distance d from there that adds m d^2 to an inertia that may be a thousandth of it, and takes it
-away again: on robots with hands the entries of its matrix are off by 1e-12 of sqrt(M_ii M_jj) (MuJoCo
-4.0), and the torque about an axis through a point mass, which is zero, comes out as a rounding of the
-largest one. Here M is the sum of m Jp' Jp + Jr' I Jr over the bodies (Siciliano et al., Robotics, eq.
-7.32) and the torque the sum of Jp' m (a - g) + Jr' (I dw + w x I w) (Newton and Euler, projected as in
-Kane's method), with levers from joint to body, which need no distant point.
+MuJoCo refers the inertia of every body to the centre of mass of the whole robot. For a finger of mass m at
+a distance d from there that adds m d^2 to an inertia that may be a thousandth of it, and takes it away
+again (`mj_crb`, `mj_rne`): on robots with hands the entries of its matrix are off by 1e-12 of sqrt(M_ii
+M_jj) (MuJoCo 4.0), and the torque about an axis through a point mass, which is zero, comes out as a
+rounding of the largest one. Here M is the sum of m Jp' Jp + Jr' I Jr over the bodies (Siciliano et al.,
+Robotics, eq. 7.32) and the torque the sum of Jp' m (a - g) + Jr' (I dw + w x I w) (Newton and Euler,
+projected as in Kane's method), with levers from joint to body, which need no distant point.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""DX119 inertia-scaled-for-contact: PyBullet multiplies the inertia of a link by ``<inertia_scaling>``
+"""DX114 inertia-scaled-for-contact: PyBullet multiplies the inertia of a link by ``<inertia_scaling>``
 
 ``<contact><inertia_scaling value="3.0"/></contact>`` is an extension of PyBullet's, meant to make contacts of
 light links steadier. Many files that come with PyBullet, and files copied from them, have it.
@@ -24,20 +24,20 @@ from typing import ClassVar
 from dynx.model.xml_source import SourceElement
 from dynx.rules.attributes import number_or_none
 from dynx.rules.case import Case
-from dynx.rules.editing import EditingRule, Place, found_at
+from dynx.rules.editing import Correction, EditingRule, found_at
 
 
 class InertiaScaledForContact(EditingRule):
-    """DX119."""
+    """DX114."""
 
-    id = "DX119"
+    id = "DX114"
     name = "inertia-scaled-for-contact"
     title = "A link has inertia_scaling, by which PyBullet alone multiplies its inertia."
     advice = "Take <inertia_scaling> away."
     engines: ClassVar[Mapping[str, str]] = {"pybullet": ">=3.2.7"}
     changed = "took <inertia_scaling> away"
 
-    def places(self, case: Case) -> Iterable[Place]:
+    def corrections(self, case: Case) -> Iterable[Correction]:
         """Scales other than 1."""
         for link in case.source.root.all("link"):
             for contact in link.all("contact"):
@@ -45,7 +45,7 @@ class InertiaScaledForContact(EditingRule):
                     scale = _scale(scaling)
                     if scale != 1.0:
                         message = f"PyBullet multiplies the moments of inertia of the link by {scale:g}"
-                        yield Place(found_at(scaling, message), (case.source.removing(scaling),))
+                        yield Correction(found_at(scaling, message), (case.source.removing(scaling),))
 
 
 def _scale(scaling: SourceElement) -> float:

@@ -1,0 +1,55 @@
+"""DX216 upper-limit-missing: a ``<limit>`` has a ``lower`` of -1 or less, and no ``upper``
+
+URDF reads an end that is not given as 0, so ``<limit lower="-2" .../>`` is the range -2 to 0. Hardly anybody
+who leaves an end away means that.
+
+- PyBullet 3.2.7 reads a missing ``upper`` as -1. The range is -2 to -1, and a joint between -1 and 0 is
+  beyond it: in ``stepSimulation`` it can turn towards -1 and not the other way, as at any stop.
+  ``calculateInverseDynamics`` knows of no limit.
+- Pinocchio 4.1 has the range -2 to 0. So has dynx, with a note.
+- Drake 1.51 has a lower limit of -2 and no upper one; MuJoCo 4.0 takes half a limit for none.
+
+Only PyBullet's range shows in a motion that the file allows. Where ``lower`` is above -1, it is above what
+PyBullet has for ``upper``, and PyBullet then takes both for none, as it does where neither is given (DX508).
+A missing ``lower`` is 0 in PyBullet and in Pinocchio, and again no limit in Drake and MuJoCo.
+
+The effect is a joint that does not move: all of its acceleration, in PyBullet's simulation and in the part of
+the range above -1 alone.
+
+What to do: write the end that is meant. It is not in the file, so ``dynx doctor --fix`` writes ``upper="0"``,
+which is what URDF, Pinocchio and dynx read; the other three engines then have that range too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import ClassVar
+
+from dynx.rules.attributes import number_or_none
+from dynx.rules.case import Case
+from dynx.rules.editing import Correction, EditingRule, found_at
+from dynx.rules.joint_elements import elements_in_joints
+
+_UPPER_OF_PYBULLET = -1.0
+"""What PyBullet has for an upper limit that is not given; URDF has 0."""
+
+
+class UpperLimitMissing(EditingRule):
+    """DX216."""
+
+    id = "DX216"
+    name = "upper-limit-missing"
+    title = "A limit has a lower end of -1 or less and no upper end, which PyBullet reads as -1."
+    advice = "Write both ends of every range."
+    engines: ClassVar[Mapping[str, str]] = {"pybullet": ">=3.2.7"}
+    changed = 'wrote upper="0" where a limit has no upper end'
+    depends_on_state = True
+
+    def corrections(self, case: Case) -> Iterable[Correction]:
+        """Limits of joints that have a range: a continuous one has none in any engine's motion."""
+        for _, limit in elements_in_joints(case, "limit", ("revolute", "prismatic")):
+            lower = number_or_none(limit, "lower")
+            if "upper" in limit.attributes or lower is None or lower > _UPPER_OF_PYBULLET:
+                continue
+            message = f"lower is {lower:g} and upper is not given, which is 0 in URDF and -1 in PyBullet"
+            yield Correction(found_at(limit, message), (case.source.setting(limit, "upper", "0"),))
