@@ -22,18 +22,23 @@ if TYPE_CHECKING:
     from dynx import errors
     from dynx.agreement import AgreementReport, agree
     from dynx.backends import Backend, backend, installed_backends, register
+    from dynx.backends.derivatives import Derivatives
+    from dynx.backends.parametric import ParametricDynamics, parametric
     from dynx.doctor import DoctorReport, compare_as_loaded, diagnose
     from dynx.ik import IKResult
     from dynx.model import Model, Pose
     from dynx.model.library import robots
     from dynx.model.loading import load
+    from dynx.rbd.regressor import inertial_parameters
 
 __all__ = [
     "AgreementReport",
     "Backend",
+    "Derivatives",
     "DoctorReport",
     "IKResult",
     "Model",
+    "ParametricDynamics",
     "Pose",
     "__version__",
     "agree",
@@ -41,8 +46,10 @@ __all__ = [
     "compare_as_loaded",
     "diagnose",
     "errors",
+    "inertial_parameters",
     "installed_backends",
     "load",
+    "parametric",
     "register",
     "robots",
 ]
@@ -50,16 +57,20 @@ __all__ = [
 _HOME = {
     "AgreementReport": "dynx.agreement",
     "Backend": "dynx.backends",
+    "Derivatives": "dynx.backends.derivatives",
     "DoctorReport": "dynx.doctor",
     "IKResult": "dynx.ik",
     "Model": "dynx.model",
+    "ParametricDynamics": "dynx.backends.parametric",
     "Pose": "dynx.model",
     "agree": "dynx.agreement",
     "backend": "dynx.backends",
     "compare_as_loaded": "dynx.doctor",
     "diagnose": "dynx.doctor",
+    "inertial_parameters": "dynx.rbd.regressor",
     "installed_backends": "dynx.backends",
     "load": "dynx.model.loading",
+    "parametric": "dynx.backends.parametric",
     "register": "dynx.backends",
     "robots": "dynx.model.library",
 }

@@ -16,7 +16,9 @@
     |  |- EngineLimitError          the model is larger than the engine can hold
     |  |- EngineError               the engine failed; its own exception is ``__cause__``
     |  `- ClosedError               the backend was closed
-    `- SingularMassMatrixError      forward dynamics has no unique answer
+    |- SingularMassMatrixError      forward dynamics has no unique answer
+    `- CompileError                 the SIMD compiler cannot do what it was asked
+       `- TraceError                traced code asks for a value that is not known yet
 
 No other exception reaches a caller because of his input; anything else is a defect of dynx.
 """
@@ -105,6 +107,14 @@ class ClosedError(BackendError):
 
 class SingularMassMatrixError(DynxError, ArithmeticError):
     """The mass matrix is singular, so no unique acceleration exists."""
+
+
+class CompileError(DynxError, RuntimeError):
+    """The SIMD compiler cannot do what it was asked."""
+
+
+class TraceError(CompileError, TypeError):
+    """Traced code asks for the value of a symbol (by a branch, a comparison or a conversion)."""
 
 
 def located(message: str, source: str | None, line: int | None) -> str:

@@ -206,6 +206,20 @@ def coriolis_scale(sizes: Magnitudes) -> Floats:
     return np.asarray(linear + turned)
 
 
+def _regressor_scale(sizes: Magnitudes) -> Floats:
+    """(n, nv, 10 n_links): what a unit of a parameter, anywhere on the robot, can take.
+
+    A mass takes its acceleration, gravity included, at the end of a lever; a first moment takes the
+    same about an axis, or the second derivative of turning at the end of a lever; a second moment takes
+    the latter about an axis.
+    """
+    L, A = sizes.linear_column, sizes.angular_column
+    moving = (_linear_acceleration(sizes) + sizes.gravity)[:, None]
+    turning = (_angular_acceleration(sizes) + _turning(sizes) ** 2)[:, None]
+    ten = [L * moving] + [L * turning + A * moving] * 3 + [A * turning] * 6
+    return np.tile(np.stack(ten, axis=-1), len(sizes.samples.model.links))
+
+
 def _derived_energy_scale(sizes: Magnitudes) -> Floats:
     v = np.abs(sizes.samples.v)
     return np.asarray(0.5 * np.einsum("ni,nij,nj->n", v, _derived_mass_scale(sizes), v))
@@ -294,6 +308,13 @@ QUANTITIES: tuple[Quantity, ...] = (
         coriolis_scale,
         _rounding,
         native="coriolis_matrix",
+    ),
+    Quantity(
+        "inertial_regressor",
+        lambda b, s: b.inertial_regressor(s.q, s.v, s.a),
+        _regressor_scale,
+        _rounding,
+        native="inertial_regressor",
     ),
     Quantity(
         "center_of_mass",

@@ -261,6 +261,19 @@ class Backend(Lifecycle, EngineHooks):
         q, v = self._checked_q(q), self._checked_v(v)
         return self._evaluation(self._coriolis_matrix, (-1, -1), q, v, reduce=self._evaluation.reduce_both)
 
+    def inertial_regressor(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> Floats:
+        """Y (..., nv, 10 n_links): inverse dynamics is Y pi, with pi the links' inertial parameters.
+
+        The ten of each link of `model.links`, in order and about the origin of the link's frame in its
+        axes: m [kg], m cx, m cy, m cz [kg m], Ixx, Ixy, Ixz, Iyy, Iyz, Izz [kg m^2]
+        (`dynx.inertial_parameters` gives the model's own). Links that no coordinate moves have zeros.
+        """
+        q, v, a = self._checked_q(q), self._checked_v(v), self._checked_v(a, "a")
+        tail = (-1, 10 * len(self.model.links))
+        return self._evaluation(
+            self._inertial_regressor, tail, q, v, a, reduce=self._evaluation.reduce_leading
+        )
+
     # -- the whole body -----------------------------------------------------------------------
 
     def center_of_mass(self, q: ArrayLike) -> Floats:

@@ -26,6 +26,7 @@ HOOK_OF_QUANTITY = {
     "bias_torque": "_bias_torque",
     "gravity_torque": "_gravity_torque",
     "coriolis_matrix": "_coriolis_matrix",
+    "inertial_regressor": "_inertial_regressor",
     "center_of_mass": "_center_of_mass",
     "center_of_mass_jacobian": "_center_of_mass_jacobian",
     "centroidal_momentum": "_centroidal_momentum",

@@ -65,6 +65,10 @@ class Evaluation:
         """A torque (..., nv) or the columns of a Jacobian (..., 6, nv), in model coordinates."""
         return np.asarray(answer @ self._S)
 
+    def reduce_leading(self, answer: Floats) -> Floats:
+        """S' A for a matrix (..., nv, n), in model coordinates."""
+        return np.asarray(self._S.T @ answer)
+
     def reduce_both(self, answer: Floats) -> Floats:
         """S' A S for a matrix (..., nv, nv)."""
         return np.asarray(self._S.T @ answer @ self._S)

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.errors import SingularMassMatrixError
-from dynx.model import Mechanism
-from dynx.rbd import centroidal, coriolis, jacobians, kinematics
+from dynx.model import Mechanism, Model
+from dynx.rbd import centroidal, coriolis, jacobians, kinematics, regressor
 from dynx.rbd.jacobians import Reference
 from dynx.spatial.scalar import Floats
 
@@ -28,6 +28,7 @@ class EngineHooks(ABC):
     vectorized: ClassVar[bool] = False
     """Whether the hooks take leading batch axes."""
 
+    model: Model
     _mechanism: Mechanism
 
     # -- what every engine must answer --------------------------------------------------------
@@ -95,6 +96,11 @@ class EngineHooks(ABC):
     def _coriolis_matrix(self, q: Floats, v: Floats) -> Floats:
         """The C (..., nv, nv) of `dynx.rbd.coriolis`, for which dM/dt - 2 C is skew-symmetric."""
         return coriolis.coriolis_matrix(self._mechanism, self._body_poses(q), v)
+
+    def _inertial_regressor(self, q: Floats, v: Floats, a: Floats) -> Floats:
+        """Y (..., nv, 10 n_links) of `dynx.rbd.regressor`, the links those of the model in order."""
+        links, poses = range(len(self.model.links)), self._body_poses(q)
+        return regressor.inertial_regressor(self._mechanism, poses, v, a, links)
 
     # -- the whole body -----------------------------------------------------------------------
 

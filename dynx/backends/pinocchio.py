@@ -27,6 +27,7 @@ from dynx.errors import DynxError, EngineError, EngineLimitError, shown
 from dynx.model import Model
 from dynx.model.elements import Inertial, Joint, Pose
 from dynx.rbd.jacobians import Reference
+from dynx.rbd.regressor import inertia_of, parameters_of
 from dynx.spatial.scalar import Floats
 
 MAX_NV = 200
@@ -74,6 +75,7 @@ class PinocchioBackend(Backend):
         # At one degree of freedom the binding returns Jacobians as vectors; without any, its
         # derivative of a Jacobian ends the process.
         self._nv = self._mechanism.nv
+        self._lumped = _lumping(self._engine, self._frame_ids[: len(model.links)])
         # The engine's whole-body quantities leave out what is welded to the world.
         at_rest = self._engine.inertias[WORLD]
         self._rest_mass = float(at_rest.mass)
@@ -180,6 +182,16 @@ class PinocchioBackend(Backend):
         C: Floats = pin.computeCoriolisMatrix(self._engine, self._workspace.data, q, v)
         return C
 
+    @_mapped
+    def _inertial_regressor(self, q: Floats, v: Floats, a: Floats) -> Floats:
+        joints, lumping = self._lumped
+        if not self._nv:
+            return np.zeros((0, 10 * len(joints)))
+        Y = pin.computeJointTorqueRegressor(self._engine, self._workspace.data, q, v, a)
+        of_joints: Floats = Y.reshape(self._nv, -1, 10).transpose(1, 0, 2)
+        of_links: Floats = of_joints[joints] @ lumping
+        return np.asarray(of_links.transpose(1, 0, 2).reshape(self._nv, -1))
+
     # -- the whole body -----------------------------------------------------------------------
 
     @_mapped
@@ -268,6 +280,24 @@ def _build(model: Model) -> tuple[Any, list[int]]:
         made = pin.Frame(f"{index}:{frame.name}", carrier, 0, T_carrier_frame, pin.FrameType.OP_FRAME)
         frame_ids.append(int(engine.addFrame(made, False)))
     return engine, frame_ids
+
+
+def _lumping(engine: Any, links: list[int]) -> tuple[list[int], Floats]:
+    """How links add to the inertia of the joints that carry them.
+
+    For each link its joint, counted without the universe, and the matrix (10, 10) from its parameters
+    in the order of dynx to those of the joint in the engine's; zeros for what the universe carries.
+    """
+    theirs = [0, 1, 2, 3, 4, 5, 7, 6, 8, 9]  # the tensor goes down the columns of its upper triangle
+    joints, matrices = [], []
+    for link in links:
+        frame = engine.frames[link]
+        R, p = np.array(frame.placement.rotation), np.array(frame.placement.translation)
+        moved = [parameters_of(inertia_of(unit).seen_from(R, p)) for unit in np.eye(10)]
+        matrix = np.stack(moved, axis=-1)[theirs]
+        joints.append(max(int(frame.parentJoint) - 1, 0))
+        matrices.append(0.0 * matrix if frame.parentJoint == WORLD else matrix)
+    return joints, np.stack(matrices)
 
 
 def _placement(pose: Pose) -> Any:

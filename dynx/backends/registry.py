@@ -33,6 +33,7 @@ _BUILT_IN = {
     "pybullet": "dynx.backends.pybullet:PyBulletBackend",
     "mujoco": "dynx.backends.mujoco:MujocoBackend",
     "drake": "dynx.backends.drake:DrakeBackend",
+    "compiled": "dynx.backends.compiled:CompiledBackend",
 }
 _registered: dict[str, Loader] = {}
 

@@ -13,6 +13,7 @@ import click
 from dynx._version import __version__
 from dynx.cli.commands.agree import agree
 from dynx.cli.commands.backends import backends
+from dynx.cli.commands.bench import bench
 from dynx.cli.commands.doctor import doctor
 from dynx.cli.commands.evaluate import fd, fk, id_, jacobian, mass
 from dynx.cli.commands.explain import explain
@@ -79,6 +80,7 @@ def _show_traceback(ctx: click.Context, option: click.Parameter, wanted: bool) -
       dynx agree ur5               do the installed engines agree on the UR5?
       dynx agree all --json a.json every robot of example-robot-data
       dynx doctor my.urdf          why do engines differ on my file, and how is it mended?
+      dynx bench panda             how fast are they on this machine?
       dynx explain DX101           what a cause means, and what each engine does
       dynx info panda              joints, limits, masses, frames
       dynx id ur5 --q 0,-1,1,0,0,0 torque that holds the arm there
@@ -107,7 +109,7 @@ def cli(ctx: click.Context) -> None:
         click.echo(ctx.get_help())
 
 
-for _command in (agree, doctor, explain, info, robots, backends, fk, jacobian, id_, fd, mass, ik):
+for _command in (agree, doctor, bench, explain, info, robots, backends, fk, jacobian, id_, fd, mass, ik):
     cli.add_command(_command)
 
 

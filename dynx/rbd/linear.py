@@ -6,15 +6,20 @@ import numpy as np
 
 from dynx.spatial.scalar import Array
 
+Factors = tuple[list[list[Array]], list[Array]]
+
 
 def solve_positive(A: Array, b: Array) -> Array:
     """x (..., n) with A x = b by A = L D L' (Golub and Van Loan, algorithm 4.1.2).
 
     Square roots are not needed, so any field of numbers will do; a singular A divides by zero.
     """
+    return substituted(*factorised(A), b)
+
+
+def factorised(A: Array) -> Factors:
+    """L, whose row i holds the i entries left of the diagonal, and D, with A = L D L' and 1 on it."""
     n = A.shape[-1]
-    if n == 0:
-        return b
     L: list[list[Array]] = [[] for _ in range(n)]
     D: list[Array] = []
     for i in range(n):
@@ -29,6 +34,14 @@ def solve_positive(A: Array, b: Array) -> Array:
         for k in range(i):
             pivot = pivot - scaled[k] * L[i][k]
         D.append(pivot)
+    return L, D
+
+
+def substituted(L: list[list[Array]], D: list[Array], b: Array) -> Array:
+    """x (..., n) with L D L' x = b."""
+    if not D:
+        return b
+    n = len(D)
     x: list[Array] = []
     for i in range(n):
         entry = b[..., i]

@@ -21,6 +21,7 @@ BOUNDS = {
     "mass_matrix",
     "kinetic_energy",
     "potential_energy",
+    "inertial_regressor",
     "center_of_mass",
     "center_of_mass_jacobian",
     "centroidal_momentum",

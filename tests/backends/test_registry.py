@@ -24,7 +24,7 @@ from dynx.backends.reference import ReferenceBackend
 from dynx.errors import ArgumentError, BackendError, NotInstalledError, UnknownBackendError
 from tests.backends.robots import chain
 
-BUILT_IN = ("reference", "pinocchio", "pybullet", "mujoco", "drake")
+BUILT_IN = ("reference", "pinocchio", "pybullet", "mujoco", "drake", "compiled")
 
 
 class Mine(ReferenceBackend):
@@ -55,7 +55,7 @@ def test_the_backends_of_dynx_are_known_without_package_metadata(monkeypatch: py
 
 def test_every_engine_that_is_here_can_be_used() -> None:
     """Tests that ask for the installed backends would otherwise leave out one that dynx has broken."""
-    packages = {"reference": "numpy", "drake": "pydrake"}
+    packages = {"reference": "numpy", "drake": "pydrake", "compiled": "llvmlite"}
     here = [name for name in BUILT_IN if find_spec(packages.get(name, name)) is not None]
     assert [name for name in installed_backends() if name in BUILT_IN] == here
 
@@ -78,7 +78,7 @@ def test_listing_imports_no_engine() -> None:
     program = (
         "import sys; import dynx.backends as b; b.backend_names(); "
         "b.backend_class('reference'); "
-        "print(sorted({'pinocchio', 'pybullet', 'mujoco', 'pydrake'} & sys.modules.keys()))"
+        "print(sorted({'pinocchio', 'pybullet', 'mujoco', 'pydrake', 'llvmlite'} & sys.modules.keys()))"
     )
     found = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert found.stdout.strip() == "[]"
@@ -102,7 +102,7 @@ def test_a_backend_without_its_engine_is_known_but_not_installed(
     [
         ("pinochio", "did you mean 'pinocchio'"),
         ("Bullet", "did you mean 'pybullet'"),
-        ("gazebo", "known: reference, pinocchio, pybullet, mujoco, drake"),
+        ("gazebo", "known: reference, pinocchio, pybullet, mujoco, drake, compiled"),
         ("", "known: reference"),
         ("x" * 10_000, r"\(10000 characters\)"),
     ],

@@ -105,6 +105,7 @@ QUESTIONS = (
     Question("bias_torque", ("q", "v"), _nv),
     Question("gravity_torque", ("q",), _nv),
     Question("coriolis_matrix", ("q", "v"), _square),
+    Question("inertial_regressor", ("q", "v", "a"), lambda model: (model.nv, 10 * len(model.links))),
     Question("center_of_mass", ("q",), lambda model: (3,)),
     Question("center_of_mass_jacobian", ("q",), lambda model: (3, model.nv)),
     Question("centroidal_momentum", ("q", "v"), lambda model: (6,)),

@@ -35,6 +35,13 @@ def test_a_link_without_inertial_has_no_mass(
     assert plain.frame_names[-1] == decked.frame_names[-1]
     state = random_state(plain, 51, (3,))
     answer = question.ask(make(decked), state)
+    if question.method == "inertial_regressor":
+        # It has columns for the links that were added, too.
+        shared = [decked.links.index(link) for link in plain.links]
+        by_link = answer.reshape(*answer.shape[:-1], len(decked.links), 10)
+        answer = by_link[..., shared, :].reshape(*answer.shape[:-1], -1)
+        question.check(make(plain), state, answer, question.ask(make(plain), state))
+        return
     question.check(make(decked), state, answer, question.ask(make(plain), state))
 
 

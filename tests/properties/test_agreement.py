@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from itertools import combinations
 from typing import Literal
 
 import numpy as np
 import pytest
-from hypothesis import given, note
+from hypothesis import given, note, settings
 from hypothesis import strategies as st
 
 from dynx.agreement.answers import Answers
@@ -34,10 +34,15 @@ each_base = pytest.mark.parametrize("base", ["fixed", "floating"])
 
 
 @contextmanager
-def backends_of(model: Model) -> Iterator[list[Backend]]:
-    """Every installed backend of a model, closed at the end."""
+def backends_of(model: Model, names: Sequence[str] | None = None) -> Iterator[list[Backend]]:
+    """Every installed backend of a model, or those named, closed at the end."""
     with ExitStack() as stack:
-        yield [stack.enter_context(backend(name, model)) for name in installed_backends()]
+        yield [stack.enter_context(backend(name, model)) for name in names or installed_backends()]
+
+
+INTERPRETED = [name for name in installed_backends() if name != "compiled"]
+"""Backends to which a new robot costs nothing. The compiled one makes some thirty kernels for each, so
+it meets fewer of them (`test_compiled_random_robots`)."""
 
 
 def assert_agree(engines: list[Backend], states: Samples) -> None:
@@ -76,7 +81,17 @@ def test_random_robots(base: Base, data: st.DataObject) -> None:
     """Thin bodies, massless links, mimic joints and locked joints among them."""
     model, states = data.draw(robots_in_states(base))
     note(model.to_urdf())
-    with backends_of(model) as engines:
+    with backends_of(model, INTERPRETED) as engines:
+        assert_agree(engines, states)
+
+
+@each_base
+@given(data=st.data())
+@settings(max_examples=15)
+def test_compiled_random_robots(base: Base, data: st.DataObject) -> None:
+    model, states = data.draw(robots_in_states(base, physical=data.draw(st.booleans())))
+    note(model.to_urdf())
+    with backends_of(model, ["reference", "compiled"]) as engines:
         assert_agree(engines, states)
 
 
@@ -85,7 +100,7 @@ def test_random_robots(base: Base, data: st.DataObject) -> None:
 def test_random_robots_that_forward_dynamics_can_solve(base: Base, data: st.DataObject) -> None:
     model, states = data.draw(robots_in_states(base, solvable=True))
     note(model.to_urdf())
-    with backends_of(model) as engines:
+    with backends_of(model, INTERPRETED) as engines:
         for engine in engines:
             assert np.isfinite(engine.forward_dynamics(states.q, states.v, states.tau)).all()
         assert_agree(engines, states)
@@ -96,7 +111,7 @@ def test_random_robots_that_forward_dynamics_can_solve(base: Base, data: st.Data
 def test_random_robots_with_impossible_inertias(base: Base, data: st.DataObject) -> None:
     model, states = data.draw(robots_in_states(base, physical=False))
     note(model.to_urdf())
-    with backends_of(model) as engines:
+    with backends_of(model, INTERPRETED) as engines:
         assert_agree(engines, states)
 
 
@@ -107,7 +122,7 @@ def test_derived_answers_are_the_native_ones(base: Base, data: st.DataObject) ->
     model, states = data.draw(robots_in_states(base))
     note(model.to_urdf())
     sizes = Magnitudes(states)
-    with backends_of(model) as engines:
+    with backends_of(model, INTERPRETED) as engines:
         for engine in engines:
             native = Answers(engine.name, engine, states)
             derived = Answers("derived", DerivedBackend(engine), states)

@@ -1,0 +1,46 @@
+"""Solving with the mass matrix in a kernel: the sparsity of the tree's branches, kept by elimination."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dynx.model import Mechanism
+from dynx.rbd.kinematics import ancestry
+from dynx.rbd.linear import Factors, factorised, substituted
+from dynx.spatial.scalar import Array
+
+
+def factors_of(mechanism: Mechanism, M: Array) -> Factors:
+    """L and D of M, eliminated from the tips to the root.
+
+    So entries stay zero where two joints are on different branches (Featherstone 2008, section 6.5), and
+    neither they nor zeros of M are computed with.
+    """
+    nv, filled = filled_entries(mechanism)
+    A = np.zeros((nv, nv), dtype=object)
+    for i, j in [*filled, *((i, i) for i in range(nv))]:
+        A[i, j] = M[nv - 1 - i, nv - 1 - j]
+    return factorised(A)
+
+
+def solved(L: list[list[Array]], D: list[Array], b: Array) -> Array:
+    """M^-1 b for sides b (..., nv), from those factors."""
+    return substituted(L, D, b[..., ::-1])[..., ::-1]
+
+
+def filled_entries(mechanism: Mechanism) -> tuple[int, list[tuple[int, int]]]:
+    """The size of M, and where its factor L, in the order of elimination, may differ from zero."""
+    base = 6 if mechanism.floating else 0
+    on_branch = np.zeros((mechanism.nv, mechanism.nv), dtype=bool)
+    on_branch[:base] = True
+    for body in range(len(mechanism.bodies)):
+        on_branch[[base + k for k in ancestry(mechanism, body)], base + body] = True
+    if mechanism.coupling is not None:
+        S = mechanism.coupling.matrix() != 0.0
+        on_branch = S.T @ (on_branch | on_branch.T) @ S
+    A = (on_branch | on_branch.T)[::-1, ::-1]
+    nv = len(A)
+    for i in range(nv):
+        for j in range(i):
+            A[i, j] = A[i, j] or np.any(A[i, :j] & A[j, :j])
+    return nv, [(i, j) for i in range(nv) for j in range(i) if A[i, j]]

@@ -1,0 +1,136 @@
+"""Which parameters of a robot are arguments, what they are called, and where they enter the mechanism."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
+from dynx.model import Mechanism, Model
+from dynx.model.mechanism import ROOT, build_mechanism
+from dynx.rbd.regressor import PARAMETERS, inertia_of, link_inertia, parameters_of
+from dynx.spatial.inertia import RigidInertia
+from dynx.spatial.scalar import Array, Floats
+from dynx.spatial.so3 import skew
+
+POINT = ("mass", "cx", "cy", "cz")
+"""Parameters of a point payload: mass [kg] and centre [m] in the axes of the frame that carries it."""
+
+JOINT = ("damping", "friction", "armature")
+"""Parameters of a joint: [N m s] or [N s/m], [N m] or [N], [kg m^2] or [kg]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Parameters:
+    """The parameters of a robot that are arguments.
+
+    `names` are such as ``forearm.m``, ``tool0.payload.mcx``, ``tool0.point.mass`` and
+    ``elbow.damping``; `defaults` (n,) are the model's own, zeros for a payload.
+    """
+
+    names: tuple[str, ...]
+    defaults: Floats
+
+    def index(self, name: str) -> int:
+        """Where a parameter is on the last axis; UnknownNameError for a name that is none."""
+        try:
+            return self.names.index(name)
+        except ValueError:
+            raise UnknownNameError(f"no parameter {shown(name)}{nearest(str(name), self.names)}") from None
+
+
+@dataclass(frozen=True)
+class Known:
+    """Parameters that were read: bodies to be added, by the frame that carries them, and joints (n, 3)."""
+
+    bodies: tuple[tuple[int, RigidInertia], ...]
+    joints: Array | None
+
+    def added_to(self, mechanism: Mechanism) -> Mechanism:
+        """The mechanism with these bodies welded to it."""
+        inertia = {ROOT: mechanism.root, **{k: body.inertia for k, body in enumerate(mechanism.bodies)}}
+        for number, added in self.bodies:
+            frame = mechanism.frames[number]
+            inertia[frame.body] = inertia[frame.body] + added.seen_from(frame.R, frame.p)
+        bodies = tuple(replace(body, inertia=inertia[k]) for k, body in enumerate(mechanism.bodies))
+        return replace(mechanism, root=inertia[ROOT], bodies=bodies)
+
+
+@dataclass(frozen=True)
+class Selection:
+    """What of `model` is an argument. Checked when it is made."""
+
+    model: Model
+    links: tuple[str, ...]
+    payload: str | None
+    point_payload: str | None
+    joint_dynamics: bool
+
+    def __post_init__(self) -> None:
+        for link in self.links:
+            self.model.link(link)
+            if self.links.count(link) > 1:
+                raise ArgumentError(f"link {shown(link)} is named twice")
+        for frame in (self.payload, self.point_payload):
+            if frame is not None:
+                self.model.frame_index(frame)
+
+    @property
+    def question(self) -> tuple[object, ...]:
+        """All but the model."""
+        return self.links, self.payload, self.point_payload, self.joint_dynamics
+
+    def parameters(self) -> Parameters:
+        """Their names and defaults."""
+        names: list[str] = []
+        defaults: list[Floats] = []
+        for link in self.links:
+            names += [f"{link}.{name}" for name in PARAMETERS]
+            defaults.append(parameters_of(link_inertia(self.model, link)))
+        if self.payload is not None:
+            names += [f"{self.payload}.payload.{name}" for name in PARAMETERS]
+            defaults.append(np.zeros(len(PARAMETERS)))
+        if self.point_payload is not None:
+            names += [f"{self.point_payload}.point.{name}" for name in POINT]
+            defaults.append(np.zeros(len(POINT)))
+        if self.joint_dynamics:
+            for joint in self.model.joints:
+                if joint.moves:
+                    own = joint.dynamics
+                    names += [f"{joint.name}.{name}" for name in JOINT]
+                    defaults.append(np.array([own.damping, own.friction, own.armature]))
+        whole = np.concatenate(defaults) if defaults else np.zeros(0)
+        whole.setflags(write=False)
+        return Parameters(tuple(names), whole)
+
+    def remainder(self) -> Mechanism:
+        """The mechanism without the links whose inertia is an argument."""
+        links = [
+            replace(link, inertial=None) if link.name in self.links else link for link in self.model.links
+        ]
+        return build_mechanism(replace(self.model, links=tuple(links)))
+
+    def read(self, parameters: Array) -> Known:
+        """What an array (n,) of them says."""
+        values = iter(parameters)
+        bodies = [(self.model.frame_index(link), inertia_of(_next(values, 10))) for link in self.links]
+        if self.payload is not None:
+            bodies.append((self.model.frame_index(self.payload), inertia_of(_next(values, 10))))
+        if self.point_payload is not None:
+            mass, *center = _next(values, len(POINT))
+            bodies.append((self.model.frame_index(self.point_payload), _point_mass(mass, np.array(center))))
+        if not self.joint_dynamics:
+            return Known(tuple(bodies), None)
+        moving = sum(joint.moves for joint in self.model.joints)
+        return Known(tuple(bodies), _next(values, len(JOINT) * moving).reshape(moving, len(JOINT)))
+
+
+def _next(values: Iterator[object], count: int) -> Array:
+    return np.array([next(values) for _ in range(count)], dtype=object)
+
+
+def _point_mass(mass: object, center: Array) -> RigidInertia:
+    C = skew(center)
+    return RigidInertia(np.asarray(mass), center * mass, -(C @ C) * mass)

@@ -1,0 +1,73 @@
+"""What one sample of a program costs at least: bytes moved and operations done."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from dynx.backends.compiled_kernels import compiles, evaluated, tidied
+from dynx.bench.work import ARGUMENTS
+from dynx.model import Model
+from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED
+from dynx.simd.program import Program
+from dynx.simd.trace import trace
+from dynx.simd.trigonometry import COS, HALF_PI, SIN
+
+SINE_COSINE_PAIRS = 1 + len(HALF_PI) + (len(SIN) - 1) + 1 + (len(COS) + 1)
+"""Products with a sum in the sine and cosine of one angle: the nearest quarter turn, the reduction, and
+the two polynomials (`dynx.simd.trigonometry`)."""
+
+SINE_COSINE_SINGLES = 3
+"""Its sums and products that stand alone: the quarter turn as a number, r^2, and r^3."""
+
+_SUMS = frozenset({"add", "sub"})
+_NOT_COUNTED = frozenset({"input", "constant", "sin", "cos", "neg", "abs"})
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Of one sample.
+
+    `bytes` are those of the inputs and outputs, each moved once. `operations` are sums, products,
+    quotients and roots. `multiply_adds` counts what a machine has to issue if every product that only
+    one sum uses is done together with it; a sum or product without a partner counts as one.
+    """
+
+    bytes: int
+    operations: int
+    multiply_adds: int
+
+
+def cost_of(program: Program) -> Cost:
+    """The cost of a traced program; the sine and cosine of one angle are computed together."""
+    nodes = program.nodes
+    uses = [0] * len(nodes)
+    for index in (*(arg for node in nodes for arg in node.args), *program.results):
+        uses[index] += 1
+    single = sum(node.op not in _NOT_COUNTED for node in nodes)
+    pairs = sum(
+        node.op in _SUMS and any(nodes[arg].op == "mul" and uses[arg] == 1 for arg in node.args)
+        for node in nodes
+    )
+    angles = len({node.args[0] for node in nodes if node.op in ("sin", "cos")})
+    doubles = program.n_inputs + len(program.results)
+    return Cost(
+        bytes=8 * doubles,
+        operations=single + angles * (2 * SINE_COSINE_PAIRS + SINE_COSINE_SINGLES),
+        multiply_adds=single - pairs + angles * (SINE_COSINE_PAIRS + SINE_COSINE_SINGLES),
+    )
+
+
+def program_of(model: Model, quantity: str, frame: str) -> Program | None:
+    """The program that the backend `compiled` makes a kernel of, without the check of its arguments.
+
+    None where that backend evaluates the quantity by NumPy, since its code would be too long.
+    """
+    mechanism, number = tidied(model.mechanism), model.frame_index(frame)
+    name, details = {
+        "forward_kinematics": ("frame_placement", (number,)),
+        "jacobian": ("jacobian", (number, LOCAL_WORLD_ALIGNED)),
+    }.get(quantity, (quantity, ()))
+    if not compiles(mechanism, name):
+        return None
+    inputs = {argument: (model.nq if argument == "q" else model.nv,) for argument in ARGUMENTS[quantity]}
+    return trace(lambda **arguments: evaluated(mechanism, name, details, *arguments.values()), inputs)

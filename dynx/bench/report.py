@@ -1,0 +1,116 @@
+"""The results of a session as one document: plain numbers, fit for JSON (docs/bench.md describes it)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from dynx._version import __version__
+from dynx.bench.cost import Cost
+from dynx.bench.measurement import Measurement
+from dynx.bench.roofline import Peak, roofline
+from dynx.bench.session import Session
+from dynx.bench.work import Work
+
+SCHEMA = 1
+
+
+def document(session: Session, found: Sequence[Sequence[Measurement]], processor: str) -> dict[str, Any]:
+    """What a session found: one entry of `found` for each work that was measured, in order."""
+    plan = session.plan
+    measured = {group[0].work for group in found if group}
+    return {
+        "schema": SCHEMA,
+        "dynx": __version__,
+        "robot": plan.model.name,
+        "source": plan.model.source,
+        "base": plan.model.base,
+        "nq": plan.model.nq,
+        "nv": plan.model.nv,
+        "frame": plan.frame,
+        "repetitions": plan.repetitions,
+        "seed": plan.seed,
+        "processor": processor,
+        "load": session.load,
+        "peaks": [_peak(peak) for peak in session.peaks.values()],
+        "results": [
+            result(group, [session.cost(each) for each in group], session.peaks) for group in found if group
+        ],
+        "not_done": [_work(work) for work in plan.works if work not in measured],
+    }
+
+
+def result(
+    group: Sequence[Measurement], costs: Sequence[Cost | None], peaks: Mapping[int, Peak]
+) -> dict[str, Any]:
+    """One work and all its ways. A ratio says how many times faster the way is than a peer."""
+    peers = {each.way: each.times.median for each in group if each.role == "peer" and each.times is not None}
+    return {
+        **_work(group[0].work),
+        "ways": [_way(each, cost, peers, peaks) for each, cost in zip(group, costs, strict=True)],
+    }
+
+
+def wrong(found: Sequence[Sequence[Measurement]]) -> list[Measurement]:
+    """The measurements of ways that answered wrongly."""
+    return [each for group in found for each in group if is_wrong(each)]
+
+
+def is_wrong(measurement: Measurement) -> bool:
+    """Whether the answer was outside the tolerance."""
+    error, tolerance = measurement.error, measurement.tolerance
+    return error is not None and tolerance is not None and not error <= tolerance
+
+
+def _way(
+    measurement: Measurement, cost: Cost | None, peers: Mapping[str, float], peaks: Mapping[int, Peak]
+) -> dict[str, Any]:
+    times = measurement.times
+    peak = peaks.get(measurement.threads)
+    entry: dict[str, Any] = {
+        "way": measurement.way,
+        "role": measurement.role,
+        "version": measurement.version,
+        "threads": measurement.threads,
+        "samples": measurement.samples,
+        "error": measurement.error,
+        "tolerance": measurement.tolerance,
+        "problem": measurement.problem,
+        "ns": None,
+        "ns_quartiles": None,
+        "ratios": {},
+        "roofline": None,
+    }
+    if times is None:
+        return entry
+    entry["ns"] = 1e9 * times.median
+    entry["ns_quartiles"] = [1e9 * each for each in times.quartiles]
+    if times.median > 0.0:
+        entry["ratios"] = {peer: seconds / times.median for peer, seconds in peers.items()}
+        if cost is not None and peak is not None:
+            entry["roofline"] = _roofline(cost, times.median, peak)
+    return entry
+
+
+def _roofline(cost: Cost, seconds: float, peak: Peak) -> dict[str, Any]:
+    found = roofline(cost, seconds, peak)
+    return {
+        "bytes": cost.bytes,
+        "operations": cost.operations,
+        "multiply_adds": cost.multiply_adds,
+        "memory_share": found.memory_share,
+        "arithmetic_share": found.arithmetic_share,
+        "binds": found.binds,
+    }
+
+
+def _peak(peak: Peak) -> dict[str, Any]:
+    return {
+        "threads": peak.threads,
+        "copy_bandwidth": peak.copy_bandwidth,
+        "multiply_adds": peak.multiply_adds,
+    }
+
+
+def _work(work: Work) -> dict[str, Any]:
+    return {"quantity": work.quantity, "batch": work.batch, "threads": work.threads}

@@ -1,0 +1,85 @@
+"""Times of several calls, taken in turn so that the machine's other business falls on all alike."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+Call = Callable[[], Any]
+Clock = Callable[[], float]
+
+LEAST_SECONDS = 1e-3
+"""One timing lasts at least so long: a shorter call is repeated within it."""
+
+
+@dataclass(frozen=True)
+class Times:
+    """Seconds that one call took, one entry for each repetition."""
+
+    seconds: tuple[float, ...]
+
+    @property
+    def median(self) -> float:
+        """Half of the repetitions were faster."""
+        return float(np.median(self.seconds))
+
+    @property
+    def quartiles(self) -> tuple[float, float]:
+        """A quarter of the repetitions were faster than the first, a quarter slower than the second."""
+        low, high = np.percentile(self.seconds, [25.0, 75.0])
+        return float(low), float(high)
+
+    @property
+    def spread(self) -> float:
+        """The distance of the quartiles over the median."""
+        low, high = self.quartiles
+        return (high - low) / self.median if self.median > 0.0 else float("inf")
+
+    def less(self, other: Times) -> Times:
+        """What is left when the other's time is taken away, repetition by repetition.
+
+        Where noise is larger than what is left, an entry may be negative.
+        """
+        return Times(tuple(own - taken for own, taken in zip(self.seconds, other.seconds, strict=True)))
+
+    def per(self, count: int) -> Times:
+        """The seconds of one of `count` things that the call did."""
+        return Times(tuple(each / count for each in self.seconds))
+
+
+def interleaved(calls: Sequence[Call], repetitions: int, clock: Clock = time.perf_counter) -> list[Times]:
+    """The times of each call: every repetition does all of them, each time another one first."""
+    rounds = [_rounds(call, clock) for call in calls]
+    found: list[list[float]] = [[] for _ in calls]
+    for repetition in range(repetitions):
+        for turn in range(len(calls)):
+            number = (turn + repetition) % len(calls)
+            found[number].append(_timed(calls[number], rounds[number], clock))
+    return [Times(tuple(seconds)) for seconds in found]
+
+
+def once(call: Call, clock: Clock = time.perf_counter) -> float:
+    """Seconds of one call."""
+    return _timed(call, 1, clock)
+
+
+def _rounds(call: Call, clock: Clock) -> int:
+    """How often the call is repeated within one timing; finding out warms it up."""
+    rounds = 1
+    while True:
+        taken = rounds * _timed(call, rounds, clock)
+        if taken >= LEAST_SECONDS:
+            return rounds
+        rounds = 2 * rounds if taken <= 0.0 else max(rounds + 1, int(rounds * LEAST_SECONDS / taken) + 1)
+
+
+def _timed(call: Call, rounds: int, clock: Clock) -> float:
+    turns = range(rounds)
+    begin = clock()
+    for _ in turns:
+        call()
+    return (clock() - begin) / rounds

@@ -1,0 +1,81 @@
+"""A finished program as a function of arrays: of symbols, to build on it in another trace, or of numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from dynx.simd.expr import Symbol
+from dynx.simd.program import Program
+from dynx.spatial.scalar import Array, cos, sin, sqrt
+
+
+def inlined(program: Program, inputs: Mapping[str, Array]) -> dict[str, Array]:
+    """The outputs of `program` by name, each of its port's shape, for one array for every input.
+
+    The arrays hold symbols of one trace, plain numbers, or both; entries that are numbers are folded
+    into what depends on them. Arrays of mpmath's numbers are evaluated in mpmath's precision.
+    """
+    slots = [entry for port in program.inputs for entry in np.asarray(inputs[port.name]).ravel().tolist()]
+    values: list[Any] = []
+    for node in program.nodes:
+        if node.op == "input":
+            values.append(slots[node.slot])
+        elif node.op == "constant":
+            values.append(node.value)
+        else:
+            values.append(_MEANING[node.op](*(values[arg] for arg in node.args)))
+    outputs, first = {}, 0
+    for port in program.outputs:
+        entries = np.empty(port.size, dtype=object)
+        for k in range(port.size):
+            entries[k] = values[program.results[first + k]]
+        outputs[port.name] = entries.reshape(port.shape)
+        first += port.size
+    return outputs
+
+
+def _smaller(a: Any, b: Any) -> Any:
+    for first in (a, b):
+        if isinstance(first, Symbol):
+            return _symbol(first, a).minimum(b)
+    return a if a < b else b
+
+
+def _larger(a: Any, b: Any) -> Any:
+    for first in (a, b):
+        if isinstance(first, Symbol):
+            return _symbol(first, a).maximum(b)
+    return a if a > b else b
+
+
+def _symbol(of_the_trace: Symbol, x: Any) -> Symbol:
+    if isinstance(x, Symbol):
+        return x
+    return Symbol(of_the_trace.graph, of_the_trace.graph.constant(float(x)))
+
+
+def _elementary(function: Callable[[Array], Array]) -> Callable[[Any], Any]:
+    def of_one(x: Any) -> Any:
+        entry = np.empty((), dtype=object)
+        entry[()] = x
+        return function(entry)[()]
+
+    return of_one
+
+
+_MEANING: dict[str, Callable[..., Any]] = {
+    "add": lambda a, b: a + b,
+    "sub": lambda a, b: a - b,
+    "mul": lambda a, b: a * b,
+    "div": lambda a, b: a / b,
+    "neg": lambda a: -a,
+    "abs": abs,
+    "sqrt": _elementary(sqrt),
+    "sin": _elementary(sin),
+    "cos": _elementary(cos),
+    "min": _smaller,
+    "max": _larger,
+}

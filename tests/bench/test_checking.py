@@ -1,0 +1,71 @@
+"""Right answers pass, wrong ones do not, wherever in a batch they are."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import dynx
+from dynx.backends.reference import ReferenceBackend
+from dynx.bench.checking import ENDS, Judge, checked_rows
+from dynx.bench.work import ARGUMENTS, OF_A_FRAME, draw_batch
+from dynx.errors import SingularMassMatrixError
+from dynx.model import Joint, Link, Model
+from dynx.model.model import Base
+from dynx.spatial.scalar import Floats
+
+ROBOTS = ("double_pendulum", "panda")
+
+
+def answers(quantity: str, robot: str, base: Base) -> tuple[Judge, Floats]:
+    """The judge of some samples, and the right answers."""
+    model = dynx.load(robot, base=base)
+    batch = draw_batch(model, model.frame_names[-1], 20)
+    frame = [batch.frame] if quantity in OF_A_FRAME else []
+    right = getattr(ReferenceBackend(model), quantity)(*batch.arguments(quantity), *frame)
+    return Judge(batch), right
+
+
+@pytest.mark.parametrize("base", ["fixed", "floating"])
+@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize("quantity", ARGUMENTS)
+def test_right_answers_pass_and_small_errors_do_not(quantity: str, robot: str, base: Base) -> None:
+    judge, right = answers(quantity, robot, base)
+    assert judge.check(quantity, right).right
+    # An acceleration is judged by the torque it takes, which mostly holds gravity.
+    error = 1e-6 if quantity == "forward_dynamics" else 1e-9
+    for row in (0, len(right) - 1):
+        wrong = right.copy()
+        wrong[row] *= 1.0 + error
+        check = judge.check(quantity, wrong)
+        assert not check.right
+        assert check.error > check.tolerance
+
+
+@pytest.mark.parametrize("quantity", ARGUMENTS)
+@pytest.mark.parametrize("wild", [np.nan, np.inf])
+def test_what_is_no_number_is_wrong(quantity: str, wild: float) -> None:
+    judge, right = answers(quantity, "double_pendulum", "fixed")
+    right[7] = wild
+    assert judge.check(quantity, right).error == np.inf
+
+
+def test_where_no_acceleration_is_right_none_is_judged() -> None:
+    joint = Joint("joint", "revolute", "base", "tip")
+    model = Model.build("massless", [Link("base"), Link("tip")], [joint])
+    judge = Judge(draw_batch(model, "tip", 3))
+    with pytest.raises(SingularMassMatrixError):
+        judge.check("forward_dynamics", np.zeros((3, 1)))
+
+
+def test_all_rows_of_few_samples_are_checked() -> None:
+    assert checked_rows(100) == list(range(100))
+
+
+def test_of_many_samples_both_ends_and_some_between_are_checked() -> None:
+    rows = checked_rows(10**6)
+    assert rows == sorted(set(rows))
+    assert rows[:ENDS] == list(range(ENDS))
+    assert rows[-ENDS:] == list(range(10**6 - ENDS, 10**6))
+    # Groups of samples begin at multiples of 8: what is between must not all be at one place in them.
+    assert {row % 8 for row in rows[ENDS:-ENDS]} == set(range(8))

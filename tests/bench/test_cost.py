@@ -1,0 +1,76 @@
+"""What a program costs, counted by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import dynx
+from dynx.bench.cost import SINE_COSINE_PAIRS, SINE_COSINE_SINGLES, Cost, cost_of, program_of
+from dynx.bench.work import ARGUMENTS, sample_bytes
+from dynx.simd.text import Writer
+from dynx.simd.trace import trace
+from dynx.simd.trigonometry import sines_and_cosines
+from dynx.spatial.scalar import Array
+
+
+def test_a_product_and_its_sum_are_two_operations_done_as_one() -> None:
+    program = trace(lambda x: x[:1] * x[1:2] + x[2:3], {"x": (3,)})
+    assert cost_of(program) == Cost(bytes=8 * 4, operations=2, multiply_adds=1)
+
+
+def test_a_product_that_two_sums_use_is_done_alone() -> None:
+    def function(x: Array) -> Array:
+        product = x[0] * x[1]
+        return np.array([product + x[2], product - x[2]])
+
+    assert cost_of(trace(function, {"x": (3,)})) == Cost(bytes=8 * 5, operations=3, multiply_adds=3)
+
+
+def test_a_product_that_is_also_an_answer_is_done_alone() -> None:
+    def function(x: Array) -> Array:
+        product = x[0] * x[1]
+        return np.array([product + x[2], product])
+
+    assert cost_of(trace(function, {"x": (3,)})) == Cost(bytes=8 * 5, operations=2, multiply_adds=2)
+
+
+def test_a_sum_of_two_products_is_paired_with_one_of_them() -> None:
+    program = trace(lambda x: x[:1] * x[1:2] + x[2:3] * x[3:4], {"x": (4,)})
+    assert cost_of(program) == Cost(bytes=8 * 5, operations=3, multiply_adds=2)
+
+
+def test_copying_takes_no_operation() -> None:
+    assert cost_of(trace(lambda x: x, {"x": (4,)})) == Cost(bytes=64, operations=0, multiply_adds=0)
+
+
+def test_sine_and_cosine_of_one_angle_cost_once() -> None:
+    both = trace(lambda x: np.array([np.sin(x[0]), np.cos(x[0])]), {"x": (1,)})
+    assert cost_of(both).multiply_adds == SINE_COSINE_PAIRS + SINE_COSINE_SINGLES
+    assert cost_of(both).operations == 2 * SINE_COSINE_PAIRS + SINE_COSINE_SINGLES
+
+
+def test_that_cost_is_what_the_compiler_writes() -> None:
+    write = Writer(4)
+    sines_and_cosines(write, ["%x"], fma=True)
+    labels = [k for k, line in enumerate(write.lines) if not line.startswith(" ")]
+    straight = write.lines[: labels[0]]  # before the branch for large angles
+    assert sum("@llvm.fma" in line for line in straight) == SINE_COSINE_PAIRS
+    # Of the sign of the result nothing is counted: it is turned by operations on bits.
+    single = [line for line in straight if any(f" {op} " in line for op in ("fadd", "fsub", "fmul"))]
+    assert len(single) == SINE_COSINE_SINGLES
+
+
+@pytest.mark.parametrize("quantity", ARGUMENTS)
+@pytest.mark.parametrize("robot", ["double_pendulum", "panda"])
+def test_bytes_are_those_of_arguments_and_answer(robot: str, quantity: str) -> None:
+    model = dynx.load(robot)
+    program = program_of(model, quantity, model.frame_names[-1])
+    assert program is not None
+    assert cost_of(program).bytes == sample_bytes(model, quantity)
+
+
+def test_of_a_quantity_that_is_not_compiled_nothing_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("dynx.bench.cost.compiles", lambda mechanism, name: False)
+    model = dynx.load("double_pendulum")
+    assert program_of(model, "inverse_dynamics", model.frame_names[-1]) is None

@@ -1,0 +1,131 @@
+"""Ways are checked before they are timed, and all that are right are."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+import dynx
+from dynx.bench import measurement
+from dynx.bench.measurement import LOST, TRIAL, measure
+from dynx.bench.timing import Call, Times
+from dynx.bench.ways import Prepared
+from dynx.bench.work import ARGUMENTS, Batch, Work, draw_batch
+from dynx.spatial.scalar import Floats
+from tests.bench.ways import Failing, Scaled, Silent
+
+MODEL = dynx.load("double_pendulum")
+BATCH = draw_batch(MODEL, MODEL.frame_names[-1], 40)
+WORK = Work("inverse_dynamics", 40)
+
+
+def test_right_ways_are_timed_per_sample() -> None:
+    way = Scaled("right")
+    (found,) = measure(WORK, [way], BATCH, 3)
+    assert found.problem is None
+    assert found.times is not None
+    assert len(found.times.seconds) == 3
+    assert 0.0 < found.times.median < 1.0 / 40
+    assert found.samples == 40
+    assert found.error == 0.0
+
+
+@pytest.mark.parametrize("quantity", ARGUMENTS)
+def test_a_wrong_answer_is_reported_and_not_timed(quantity: str) -> None:
+    wrong, right = Scaled("wrong", 1.01), Scaled("right")
+    found = measure(Work(quantity, 40), [wrong, right], BATCH, 2)
+    assert [each.way for each in found] == ["wrong", "right"]
+    assert found[0].times is None
+    assert found[0].problem is not None
+    assert found[0].problem.startswith("wrong answer, not timed: error ")
+    assert wrong.calls == 1
+    assert found[1].times is not None
+
+
+def test_one_wrong_sample_is_enough() -> None:
+    (found,) = measure(WORK, [Scaled("nearly", spoilt=39)], BATCH, 2)
+    assert found.times is None
+
+
+def test_a_way_that_writes_nothing_does_not_live_on_the_answers_of_another() -> None:
+    found = measure(WORK, [Scaled("right"), Silent("silent")], BATCH, 2)
+    assert found[0].times is not None
+    assert found[1].times is None
+    assert found[1].error == np.inf
+
+
+def test_what_cannot_be_done_says_why() -> None:
+    (found,) = measure(WORK, [Failing("failing")], BATCH, 2)
+    assert (found.times, found.error, found.problem) == (None, None, "no such luck")
+
+
+class Slow(Scaled):
+    """So slow for one sample that a whole batch would take long."""
+
+    whole = False
+
+    def prepare(self, work: Work, batch: Batch, out: Floats) -> Prepared:
+        call = super().prepare(work, batch, out).call
+
+        def slow() -> Floats:
+            for _ in range(len(batch) * 200):
+                np.sqrt(2.0)
+            answers: Floats = call()
+            return answers
+
+        return Prepared(slow)
+
+
+def test_a_slow_way_is_timed_at_fewer_samples() -> None:
+    batch = draw_batch(MODEL, MODEL.frame_names[-1], 65536)
+    found = measure(Work("inverse_dynamics", 65536), [Slow("slow"), Scaled("quick")], batch, 1)
+    assert TRIAL <= found[0].samples < 65536
+    assert found[1].samples == 65536
+
+
+class WithBaseline(Scaled):
+    """Something of its calls is not the work."""
+
+    def prepare(self, work: Work, batch: Batch, out: Floats) -> Prepared:
+        return Prepared(super().prepare(work, batch, out).call, lambda: None)
+
+
+def made_up(monkeypatch: pytest.MonkeyPatch, *times: Times) -> None:
+    """Let calls have taken these times."""
+
+    def interleaved(calls: Sequence[Call], repetitions: int) -> list[Times]:
+        assert len(calls) == len(times)
+        return list(times)
+
+    monkeypatch.setattr(measurement, "interleaved", interleaved)
+
+
+def test_a_baseline_is_taken_away(monkeypatch: pytest.MonkeyPatch) -> None:
+    plain, with_baseline, baseline = Times((4.0, 4.0)), Times((8.0, 12.0)), Times((2.0, 4.0))
+    made_up(monkeypatch, with_baseline, baseline, plain)
+    found = measure(WORK, [WithBaseline("less"), Scaled("wrong", 2.0), Scaled("plain")], BATCH, 2)
+    assert found[0].times == Times((6.0 / 40, 8.0 / 40))
+    assert found[1].times is None
+    assert found[2].times == Times((0.1, 0.1))
+
+
+def test_what_is_lost_in_the_noise_is_not_shown_as_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    made_up(monkeypatch, Times((5e-6,) * 3), Times((6e-6, 5e-6, 1e-6)))
+    (found,) = measure(WORK, [WithBaseline("less")], BATCH, 3)
+    assert (found.times, found.problem) == (None, LOST)
+    assert found.error == 0.0
+
+
+def test_one_sample_has_no_batch_axis() -> None:
+    shapes = []
+
+    class Asked(Scaled):
+        def prepare(self, work: Work, batch: Batch, out: Floats) -> Prepared:
+            shapes.append((len(batch), out.shape))
+            return super().prepare(work, batch, out)
+
+    (found,) = measure(Work("jacobian", 1), [Asked("asked")], BATCH, 1)
+    assert shapes == [(1, (1, 6, MODEL.nv))]
+    assert isinstance(found.times, Times)

@@ -1,0 +1,132 @@
+target triple = "x86_64-unknown-linux-gnu"
+define internal void @segment0(ptr noalias nocapture readonly %arguments, i64 %first, ptr noalias nocapture %kept) {
+entry:
+  %a0 = getelementptr inbounds i64, ptr %arguments, i64 1
+  %b0 = load ptr, ptr %a0
+  %s0_ = getelementptr inbounds i64, ptr %arguments, i64 2
+  %s0 = load i64, ptr %s0_
+  %o0 = mul i64 %first, %s0
+  %p0_0 = getelementptr inbounds i8, ptr %b0, i64 %o0
+  %p0_1 = getelementptr inbounds i8, ptr %p0_0, i64 %s0
+  %a1 = getelementptr inbounds i64, ptr %arguments, i64 3
+  %b1 = load ptr, ptr %a1
+  %s1_ = getelementptr inbounds i64, ptr %arguments, i64 4
+  %s1 = load i64, ptr %s1_
+  %o1 = mul i64 %first, %s1
+  %p1_0 = getelementptr inbounds i8, ptr %b1, i64 %o1
+  %p1_1 = getelementptr inbounds i8, ptr %p1_0, i64 %s1
+  %v1 = load <2 x double>, ptr %p0_0, align 8
+  %v2 = load <2 x double>, ptr %p0_1, align 8
+  %v3 = shufflevector <2 x double> %v1, <2 x double> %v2, <2 x i32> <i32 0, i32 2>
+  %v4 = shufflevector <2 x double> %v1, <2 x double> %v2, <2 x i32> <i32 1, i32 3>
+  %v5 = call <2 x double> @llvm.fabs.v2f64(<2 x double> %v3)
+  %v6 = call <2 x double> @llvm.fma.v2f64(<2 x double> %v5, <2 x double> splat (double 0x3FE45F306DC9C883), <2 x double> splat (double 0x4338000000000000))
+  %v7 = bitcast <2 x double> %v6 to <2 x i64>
+  %v8 = fsub <2 x double> %v6, splat (double 0x4338000000000000)
+  %v9 = call <2 x double> @llvm.fma.v2f64(<2 x double> %v8, <2 x double> splat (double 0xBFF921FB54442D18), <2 x double> %v5)
+  %v10 = call <2 x double> @llvm.fma.v2f64(<2 x double> %v8, <2 x double> splat (double 0xBC91A62633145C07), <2 x double> %v9)
+  %v11 = call <2 x double> @llvm.fma.v2f64(<2 x double> %v8, <2 x double> splat (double 0x391F1976B7ED8FBC), <2 x double> %v10)
+  %v12 = fmul <2 x double> %v11, %v11
+  %v13 = call <2 x double> @llvm.fma.v2f64(<2 x double> splat (double 0x3DE5D8FA31EAA9E0), <2 x double> %v12, <2 x double> splat (double 0xBE5AE5E59F595795))
+  %v14 = call <2 x double> @llvm.fma.v2f64(<2 x double> %v13, <2 x double> %v12, <2 x double> splat (double 0x3EC71DE3567125EC))
+  %v15 = call <2 x double> @llvm.fma.v2f64(<2 x double> %v14, <2 x double> %v12, <2 x double> splat (double 0xBF2A01A019BFD181))
+  %v16 = call <2 x double> @llvm.fma.v2f64(<2 x double> %v15, <2 x double> %v12, <2 x double> splat (double 0x3F8111111110F7CA))
+  %v17 = call <2 x double> @llvm.fma.v2f64(<2 x double> %v16, <2 x double> %v12, <2 x double> splat (double 0xBFC5555555555548))
+  %v18 = fmul <2 x double> %v12, %v11
+  %v19 = call <2 x double> @llvm.fma.v2f64(<2 x double> %v17, <2 x double> %v18, <2 x double> %v11)
+  %v20 = call <2 x double> @llvm.fma.v2f64(<2 x double> splat (double 0xBDA8FA465DD74BCA), <2 x double> %v12, <2 x double> splat (double 0x3E21EE9D7526EF7C))
+  %v21 = call <2 x double> @llvm.fma.v2f64(<2 x double> %v20, <2 x double> %v12, <2 x double> splat (double 0xBE927E4F7EA3760B))
+  %v22 = call <2 x double> @llvm.fma.v2f64(<2 x double> %v21, <2 x double> %v12, <2 x double> splat (double 0x3EFA01A019C8390A))
+  %v23 = call <2 x double> @llvm.fma.v2f64(<2 x double> %v22, <2 x double> %v12, <2 x double> splat (double 0xBF56C16C16C14F8A))
+  %v24 = call <2 x double> @llvm.fma.v2f64(<2 x double> %v23, <2 x double> %v12, <2 x double> splat (double 0x3FA555555555554B))
+  %v25 = call <2 x double> @llvm.fma.v2f64(<2 x double> %v24, <2 x double> %v12, <2 x double> splat (double 0xBFE0000000000000))
+  %v26 = call <2 x double> @llvm.fma.v2f64(<2 x double> %v25, <2 x double> %v12, <2 x double> splat (double 0x3FF0000000000000))
+  %v27 = shl <2 x i64> %v7, splat (i64 63)
+  %v28 = icmp slt <2 x i64> %v27, zeroinitializer
+  %v29 = select <2 x i1> %v28, <2 x double> %v26, <2 x double> %v19
+  %v30 = select <2 x i1> %v28, <2 x double> %v19, <2 x double> %v26
+  %v31 = add <2 x i64> %v7, splat (i64 1)
+  %v32 = bitcast <2 x double> %v3 to <2 x i64>
+  %v33 = shl <2 x i64> %v7, splat (i64 62)
+  %v34 = xor <2 x i64> %v33, %v32
+  %v35 = shl <2 x i64> %v31, splat (i64 62)
+  %v36 = and <2 x i64> %v34, splat (i64 -9223372036854775808)
+  %v37 = bitcast <2 x double> %v29 to <2 x i64>
+  %v38 = xor <2 x i64> %v37, %v36
+  %v39 = bitcast <2 x i64> %v38 to <2 x double>
+  %v40 = and <2 x i64> %v35, splat (i64 -9223372036854775808)
+  %v41 = bitcast <2 x double> %v30 to <2 x i64>
+  %v42 = xor <2 x i64> %v41, %v40
+  %v43 = bitcast <2 x i64> %v42 to <2 x double>
+  %v44 = fcmp ogt <2 x double> %v5, splat (double 0x40F86A0000000000)
+  %v45 = or <2 x i1> zeroinitializer, %v44
+  %v46 = bitcast <2 x i1> %v45 to i2
+  %v47 = icmp ne i2 %v46, 0
+  br label %near48
+near48:
+  br i1 %v47, label %far49, label %trig50, !prof !0
+far49:
+  %v51 = extractelement <2 x double> %v3, i32 0
+  %v52 = call double @sin(double %v51)
+  %v53 = call double @llvm.fabs.f64(double %v51)
+  %v54 = fcmp ogt double %v53, 0x40F86A0000000000
+  %v55 = extractelement <2 x double> %v39, i32 0
+  %v56 = select i1 %v54, double %v52, double %v55
+  %v57 = insertelement <2 x double> %v39, double %v56, i32 0
+  %v58 = extractelement <2 x double> %v3, i32 1
+  %v59 = call double @sin(double %v58)
+  %v60 = call double @llvm.fabs.f64(double %v58)
+  %v61 = fcmp ogt double %v60, 0x40F86A0000000000
+  %v62 = extractelement <2 x double> %v57, i32 1
+  %v63 = select i1 %v61, double %v59, double %v62
+  %v64 = insertelement <2 x double> %v57, double %v63, i32 1
+  %v65 = extractelement <2 x double> %v3, i32 0
+  %v66 = call double @cos(double %v65)
+  %v67 = call double @llvm.fabs.f64(double %v65)
+  %v68 = fcmp ogt double %v67, 0x40F86A0000000000
+  %v69 = extractelement <2 x double> %v43, i32 0
+  %v70 = select i1 %v68, double %v66, double %v69
+  %v71 = insertelement <2 x double> %v43, double %v70, i32 0
+  %v72 = extractelement <2 x double> %v3, i32 1
+  %v73 = call double @cos(double %v72)
+  %v74 = call double @llvm.fabs.f64(double %v72)
+  %v75 = fcmp ogt double %v74, 0x40F86A0000000000
+  %v76 = extractelement <2 x double> %v71, i32 1
+  %v77 = select i1 %v75, double %v73, double %v76
+  %v78 = insertelement <2 x double> %v71, double %v77, i32 1
+  br label %trig50
+trig50:
+  %v79 = phi <2 x double> [%v39, %near48], [%v64, %far49]
+  %v80 = phi <2 x double> [%v43, %near48], [%v78, %far49]
+  %v81 = fmul <2 x double> %v3, %v4
+  %v82 = fadd <2 x double> %v81, %v79
+  %v83 = shufflevector <2 x double> %v82, <2 x double> poison, <1 x i32> <i32 0>
+  store <1 x double> %v83, ptr %p1_0, align 8
+  %v84 = shufflevector <2 x double> %v82, <2 x double> poison, <1 x i32> <i32 1>
+  store <1 x double> %v84, ptr %p1_1, align 8
+  ret void
+}
+define void @kernel(ptr noalias nocapture readonly %arguments) {
+entry:
+  %kept = alloca [1 x <2 x double>], align 64
+  %n = load i64, ptr %arguments
+  %last = sub i64 %n, 2
+  br label %group
+group:
+  %i = phi i64 [0, %entry], [%next, %group]
+  %late = icmp sgt i64 %i, %last
+  %first = select i1 %late, i64 %last, i64 %i
+  call void @segment0(ptr %arguments, i64 %first, ptr %kept)
+  %next = add i64 %i, 2
+  %more = icmp slt i64 %next, %n
+  br i1 %more, label %group, label %done
+done:
+  ret void
+}
+declare <2 x double> @llvm.fabs.v2f64(<2 x double>)
+declare <2 x double> @llvm.fma.v2f64(<2 x double>, <2 x double>, <2 x double>)
+declare <2 x double> @llvm.sqrt.v2f64(<2 x double>)
+declare double @llvm.fabs.f64(double)
+declare double @sin(double)
+declare double @cos(double)
+!0 = !{!"branch_weights", i32 1, i32 100000}

@@ -1,0 +1,54 @@
+"""Running what `emit` writes: LLVM, one call, nothing else between the text and the numbers."""
+
+from __future__ import annotations
+
+import ctypes
+import platform
+from collections.abc import Sequence
+
+import numpy as np
+from llvmlite import binding
+
+from dynx.simd.emit import ENTRY, Settings, emit
+from dynx.simd.program import Program
+from dynx.simd.target import Target, host, sse2
+from dynx.spatial.scalar import Floats
+
+X86 = platform.machine().lower() in ("x86_64", "amd64")
+TARGETS: tuple[Target, ...] = (host(), sse2()) if X86 else (host(),)
+"""This processor and, where it is one of them, the least of its family."""
+
+LANES = (2, 4, 8)
+
+
+class Machine:
+    """A program compiled for `target`."""
+
+    def __init__(self, program: Program, target: Target, settings: Settings) -> None:
+        self._program = program
+        module = binding.parse_assembly(emit(program, target, settings))
+        module.verify()
+        self._jit = binding.create_lljit_compiler()
+        builder = binding.JITLibraryBuilder().add_object_img(target.machine().emit_object(module))
+        self._library = builder.add_current_process().export_symbol(ENTRY).link(self._jit, ENTRY)
+        self._entry = ctypes.CFUNCTYPE(None, ctypes.c_void_p)(self._library[ENTRY])
+
+    def fill(self, inputs: Sequence[Floats], outputs: Sequence[Floats], n: int) -> None:
+        """Evaluate `n` samples, at least as many as lanes. Rows (n, port size) may lie anywhere."""
+        words = [n]
+        for array in (*inputs, *outputs):
+            words += [array.ctypes.data, array.strides[0]]
+        self._entry(np.array(words, dtype=np.int64).ctypes.data)
+
+    def __call__(self, inputs: Sequence[Floats]) -> list[Floats]:
+        """The same into new arrays."""
+        n = len(inputs[0])
+        outputs = [np.empty((n, port.size)) for port in self._program.outputs]
+        self.fill(inputs, outputs, n)
+        return outputs
+
+
+def same_bits(a: Floats, b: Floats) -> np.bool_:
+    """Whether all numbers are the same, zeros with their sign; every NaN counts as NaN."""
+    a, b = np.ascontiguousarray(a), np.ascontiguousarray(b)
+    return np.all((a.view(np.int64) == b.view(np.int64)) | (np.isnan(a) & np.isnan(b)))

@@ -1,0 +1,215 @@
+"""The cache of machine code: what is found again, and what is never used."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import platformdirs
+import pytest
+
+from dynx.simd import cache
+from dynx.simd.cache import cached_kernel, recipe_of
+from dynx.simd.emit import Settings
+from dynx.simd.kernel import Kernel
+from dynx.simd.program import Program
+from dynx.simd.target import host
+from dynx.simd.trace import trace
+
+TWICE = trace(lambda x: 2.0 * x + 1.0, {"x": (2,)})
+THRICE = trace(lambda x: 3.0 * x + 1.0, {"x": (2,)})
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty cache."""
+    monkeypatch.delenv("DYNX_CACHE", raising=False)
+    monkeypatch.setenv("DYNX_CACHE_DIR", str(tmp_path / "cache"))
+    return tmp_path / "cache" / "kernels"
+
+
+class Made:
+    """A program, and how often it was asked for."""
+
+    def __init__(self, program: Program) -> None:
+        self.program, self.times = program, 0
+
+    def __call__(self) -> Program:
+        self.times += 1
+        return self.program
+
+
+def values(kernel: Kernel) -> list[float]:
+    x, found = np.array([[1.0, 10.0]]), np.empty((1, 2))
+    kernel([x], [found])
+    return [float(value) for value in found[0]]
+
+
+def files(folder: Path) -> list[Path]:
+    return sorted(folder.iterdir()) if folder.is_dir() else []
+
+
+def test_found_again_without_a_program(folder: Path) -> None:
+    made = Made(TWICE)
+    for _ in range(3):
+        kernel = cached_kernel(b"twice", made)
+        assert values(kernel) == [3.0, 21.0]
+        assert (kernel.inputs, kernel.outputs) == (TWICE.inputs, TWICE.outputs)
+    assert made.times == 1
+    assert len(files(folder)) == 1
+
+
+def test_what_decides_the_code_decides_the_key(monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
+    made = Made(TWICE)
+    target = host()
+    ways: list[Callable[[], Kernel]] = [
+        lambda: cached_kernel(b"twice", made),
+        lambda: cached_kernel(b"twicf", made),
+        lambda: cached_kernel(b"twice", made, settings=Settings(2)),
+        lambda: cached_kernel(b"twice", made, settings=Settings(target.lanes, fast=False)),
+        lambda: cached_kernel(b"twice", made, settings=Settings(target.lanes, segment=77)),
+        lambda: cached_kernel(b"twice", made, target=replace(target, cpu="x86-64")),
+    ]
+    if not target.triple.startswith("x86_64"):
+        ways.pop()
+    for ask in [*ways, *ways]:
+        ask()
+    assert made.times == len(ways)
+    for name in ("compiler_version", "_emitter_version"):
+        monkeypatch.setattr(cache, name, lambda: "another version")
+        cached_kernel(b"twice", made)
+    assert made.times == len(ways) + 2 == len(files(folder))
+
+
+def test_recipes_of_programs() -> None:
+    same = trace(lambda x: 2.0 * x + 1.0, {"x": (2,)})
+    close = trace(lambda x: np.nextafter(2.0, 3.0) * x + 1.0, {"x": (2,)})
+    named = trace(lambda y: 2.0 * y + 1.0, {"y": (2,)})
+    shaped = trace(lambda x: (2.0 * x + 1.0)[None], {"x": (2,)})
+    assert recipe_of(same) == recipe_of(TWICE)
+    assert len({recipe_of(p) for p in (TWICE, THRICE, close, named, shaped)}) == 5
+
+
+def _flip(content: bytes, place: int) -> bytes:
+    return content[:place] + bytes([content[place] ^ 0x10]) + content[place + 1 :]
+
+
+def test_altered_files_are_replaced(folder: Path) -> None:
+    """Bytes flipped all over the file, cut short, emptied, with something added."""
+    cached_kernel(b"twice", Made(TWICE))
+    (path,) = files(folder)
+    whole = path.read_bytes()
+    spoiled = [_flip(whole, place) for place in range(0, len(whole), max(1, len(whole) // 60))]
+    spoiled += [whole[:length] for length in (0, 1, 13, 14, 40, 50, len(whole) // 2, len(whole) - 1)]
+    spoiled += [whole + b"x", b"something else altogether"]
+    for content in spoiled:
+        path.write_bytes(content)
+        made = Made(TWICE)
+        assert values(cached_kernel(b"twice", made)) == [3.0, 21.0]
+        assert made.times == 1
+        assert path.read_bytes() == whole
+
+
+def test_code_that_cannot_be_linked_is_replaced(folder: Path) -> None:
+    """Whole by its checksum, and yet no object file."""
+    image = cached_kernel(b"twice", Made(TWICE)).image
+    (path,) = files(folder)
+    cache._write(path, replace(image, code=b"nothing of the kind"))
+    made = Made(TWICE)
+    assert values(cached_kernel(b"twice", made)) == [3.0, 21.0]
+    assert made.times == 1
+
+
+@pytest.mark.parametrize("spoil", ["off", "a file", "read-only", "writable by others"])
+def test_without_a_folder_everything_works(folder: Path, monkeypatch: pytest.MonkeyPatch, spoil: str) -> None:
+    if spoil == "off":
+        monkeypatch.setenv("DYNX_CACHE", "0")
+    elif spoil == "a file":
+        folder.parent.write_text("not a folder")
+    elif spoil == "read-only":
+        # Root writes where it likes, so the system's answer is given for it.
+        folder.mkdir(parents=True)
+        monkeypatch.setattr(os, "access", lambda path, mode: False)
+    else:
+        folder.mkdir(parents=True)
+        folder.chmod(0o777)
+    made = Made(TWICE)
+    for _ in range(2):
+        assert values(cached_kernel(b"twice", made)) == [3.0, 21.0]
+    assert made.times == 2
+    assert files(folder) == []
+
+
+def test_a_full_disk_is_no_error(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(source: object, target: object) -> None:
+        raise OSError("no space left on device")
+
+    monkeypatch.setattr(os, "replace", full)
+    assert values(cached_kernel(b"twice", Made(TWICE))) == [3.0, 21.0]
+    assert files(folder) == []
+
+
+def test_the_users_own_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.delenv("DYNX_CACHE_DIR")
+    monkeypatch.setattr(platformdirs, "user_cache_path", lambda name: tmp_path / name)
+    cached_kernel(b"twice", Made(TWICE))
+    assert len(files(tmp_path / "dynx" / "kernels")) == 1
+
+
+def test_the_folder_is_the_users_alone(folder: Path) -> None:
+    cached_kernel(b"twice", Made(TWICE))
+    assert folder.stat().st_mode & 0o077 == 0
+
+
+def test_what_was_not_used_for_longest_goes(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    recipes = [b"%d" % k for k in range(5)]
+    paths: list[Path] = []
+    for age, recipe in enumerate(recipes):
+        cached_kernel(recipe, Made(TWICE))
+        (new,) = set(files(folder)) - set(paths)
+        paths.append(new)
+        os.utime(new, (time.time() - 1000 + age,) * 2)
+    # Reading the oldest makes it the newest.
+    made = Made(TWICE)
+    cached_kernel(recipes[0], made)
+    assert made.times == 0
+    monkeypatch.setattr(cache, "LARGEST", 3 * paths[0].stat().st_size)
+    cached_kernel(b"one more", Made(TWICE))
+    assert len(files(folder)) == 3
+    assert {path.exists() for path in (paths[0], paths[4])} == {True}
+    assert not any(paths[k].exists() for k in (1, 2, 3))
+
+
+WRITER = """
+import sys
+import numpy as np
+from dynx.simd.cache import cached_kernel
+from dynx.simd.trace import trace
+for turn in range(6):
+    for k in range(4):
+        kernel = cached_kernel(b"%d" % k, lambda: trace(lambda x: (k + 2.0) * x, {"x": (3,)}))
+        x, y = np.ones((9, 3)), np.empty((9, 3))
+        kernel([x], [y])
+        assert (y == k + 2.0).all()
+print("done")
+"""
+
+
+def test_several_processes_at_once(folder: Path) -> None:
+    """All of them compile, write and read the same kernels, while another one spoils the files."""
+    writers = [
+        subprocess.Popen([sys.executable, "-c", WRITER], stdout=subprocess.PIPE, text=True) for _ in range(3)
+    ]
+    while any(writer.poll() is None for writer in writers):
+        for path in files(folder):
+            if path.suffix == ".kernel":
+                path.write_bytes(path.read_bytes()[:-7])
+        time.sleep(0.05)
+    assert [writer.communicate()[0].strip() for writer in writers] == ["done"] * 3
+    assert {path.suffix for path in files(folder)} == {".kernel"}

@@ -1,0 +1,229 @@
+"""What is emitted computes what the program means, on every target and however many lanes."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from llvmlite import binding
+
+from dynx.simd.emit import Settings, emit
+from dynx.simd.expr import ARITY, Graph, Simplify
+from dynx.simd.interp import Function, interpret
+from dynx.simd.program import Port, Program, finished
+from dynx.simd.simplify import FAST, STRICT
+from dynx.simd.target import Target
+from dynx.spatial.scalar import Floats
+from tests.simd.machine import LANES, TARGETS, X86, Machine, same_bits
+from tests.simd.programs import (
+    OPERATIONS,
+    ORDINARY_CONSTANTS,
+    RANDOM,
+    doubles,
+    ordinary,
+    programs,
+    simplified,
+)
+from tests.simd.rounding import agree, bounds
+
+TARGET = st.sampled_from(TARGETS)
+LANE = st.sampled_from(LANES)
+BATCH = st.integers(0, 17)
+"""How many samples there are above the least, up to two groups and one."""
+LAYOUTS = ("rows", "padded", "every second", "backwards", "one row")
+
+
+@functools.cache
+def own_trigonometry(target: Target) -> tuple[Function, Function]:
+    """Sine and cosine as the kernels of `target` compute them; `test_trigonometry` judges these."""
+    functions = []
+    for op in ("sin", "cos"):
+        graph = Graph()
+        result = graph.literal("sin" if op == "sin" else "cos", graph.input(0))
+        program = finished(graph, [Port("x", (1,))], [Port(op, (1,))], [result])
+        machine = Machine(program, target, Settings(2, fast=False))
+
+        def function(x: Floats, machine: Machine = machine) -> Floats:
+            return np.asarray(machine([np.concatenate([x, x, x[:1]])[:, None]])[0][: len(x), 0])
+
+        functions.append(function)
+    return functions[0], functions[1]
+
+
+def laid_out(array: Floats, layout: str) -> Floats:
+    """A view with the numbers of `array`, whose rows lie in memory as `layout` says."""
+    n, width = array.shape
+    if layout == "padded":
+        room = np.full((n, width + 3), np.nan)
+        room[:, 1 : width + 1] = array
+        return room[:, 1 : width + 1]
+    if layout == "every second":
+        room = np.full((2 * n, width), np.nan)
+        room[::2] = array
+        return room[::2]
+    if layout == "backwards":
+        return np.flip(np.flip(array, 0).copy(), 0)
+    if layout == "one row":
+        return np.asarray(np.broadcast_to(array[:1], array.shape))
+    return array
+
+
+def drawn(program: Program, rng: np.random.Generator, n: int, *, special: bool) -> list[Floats]:
+    numbers = doubles if special else ordinary
+    return [laid_out(numbers(rng, (n, port.size)), str(rng.choice(LAYOUTS))) for port in program.inputs]
+
+
+@given(programs(), TARGET, LANE, BATCH, st.sampled_from((5, 2500)), RANDOM)
+def test_strict_code_is_the_interpreter_bit_for_bit(
+    program: Program, target: Target, lanes: int, more: int, segment: int, rng: np.random.Generator
+) -> None:
+    n = lanes + min(more, 2 * lanes + 1)
+    inputs = drawn(program, rng, n, special=True)
+    sine, cosine = own_trigonometry(target)
+    wanted = interpret(program, inputs, sine=sine, cosine=cosine)
+    got = Machine(program, target, Settings(lanes, fast=False, segment=segment))(inputs)
+    for port, a, b in zip(program.outputs, got, wanted, strict=True):
+        assert same_bits(a, b), port
+
+
+@given(
+    programs(constants=ORDINARY_CONSTANTS),
+    st.sampled_from((None, STRICT, FAST)),
+    TARGET,
+    LANE,
+    BATCH,
+    st.sampled_from((5, 2500)),
+    RANDOM,
+)
+def test_fast_code_is_the_interpreter_to_rounding(
+    program: Program,
+    simplify: Simplify | None,
+    target: Target,
+    lanes: int,
+    more: int,
+    segment: int,
+    rng: np.random.Generator,
+) -> None:
+    n = lanes + min(more, 2 * lanes + 1)
+    inputs = drawn(program, rng, n, special=False)
+    wanted = interpret(program, inputs)
+    short = simplified(program, simplify)
+    got = Machine(short, target, Settings(lanes, segment=segment))(inputs)
+    for port, a, b, one, other in zip(
+        program.outputs, got, wanted, bounds(program, inputs), bounds(short, inputs), strict=True
+    ):
+        assert agree(a, b, one, other), port
+
+
+def test_fast_code_contracts_and_strict_code_does_not() -> None:
+    """a b - c with a b = 1 - 2^-104, c = 1: one rounding gives -2^-104, two give 0."""
+    graph = Graph()
+    a, b, c = (graph.input(slot) for slot in range(3))
+    program = finished(
+        graph, [Port("x", (3,))], [Port("y", (1,))], [graph.literal("sub", graph.literal("mul", a, b), c)]
+    )
+    x = np.array([[1.0 + 2.0**-52, 1.0 - 2.0**-52, 1.0]] * 2)
+    for target in TARGETS:
+        fast, strict = (Machine(program, target, Settings(2, fast=flag))([x])[0] for flag in (True, False))
+        assert np.all(strict == 0.0)
+        assert np.all(fast == (-(2.0**-104) if target.fma else 0.0))
+
+
+def everything() -> Program:
+    """Every operation on its own, on two inputs."""
+    graph = Graph()
+    pair = graph.input(0), graph.input(1)
+    results = [graph.literal(op, *pair[: ARITY[op]]) for op in OPERATIONS]
+    return finished(graph, [Port("x", (2,))], [Port("y", (len(results),))], results)
+
+
+@pytest.mark.parametrize("target", TARGETS, ids=lambda target: target.cpu)
+@pytest.mark.parametrize("lanes", LANES)
+@pytest.mark.parametrize("fast", [False, True], ids=["strict", "fast"])
+@pytest.mark.parametrize("poison", [np.nan, np.inf, -np.inf, 1e300, 2.0**-1074])
+def test_a_lane_knows_nothing_of_its_neighbours(
+    target: Target, lanes: int, fast: bool, poison: float
+) -> None:
+    machine = Machine(everything(), target, Settings(lanes, fast=fast))
+    x = ordinary(np.random.default_rng(lanes), (lanes, 2))
+    (clean,) = machine([x])
+    for lane in range(lanes):
+        for columns in ([0], [1], [0, 1]):
+            dirty = x.copy()
+            dirty[lane, columns] = poison
+            (got,) = machine([dirty])
+            others = np.arange(lanes) != lane
+            assert same_bits(got[others], clean[others])
+            assert not same_bits(got[lane], clean[lane])
+
+
+@given(programs(), TARGET, LANE, BATCH, st.sampled_from(("padded", "every second")), RANDOM)
+def test_nothing_is_written_outside_of_the_rows(
+    program: Program, target: Target, lanes: int, more: int, layout: str, rng: np.random.Generator
+) -> None:
+    n = lanes + min(more, 2 * lanes + 1)
+    inputs = drawn(program, rng, n, special=True)
+    machine = Machine(program, target, Settings(lanes, fast=False))
+    wanted = machine(inputs)
+    mark = -123.456
+    rooms = [np.full((2 * n, port.size + 3), mark) for port in program.outputs]
+    views = [
+        room[:n, 1 : port.size + 1] if layout == "padded" else room[::2, : port.size]
+        for room, port in zip(rooms, program.outputs, strict=True)
+    ]
+    machine.fill(inputs, views, n)
+    for room, view, right in zip(rooms, views, wanted, strict=True):
+        assert same_bits(view, right)
+        view[:] = mark
+        assert np.all(room == mark)
+
+
+def test_samples_do_not_depend_on_their_place_in_the_batch() -> None:
+    """The last group overlaps the one before; every size gives every sample the same bits."""
+    rng = np.random.default_rng(4)
+    x = doubles(rng, (33, 2))
+    for target in TARGETS:
+        for lanes in LANES:
+            machine = Machine(everything(), target, Settings(lanes))
+            (whole,) = machine([x])
+            for n in range(lanes, 33):
+                assert same_bits(machine([x[:n]])[0], whole[:n])
+
+
+def _ports(sizes: Sequence[int], stem: str) -> list[Port]:
+    return [Port(f"{stem}{k}", (size,)) for k, size in enumerate(sizes)]
+
+
+def test_inputs_go_through_to_outputs_of_every_width() -> None:
+    """Loads and stores of every tile shape, with nothing in between."""
+    sizes = range(1, 20)
+    graph = Graph()
+    slots = [graph.input(slot) for slot in range(sum(sizes))]
+    program = finished(graph, _ports(sizes, "in"), _ports(sizes, "out"), slots)
+    rng = np.random.default_rng(5)
+    for target in TARGETS:
+        for lanes in LANES:
+            inputs = [doubles(rng, (2 * lanes + 1, size)) for size in sizes]
+            for a, b in zip(Machine(program, target, Settings(lanes))(inputs), inputs, strict=True):
+                assert same_bits(a, b)
+
+
+CROSS = (
+    Target("x86_64-unknown-linux-gnu", "skylake-avx512", "+avx,+avx2,+fma,+avx512f,+avx512vl"),
+    Target("x86_64-unknown-linux-gnu", "x86-64", ""),
+)
+
+
+@pytest.mark.skipif(not X86, reason="LLVM is built for this machine's family")
+@pytest.mark.parametrize("target", CROSS, ids=lambda target: target.cpu)
+def test_other_processors_of_the_family_get_code(target: Target) -> None:
+    """It cannot be run here, but LLVM takes it, with vectors as wide as that processor has."""
+    program = everything()
+    machine = target.machine()
+    module = binding.parse_assembly(emit(program, target, Settings(target.lanes)))
+    register = {8: "%zmm", 2: "%xmm"}[target.lanes]
+    assert register in machine.emit_assembly(module)
