@@ -77,7 +77,6 @@ REAL = [
     ("panda", "floating"),
     ("solo12", "fixed"),
     ("solo12", "floating"),
-    ("talos_reduced", "floating"),
 ]
 
 

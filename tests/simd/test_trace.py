@@ -156,7 +156,7 @@ def test_two_traces_do_not_mix() -> None:
         trace(lambda x: stolen[0], {"x": (1,)})
 
 
-@pytest.mark.parametrize("result", ["text", None, 1j, object()], ids=str)
+@pytest.mark.parametrize("result", ["text", None, 1j, object()], ids=["text", "none", "complex", "object"])
 def test_results_are_numbers(result: object) -> None:
     with pytest.raises(TraceError, match=f"result holds a {type(result).__name__}; wanted numbers"):
         trace(lambda x: [x[0], result], {"x": (1,)})
