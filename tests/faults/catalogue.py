@@ -14,6 +14,7 @@ from tests.faults.catalogue_pybullet import PYBULLET_FAULTS
 from tests.faults.catalogue_rbd import RBD_FAULTS
 from tests.faults.catalogue_reader import READER_FAULTS
 from tests.faults.catalogue_rules import RULES_FAULTS
+from tests.faults.catalogue_simd import SIMD_FAULTS
 from tests.faults.catalogue_spatial import SPATIAL_FAULTS
 from tests.faults.fault import Fault
 
@@ -31,5 +32,6 @@ FAULTS_BY_AREA: dict[str, tuple[Fault, ...]] = {
     "agreement": AGREEMENT_FAULTS,
     "rules": RULES_FAULTS,
     "doctor": DOCTOR_FAULTS,
+    "simd": SIMD_FAULTS,
 }
 FAULTS: tuple[Fault, ...] = tuple(fault for faults in FAULTS_BY_AREA.values() for fault in faults)

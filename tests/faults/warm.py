@@ -36,8 +36,11 @@ OPTIONS = (
 
 
 def environment(fault: str) -> dict[str, str]:
-    """What is set in the process that runs tests with the fault of that name; "" plants none."""
-    return {"DYNX_FAULT": fault, "HYPOTHESIS_PROFILE": "faults"}
+    """What is set in the process that runs tests with the fault of that name; "" plants none.
+
+    Kernels are compiled anew: those in the cache are from the source on the disk, without the fault.
+    """
+    return {"DYNX_FAULT": fault, "HYPOTHESIS_PROFILE": "faults", "DYNX_CACHE": "0"}
 
 
 class Runner:
