@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import os
-import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from typing import Any, Generic, Protocol, TypeVar
 
 from dynx.cli.exits import complain
 from dynx.cli.interruption import interruptible
+from dynx.cli.progress import progress_bar
 from dynx.cli.terminal import counted
 from dynx.cli.workers import Failure, Workers
 from dynx.errors import DynxError, EngineError
@@ -95,47 +94,18 @@ class Run(Generic[Task, Result]):
         """
         started = time.perf_counter()
         pending = [index for index in range(len(self.tasks)) if index not in self._results]
+        bar = progress_bar(len(self.tasks), len(self._results), self._words([]), wanted=show_progress)
         try:
-            with (
-                Workers(self._target, jobs, timeout) as workers,
-                self._progress(show_progress) as advance,
-            ):
+            with Workers(self._target, jobs, timeout) as workers, bar as advance:
                 for outcome in workers.run([self.tasks[index] for index in pending]):
                     index = pending[outcome.index]
                     result: Any = outcome.value
                     if outcome.failure is not None:
                         result = self._failed(self.tasks[index], outcome.failure)
                     self.record(index, result)
-                    advance()
+                    advance(len(self._results), self._words(self.results))
         finally:
             self.seconds = time.perf_counter() - started
-
-    @contextmanager
-    def _progress(self, wanted: bool) -> Iterator[Callable[[], None]]:
-        """A bar on standard error while the run lasts, on a terminal only; yields its update."""
-        if not wanted or not sys.stderr.isatty():
-            yield lambda: None
-            return
-        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-
-        from dynx.cli.terminal import console
-
-        columns = (
-            TextColumn("{task.description}", markup=False),
-            BarColumn(),
-            MofNCompleteColumn(),
-            TimeElapsedColumn(),
-        )
-        screen = console(err=True)
-        screen.soft_wrap = False  # a bar that ran over the line could not be drawn again in place
-        with Progress(*columns, console=screen, transient=True) as progress:
-            total, done = len(self.tasks), len(self._results)
-            bar = progress.add_task(self._words([]), total=total, completed=done)
-
-            def advance() -> None:
-                progress.update(bar, completed=len(self._results), description=self._words(self.results))
-
-            yield advance
 
 
 def carry_out(
