@@ -135,5 +135,13 @@ def test_derived_answers_are_the_native_ones(base: Base, data: st.DataObject) ->
 @pytest.mark.parametrize("robot", REAL)
 def test_real_robots(robot: str, base: Base) -> None:
     model = load(robot, base=base)
-    with backends_of(model) as engines:
+    with backends_of(model, INTERPRETED) as engines:
+        assert_agree(engines, draw_samples(model, 8, seed=0))
+
+
+@pytest.mark.parametrize(("robot", "base"), [("panda", "fixed"), ("z1", "floating"), ("scara", "fixed")])
+def test_compiled_real_robots(robot: str, base: Base) -> None:
+    """Few, for each takes seconds of compiling; `dynx agree all` does them all."""
+    model = load(robot, base=base)
+    with backends_of(model, ["reference", "compiled"]) as engines:
         assert_agree(engines, draw_samples(model, 8, seed=0))
