@@ -1,4 +1,7 @@
-"""Faults in the SIMD compiler, the backend `compiled`, derivatives, parameters and the regressor."""
+"""Faults in the SIMD compiler, the backend `compiled`, derivatives, parameters and the regressor.
+
+None that would write outside of arrays or run altered code: what such a process does is not defined.
+"""
 
 from __future__ import annotations
 
@@ -54,11 +57,11 @@ SIMD_FAULTS = (
         caught_by=f"{TESTS}/test_trigonometry.py::test_within_one_unit_beyond_it",
     ),
     Fault(
-        "simd_last_group_beyond_the_arrays",
+        "simd_every_group_the_last",
         f"{SIMD}.emit",
         right="%first = select i1 %late, i64 %last, i64 %i",
-        wrong="%first = select i1 %late, i64 %i, i64 %i",
-        caught_by=f"{TESTS}/test_emit.py::test_nothing_is_written_outside_of_the_rows",
+        wrong="%first = select i1 %late, i64 %last, i64 %last",
+        caught_by=STRICT,
     ),
     Fault(
         "simd_smaller_for_larger",
@@ -87,13 +90,6 @@ SIMD_FAULTS = (
         right="first[-1] = n",
         wrong="first[-1] = n // lanes * lanes",
         caught_by=f"{TESTS}/test_kernel.py::test_threads_change_nothing",
-    ),
-    Fault(
-        "simd_altered_cache_file_believed",
-        f"{SIMD}.cache",
-        right="or sha256(body).digest() != digest",
-        wrong="or len(digest) != _DIGEST",
-        caught_by=f"{TESTS}/test_cache.py::test_altered_files_are_replaced",
     ),
     Fault(
         "simd_derivative_of_a_quotient_with_the_wrong_sign",
