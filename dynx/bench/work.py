@@ -105,13 +105,6 @@ def answer_shape(model: Model, quantity: str) -> tuple[int, ...]:
     }[quantity]
 
 
-def sample_bytes(model: Model, quantity: str) -> int:
-    """Bytes of one sample's arguments and answer."""
-    sizes = {"q": model.nq, "v": model.nv, "a": model.nv, "tau": model.nv}
-    numbers = sum(sizes[name] for name in ARGUMENTS[quantity]) + prod(answer_shape(model, quantity))
-    return np.dtype(np.float64).itemsize * numbers
-
-
 def require_memory(model: Model, work: Work) -> None:
     """Raise ArgumentError for a batch whose arrays would not fit beside what else the machine does."""
     # Two arrays of answers: one that all ways share, and one that a backend makes itself.
