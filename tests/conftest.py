@@ -1,6 +1,6 @@
-"""Hypothesis profiles: ``ci`` (200 examples of each property, the default), ``dev`` (20, for a quick
-look) and ``faults`` (25, not shrunk: `tests.faults` asks only whether a test fails);
-``pytest --hypothesis-profile dev`` or ``HYPOTHESIS_PROFILE=dev`` chooses.
+"""Hypothesis profiles: ``ci`` (100 examples of each property, the default), ``dev`` (20, for a quick
+look), ``faults`` (25, not shrunk: `tests.faults` asks only whether a test fails) and ``long`` (1000, for
+a night); ``pytest --hypothesis-profile dev`` or ``HYPOTHESIS_PROFILE=dev`` chooses.
 
 Examples are drawn from a fixed seed, so a failure in CI is a failure everywhere; no deadline, since
 the time of one example says more about the machine than about dynx.
@@ -9,19 +9,21 @@ the time of one example says more about the machine than about dynx.
 from __future__ import annotations
 
 import os
+import tempfile
 
 import pytest
 from hypothesis import HealthCheck, Phase, settings
 
 settings.register_profile(
     "ci",
-    max_examples=200,
+    max_examples=100,
     deadline=None,
     derandomize=True,
     print_blob=True,
     suppress_health_check=[HealthCheck.too_slow],
 )
 settings.register_profile("dev", parent=settings.get_profile("ci"), max_examples=20)
+settings.register_profile("long", parent=settings.get_profile("ci"), max_examples=1000)
 settings.register_profile(
     "faults",
     parent=settings.get_profile("ci"),
@@ -30,7 +32,26 @@ settings.register_profile(
 )
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
 
+LONGEST = (
+    "tests/test_readme.py::test_python_blocks",
+    "tests/properties/",
+    "tests/doctor/test_raw_engines.py",
+)
+"""Where single tests take up to a minute."""
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """One cache of compiled kernels for the whole run, parallel workers included, that goes with it.
+
+    A kernel is compiled once and no test depends on what an earlier run left behind; a folder named in
+    DYNX_CACHE_DIR is kept.
+    """
+    if "DYNX_CACHE_DIR" not in os.environ:
+        folder = tempfile.TemporaryDirectory(prefix="dynx-tests-")
+        os.environ["DYNX_CACHE_DIR"] = folder.name
+        config.add_cleanup(folder.cleanup)
+
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """What takes longest comes first, so that parallel workers end together."""
-    items.sort(key=lambda item: not item.nodeid.startswith("tests/properties/"))
+    items.sort(key=lambda item: not item.nodeid.startswith(LONGEST))

@@ -123,7 +123,7 @@ def draw_samples(model: Model, count: int, seed: int) -> Samples:
         derivatives=deal(
             names,
             count,
-            each=_share(128, n_questions, count),
+            each=_share(64, n_questions, count),
             references=_share(192, len(names), len(REFERENCES)),
         ),
     )

@@ -48,6 +48,11 @@ class Backend(Lifecycle, EngineHooks):
     `external_forces` maps frame names to wrenches (..., 6), force [N] then moment [N m], that act
     on the robot, expressed at and in `force_reference` as a Jacobian is.
 
+    A batch is a Python loop over the engine's calls unless the class is `vectorized`; in the backend
+    ``reference`` NumPy evaluates it whole. The backend ``compiled`` gives the same numbers for batches, to
+    rounding, on UR5 at least about 60 times as fast (to one significant figure, ``dynx bench ur5 --batch
+    65536 --threads 1``; docs/bench.md says which backend suits which work).
+
     Raises errors of `dynx.errors` only. With ``validate=False`` the arguments must be float64
     arrays of the right shape and are not looked at; a wrong one then gives an undefined answer.
     """

@@ -1,8 +1,9 @@
 """The backend `compiled`: `dynx.rbd` traced for one robot and compiled for this processor.
 
 Every quantity becomes a kernel when it is first asked for, with the robot's constants folded in
-(`dynx.backends.compiled_kernels`); batches are evaluated several samples at a time and on several
-threads. What was compiled once is found in a cache afterwards (`dynx.simd.cache`).
+(`dynx.backends.compiled_kernels`; one kernel serves many frames, see `dynx.backends.compiled_frames`).
+Batches are evaluated several samples at a time and on several threads. What was compiled once is found
+in a cache afterwards (`dynx.simd.cache`).
 
 Safe to use from several threads, which may share one backend and its kernels.
 """
@@ -19,8 +20,11 @@ from dynx._version import __version__
 from dynx.backends.base import Backend, Forces
 from dynx.backends.compiled_arguments import BatchArguments
 from dynx.backends.compiled_call import KernelCall, NumericCall, into
+from dynx.backends.compiled_frames import chain_of, place_of
 from dynx.backends.compiled_kernels import (
+    ON_CHAINS,
     QUANTITIES,
+    chain_kernel,
     compiles,
     is_physical,
     quantity_kernel,
@@ -30,6 +34,7 @@ from dynx.backends.evaluation import Evaluation, Reduction
 from dynx.model import Mechanism, Model
 from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED, Reference
 from dynx.simd.image import COMPILING
+from dynx.simd.kernel import Kernel
 from dynx.simd.target import compiler_version, host
 from dynx.simd.threads import checked_threads
 from dynx.spatial.scalar import Floats
@@ -71,6 +76,7 @@ class CompiledBackend(Backend):
         }
         self._eliminates = self._straight or is_physical(self._mechanism)
         self._calls: dict[object, Call] = {}
+        self._chains: dict[object, Kernel] = {}
         # The same by what the caller says: names, before they are looked up and checked.
         self._asked: dict[object, Call] = {}
 
@@ -82,7 +88,7 @@ class CompiledBackend(Backend):
     def _release(self) -> None:
         # Calls that other threads are in keep their kernel until they end.
         with COMPILING:
-            self._asked, self._calls = {}, {}
+            self._asked, self._calls, self._chains = {}, {}, {}
 
     # -- with `out` ---------------------------------------------------------------------------
 
@@ -92,8 +98,9 @@ class CompiledBackend(Backend):
         """T_world_frame (..., 4, 4); for several frames, or None for all, (..., n, 4, 4)."""
         if frame is not None and not isinstance(frame, str):
             names = self._arguments.frames(frame)
-            of_names = self._call_for("frame_placements", tuple(self._index(name) for name in names))
-            return of_names(q, out=out)
+            # Picked from all, as lists are many and a kernel for each would round in its own way.
+            of_all = self._call_for("frame_placements", self._all_frames)
+            return into(out, of_all(q)[..., [self._index(name) for name in names], :, :])
         call = self._asked.get(("forward_kinematics", frame))
         if call is None:
             self._arguments.refuse_closed()
@@ -172,7 +179,7 @@ class CompiledBackend(Backend):
                 self._arguments.refuse_closed()
                 self._solvability.refuse_singular(joint_dynamics)
                 call = self._named("forward_dynamics")
-            return self._arguments.finite_acceleration(call(q, v, tau, out))
+            return call(q, v, tau, out)
         a = super().forward_dynamics(
             q,
             v,
@@ -224,10 +231,24 @@ class CompiledBackend(Backend):
 
     def _made(self, quantity: str, details: tuple[Any, ...], tree: bool) -> Call:
         checks = tuple(self._check(argument, tree) for argument in QUANTITIES[quantity].arguments)
+        divides = QUANTITIES[quantity].divides and not tree
+        refuse = self._arguments.finite_acceleration if divides else None
         if not compiles(self._tidy, quantity):
-            return NumericCall(self._tidy, quantity, details, checks, tree=tree)
-        kernel = quantity_kernel(self._tidy, quantity, details, tree=tree)
-        return KernelCall(kernel, checks, threads=self._threads, validate=self._validate and not tree)
+            return NumericCall(self._tidy, quantity, details, checks, tree=tree, refuse=refuse)
+        options: dict[str, Any] = {
+            "threads": self._threads,
+            "validate": self._validate and not tree,
+            "refuse": refuse,
+        }
+        if quantity not in ON_CHAINS:
+            kernel = quantity_kernel(self._tidy, quantity, details, tree=tree)
+            return KernelCall(kernel, checks, **options)
+        chain = chain_of(self._tidy, quantity, *details)
+        key = (quantity, chain, tree)
+        if key not in self._chains:
+            self._chains[key] = chain_kernel(self._tidy, quantity, chain, tree=tree)
+        place = place_of(self._tidy, chain, *details)
+        return KernelCall(self._chains[key], checks, place=place, **options)
 
     def _check(self, argument: str, tree: bool) -> Callable[[Any], Floats]:
         if tree:

@@ -39,7 +39,9 @@ class KernelCall:
     """A quantity of one robot, asked with arguments of any leading axes.
 
     `checks` are those of the arguments, in their order. The kernel says whether arguments are sound;
-    only if they are not, or no float64 arrays, do the checks look at them.
+    only if they are not, or no float64 arrays, do the checks look at them. `place`, if given, is what
+    the kernel takes after the arguments, for all samples alike. `refuse` raises for answers that are
+    none; it is asked where the kernel found something and arguments are not to blame.
     """
 
     __slots__ = (
@@ -48,22 +50,36 @@ class KernelCall:
         "_few",
         "_first",
         "_kernel",
+        "_place",
+        "_refuse",
         "_rooms",
         "_second",
         "_shape",
         "_sizes",
         "_third",
         "_threads",
+        "_trusting",
         "_validate",
     )
 
-    def __init__(self, kernel: Kernel, checks: tuple[Check, ...], *, threads: int, validate: bool) -> None:
+    def __init__(
+        self,
+        kernel: Kernel,
+        checks: tuple[Check, ...],
+        *,
+        threads: int,
+        validate: bool,
+        place: Floats | None = None,
+        refuse: Check | None = None,
+    ) -> None:
         self._kernel, self._checks, self._threads, self._validate = kernel, checks, threads, validate
-        self._sizes = [port.size for port in kernel.inputs]
+        self._place, self._refuse = place, refuse
+        self._trusting = not validate and refuse is None
+        self._sizes = [port.size for port in kernel.inputs[: len(checks)]]
         self._shape = kernel.outputs[0].shape
         largest = max(port.size for port in (*kernel.inputs, *kernel.outputs))
         self._few = min(FEW, max(1, FEW_NUMBERS // largest))
-        room = kernel.workspace(self._few)
+        room = self._room()
         self._first, self._second, self._third = (*room.places, slice(0), slice(0))[:3]
         self._defect = room.found_places[1].start
         # Taken and given back, rather than one for each thread: also safe where a signal handler or a
@@ -79,7 +95,7 @@ class KernelCall:
         try:
             room = self._rooms.pop()
         except IndexError:
-            room = self._kernel.workspace(self._few)
+            room = self._room()
         numbers = room.inputs
         try:
             numbers[self._first] = q
@@ -90,7 +106,7 @@ class KernelCall:
         except _ODD:
             return self._rows_answered(room, tuple(x for x in (q, v, a) if x is not _ABSENT), out)
         room.run()
-        if room.numbers[self._defect] < SOUND or not self._validate:
+        if room.numbers[self._defect] < SOUND or self._trusting:
             if out is None:
                 out = room.results[0].copy()
             else:
@@ -105,7 +121,7 @@ class KernelCall:
         n = len(arguments[0]) if _is_float64(arguments[0], self._sizes[0]) else 0
         few = 0 < n <= self._few
         if few:
-            for rows, array, size in zip(room.input_rows, arguments, self._sizes, strict=True):
+            for rows, array, size in zip(room.input_rows, arguments, self._sizes, strict=False):
                 if not _is_float64(array, size) or array.shape != (n, size):
                     few = False
                     break
@@ -113,7 +129,7 @@ class KernelCall:
         if few:
             room.run_rows(n)
             # Not negative, so that the sum is below the bound only if each is, and none is NaN.
-            if sum(room.output_rows[1][:n, 0].tolist()) < SOUND or not self._validate:
+            if sum(room.output_rows[1][:n, 0].tolist()) < SOUND or self._trusting:
                 if out is None:
                     out = room.output_rows[0][:n].copy()
                 else:
@@ -122,6 +138,12 @@ class KernelCall:
                 return out
         self._rooms.append(room)
         return self._batch(arguments, out)
+
+    def _room(self) -> Workspace:
+        room = self._kernel.workspace(self._few)
+        if self._place is not None:
+            room.input_rows[-1][...] = self._place
+        return room
 
     def _batch(self, arguments: tuple[Any, ...], out: Floats | None) -> Floats:
         arrays = [
@@ -135,10 +157,13 @@ class KernelCall:
             # The arguments may be needed once more.
             answer = np.empty(shape)
         defect = self._evaluate(arrays, batch, answer)
-        if self._validate and not np.max(defect, initial=0.0) < SOUND:
-            checked = [check(array) for array, check in zip(arrays, self._checks, strict=True)]
-            if any(new is not old for new, old in zip(checked, arrays, strict=True)):
-                self._evaluate(checked, batch, answer)
+        if not self._trusting and not np.max(defect, initial=0.0) < SOUND:
+            if self._validate:
+                checked = [check(array) for array, check in zip(arrays, self._checks, strict=True)]
+                if any(new is not old for new, old in zip(checked, arrays, strict=True)):
+                    self._evaluate(checked, batch, answer)
+            if self._refuse is not None:
+                self._refuse(answer)
         if out is None or answer is out:
             return answer
         out[...] = answer
@@ -147,8 +172,11 @@ class KernelCall:
     def _evaluate(self, arrays: list[Floats], batch: tuple[int, ...], answer: Floats) -> Floats:
         n = prod(batch)
         defect = np.empty((n, 1))
+        rows = [_rows(array, batch, n) for array in arrays]
+        if self._place is not None:
+            rows.append(np.broadcast_to(self._place, (n, len(self._place))))
         self._kernel(
-            [_rows(array, batch, n) for array in arrays],
+            rows,
             [answer.reshape(n, prod(self._shape)), defect],
             threads=self._threads,
         )
@@ -166,9 +194,10 @@ class NumericCall:
         checks: tuple[Check, ...],
         *,
         tree: bool,
+        refuse: Check | None = None,
     ) -> None:
         self._mechanism, self._quantity, self._details = mechanism, quantity, details
-        self._checks, self._tree = checks, tree
+        self._checks, self._tree, self._refuse = checks, tree, refuse
 
     def __call__(self, q: Any, v: Any = _ABSENT, a: Any = _ABSENT, out: Floats | None = None) -> Floats:
         """As `KernelCall` does."""
@@ -182,6 +211,8 @@ class NumericCall:
         # What no coordinate moves comes without the batch.
         own = rank(self._quantity)
         answer = np.array(np.broadcast_to(found, (*batch, *found.shape[found.ndim - own :])))
+        if self._refuse is not None:
+            self._refuse(answer)
         return into(out, answer)
 
 

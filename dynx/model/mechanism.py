@@ -52,6 +52,11 @@ class Body:
     axis: Array
     inertia: RigidInertia
 
+    @property
+    def about_z(self) -> bool:
+        """Whether it turns about the z axis of its joint frame."""
+        return self.revolute and all(self.axis == (0, 0, 1))
+
 
 @dataclass(frozen=True)
 class BodyFrame:

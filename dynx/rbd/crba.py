@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from dynx.model.mechanism import ROOT, Mechanism, joint_motion
+from dynx.model.mechanism import ROOT, Mechanism
 from dynx.rbd.kinematics import joint_value
+from dynx.rbd.placement import Placement
 from dynx.spatial.scalar import Array
-from dynx.spatial.so3 import cross, rotate, skew
+from dynx.spatial.so3 import skew
 
 
 def mass_matrix(mechanism: Mechanism, q: Array) -> Array:
     """M (..., nv, nv) in tree coordinates."""
     bodies = mechanism.bodies
-    placements = [joint_motion(body, joint_value(mechanism, q, k)) for k, body in enumerate(bodies)]
+    placements = [Placement.of(body, joint_value(mechanism, q, k)) for k, body in enumerate(bodies)]
     composite = {ROOT: mechanism.root, **{k: body.inertia for k, body in enumerate(bodies)}}
     for index in reversed(range(len(bodies))):
         parent = bodies[index].parent
-        composite[parent] = composite[parent] + composite[index].seen_from(*placements[index])
+        composite[parent] = composite[parent] + placements[index].inertia_of_parent(composite[index])
 
     base = 6 if mechanism.floating else 0
     zero = 0 * np.sum(q, axis=-1)
@@ -31,9 +32,7 @@ def mass_matrix(mechanism: Mechanism, q: Array) -> Array:
             owner = bodies[row]
             along = np.sum(owner.axis * (moment if owner.revolute else force), axis=-1)
             M[base + row][base + index] = M[base + index][base + row] = along + zero
-            R, p = placements[row]
-            force, moment = rotate(R, force), rotate(R, moment)
-            moment = moment + cross(p, force)
+            force, moment = placements[row].wrench_of_parent(force, moment)
             row = owner.parent
         if mechanism.floating:
             for k in range(3):

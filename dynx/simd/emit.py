@@ -19,7 +19,7 @@ from functools import partial
 from dynx.simd.expr import Op
 from dynx.simd.program import Program
 from dynx.simd.rows import Rows
-from dynx.simd.schedule import Segment, TrigGroup, schedule
+from dynx.simd.schedule import Segment, TrigGroup, places_of_kept, schedule
 from dynx.simd.target import Target
 from dynx.simd.text import Writer
 from dynx.simd.trigonometry import declarations, sines_and_cosines
@@ -52,15 +52,14 @@ def emit(program: Program, target: Target, settings: Settings) -> str:
     """The module's text."""
     segments = schedule(program, settings.lanes, settings.segment)
     check_schedule(program, segments, settings.lanes)
-    kept = [value for segment in segments for value in sorted(segment.kept)]
-    slots = {value: place for place, value in enumerate(kept)}
+    slots = places_of_kept(program, segments)
     bodies = [
         _Body(program, target, settings, segment, slots, number).text()
         for number, segment in enumerate(segments)
     ]
     parts = [f'target triple = "{target.triple}"']
     parts += bodies
-    parts += [_loop(program, settings, len(segments), len(slots))]
+    parts += [_loop(program, settings, len(segments), max(slots.values(), default=0) + 1)]
     parts += declarations(settings.lanes)
     return "\n".join(parts) + "\n"
 
@@ -71,7 +70,7 @@ def _loop(program: Program, settings: Settings, segments: int, slots: int) -> st
     lines = [
         f"define void @{ENTRY}(ptr noalias nocapture readonly %arguments) {{",
         "entry:",
-        f"  %kept = alloca [{max(slots, 1)} x <{lanes} x double>], align 64",
+        f"  %kept = alloca [{slots} x <{lanes} x double>], align 64",
         "  %n = load i64, ptr %arguments",
         f"  %last = sub i64 %n, {lanes}",
         "  br label %group",

@@ -71,7 +71,7 @@ class Code:
         """Raises CompileError if the image cannot be linked."""
         with COMPILING:
             try:
-                self._jit = binding.create_lljit_compiler()
+                self._jit = binding.create_lljit_compiler(use_jit_link=image.target.near)
                 builder = binding.JITLibraryBuilder().add_object_img(image.code).add_current_process()
                 self._library = builder.export_symbol(ENTRY).link(self._jit, ENTRY)
             except RuntimeError as error:

@@ -6,7 +6,7 @@ them: they share one test for large angles, and the rest is one straight line.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -47,10 +47,16 @@ class Segment:
 
 
 def schedule(program: Program, lanes: int, longest: int) -> list[Segment]:
-    """Segments of about `longest` operations; a group of angles is not cut."""
+    """One segment if that has at most `longest` operations, else segments of half as many.
+
+    A group of angles is not cut.
+    """
+    steps = list(_steps(program))
+    if sum(_size(step) for step in steps) > longest:
+        longest = max(longest // 2, 1)
     segments, home, length = [Segment()], {}, 0
-    for step in _steps(program):
-        size = 50 * len(step.angles) if isinstance(step, TrigGroup) else 1
+    for step in steps:
+        size = _size(step)
         if length and length + size > longest:
             segments.append(Segment())
             length = 0
@@ -65,6 +71,26 @@ def schedule(program: Program, lanes: int, longest: int) -> list[Segment]:
             if home.get(node, number) < number:
                 segments[home[node]].kept.add(node)
     return segments
+
+
+def places_of_kept(program: Program, segments: Sequence[Segment]) -> dict[int, int]:
+    """A place in memory for every value that is kept; places are used again when none needs them."""
+    last = {value: number for number, segment in enumerate(segments) for value in _read(program, segment)}
+    places: dict[int, int] = {}
+    held: list[int] = []
+    free: list[int] = []
+    for number, segment in enumerate(segments):
+        free += [places[value] for value in held if last[value] < number]
+        held = [value for value in held if last[value] >= number]
+        for value in sorted(segment.kept):
+            places[value] = free.pop() if free else len(held)
+            held.append(value)
+    return places
+
+
+def _size(step: Step) -> int:
+    """Operations of a step, about."""
+    return 50 * len(step.angles) if isinstance(step, TrigGroup) else 1
 
 
 def _steps(program: Program) -> Iterator[Step]:

@@ -30,12 +30,22 @@ class Target:
             return 8
         return 4 if "+avx" in features else 2
 
+    @property
+    def near(self) -> bool:
+        """Whether code may reach its constants by short addresses, which takes a tenth of its bytes off.
+
+        LLVM's newer linker puts all of an object into one piece of memory; the older one, which may put
+        constants gigabytes away, is left where the newer one is not known to work.
+        """
+        return self.triple.startswith("x86_64") and "windows" not in self.triple
+
     def machine(self) -> binding.TargetMachine:
         """LLVM's code generator for it."""
         _initialise()
         target = binding.Target.from_triple(self.triple)
+        model = "small" if self.near else "jitdefault"
         return target.create_target_machine(
-            cpu=self.cpu, features=self.features, opt=2, reloc="pic", codemodel="jitdefault", jit=True
+            cpu=self.cpu, features=self.features, opt=2, reloc="pic", codemodel=model, jit=True
         )
 
 

@@ -43,6 +43,9 @@ HALF_PI = (1.5707963267948966, 6.123233995736766e-17, -1.4973849048591698e-33)
 HALF_PI_SHORT = (1.57079632673412561417, 6.07710050630396597660e-11, 2.02226624879595063154e-21)
 """pi/2 in parts of 33 bits, whose products with k are exact without a fused multiply-add."""
 
+TOGETHER = 6
+"""Most angles whose polynomials are evaluated side by side: what 16 registers hold with their squares."""
+
 ROUND = 6755399441055744.0
 """1.5 * 2^52: adding it rounds to an integer, which is then in the last bits."""
 
@@ -56,13 +59,17 @@ class SineCosine(NamedTuple):
 
 def sines_and_cosines(write: Writer, angles: Sequence[str], *, fma: bool) -> list[SineCosine]:
     """Both functions of every vector in `angles`, with one branch for all of them."""
-    near = []
+    near: list[SineCosine] = []
     far = "zeroinitializer"
-    for x in angles:
-        size = write.let(f"call {write.vector} @llvm.fabs.v{write.lanes}f64({write.vector} {x})")
-        near.append(_polynomials(write, x, size, fma))
-        beyond = write.let(f"fcmp ogt {write.vector} {size}, {write.splat(LIMIT)}")
-        far = write.let(f"or {write.mask} {far}, {beyond}")
+    for together in _in_parts(angles):
+        sizes = [
+            write.let(f"call {write.vector} @llvm.fabs.v{write.lanes}f64({write.vector} {x})")
+            for x in together
+        ]
+        for size in sizes:
+            beyond = write.let(f"fcmp ogt {write.vector} {size}, {write.splat(LIMIT)}")
+            far = write.let(f"or {write.mask} {far}, {beyond}")
+        near += _polynomials(write, together, sizes, fma)
     bits = write.let(f"bitcast {write.mask} {far} to i{write.lanes}")
     some = write.let(f"icmp ne i{write.lanes} {bits}, 0")
     before, slow, done = (write.fresh(stem) for stem in ("near", "far", "trig"))
@@ -83,8 +90,19 @@ def sines_and_cosines(write: Writer, angles: Sequence[str], *, fma: bool) -> lis
     return found
 
 
-def _polynomials(write: Writer, x: str, size: str, fma: bool) -> SineCosine:
-    """Those of the size |x|; the sign of x comes back at the end, that of a zero as well."""
+def _in_parts(angles: Sequence[str]) -> list[Sequence[str]]:
+    """Parts of about the same size, none larger than `TOGETHER`."""
+    n = len(angles)
+    parts = -(-n // TOGETHER)
+    return [angles[n * k // parts : n * (k + 1) // parts] for k in range(parts)]
+
+
+def _polynomials(write: Writer, angles: Sequence[str], sizes: Sequence[str], fma: bool) -> list[SineCosine]:
+    """Those of each size |x|; the sign of x comes back at the end, that of a zero as well.
+
+    Step by step for all angles: their chains of operations run side by side, and each coefficient is
+    loaded once.
+    """
     vector, integers = write.vector, write.integers
 
     def multiply_add(a: str, b: str, c: str) -> str:
@@ -93,21 +111,30 @@ def _polynomials(write: Writer, x: str, size: str, fma: bool) -> SineCosine:
             return write.let(f"call {vector} {name}({vector} {a}, {vector} {b}, {vector} {c})")
         return write.let(f"fadd {vector} {write.let(f'fmul {vector} {a}, {b}')}, {c}")
 
-    turns = multiply_add(size, write.splat(2.0 / 3.141592653589793), write.splat(ROUND))
-    k = write.let(f"bitcast {vector} {turns} to {integers}")
-    whole = write.let(f"fsub {vector} {turns}, {write.splat(ROUND)}")
-    r = _reduced(write, size, whole, fma)
+    def polynomials(coefficients: Sequence[float]) -> list[str]:
+        """Ascending in r^2, by Horner's rule."""
+        found = [write.splat(coefficients[-1])] * len(squares)
+        for coefficient in reversed(coefficients[:-1]):
+            found = [
+                multiply_add(p, z, write.splat(coefficient)) for p, z in zip(found, squares, strict=True)
+            ]
+        return found
 
-    z = write.let(f"fmul {vector} {r}, {r}")
-    sin = write.splat(SIN[-1])
-    for coefficient in reversed(SIN[:-1]):
-        sin = multiply_add(sin, z, write.splat(coefficient))
-    cube = write.let(f"fmul {vector} {z}, {r}")
-    sin = multiply_add(sin, cube, r)
-    cos = write.splat(COS[-1])
-    for coefficient in (*reversed(COS[:-1]), -0.5, 1.0):
-        cos = multiply_add(cos, z, write.splat(coefficient))
+    turns = [multiply_add(size, write.splat(2.0 / 3.141592653589793), write.splat(ROUND)) for size in sizes]
+    counts = [write.let(f"bitcast {vector} {turn} to {integers}") for turn in turns]
+    whole = [write.let(f"fsub {vector} {turn}, {write.splat(ROUND)}") for turn in turns]
+    rests = _reduced(write, sizes, whole, fma)
+    squares = [write.let(f"fmul {vector} {r}, {r}") for r in rests]
+    sines = polynomials(SIN)
+    cubes = [write.let(f"fmul {vector} {z}, {r}") for z, r in zip(squares, rests, strict=True)]
+    sines = [multiply_add(p, cube, r) for p, cube, r in zip(sines, cubes, rests, strict=True)]
+    cosines = polynomials((1.0, -0.5, *COS))
+    return [_in_quadrant(write, *numbers) for numbers in zip(angles, counts, sines, cosines, strict=True)]
 
+
+def _in_quadrant(write: Writer, x: str, k: str, sin: str, cos: str) -> SineCosine:
+    """Swapped and negated by the last two bits of k; the sine has the sign of x as well."""
+    vector, integers = write.vector, write.integers
     last = write.let(f"shl {integers} {k}, {write.integer_splat(63)}")
     swap = write.let(f"icmp slt {integers} {last}, zeroinitializer")
     s = write.let(f"select {write.mask} {swap}, {vector} {cos}, {vector} {sin}")
@@ -128,15 +155,23 @@ def _signed(write: Writer, x: str, sign: str) -> str:
     return write.let(f"bitcast {write.integers} {flipped} to {write.vector}")
 
 
-def _reduced(write: Writer, x: str, k: str, fma: bool) -> str:
-    """x - k pi/2."""
+def _reduced(write: Writer, sizes: Sequence[str], turns: Sequence[str], fma: bool) -> list[str]:
+    """x - k pi/2 of each."""
     vector = write.vector
-    if fma:
-        r = x
-        for part in HALF_PI:
-            name = f"@llvm.fma.v{write.lanes}f64"
-            r = write.let(f"call {vector} {name}({vector} {k}, {vector} {write.splat(-part)}, {vector} {r})")
-        return r
+    if not fma:
+        return [_reduced_by_short_parts(write, x, k) for x, k in zip(sizes, turns, strict=True)]
+    rests = list(sizes)
+    for part in HALF_PI:
+        call = f"call {vector} @llvm.fma.v{write.lanes}f64"
+        rests = [
+            write.let(f"{call}({vector} {k}, {vector} {write.splat(-part)}, {vector} {r})")
+            for k, r in zip(turns, rests, strict=True)
+        ]
+    return rests
+
+
+def _reduced_by_short_parts(write: Writer, x: str, k: str) -> str:
+    vector = write.vector
     first, second, third = (write.let(f"fmul {vector} {k}, {write.splat(part)}") for part in HALF_PI_SHORT)
     high = write.let(f"fsub {vector} {x}, {first}")
     r = write.let(f"fsub {vector} {high}, {second}")

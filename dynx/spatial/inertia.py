@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dynx.spatial.scalar import Array
+from dynx.spatial.scalar import Array, along
 from dynx.spatial.so3 import cross, rotate, skew
 
 
@@ -21,6 +21,16 @@ class RigidInertia:
     mass: Array  # () [kg]
     first_moment: Array  # (3,) mass times centre of mass [kg m]
     second_moment: Array  # (3, 3) rotational inertia about O [kg m^2]
+
+    @property
+    def spread(self) -> Array:
+        """The sum of r r' over the mass (..., 3, 3), r from O [kg m^2]: half the trace less the tensor.
+
+        With mass and first moment it makes the pseudo-inertia (Wensing, Kim and Slotine 2018).
+        """
+        tensor = self.second_moment
+        half = (tensor[..., 0, 0] + tensor[..., 1, 1] + tensor[..., 2, 2]) / 2
+        return np.asarray(np.eye(3, dtype=int) * along(along(half)) - tensor)
 
     def __add__(self, other: RigidInertia) -> RigidInertia:
         """Two bodies welded together; both must be about the same frame."""
@@ -36,7 +46,7 @@ class RigidInertia:
         shift, H = skew(p), skew(h)
         rotated = R @ self.second_moment @ np.swapaxes(R, -1, -2)
         moved = rotated - shift @ H - H @ shift - self.mass * (shift @ shift)
-        return RigidInertia(self.mass, h + p * self.mass, moved)
+        return RigidInertia(self.mass, h + p * self.mass, mirrored(moved))
 
     def momentum(self, linear: Array, angular: Array) -> tuple[Array, Array]:
         """Linear and angular momentum about O of a body with this velocity at O."""
@@ -51,3 +61,14 @@ def inertia_about_origin(mass: Array, center: Array, rotation: Array, tensor: Ar
     central = rotation @ tensor @ np.swapaxes(rotation, -1, -2)
     C = skew(center)
     return RigidInertia(np.asarray(mass), center * mass, central - (C @ C) * mass)
+
+
+_UPPER = np.array([[0, 0, 0], [0, 1, 1], [0, 1, 2]]), np.array([[0, 1, 2], [1, 1, 2], [2, 2, 2]])
+
+
+def mirrored(A: Array) -> Array:
+    """The symmetric matrix (..., 3, 3) that has the upper triangle of `A`.
+
+    Where symmetry is known it need not be computed: on traced symbols the other half costs nothing.
+    """
+    return np.asarray(A[..., _UPPER[0], _UPPER[1]])

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 
 from dynx.agreement import AgreementReport, agree
 from dynx.agreement.tolerances import BAR
@@ -184,6 +184,8 @@ def test_the_json_holds_no_number_that_json_lacks() -> None:
     assert json.loads(text)["agree"] is False
 
 
+# Every engine meets such robots in `tests.properties`; what counts here is the referee, which is slow.
+@settings(max_examples=40)
 @given(models(physical=False))
 def test_reference_and_pinocchio_agree_about_random_robots(model: Model) -> None:
     report = agree(model, ["reference", "pinocchio"], samples=3, referee_samples=1)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import pytest
 
@@ -24,15 +24,21 @@ def backend_name(request: pytest.FixtureRequest) -> str:
 
 @pytest.fixture(scope="module")
 def make(backend_name: str) -> Iterator[Make]:
-    """Makes that backend for a model. The last few stay open, since an engine may hold 30 MB."""
-    made: deque[Backend] = deque()
+    """Makes that backend for a model, or hands out again the one that was made for it with the same
+    options: evaluating changes nothing (`test_lifecycle`), and to make an engine takes longer than to ask
+    it. The last few stay open, since one may hold 30 MB; who closes one makes it by `backend`.
+    """
+    made: dict[tuple[Any, ...], Backend] = {}
 
     def make_one(model: Model, **options: bool) -> Backend:
-        made.append(backend(backend_name, model, **options))
+        # The engine keeps its model alive, so that no other can come to have its id.
+        recipe = (id(model), *sorted(options.items()))
+        # Put back at the end, for it is now the last that was used.
+        made[recipe] = made.pop(recipe) if recipe in made else backend(backend_name, model, **options)
         if len(made) > ALIVE:
-            made.popleft().close()
-        return made[-1]
+            made.pop(next(iter(made))).close()
+        return made[recipe]
 
     yield make_one
-    for engine in made:
+    for engine in made.values():
         engine.close()

@@ -17,6 +17,7 @@ from tests.closeness import Closeness, samples_at
 from tests.contract.conftest import Make
 from tests.contract.questions import QUESTIONS, Question, State, random_state
 from tests.contract.robots import JOINT_ORDER, LINK_ORDER, LINKS, branched, followed_elbow, mimicking
+from tests.examples import one_robot
 
 BELOW = {
     "z_shoulder": {"zeta", "plate", "mid", "tool"},
@@ -102,6 +103,7 @@ def test_velocity_is_the_rate_of_the_pose(make: Make, base: str) -> None:
     model = branched() if base == "fixed" else branched().with_base("floating")
     engine = make(model)
 
+    @one_robot
     @given(samples(model))
     def holds(state: Sample) -> None:
         q, v, _ = state

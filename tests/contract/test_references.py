@@ -16,6 +16,7 @@ from tests.closeness import Closeness, samples_at
 from tests.contract.conftest import Make
 from tests.contract.questions import random_state
 from tests.contract.robots import branched, mimicking
+from tests.examples import one_robot
 
 MODELS = {
     "fixed": branched(),
@@ -98,6 +99,7 @@ def test_derivative_of_the_jacobian(make: Make, model: Model, reference: str) ->
     """Against the difference quotient along a motion at constant velocity."""
     engine = make(model)
 
+    @one_robot
     @given(samples(model))
     def holds(state: Sample) -> None:
         q, v, _ = state

@@ -7,6 +7,8 @@ from tests.faults.fault import Fault
 ABA = "dynx.rbd.aba"
 CRBA = "dynx.rbd.crba"
 RNEA = "dynx.rbd.rnea"
+PLACEMENT = "dynx.rbd.placement"
+BASE_PARAMETERS = "dynx.rbd.base_parameters"
 LINEAR = "dynx.rbd.linear"
 KINEMATICS = "dynx.rbd.kinematics"
 JACOBIANS = "dynx.rbd.jacobians"
@@ -22,35 +24,36 @@ DOUBLE_PENDULUM = f"{CLOSED_FORMS}::test_backend_matches_closed_form[double_pend
 PLANAR_3R = f"{CLOSED_FORMS}::test_backend_matches_closed_form[planar_3r-reference]"
 CART_POLE = f"{CLOSED_FORMS}::test_backend_matches_closed_form[cart_pole-reference]"
 EXACT = "tests/rbd/test_identities.py"
+FEWER = "tests/rbd/test_base_parameters.py"
 NATIVE = "tests/backends/test_pinocchio.py::test_native_answers_are_those_derived_and_those_of_the_reference"
 
 RBD_FAULTS = (
     Fault(
         "no_gyroscopic_term",
         RNEA,
-        right="moment + cross(angular, spin) + cross(linear, momentum)",
-        wrong="moment + cross(linear, momentum)",
+        right="xy, xz, yz = x * y, x * z, y * z",
+        wrong="xy, xz, yz = 0 * x, 0 * y, 0 * z",
         caught_by=FREE_BODY,
     ),
     Fault(
         "no_coriolis_term_of_a_slide",
         RNEA,
-        right="d_linear = d_linear + change + cross(angular, speed)",
-        wrong="d_linear = d_linear + change",
+        right="proper + second + 2 * cross(turning, rate)",
+        wrong="proper + second + cross(turning, rate)",
         caught_by=f"{NATIVE}[floating-False]",
     ),
     Fault(
         "no_coriolis_term_of_a_hinge",
         RNEA,
-        right="d_linear = d_linear + cross(linear, speed)",
-        wrong="d_linear = d_linear + 0 * speed",
-        caught_by=DOUBLE_PENDULUM,
+        right="turned + second + cross(turning, rate)",
+        wrong="turned + second + 0 * rate",
+        caught_by=f"{NATIVE}[floating-False]",
     ),
     Fault(
         "gravity_sign",
         RNEA,
-        right="return (still, still), (-mechanism.gravity, still)",
-        wrong="return (still, still), (mechanism.gravity, still)",
+        right="return Motion(still, still, -mechanism.gravity)",
+        wrong="return Motion(still, still, mechanism.gravity)",
         caught_by=f"{FORCES}::TestGravity::test_default[reference]",
     ),
     Fault(
@@ -62,16 +65,16 @@ RBD_FAULTS = (
     ),
     Fault(
         "lever_arm_of_the_child_forgotten",
-        RNEA,
-        right="parent_moment + rotate(R, moment) + cross(p, below)",
-        wrong="parent_moment + rotate(R, moment)",
+        PLACEMENT,
+        right="rotate(self.R, moment) + cross(self.p, below)",
+        wrong="rotate(self.R, moment)",
         caught_by=DOUBLE_PENDULUM,
     ),
     Fault(
         "velocity_carried_outward_backwards",
-        RNEA,
-        right="rotate_back(R, linear + cross(angular, p))",
-        wrong="rotate_back(R, linear - cross(angular, p))",
+        PLACEMENT,
+        right="linear + cross(angular, self.p)",
+        wrong="linear - cross(angular, self.p)",
         caught_by=DOUBLE_PENDULUM,
     ),
     Fault(
@@ -84,15 +87,15 @@ RBD_FAULTS = (
     Fault(
         "composite_of_the_children_only",
         CRBA,
-        right="composite[parent] + composite[index].seen_from(*placements[index])",
-        wrong="composite[parent] + (bodies[index].inertia).seen_from(*placements[index])",
+        right="placements[index].inertia_of_parent(composite[index])",
+        wrong="placements[index].inertia_of_parent(bodies[index].inertia)",
         caught_by=PLANAR_3R,
     ),
     Fault(
         "moment_of_the_child_sign",
-        CRBA,
-        right="moment = moment + cross(p, force)",
-        wrong="moment = moment - cross(p, force)",
+        PLACEMENT,
+        right="rotate(self.R, moment) + cross(self.p, below)",
+        wrong="rotate(self.R, moment) - cross(self.p, below)",
         caught_by=DOUBLE_PENDULUM,
     ),
     Fault(
@@ -105,23 +108,51 @@ RBD_FAULTS = (
     Fault(
         "velocity_product_missing_in_forward_dynamics",
         ABA,
-        right="wrench = bias[index + 1] + (handed @ c[..., None])[..., 0] + U * along(u / D)",
-        wrong="wrench = bias[index + 1] + U * along(u / D)",
+        right="summed((force, moment), handed.times(*products[index]))",
+        wrong="(force, moment)",
         caught_by=DOUBLE_PENDULUM,
     ),
     Fault(
         "free_fall_left_in_the_acceleration",
         ABA,
-        right="np.concatenate([linear - up[0], angular,",
+        right="np.concatenate([linear - root.proper, angular,",
         wrong="np.concatenate([linear, angular,",
         caught_by=FREE_BODY,
     ),
     Fault(
         "articulated_inertia_not_handed_on",
         ABA,
-        right="handed = A - U[..., :, None] * U[..., None, :] / along(along(D))",
-        wrong="handed = A + 0 * along(along(D))",
+        right="handed = A.yielding(U, K, kept)",
+        wrong="handed = A",
         caught_by=DOUBLE_PENDULUM,
+    ),
+    Fault(
+        "no_centripetal_term_of_a_hinge",
+        RNEA,
+        right="[xz - Y, yz + X, -(xx + yy)],",
+        wrong="[xz - Y, yz + X, 0 * xx],",
+        caught_by=DOUBLE_PENDULUM,
+    ),
+    Fault(
+        "matrix_turned_about_z_with_its_transpose",
+        PLACEMENT,
+        right="[xx - s * w, c * w - yx, c * xz - s * yz],",
+        wrong="[xx - s * w, c * w - xy, c * xz - s * yz],",
+        caught_by=f"{FEWER}::test_a_turn_about_z_is_the_product_of_matrices",
+    ),
+    Fault(
+        "mass_along_the_axis_lost_on_the_way_to_the_parent",
+        BASE_PARAMETERS,
+        right="RigidInertia(mass, h * along, np.diag(across) * line),",
+        wrong="RigidInertia(mass, h * along, 0 * np.diag(across) * line),",
+        caught_by=f"{FEWER}::test_torque_and_mass_matrix_are_the_same",
+    ),
+    Fault(
+        "joint_of_a_child_left_where_the_old_frame_was",
+        BASE_PARAMETERS,
+        right="Q_parent.T @ (body.p - o_parent)",
+        wrong="Q_parent.T @ body.p",
+        caught_by=f"{FEWER}::test_real_robots_take_fewer_numbers",
     ),
     Fault(
         "back_substitution_skips_a_row",
@@ -212,9 +243,31 @@ RBD_FAULTS = (
     Fault(
         "coriolis_matrix_not_that_of_christoffel",
         CORIOLIS,
-        right="_blocks(0 * L, -L, -L, -H)) / 2",
-        wrong="_blocks(0 * L, -L, -L, H)) / 2",
+        right="return _Composite(inertia, cross(w, inertia.first_moment), -skew(w) @ inertia.spread)",
+        wrong="W, I = skew(w), inertia.second_moment\n"
+        "    return _Composite(inertia, cross(w, inertia.first_moment), (W @ I - I @ W) / 2)",
         caught_by=FREE_BODY,
+    ),
+    Fault(
+        "coriolis_matrix_of_bodies_that_stand_still_in_their_parent",
+        CORIOLIS,
+        right="E = E - skew(inertia.first_moment) @ step.lever_rate",
+        wrong="E = E + 0",
+        caught_by=DOUBLE_PENDULUM,
+    ),
+    Fault(
+        "coriolis_matrix_of_slides_that_stand_still",
+        CORIOLIS,
+        right="dp = dp + rotate(R, speed)",
+        wrong="dp = dp + 0 * rotate(R, speed)",
+        caught_by=f"{NATIVE}[floating-False]",
+    ),
+    Fault(
+        "coriolis_matrix_with_a_couple_the_wrong_way_round",
+        CORIOLIS,
+        right="couple=F @ u + _transposed(self.E) @ e,",
+        wrong="couple=F @ u + self.E @ e,",
+        caught_by="tests/rbd/test_coriolis.py::test_it_is_the_sum_over_bodies_of_its_definition_in_50_digits",
     ),
     Fault(
         "centre_divided_by_the_mass_of_one_body",

@@ -12,6 +12,7 @@ TESTS = "tests/simd"
 STRICT = f"{TESTS}/test_emit.py::test_strict_code_is_the_interpreter_bit_for_bit"
 ANY_NUMBER = f"{TESTS}/test_kernel.py::test_any_number_of_samples"
 TEST_PARAMETRIC = "tests/backends/test_parametric.py"
+TEST_FRAMES = "tests/backends/test_compiled_frames.py"
 
 SIMD_FAULTS = (
     Fault(
@@ -34,6 +35,13 @@ SIMD_FAULTS = (
         right='frozenset({"add", "mul"})',
         wrong='frozenset({"add", "mul", "sub"})',
         caught_by=f"{TESTS}/test_verify.py::test_operations_that_do_not_commute_are_two",
+    ),
+    Fault(
+        "simd_kept_value_overwritten_by_the_last_that_reads_it",
+        f"{SIMD}.schedule",
+        right="for value in held if last[value] < number]",
+        wrong="for value in held if last[value] <= number]",
+        caught_by=f"{TESTS}/test_schedule.py::test_what_is_still_wanted_is_not_overwritten",
     ),
     Fault(
         "simd_cosine_in_the_quadrant_of_the_sine",
@@ -129,8 +137,43 @@ SIMD_FAULTS = (
     Fault(
         "compiled_batch_believed_without_its_check",
         "dynx.backends.compiled_call",
-        right="if self._validate and not np.max(defect, initial=0.0) < SOUND:",
-        wrong="if self._validate and np.max(defect, initial=0.0) > SOUND:",
-        caught_by="tests/backends/test_compiled.py::test_a_bad_number_anywhere",
+        right="if not self._trusting and not np.max(defect, initial=0.0) < SOUND:",
+        wrong="if not self._trusting and np.max(defect, initial=0.0) > SOUND:",
+        caught_by="tests/backends/test_compiled_arguments.py::test_a_bad_number_anywhere",
+    ),
+    Fault(
+        "compiled_singular_mass_matrix_not_noticed",
+        "dynx.backends.compiled_kernels",
+        right="defect = defect + np.sum(abs(found)) * (SOUND / LARGEST)",
+        wrong="defect = defect + 0 * np.sum(abs(found)) * (SOUND / LARGEST)",
+        caught_by="tests/backends/test_compiled_arguments.py::test_a_configuration_without_an_acceleration",
+    ),
+    Fault(
+        "compiled_frame_moved_by_joints_beyond_it",
+        "dynx.backends.compiled_frames",
+        right="np.sum(shares[k:]) for k in range(1, len(shares))",
+        wrong="np.sum(shares[k:]) for k in range(len(shares) - 1)",
+        caught_by=f"{TEST_FRAMES}::test_any_frame_of_any_robot",
+    ),
+    Fault(
+        "compiled_references_of_a_frame_exchanged",
+        "dynx.backends.compiled_frames",
+        right='place[_LOCAL], place[_WORLD] = reference == "local", reference == "world"',
+        wrong='place[_WORLD], place[_LOCAL] = reference == "local", reference == "world"',
+        caught_by=f"{TEST_FRAMES}::test_any_frame_of_any_robot",
+    ),
+    Fault(
+        "compiled_acceleration_at_a_world_origin_that_moves_along",
+        "dynx.backends.compiled_frames",
+        right=" + skew(self.stays * twist[:3]) @ x[3:]",
+        wrong="",
+        caught_by=f"{TEST_FRAMES}::test_any_frame_of_any_robot",
+    ),
+    Fault(
+        "compiled_place_known_to_the_first_sample_only",
+        "dynx.backends.compiled_call",
+        right="room.input_rows[-1][...] = self._place",
+        wrong="room.input_rows[-1][:1] = self._place",
+        caught_by=f"{TEST_FRAMES}::test_every_way_gives_the_same_bits",
     ),
 )

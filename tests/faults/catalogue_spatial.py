@@ -17,17 +17,17 @@ SPATIAL_FAULTS = (
     Fault(
         "cross_product_sign",
         SO3,
-        right="a2 * b0 - a0 * b2",
-        wrong="a0 * b2 - a2 * b0",
+        right="a1 * b2 - a2 * b1",
+        wrong="a2 * b1 - a1 * b2",
         caught_by="tests/spatial/test_so3.py::test_cross_skew_and_numpy_agree",
     ),
     Fault(
         "rpy_order",
         SO3,
-        right="cr, cp, cy = c[..., 0], c[..., 1], c[..., 2]\n"
-        "    sr, sp, sy = s[..., 0], s[..., 1], s[..., 2]",
-        wrong="cr, cp, cy = c[..., 2], c[..., 1], c[..., 0]\n"
-        "    sr, sp, sy = s[..., 2], s[..., 1], s[..., 0]",
+        right="cr, cp, cy = c[..., 0:1], c[..., 1:2], c[..., 2:3]\n"
+        "    sr, sp, sy = s[..., 0:1], s[..., 1:2], s[..., 2:3]",
+        wrong="cr, cp, cy = c[..., 2:3], c[..., 1:2], c[..., 0:1]\n"
+        "    sr, sp, sy = s[..., 2:3], s[..., 1:2], s[..., 0:1]",
         caught_by=f"{COORDINATES}::test_at_zero_frames_are_where_the_description_puts_them[reference-fixed]",
     ),
     Fault(
@@ -49,8 +49,8 @@ SPATIAL_FAULTS = (
     Fault(
         "quaternion_order_wxyz",
         SO3,
-        right="x, y, z, w = (quat_xyzw[..., i] for i in range(4))",
-        wrong="w, x, y, z = (quat_xyzw[..., i] for i in range(4))",
+        right="x, y, z, w = (quat_xyzw[..., i : i + 1] for i in range(4))",
+        wrong="w, x, y, z = (quat_xyzw[..., i : i + 1] for i in range(4))",
         caught_by=f"{COORDINATES}::TestFloatingBase::test_pose_of_the_base[reference]",
     ),
     Fault(

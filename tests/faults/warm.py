@@ -8,6 +8,7 @@ several times as fast as a new interpreter for each fault. Where there is no for
 
 from __future__ import annotations
 
+import gc
 import json
 import os
 import signal
@@ -38,9 +39,10 @@ OPTIONS = (
 def environment(fault: str) -> dict[str, str]:
     """What is set in the process that runs tests with the fault of that name; "" plants none.
 
-    Kernels are compiled anew: those in the cache are from the source on the disk, without the fault.
+    With a fault kernels are compiled anew: those in the cache are from the source on the disk.
     """
-    return {"DYNX_FAULT": fault, "HYPOTHESIS_PROFILE": "faults", "DYNX_CACHE": "0"}
+    cache = "0" if fault else os.environ.get("DYNX_CACHE", "")
+    return {"DYNX_FAULT": fault, "HYPOTHESIS_PROFILE": "faults", "DYNX_CACHE": cache}
 
 
 class Runner:
@@ -96,16 +98,28 @@ def serve() -> None:
         if find_spec(name.partition(".")[0]) is not None:
             import_module(name)
     assert not any(name == "dynx" or name.startswith("dynx.") for name in sys.modules)
-    for line in sys.stdin:
-        fault, *tests = json.loads(line)
-        with tempfile.TemporaryFile() as output:
-            child = os.fork()
-            if child == 0:
-                run_here(tests, fault, output.fileno())
-            _, status = os.waitpid(child, 0)
-            output.seek(0)
-            said = output.read().decode(errors="replace")
-        print(json.dumps([os.waitstatus_to_exitcode(status), said]), flush=True)
+    # pytest collects garbage at its end; what is imported by now never is any, and is not to be looked at.
+    gc.freeze()
+    with tempfile.TemporaryDirectory() as compiled:
+        if sys.dont_write_bytecode:
+            # What one run compiles, and pytest rewrites, the next ones read: half the time of most. A
+            # planted fault is never among it (`tests.faults.plant`).
+            sys.pycache_prefix, sys.dont_write_bytecode = compiled, False
+        for line in sys.stdin:
+            fault, *tests = json.loads(line)
+            code, said = in_a_child(tests, fault)
+            print(json.dumps([code, said]), flush=True)
+
+
+def in_a_child(tests: list[str], fault: str) -> tuple[int, str]:
+    """The exit code of a forked process that runs the tests, and what it wrote."""
+    with tempfile.TemporaryFile() as output:
+        child = os.fork()
+        if child == 0:
+            run_here(tests, fault, output.fileno())
+        _, status = os.waitpid(child, 0)
+        output.seek(0)
+        return os.waitstatus_to_exitcode(status), output.read().decode(errors="replace")
 
 
 def run_here(tests: list[str], fault: str, output: int) -> None:

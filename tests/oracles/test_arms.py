@@ -10,6 +10,7 @@ from dynx.backends import backend, installed_backends
 from dynx.model.loading import load
 from dynx.testing.strategies import configurations
 from tests.closeness import Closeness, samples_at
+from tests.examples import one_robot
 from tests.oracles.closed_form import MODELS
 
 
@@ -20,6 +21,7 @@ def test_wrist_centre_of_the_six_axis_arm(name: str) -> None:
     model = load(MODELS / "six_axis_arm.urdf")
     with backend(name, model) as engine:
 
+        @one_robot
         @given(configurations(model))
         def is_where_it_should_be(q: np.ndarray) -> None:
             raised = q[1] + q[2]
@@ -45,6 +47,7 @@ def test_distance_of_the_seven_axis_arms_wrist(name: str) -> None:
     model = load(MODELS / "seven_axis_arm.urdf")
     with backend(name, model) as engine:
 
+        @one_robot
         @given(configurations(model))
         def follows_from_the_elbow(q: np.ndarray) -> None:
             wrist = engine.forward_kinematics(q, "link6")

@@ -11,6 +11,7 @@ from dynx.backends import Backend, backend, installed_backends
 from dynx.model.loading import load
 from dynx.testing.strategies import samples
 from tests.closeness import Closeness, samples_at
+from tests.examples import one_robot
 from tests.oracles.cart_pole import CartPole
 from tests.oracles.closed_form import MODELS, ClosedForm
 from tests.oracles.free_body import FreeBody
@@ -41,6 +42,7 @@ def engine_of(form: ClosedForm, name: str) -> Backend:
 def test_backend_matches_closed_form(form: ClosedForm, name: str) -> None:
     with engine_of(form, name) as engine:
 
+        @one_robot
         @given(st.lists(samples(engine.model), min_size=STATES, max_size=STATES))
         def matches(states: list[tuple[np.ndarray, np.ndarray, np.ndarray]]) -> None:
             q, v, a = (np.stack(column) for column in zip(*states, strict=True))
@@ -85,6 +87,7 @@ def test_momentum_of_a_free_body(name: str) -> None:
     form = FreeBody()
     with engine_of(form, name) as engine:
 
+        @one_robot
         @given(samples(engine.model))
         def matches(state: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
             q, v, _ = state

@@ -26,6 +26,12 @@ from dynx.testing.strategies import models, samples, wrenches
 from tests.closeness import samples_at
 
 REAL = ("ur5", "panda", "solo12", "hyq", "xarm7", "z1", "six_axis_arm", "seven_axis_arm", "scara")
+REAL_COMPILED = [(robot, ("fixed", "floating")[k % 2]) for k, robot in enumerate(REAL)]
+"""All of them with the compiled backend too, which takes seconds a robot: each on one of the bases."""
+
+COMPILED_EXAMPLES = 40
+"""Random robots that the compiled backend meets in one property."""
+
 STATES = 2
 """States in one example, evaluated as a batch."""
 
@@ -41,8 +47,8 @@ def backends_of(model: Model, names: Sequence[str] | None = None) -> Iterator[li
 
 
 INTERPRETED = [name for name in installed_backends() if name != "compiled"]
-"""Backends to which a new robot costs nothing. The compiled one makes some thirty kernels for each, so
-it meets fewer of them (`test_compiled_random_robots`)."""
+"""Backends to which a new robot costs nothing. The compiled one makes some thirty kernels for each, which
+takes it half a second, so it meets fewer of them (`test_compiled_random_robots`)."""
 
 
 def assert_agree(engines: list[Backend], states: Samples) -> None:
@@ -87,9 +93,10 @@ def test_random_robots(base: Base, data: st.DataObject) -> None:
 
 @each_base
 @given(data=st.data())
-@settings(max_examples=15)
+@settings(max_examples=min(COMPILED_EXAMPLES, settings().max_examples))
 def test_compiled_random_robots(base: Base, data: st.DataObject) -> None:
-    model, states = data.draw(robots_in_states(base, physical=data.draw(st.booleans())))
+    physical, solvable = data.draw(st.sampled_from([(True, False), (True, True), (False, False)]))
+    model, states = data.draw(robots_in_states(base, physical, solvable))
     note(model.to_urdf())
     with backends_of(model, ["reference", "compiled"]) as engines:
         assert_agree(engines, states)
@@ -139,9 +146,8 @@ def test_real_robots(robot: str, base: Base) -> None:
         assert_agree(engines, draw_samples(model, 8, seed=0))
 
 
-@pytest.mark.parametrize(("robot", "base"), [("panda", "fixed"), ("z1", "floating"), ("scara", "fixed")])
+@pytest.mark.parametrize(("robot", "base"), REAL_COMPILED)
 def test_compiled_real_robots(robot: str, base: Base) -> None:
-    """Few, for each takes seconds of compiling; `dynx agree all` does them all."""
     model = load(robot, base=base)
     with backends_of(model, ["reference", "compiled"]) as engines:
         assert_agree(engines, draw_samples(model, 8, seed=0))

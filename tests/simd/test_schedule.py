@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from dynx.simd.expr import Graph
 from dynx.simd.program import Port, Program, finished
-from dynx.simd.schedule import LEAVES, TrigGroup, schedule
+from dynx.simd.schedule import LEAVES, Segment, TrigGroup, places_of_kept, schedule
 from tests.simd.programs import programs
 
 
@@ -23,13 +23,30 @@ def test_segments_are_no_longer_than_asked(program: Program, longest: int) -> No
 def test_nothing_is_kept_that_no_later_segment_uses(program: Program, longest: int) -> None:
     segments = schedule(program, 4, longest)
     for number, segment in enumerate(segments):
-        used: set[int] = set()
-        for later in segments[number + 1 :]:
-            for step in later.steps:
-                used.update(step.angles if isinstance(step, TrigGroup) else program.nodes[step].args)
-            used.update(node for store in later.stores for node in store.nodes)
-        assert segment.kept <= used
+        assert segment.kept <= used_by(program, segments[number + 1 :])
         assert not any(program.nodes[node].op in LEAVES for node in segment.kept)
+
+
+def used_by(program: Program, segments: list[Segment]) -> set[int]:
+    used: set[int] = set()
+    for segment in segments:
+        for step in segment.steps:
+            used.update(step.angles if isinstance(step, TrigGroup) else program.nodes[step].args)
+        used.update(node for store in segment.stores for node in store.nodes)
+    return used
+
+
+@given(programs(), st.integers(1, 30))
+def test_what_is_still_wanted_is_not_overwritten(program: Program, longest: int) -> None:
+    """A segment writes what it keeps while later steps of its own still read what others kept."""
+    segments = schedule(program, 4, longest)
+    places = places_of_kept(program, segments)
+    assert set(places) == {value for segment in segments for value in segment.kept}
+    for number, segment in enumerate(segments):
+        wanted = used_by(program, segments[number:])
+        earlier = {value for before in segments[:number] for value in before.kept} & wanted
+        alive = [places[value] for value in (*earlier, *segment.kept)]
+        assert len(set(alive)) == len(alive)
 
 
 @given(programs())

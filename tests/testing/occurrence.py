@@ -1,4 +1,4 @@
-"""That a strategy draws examples of some sort."""
+"""That a strategy draws examples of some sort, and which is the simplest."""
 
 from __future__ import annotations
 
@@ -16,3 +16,11 @@ FIRST = settings(max_examples=3000, phases=[Phase.generate], database=None, dera
 def assert_occurs(strategy: st.SearchStrategy[T], sort: Callable[[T], bool]) -> None:
     """Assert that an example of the sort is drawn; it is not shrunk, which takes long."""
     find(strategy, sort, settings=FIRST)
+
+
+SHRUNK = settings(max_examples=2000, phases=[Phase.generate, Phase.shrink], database=None, derandomize=True)
+
+
+def simplest(strategy: st.SearchStrategy[T], sort: Callable[[T], bool]) -> T:
+    """The example of the sort to which Hypothesis shrinks; what explains it, which takes longest, is left."""
+    return find(strategy, sort, settings=SHRUNK)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 import operator
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from hypothesis import strategies as st
 
 from dynx.errors import DTypeError, shown
-from dynx.model import Joint, Model
+from dynx.model import Model
 from dynx.spatial.scalar import Floats
 from dynx.testing.strategies.geometry import (
     SMALL_STEPS,
@@ -46,7 +47,7 @@ def configurations(model: Model, *, within_limits: bool = False) -> Strategy[Flo
         raise DTypeError(f"within_limits is {shown(within_limits)}; wanted True or False")
     base = 7 if model.floating else 0
     joints = [
-        _coordinate(joint, float(low), float(high), within_limits)
+        _coordinate(joint.type == "prismatic", float(low), float(high), within_limits)
         for joint, low, high in zip(
             model.coordinate_joints, model.lower[base:], model.upper[base:], strict=True
         )
@@ -55,12 +56,10 @@ def configurations(model: Model, *, within_limits: bool = False) -> Strategy[Flo
     if not model.floating:
         anywhere = values.map(lambda q: np.array(q, dtype=float))
     else:
-        anywhere = st.builds(
-            lambda p, quat, q: np.concatenate([p, quat, q]), vectors(2.0), quaternions(), values
-        )
+        anywhere = st.tuples(vectors(2.0), quaternions(), values).map(np.concatenate)
     if within_limits:
         return anywhere
-    return st.one_of(st.builds(model.neutral), anywhere)
+    return st.one_of(st.just(model).map(Model.neutral), anywhere)
 
 
 def velocities(model: Model, reach: float = 3.0) -> Strategy[Floats]:
@@ -75,7 +74,7 @@ def accelerations(model: Model, reach: float = 5.0) -> Strategy[Floats]:
 
 def samples(model: Model) -> Strategy[Sample]:
     """A `Sample` (q, v, a) of `model`. Shrinks to rest at the neutral configuration."""
-    return st.builds(Sample, configurations(model), velocities(model), accelerations(model))
+    return st.tuples(configurations(model), velocities(model), accelerations(model)).map(Sample._make)
 
 
 def checked_model(model: Model) -> Model:
@@ -86,14 +85,19 @@ def checked_model(model: Model) -> Model:
 
 
 def _coordinates(model: Model, reach: float) -> Strategy[Floats]:
-    nv = checked_model(model).nv
-    number = numbers(checked_reach("reach", reach))
+    return _vectors_of(checked_model(model).nv, checked_reach("reach", reach))
+
+
+@lru_cache(maxsize=256)
+def _vectors_of(nv: int, reach: float) -> Strategy[Floats]:
+    number = numbers(reach)
     anything = st.lists(number, min_size=nv, max_size=nv).map(lambda v: np.array(v, dtype=float))
-    return st.one_of(st.builds(np.zeros, st.just(nv)), anything)
+    return st.one_of(st.just(nv).map(np.zeros), anything)
 
 
-def _coordinate(joint: Joint, low: float, high: float, within_limits: bool) -> Strategy[float]:
-    reach = 1.0 if joint.type == "prismatic" else math.pi
+@lru_cache(maxsize=256)
+def _coordinate(sliding: bool, low: float, high: float, within_limits: bool) -> Strategy[float]:
+    reach = 1.0 if sliding else math.pi
     span = 2.0 * reach if within_limits else 2.0 * TURNS
     bounded_low = low if math.isfinite(low) else min(high, span / 2) - span
     bounded_high = high if math.isfinite(high) else bounded_low + span

@@ -29,7 +29,11 @@ SMALL_STEPS = (0.0, 1e-12, -1e-9, 1e-6, -1e-3)
 """Distances from a singular attitude or posture at which cancellation shows in different digits."""
 
 
-@lru_cache(maxsize=64)  # composite strategies ask for the same few again and again
+# To make a strategy and have Hypothesis look it over takes longer than to draw from it, and composite
+# strategies ask for the same few again and again: those are made once.
+
+
+@lru_cache(maxsize=64)
 def numbers(reach: float) -> Strategy[float]:
     """A number in [-reach, reach]: quarters of the reach, or any with nine digits. Shrinks to 0."""
     rounded = st.integers(-4, 4).map(lambda n: n * reach / 4)
@@ -44,10 +48,16 @@ def angles() -> Strategy[float]:
 
 def vectors(reach: float = 1.0) -> Strategy[Vector]:
     """Three numbers in [-reach, reach]. Shrinks to the zero vector."""
-    number = numbers(checked_reach("reach", reach))
+    return _vectors(checked_reach("reach", reach))
+
+
+@lru_cache(maxsize=64)
+def _vectors(reach: float) -> Strategy[Vector]:
+    number = numbers(reach)
     return st.one_of(st.just((0.0, 0.0, 0.0)), st.tuples(number, number, number))
 
 
+@lru_cache(maxsize=1)
 def unit_vectors() -> Strategy[Vector]:
     """A direction: the six along the axes, or any. Shrinks to z."""
     return st.one_of(
@@ -56,6 +66,7 @@ def unit_vectors() -> Strategy[Vector]:
     )
 
 
+@lru_cache(maxsize=1)
 def quaternions() -> Strategy[Floats]:
     """A unit quaternion (x, y, z, w), either of the two of its attitude. Shrinks to the identity.
 
@@ -87,11 +98,12 @@ def origins(reach: float = 1.0) -> Strategy[Pose]:
 
 def wrenches(force: float = 10.0, moment: float = 5.0) -> Strategy[Floats]:
     """Force [N] then moment [N m] (6,), each component within its bound. Shrinks to zero."""
-    return st.builds(
-        lambda f, m: np.array(f + m),
-        vectors(checked_reach("force", force)),
-        vectors(checked_reach("moment", moment)),
-    )
+    return _wrenches(checked_reach("force", force), checked_reach("moment", moment))
+
+
+@lru_cache(maxsize=64)
+def _wrenches(force: float, moment: float) -> Strategy[Floats]:
+    return st.builds(lambda f, m: np.array(f + m), vectors(force), vectors(moment))
 
 
 def checked_reach(name: str, value: float) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -31,6 +32,11 @@ def inertials(kind: Kind = "physical") -> Strategy[Inertial | None]:
     """
     if kind not in KINDS:
         raise UnknownNameError(f"kind is {shown(kind)}{nearest(str(kind), KINDS)}")
+    return _inertials(kind)
+
+
+@lru_cache(maxsize=len(KINDS))
+def _inertials(kind: Kind) -> Strategy[Inertial | None]:
     solid = _bodies(st.sampled_from((0.25, 0.125, 0.5)) | st.floats(0.05, 0.5).map(_rounded))
     if kind == "solid":
         return solid

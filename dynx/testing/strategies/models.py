@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Literal, TypeVar, get_args
 
 from hypothesis import strategies as st
@@ -19,7 +20,7 @@ from dynx.testing.strategies.geometry import (
     unit_vectors,
     vectors,
 )
-from dynx.testing.strategies.inertials import inertials
+from dynx.testing.strategies.inertials import Kind, inertials
 
 T = TypeVar("T")
 BaseChoice = Literal["fixed", "floating", "either"]
@@ -126,9 +127,25 @@ def models(
             raise DTypeError(f"{name} is {shown(flag)}; wanted True or False")
     if solvable and not physical:
         raise ArgumentError("solvable=True needs physical=True: other tensors may make M singular")
-    inertial = inertials("solid" if solvable else "physical" if physical else "any")
     allowed = tuple(kind for kind in JOINT_TYPES if kind in joint_types)
-    limb = _limbs(allowed, inertial, mimics, locks and not from_urdf)
+    bodies: Kind = "solid" if solvable else "physical" if physical else "any"
+    return _made_once(min_links, max_links, base, allowed, bodies, mimics, locks and not from_urdf, from_urdf)
+
+
+@lru_cache(maxsize=64)
+def _made_once(
+    min_links: int,
+    max_links: int,
+    base: BaseChoice,
+    joint_types: tuple[JointType, ...],
+    bodies: Kind,
+    mimics: bool,
+    locks: bool,
+    from_urdf: bool,
+) -> Strategy[Model]:
+    """`models` of arguments that were checked."""
+    inertial = inertials(bodies)
+    limb = _limbs(joint_types, inertial, mimics, locks)
     bases: tuple[Base, ...] = ("fixed", "floating") if base == "either" else (base,)
     return _models(min_links, max_links, bases, limb, inertial, from_urdf)
 

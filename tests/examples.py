@@ -1,0 +1,15 @@
+"""How many examples a property of one robot takes: a quarter of those of a property of all robots."""
+
+from __future__ import annotations
+
+from hypothesis import settings
+
+ENOUGH = 25
+"""Examples by which `tests.faults` has every planted fault found."""
+
+PROFILE = settings().max_examples
+
+one_robot = settings(max_examples=min(PROFILE, max(ENOUGH, PROFILE // 4)))
+"""For an identity in q, v and a of a given robot. Both sides are polynomials in these and in sines and
+cosines of q: where they differ at all they differ almost everywhere, so that further states tell little,
+whereas a further robot may be of a kind that was not met."""
