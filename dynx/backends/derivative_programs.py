@@ -8,6 +8,7 @@ from dynx.backends.mass_factors import factors_of, filled_entries, solved
 from dynx.backends.robot_kernel import argument_shapes, model_torque, tree_coordinates
 from dynx.model import Mechanism
 from dynx.rbd import aba, kinematics, rnea
+from dynx.rbd.base_parameters import regrouped
 from dynx.rbd.crba import mass_matrix
 from dynx.rbd.linear import solve_positive
 from dynx.rbd.tangent import displaced
@@ -95,7 +96,7 @@ def pose_derivative(mechanism: Mechanism, frame: int) -> Program:
 
 
 def _torque(mechanism: Mechanism, q: Array, v: Array, a: Array) -> Array:
-    tau = rnea.inverse_dynamics(mechanism, *tree_coordinates(mechanism, q, v, a))
+    tau = rnea.inverse_dynamics(regrouped(mechanism), *tree_coordinates(mechanism, q, v, a))
     return model_torque(mechanism, tau)
 
 

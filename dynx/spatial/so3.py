@@ -88,12 +88,26 @@ def rotation_from_quat(quat_xyzw: Array) -> Array:
 
 
 def quat_from_rotation(R: Floats) -> Floats:
-    """Unit quaternion (x, y, z, w), w >= 0, of a rotation matrix (..., 3, 3)."""
-    from scipy.spatial.transform import Rotation
+    """Unit quaternion (x, y, z, w), w >= 0, of a rotation matrix (..., 3, 3).
 
+    The products of each component with all four are sums of entries of R. Those of the largest are
+    taken, divided by their length (Shepperd 1978; Markley and Crassidis 2014, section 2.9.3).
+    """
     R = np.asarray(R, dtype=float)
-    quat = Rotation.from_matrix(R.reshape(-1, 3, 3)).as_quat(canonical=True)
-    return np.asarray(quat, dtype=float).reshape(*R.shape[:-2], 4)
+    m = [[R[..., i, j] for j in range(3)] for i in range(3)]
+    trace = m[0][0] + m[1][1] + m[2][2]
+    skewed = [m[2][1] - m[1][2], m[0][2] - m[2][0], m[1][0] - m[0][1]]
+    rows = []
+    for i in range(3):
+        row = [m[i][j] + m[j][i] for j in range(3)]
+        row[i] = 1.0 + 2.0 * m[i][i] - trace
+        rows.append(np.stack([*row, skewed[i]], axis=-1))
+    rows.append(np.stack([*skewed, 1.0 + trace], axis=-1))
+    products = np.stack(rows, axis=-2)
+    largest = np.argmax(np.diagonal(products, axis1=-2, axis2=-1), axis=-1)
+    quat = np.take_along_axis(products, largest[..., None, None], axis=-2)[..., 0, :]
+    quat = quat / np.linalg.norm(quat, axis=-1, keepdims=True)
+    return np.asarray(np.where(quat[..., 3:] < 0, -quat, quat))
 
 
 def quat_product(a_xyzw: Floats, b_xyzw: Floats) -> Floats:
