@@ -103,6 +103,12 @@ class ParametricDynamics:
         """M (..., nv, nv), symmetric, armature included where it is a parameter."""
         return self._answer("mass_matrix", _mass_matrix, None, [self._arguments.q(q)], parameters)
 
+    def acceleration(self, parameters: Array, q: Array, v: Array, tau: Array) -> Array:
+        """The acceleration (nv,) of one sample, for arrays of symbols: to build on it in a trace."""
+        known = self._selection.read(parameters)
+        mechanism = tidied(self._selection.remainder())
+        return _forward_dynamics(known.added_to(mechanism), known.joints, q, v, tau)
+
     def _answer(
         self,
         question: str,

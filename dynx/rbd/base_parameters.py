@@ -6,7 +6,7 @@ about the axis and has no inertia about it, that is mass spread along the axis; 
 rotational inertia without mass. Moved to the parent, wherever that body is, it leaves three of ten
 parameters of a body zero for good, six for a prismatic joint (Gautier and Khalil, Direct calculation of
 minimum set of inertial parameters of serial robots, 1990). Nor do torques know where on its axis a body's
-frame sits: its origin is moved to where the way from the parent has the fewest components.
+frame sits: its origin is moved to where the ways from joint to joint have the fewest components.
 
 Torque, mass matrix, energies, momentum and centre of mass stay what they are, as functions of the same
 coordinates, in the terms of real arithmetic; frames keep their names and places. What does not stay is which
@@ -15,7 +15,9 @@ body has which inertia.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -23,6 +25,9 @@ from dynx.model.mechanism import ROOT, Body, Mechanism
 from dynx.spatial.inertia import RigidInertia
 from dynx.spatial.scalar import Array, sqrt
 from dynx.spatial.so3 import cross
+
+NOTHING = 1e-14
+"""A length [m] that is zero but for rounding."""
 
 Z = np.array([0, 0, 1])
 """The axis of every revolute joint of a mechanism that was `aligned`."""
@@ -34,7 +39,8 @@ def reduced(mechanism: Mechanism) -> Mechanism:
 
 
 def aligned(mechanism: Mechanism) -> Mechanism:
-    """Every body in a frame of which z is the axis of its joint, its origin slid along that axis.
+    """Every body in a frame of which z is the axis of its joint, its origin slid along that axis if that
+    saves numbers.
 
     A body on a prismatic joint has the axes of its parent, and its origin when the joint is at 0.
     """
@@ -46,7 +52,11 @@ def aligned(mechanism: Mechanism) -> Mechanism:
         Q_parent, o_parent = frames[body.parent]
         # The joint as the parent's new frame sees it.
         R, p = Q_parent.T @ body.R, Q_parent.T @ (body.p - o_parent)
-        Q, o = (_axes(R, body.axis), _slide(R, p, body.axis)) if body.revolute else (R.T, -R.T @ p)
+        if body.revolute:
+            onwards = [np.sum(child.p * body.axis) for child in mechanism.bodies if child.parent == index]
+            Q, o = _axes(R, body.axis), _slide(R, p, body.axis, onwards)
+        else:
+            Q, o = R.T, -R.T @ p
         frames[index] = Q, o
         moved = replace(body, R=R @ Q, p=p + R @ o, axis=Z + nothing, inertia=_in_frame(body.inertia, Q, o))
         bodies.append(moved if body.revolute else replace(moved, R=one, p=nothing, axis=R @ body.axis))
@@ -108,8 +118,17 @@ def _axes(R: Array, axis: Array) -> Array:
     return np.stack([x + 0 * axis, cross(axis, x + 0 * axis), axis], axis=-1)
 
 
-def _slide(R: Array, p: Array, axis: Array) -> Array:
-    """Where on the axis (through the old origin) the new one is: one component of p + R o vanishes."""
+def _slide(R: Array, p: Array, axis: Array, onwards: Sequence[Any]) -> Array:
+    """Where on the axis (through the old origin) the new one is.
+
+    There a component of p + R o vanishes, but others may come into being: `onwards` are the ways along
+    the axis to the joints that the body carries. If that does not save a number the origin stays.
+    Three axes through one point would otherwise be pulled apart, with bodies without mass between
+    them, and forward dynamics would lose digits.
+    """
     along = R @ axis
     k = int(np.argmax(np.abs(along)))
-    return np.asarray(axis * (-p[k] / along[k]))
+    way = -p[k] / along[k]
+    before = (abs(p[k]) > NOTHING) + sum(abs(length) > NOTHING for length in onwards)
+    after = sum(abs(length - way) > NOTHING for length in onwards)
+    return np.asarray(axis * (way if after < before else 0 * way))

@@ -108,6 +108,33 @@ class Kernel:
 
         run_parts(call, parts, threads)
 
+    def bound(self, inputs: Sequence[Floats], outputs: Sequence[Floats]) -> Callable[[], None]:
+        """A call that fills these `outputs` from these `inputs` each time, whatever they hold by then.
+
+        For loops of many calls: everything is checked here and nothing afterwards. Wants at least as
+        many samples as there are `lanes`, rows whose numbers lie side by side, and outputs that share
+        memory with nothing; raises ArgumentError for others, and what a plain call raises.
+        """
+        code, arrays = self._opened(), (*inputs, *outputs)
+        n = _checked(self.inputs, self.outputs, inputs, outputs)
+        if n < self.image.lanes:
+            raise ArgumentError(f"a bound call wants at least {self.image.lanes} samples, not {n}")
+        for array in arrays:
+            if not _direct(array):
+                raise ArgumentError("a bound call wants arrays whose rows are contiguous")
+        if not all(_apart(out, inputs, outputs) for out in outputs):
+            raise ArgumentError("an output of a bound call shares memory with another array")
+        words = [n]
+        for array in arrays:
+            words += [array.ctypes.data, array.strides[0]]
+        arguments = np.array(words, dtype=np.int64)
+        start = arguments.ctypes.data
+
+        def call(_alive: object = (arrays, arguments)) -> None:
+            code.entry(start)
+
+        return call
+
     def workspace(self, samples: int = 1) -> Workspace:
         """Room for at most so many samples, for callers that ask for few at a time."""
         return Workspace(self._opened(), self.image, samples)
