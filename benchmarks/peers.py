@@ -1,79 +1,50 @@
 """What the batches are timed on and against: robots, a tree of a hundred joints, and ways to do a work.
 
 The ways are those of ``dynx bench`` (the compiled backend, Pinocchio's C++ batches, a loop over its
-binding), and MuJoCo's ``mj_inverse`` in a loop where MuJoCo is installed. The C++ within a call of the
-binding is a difference of two times, which pytest-benchmark cannot show: `dynx bench` does.
+binding), and what the extra ``benchmark`` installs: MuJoCo, adam on JAX and on CasADi, frax. The C++ within
+a call of the binding is a difference of two times, which pytest-benchmark cannot show: `dynx bench` does.
 """
 
 from __future__ import annotations
 
-from functools import cache
-from typing import Any
+from collections.abc import Callable
+from functools import cache, partial
 
 import numpy as np
-import pytest
 
+from benchmarks.casadi_peers import CasadiCode, CasadiMap
+from benchmarks.compiling_peer import CompilingPeer
+from benchmarks.jax_peers import AdamJax, Frax
+from benchmarks.mujoco_peers import MujocoInverse, MujocoRollout
 from dynx.bench.backend_ways import backend_way
 from dynx.bench.measurement import Preparation
 from dynx.bench.pinocchio_ways import BATCH, LOOP, PinocchioBatch, PinocchioLoop
-from dynx.bench.ways import Prepared, Role, Way
+from dynx.bench.ways import Prepared, Way
 from dynx.bench.work import ARGUMENTS, Batch, Work, draw_batch
 from dynx.model import Inertial, Joint, Link, Model, Pose
 from dynx.model.loading import load
-from dynx.spatial.scalar import Floats
 
 FRAMES = {"ur5": "tool0", "panda": "panda_hand", "talos_reduced": "gripper_left_base_link"}
 """The robots that are timed, and the frame of each."""
 
-MUJOCO = "mujoco mj_inverse"
 COMPILED = "compiled"
+COMPILING: tuple[type[CompilingPeer], ...] = (AdamJax, Frax, CasadiMap, CasadiCode)
+"""Peers that take batches, once they have compiled."""
+
 WAYS: dict[str, tuple[str, ...]] = {
     COMPILED: tuple(ARGUMENTS),
     BATCH: ("inverse_dynamics", "forward_dynamics"),
     LOOP: tuple(ARGUMENTS),
-    MUJOCO: ("inverse_dynamics",),
+    MujocoInverse.name: ("inverse_dynamics",),
+    MujocoRollout.name: ("forward_dynamics",),
+    **{peer.name: tuple(ARGUMENTS) for peer in COMPILING},
 }
 """Each way, and the quantities that it does."""
 
-HAVE_THREADS = frozenset({COMPILED, BATCH})
-ONLY_BATCHES = frozenset({BATCH})
-
-
-class MujocoInverse(Way):
-    """`mj_inverse` called once for each sample, as MuJoCo's users do; answers go to one array."""
-
-    name = MUJOCO
-    role: Role = "peer"
-    threads = 1
-    whole = False
-
-    def __init__(self, model: Model) -> None:
-        tree = pytest.importorskip("dynx.backends.mujoco_tree", reason="mujoco is not installed")
-        from dynx.engines.mujoco import mujoco
-
-        self.version = f"mujoco {mujoco.__version__}"
-        if model.mechanism.coupling is not None:
-            pytest.skip("MuJoCo has mimic joints as constraints: another work")
-        self._engine: Any = tree.build_tree(model).model
-        self._inverse, self._data = mujoco.mj_inverse, mujoco.MjData(self._engine)
-
-    def does(self, work: Work) -> bool:
-        """It is inverse dynamics."""
-        return work.quantity == "inverse_dynamics"
-
-    def prepare(self, work: Work, batch: Batch, out: Floats) -> Prepared:
-        """Ready."""
-        rows = list(zip(batch.q, batch.v, batch.a, strict=True))
-        engine, data, inverse = self._engine, self._data, self._inverse
-
-        def call() -> Floats:
-            for k, (q, v, a) in enumerate(rows):
-                data.qpos[:], data.qvel[:], data.qacc[:] = q, v, a
-                inverse(engine, data)
-                out[k] = data.qfrc_inverse
-            return out
-
-        return Prepared(call)
+TAKE_SECONDS = frozenset({MujocoRollout.name, *(peer.name for peer in COMPILING)})
+"""Peers for large batches: getting ready takes seconds to minutes, handing over arrays much of a call."""
+HAVE_THREADS = frozenset({COMPILED, BATCH, *TAKE_SECONDS})
+ONLY_BATCHES = frozenset({BATCH, *TAKE_SECONDS})
 
 
 @cache
@@ -90,13 +61,21 @@ def batch_of(robot: str, count: int) -> Batch:
 
 @cache
 def way_of(robot: str, name: str, threads: int) -> Way:
-    """The way of that name for a robot."""
-    model = model_of(robot)
-    if name == BATCH:
-        return PinocchioBatch(model, threads)
-    if name == LOOP:
-        return PinocchioLoop(model)
-    return MujocoInverse(model) if name == MUJOCO else backend_way(model, name, threads)
+    """The way of that name for a robot; an error of `dynx.errors` says why there is none."""
+    return make_way(model_of(robot), name, threads)
+
+
+def make_way(model: Model, name: str, threads: int) -> Way:
+    """The way of that name, on so many threads where it has any of its own."""
+    makers: dict[str, Callable[[], Way]] = {
+        BATCH: lambda: PinocchioBatch(model, threads),
+        LOOP: lambda: PinocchioLoop(model),
+        MujocoInverse.name: lambda: MujocoInverse(model),
+        MujocoRollout.name: lambda: MujocoRollout(model, threads),
+    }
+    for peer in COMPILING:
+        makers[peer.name] = partial(peer, model, threads)
+    return makers[name]() if name in makers else backend_way(model, name, threads)
 
 
 def checked_call(way: Way, work: Work, batch: Batch) -> tuple[Prepared, int]:

@@ -7,6 +7,7 @@
     tau = engine.inverse_dynamics(q, v, a)
     report = dynx.agree(model)                      # do all engines give the same answers?
     report = dynx.diagnose("my.urdf")               # why do they differ when they load it themselves?
+    rollout = dynx.simulate(model, controller, reference, plant="pybullet")
 
 Importing dynx imports no engine; each name below is imported when it is first used.
 """
@@ -19,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 from dynx._version import __version__
 
 if TYPE_CHECKING:
-    from dynx import errors
+    from dynx import control, errors, trajectory
     from dynx.agreement import AgreementReport, agree
     from dynx.backends import Backend, backend, installed_backends, register
     from dynx.backends.derivatives import Derivatives
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from dynx.model.library import robots
     from dynx.model.loading import load
     from dynx.rbd.regressor import inertial_parameters
+    from dynx.sim import Noise, Payload, Push, Rollout, simulate, simulate_batch
 
 __all__ = [
     "AgreementReport",
@@ -38,12 +40,17 @@ __all__ = [
     "DoctorReport",
     "IKResult",
     "Model",
+    "Noise",
     "ParametricDynamics",
+    "Payload",
     "Pose",
+    "Push",
+    "Rollout",
     "__version__",
     "agree",
     "backend",
     "compare_as_loaded",
+    "control",
     "diagnose",
     "errors",
     "inertial_parameters",
@@ -52,6 +59,9 @@ __all__ = [
     "parametric",
     "register",
     "robots",
+    "simulate",
+    "simulate_batch",
+    "trajectory",
 ]
 
 _HOME = {
@@ -61,8 +71,12 @@ _HOME = {
     "DoctorReport": "dynx.doctor",
     "IKResult": "dynx.ik",
     "Model": "dynx.model",
+    "Noise": "dynx.sim",
     "ParametricDynamics": "dynx.backends.parametric",
+    "Payload": "dynx.sim",
     "Pose": "dynx.model",
+    "Push": "dynx.sim",
+    "Rollout": "dynx.sim",
     "agree": "dynx.agreement",
     "backend": "dynx.backends",
     "compare_as_loaded": "dynx.doctor",
@@ -73,12 +87,15 @@ _HOME = {
     "parametric": "dynx.backends.parametric",
     "register": "dynx.backends",
     "robots": "dynx.model.library",
+    "simulate": "dynx.sim",
+    "simulate_batch": "dynx.sim",
 }
+_SUBPACKAGES = ("control", "errors", "trajectory")
 
 
 def __getattr__(name: str) -> Any:
-    if name == "errors":
-        return import_module("dynx.errors")
+    if name in _SUBPACKAGES:
+        return import_module(f"dynx.{name}")
     if name not in _HOME:
         raise AttributeError(f"module 'dynx' has no attribute {name!r}")
     return getattr(import_module(_HOME[name]), name)

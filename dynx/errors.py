@@ -9,13 +9,19 @@
     |  |- ShapeError                wrong shape
     |  |- DTypeError                not real numbers
     |  |- NotFiniteError            NaN or infinity where a number is needed
-    |  `- UnknownNameError          no such frame, joint, reference, ...
+    |  |- UnknownNameError          no such frame, joint, reference, ...
+    |  `- GainError                 gains that are no gains (negative, of the wrong length)
     |- BackendError                 an engine cannot be used
     |  |- UnknownBackendError       no backend of that name is registered
     |  |- NotInstalledError         a package is missing (says which extra brings it)
     |  |- EngineLimitError          the model is larger than the engine can hold
     |  |- EngineError               the engine failed; its own exception is ``__cause__``
     |  `- ClosedError               the backend was closed
+    |- TrajectoryError              no such motion exists (where along it)
+    |  `- LimitError                a motion breaks limits of the model (each of them)
+    |- SimulationError              a rollout ended early (time, step, state, what was computed)
+    |  |- DivergedError             the state grew beyond all bounds
+    |  `- ControlError              a controller gave no torque that can be applied
     |- SingularMassMatrixError      forward dynamics has no unique answer
     `- CompileError                 the SIMD compiler cannot do what it was asked
        `- TraceError                traced code asks for a value that is not known yet
@@ -27,6 +33,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
+from typing import Any, Literal, NamedTuple
 
 
 class DynxError(Exception):
@@ -81,6 +88,10 @@ class UnknownNameError(ArgumentError, LookupError):
     """A name that is not there; the message offers the nearest that is."""
 
 
+class GainError(ArgumentError):
+    """Gains of a controller that cannot be used."""
+
+
 class BackendError(DynxError, RuntimeError):
     """An engine cannot be used."""
 
@@ -103,6 +114,73 @@ class EngineError(BackendError):
 
 class ClosedError(BackendError):
     """The backend was used after ``close()``."""
+
+
+class TrajectoryError(DynxError, ValueError):
+    """No motion does what was asked; `at` is how far along the path it fails (0 to 1), where known."""
+
+    def __init__(self, message: str, *, at: float | None = None) -> None:
+        self.message = message
+        self.at = at
+        super().__init__(message)
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return _rebuild_trajectory_error, (type(self), self.message, self.at)
+
+
+class LimitViolation(NamedTuple):
+    """A limit that a motion breaks: which, when it does so most, the value then, and what is allowed."""
+
+    joint: str
+    quantity: Literal["position", "velocity", "effort"]
+    time: float
+    value: float
+    limit: float
+
+    def __str__(self) -> str:
+        return (
+            f"{self.quantity} of {shown(self.joint)} is {self.value:.6g} at {self.time:.6g} s; "
+            f"its limit is {self.limit:.6g}"
+        )
+
+
+class LimitError(TrajectoryError):
+    """A motion breaks limits of the model; `violations` has every one, by joint."""
+
+    def __init__(self, message: str, violations: Iterable[LimitViolation] = ()) -> None:
+        self.violations = tuple(violations)
+        super().__init__(message)
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return type(self), (self.message, self.violations)
+
+
+class SimulationError(DynxError, RuntimeError):
+    """A rollout ended at `time` [s], after `step` steps, in `state` (q, v).
+
+    `rollout` holds what was computed until then (a `dynx.Rollout`; None after unpickling).
+    """
+
+    def __init__(
+        self, message: str, *, time: float, step: int, state: tuple[Any, Any], rollout: Any = None
+    ) -> None:
+        self.message = message
+        self.time = time
+        self.step = step
+        self.state = state
+        self.rollout = rollout
+        super().__init__(message)
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return _rebuild_simulation_error, (type(self), self.message, self.time, self.step, self.state)
+
+
+class DivergedError(SimulationError, ArithmeticError):
+    """The state is no longer finite, or so fast that nothing can be learnt from it."""
+
+
+class ControlError(SimulationError):
+    """A controller gave a torque that is not finite, or not of the robot's size."""
 
 
 class SingularMassMatrixError(DynxError, ArithmeticError):
@@ -151,7 +229,17 @@ def nearest(name: str, known: Iterable[str]) -> str:
     return f"; {len(names)} are known, such as " + ", ".join(names[:5])
 
 
+def _rebuild_trajectory_error(kind: type[TrajectoryError], message: str, at: float | None) -> TrajectoryError:
+    return kind(message, at=at)
+
+
 def _rebuild_located(
     kind: type[DescriptionError], message: str, source: str | None, line: int | None
 ) -> DescriptionError:
     return kind(message, source=source, line=line)
+
+
+def _rebuild_simulation_error(
+    kind: type[SimulationError], message: str, time: float, step: int, state: tuple[Any, Any]
+) -> SimulationError:
+    return kind(message, time=time, step=step, state=state)

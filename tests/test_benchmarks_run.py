@@ -11,10 +11,30 @@ ROOT = Path(__file__).resolve().parent.parent
 
 
 def test_every_benchmark_runs() -> None:
-    command = [sys.executable, "-m", "pytest", "benchmarks", "--benchmark-disable", "-q"]
+    finished = run("pytest", "benchmarks", "--benchmark-disable", "-q")
+    assert finished.returncode == 0, finished.stdout + finished.stderr
+
+
+def test_the_table_of_peers_has_dynx_first() -> None:
+    # Without the two peers for which something is compiled for seconds.
+    quick = ["--without", "adam, JAX", "--without", "CasADi map, C code"]
+    table = ["ur5", "--quantity", "mass_matrix", "--batch", "4096", "--repetitions", "3", *quick]
+    finished = run("benchmarks.compare", *table)
+    assert finished.returncode == 0, finished.stdout + finished.stderr
+    rows = [line for line in finished.stdout.splitlines() if line.startswith("| ")]
+    assert [row.split(" | ")[0] for row in rows[:2]] == ["| way", "| compiled"]
+
+
+def run(*command: str) -> subprocess.CompletedProcess[str]:
+    """What `python -m` with these arguments came to, in the root of the repository."""
     # Options meant for this run, such as its number of processes, are not meant for that one.
     environment = {name: value for name, value in os.environ.items() if name != "PYTEST_ADDOPTS"}
-    finished = subprocess.run(
-        command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=600, check=False
+    return subprocess.run(
+        [sys.executable, "-m", *command],
+        cwd=ROOT,
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=600,
+        check=False,
     )
-    assert finished.returncode == 0, finished.stdout + finished.stderr

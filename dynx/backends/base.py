@@ -282,7 +282,11 @@ class Backend(Lifecycle, EngineHooks):
     # -- the whole body -----------------------------------------------------------------------
 
     def center_of_mass(self, q: ArrayLike) -> Floats:
-        """Centre of mass in the world (..., 3) [m]; the base frame's origin if nothing has mass."""
+        """Centre of mass in the world (..., 3) [m]; the base frame's origin if nothing has mass.
+
+        Links that are bolted to the world count, as they do for the potential energy (Pinocchio's own
+        `centerOfMass` leaves them out).
+        """
         q = self._checked_q(q)
         return self._evaluation(self._center_of_mass, (3,), q)
 

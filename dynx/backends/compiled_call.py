@@ -162,7 +162,8 @@ class KernelCall:
                 checked = [check(array) for array, check in zip(arrays, self._checks, strict=True)]
                 if any(new is not old for new, old in zip(checked, arrays, strict=True)):
                     self._evaluate(checked, batch, answer)
-            if self._refuse is not None:
+            # Unchecked numbers that are none give answers that are none, in their rows alone.
+            if self._refuse is not None and (self._validate or all(np.isfinite(x).all() for x in arrays)):
                 self._refuse(answer)
         if out is None or answer is out:
             return answer
@@ -210,7 +211,9 @@ class NumericCall:
             found = evaluated(self._mechanism, self._quantity, self._details, *spread, tree=self._tree)
         # What no coordinate moves comes without the batch.
         own = rank(self._quantity)
-        answer = np.array(np.broadcast_to(found, (*batch, *found.shape[found.ndim - own :])))
+        shape = (*batch, *found.shape[found.ndim - own :])
+        whole = found.shape == shape and found.flags.c_contiguous and found.flags.writeable
+        answer = found if whole else np.array(np.broadcast_to(found, shape))
         if self._refuse is not None:
             self._refuse(answer)
         return into(out, answer)
@@ -251,6 +254,8 @@ def _checked_out(out: Any, shape: tuple[int, ...]) -> Floats:
         raise DTypeError(f"out has dtype {out.dtype}; wanted float64")
     if out.shape != shape:
         raise ShapeError(f"out has shape {out.shape}; wanted {shape}")
+    if not out.flags.writeable:
+        raise ArgumentError("out is read-only; wanted an array to write into")
     if not out.flags.carray:
-        raise ArgumentError("out is read-only or not C-contiguous; wanted an array to write into")
+        raise ArgumentError("out is not C-contiguous and aligned; wanted an array without gaps")
     return out

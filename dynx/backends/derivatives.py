@@ -25,6 +25,7 @@ from numpy.typing import ArrayLike
 from dynx.backends import derivative_programs as programs
 from dynx.backends.arguments import Arguments
 from dynx.backends.compiled_kernels import tidied
+from dynx.backends.registry import refuse_other_than_model
 from dynx.backends.robot_kernel import evaluated, robot_kernel
 from dynx.backends.solvability import Solvability
 from dynx.model import Mechanism, Model
@@ -74,7 +75,8 @@ class Derivatives:
     """
 
     def __init__(self, model: Model, *, threads: int | None = None) -> None:
-        """Raises ArgumentError for a number of threads that is none."""
+        """Raises ArgumentError for what is no model, or a number of threads that is none."""
+        refuse_other_than_model(model)
         self.model = model
         self._option = threads
         self._threads = checked_threads(threads)

@@ -17,6 +17,7 @@ from dynx.backends.arguments import Arguments
 from dynx.backends.compiled_kernels import tidied
 from dynx.backends.mass_factors import factors_of, solved
 from dynx.backends.parameters import Parameters, Selection
+from dynx.backends.registry import refuse_other_than_model
 from dynx.backends.robot_kernel import (
     argument_shapes,
     evaluated,
@@ -24,6 +25,7 @@ from dynx.backends.robot_kernel import (
     robot_kernel,
     tree_coordinates,
 )
+from dynx.errors import ArgumentError, shown
 from dynx.model import Mechanism, Model
 from dynx.model.configuration import checked_array
 from dynx.rbd import crba, rnea
@@ -54,6 +56,9 @@ def parametric(
     `threads` bounds how many threads a batch is split over; None stands for all processors. Raises
     UnknownNameError for a link or frame that is not there, ArgumentError for a link named twice.
     """
+    refuse_other_than_model(model)
+    if isinstance(links, str):
+        raise ArgumentError(f"links is the text {shown(links)}; wanted a list of names: [{shown(links)}]")
     selection = Selection(model, tuple(links), payload, point_payload, joint_dynamics)
     return ParametricDynamics(selection, threads=threads)
 

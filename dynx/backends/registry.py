@@ -38,6 +38,14 @@ _BUILT_IN = {
 _registered: dict[str, Loader] = {}
 
 
+def refuse_other_than_model(model: object) -> None:
+    """Raise ArgumentError for anything but a `Model`, such as a robot's name."""
+    if not isinstance(model, Model):
+        raise ArgumentError(
+            f"model is of type {type(model).__name__}; wanted a Model, such as dynx.load({_example(model)})"
+        )
+
+
 def backend(name: str, model: Model, **options: Any) -> Backend:
     """The backend of that name for `model`; `options` go to its constructor (``validate=False``).
 
@@ -46,10 +54,7 @@ def backend(name: str, model: Model, **options: Any) -> Backend:
     option that the backend does not have or something that is no `Model`.
     """
     kind = backend_class(name)
-    if not isinstance(model, Model):
-        raise ArgumentError(
-            f"model is of type {type(model).__name__}; wanted a Model, such as dynx.load({_example(model)})"
-        )
+    refuse_other_than_model(model)
     try:
         inspect.signature(kind).bind(model, **options)
     except TypeError as error:

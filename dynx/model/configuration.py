@@ -81,9 +81,11 @@ def checked_q(model: Model, q: ArrayLike, name: str = "q") -> Floats:
     norm = np.linalg.norm(array[..., 3:7], axis=-1, keepdims=True)
     off = np.abs(norm - 1.0)
     if np.any(off > 1e-6):
-        worst = float(np.ravel(norm)[np.argmax(np.ravel(off))])
+        at = np.unravel_index(np.argmax(off), off.shape)[:-1]
+        where = ", ".join([*map(str, map(int, at)), "3:7"])
         raise ArgumentError(
-            f"{name}[3:7] is a quaternion (x, y, z, w) of length {worst:.9g}; wanted length 1"
+            f"{name}[{where}] is a quaternion (x, y, z, w) of length {float(norm[at][0]):.9g}; "
+            "wanted length 1"
         )
     if np.any(off > UNIT):
         array = np.array(array)

@@ -35,6 +35,9 @@ from dynx.simd.target import Target, compiler_version, host
 LARGEST = 512 * 2**20
 """Bytes the cache may hold; beyond, what was not used for longest is removed."""
 
+OFF = frozenset({"0", "no", "off", "false"})
+"""What ``DYNX_CACHE`` is set to where nothing shall be kept."""
+
 _SUFFIX = ".kernel"
 _MAGIC = b"dynx kernel 1\n"
 _DIGEST = 32
@@ -103,7 +106,7 @@ def source_hash(*sources: Path) -> str:
 
 def _folder() -> Path | None:
     """Where kernels are kept, made if need be; None where the cache is off."""
-    if os.environ.get("DYNX_CACHE") == "0":
+    if os.environ.get("DYNX_CACHE", "").strip().lower() in OFF:
         return None
     given = os.environ.get("DYNX_CACHE_DIR")
     folder = (Path(given) if given else platformdirs.user_cache_path("dynx")) / "kernels"

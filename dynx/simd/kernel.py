@@ -19,6 +19,9 @@ PART = 1.2e7
 """Least work of a part that is worth handing to another thread, in bytes of code times groups of
 samples: about 150 microseconds. Handing parts out costs 20, waking a thread as much again."""
 
+LONGEST_PART = 1e10
+"""Most work of a part, in the same units: some tenths of a second."""
+
 PARTS_PER_THREAD = 4
 """More parts than threads, so that a thread which the system held up does not hold up the rest."""
 
@@ -90,10 +93,11 @@ class Kernel:
             # One sample alone is evaluated in every lane.
             words += [array.ctypes.data, array.strides[0] if n > 1 else 0]
         groups = n // lanes
-        parts = 1
+        work = groups * len(self.image.code)
+        # Ctrl-C is heard between two parts.
+        parts = max(1, min(int(work / LONGEST_PART) + 1, groups))
         if threads > 1:
-            worth = int(groups * len(self.image.code) / PART)
-            parts = max(1, min(worth, threads * PARTS_PER_THREAD, groups))
+            parts = max(parts, min(int(work / PART), threads * PARTS_PER_THREAD, groups))
         arguments = np.empty((parts, len(words)), dtype=np.int64)
         arguments[:] = words
         if parts > 1:

@@ -14,6 +14,8 @@ from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import suppress
 from functools import cache
 from itertools import count
+from operator import index
+from typing import SupportsIndex
 
 from dynx.errors import ArgumentError, shown
 
@@ -35,9 +37,9 @@ def checked_threads(threads: object) -> int:
     """A number of threads: that given, or as many as there are cores for None; else ArgumentError."""
     if threads is None:
         return cores()
-    if isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
+    if isinstance(threads, bool) or not isinstance(threads, SupportsIndex) or index(threads) < 1:
         raise ArgumentError(f"threads is {shown(threads)}; wanted a whole number above 0, or None for all")
-    return threads
+    return index(threads)
 
 
 def run_parts(task: Callable[[int], object], parts: int, threads: int) -> None:

@@ -2,7 +2,7 @@
 
 The algorithms of `dynx.rbd` are written once and evaluated on several kinds of number. NumPy's
 operators already dispatch on the elements of an object array; its ``sin`` does so only where the
-element has a method of that name. These three functions close that gap.
+element has a method of that name. The functions here close that gap.
 """
 
 from __future__ import annotations
@@ -31,6 +31,22 @@ def cos(x: Array) -> Array:
 def sqrt(x: Array) -> Array:
     """Square root of each element."""
     return _elementwise("sqrt", x)
+
+
+def clipped(x: Array, limit: Array) -> Array:
+    """Each element cut to -limit and limit (the same number of them, or one); infinite is no limit."""
+    x = np.asarray(x)
+    if x.dtype != object:
+        return np.asarray(np.minimum(np.maximum(x, -limit), limit))
+
+    def one(element: Any, most: Any) -> Any:
+        if np.isinf(most):
+            return element
+        if hasattr(element, "maximum"):
+            return element.maximum(-most).minimum(most)
+        return min(max(element, -most), most)
+
+    return np.asarray(np.frompyfunc(one, 2, 1)(x, limit), dtype=object)
 
 
 def along(x: Any) -> Array:

@@ -95,7 +95,7 @@ def test_a_quaternion_must_have_length_one(quaternion: tuple[float, ...]) -> Non
     q = FLOATING.model.neutral()
     q[3:7] = quaternion
     for wrong in (q, np.stack([FLOATING.model.neutral(), q])):
-        with pytest.raises(ArgumentError, match=r"q\[3:7\] is a quaternion.*wanted length 1"):
+        with pytest.raises(ArgumentError, match=r"q\[(\d, )?3:7\] is a quaternion.*wanted length 1"):
             FLOATING.gravity_torque(wrong)
 
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
+import dynx
 from dynx.backends.compiled import CompiledBackend
 from dynx.backends.compiled_call import FEW
 from dynx.errors import ArgumentError, NotFiniteError, ShapeError, SingularMassMatrixError
@@ -92,6 +94,40 @@ def test_a_configuration_without_an_acceleration() -> None:
     model = Model.build("slides", links, joints)
     engine, ask = made(model), np.zeros(3)
     for q in (np.zeros(3), np.zeros((4, 3)), np.zeros((FEW + 4, 3))):
-        with pytest.raises(SingularMassMatrixError, match="at this configuration"):
+        with pytest.raises(SingularMassMatrixError, match=r"at this configuration|at sample"):
             engine.forward_dynamics(q, ask, ask)
     assert np.isfinite(engine.forward_dynamics(np.array([0.0, 1.0, 0.0]), ask, ask)).all()
+
+
+def test_which_sample_is_at_fault() -> None:
+    model = dynx.load("ur5", base="floating")
+    q = np.tile(model.neutral(), (40, 1))
+    q[37, 3:7] = 2.0
+    with pytest.raises(ArgumentError, match=r"q\[37, 3:7\] is a quaternion .* of length 4"):
+        made(model).gravity_torque(q)
+    arm = dynx.load("ur5")
+    heavy = dynx.parametric(arm, links=["wrist_3_link"])
+    parameters = np.tile(heavy.parameters.defaults, (10, 1))
+    parameters[4] = 0.0
+    with pytest.raises(SingularMassMatrixError, match=r"at sample \[4\]"):
+        heavy.forward_dynamics(np.zeros((10, 6)), np.zeros(6), np.zeros(6), parameters)
+
+
+@pytest.mark.parametrize("n", [5, FEW + 5])
+def test_unchecked_numbers_that_are_none_spoil_their_own_sample_only(n: int) -> None:
+    model = dynx.load("ur5")
+    q = np.zeros((n, 6))
+    q[3, 2] = np.nan
+    with dynx.backend("compiled", model, validate=False) as engine:
+        a = engine.forward_dynamics(q, np.zeros(6), np.zeros(6))
+    assert np.isnan(a[3]).all()
+    assert np.isfinite(np.delete(a, 3, axis=0)).all()
+
+
+def test_what_is_no_model_is_said_so() -> None:
+    name: Any = "panda"
+    for make in (dynx.Derivatives, dynx.parametric):
+        with pytest.raises(ArgumentError, match=r"wanted a Model, such as dynx.load\('panda'\)"):
+            make(name)
+    with pytest.raises(ArgumentError, match="wanted a list of names"):
+        dynx.parametric(dynx.load("ur5"), links="wrist_3_link")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from tests.faults.catalogue_agreement import AGREEMENT_FAULTS
+from tests.faults.catalogue_control import CONTROL_FAULTS
 from tests.faults.catalogue_doctor import DOCTOR_FAULTS
 from tests.faults.catalogue_drake import DRAKE_FAULTS
 from tests.faults.catalogue_ik import IK_FAULTS
@@ -16,6 +17,7 @@ from tests.faults.catalogue_reader import READER_FAULTS
 from tests.faults.catalogue_rules import RULES_FAULTS
 from tests.faults.catalogue_simd import SIMD_FAULTS
 from tests.faults.catalogue_spatial import SPATIAL_FAULTS
+from tests.faults.catalogue_trajectory import TRAJECTORY_FAULTS
 from tests.faults.fault import Fault
 
 FAULTS_BY_AREA: dict[str, tuple[Fault, ...]] = {
@@ -33,5 +35,7 @@ FAULTS_BY_AREA: dict[str, tuple[Fault, ...]] = {
     "rules": RULES_FAULTS,
     "doctor": DOCTOR_FAULTS,
     "simd": SIMD_FAULTS,
+    "trajectory": TRAJECTORY_FAULTS,
+    "control": CONTROL_FAULTS,
 }
 FAULTS: tuple[Fault, ...] = tuple(fault for faults in FAULTS_BY_AREA.values() for fault in faults)

@@ -1,0 +1,52 @@
+"""Computed torque: inverse dynamics of an acceleration that leads the error to zero."""
+
+from __future__ import annotations
+
+from numpy.typing import ArrayLike
+
+from dynx.backends import Backend
+from dynx.control.base import Measured, ModelBased
+from dynx.control.gains import feedback_gains
+from dynx.model import Model
+from dynx.spatial.scalar import Array, Floats
+from dynx.trajectory.base import Setpoint
+
+
+class ComputedTorque(ModelBased[None]):
+    """tau = ID(q, v, a* + kd (v* - v) + kp (q* - q)).
+
+    With the right model the error of each coordinate obeys e'' + kd e' + kp e = 0 and knows nothing of
+    the others (Spong, Hutchinson and Vidyasagar, Robot Modeling and Control, section 8.3). In steps of
+    dt the error does not vanish: about dt a* kd / (2 kp) remains, which `DiscreteComputedTorque` removes.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        *,
+        kp: ArrayLike | None = None,
+        kd: ArrayLike | None = None,
+        natural_frequency: ArrayLike | None = None,
+        damping_ratio: ArrayLike = 1.0,
+        backend: str | Backend = "pinocchio",
+    ) -> None:
+        """Gains `kp` [1/s^2] and `kd` [1/s], or `natural_frequency` [rad/s] and `damping_ratio`.
+
+        One number, or one for each coordinate. Raises GainError.
+        """
+        super().__init__(model, backend)
+        self.kp, self.kd = feedback_gains(model.nv, kp, kd, natural_frequency, damping_ratio)
+
+    def torque(self, measured: Measured, setpoint: Setpoint, memory: None) -> tuple[Floats, None]:
+        """The torque (nv,)."""
+        _, q, v = measured
+        a = commanded_acceleration(q, v, *setpoint, self.kp, self.kd)
+        return self._dynamics.inverse_dynamics(q, v, a), None
+
+
+def commanded_acceleration(
+    q: Array, v: Array, q_wanted: Array, v_wanted: Array, a_wanted: Array, kp: Array, kd: Array
+) -> Array:
+    """a* + kd (v* - v) + kp (q* - q), for arrays of any scalar."""
+    a: Array = a_wanted + kd * (v_wanted - v) + kp * (q_wanted - q)
+    return a

@@ -1,0 +1,62 @@
+"""Operational-space control: a frame follows its reference as a unit mass would, the rest keeps a posture."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dynx.backends import Backend
+from dynx.control.base import Measured
+from dynx.control.computed_torque import commanded_acceleration
+from dynx.control.gains import checked_gain, feedback_gains
+from dynx.control.task_space import TaskSpace
+from dynx.model import Model
+from dynx.spatial.scalar import Floats
+from dynx.trajectory.base import Setpoint
+
+
+class OperationalSpace(TaskSpace[None]):
+    """Computed torque in the space of a frame (Khatib 1987; Siciliano et al., Robotics, section 8.6.2).
+
+    The frame's error e obeys e'' + kd e' + kp e = 0. Joint accelerations that leave the frame alone draw
+    the posture to the setpoint, by the projector of the dynamically consistent inverse
+    J# = M^-1 J' (J M^-1 J' + damping^2)^-1. `damping` keeps the torque finite near singular postures, at
+    the price of an error there.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        frame: str,
+        *,
+        kp: ArrayLike | None = None,
+        kd: ArrayLike | None = None,
+        natural_frequency: ArrayLike | None = None,
+        damping_ratio: ArrayLike = 1.0,
+        posture_kp: ArrayLike = 0.0,
+        posture_kd: ArrayLike = 1.0,
+        damping: float = 1e-3,
+        backend: str | Backend = "pinocchio",
+    ) -> None:
+        """Gains of the frame (6,), linear then angular, or one number; of the posture (nv,).
+
+        Units as those of `ComputedTorque`. Raises GainError, UnknownNameError for the frame.
+        """
+        super().__init__(model, frame, backend)
+        self.kp, self.kd = feedback_gains(6, kp, kd, natural_frequency, damping_ratio)
+        self.posture_kp = checked_gain("posture_kp", posture_kp, model.nv)
+        self.posture_kd = checked_gain("posture_kd", posture_kd, model.nv)
+        self._ridge = float(checked_gain("damping", damping, 1, per="")[0]) ** 2 * np.eye(6)
+
+    def torque(self, measured: Measured, setpoint: Setpoint, memory: None) -> tuple[Floats, None]:
+        """The torque (nv,)."""
+        _, q, v = measured
+        engine, frame = self._engine, self.frame
+        error = self._error(measured, setpoint)
+        wanted = engine.frame_acceleration(*setpoint, frame) + self.kd * error.twist + self.kp * error.pose
+        left = wanted - engine.jacobian_derivative(q, v, frame) @ v
+        posture = commanded_acceleration(q, v, *setpoint, self.posture_kp, self.posture_kd)
+        J = error.jacobian
+        inverse = np.linalg.solve(engine.mass_matrix(q), J.T)
+        a = posture + inverse @ np.linalg.solve(J @ inverse + self._ridge, left - J @ posture)
+        return self._dynamics.inverse_dynamics(q, v, a), None

@@ -1,0 +1,115 @@
+"""What many rollouts came to."""
+
+from __future__ import annotations
+
+import os
+import zipfile
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dynx.errors import ArgumentError, NotInstalledError, shown
+from dynx.spatial.scalar import Floats
+
+SCHEMA = "dynx.rollouts/1"
+"""What the file says it is."""
+
+
+@dataclass(frozen=True, eq=False)
+class BatchRollouts:
+    """The outcome of n rollouts, one in each row; rows that were not done are NaN.
+
+    Errors are those of the joints' positions at the ends of all steps, against the reference there.
+    The record has the states after every `record_every` steps, and the torque that led there.
+    """
+
+    joint_names: Sequence[str]
+    dt: float
+    q: Floats  # (n, nv), at the end
+    v: Floats  # (n, nv), at the end
+    max_error: Floats  # (n, nv)
+    rms_error: Floats  # (n, nv)
+    diverged: Floats  # (n,), the time [s] by which a rollout was seen to diverge; NaN if it did not
+    done: Any  # (n,) bool
+    t: Floats  # (kept,), the times of the record [s]
+    q_record: Floats  # (n, kept, nv)
+    v_record: Floats  # (n, kept, nv)
+    tau_record: Floats  # (n, kept, nv)
+
+    def __len__(self) -> int:
+        return len(self.q)
+
+    @property
+    def worst(self) -> Floats:
+        """The largest error of any joint at any time (n,); infinite where a rollout diverged."""
+        worst = np.max(self.max_error, axis=1, initial=0.0)
+        return np.where(np.isnan(self.diverged), worst, np.where(self.done, np.inf, np.nan))
+
+    def quantiles(self, levels: Sequence[float] = (0.05, 0.5, 0.95)) -> Floats:
+        """Of `worst`, over the rollouts that were done: (len(levels),). NaN if none was."""
+        worst = self.worst[self.done]
+        if not len(worst):
+            return np.full(len(levels), np.nan)
+        return np.asarray(np.quantile(worst, levels, method="inverted_cdf"))
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write a ``.npz`` that `load` reads. Raises ArgumentError for another name."""
+        if Path(path).suffix != ".npz":
+            raise ArgumentError(f"rollouts are saved as .npz, not as {shown(Path(path).name)}")
+        arrays: dict[str, Any] = {field.name: np.asarray(getattr(self, field.name)) for field in fields(self)}
+        np.savez(path, schema=SCHEMA, **arrays)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> BatchRollouts:
+        """Read what `save` wrote. Raises ArgumentError for any other file."""
+        try:
+            with np.load(path, allow_pickle=False) as file:
+                entries = {name: file[name] for name in file.files}
+        except (OSError, ValueError, zipfile.BadZipFile) as error:
+            raise ArgumentError(f"{os.fspath(path)} cannot be read as rollouts: {error}") from error
+        names = [field.name for field in fields(cls)]
+        if str(entries.get("schema")) != SCHEMA or not set(names) <= set(entries):
+            raise ArgumentError(f"{os.fspath(path)} does not hold {SCHEMA!r}")
+        arrays: dict[str, Any] = {name: entries[name] for name in names}
+        arrays |= {"joint_names": tuple(entries["joint_names"].tolist()), "dt": float(entries["dt"])}
+        return cls(**arrays)
+
+    def plot(self, path: str | os.PathLike[str] | None = None) -> Any:
+        """A `matplotlib.figure.Figure`: how many rollouts stay below an error, and each joint's errors.
+
+        Raises NotInstalledError without matplotlib (``pip install 'dynx[plot]'``).
+        """
+        try:
+            from matplotlib.figure import Figure
+        except ImportError as error:
+            raise NotInstalledError("a plot needs matplotlib: pip install 'dynx[plot]'") from error
+        figure = Figure(figsize=(7.0, 6.0), layout="constrained")
+        upper, lower = figure.subplots(2, 1)
+        worst = np.sort(self.worst[np.isfinite(self.worst)])
+        upper.step(
+            worst, np.arange(1, len(worst) + 1) / max(int(self.done.sum()), 1), where="post", color="C0"
+        )
+        upper.set_ylim(0.0, 1.02)
+        upper.set_xlabel("largest error of any joint [rad or m]")
+        upper.set_ylabel("share of rollouts below")
+        sound = self.done & np.isnan(self.diverged)
+        lower.boxplot(
+            self.max_error[sound], tick_labels=list(self.joint_names), whis=(5, 95), showfliers=False
+        )
+        lower.set_ylabel("largest error [rad or m]")
+        lower.tick_params(axis="x", rotation=30)
+        for axis in (upper, lower):
+            axis.grid(visible=True, color="0.9")
+        lost = int((~np.isnan(self.diverged)).sum())
+        figure.suptitle(
+            f"{int(self.done.sum())} of {len(self)} rollouts" + (f", {lost} diverged" if lost else "")
+        )
+        if path is not None:
+            figure.savefig(path, dpi=200)
+        return figure
+
+    def __repr__(self) -> str:
+        return f"<BatchRollouts: {int(np.sum(self.done))} of {len(self)} done>"

@@ -1,0 +1,77 @@
+"""When things happen: physics steps, control steps, and how late measurements arrive."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dynx.errors import ArgumentError, shown
+from dynx.spatial.scalar import Floats
+
+WHOLE = 1e-9
+"""How far from a whole number a ratio of two times may be, for rounding."""
+
+
+@dataclass(frozen=True)
+class Clock:
+    """Steps of `dt` [s], counted and never added up, so that step k is at k dt to rounding."""
+
+    dt: float
+    n_steps: int
+    steps_per_control: int
+    delay_steps: int
+
+    @classmethod
+    def of(cls, dt: float, duration: float, control_dt: float | None, delay: float) -> Clock:
+        """Raises ArgumentError for times that are none, or no multiples of `dt`."""
+        dt = positive("dt", dt)
+        duration = positive("duration", duration)
+        control = dt if control_dt is None else positive("control_dt", control_dt)
+        if not isinstance(delay, int | float) or not 0.0 <= delay < np.inf:
+            raise ArgumentError(f"delay is {shown(delay)}; wanted seconds, 0 or more")
+        return cls(
+            dt,
+            multiple("duration", duration, dt),
+            multiple("control_dt", control, dt),
+            multiple("delay", delay, dt) if delay else 0,
+        )
+
+    @property
+    def n_controls(self) -> int:
+        """How often the controller is asked."""
+        return -(-self.n_steps // self.steps_per_control)
+
+    @property
+    def control_dt(self) -> float:
+        """The time between two answers of the controller [s]."""
+        return self.steps_per_control * self.dt
+
+    def times(self) -> Floats:
+        """The times of all steps, the end included (n_steps + 1,) [s]."""
+        return np.arange(self.n_steps + 1, dtype=np.float64) * self.dt
+
+    def control_times(self, lead: int) -> Floats:
+        """The times of the setpoints that the controller is handed (n_controls,) [s]."""
+        steps = (np.arange(self.n_controls) + lead) * self.steps_per_control
+        return steps.astype(np.float64) * self.dt
+
+
+def positive(name: str, seconds: object) -> float:
+    """A positive number of seconds as a float, or an ArgumentError."""
+    if isinstance(seconds, int | float | np.integer | np.floating) and not isinstance(seconds, bool):
+        number = float(seconds)
+        if 0.0 < number < np.inf:
+            return number
+    raise ArgumentError(f"{name} is {shown(seconds)}; wanted a positive number of seconds")
+
+
+def multiple(name: str, seconds: float, dt: float) -> int:
+    """How many steps of `dt` a time is, or an ArgumentError that names the nearest one that is whole."""
+    steps = round(seconds / dt)
+    if steps < 1 or abs(seconds / dt - steps) > WHOLE * steps:
+        nearest = max(1, steps) * dt
+        raise ArgumentError(
+            f"{name} is {seconds:.12g} s, which is no multiple of dt = {dt:.12g} s; {nearest:.12g} s would be"
+        )
+    return steps

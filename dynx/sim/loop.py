@@ -1,0 +1,169 @@
+"""The closed loop: measure, command, cut to the limits, step, record.
+
+All checks that can be made before are made before (`dynx.sim.simulation`); what is left inside is what
+only the loop can see: a torque that is none, and a state that runs away.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import hypot, isfinite
+from typing import Any
+
+import numpy as np
+
+from dynx.control.base import Controller, Measured
+from dynx.control.engine_motors import EngineMotor
+from dynx.errors import ControlError, DivergedError
+from dynx.sim.clock import Clock
+from dynx.sim.plants import Plant
+from dynx.sim.sensors import Sensors
+from dynx.sim.stops import Stops
+from dynx.spatial.scalar import Floats, clipped
+from dynx.trajectory.base import Setpoint
+
+FLOAT64 = np.dtype(np.float64)
+
+RUNAWAY = 1e8
+"""Speed [rad/s or m/s] beyond which nothing can be learnt from a simulation."""
+
+
+@dataclass
+class Record:
+    """What happened, as it happens: states, accelerations, and arrays of what acted.
+
+    A plant makes new arrays in each step, so they are kept as they are; a controller may hand out the
+    same one again, so torques are copied.
+    """
+
+    q: list[Floats]
+    v: list[Floats]
+    a: list[Floats]
+    tau: Floats
+    saturated: np.ndarray[Any, np.dtype[np.bool_]]
+
+    @classmethod
+    def begin(cls, q: Floats, v: Floats, n: int) -> Record:
+        """For n steps from the state (q, v)."""
+        return cls([q], [v], [], np.empty((n, len(v))), np.zeros((n, len(v)), dtype=bool))
+
+    @property
+    def steps(self) -> int:
+        """How many steps were taken."""
+        return len(self.a)
+
+
+@dataclass(frozen=True)
+class Loop:
+    """One controller on one plant; a controller of None gives no torque."""
+
+    plant: Plant
+    controller: Controller[Any] | None
+    setpoints: list[Setpoint]
+    clock: Clock
+    sensors: Sensors
+    limit: Floats | None
+    stops: Stops | None
+
+    def run(self, record: Record) -> None:
+        """From the state in row `record.steps` to the end.
+
+        Raises DivergedError and ControlError, with the steps before in `record`.
+        """
+        plant, controller, record_tau = self.plant, self.controller, record.tau
+        per_control, dt, limit = self.clock.steps_per_control, self.clock.dt, self.limit
+        Q, V, A = record.q, record.v, record.a
+        begin = record.steps
+        memory = self._remembered(record)
+        plant.reset(Q[begin].copy(), V[begin].copy())
+        q, v = Q[begin].copy(), V[begin].copy()
+        tau, flags, command = self._held(record)
+        sensors = None if self.sensors.plain else self.sensors
+        motors = controller if isinstance(controller, EngineMotor) else None
+        setpoints, stops, shape = self.setpoints, self.stops, (plant.model.nv,)
+        step = plant.step
+        # The next step at which the controller is asked; never, if there is none.
+        due = -1 if controller is None else -(-begin // per_control) * per_control
+        for k in range(begin, self.clock.n_steps):
+            t = k * dt
+            if k == due and controller is not None:
+                due += per_control
+                measured = Measured(t, q, v) if sensors is None else sensors(k, Q, V)
+                setpoint = setpoints[k // per_control]
+                try:
+                    if motors is not None:
+                        command = motors.command(measured, setpoint)
+                    else:
+                        tau, memory = controller.torque(measured, setpoint, memory)
+                except Exception as error:
+                    raise self._control_failed(k, record, f"{type(error).__name__}: {error}") from error
+                if motors is None:
+                    if type(tau) is not np.ndarray or tau.shape != shape or tau.dtype is not FLOAT64:
+                        raise self._control_failed(k, record, f"no float64 array {shape} but {tau!r:.80}")
+                    if not isfinite(sum(tau.tolist())):
+                        raise self._control_failed(k, record, f"a torque that is not finite: {tau!r:.120}")
+                    if limit is not None:
+                        wanted, tau = tau, clipped(tau, limit)
+                        flags = tau != wanted
+            try:
+                if command is None:
+                    q, v, a = step(t, tau)
+                else:
+                    q, v, a, tau = plant.step_motors(t, command)
+                if stops is not None:
+                    stopped = stops(q, v)
+                    if stopped is not None:
+                        q, v = stopped
+                        plant.reset(q, v)
+            except Exception as error:
+                # Also what an engine raises: its hooks are called bare (`dynx.control.single_sample`).
+                raise self._diverged(k, record, f"{type(error).__name__}: {error}") from error
+            if not hypot(*v.tolist()) < RUNAWAY:
+                raise self._diverged(k, record, "the velocity is no number or beyond all bounds")
+            record_tau[k] = tau
+            Q.append(q)
+            V.append(v)
+            A.append(a)
+            if limit is not None:
+                record.saturated[k] = flags
+
+    def _remembered(self, record: Record) -> Any:
+        """The controller's memory at the step where the loop begins.
+
+        It is a function of what was measured until then, so it is not recorded but found again.
+        """
+        if self.controller is None:
+            return None
+        memory = self.controller.start()
+        if memory is None or isinstance(self.controller, EngineMotor):
+            return memory
+        for number in range(-(-record.steps // self.clock.steps_per_control)):
+            step = number * self.clock.steps_per_control
+            measured = self.sensors(step, record.q, record.v)
+            _, memory = self.controller.torque(measured, self.setpoints[number], memory)
+        return memory
+
+    def _held(self, record: Record) -> tuple[Floats, Any, Any]:
+        """Torque, flags and command that the last control step before the beginning left."""
+        begin = record.steps
+        nothing = np.zeros(self.plant.model.nv)
+        if begin % self.clock.steps_per_control == 0:
+            return nothing, False, None
+        if isinstance(self.controller, EngineMotor):
+            number = begin // self.clock.steps_per_control
+            measured = self.sensors(number * self.clock.steps_per_control, record.q, record.v)
+            return nothing, False, self.controller.command(measured, self.setpoints[number])
+        return record.tau[begin - 1].copy(), record.saturated[begin - 1].copy(), None
+
+    def _diverged(self, k: int, record: Record, why: str) -> DivergedError:
+        t, state = k * self.clock.dt, (record.q[k].copy(), record.v[k].copy())
+        return DivergedError(
+            f"the simulation diverged in step {k}, at {t:.6g} s: {why}", time=t, step=k, state=state
+        )
+
+    def _control_failed(self, k: int, record: Record, why: str) -> ControlError:
+        t, state = k * self.clock.dt, (record.q[k].copy(), record.v[k].copy())
+        name = "" if self.controller is None else self.controller.name
+        return ControlError(
+            f"controller {name} gave in step {k}, at {t:.6g} s: {why}", time=t, step=k, state=state
+        )

@@ -1,0 +1,92 @@
+"""What makes the plant another robot than the one that the controller knows: a payload, wrong masses."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dynx.errors import ArgumentError, shown
+from dynx.model import Model
+from dynx.model.configuration import checked_array, checked_vector
+from dynx.model.elements import Inertial, Joint, Link, Pose
+
+
+@dataclass(frozen=True)
+class Payload:
+    """A rigid body in the robot's hand.
+
+    `mass` [kg], `center` (3,) [m] of mass in the axes of `frame`, central `inertia` (3, 3) [kg m^2] in
+    those axes too; a point by default.
+    """
+
+    frame: str
+    mass: float
+    center: ArrayLike = (0.0, 0.0, 0.0)
+    inertia: ArrayLike | None = None
+
+
+MassScale = float | Mapping[str, float]
+"""One factor for all links, or one for each of some links."""
+
+
+def plant_model(model: Model, payload: Payload | Sequence[Payload] | None, mass_scale: MassScale) -> Model:
+    """`model` with masses and inertia tensors scaled, and then the payloads welded to their frames.
+
+    Raises UnknownNameError for a frame or link that is not there, ArgumentError for a factor or a
+    payload that cannot be.
+    """
+    payloads = [] if payload is None else [payload] if isinstance(payload, Payload) else list(payload)
+    if not payloads and mass_scale == 1.0:
+        return model
+    factors = {name: _factor(name, x) for name, x in _by_link(model, mass_scale).items()}
+    links = [
+        link if link.inertial is None else replace(link, inertial=_scaled(link.inertial, factors[link.name]))
+        for link in model.links
+    ]
+    joints = list(model.joints)
+    for number, load in enumerate(payloads):
+        frame = model.frames[model.frame_index(load.frame)]
+        name = _free(f"payload {number}", {*model.frame_names, *(joint.name for joint in model.joints)})
+        links.append(Link(name, _inertial(load)))
+        joints.append(Joint(name, "fixed", frame.link, name, origin=frame.placement))
+    built = Model.build(model.name, links, joints, base=model.base, gravity=model.gravity, notes=model.notes)
+    return replace(built, extra_frames=model.extra_frames, source=model.source)
+
+
+def _by_link(model: Model, mass_scale: MassScale) -> dict[str, float]:
+    if not isinstance(mass_scale, Mapping):
+        return dict.fromkeys((link.name for link in model.links), mass_scale)
+    for name in mass_scale:
+        model.link(name)
+    return {link.name: mass_scale.get(link.name, 1.0) for link in model.links}
+
+
+def _factor(link: str, x: object) -> float:
+    if isinstance(x, int | float | np.number) and not isinstance(x, bool) and 0.0 < float(x) < np.inf:
+        return float(x)
+    raise ArgumentError(f"mass_scale of {shown(link)} is {shown(x)}; wanted a positive factor")
+
+
+def _scaled(inertial: Inertial, factor: float) -> Inertial:
+    numbers = {name: factor * getattr(inertial, name) for name in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")}
+    return replace(inertial, mass=factor * inertial.mass, **numbers)
+
+
+def _inertial(payload: Payload) -> Inertial:
+    if not isinstance(payload.mass, int | float) or not 0.0 <= payload.mass < np.inf:
+        raise ArgumentError(f"the mass of a payload is {shown(payload.mass)}; wanted kilograms, 0 or more")
+    x, y, z = checked_vector("center", payload.center).tolist()
+    tensor = np.zeros((3, 3)) if payload.inertia is None else checked_array("inertia", payload.inertia, 3)
+    if tensor.shape != (3, 3) or not np.array_equal(tensor, tensor.T):
+        raise ArgumentError("the inertia of a payload is no symmetric matrix (3, 3)")
+    (ixx, ixy, ixz), (_, iyy, iyz), (_, _, izz) = tensor.tolist()
+    return Inertial(float(payload.mass), Pose((x, y, z)), ixx, ixy, ixz, iyy, iyz, izz)
+
+
+def _free(name: str, taken: set[str]) -> str:
+    while name in taken:
+        name += "'"
+    return name

@@ -1,0 +1,130 @@
+"""From one configuration to another: q0 moved along a curve of displacements.
+
+    q(t) = q0 (+) x(t),  v = dx/dt,  a = d2x/dt2
+
+where (+) is `model.integrate`. For joints that is a sum. For a floating base the first six of x are
+always a multiple s(t) of one body twist d: the base moves along the screw exp(s d), and its velocity in
+its own axes is then exactly ds/dt d (Murray, Li and Sastry, A Mathematical Introduction to Robotic
+Manipulation, section 2.3).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dynx.errors import ArgumentError, ShapeError
+from dynx.model import Model
+from dynx.model.configuration import checked_array, checked_entries, checked_q, real_array
+from dynx.spatial.scalar import Floats
+from dynx.trajectory.base import Setpoint, Trajectory, frozen_setpoint
+from dynx.trajectory.curve import Curve
+
+
+@dataclass(frozen=True, eq=False)
+class DisplacementTrajectory(Trajectory):
+    """`start.q` moved along a curve that begins at 0; `floating` is the model of a floating base."""
+
+    curve: Curve
+    floating: Model | None = None
+
+    @property
+    def knots(self) -> Floats:
+        """Where the pieces of the curve meet."""
+        return self.curve.knots
+
+    def inside(self, t: Floats) -> Setpoint:
+        """q0 (+) x and the derivatives of x."""
+        x, v, a = self.curve(t)
+        q = self.start.q + x if self.floating is None else self.floating.integrate(self.start.q, x)
+        return Setpoint(q, v, a)
+
+
+@dataclass(frozen=True, eq=False)
+class Ends:
+    """Where a motion begins and ends, and the displacement (nv,) between: q1 = q0 (+) displacement."""
+
+    q0: Floats
+    q1: Floats
+    displacement: Floats
+    model: Model | None
+
+    @property
+    def nv(self) -> int:
+        """Length of a velocity."""
+        return len(self.displacement)
+
+    @property
+    def floating(self) -> Model | None:
+        """The model if its base floats."""
+        return self.model if self.model is not None and self.model.floating else None
+
+    def name(self, k: int) -> str:
+        """What entry k of a velocity is called in a message."""
+        offset = 6 if self.floating is not None else 0
+        if self.model is None or k < offset:
+            return f"coordinate {k}"
+        return f"joint '{self.model.joint_names[k - offset]}'"
+
+    def velocity(self, name: str, value: ArrayLike | None) -> Floats:
+        """A velocity or an acceleration (nv,) at an end; zeros without one.
+
+        That of a floating base must be zero: its path is one screw, travelled from rest to rest.
+        """
+        if value is None:
+            return np.zeros(self.nv)
+        array = checked_array(name, value, self.nv)
+        if array.ndim != 1:
+            raise ShapeError(f"{name} has shape {array.shape}; wanted ({self.nv},)")
+        if self.floating is not None and array[:6].any():
+            raise ArgumentError(f"{name}[:6] is not 0; a floating base can only go from rest to rest")
+        return array
+
+    def trajectory(
+        self, duration: float, curve: Curve, start: tuple[Floats, Floats], end: tuple[Floats, Floats]
+    ) -> DisplacementTrajectory:
+        """The motion along `curve`, with (v, a) at its ends."""
+        q1 = self.q1
+        if self.floating is not None:
+            # A quaternion and its negative are one attitude: take the one that the motion comes to.
+            arrived = self.floating.integrate(self.q0, self.displacement)
+            if np.dot(arrived[3:7], q1[3:7]) < 0.0:
+                q1 = np.concatenate([q1[:3], -q1[3:7], q1[7:]])
+        return DisplacementTrajectory(
+            duration, frozen_setpoint(self.q0, *start), frozen_setpoint(q1, *end), curve, self.floating
+        )
+
+    def rest_to_rest(self, duration: float, curve: Curve) -> DisplacementTrajectory:
+        """The motion along `curve`, with v and a zero at both ends."""
+        rest = np.zeros(self.nv), np.zeros(self.nv)
+        return self.trajectory(duration, curve, rest, rest)
+
+
+def checked_ends(q0: ArrayLike, q1: ArrayLike, model: Model | None) -> Ends:
+    """Two configurations (nq,); without a model every coordinate is a joint's.
+
+    Raises ShapeError, DTypeError, NotFiniteError, and ArgumentError for a quaternion that is not of
+    unit length.
+    """
+    first, last = (configuration(name, q, model) for name, q in (("q0", q0), ("q1", q1)))
+    if first.shape != last.shape:
+        raise ShapeError(f"q0 has shape {first.shape} and q1 {last.shape}; wanted the same")
+    displacement = last - first if model is None else model.difference(first, last)
+    return Ends(first, last, checked_entries("the displacement from q0 to q1", displacement), model)
+
+
+def configuration(name: str, q: ArrayLike, model: Model | None) -> Floats:
+    """One configuration: (nq,) of the model, or of any length above 0 without one."""
+    if model is not None and not isinstance(model, Model):
+        raise ArgumentError(f"model is of type {type(model).__name__}; wanted a Model or None")
+    if model is None:
+        array = checked_entries(name, real_array(name, q))
+        wanted = "(nq,)"
+    else:
+        array = checked_q(model, q, name)
+        wanted = f"({model.nq},)"
+    if array.ndim != 1 or not array.size:
+        raise ShapeError(f"{name} has shape {array.shape}; wanted {wanted}")
+    return array

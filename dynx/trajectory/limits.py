@@ -1,0 +1,139 @@
+"""Whether a robot can do a motion: its limits of position, velocity and effort, looked at beforehand."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, nullcontext
+from typing import Literal
+
+import numpy as np
+
+from dynx.backends import Backend
+from dynx.backends import backend as make_backend
+from dynx.errors import ArgumentError, LimitError, LimitViolation, ShapeError, shown
+from dynx.model import Model
+from dynx.spatial.scalar import Floats
+from dynx.trajectory.base import Trajectory
+
+SAMPLES = 500
+"""Evenly spaced times that are looked at, besides both sides of every knot."""
+
+CLOSER = 16
+"""Further times next to the worst of those, on either side."""
+
+WITHIN = 1e-12
+"""A limit is broken by more than this part of it, or of the largest value of the joint: what is planned
+up to a limit is on it to rounding."""
+
+Excess = tuple[Literal["position", "velocity", "effort"], Floats, Floats, Floats]
+"""A quantity, its values (n, nv), the limit that each is nearer to, and by how much they break it."""
+
+
+def check(
+    model: Model,
+    trajectory: Trajectory,
+    *,
+    effort: bool = True,
+    joint_dynamics: bool = False,
+    backend: str | Backend = "pinocchio",
+) -> None:
+    """Raise LimitError if the motion breaks a limit of the model; its `violations` are all of them.
+
+    See `violations` for what is looked at.
+    """
+    found = violations(model, trajectory, effort=effort, joint_dynamics=joint_dynamics, backend=backend)
+    if found:
+        limits = "1 limit" if len(found) == 1 else f"{len(found)} limits"
+        listed = "".join(f"\n  {violation}" for violation in found)
+        raise LimitError(f"the motion breaks {limits} of {model.name}:{listed}", found)
+
+
+def violations(
+    model: Model,
+    trajectory: Trajectory,
+    *,
+    effort: bool = True,
+    joint_dynamics: bool = False,
+    backend: str | Backend = "pinocchio",
+) -> list[LimitViolation]:
+    """Every limit of position, velocity and effort that the motion breaks, joint by joint, each at its worst.
+
+    Effort is inverse dynamics along the motion (with `joint_dynamics`, damping, friction and armature
+    too) by `backend`, a name or a backend of the model; with a floating base that takes the wrench
+    that nothing exerts there, so it is the effort of a robot held by its base. ``effort=False`` leaves
+    it out. Looked at are 500 times, both sides of each knot of the trajectory, and more times around
+    the worst of them.
+
+    Raises ShapeError if the trajectory is not one of this model.
+    """
+    if not isinstance(model, Model):
+        raise ArgumentError(f"model is of type {type(model).__name__}; wanted a Model")
+    if not isinstance(trajectory, Trajectory):
+        raise ArgumentError(f"trajectory is of type {type(trajectory).__name__}; wanted a Trajectory")
+    if (trajectory.nq, trajectory.nv) != (model.nq, model.nv):
+        raise ShapeError(
+            f"the trajectory has nq {trajectory.nq}, nv {trajectory.nv}; "
+            f"{model.name} has nq {model.nq}, nv {model.nv}"
+        )
+    if isinstance(backend, Backend) and backend.model != model:
+        raise ArgumentError(f"backend is one of {shown(backend.model.name)}, not of this model")
+    effort = effort and bool(np.isfinite(model.effort_limit).any())
+    with _opened(backend, model) if effort else nullcontext() as engine:
+        times = _first_times(trajectory)
+        coarse = list(_excesses(model, trajectory, times, engine, joint_dynamics))
+        closer = _closer_times(times, coarse)
+        fine = list(_excesses(model, trajectory, closer, engine, joint_dynamics))
+    times = np.concatenate([times, closer])
+    found = []
+    for (quantity, *near), (_, *far) in zip(coarse, fine, strict=True):
+        value, limit, excess = (np.concatenate(pair) for pair in zip(near, far, strict=True))
+        worst, size = np.argmax(excess, axis=0), np.abs(value).max(axis=0)
+        for k, row in enumerate(worst.tolist()):
+            if excess[row, k] > WITHIN * max(abs(limit[row, k]), size[k]):
+                joint = model.joint_names[k - (6 if model.floating else 0)]
+                number = float(times[row]), float(value[row, k]), float(limit[row, k])
+                found.append((k, LimitViolation(joint, quantity, *number)))
+    return [violation for _, violation in sorted(found, key=lambda entry: entry[0])]
+
+
+def _excesses(
+    model: Model, trajectory: Trajectory, times: Floats, engine: Backend | None, joint_dynamics: bool
+) -> Iterator[Excess]:
+    q, v, a = trajectory(times)
+    joints = slice(7, None) if model.floating else slice(None)
+    base = np.zeros((len(times), 6 if model.floating else 0))
+    q_v = np.concatenate([base, q[:, joints]], axis=1)
+    unbounded = np.full(base.shape[1], np.inf)
+    lower = np.concatenate([-unbounded, model.lower[joints]])
+    upper = np.concatenate([unbounded, model.upper[joints]])
+    yield "position", q_v, *_nearer(q_v, lower, upper)
+    yield "velocity", v, *_nearer(v, -model.velocity_limit, model.velocity_limit)
+    if engine is not None:
+        tau = engine.inverse_dynamics(q, v, a, joint_dynamics=joint_dynamics)
+        yield "effort", tau, *_nearer(tau, -model.effort_limit, model.effort_limit)
+
+
+def _nearer(x: Floats, lower: Floats, upper: Floats) -> tuple[Floats, Floats]:
+    """The limit that x breaks, or comes nearer to, and by how much it is beyond."""
+    over, under = x - upper, lower - x
+    return np.where(over >= under, upper, lower), np.maximum(over, under)
+
+
+def _first_times(trajectory: Trajectory) -> Floats:
+    T = trajectory.duration
+    knots = trajectory.knots
+    times = np.concatenate([np.linspace(0.0, T, SAMPLES), knots, np.nextafter(knots, -np.inf)])
+    return np.unique(np.clip(times, 0.0, T))
+
+
+def _closer_times(times: Floats, coarse: list[Excess]) -> Floats:
+    """Times on both sides of the worst of each joint and quantity."""
+    worst = np.unique(np.concatenate([np.argmax(excess, axis=0) for *_, excess in coarse]))
+    before, after = times[np.maximum(worst - 1, 0)], times[np.minimum(worst + 1, len(times) - 1)]
+    parts = np.linspace(0.0, 1.0, 2 * CLOSER + 1)[1:-1]
+    return np.unique(before[:, None] + parts * (after - before)[:, None])
+
+
+def _opened(backend: str | Backend, model: Model) -> AbstractContextManager[Backend]:
+    """A backend of the model: the caller's own stays open."""
+    return nullcontext(backend) if isinstance(backend, Backend) else make_backend(backend, model)

@@ -1,0 +1,162 @@
+"""The fastest motion between two states under limits of velocity, acceleration and jerk, by Ruckig.
+
+Each joint takes its own jerk-limited profile, as slow as the slowest (Berscheid and Kröger, Jerk-limited
+real-time trajectory generation with arbitrary target states, RSS 2021). Ruckig is asked once; what it found
+is kept as polynomials, so that the trajectory is like any other and needs no Ruckig to be used.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dynx.errors import ArgumentError, NotInstalledError, TrajectoryError
+from dynx.model import Model
+from dynx.spatial.scalar import Floats
+from dynx.trajectory.base import LONGEST, SHORTEST, Trajectory
+from dynx.trajectory.bounds import checked_bound, refuse_unusable, velocity_bound
+from dynx.trajectory.curve import PiecewisePolynomial
+from dynx.trajectory.displacement import Ends, checked_ends
+
+Phase = tuple[float, tuple[float, float, float, float]]
+"""Duration [s], and position, velocity, acceleration and jerk at its beginning."""
+
+
+def time_optimal(
+    q0: ArrayLike,
+    q1: ArrayLike,
+    *,
+    acceleration: ArrayLike,
+    jerk: ArrayLike,
+    velocity: ArrayLike | None = None,
+    v0: ArrayLike | None = None,
+    v1: ArrayLike | None = None,
+    a0: ArrayLike | None = None,
+    a1: ArrayLike | None = None,
+    model: Model | None = None,
+) -> Trajectory:
+    """From the state (`q0`, `v0`, `a0`) to (`q1`, `v1`, `a1`) (nq,) as fast as the limits allow.
+
+    `velocity`, `acceleration` and `jerk` are limits, one number or (nv,), above 0 and finite; without
+    `velocity` it is that of the `model`. v and a are 0 by default. The joints arrive together, but do not
+    stay on a straight line as with `s_curve`; no limit of position is looked at between the ends
+    (`dynx.trajectory.check` does). Only for a fixed base.
+
+    Raises NotInstalledError without the extra ``trajectory``, TrajectoryError where no such motion is
+    found (an end that is faster than the limits, say), ArgumentError for what cannot be used.
+    """
+    ends = checked_ends(q0, q1, model)
+    if ends.floating is not None:
+        raise ArgumentError(f"{ends.floating.name} has a floating base; use s_curve, which follows one screw")
+    limits = {
+        "velocity": velocity_bound(velocity, ends),
+        "acceleration": checked_bound("acceleration", acceleration, ends.nv),
+        "jerk": checked_bound("jerk", jerk, ends.nv),
+    }
+    for name, bound in limits.items():
+        refuse_unusable(name, bound, ends)
+    begin = ends.velocity("v0", v0), ends.velocity("a0", a0)
+    finish = ends.velocity("v1", v1), ends.velocity("a1", a1)
+    _refuse_fast_ends(ends, limits, {"v0": begin[0], "a0": begin[1], "v1": finish[0], "a1": finish[1]})
+    found = _asked(ends, limits, begin, finish)
+    duration = float(found.duration)
+    if duration == 0.0:
+        raise ArgumentError("q0 and q1 are the same, at the same velocity; there is nothing to do")
+    if not SHORTEST <= duration <= LONGEST:
+        raise TrajectoryError(f"it takes {duration:g} s; wanted between {SHORTEST:g} and {LONGEST:g} s")
+    phases = [list(_phases(profile, duration)) for profile in found.profiles[0]]
+    return ends.trajectory(duration, _common_breaks(phases, duration), begin, finish)
+
+
+def _asked(
+    ends: Ends, limits: dict[str, Floats], begin: tuple[Floats, Floats], finish: tuple[Floats, Floats]
+) -> Any:
+    """Ruckig's trajectory, counted from q0."""
+    try:
+        import ruckig
+    except ImportError as error:
+        raise NotInstalledError(
+            f"time_optimal needs Ruckig: pip install 'dynx[trajectory]' ({error})"
+        ) from error
+    question = ruckig.InputParameter(ends.nv)
+    question.current_position, question.target_position = [0.0] * ends.nv, ends.displacement.tolist()
+    question.current_velocity, question.current_acceleration = (x.tolist() for x in begin)
+    question.target_velocity, question.target_acceleration = (x.tolist() for x in finish)
+    question.max_velocity = limits["velocity"].tolist()
+    question.max_acceleration = limits["acceleration"].tolist()
+    question.max_jerk = limits["jerk"].tolist()
+    answer = ruckig.Trajectory(ends.nv)
+    try:
+        result = ruckig.Ruckig(ends.nv).calculate(question, answer)
+    except (ruckig.RuckigError, ValueError) as error:
+        # The second where the result is one of its numbers for failures that has no name.
+        raise TrajectoryError(f"Ruckig finds no motion between these states: {_first_line(error)}") from error
+    if result not in (ruckig.Result.Working, ruckig.Result.Finished):
+        raise TrajectoryError(f"Ruckig finds no motion between these states: {result}")
+    return answer
+
+
+def _phases(profile: Any, duration: float) -> Iterator[Phase]:
+    """The phases of one joint: braking into the limits, the seven of the profile, and rest to the end."""
+    passed = 0.0
+    for part in (profile.brake, profile):
+        states = zip(part.t, part.p, part.v, part.a, part.j, strict=False)
+        for span, *state in states:
+            if span > 0.0:
+                p, v, a, j = state
+                yield span, (p, v, a, j)
+                passed += span
+    if passed < duration:
+        yield duration - passed, (profile.pf, profile.vf, 0.0, 0.0)
+
+
+def _common_breaks(phases: list[list[Phase]], duration: float) -> PiecewisePolynomial:
+    """All joints over the same pieces: the breaks of each are breaks of all."""
+    own = [np.cumsum([0.0] + [span for span, _ in joint]) for joint in phases]
+    breaks = np.unique(np.concatenate([np.minimum(times[:-1], duration) for times in own]))
+    breaks = np.append(breaks[breaks < duration], duration)
+    columns = []
+    for joint, times in zip(phases, own, strict=True):
+        number = np.minimum(np.searchsorted(times, breaks[:-1], side="right") - 1, len(joint) - 1)
+        p, v, a, j = np.array([state for _, state in joint])[number].T
+        s = breaks[:-1] - times[number]
+        columns.append(
+            [
+                p + s * (v + s * (a / 2.0 + s * (j / 6.0))),
+                v + s * (a + s * (j / 2.0)),
+                (a + s * j) / 2.0,
+                j / 6.0,
+            ]
+        )
+    return PiecewisePolynomial(breaks, np.transpose(np.array(columns), (2, 1, 0)))
+
+
+def _refuse_fast_ends(ends: Ends, limits: dict[str, Floats], states: dict[str, Floats]) -> None:
+    for name, value in states.items():
+        quantity = "velocity" if name.startswith("v") else "acceleration"
+        over = np.flatnonzero(np.abs(value) > limits[quantity])
+        if over.size:
+            k = int(over[0])
+            raise TrajectoryError(
+                f"{name} of {ends.name(k)} is {value[k]:g}, beyond its limit of {quantity}, "
+                f"{limits[quantity][k]:g}"
+            )
+    V, J = limits["velocity"], limits["jerk"]
+    for n, after in ((0, 1.0), (1, -1.0)):
+        # The velocity at which the acceleration can be 0: soonest after the beginning, latest before the end.
+        v, a = states[f"v{n}"], states[f"a{n}"]
+        reached = v + after * 0.5 * a * np.abs(a) / J
+        over = np.flatnonzero(np.abs(reached) > V)
+        if over.size:
+            k = int(over[0])
+            raise TrajectoryError(
+                f"v{n} = {v[k]:g} with a{n} = {a[k]:g} of {ends.name(k)} takes a velocity of {reached[k]:g} "
+                f"{'after it' if n == 0 else 'before it'}, beyond its limit, {V[k]:g}"
+            )
+
+
+def _first_line(error: Exception) -> str:
+    return next((line.strip() for line in str(error).splitlines() if line.strip()), type(error).__name__)

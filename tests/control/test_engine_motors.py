@@ -1,0 +1,124 @@
+"""PyBullet's own motors: they move its plant, and let go when a law of torque follows."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dynx.backends import installed_backends
+from dynx.backends.bullet_inertia import ballast_for
+from dynx.backends.bullet_stepping import MotorCommand, SteppingClient
+from dynx.backends.bullet_urdf import bullet_tree
+from dynx.control import PD, ComputedTorque, PDMotor, PositionMotor, TorqueMotor, VelocityMotor
+from dynx.engines.pybullet import bullet
+from dynx.errors import ArgumentError, GainError, UnsupportedFeatureError
+from dynx.model import Model
+from dynx.model.loading import load
+from dynx.model.mechanism import build_mechanism
+from dynx.sim import simulate
+from dynx.spatial.extended import longdouble
+from tests.backends.robots import mixed_robot
+from tests.sim.bars import PLANTS_AGREE, apart, tutorial_motion, tutorial_robot
+
+pytestmark = pytest.mark.skipif("pybullet" not in installed_backends(), reason="PyBullet is not installed")
+
+
+def client_of(robot: Model) -> SteppingClient:
+    mechanism = build_mechanism(robot, longdouble)
+    tree = bullet_tree(mechanism, ballast_for(mechanism), 0)
+    return SteppingClient(bullet(), tree, robot.name, gravity=list(robot.gravity), dt=1e-3)
+
+
+def test_position_and_velocity_motors_follow_a_motion() -> None:
+    robot, motion = tutorial_robot(), tutorial_motion()
+    position = simulate(robot, PositionMotor(robot), motion, plant="pybullet", dt=2e-3)
+    velocity = simulate(robot, VelocityMotor(robot), motion, plant="pybullet", dt=2e-3)
+    # Each step ends at the wanted speed, which is that at its beginning: late by one step.
+    np.testing.assert_allclose(velocity.v[1:], motion(velocity.t[:-1]).v, atol=1e-2)
+    assert np.abs(position.error).max() < 2e-2
+    # Positions drift under a law that does not look at them.
+    assert np.abs(position.error[-1]).max() < np.abs(velocity.error[-1]).max()
+
+
+def test_a_pd_motor_is_the_pd_law() -> None:
+    robot, motion = tutorial_robot(), tutorial_motion()
+    gains = {"kp": [300.0, 300.0, 200.0, 30.0, 30.0, 10.0], "kd": [30.0, 30.0, 20.0, 3.0, 3.0, 1.0]}
+    motor = simulate(robot, PDMotor(robot, **gains), motion, plant="pybullet", duration=0.2)
+    law = simulate(robot, PD(robot, **gains), motion, plant="pybullet", duration=0.2)
+    assert apart(motor.q, law.q) <= PLANTS_AGREE
+    assert apart(motor.tau, law.tau) <= PLANTS_AGREE
+
+
+def test_a_torque_motor_is_the_law_within() -> None:
+    robot, motion = tutorial_robot(), tutorial_motion()
+    law = ComputedTorque(robot, kp=400, kd=40)
+    motor = simulate(robot, TorqueMotor(law), motion, plant="pybullet", duration=0.2)
+    bare = simulate(robot, law, motion, plant="pybullet", duration=0.2)
+    np.testing.assert_array_equal(motor.q, bare.q)
+    assert apart(motor.tau, bare.tau) <= PLANTS_AGREE
+
+
+def test_a_motor_that_may_not_pull_does_not() -> None:
+    robot = tutorial_robot()
+    weak = simulate(robot, PositionMotor(robot, force=0.5), np.zeros(6), plant="pybullet", duration=0.2)
+    assert np.abs(weak.tau).max() == pytest.approx(0.5, rel=1e-9)
+    assert np.abs(weak.error[-1]).max() > 0.1
+
+
+def test_motors_move_joints_whatever_else_acts() -> None:
+    """Friction and pushes reach the plant past the motors, and are not reported as theirs."""
+    robot = tutorial_robot()
+    free = simulate(robot, VelocityMotor(robot), np.zeros(6), plant="pybullet", duration=0.02)
+    damped = simulate(
+        robot, VelocityMotor(robot), np.zeros(6), plant="pybullet", duration=0.02, damping=5.0, v0=np.ones(6)
+    )
+    # The first step stops the arm: the motor gives all that is missing.
+    np.testing.assert_allclose(damped.v[1], 0.0, atol=2e-2)
+    assert np.abs(damped.tau[0]).max() > 10 * np.abs(free.tau[0]).max()
+
+
+@pytest.mark.parametrize("mode", ["POSITION_CONTROL", "VELOCITY_CONTROL"])
+def test_the_tutorial_s_trap(mode: str) -> None:
+    """After a motor was used, torque moves the arm as if there had been none; in the engine it does not."""
+    robot = tutorial_robot()
+    client = client_of(robot)
+    rest, torque = [0.0] * 6, [3.0, 2.0, 1.0, 0.1, 0.1, 0.1]
+    try:
+        client.place(rest, rest, None)
+        client.apply(torque)
+        client.advance()
+        fresh = client.joint_states()[1]
+        client.place(rest, rest, None)
+        client.command(MotorCommand(mode, positions=rest, velocities=rest))
+        client.advance()
+        client.place(rest, rest, None)
+        client.add(torque)
+        client.advance()
+        trapped = client.joint_states()[1]
+        client.place(rest, rest, None)
+        client.apply(torque)
+        client.advance()
+        released = client.joint_states()[1]
+    finally:
+        client.close()
+    assert np.abs(trapped).max() < 0.1 * np.abs(fresh).max()
+    assert released == fresh
+
+
+def test_what_motors_cannot_be() -> None:
+    robot = tutorial_robot()
+    with pytest.raises(UnsupportedFeatureError, match="mimic"):
+        PositionMotor(mixed_robot(mimic=True))
+    with pytest.raises(GainError, match="position_gain"):
+        PositionMotor(robot, position_gain=-1.0)
+    with pytest.raises(UnsupportedFeatureError, match="armature"):
+        simulate(robot, PositionMotor(robot), np.zeros(6), plant="pybullet", duration=0.01, armature=0.1)
+    floating = load("solo12", base="floating")
+    moved = simulate(floating, PositionMotor(floating), floating.neutral(), plant="pybullet", duration=0.02)
+    assert np.abs(moved.error[:, 6:]).max() < 1e-3
+    client = client_of(robot)
+    try:
+        with pytest.raises(ArgumentError, match="one of POSITION_CONTROL"):
+            client.command(MotorCommand("MAGIC"))
+    finally:
+        client.close()

@@ -1,0 +1,85 @@
+"""Faults in control laws and in simulation."""
+
+from __future__ import annotations
+
+from tests.faults.fault import Fault
+
+LAWS = "tests/control/test_laws.py"
+BEHAVIOUR = "tests/control/test_behaviour.py"
+AGREE = "tests/sim/test_plants_agree.py"
+OPTIONS = "tests/sim/test_options.py"
+PHYSICS = "tests/sim/test_physics.py"
+RESUME = "tests/sim/test_resume.py"
+
+CONTROL_FAULTS = (
+    Fault(
+        "control_discrete_law_without_the_velocity",
+        "dynx.control.discrete_computed_torque",
+        right="return ((q_next - q) / dt - v) / dt",
+        wrong="return (q_next - q) / dt / dt",
+        caught_by=f"{LAWS}::test_the_discrete_law_lands_on_its_setpoint",
+    ),
+    Fault(
+        "control_integral_winds_up",
+        "dynx.control.pid",
+        right="self._dt * self.ki * error + self._share * (tau - wanted)",
+        wrong="self._dt * self.ki * error",
+        caught_by=f"{BEHAVIOUR}::test_an_integral_does_not_wind_up_while_the_motor_is_at_its_limit",
+    ),
+    Fault(
+        "control_damping_ratio_without_its_two",
+        "dynx.control.gains",
+        right="return w * w, 2.0 * checked_gain",
+        wrong="return w * w, checked_gain",
+        caught_by="tests/control/test_gains.py::test_natural_frequency_and_damping_are_those_of_the_error",
+    ),
+    Fault(
+        "sim_bullet_motors_are_not_released",
+        "dynx.backends.bullet_stepping",
+        right="        if self._motors_hold:\n",
+        wrong="        if False:\n",
+        caught_by="tests/control/test_engine_motors.py::test_the_tutorial_s_trap",
+    ),
+    Fault(
+        "sim_explicit_euler",
+        "dynx.sim.integrators",
+        right="        v = v + h * a\n        return q + h * v, v, a",
+        wrong="        return q + h * v, v + h * a, a",
+        caught_by="tests/sim/test_tracking.py::test_the_discrete_law_leaves_no_error",
+    ),
+    Fault(
+        "sim_floating_step_at_the_link_s_origin",
+        "dynx.sim.integrators",
+        right="rising = a[:3] + cross(w, v[:3]) + cross(a[3:6], c) + cross(w, cross(w, c))",
+        wrong="rising = a[:3] + cross(w, v[:3]) + cross(a[3:6], c)",
+        caught_by=f"{PHYSICS}::test_semi_implicit_euler_keeps_linear_momentum",
+    ),
+    Fault(
+        "sim_bullet_base_torque_about_the_origin",
+        "dynx.sim.bullet_plant",
+        right="R @ (tau[3:6] - cross(c, tau[:3]))",
+        wrong="R @ tau[3:6]",
+        caught_by=f"{AGREE}::test_a_quadruped_that_falls_and_turns_and_moves_its_legs",
+    ),
+    Fault(
+        "sim_noise_begins_anew_when_resumed",
+        "dynx.sim.sensors",
+        right="number = step // self._clock.steps_per_control",
+        wrong="number = len(q) % self._clock.n_controls",
+        caught_by=f"{RESUME}::test_on_a_plant_of_dynx",
+    ),
+    Fault(
+        "sim_memory_is_forgotten_when_resumed",
+        "dynx.sim.loop",
+        right="for number in range(-(-record.steps // self.clock.steps_per_control)):",
+        wrong="for number in range(0):",
+        caught_by=f"{RESUME}::test_on_a_plant_of_dynx",
+    ),
+    Fault(
+        "sim_stop_strikes_one_joint_alone",
+        "dynx.sim.stops",
+        right="                v = v + inverse[:, at] @ impulse\n",
+        wrong="                v = v.copy()\n",
+        caught_by=f"{OPTIONS}::test_a_stop_is_an_inelastic_impact",
+    ),
+)

@@ -1,0 +1,201 @@
+"""What cannot be simulated is refused by name; what fails on the way leaves what was computed."""
+
+from __future__ import annotations
+
+import pickle
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from dynx.control import (
+    ComputedTorque,
+    DiscreteComputedTorque,
+    GravityCompensatedPD,
+    Measured,
+    PositionMotor,
+)
+from dynx.control.base import Controller
+from dynx.errors import (
+    ArgumentError,
+    ControlError,
+    DivergedError,
+    GainError,
+    LimitError,
+    SingularMassMatrixError,
+    UnknownBackendError,
+    UnknownNameError,
+    UnsupportedFeatureError,
+)
+from dynx.model import Inertial, Joint, Link, Model
+from dynx.model.loading import load
+from dynx.sim import Noise, Payload, Push, simulate
+from dynx.spatial.scalar import Floats
+from dynx.trajectory.base import Setpoint
+from tests.sim.bars import tutorial_motion, tutorial_robot
+
+ARM = tutorial_robot()
+LAW = ComputedTorque(ARM, kp=400, kd=40)
+REST = np.zeros(6)
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "says"),
+    [
+        ({"dt": 0.0}, ArgumentError, "dt is '0.0'"),
+        ({"dt": -1e-3}, ArgumentError, "dt is"),
+        ({"dt": float("nan")}, ArgumentError, "dt is"),
+        ({"dt": "fast"}, ArgumentError, "dt is 'fast'"),
+        ({"duration": 0.0105}, ArgumentError, "no multiple of dt"),
+        ({"duration": -1.0}, ArgumentError, "duration"),
+        ({"control_dt": 1.5e-3}, ArgumentError, "control_dt is 0.0015 s.*0.002 s would be"),
+        ({"control_dt": 5e-4}, ArgumentError, "control_dt"),
+        ({"delay": 5e-4}, ArgumentError, "delay"),
+        ({"delay": -1.0}, ArgumentError, "delay"),
+        ({"substeps": 0}, ArgumentError, "substeps"),
+        ({"substeps": 1.5}, ArgumentError, "substeps"),
+        ({"plant": "bulet"}, UnknownBackendError, "pybullet"),
+        ({"integrator": "rk5"}, ArgumentError, "rk4"),
+        ({"integrator": "engine"}, ArgumentError, "no stepper"),
+        ({"integrator": "adaptive", "method": "DOP85"}, ArgumentError, "DOP853"),
+        ({"integrator": "adaptive", "rtol": 0.0}, ArgumentError, "rtol"),
+        ({"q0": np.zeros(5)}, ArgumentError, "q0"),
+        ({"q0": np.zeros((2, 6))}, ArgumentError, "one state"),
+        ({"v0": np.full(6, np.nan)}, ArgumentError, "v0"),
+        ({"damping": -1.0}, GainError, "damping is negative"),
+        ({"friction": np.zeros(3)}, GainError, "friction has shape"),
+        ({"armature": "much"}, GainError, "armature"),
+        ({"friction": 1.0, "friction_slip": -1.0}, ArgumentError, "slip"),
+        ({"effort_limits": 0.0}, LimitError, "shoulder_pan_joint.*is 0"),
+        ({"effort_limits": [1.0, 2.0]}, GainError, "limit"),
+        ({"payload": Payload("too0", 1.0)}, UnknownNameError, "tool0"),
+        ({"payload": Payload("tool0", -1.0)}, ArgumentError, "mass"),
+        ({"payload": Payload("tool0", 1.0, inertia=np.eye(2))}, ArgumentError, "inertia"),
+        ({"mass_scale": 0.0}, ArgumentError, "mass_scale"),
+        ({"mass_scale": {"forearm": 2.0}}, UnknownNameError, "forearm_link"),
+        ({"noise": Noise(-1.0)}, GainError, "noise"),
+        ({"noise": Noise(seed=-1)}, ArgumentError, "seed"),
+        ({"pushes": [Push("tool0", np.zeros(3))]}, ArgumentError, "wrench"),
+        ({"pushes": [Push("tool0", np.zeros(6), reference="here")]}, ArgumentError, "here"),
+        ({"pushes": [Push("tool", np.zeros(6))]}, UnknownNameError, "tool0"),
+    ],
+)
+def test_options_that_cannot_be_used(options: dict[str, Any], error: type[Exception], says: str) -> None:
+    with pytest.raises(error, match=says):
+        simulate(ARM, LAW, tutorial_motion(), **{"duration": 0.01, **options})
+
+
+def test_a_reference_outside_the_limits_is_refused_before_anything_moves() -> None:
+    too_fast = tutorial_motion(0.2)
+    with pytest.raises(LimitError, match="velocity of") as caught:
+        simulate(ARM, LAW, too_fast)
+    assert {violation.quantity for violation in caught.value.violations} == {"velocity"}
+    with pytest.raises(LimitError, match="position of 'elbow_joint' is 4"):
+        simulate(ARM, LAW, np.array([0.0, 0.0, 4.0, 0.0, 0.0, 0.0]), duration=0.01)
+    assert len(simulate(ARM, LAW, too_fast, duration=0.01, check_reference=False)) == 10
+
+
+def test_what_is_missing_or_of_another_robot() -> None:
+    other, no_law = load("panda"), cast(Any, "pd")
+    with pytest.raises(ArgumentError, match="duration"):
+        simulate(ARM)
+    with pytest.raises(ArgumentError, match="needs a reference"):
+        simulate(ARM, LAW, duration=0.01)
+    with pytest.raises(ArgumentError, match=r"made for control_dt = 0\.002 s; it is 0\.001 s"):
+        simulate(ARM, DiscreteComputedTorque(ARM, control_dt=2e-3), REST, duration=0.01)
+    with pytest.raises(ArgumentError, match="joints are not"):
+        simulate(other, LAW, other.neutral(), duration=0.01)
+    with pytest.raises(ArgumentError, match="nq 6"):
+        simulate(other, GravityCompensatedPD(other, kp=1, kd=1), tutorial_motion())
+    with pytest.raises(ArgumentError, match=r"wanted a dynx\.control law"):
+        simulate(ARM, no_law, REST, duration=0.01)
+
+
+def test_a_motor_of_the_engine_needs_the_engine() -> None:
+    with pytest.raises(UnsupportedFeatureError, match="plant='pybullet'"):
+        simulate(ARM, PositionMotor(ARM), REST, duration=0.01)
+    with pytest.raises(ArgumentError, match="force"):
+        simulate(ARM, PositionMotor(ARM), REST, duration=0.01, effort_limits=True)
+
+
+def test_a_floating_base_has_no_motor() -> None:
+    robot = load("solo12", base="floating")
+    with pytest.raises(UnsupportedFeatureError, match="floating base"):
+        ComputedTorque(robot, kp=1, kd=1)
+
+
+def test_a_robot_without_an_acceleration() -> None:
+    links = [Link("base"), Link("arm", Inertial(1.0, ixx=1, iyy=1, izz=1)), Link("flag")]
+    joints = [Joint("a", "revolute", "base", "arm"), Joint("b", "revolute", "arm", "flag")]
+    with pytest.raises(SingularMassMatrixError, match="'b'"):
+        simulate(Model.build("flagpole", links, joints), duration=0.01)
+
+
+class Faulty(Controller[None]):
+    """Gives `answer` from step 5 on, and nothing before."""
+
+    def __init__(self, answer: Any) -> None:
+        self.model = ARM
+        self.answer = answer
+
+    def torque(self, measured: Measured, setpoint: Setpoint, memory: None) -> tuple[Floats, None]:
+        if measured.t < 4.5e-3:
+            return np.zeros(6), None
+        if isinstance(self.answer, Exception):
+            raise self.answer
+        return self.answer, None
+
+
+@pytest.mark.parametrize("plant", ["pinocchio", "pybullet"])
+@pytest.mark.parametrize(
+    ("answer", "says"),
+    [
+        (np.full(6, np.nan), "not finite"),
+        (np.array([0, 0, np.inf, 0, 0, 0.0]), "not finite"),
+        (np.zeros(5), r"no float64 array \(6,\)"),
+        ([0.0] * 6, "no float64 array"),
+        (np.zeros(6, dtype=np.float32), "no float64 array"),
+        (RuntimeError("no idea"), "RuntimeError: no idea"),
+    ],
+)
+def test_a_controller_that_fails_leaves_what_was_before(plant: str, answer: Any, says: str) -> None:
+    pytest.importorskip(plant)
+    with pytest.raises(ControlError, match=says) as caught:
+        simulate(ARM, Faulty(answer), REST, plant=plant, duration=0.01)
+    error = caught.value
+    assert (error.step, error.time) == (5, 5e-3)
+    assert len(error.rollout) == 5
+    np.testing.assert_array_equal(error.state[0], error.rollout.q[-1])
+    np.testing.assert_array_equal(error.rollout.q, simulate(ARM, None, REST, plant=plant, duration=0.005).q)
+    again = pickle.loads(pickle.dumps(error))
+    assert (again.step, again.time, str(again)) == (error.step, error.time, str(error))
+
+
+@pytest.mark.parametrize("plant", ["pinocchio", "pybullet"])
+def test_a_simulation_that_runs_away_says_when_and_where(plant: str) -> None:
+    pytest.importorskip(plant)
+    # A damper so stiff that an explicit step overshoots.
+    with pytest.raises(DivergedError, match="diverged in step") as caught:
+        simulate(ARM, None, q0=REST, v0=np.ones(6), plant=plant, damping=1e5, duration=1.0)
+    error = caught.value
+    assert 0 < error.step < 100
+    assert error.time == pytest.approx(error.step * 1e-3)
+    assert np.isfinite(error.rollout.q).all()
+    assert len(error.rollout) == error.step
+    np.testing.assert_array_equal(error.state[1], error.rollout.v[-1])
+
+
+def test_what_an_engine_raises_is_ours_in_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(*args: Any) -> Any:
+        raise OverflowError("the engine has enough")
+
+    monkeypatch.setattr("dynx.sim.integrators.SemiImplicitEuler.__call__", broken)
+    with pytest.raises(DivergedError, match="OverflowError: the engine has enough") as caught:
+        simulate(ARM, None, REST, duration=0.01)
+    assert len(caught.value.rollout) == 0
+
+
+def test_a_law_of_inverse_dynamics_that_overflows_is_the_law_s_fault() -> None:
+    law = ComputedTorque(ARM, kp=1e308, kd=0.0)
+    with pytest.raises(ControlError, match="not finite"):
+        simulate(ARM, law, REST, q0=REST + 3.0, duration=0.01)

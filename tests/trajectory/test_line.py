@@ -1,0 +1,132 @@
+"""Straight lines: followed as closely as was asked, and refused where they cannot be."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import dynx
+from dynx.errors import TrajectoryError
+from dynx.spatial.scalar import Floats
+from dynx.spatial.se3 import pose_error
+from dynx.trajectory import LineTrajectory, line, trapezoidal
+from tests.trajectory.motions import REACH, turned, ur5
+
+FRAME = "tool0"
+
+
+def pose(q: Floats) -> Floats:
+    with dynx.backend("pinocchio", ur5()) as engine:
+        return engine.forward_kinematics(q, FRAME)
+
+
+def target(way: tuple[float, float, float], angle: float) -> Floats:
+    T = pose(REACH) @ turned(angle)
+    T[:3, 3] += way
+    return T
+
+
+def distances_from_the_line(motion: LineTrajectory, goal: Floats, t: Floats) -> tuple[Floats, Floats]:
+    """How far the origin is from the segment, and the axes from some turn on the way [m, rad]."""
+    T = pose(motion(t).q)
+    start = pose(REACH)
+    way = goal[:3, 3] - start[:3, 3]
+    from_start = T[:, :3, 3] - start[:3, 3]
+    part = np.clip(from_start @ way / (way @ way), 0.0, 1.0)
+    off = np.linalg.norm(from_start - part[:, None] * way, axis=1)
+    # The axis z of the tool stays where it is, since the turn is about it.
+    tilt = np.linalg.norm(np.cross(T[:, :3, 2], start[:3, 2]), axis=1)
+    return off, tilt
+
+
+@settings(max_examples=10)
+@given(
+    st.tuples(*[st.integers(-15, 15).map(lambda n: n / 100)] * 3).filter(any),
+    st.integers(-10, 10).map(lambda n: n / 10),
+    st.sampled_from([1e-3, 1e-5, 1e-7]),
+)
+def test_the_frame_is_on_the_line(way: tuple[float, float, float], angle: float, bound: float) -> None:
+    goal = target(way, angle)
+    motion = line(ur5(), FRAME, REACH, goal, 2.0, deviation=bound, rotation_deviation=bound)
+    assert motion.deviation <= bound
+    assert motion.rotation_deviation <= bound
+    # Looked at elsewhere than where it was measured, where it may be a little more.
+    off, tilt = distances_from_the_line(motion, goal, np.linspace(0.0, 2.0, 97))
+    assert off.max() <= 1.5 * bound
+    assert tilt.max() <= 1.5 * bound
+    position, rotation = pose_error(goal, pose(motion.end.q))
+    assert np.linalg.norm(position) <= 1e-9
+    assert np.linalg.norm(rotation) <= 1e-9
+    np.testing.assert_array_equal(motion(0.0).q, REACH)
+    assert not motion(2.0).v.any()
+
+
+def test_along_it_the_law_is_kept() -> None:
+    """The place on the line at each time is that of the law, as is the speed of the frame."""
+    goal = target((0.1, 0.1, -0.1), 0.0)
+    law = trapezoidal([0.0], [1.0], velocity=0.8, acceleration=2.0)
+    motion = line(ur5(), FRAME, REACH, goal, law=law)
+    assert motion.duration == law.duration
+    t = np.linspace(0.0, law.duration, 33)
+    start = pose(REACH)[:3, 3]
+    way = goal[:3, 3] - start
+    s, rate, _ = law(t)
+    q, v, _ = motion(t)
+    assert np.abs(pose(q)[:, :3, 3] - start - s * way).max() <= 2.0 * motion.deviation + 1e-9
+    with dynx.backend("pinocchio", ur5()) as engine:
+        speed = engine.frame_velocity(q, v, FRAME)[:, :3]
+    # The spline is off by d within an interval of 1/n, so its slope by some n d.
+    assert np.abs(speed - rate * way).max() <= 20.0 * motion.intervals * motion.deviation
+
+
+def test_a_frame_that_too_few_joints_hold_is_refused() -> None:
+    """Three joints reach the pose, but not along the line."""
+    with dynx.backend("pinocchio", ur5()) as engine:
+        goal = engine.forward_kinematics(REACH + np.array([0.3, 0.2, -0.2, 0.0, 0.0, 0.0]), "forearm_link")
+    with pytest.raises(TrajectoryError, match=r"'forearm_link' cannot follow the line beyond 0\.0000"):
+        line(ur5(), "forearm_link", REACH, goal, 1.0)
+
+
+def test_joints_that_do_not_move_the_frame_stay() -> None:
+    panda = dynx.load("panda")
+    q0 = np.array([0.1, -0.3, 0.2, -2.0, 0.1, 1.8, 0.5, 0.01])
+    with dynx.backend("pinocchio", panda) as engine:
+        goal = engine.forward_kinematics(q0, "panda_hand")
+        goal[:3, 3] += (0.1, 0.05, -0.05)
+        motion = line(panda, "panda_hand", q0, goal, 1.0, backend=engine)
+        # The fingers are beyond the hand. The caller's backend is still open.
+        assert not motion(np.linspace(0.0, 1.0, 11)).v[:, 7:].any()
+        reached = engine.forward_kinematics(motion.end.q, "panda_hand")
+    np.testing.assert_allclose(reached, goal, atol=1e-9)
+
+
+@pytest.mark.parametrize("further", [1.3, 2.0])
+def test_beyond_reach_the_error_says_where(further: float) -> None:
+    """An arm of three links in the plane reaches as far as they are long, so a known part of the way."""
+    model, length = dynx.load("planar_3r"), 0.6 + 0.45 + 0.2
+    q0 = np.array([0.0, 1.2, -0.4])
+    with dynx.backend("pinocchio", model) as engine:
+        start = engine.forward_kinematics(q0, "tip")[:3, 3]
+    reach = float(np.linalg.norm(start))
+    direction = start / reach
+    with pytest.raises(TrajectoryError, match="'tip' cannot follow the line beyond") as caught:
+        line(model, "tip", q0, further * length * direction, 1.0)
+    possible = (length - reach) / (further * length - reach)
+    assert caught.value.at is not None
+    # The solutions are 1/256 apart when it gives up, and close to the edge the arm is nearly singular.
+    assert possible - 3.0 / 256.0 <= caught.value.at <= possible
+    motion = line(model, "tip", q0, 0.99 * length * direction, 1.0)
+    assert motion.deviation <= 1e-5
+    assert motion.rotation_deviation == 0.0
+
+
+def test_a_line_through_the_base_is_refused_with_its_place() -> None:
+    goal = pose(REACH)
+    goal[:2, 3] *= -1.0
+    with pytest.raises(TrajectoryError, match="of the way") as caught:
+        line(ur5(), FRAME, REACH, goal, 2.0)
+    # The wrist cannot pass the axis of the first joint, which is halfway.
+    assert caught.value.at is not None
+    assert 0.3 <= caught.value.at <= 0.5
