@@ -136,8 +136,8 @@ RBD_FAULTS = (
     Fault(
         "matrix_turned_about_z_with_its_transpose",
         PLACEMENT,
-        right="[xx - s * w, c * w - yx, c * xz - s * yz],",
-        wrong="[xx - s * w, c * w - xy, c * xz - s * yz],",
+        right="apart + cc * xy - ss * yx,",
+        wrong="apart + cc * yx - ss * xy,",
         caught_by=f"{FEWER}::test_a_turn_about_z_is_the_product_of_matrices",
     ),
     Fault(

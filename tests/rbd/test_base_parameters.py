@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import dynx
+from dynx.agreement.tolerances import ROUNDINGS
 from dynx.model import Mechanism
 from dynx.rbd import aba, centroidal, coriolis, crba, kinematics, rnea
 from dynx.rbd.base_parameters import aligned, reduced, regrouped
@@ -138,3 +139,17 @@ def numbers(mechanism: Mechanism) -> int:
         count += sum(np.count_nonzero(x) for x in (body.p, inertia.first_moment, inertia.spread))
         count += int(inertia.mass != 0)
     return count
+
+
+@pytest.mark.parametrize("robot", ["human", "solo12"])
+def test_joints_that_give_way_to_nearly_all_inertia_cost_no_digits(robot: str) -> None:
+    """Not more than one joint's roundings, in float64 against 50 digits: shoulders of three hinges, and long legs that weigh little."""
+    model = dynx.load(robot)
+    rng = np.random.default_rng(11)
+    q = model.random(rng, 40)
+    v, tau = rng.standard_normal((2, 40, model.nv))
+    found = aba.forward_dynamics(aligned(model.mechanism), q, v, tau)
+    exact = exact_mechanism(model)
+    for k in range(len(q)):
+        wanted = aba.forward_dynamics(exact, tree_q(model, q[k]), exactly(v[k]), exactly(tau[k]))
+        assert distance(exactly(found[k]), wanted) < ROUNDINGS * np.finfo(float).eps
