@@ -143,7 +143,7 @@ def numbers(mechanism: Mechanism) -> int:
 
 @pytest.mark.parametrize("robot", ["human", "solo12"])
 def test_joints_that_give_way_to_nearly_all_inertia_cost_no_digits(robot: str) -> None:
-    """Not more than one joint's roundings, in float64 against 50 digits: shoulders of three hinges, and long legs that weigh little."""
+    """No more than one joint's roundings: shoulders of three hinges, and long legs that weigh little."""
     model = dynx.load(robot)
     rng = np.random.default_rng(11)
     q = model.random(rng, 40)
