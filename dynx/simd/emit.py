@@ -29,6 +29,19 @@ ENTRY = "kernel"
 """Name of the function."""
 
 
+WIDE = range(16, 129)
+"""Numbers in a row of an output whose memory is fetched before it is written.
+
+Writing to memory that is not in the caches waits for it. Narrow rows wait little, and long ones are
+fetched by the processor itself."""
+
+AHEAD = 8
+"""So many groups before."""
+
+LINE = 64
+"""Bytes fetched at a time."""
+
+
 @dataclass(frozen=True)
 class Settings:
     """How a program becomes code.
@@ -60,7 +73,7 @@ def emit(program: Program, target: Target, settings: Settings) -> str:
     parts = [f'target triple = "{target.triple}"']
     parts += bodies
     parts += [_loop(program, settings, len(segments), max(slots.values(), default=0) + 1)]
-    parts += declarations(settings.lanes)
+    parts += [*declarations(settings.lanes), "declare void @llvm.prefetch.p0(ptr, i32, i32, i32)"]
     return "\n".join(parts) + "\n"
 
 
@@ -73,12 +86,14 @@ def _loop(program: Program, settings: Settings, segments: int, slots: int) -> st
         f"  %kept = alloca [{slots} x <{lanes} x double>], align 64",
         "  %n = load i64, ptr %arguments",
         f"  %last = sub i64 %n, {lanes}",
+        *_wide_arrays(program),
         "  br label %group",
         "group:",
         "  %i = phi i64 [0, %entry], [%next, %group]",
         "  %late = icmp sgt i64 %i, %last",
         "  %first = select i1 %late, i64 %last, i64 %i",
     ]
+    lines += _fetched_ahead(program, lanes)
     lines += [f"  call void @segment{k}(ptr %arguments, i64 %first, ptr %kept)" for k in range(segments)]
     lines += [
         f"  %next = add i64 %i, {lanes}",
@@ -89,6 +104,45 @@ def _loop(program: Program, settings: Settings, segments: int, slots: int) -> st
         "}",
     ]
     return "\n".join(lines)
+
+
+def _wide(program: Program) -> list[tuple[int, int]]:
+    """The outputs that are fetched before they are written: their number among all arrays, their size."""
+    ports = enumerate(program.outputs, start=len(program.inputs))
+    return [(number, port.size) for number, port in ports if port.size in WIDE]
+
+
+def _wide_arrays(program: Program) -> list[str]:
+    """Their addresses and row distances."""
+    lines = []
+    for k, _ in _wide(program):
+        lines += [
+            f"  %at{k} = getelementptr inbounds i64, ptr %arguments, i64 {1 + 2 * k}",
+            f"  %base{k} = load ptr, ptr %at{k}",
+            f"  %by{k} = getelementptr inbounds i64, ptr %arguments, i64 {2 + 2 * k}",
+            f"  %stride{k} = load i64, ptr %by{k}",
+        ]
+    return lines
+
+
+def _fetched_ahead(program: Program, lanes: int) -> list[str]:
+    """Their rows of a later group. Beyond the arrays that does nothing: a fetch never faults."""
+    lines = []
+    for k, size in _wide(program):
+        for lane in range(lanes):
+            row = f"{k}_{lane}"
+            lines += [
+                f"  %sample{row} = add i64 %first, {AHEAD * lanes + lane}",
+                f"  %offset{row} = mul i64 %sample{row}, %stride{k}",
+                f"  %row{row} = getelementptr i8, ptr %base{k}, i64 %offset{row}",
+            ]
+            for start in range(0, 8 * size, LINE):
+                place = f"%line{row}_{start}"
+                lines += [
+                    f"  {place} = getelementptr i8, ptr %row{row}, i64 {start}",
+                    f"  call void @llvm.prefetch.p0(ptr {place}, i32 1, i32 3, i32 1)",
+                ]
+    return lines
 
 
 _BINARY: dict[Op, str] = {"add": "fadd", "sub": "fsub", "mul": "fmul", "div": "fdiv"}

@@ -130,3 +130,4 @@ declare double @llvm.fabs.f64(double)
 declare double @sin(double)
 declare double @cos(double)
 !0 = !{!"branch_weights", i32 1, i32 100000}
+declare void @llvm.prefetch.p0(ptr, i32, i32, i32)
