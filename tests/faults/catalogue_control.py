@@ -82,4 +82,32 @@ CONTROL_FAULTS = (
         wrong="                v = v.copy()\n",
         caught_by=f"{OPTIONS}::test_a_stop_is_an_inelastic_impact",
     ),
+    Fault(
+        "batch_steps_by_explicit_euler",
+        "dynx.sim.fused",
+        right="q = q + self.dt * v\n            error",
+        wrong='q = given["q"] + self.dt * given["v"]\n            error',
+        caught_by="tests/sim/test_batch.py::test_a_rollout_is_that_of_simulate",
+    ),
+    Fault(
+        "batch_repeats_the_noise_of_its_first_part",
+        "dynx.sim.batch",
+        right="(noise.seed, first // PART)",
+        wrong="(noise.seed, 0)",
+        caught_by="tests/sim/test_batch.py::test_outcomes_do_not_depend_on_who_computes_them",
+    ),
+    Fault(
+        "batch_takes_the_kept_part_of_other_arguments",
+        "dynx.sim.batch_store",
+        right="arrays = (part.start, part.fixed, tuple(part.setpoints), part.goals)",
+        wrong="arrays = (tuple(part.setpoints), part.goals)",
+        caught_by="tests/sim/test_batch.py::test_ctrl_c_keeps_what_is_done",
+    ),
+    Fault(
+        "batch_forgets_what_the_law_remembers_between_controls",
+        "dynx.sim.fused",
+        right='tau, memory = given["tau"], given.get("memory")',
+        wrong='tau, memory = given["tau"], None if given.get("memory") is None else 0 * given["memory"]',
+        caught_by="tests/sim/test_batch.py::test_a_law_asked_at_some_steps_only",
+    ),
 )
