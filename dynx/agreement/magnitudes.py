@@ -272,10 +272,12 @@ class Magnitudes:
 
 
 def _physical(inertia: RigidInertia) -> bool:
-    """Whether no rotation about the mass centre has negative energy, to within rounding."""
+    """Whether some body has this inertia, to within rounding: no moment about the mass centre is negative,
+    and none is larger than the other two together."""
     size = float(np.max(np.abs(inertia.second_moment)))
     if inertia.mass < 0.0:
         return False
     H = skew(inertia.first_moment)
     central = inertia.second_moment + (H @ H / inertia.mass if inertia.mass > 0.0 else 0.0)
-    return float(np.linalg.eigvalsh(central)[0]) >= -4.0 * EPS * size
+    least, middle, most = np.linalg.eigvalsh(central).tolist()
+    return bool(min(least, least + middle - most) >= -4.0 * EPS * size)

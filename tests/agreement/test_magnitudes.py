@@ -3,6 +3,7 @@ from __future__ import annotations
 import numpy as np
 from hypothesis import given
 
+import dynx
 from dynx.agreement import tolerances
 from dynx.agreement.magnitudes import Magnitudes
 from dynx.agreement.quantities import QUANTITIES
@@ -53,3 +54,15 @@ def test_poses_turn_no_faster_than_the_bound(model: Model) -> None:
             slack = 1.0 + tolerances.rounding(sizes.depth)
             assert np.all(np.linalg.norm(twist[:, 3:], axis=-1) <= 2.0 * sizes.turning_speed * slack)
             assert np.all(np.linalg.norm(twist[:, :3], axis=-1) <= 2.0 * sizes.speed * slack)
+
+
+def test_a_tensor_that_breaks_the_triangle_inequality_counts_as_a_whole() -> None:
+    """0.125 about one oblique axis and nothing about the others: no rod, and rounded like what it is."""
+    text = """<robot name="spindle"><link name="only"><inertial>
+        <origin xyz="0 0 0" rpy="0.7853981633974483 1.5707963267948966 0.7853981633974483"/>
+        <mass value="1"/><inertia ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0.125"/>
+        </inertial></link></robot>"""
+    spindle = dynx.load(text, base="floating")
+    sizes = Magnitudes(draw_samples(spindle, 2, 0))
+    np.testing.assert_allclose(sizes.root_inertia[:, 3:] ** 2, 0.125)
+    assert dynx.agree(spindle, ["reference", "pinocchio"], samples=2).agree
