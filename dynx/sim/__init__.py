@@ -5,7 +5,7 @@ from dynx.sim.batch_rollouts import BatchRollouts
 from dynx.sim.loads import Push
 from dynx.sim.rollout import Rollout, Summary
 from dynx.sim.sensors import Noise
-from dynx.sim.simulation import simulate
+from dynx.sim.simulation import RolloutInterrupted, simulate
 from dynx.sim.variations import Payload, plant_model
 
 __all__ = [
@@ -15,6 +15,7 @@ __all__ = [
     "Payload",
     "Push",
     "Rollout",
+    "RolloutInterrupted",
     "Summary",
     "plant_model",
     "simulate",

@@ -86,7 +86,7 @@ class BulletPlant(Plant):
     def step(self, t: float, tau: Floats) -> State:
         """One step, or as many sub-steps."""
         first = self._substep(t, tau)
-        for k in range(1, self._substeps):
+        for k in range(1, self.substeps):
             self._substep(t + k * self._h, tau)
         return self._q, self._v, first
 
@@ -100,7 +100,7 @@ class BulletPlant(Plant):
         q, v = self._q, self._v
         first, loads = self._motor_substep(t, command)
         tau = self._engine.inverse_dynamics(q, v, first) - loads
-        for k in range(1, self._substeps):
+        for k in range(1, self.substeps):
             self._motor_substep(t + k * self._h, command)
         return self._q, self._v, first, tau
 

@@ -6,6 +6,7 @@ only the loop can see: a torque that is none, and a state that runs away.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import hypot, isfinite
 from typing import Any
@@ -17,6 +18,7 @@ from dynx.control.engine_motors import EngineMotor
 from dynx.errors import ControlError, DivergedError
 from dynx.sim.clock import Clock
 from dynx.sim.plants import Plant
+from dynx.sim.record import Record
 from dynx.sim.sensors import Sensors
 from dynx.sim.stops import Stops
 from dynx.spatial.scalar import Floats, clipped
@@ -24,33 +26,11 @@ from dynx.trajectory.base import Setpoint
 
 FLOAT64 = np.dtype(np.float64)
 
+TELLING = 200
+"""Steps between two tellings."""
+
 RUNAWAY = 1e8
 """Speed [rad/s or m/s] beyond which nothing can be learnt from a simulation."""
-
-
-@dataclass
-class Record:
-    """What happened, as it happens: states, accelerations, and arrays of what acted.
-
-    A plant makes new arrays in each step, so they are kept as they are; a controller may hand out the
-    same one again, so torques are copied.
-    """
-
-    q: list[Floats]
-    v: list[Floats]
-    a: list[Floats]
-    tau: Floats
-    saturated: np.ndarray[Any, np.dtype[np.bool_]]
-
-    @classmethod
-    def begin(cls, q: Floats, v: Floats, n: int) -> Record:
-        """For n steps from the state (q, v)."""
-        return cls([q], [v], [], np.empty((n, len(v))), np.zeros((n, len(v)), dtype=bool))
-
-    @property
-    def steps(self) -> int:
-        """How many steps were taken."""
-        return len(self.a)
 
 
 @dataclass(frozen=True)
@@ -59,29 +39,36 @@ class Loop:
 
     plant: Plant
     controller: Controller[Any] | None
-    setpoints: list[Setpoint]
+    setpoints: Setpoint
+    """What the controller is given at each control step: arrays with a row for each."""
     clock: Clock
     sensors: Sensors
     limit: Floats | None
     stops: Stops | None
+    told: Callable[[int], object] | None = None
+    """Told now and then how many steps were taken."""
 
     def run(self, record: Record) -> None:
         """From the state in row `record.steps` to the end.
 
-        Raises DivergedError and ControlError, with the steps before in `record`.
+        Raises DivergedError and ControlError, with the steps before in `record`, which is whole too
+        where Ctrl-C cuts in.
         """
-        plant, controller, record_tau = self.plant, self.controller, record.tau
+        plant, controller = self.plant, self.controller
         per_control, dt, limit = self.clock.steps_per_control, self.clock.dt, self.limit
-        Q, V, A = record.q, record.v, record.a
+        Q, V, A, applied, saturated = record.q, record.v, record.a, record.tau, record.saturated
         begin = record.steps
-        memory = self._remembered(record)
+        if begin == self.clock.n_steps:
+            return
+        memory = self.remembered(record)
         plant.reset(Q[begin].copy(), V[begin].copy())
         q, v = Q[begin].copy(), V[begin].copy()
         tau, flags, command = self._held(record)
         sensors = None if self.sensors.plain else self.sensors
         motors = controller if isinstance(controller, EngineMotor) else None
-        setpoints, stops, shape = self.setpoints, self.stops, (plant.model.nv,)
-        step = plant.step
+        setpoints = list(map(Setpoint, *self.setpoints))
+        stops, shape = self.stops, (plant.model.nv,)
+        step, told, tell = plant.step, self.told, begin
         # The next step at which the controller is asked; never, if there is none.
         due = -1 if controller is None else -(-begin // per_control) * per_control
         for k in range(begin, self.clock.n_steps):
@@ -120,14 +107,15 @@ class Loop:
                 raise self._diverged(k, record, f"{type(error).__name__}: {error}") from error
             if not hypot(*v.tolist()) < RUNAWAY:
                 raise self._diverged(k, record, "the velocity is no number or beyond all bounds")
-            record_tau[k] = tau
-            Q.append(q)
-            V.append(v)
-            A.append(a)
+            applied[k], A[k], Q[k + 1], V[k + 1] = tau, a, q, v
             if limit is not None:
-                record.saturated[k] = flags
+                saturated[k] = flags
+            record.steps = k + 1
+            if told is not None and k >= tell:
+                tell = k + TELLING
+                told(k + 1)
 
-    def _remembered(self, record: Record) -> Any:
+    def remembered(self, record: Record) -> Any:
         """The controller's memory at the step where the loop begins.
 
         It is a function of what was measured until then, so it is not recorded but found again.
@@ -140,8 +128,11 @@ class Loop:
         for number in range(-(-record.steps // self.clock.steps_per_control)):
             step = number * self.clock.steps_per_control
             measured = self.sensors(step, record.q, record.v)
-            _, memory = self.controller.torque(measured, self.setpoints[number], memory)
+            _, memory = self.controller.torque(measured, self._setpoint(number), memory)
         return memory
+
+    def _setpoint(self, number: int) -> Setpoint:
+        return Setpoint(*(array[number] for array in self.setpoints))
 
     def _held(self, record: Record) -> tuple[Floats, Any, Any]:
         """Torque, flags and command that the last control step before the beginning left."""
@@ -152,7 +143,7 @@ class Loop:
         if isinstance(self.controller, EngineMotor):
             number = begin // self.clock.steps_per_control
             measured = self.sensors(number * self.clock.steps_per_control, record.q, record.v)
-            return nothing, False, self.controller.command(measured, self.setpoints[number])
+            return nothing, False, self.controller.command(measured, self._setpoint(number))
         return record.tau[begin - 1].copy(), record.saturated[begin - 1].copy(), None
 
     def _diverged(self, k: int, record: Record, why: str) -> DivergedError:

@@ -15,9 +15,9 @@ from dynx.backends.solvability import singular_coordinates
 from dynx.control.engine_motors import EngineMotor
 from dynx.errors import ArgumentError, UnsupportedFeatureError, shown
 from dynx.model import Model
-from dynx.sim.integrators import Adaptive, RungeKutta4, SemiImplicitEuler, State
+from dynx.sim.integrators import Accelerate, Adaptive, RungeKutta4, SemiImplicitEuler, State
 from dynx.sim.loads import Acceleration, Loads
-from dynx.spatial.scalar import Floats
+from dynx.spatial.scalar import Array, Floats
 
 INTEGRATORS = ("semi_implicit", "rk4", "adaptive", "engine")
 """Schemes; ``engine`` is the engine's own stepper, where it has one."""
@@ -40,7 +40,7 @@ class Plant(ABC):
     def __init__(self, model: Model, dt: float, substeps: int) -> None:
         self.model = model
         self._dt = dt
-        self._substeps = substeps
+        self.substeps = substeps
 
     @abstractmethod
     def reset(self, q: Floats, v: Floats) -> None:
@@ -97,7 +97,8 @@ class DynxPlant(Plant):
             raise ArgumentError(
                 f"integrator is {shown(integrator)}; a plant of dynx has {', '.join(INTEGRATORS[:3])}"
             )
-        self._forward = self._accelerate.dynamics.forward_dynamics
+        self.forward_dynamics = self._accelerate.dynamics.forward_dynamics
+        """a (nv,) of q, v, tau, by the engine and nothing else."""
         self._plain = self._accelerate.is_plain
         self._singular = not loads.has_rotors and _is_singular(engine.model)
 
@@ -110,15 +111,28 @@ class DynxPlant(Plant):
     def step(self, t: float, tau: Floats) -> State:
         """One step, or as many sub-steps."""
         first = self._advance(t, tau)
-        if self._substeps == 1:
+        if self.substeps == 1:
             return first
-        for k in range(1, self._substeps):
+        for k in range(1, self.substeps):
             self._advance(t + k * self._h, tau)
         return self._q, self._v, first[2]
 
+    @property
+    def is_array_code(self) -> bool:
+        """Whether a step is `advanced` over the engine's forward dynamics, for arrays of any scalar."""
+        fixed_steps = isinstance(self._scheme, SemiImplicitEuler | RungeKutta4)
+        return self._plain and fixed_steps and not self.model.floating
+
+    def advanced(self, accelerate: Accelerate, q: Array, v: Array, tau: Array) -> State:
+        """One step from q, v, with `accelerate(q, v, tau)` in the place of the engine."""
+        q, v, first = self._scheme(accelerate, q, v, tau)
+        for _ in range(1, self.substeps):
+            q, v, _ = self._scheme(accelerate, q, v, tau)
+        return q, v, first
+
     def _advance(self, t: float, tau: Floats) -> State:
         if self._plain:
-            state = self._scheme(self._forward, self._q, self._v, tau)
+            state = self._scheme(self.forward_dynamics, self._q, self._v, tau)
         else:
             state = self._scheme(self._accelerate, self._q, self._v, tau, t)
         self._q, self._v, _ = state

@@ -40,17 +40,24 @@ def checked_reference(model: Model, reference: Any, *, within_limits: bool) -> S
     return reference
 
 
-def setpoints_of(setpoint_of: SetpointOf | None, clock: Clock, controller: Controller[Any]) -> list[Setpoint]:
-    """The setpoint of every control step, as far ahead as the controller wants it.
+def setpoints_of(
+    setpoint_of: SetpointOf | None, clock: Clock, controller: Controller[Any] | None
+) -> Setpoint:
+    """The setpoint of every control step, as far ahead as the controller wants it: (n_controls, ...).
 
     Raises ArgumentError if there is none though the controller needs one.
     """
+    n = clock.n_controls
+    if controller is None:
+        nothing = np.zeros((n, 0))
+        return Setpoint(nothing, nothing, nothing)
     if setpoint_of is not None:
-        return list(map(Setpoint, *setpoint_of(clock.control_times(controller.lead))))
+        return setpoint_of(clock.control_times(controller.lead))
     if controller.needs_setpoint:
         raise ArgumentError(f"{controller.name} needs a reference: a trajectory, or a configuration to hold")
-    rest = np.zeros(controller.model.nv)
-    return [Setpoint(controller.model.neutral(), rest, rest)] * clock.n_controls
+    model = controller.model
+    rest = np.broadcast_to(np.zeros(model.nv), (n, model.nv))
+    return Setpoint(np.broadcast_to(model.neutral(), (n, model.nq)), rest, rest)
 
 
 def _held(model: Model, q: Any, within_limits: bool) -> SetpointOf:

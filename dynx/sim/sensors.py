@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,13 +35,14 @@ class Sensors:
         """Raises GainError for a standard deviation, ArgumentError for a seed, that is none."""
         self._model = model
         self._clock = clock
-        self._noise: tuple[Floats, Floats] | None = None
+        self.noise: tuple[Floats, Floats] | None = None
+        """What is added to q and to v at each control step (n_controls, nv)."""
         if noise is not None:
             if not isinstance(noise.seed, int) or noise.seed < 0:
                 raise ArgumentError(f"seed is {shown(noise.seed)}; wanted a whole number, 0 or more")
             # Drawn at once, so that the noise of a step does not depend on where a rollout began.
             drawn = np.random.default_rng(noise.seed).standard_normal((clock.n_controls, 2, model.nv))
-            self._noise = (
+            self.noise = (
                 drawn[:, 0] * checked_gain("noise.q", noise.q, model.nv),
                 drawn[:, 1] * checked_gain("noise.v", noise.v, model.nv),
             )
@@ -50,17 +50,17 @@ class Sensors:
     @property
     def plain(self) -> bool:
         """Whether the state itself is what is measured."""
-        return self._noise is None and not self._clock.delay_steps
+        return self.noise is None and not self._clock.delay_steps
 
-    def __call__(self, step: int, q: Sequence[Floats], v: Sequence[Floats]) -> Measured:
-        """The measurement at physics step `step`, from the states (nq,), (nv,) until then.
+    def __call__(self, step: int, q: Floats, v: Floats) -> Measured:
+        """The measurement at physics step `step`, from the states (n, nq), (n, nv) until then.
 
         With a delay it is the state of that long ago; before the start, the state at the start.
         """
         seen = max(step - self._clock.delay_steps, 0)
         measured = Measured(step * self._clock.dt, q[seen], v[seen])
-        if self._noise is None:
+        if self.noise is None:
             return measured
         number = step // self._clock.steps_per_control
-        off_q, off_v = self._noise[0][number], self._noise[1][number]
+        off_q, off_v = self.noise[0][number], self.noise[1][number]
         return Measured(measured.t, self._model.integrate(measured.q, off_q), measured.v + off_v)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,9 +18,11 @@ from dynx.errors import ArgumentError, SimulationError, shown
 from dynx.model import Model
 from dynx.model.configuration import checked_array, checked_q
 from dynx.sim.clock import WHOLE, Clock
+from dynx.sim.glued_loop import glued
 from dynx.sim.loads import Loads, Push
-from dynx.sim.loop import Loop, Record
+from dynx.sim.loop import Loop
 from dynx.sim.plants import INTEGRATORS, DynxPlant, Plant
+from dynx.sim.record import Record
 from dynx.sim.references import SetpointOf, checked_reference, setpoints_of
 from dynx.sim.rollout import Rollout
 from dynx.sim.sensors import Noise, Sensors
@@ -27,6 +30,17 @@ from dynx.sim.stops import Stops
 from dynx.sim.variations import MassScale, Payload, plant_model
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Trajectory
+
+Progress = Callable[[int, int], object]
+"""Called with the steps taken and those asked for."""
+
+
+class RolloutInterrupted(KeyboardInterrupt):
+    """Ctrl-C in a simulation; `rollout` is what was computed until then."""
+
+    def __init__(self, rollout: Rollout, wanted: int) -> None:
+        super().__init__(f"interrupted after {len(rollout)} of {wanted} steps")
+        self.rollout = rollout
 
 
 def simulate(
@@ -60,6 +74,7 @@ def simulate(
     atol: float = 1e-12,
     resume: Rollout | None = None,
     step: int | None = None,
+    progress: Progress | None = None,
 ) -> Rollout:
     """Let `model` move under `controller` along `reference`, and record it.
 
@@ -88,6 +103,9 @@ def simulate(
 
     **Resuming.** With `resume` the first `step` steps (by default all) are taken from that record, and
     the rest computed, with all else given as then: the outcome is that of one run, to the last bit.
+
+    **Long runs.** `progress` is called now and then with the steps taken and those asked for. Ctrl-C
+    raises RolloutInterrupted, which has what was computed in ``.rollout`` and can be resumed.
 
     Raises ArgumentError for what cannot be simulated, LimitError for a reference outside the limits of
     position and velocity (unless `check_reference` is False) or an effort limit of 0, DivergedError and
@@ -131,7 +149,7 @@ def simulate(
     elif step is not None:
         raise ArgumentError("step is that of a rollout to resume, which is not given")
     options = {"method": method, "rtol": rtol, "atol": atol}
-    setpoints = [] if controller is None else setpoints_of(setpoint_of, clock, controller)
+    setpoints = setpoints_of(setpoint_of, clock, controller)
     made = _plant(moved, plant, settings["integrator"], loads, clock.dt, substeps, options)
 
     def so_far() -> Rollout:
@@ -140,9 +158,9 @@ def simulate(
         return Rollout(
             moved,
             times,
-            _rows(record.q, model.nq),
-            _rows(record.v, model.nv),
-            _rows(record.a, model.nv),
+            record.q[: n + 1],
+            record.v[: n + 1],
+            record.a[:n],
             record.tau[:n],
             record.saturated[:n],
             None if setpoint_of is None else setpoint_of(times),
@@ -153,16 +171,28 @@ def simulate(
     try:
         made.refuse(controller)
         stops = Stops(moved, _mass_matrix(moved, loads)) if position_limits else None
-        loop = Loop(made, controller, setpoints, clock, sensors, limit, stops)
+        told = None if progress is None else partial(_tell, progress, clock.n_steps)
+        loop = Loop(made, controller, setpoints, clock, sensors, limit, stops, told)
         # A state that runs away is seen by the loop, which says more than NumPy's warning.
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            quick = glued(loop, record)
+            if quick is not None:
+                quick.run(record)
             loop.run(record)
+        if told is not None:
+            told(record.steps)
     except SimulationError as error:
         error.rollout = so_far()
         raise
+    except KeyboardInterrupt:
+        raise RolloutInterrupted(so_far(), clock.n_steps) from None
     finally:
         made.close()
     return so_far()
+
+
+def _tell(progress: Progress, wanted: int, taken: int) -> None:
+    progress(taken, wanted)
 
 
 def _refuse_foreign(model: Model, clock: Clock, controller: Controller[Any] | None) -> None:
@@ -209,9 +239,9 @@ def _start(
 
 def _take_over(record: Record, rollout: Rollout, step: int, model: Model, settings: dict[str, Any]) -> None:
     """Begin where `rollout` was at `step`, if it is a record of the same simulation."""
-    if not isinstance(step, int) or not 0 <= step <= min(len(rollout), len(record.tau)):
+    if not isinstance(step, int) or not 0 <= step <= min(len(rollout), len(record)):
         raise ArgumentError(
-            f"step is {shown(step)}; the rollout to resume has {len(rollout)} and this one {len(record.tau)}"
+            f"step is {shown(step)}; the rollout to resume has {len(rollout)} and this one {len(record)}"
         )
     if rollout.model != model:
         raise ArgumentError(f"the rollout to resume is of {shown(rollout.model)}, not of {shown(model)}")
@@ -219,10 +249,10 @@ def _take_over(record: Record, rollout: Rollout, step: int, model: Model, settin
         then = rollout.settings.get(name)
         if then != now:
             raise ArgumentError(f"the rollout to resume had {name} {shown(then)}; now it is {shown(now)}")
-    record.q[:], record.v[:] = list(rollout.q[: step + 1]), list(rollout.v[: step + 1])
-    record.a[:] = list(rollout.a[:step])
-    record.tau[:step] = rollout.tau[:step]
+    record.q[: step + 1], record.v[: step + 1] = rollout.q[: step + 1], rollout.v[: step + 1]
+    record.a[:step], record.tau[:step] = rollout.a[:step], rollout.tau[:step]
     record.saturated[:step] = rollout.saturated[:step]
+    record.steps = step
 
 
 def _plant(
@@ -241,10 +271,6 @@ def _plant(
         return BulletPlant(model, loads, dt, substeps=substeps)
     engine = backend(name, model, validate=False)
     return DynxPlant(engine, loads, dt, integrator=integrator, substeps=substeps, **options)
-
-
-def _rows(rows: list[Floats], width: int) -> Floats:
-    return np.concatenate(rows).reshape(len(rows), width) if rows else np.zeros((0, width))
 
 
 def _mass_matrix(model: Model, loads: Loads) -> Callable[[Floats], Floats]:

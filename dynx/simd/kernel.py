@@ -143,6 +143,11 @@ class Kernel:
         """Room for at most so many samples, for callers that ask for few at a time."""
         return Workspace(self._opened(), self.image, samples)
 
+    @property
+    def brief_entry(self) -> Callable[[int], None]:
+        """The code itself, called with the address of its arguments (`dynx.simd.emit`), lock held."""
+        return self._opened().brief_entry
+
     def close(self) -> None:
         """Let go of the code; further calls raise ClosedError."""
         self._code = None

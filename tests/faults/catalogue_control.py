@@ -6,6 +6,7 @@ from tests.faults.fault import Fault
 
 LAWS = "tests/control/test_laws.py"
 BEHAVIOUR = "tests/control/test_behaviour.py"
+GLUED = "tests/sim/test_glued_loop.py"
 AGREE = "tests/sim/test_plants_agree.py"
 OPTIONS = "tests/sim/test_options.py"
 PHYSICS = "tests/sim/test_physics.py"
@@ -62,11 +63,11 @@ CONTROL_FAULTS = (
         caught_by=f"{AGREE}::test_a_quadruped_that_falls_and_turns_and_moves_its_legs",
     ),
     Fault(
-        "sim_noise_begins_anew_when_resumed",
+        "sim_noise_is_that_of_the_first_step",
         "dynx.sim.sensors",
         right="number = step // self._clock.steps_per_control",
-        wrong="number = len(q) % self._clock.n_controls",
-        caught_by=f"{RESUME}::test_on_a_plant_of_dynx",
+        wrong="number = 0",
+        caught_by=f"{OPTIONS}::test_noise_has_the_size_and_the_seed_that_were_asked",
     ),
     Fault(
         "sim_memory_is_forgotten_when_resumed",
@@ -81,6 +82,48 @@ CONTROL_FAULTS = (
         right="                v = v + inverse[:, at] @ impulse\n",
         wrong="                v = v.copy()\n",
         caught_by=f"{OPTIONS}::test_a_stop_is_an_inelastic_impact",
+    ),
+    Fault(
+        "glue_forgets_the_delay",
+        "dynx.sim.glued_loop",
+        right="return np.maximum(steps - clock.delay_steps, 0)",
+        wrong="return steps",
+        caught_by=f"{GLUED}::test_the_record_is_that_of_the_plain_loop",
+    ),
+    Fault(
+        "glue_is_compiled_with_licence",
+        "dynx.sim.glue",
+        right="fast=False",
+        wrong="fast=True",
+        caught_by=f"{GLUED}::test_the_record_is_that_of_the_plain_loop",
+    ),
+    Fault(
+        "glue_traces_a_law_of_somebody_s_own",
+        "dynx.sim.glue",
+        right='if not type(controller).__module__.startswith("dynx.control."):',
+        wrong="if controller is None:",
+        caught_by=f"{GLUED}::test_a_law_of_one_s_own_is_asked_in_every_step",
+    ),
+    Fault(
+        "glue_goes_on_with_what_is_no_number",
+        "dynx.sim.glued_loop",
+        right="            if defect[0] != 0.0:\n                return False\n",
+        wrong="            if defect[0] > 0.0:\n                return False\n",
+        caught_by=f"{GLUED}::test_no_plant_is_given_what_is_no_number",
+    ),
+    Fault(
+        "glue_marks_motors_cut_before_it_began",
+        "dynx.sim.glued_loop",
+        right="np.where((asked < begin)[:, None], earlier, cut)",
+        wrong="cut",
+        caught_by=f"{GLUED}::test_random_robots_resumed_at_any_step",
+    ),
+    Fault(
+        "glue_loses_steps_taken_before_ctrl_c",
+        "dynx.sim.glued_loop",
+        right="            record.steps += 1\n        return True",
+        wrong="        record.steps += len(steps)\n        return True",
+        caught_by=f"{GLUED}::test_ctrl_c_in_the_middle_of_a_stage",
     ),
     Fault(
         "batch_steps_by_explicit_euler",

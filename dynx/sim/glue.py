@@ -1,0 +1,183 @@
+"""A step of a closed loop, cut where engines are asked, and compiled between the cuts.
+
+The arithmetic of a law and of an integrator is a handful of operations on a handful of numbers, for
+each of which NumPy takes half a microsecond: more than the dynamics themselves. Here the step is traced
+on symbols. A question to an engine ends a stage; its answer is an input of the next one. Stages are
+compiled without any licence (no contraction, no reordering), so that they give what NumPy gives, bit
+for bit: which of the two ran cannot be told from the record.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from dynx.control.base import Controller
+from dynx.control.single_sample import SingleSample
+from dynx.errors import TraceError
+from dynx.simd.cache import cached_kernel, recipe_of
+from dynx.simd.emit import Settings
+from dynx.simd.expr import Graph, Symbol
+from dynx.simd.kernel import Kernel
+from dynx.simd.program import Port, Program, finished
+from dynx.simd.simplify import STRICT
+from dynx.simd.target import host
+from dynx.spatial.scalar import Array, Floats
+
+Shape = tuple[int, ...]
+
+Nodes = tuple[int, ...]
+
+Ask = Callable[..., Floats]
+"""A question to an engine: arrays in, one array out."""
+
+REMEMBERED = 128
+"""Stages kept for the next simulation in this process."""
+
+_made: dict[bytes, Kernel] = {}
+
+
+@dataclass(frozen=True)
+class Cut:
+    """A stage that ends with a question."""
+
+    kernel: Kernel
+    """Writes arguments, and the defect: 0 if they are finite, otherwise NaN."""
+    ask: Ask
+    arguments: tuple[tuple[str, Shape], ...]
+    """What the question is about: arrays that this stage or an earlier one wrote, and their shapes."""
+    answer: tuple[str, Shape]
+
+
+@dataclass(frozen=True)
+class Glue:
+    """All stages of a step. Each reads `inputs`, of which the answers are a part."""
+
+    inputs: tuple[Port, ...]
+    cuts: tuple[Cut, ...]
+    last: Kernel
+    """Writes the results of the step, in the order in which the step gives them."""
+    sizes: Mapping[str, int]
+    """Of what stages write for questions, and of answers."""
+
+
+class _Asked(NamedTuple):
+    question: Ask
+    fresh: dict[str, Nodes]
+    """Arguments that no earlier question was about."""
+    arguments: tuple[tuple[str, Shape], ...]
+    answer: tuple[str, Shape]
+
+
+class Questions:
+    """Stands for engines while a step is traced, and remembers what they are asked."""
+
+    def __init__(self, inputs: Mapping[str, int]) -> None:
+        self._graph = Graph(STRICT)
+        self._ports: list[Port] = []
+        self._slot = 0
+        self._asked: list[_Asked] = []
+        self._written: dict[Nodes, str] = {}
+        self.given = {name: self._symbols(name, size) for name, size in inputs.items()}
+
+    def ask(self, question: Ask, shape: Shape, *arguments: Array) -> Array:
+        """Symbols (of `shape`) for what `question(*arguments)` will answer."""
+        fresh: dict[str, Nodes] = {}
+        named = []
+        for argument in arguments:
+            nodes = self._indices(argument)
+            name = self._written.get(nodes)
+            if name is None:
+                name = self._written[nodes] = f"argument {len(self._written)}"
+                fresh[name] = nodes
+            named.append((name, argument.shape))
+        answer = f"answer {len(self._asked)}"
+        self._asked.append(_Asked(question, fresh, tuple(named), (answer, shape)))
+        return self._symbols(answer, int(np.prod(shape))).reshape(shape)
+
+    def glue(self, results: Mapping[str, Array]) -> Glue:
+        """The stages, the last of which gives `results`."""
+        cuts = []
+        sizes = {name: len(nodes) for nodes, name in self._written.items()}
+        for question, fresh, arguments, answer in self._asked:
+            defect = self._defect([node for nodes in fresh.values() for node in nodes])
+            kernel = _kernel(self._program({**fresh, "defect": (defect,)}))
+            cuts.append(Cut(kernel, question, arguments, answer))
+            sizes[answer[0]] = int(np.prod(answer[1]))
+        last = _kernel(self._program({name: self._indices(array) for name, array in results.items()}))
+        return Glue(tuple(self._ports), tuple(cuts), last, sizes)
+
+    def _symbols(self, name: str, size: int) -> Array:
+        symbols = np.empty(size, dtype=object)
+        for k in range(size):
+            symbols[k] = Symbol(self._graph, self._graph.input(self._slot + k))
+        self._slot += size
+        self._ports.append(Port(name, (size,)))
+        return symbols
+
+    def _indices(self, array: Array) -> Nodes:
+        return tuple(
+            entry.index if isinstance(entry, Symbol) else self._graph.constant(float(entry))
+            for entry in np.asarray(array, dtype=object).ravel().tolist()
+        )
+
+    def _defect(self, nodes: list[int]) -> int:
+        graph = self._graph
+        zero = found = graph.constant(0.0)
+        for node in nodes:
+            found = graph.apply("add", found, graph.apply("mul", node, zero))
+        return found
+
+    def _program(self, wanted: Mapping[str, Nodes]) -> Program:
+        outputs = [Port(name, (len(nodes),)) for name, nodes in wanted.items()]
+        results = [node for nodes in wanted.values() for node in nodes]
+        return finished(self._graph, self._ports, outputs, results)
+
+
+class AskedDynamics:
+    """What a law asks of its backend (`SingleSample`), as questions."""
+
+    def __init__(self, questions: Questions, dynamics: SingleSample) -> None:
+        nv = dynamics.backend.model.nv
+        shapes = {"mass_matrix": (nv, nv)}
+        for name in ("inverse_dynamics", "forward_dynamics", "bias_torque", "gravity_torque", "mass_matrix"):
+            vars(self)[name] = _asking(questions, getattr(dynamics, name), shapes.get(name, (nv,)))
+
+    def __getattr__(self, name: str) -> Any:
+        raise TraceError(f"{name} is not asked for in a stage")
+
+
+def asking_law(controller: Controller[Any], questions: Questions) -> Controller[Any]:
+    """The same law, with `questions` in the place of its backend.
+
+    Raises TraceError for a law that is not one of `dynx.control`: what somebody else's does besides
+    answering, such as counting its calls, would be done once and never again.
+    """
+    if not type(controller).__module__.startswith("dynx.control."):
+        raise TraceError(f"{controller.name} is not a law of dynx")
+    twin = copy.copy(controller)
+    own = vars(twin)
+    if "inner" in own:
+        own["inner"] = asking_law(own["inner"], questions)
+    if isinstance(own.get("_dynamics"), SingleSample):
+        own["_dynamics"] = AskedDynamics(questions, own["_dynamics"])
+    return twin
+
+
+def _asking(questions: Questions, question: Ask, shape: Shape) -> Callable[..., Array]:
+    return lambda *arguments: questions.ask(question, shape, *arguments)
+
+
+def _kernel(program: Program) -> Kernel:
+    recipe = recipe_of(program)
+    kernel = _made.get(recipe)
+    if kernel is None:
+        strict = Settings(host().lanes, fast=False)
+        kernel = _made[recipe] = cached_kernel(recipe, lambda: program, settings=strict)
+        if len(_made) > REMEMBERED:
+            _made.pop(next(iter(_made)), None)
+    return kernel

@@ -1,0 +1,202 @@
+"""The closed loop in compiled stages: the record is that of `dynx.sim.loop`, in two thirds of the time.
+
+What is left to Python is to ask the engines. Where anything looks wrong, an answer that is not finite or
+a robot that runs away, this loop stops before the step, and the plain one, which says what it is, repeats
+it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dynx.control.base import Measured
+from dynx.control.engine_motors import EngineMotor
+from dynx.errors import TraceError
+from dynx.sim.glue import Ask, Glue, Questions, asking_law
+from dynx.sim.loop import RUNAWAY, Loop
+from dynx.sim.plants import DynxPlant
+from dynx.sim.record import Record
+from dynx.simd.walk import Walk, Walked, walk
+from dynx.spatial.scalar import Array, Floats, clipped
+from dynx.trajectory.base import Setpoint
+
+WORTH = 256
+"""Steps from which on tracing pays."""
+
+AT_ONCE = 4096
+"""Steps whose calls are made ready together."""
+
+MOST_SUBSTEPS = 16
+"""Sub-steps that are traced one after another."""
+
+Steps = NDArray[np.int64]
+
+Take = Callable[[int], bool]
+"""Takes a step; False where something is wrong, and nothing of it counts."""
+
+SETPOINT = ("q_wanted", "v_wanted", "a_wanted")
+NOISE = ("noise_q", "noise_v")
+
+
+def glued(loop: Loop, record: Record) -> GluedLoop | None:
+    """The loop in stages, if it can be had and there are so many steps left that it pays."""
+    plant = loop.plant
+    if len(record) - record.steps < WORTH or isinstance(loop.controller, EngineMotor):
+        return None
+    if not isinstance(plant, DynxPlant) or not plant.is_array_code or plant.substeps > MOST_SUBSTEPS:
+        return None
+    if loop.stops is not None or not plant.model.nv:
+        return None
+    try:
+        return GluedLoop(loop, plant)
+    except TraceError:
+        return None
+
+
+class GluedLoop:
+    """A step in stages, once with the law asked and once with its torque held from before."""
+
+    def __init__(self, loop: Loop, plant: DynxPlant) -> None:
+        """Raises TraceError for a law that cannot be traced."""
+        self._loop, self._plant = loop, plant
+        nv = plant.model.nv
+        sizes = dict.fromkeys(("q", "v", "held", "seen_q", "seen_v", *SETPOINT, *NOISE), nv) | {"t": 1}
+        memory = None if loop.controller is None else loop.controller.start()
+        self._memory = 0 if memory is None else memory.size
+        if self._memory:
+            sizes["memory"] = self._memory
+        self._asked = self._step(Questions(sizes), asked=True)
+        self._held = self._step(Questions(sizes), asked=False) if loop.clock.steps_per_control > 1 else None
+
+    def run(self, record: Record) -> None:
+        """From the state in row `record.steps` until the end, or until something is wrong."""
+        begin, n = record.steps, len(record)
+        self._plant.reset(record.q[begin], record.v[begin])
+        arrays = self._arrays(record)
+        try:
+            while record.steps < n and self._chunk(record, arrays):
+                if self._loop.told is not None:
+                    self._loop.told(record.steps)
+        finally:
+            self._mark_saturated(record, arrays["wanted"], begin)
+
+    def _step(self, questions: Questions, *, asked: bool) -> Glue:
+        """One step of the plant, and of the law if it is `asked`."""
+        loop, given = self._loop, questions.given
+        results: dict[str, Array] = {}
+        tau, memory = given["held"], given.get("memory")
+        if loop.controller is None:
+            tau = np.zeros(len(tau), dtype=object)
+        elif asked:
+            q, v = given["seen_q"], given["seen_v"]
+            if loop.sensors.noise is not None:
+                q, v = q + given["noise_q"], v + given["noise_v"]
+            measured = Measured(given["t"][0], q, v)
+            law = asking_law(loop.controller, questions)
+            tau, memory = law.torque(measured, Setpoint(*(given[name] for name in SETPOINT)), memory)
+            if loop.limit is not None:
+                results["wanted"] = tau
+                tau = clipped(tau, loop.limit)
+
+        def accelerate(q: Array, v: Array, tau: Array) -> Array:
+            return questions.ask(self._plant.forward_dynamics, v.shape, q, v, tau)
+
+        q, v, a = self._plant.advanced(accelerate, given["q"], given["v"], tau)
+        results |= {"tau": tau, "a": a, "next_q": q, "next_v": v}
+        if memory is not None:
+            results["next_memory"] = memory
+        results["defect"] = np.array([v @ v], dtype=object)
+        return questions.glue(results)
+
+    def _arrays(self, record: Record) -> dict[str, Floats]:
+        """What stages read and write, by the names of their ports; a row for a step or a control step."""
+        loop, n = self._loop, len(record)
+        q, v, tau = record.q, record.v, record.tau
+        arrays = {"q": q, "v": v, "seen_q": q, "seen_v": v, "next_q": q, "next_v": v}
+        arrays |= {"held": tau, "tau": tau, "wanted": np.empty_like(tau), "a": record.a}
+        arrays["t"] = loop.clock.times()[:, None]
+        silence = np.broadcast_to(np.zeros(v.shape[1]), (loop.clock.n_controls, v.shape[1]))
+        setpoints = (silence, silence, silence) if loop.controller is None else loop.setpoints
+        # A reference may hand out its columns side by side.
+        rows = [array if array[:1].flags.c_contiguous else np.ascontiguousarray(array) for array in setpoints]
+        arrays |= dict(zip(SETPOINT, rows, strict=True))
+        arrays |= dict(zip(NOISE, loop.sensors.noise or (silence, silence), strict=True))
+        if self._memory:
+            arrays["memory"] = arrays["next_memory"] = memory = np.empty((n + 1, self._memory))
+            memory[record.steps] = loop.remembered(record)
+        return arrays
+
+    def _row(self, name: str, steps: Steps) -> Steps:
+        """The row of an array that belongs to each of `steps`."""
+        clock = self._loop.clock
+        if name.startswith("next_"):
+            return steps + 1
+        if name == "held":
+            return np.maximum(steps - 1, 0)
+        if name in ("seen_q", "seen_v"):
+            return np.maximum(steps - clock.delay_steps, 0)
+        if name in SETPOINT or name in NOISE:
+            return steps // clock.steps_per_control
+        return steps
+
+    def _chunk(self, record: Record, arrays: Mapping[str, Floats]) -> bool:
+        """Some steps, counted in the record as they are taken; False if something is wrong."""
+        first, per = record.steps, self._loop.clock.steps_per_control
+        steps = np.arange(first, min(len(record), first + AT_ONCE))
+        walked = {name: Walked(array, self._row(name, steps)) for name, array in arrays.items()}
+        asked = _ready(self._asked, walked, len(steps))
+        held = asked if self._held is None else _ready(self._held, walked, len(steps))
+        for k in range(len(steps)):
+            try:
+                if not (asked if (first + k) % per == 0 else held)(k):
+                    return False
+            except Exception:
+                # Whatever it is, the plain loop meets it again, and says where.
+                return False
+            record.steps += 1
+        return True
+
+    def _mark_saturated(self, record: Record, wanted: Floats, begin: int) -> None:
+        """Where the torque that acted is not what the law wanted when it was asked last."""
+        if self._loop.limit is None:
+            return
+        steps = np.arange(begin, record.steps)
+        asked = steps // self._loop.clock.steps_per_control * self._loop.clock.steps_per_control
+        cut = record.tau[asked] != wanted[asked]
+        # Torque commanded before the beginning was marked then.
+        earlier = record.saturated[max(begin - 1, 0)]
+        record.saturated[steps] = np.where((asked < begin)[:, None], earlier, cut)
+
+
+def _ready(glue: Glue, walked: Mapping[str, Walked], n: int) -> Take:
+    """The n steps of `walked` as calls."""
+    still = np.zeros(n, dtype=np.int64)
+    places = {name: np.zeros((1, size)) for name, size in (*glue.sizes.items(), ("defect", 1))}
+    every = {**walked, **{name: Walked(place, still) for name, place in places.items()}}
+    inputs = [every[port.name] for port in glue.inputs]
+    stages: list[tuple[Callable[[int], None], range, Ask, list[Floats], Any, Walk]] = []
+    for cut in glue.cuts:
+        calls = walk(cut.kernel, inputs, [every[port.name] for port in cut.kernel.outputs])
+        arguments = [places[name].reshape(shape) for name, shape in cut.arguments]
+        name, shape = cut.answer
+        found = places[name].reshape(shape)
+        # A view of memory takes a row of numbers in a third of the time that an array does.
+        answer = found.data if found.ndim == 1 else found
+        stages.append((calls.run, calls.addresses, cut.ask, arguments, answer, calls))
+    last = walk(glue.last, inputs, [every[port.name] for port in glue.last.outputs])
+    run_last, addresses_last, defect = last.run, last.addresses, places["defect"].reshape(1).data
+
+    def take(k: int, _kept: object = last) -> bool:
+        for run, addresses, ask, arguments, answer, _ in stages:
+            run(addresses[k])
+            if defect[0] != 0.0:
+                return False
+            answer[:] = ask(*arguments)
+        run_last(addresses_last[k])
+        return bool(defect[0] < RUNAWAY**2)
+
+    return take
