@@ -39,7 +39,7 @@ from dynx.simd.target import compiler_version, host
 from dynx.simd.threads import checked_threads
 from dynx.spatial.scalar import Floats
 
-Call = KernelCall | NumericCall
+Call = Callable[..., Floats]
 
 _QUANTITY_OF_HOOK = {f"_{quantity}": quantity for quantity in QUANTITIES}
 
@@ -234,7 +234,7 @@ class CompiledBackend(Backend):
         divides = QUANTITIES[quantity].divides and not tree
         refuse = self._arguments.finite_acceleration if divides else None
         if not compiles(self._tidy, quantity):
-            return NumericCall(self._tidy, quantity, details, checks, tree=tree, refuse=refuse)
+            return NumericCall(self._tidy, quantity, details, checks, tree=tree, refuse=refuse).answer
         options: dict[str, Any] = {
             "threads": self._threads,
             "validate": self._validate and not tree,
@@ -242,13 +242,13 @@ class CompiledBackend(Backend):
         }
         if quantity not in ON_CHAINS:
             kernel = quantity_kernel(self._tidy, quantity, details, tree=tree)
-            return KernelCall(kernel, checks, **options)
+            return KernelCall(kernel, checks, **options).answer
         chain = chain_of(self._tidy, quantity, *details)
         key = (quantity, chain, tree)
         if key not in self._chains:
             self._chains[key] = chain_kernel(self._tidy, quantity, chain, tree=tree)
         place = place_of(self._tidy, chain, *details)
-        return KernelCall(self._chains[key], checks, place=place, **options)
+        return KernelCall(self._chains[key], checks, place=place, **options).answer
 
     def _check(self, argument: str, tree: bool) -> Callable[[Any], Floats]:
         if tree:

@@ -86,7 +86,7 @@ class KernelCall:
         # destructor calls in the middle of a call.
         self._rooms = [room]
 
-    def __call__(self, q: Any, v: Any = _ABSENT, a: Any = _ABSENT, out: Floats | None = None) -> Floats:
+    def answer(self, q: Any, v: Any = _ABSENT, a: Any = _ABSENT, out: Floats | None = None) -> Floats:
         """The answer (..., *shape), in `out` if that is given.
 
         `out` is a C-contiguous float64 array of the answer's shape; what it holds after an error is
@@ -200,8 +200,8 @@ class NumericCall:
         self._mechanism, self._quantity, self._details = mechanism, quantity, details
         self._checks, self._tree, self._refuse = checks, tree, refuse
 
-    def __call__(self, q: Any, v: Any = _ABSENT, a: Any = _ABSENT, out: Floats | None = None) -> Floats:
-        """As `KernelCall` does."""
+    def answer(self, q: Any, v: Any = _ABSENT, a: Any = _ABSENT, out: Floats | None = None) -> Floats:
+        """As `KernelCall.answer` does."""
         arguments = (x for x in (q, v, a) if x is not _ABSENT)
         arrays = [check(argument) for check, argument in zip(self._checks, arguments, strict=True)]
         batch = common_batch(*arrays)

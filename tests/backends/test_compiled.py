@@ -100,6 +100,10 @@ def test_every_quantity_is_native() -> None:
     assert native_quantities(CompiledBackend) >= set(QUANTITIES) - {"frame_placement", "frame_placements"}
 
 
+def owner(method: Any) -> object:
+    return method.__self__
+
+
 def test_mimic_joints_are_part_of_the_kernel() -> None:
     """A call in model coordinates makes one kernel, whose inputs are those coordinates."""
     engine = made(ROBOTS["mimic"])
@@ -107,7 +111,8 @@ def test_mimic_joints_are_part_of_the_kernel() -> None:
     engine.inverse_dynamics(q, v, a)
     engine.bias_torque(q, v)
     engine.forward_dynamics(q, v, a)
-    for call in engine._calls.values():
+    for answer in engine._calls.values():
+        call = owner(answer)
         assert isinstance(call, KernelCall)
         assert {port.shape for port in call._kernel.inputs} == {(engine.model.nv,)}
 
@@ -160,7 +165,7 @@ def test_what_is_not_compiled_is_evaluated(
         close = Closeness(samples_at(model, q, v, numbers.forward_dynamics(q, v, a)))
     close.check(quantity, answers[0], answers[1])
     assert numbers._calls
-    assert all(isinstance(call, NumericCall) for call in numbers._calls.values())
+    assert all(isinstance(owner(answer), NumericCall) for answer in numbers._calls.values())
     assert not kernels._calls
 
 
