@@ -48,7 +48,10 @@ class Evaluation:
         if self._coupling is not None:
             q = self._coupling.expand_q(q)
             velocities = tuple(v @ self._S.T for v in velocities)
-        samples = [np.broadcast_to(x, (*batch, x.shape[-1])) for x in (q, *velocities)]
+        samples = [
+            x if x.shape[:-1] == batch else np.broadcast_to(x, (*batch, x.shape[-1]))
+            for x in (q, *velocities)
+        ]
         shape = (*batch, *(self._nv if n == -1 else n for n in tail))
         if self._vectorized or not batch:
             answer = np.asarray(hook(*samples, *args))

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -93,9 +93,15 @@ class Coupling:
 
     def expand_q(self, q: Floats) -> Floats:
         """Model configuration (..., nq) to tree configuration."""
-        base = 7 if self.floating else 0
-        joints = q[..., base:][..., list(self.index)] * np.array(self.scale) + np.array(self.offset)
-        return np.concatenate([q[..., :base], joints], axis=-1)
+        index, scale, offset = self._arrays
+        if not self.floating:
+            return np.asarray(q.take(index, axis=-1) * scale + offset)
+        joints = q[..., 7:].take(index, axis=-1) * scale + offset
+        return np.concatenate([q[..., :7], joints], axis=-1)
+
+    @cached_property
+    def _arrays(self) -> tuple[np.ndarray[Any, np.dtype[np.intp]], Floats, Floats]:
+        return np.array(self.index, dtype=np.intp), np.array(self.scale), np.array(self.offset)
 
 
 @dataclass(frozen=True)
