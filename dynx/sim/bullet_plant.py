@@ -54,6 +54,7 @@ class BulletPlant(Plant):
         self._floating = model.floating
         self._base_nq, self._base_nv = (7, 6) if model.floating else (0, 0)
         self._coupling = model.mechanism.coupling
+        self._S = np.eye(0) if self._coupling is None else self._coupling.matrix()
         self._owners = np.flatnonzero([joint.mimic is None for joint in model.joints if joint.moves])
         self._solves = self._coupling is not None or loads.has_rotors
         # The root's inertial frame in the base frame.
@@ -142,7 +143,7 @@ class BulletPlant(Plant):
         coupling = self._coupling
         if coupling is None:
             return self._engine.inverse_dynamics(q, v, a)
-        S = coupling.matrix()
+        S = self._S
         return self._tree.inverse_dynamics(coupling.expand_q(q), S @ v, S @ a)
 
     def _advance(self, tau: Floats) -> Floats:
@@ -197,7 +198,7 @@ class BulletPlant(Plant):
     def _place(self) -> None:
         q, v = self._q, self._v
         if self._coupling is not None:
-            q, v = self._coupling.expand_q(q), self._coupling.matrix() @ v
+            q, v = self._coupling.expand_q(q), self._S @ v
         base = None
         if self._floating:
             R = rotation_from_quat(q[3:7])
