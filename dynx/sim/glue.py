@@ -35,6 +35,11 @@ Nodes = tuple[int, ...]
 Ask = Callable[..., Floats]
 """A question to an engine: arrays in, one array out."""
 
+ROUNDED_ALIKE = frozenset(
+    {"input", "constant", "add", "sub", "mul", "div", "neg", "abs", "sqrt", "min", "max"}
+)
+"""Operations that give the same bits in NumPy and in a kernel: those that IEEE 754 rounds correctly."""
+
 REMEMBERED = 128
 """Stages kept for the next simulation in this process."""
 
@@ -135,7 +140,11 @@ class Questions:
     def _program(self, wanted: Mapping[str, Nodes]) -> Program:
         outputs = [Port(name, (len(nodes),)) for name, nodes in wanted.items()]
         results = [node for nodes in wanted.values() for node in nodes]
-        return finished(self._graph, self._ports, outputs, results)
+        program = finished(self._graph, self._ports, outputs, results)
+        for node in program.nodes:
+            if node.op not in ROUNDED_ALIKE:
+                raise TraceError(f"{node.op} is not rounded as NumPy rounds it")
+        return program
 
 
 class AskedDynamics:

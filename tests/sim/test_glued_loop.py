@@ -190,12 +190,11 @@ def test_torques_from_a_table_go_the_plain_way() -> None:
     both(ARM, law, duration=0.01, glued=False)
 
 
-def test_compensated_friction_goes_some_way() -> None:
-    law = FrictionCompensation(PD(ARM, kp=100, kd=10), damping=0.5, friction=0.0)
-    with glue(on=True):
-        quick = simulate(ARM, law, np.zeros(6), duration=0.02)
-    with glue(on=False):
-        the_same(quick, simulate(ARM, law, np.zeros(6), duration=0.02))
+@pytest.mark.parametrize("speed", ["measured", "setpoint"])
+def test_compensated_friction_goes_the_plain_way(speed: str) -> None:
+    """Its hyperbolic tangent is not rounded alike in NumPy and in a kernel."""
+    law = FrictionCompensation(PD(ARM, kp=100, kd=10), damping=0.5, friction=0.3, speed=speed)
+    both(ARM, law, np.zeros(6), q0=np.full(6, 0.1), duration=0.02, glued=False)
 
 
 def test_a_floating_base_goes_the_plain_way() -> None:
