@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -23,6 +24,21 @@ def test_the_table_of_peers_has_dynx_first() -> None:
     assert finished.returncode == 0, finished.stdout + finished.stderr
     rows = [line for line in finished.stdout.splitlines() if line.startswith("| ")]
     assert [row.split(" | ")[0] for row in rows[:2]] == ["| way", "| compiled"]
+
+
+def test_simulators_are_right_and_timed() -> None:
+    finished = run("benchmarks.simulation", "--quick", "--repetitions", "1", "--json")
+    assert finished.returncode == 0, finished.stdout + finished.stderr
+    results = json.loads(finished.stdout)["results"]
+    ours = [each for each in results if each["name"].startswith("dynx, ")]
+    assert {each["threads"] for each in ours} == {1, 2}
+    assert all(each["step"] > 0.0 and each["checks"] for each in results)
+
+
+def test_integrators_are_of_their_order() -> None:
+    finished = run("benchmarks.integrators", "--quick")
+    assert finished.returncode == 0, finished.stdout + finished.stderr
+    assert finished.stdout.count("fitted order") == 3
 
 
 def run(*command: str) -> subprocess.CompletedProcess[str]:

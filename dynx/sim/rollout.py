@@ -124,22 +124,34 @@ class Rollout:
         )
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write a ``.npz`` (complete, `Rollout.load` reads it) or a ``.csv`` (for other programs)."""
+        """Write a file of the format that the name ends with: all of it, or nothing under that name.
+
+        - ``.npz``: complete; `Rollout.load` reads it, and so does `numpy.load`
+        - ``.csv``: a table for spreadsheets; `dynx.sim.csv_file` says what its columns are
+        - ``.mcap``: ROS 2 messages for PlotJuggler, Foxglove and ``ros2 bag``; `dynx.sim.ros_topics`
+          says what is on which topic
+
+        All three keep every bit of the numbers. Raises ArgumentError for another format or a file that
+        cannot be written, NotInstalledError for ``.mcap`` without mcap (``pip install 'dynx[mcap]'``).
+        """
         from dynx.sim.rollout_file import save
 
         save(self, path)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Rollout:
-        """Read what `save` wrote as ``.npz``, the same to the last bit."""
+        """Read what `save` wrote as ``.npz``, the same to the last bit; ArgumentError for another file."""
         from dynx.sim.rollout_file import load
 
         return load(path)
 
     def plot(self, path: str | os.PathLike[str] | None = None) -> Any:
-        """A `matplotlib.figure.Figure` of joints, errors, and torques against limits; saved at `path`.
+        """A `matplotlib.figure.Figure` of positions, errors, and torques against limits; saved at `path`.
 
-        Raises NotInstalledError without matplotlib (``pip install 'dynx[plot]'``).
+        Without a reference it has velocities for errors. A limit is drawn where a torque comes near it.
+        A floating base has a column of its own: its position in the world, and its error, velocity and
+        force in its own axes. Raises NotInstalledError without matplotlib (``pip install 'dynx[plot]'``),
+        ArgumentError for a file that cannot be written.
         """
         from dynx.sim.rollout_plot import plot
 

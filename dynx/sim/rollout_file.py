@@ -1,18 +1,24 @@
-"""Rollouts in files: NumPy's ``.npz`` with a schema, which keeps every bit, and ``.csv``."""
+"""Rollouts in files: which format a name stands for, and NumPy's ``.npz``, which `load` reads again."""
 
 from __future__ import annotations
 
 import json
 import os
+import struct
 import zipfile
+import zlib
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 
-from dynx.errors import ArgumentError, shown
+from dynx.errors import ArgumentError, ModelError, shown
 from dynx.model.loading import load as load_model
+from dynx.sim.csv_file import write_csv
+from dynx.sim.mcap_file import write_mcap
 from dynx.sim.rollout import Rollout
+from dynx.sim.whole_file import whole_file
 from dynx.trajectory.base import Setpoint
 
 SCHEMA = "dynx.rollout/1"
@@ -21,16 +27,25 @@ SCHEMA = "dynx.rollout/1"
 ARRAYS = ("t", "q", "v", "a", "tau", "saturated", "rotors")
 REFERENCE = ("reference_q", "reference_v", "reference_a")
 
+DAMAGED = (
+    *(OSError, EOFError, ValueError, KeyError, RuntimeError, MemoryError),
+    *(zipfile.BadZipFile, zlib.error, struct.error),
+)
+"""What zipfile and NumPy raise for a file that is not there or was changed after it was written."""
+
 
 def save(rollout: Rollout, path: str | os.PathLike[str]) -> None:
-    """Write `rollout` in the format that the name ends with. Raises ArgumentError for another."""
-    target = Path(path)
-    if target.suffix == ".npz":
-        _save_npz(rollout, target)
-    elif target.suffix == ".csv":
-        _save_csv(rollout, target)
-    else:
-        raise ArgumentError(f"a rollout is saved as .npz or .csv, not as {shown(target.name)}")
+    """Write `rollout` in the format that the name ends with: all of it, or nothing under that name.
+
+    Raises ArgumentError for another format or a file that cannot be written, NotInstalledError where
+    the format needs a package that is missing.
+    """
+    write = WRITERS.get(Path(path).suffix.lower())
+    if write is None:
+        formats = " or ".join([", ".join([*WRITERS][:-1]), [*WRITERS][-1]])
+        raise ArgumentError(f"a rollout is saved as {formats}, not as {shown(Path(path).name)}")
+    with whole_file(path) as file:
+        write(rollout, file)
 
 
 def load(path: str | os.PathLike[str]) -> Rollout:
@@ -38,29 +53,54 @@ def load(path: str | os.PathLike[str]) -> Rollout:
 
     The model comes back from the URDF text in the file; arrays are read without unpickling anything.
     """
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            entries = {name: file[name] for name in file.files}
-    except (OSError, ValueError, zipfile.BadZipFile) as error:
-        raise ArgumentError(f"{os.fspath(path)} cannot be read as a rollout: {error}") from error
+    name = os.fspath(path)
+    entries = _entries(path)
     if str(entries.get("schema")) != SCHEMA:
-        raise ArgumentError(f"{os.fspath(path)} does not say {SCHEMA!r}, so it is no rollout of this version")
-    missing = [name for name in (*ARRAYS, "robot") if name not in entries]
+        raise ArgumentError(f"{name} does not say {SCHEMA!r}, so it is no rollout of this version")
+    missing = [entry for entry in (*ARRAYS, "robot") if entry not in entries]
     if missing:
-        raise ArgumentError(f"{os.fspath(path)} lacks {', '.join(missing)}")
-    robot: dict[str, Any] = json.loads(str(entries["robot"]))
+        raise ArgumentError(f"{name} lacks {', '.join(missing)}")
     reference = None
-    if all(name in entries for name in REFERENCE):
-        reference = Setpoint(*(entries[name] for name in REFERENCE))
+    if all(entry in entries for entry in REFERENCE):
+        reference = Setpoint(*(entries[entry] for entry in REFERENCE))
+    try:
+        robot: dict[str, Any] = json.loads(str(entries["robot"]))
+        model = load_model(robot["urdf"], base=robot["base"], gravity=robot["gravity"])
+        settings = dict(robot["settings"])
+    except (ValueError, KeyError, TypeError, ModelError) as error:
+        raise ArgumentError(f"the robot in {name} cannot be read: {error}") from error
+    n = len(entries["tau"]) if entries["tau"].ndim else 0
+    shapes = {"t": (n + 1,), "q": (n + 1, model.nq), "rotors": (model.nv, model.nv)}
+    shapes |= {"v": (n + 1, model.nv)} | dict.fromkeys(("a", "tau", "saturated"), (n, model.nv))
+    shapes |= zip(REFERENCE, ((n + 1, model.nq), (n + 1, model.nv), (n + 1, model.nv)), strict=True)
+    for entry, shape in shapes.items():
+        array, kind = entries.get(entry), np.dtype(bool if entry == "saturated" else float)
+        if array is not None and (array.shape != shape or array.dtype != kind):
+            raise ArgumentError(
+                f"{entry} in {name} is {array.dtype} {array.shape}; wanted {kind} {shape} as n is {n}"
+            )
     return Rollout(
-        load_model(robot["urdf"], base=robot["base"], gravity=robot["gravity"]),
-        reference=reference,
-        settings=robot["settings"],
-        **{name: entries[name] for name in ARRAYS},
+        model, reference=reference, settings=settings, **{entry: entries[entry] for entry in ARRAYS}
     )
 
 
-def _save_npz(rollout: Rollout, path: Path) -> None:
+def _entries(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """All arrays of a ``.npz``."""
+    problem = "it is no .npz file, or a part of one"
+    try:
+        with open(path, "rb") as raw:
+            if zipfile.is_zipfile(raw):
+                raw.seek(0)
+                file = np.load(raw, allow_pickle=False)
+                if isinstance(file, np.lib.npyio.NpzFile):
+                    with file:
+                        return {name: file[name] for name in file.files}
+    except DAMAGED as error:
+        problem = str(error) or type(error).__name__
+    raise ArgumentError(f"{os.fspath(path)} cannot be read as a rollout: {problem}")
+
+
+def _write_npz(rollout: Rollout, file: BinaryIO) -> None:
     model = rollout.model
     robot = {
         "urdf": model.to_urdf(),
@@ -72,31 +112,12 @@ def _save_npz(rollout: Rollout, path: Path) -> None:
     if rollout.reference is not None:
         arrays.update(zip(REFERENCE, rollout.reference, strict=True))
     # The energy is for readers without dynx; `load` computes it again.
-    np.savez(path, schema=SCHEMA, robot=json.dumps(robot), energy=rollout.energy, **arrays)
+    np.savez(file, schema=SCHEMA, robot=json.dumps(robot), energy=rollout.energy, **arrays)
 
 
-def _save_csv(rollout: Rollout, path: Path) -> None:
-    """A row for each state; what acted from then on beside it, empty in the last row."""
-    model = rollout.model
-    base_q = ["x", "y", "z", "qx", "qy", "qz", "qw"] if model.floating else []
-    base_v = ["vx", "vy", "vz", "wx", "wy", "wz"] if model.floating else []
-    positions = [*base_q, *model.joint_names]
-    rates = [*base_v, *model.joint_names]
-    columns = ["t", *(f"q:{name}" for name in positions), *(f"v:{name}" for name in rates)]
-    blocks = [rollout.t[:, None], rollout.q, rollout.v]
-    if rollout.reference is not None:
-        columns += [f"q*:{name}" for name in positions] + [f"error:{name}" for name in rates]
-        blocks += [rollout.reference.q, rollout.error]
-    columns += [f"a:{name}" for name in rates] + [f"tau:{name}" for name in rates]
-    states = np.concatenate(blocks, axis=1)
-    acting = np.concatenate([rollout.a, rollout.tau], axis=1)
-    with path.open("w", encoding="utf-8", newline="") as file:
-        file.write(",".join(_quoted(column) for column in columns) + "\n")
-        for k, state in enumerate(states):
-            numbers = [repr(x) for x in state.tolist()]
-            numbers += [repr(x) for x in acting[k].tolist()] if k < len(acting) else [""] * acting.shape[1]
-            file.write(",".join(numbers) + "\n")
-
-
-def _quoted(text: str) -> str:
-    return '"' + text.replace('"', '""') + '"' if any(c in text for c in ',"\n\r') else text
+WRITERS: dict[str, Callable[[Rollout, BinaryIO], None]] = {
+    ".npz": _write_npz,
+    ".csv": write_csv,
+    ".mcap": write_mcap,
+}
+"""By the end of the name."""

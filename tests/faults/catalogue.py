@@ -14,6 +14,7 @@ from tests.faults.catalogue_pinocchio import PINOCCHIO_FAULTS
 from tests.faults.catalogue_pybullet import PYBULLET_FAULTS
 from tests.faults.catalogue_rbd import RBD_FAULTS
 from tests.faults.catalogue_reader import READER_FAULTS
+from tests.faults.catalogue_records import RECORDS_FAULTS
 from tests.faults.catalogue_rules import RULES_FAULTS
 from tests.faults.catalogue_simd import SIMD_FAULTS
 from tests.faults.catalogue_spatial import SPATIAL_FAULTS
@@ -37,5 +38,6 @@ FAULTS_BY_AREA: dict[str, tuple[Fault, ...]] = {
     "simd": SIMD_FAULTS,
     "trajectory": TRAJECTORY_FAULTS,
     "control": CONTROL_FAULTS,
+    "records": RECORDS_FAULTS,
 }
 FAULTS: tuple[Fault, ...] = tuple(fault for faults in FAULTS_BY_AREA.values() for fault in faults)

@@ -150,8 +150,8 @@ INTERFACE_FAULTS = (
     Fault(
         "broadcast_by_repeating_the_numbers",
         EVALUATION,
-        right="np.broadcast_to(x, (*batch, x.shape[-1])) for x in",
-        wrong="np.resize(x, (*batch, x.shape[-1])) for x in",
+        right="else np.broadcast_to(x, (*batch, x.shape[-1]))",
+        wrong="else np.resize(x, (*batch, x.shape[-1]))",
         caught_by=f"{SHAPES}::test_leading_axes_broadcast[reference-inverse_dynamics-fixed]",
     ),
     Fault(

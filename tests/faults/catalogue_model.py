@@ -167,8 +167,8 @@ MODEL_FAULTS = (
     Fault(
         "mimic_offset_dropped",
         MECHANISM,
-        right="* np.array(self.scale) + np.array(self.offset)",
-        wrong="* np.array(self.scale)",
+        right="q.take(index, axis=-1) * scale + offset)",
+        wrong="q.take(index, axis=-1) * scale)",
         caught_by=f"{COORDINATES}::TestMimicJoints::test_reduced_answers[reference-forward_kinematics]",
     ),
     Fault(

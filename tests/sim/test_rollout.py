@@ -105,7 +105,7 @@ def test_the_table_is_for_other_programs(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["run.txt", "run"])
 def test_other_formats_are_refused(rollout: Rollout, tmp_path: Path, name: str) -> None:
-    with pytest.raises(ArgumentError, match=r"\.npz or \.csv"):
+    with pytest.raises(ArgumentError, match=r"\.npz, \.csv or \.mcap"):
         rollout.save(tmp_path / name)
 
 
@@ -138,7 +138,8 @@ def test_a_plot_shows_every_joint_and_the_limits(tmp_path: Path) -> None:
     assert len(errors.lines) == robot.nv
     assert len(torques.lines) >= robot.nv
     np.testing.assert_array_equal(errors.lines[2].get_ydata(), moved.error[:, 2])
-    assert [text.get_text() for text in figure.legends[0].get_texts()] == list(robot.joint_names)
+    named = [text.get_text() for text in torques.get_legend().get_texts()]
+    assert named[: robot.nv + 1] == [*robot.joint_names, "reference"]
     assert (tmp_path / "run.png").read_bytes().startswith(b"\x89PNG")
 
 
