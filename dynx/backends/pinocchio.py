@@ -15,7 +15,8 @@ proves it), and its mass matrix is symmetric: the binding fills the triangle tha
 
 from __future__ import annotations
 
-from functools import cached_property
+from collections.abc import Callable, Sequence
+from functools import cached_property, lru_cache, partial
 from threading import local
 from typing import Any, ClassVar
 
@@ -49,6 +50,15 @@ def _gist(error: BaseException) -> str:
 
 
 _mapped = engine_errors("pinocchio", _gist)
+
+
+_FUNCTIONS: dict[str, Callable[..., Floats]] = {
+    "inverse_dynamics": pin.rnea,
+    "forward_dynamics": pin.aba,
+    "bias_torque": pin.nonLinearEffects,
+    "gravity_torque": pin.computeGeneralizedGravity,
+}
+"""What answers a hook at once: arrays in, one array out."""
 
 
 class _Workspace(local):
@@ -162,6 +172,14 @@ class PinocchioBackend(Backend):
 
     # -- dynamics -----------------------------------------------------------------------------
 
+    def _in_this_thread(self, question: str) -> Callable[..., Floats] | None:
+        """The binding's function itself, with the `Data` of the calling thread."""
+        function = _FUNCTIONS.get(question)
+        hook = f"_{question}"
+        if function is None or getattr(type(self), hook) is not getattr(PinocchioBackend, hook):
+            return None
+        return partial(function, self._engine, self._workspace.data)
+
     @_mapped
     def _inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
         tau: Floats = pin.rnea(self._engine, self._workspace.data, q, v, a)
@@ -240,11 +258,13 @@ class PinocchioBackend(Backend):
         return np.asarray(moving + self._rest_energy)
 
 
-def engine_model(model: Model) -> tuple[Any, list[int]]:
+@lru_cache(maxsize=16)
+def engine_model(model: Model) -> tuple[Any, tuple[int, ...]]:
     """Pinocchio's own model of `model`, and the number it gave to each frame of `model.frame_names`.
 
-    Its coordinates are those of the tree: a mimic joint is one more. Raises EngineLimitError for a
-    model that the engine cannot hold without harm, EngineError where it refuses.
+    Made once for all backends of a model, which never change it. Its coordinates are those of the tree:
+    a mimic joint is one more. Raises EngineLimitError for a model that the engine cannot hold without
+    harm, EngineError where it refuses.
     """
     nv = model.mechanism.nv
     if nv > MAX_NV:
@@ -260,7 +280,7 @@ def engine_model(model: Model) -> tuple[Any, list[int]]:
         raise EngineError(f"pinocchio cannot hold {model.name}: {_gist(error)}") from error
 
 
-def _build(model: Model) -> tuple[Any, list[int]]:
+def _build(model: Model) -> tuple[Any, tuple[int, ...]]:
     engine = pin.Model()
     engine.name = model.name
     engine.gravity.linear = np.array(model.gravity)
@@ -289,10 +309,10 @@ def _build(model: Model) -> tuple[Any, list[int]]:
         T_carrier_frame = T_carrier_link * _placement(frame.placement)
         made = pin.Frame(f"{index}:{frame.name}", carrier, 0, T_carrier_frame, pin.FrameType.OP_FRAME)
         frame_ids.append(int(engine.addFrame(made, False)))
-    return engine, frame_ids
+    return engine, tuple(frame_ids)
 
 
-def _lumping(engine: Any, links: list[int]) -> tuple[list[int], Floats]:
+def _lumping(engine: Any, links: Sequence[int]) -> tuple[list[int], Floats]:
     """How links add to the inertia of the joints that carry them.
 
     For each link its joint, counted without the universe, and the matrix (10, 10) from its parameters

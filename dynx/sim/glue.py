@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -51,7 +51,7 @@ class Cut:
     """A stage that ends with a question."""
 
     kernel: Kernel
-    """Writes arguments, and the defect: 0 if they are finite, otherwise NaN."""
+    """Writes arguments and, if they are guarded, the defect: 0 if they are finite, otherwise NaN."""
     ask: Ask
     arguments: tuple[tuple[str, Shape], ...]
     """What the question is about: arrays that this stage or an earlier one wrote, and their shapes."""
@@ -60,9 +60,8 @@ class Cut:
 
 @dataclass(frozen=True)
 class Glue:
-    """All stages of a step. Each reads `inputs`, of which the answers are a part."""
+    """All stages of a step."""
 
-    inputs: tuple[Port, ...]
     cuts: tuple[Cut, ...]
     last: Kernel
     """Writes the results of the step, in the order in which the step gives them."""
@@ -76,6 +75,7 @@ class _Asked(NamedTuple):
     """Arguments that no earlier question was about."""
     arguments: tuple[tuple[str, Shape], ...]
     answer: tuple[str, Shape]
+    guarded: bool
 
 
 class Questions:
@@ -89,8 +89,11 @@ class Questions:
         self._written: dict[Nodes, str] = {}
         self.given = {name: self._symbols(name, size) for name, size in inputs.items()}
 
-    def ask(self, question: Ask, shape: Shape, *arguments: Array) -> Array:
-        """Symbols (of `shape`) for what `question(*arguments)` will answer."""
+    def ask(self, question: Ask, shape: Shape, *arguments: Array, guarded: bool = False) -> Array:
+        """Symbols (of `shape`) for what `question(*arguments)` will answer.
+
+        If it is `guarded`, the step ends before it is asked about what is not finite.
+        """
         fresh: dict[str, Nodes] = {}
         named = []
         for argument in arguments:
@@ -101,20 +104,22 @@ class Questions:
                 fresh[name] = nodes
             named.append((name, argument.shape))
         answer = f"answer {len(self._asked)}"
-        self._asked.append(_Asked(question, fresh, tuple(named), (answer, shape)))
+        self._asked.append(_Asked(question, fresh, tuple(named), (answer, shape), guarded))
         return self._symbols(answer, int(np.prod(shape))).reshape(shape)
 
     def glue(self, results: Mapping[str, Array]) -> Glue:
         """The stages, the last of which gives `results`."""
         cuts = []
         sizes = {name: len(nodes) for nodes, name in self._written.items()}
-        for question, fresh, arguments, answer in self._asked:
-            defect = self._defect([node for nodes in fresh.values() for node in nodes])
-            kernel = _kernel(self._program({**fresh, "defect": (defect,)}))
+        for question, fresh, arguments, answer, guarded in self._asked:
+            wanted = dict(fresh)
+            if guarded:
+                wanted["defect"] = (self._defect([node for nodes in fresh.values() for node in nodes]),)
+            kernel = _kernel(self._program(wanted))
             cuts.append(Cut(kernel, question, arguments, answer))
             sizes[answer[0]] = int(np.prod(answer[1]))
         last = _kernel(self._program({name: self._indices(array) for name, array in results.items()}))
-        return Glue(tuple(self._ports), tuple(cuts), last, sizes)
+        return Glue(tuple(cuts), last, sizes)
 
     def _symbols(self, name: str, size: int) -> Array:
         symbols = np.empty(size, dtype=object)
@@ -144,7 +149,7 @@ class Questions:
         for node in program.nodes:
             if node.op not in ROUNDED_ALIKE:
                 raise TraceError(f"{node.op} is not rounded as NumPy rounds it")
-        return program
+        return _without_idle_inputs(program)
 
 
 class AskedDynamics:
@@ -154,7 +159,7 @@ class AskedDynamics:
         nv = dynamics.backend.model.nv
         shapes = {"mass_matrix": (nv, nv)}
         for name in ("inverse_dynamics", "forward_dynamics", "bias_torque", "gravity_torque", "mass_matrix"):
-            vars(self)[name] = _asking(questions, getattr(dynamics, name), shapes.get(name, (nv,)))
+            vars(self)[name] = _asking(questions, dynamics.in_this_thread(name), shapes.get(name, (nv,)))
 
     def __getattr__(self, name: str) -> Any:
         raise TraceError(f"{name} is not asked for in a stage")
@@ -179,6 +184,22 @@ def asking_law(controller: Controller[Any], questions: Questions) -> Controller[
 
 def _asking(questions: Questions, question: Ask, shape: Shape) -> Callable[..., Array]:
     return lambda *arguments: questions.ask(question, shape, *arguments)
+
+
+def _without_idle_inputs(program: Program) -> Program:
+    """The same with those inputs alone that it reads."""
+    read = {node.slot for node in program.nodes if node.op == "input"}
+    kept: list[Port] = []
+    moved: dict[int, int] = {}
+    slot = 0
+    for port in program.inputs:
+        slots = range(slot, slot + port.size)
+        slot += port.size
+        if not read.isdisjoint(slots):
+            moved.update(zip(slots, range(len(moved), len(moved) + port.size), strict=True))
+            kept.append(port)
+    nodes = [node._replace(slot=moved[node.slot]) if node.op == "input" else node for node in program.nodes]
+    return replace(program, nodes=tuple(nodes), inputs=tuple(kept))
 
 
 def _kernel(program: Program) -> Kernel:

@@ -20,6 +20,7 @@ from dynx.sim.glue import Ask, Glue, Questions, asking_law
 from dynx.sim.loop import RUNAWAY, Loop
 from dynx.sim.plants import DynxPlant
 from dynx.sim.record import Record
+from dynx.simd.kernel import Kernel
 from dynx.simd.walk import Walk, Walked, walk
 from dynx.spatial.scalar import Array, Floats, clipped
 from dynx.trajectory.base import Setpoint
@@ -35,8 +36,8 @@ MOST_SUBSTEPS = 16
 
 Steps = NDArray[np.int64]
 
-Take = Callable[[int], bool]
-"""Takes a step; False where something is wrong, and nothing of it counts."""
+Take = Callable[[int, int], bool]
+"""Takes the steps from one to before another and counts them; False if something was wrong in one."""
 
 SETPOINT = ("q_wanted", "v_wanted", "a_wanted")
 NOISE = ("noise_q", "noise_v")
@@ -102,8 +103,10 @@ class GluedLoop:
                 results["wanted"] = tau
                 tau = clipped(tau, loop.limit)
 
+        forward = self._plant.dynamics.in_this_thread("forward_dynamics")
+
         def accelerate(q: Array, v: Array, tau: Array) -> Array:
-            return questions.ask(self._plant.forward_dynamics, v.shape, q, v, tau)
+            return questions.ask(forward, v.shape, q, v, tau, guarded=True)
 
         q, v, a = self._plant.advanced(accelerate, given["q"], given["v"], tau)
         results |= {"tau": tau, "a": a, "next_q": q, "next_v": v}
@@ -148,16 +151,15 @@ class GluedLoop:
         first, per = record.steps, self._loop.clock.steps_per_control
         steps = np.arange(first, min(len(record), first + AT_ONCE))
         walked = {name: Walked(array, self._row(name, steps)) for name, array in arrays.items()}
-        asked = _ready(self._asked, walked, len(steps))
-        held = asked if self._held is None else _ready(self._held, walked, len(steps))
-        for k in range(len(steps)):
-            try:
-                if not (asked if (first + k) % per == 0 else held)(k):
-                    return False
-            except Exception:
-                # Whatever it is, the plain loop meets it again, and says where.
+        last = first + len(steps)
+        asked = _ready(self._asked, walked, record)
+        if self._held is None:
+            return asked(first, last)
+        held = _ready(self._held, walked, record)
+        while (k := record.steps) < last:
+            due = k % per == 0
+            if not (asked if due else held)(k, k + 1 if due else min(last, k - k % per + per)):
                 return False
-            record.steps += 1
         return True
 
     def _mark_saturated(self, record: Record, wanted: Floats, begin: int) -> None:
@@ -172,31 +174,49 @@ class GluedLoop:
         record.saturated[steps] = np.where((asked < begin)[:, None], earlier, cut)
 
 
-def _ready(glue: Glue, walked: Mapping[str, Walked], n: int) -> Take:
-    """The n steps of `walked` as calls."""
-    still = np.zeros(n, dtype=np.int64)
+def _ready(glue: Glue, walked: Mapping[str, Walked], record: Record) -> Take:
+    """The next steps of the record, those of `walked`, as calls."""
+    first = record.steps
+    still = np.zeros(len(walked["q"].rows), dtype=np.int64)
     places = {name: np.zeros((1, size)) for name, size in (*glue.sizes.items(), ("defect", 1))}
     every = {**walked, **{name: Walked(place, still) for name, place in places.items()}}
-    inputs = [every[port.name] for port in glue.inputs]
+
+    def walked_by(kernel: Kernel) -> Walk:
+        inputs, outputs = ([every[port.name] for port in side] for side in (kernel.inputs, kernel.outputs))
+        return walk(kernel, inputs, outputs)
+
     stages: list[tuple[Callable[[int], None], range, Ask, list[Floats], Any, Walk]] = []
     for cut in glue.cuts:
-        calls = walk(cut.kernel, inputs, [every[port.name] for port in cut.kernel.outputs])
+        calls = walked_by(cut.kernel)
         arguments = [places[name].reshape(shape) for name, shape in cut.arguments]
         name, shape = cut.answer
         found = places[name].reshape(shape)
         # A view of memory takes a row of numbers in a third of the time that an array does.
-        answer = found.data if found.ndim == 1 else found
-        stages.append((calls.run, calls.addresses, cut.ask, arguments, answer, calls))
-    last = walk(glue.last, inputs, [every[port.name] for port in glue.last.outputs])
-    run_last, addresses_last, defect = last.run, last.addresses, places["defect"].reshape(1).data
+        room = found.data if found.ndim == 1 else found
+        stages.append((calls.run, calls.addresses, cut.ask, arguments, room, calls))
+    last = walked_by(glue.last)
+    finish, finishing = last.run, last.addresses
+    defect: Any = places["defect"].reshape(1).data
 
-    def take(k: int, _kept: object = last) -> bool:
-        for run, addresses, ask, arguments, answer, _ in stages:
-            run(addresses[k])
-            if defect[0] != 0.0:
-                return False
-            answer[:] = ask(*arguments)
-        run_last(addresses_last[k])
-        return bool(defect[0] < RUNAWAY**2)
+    def take(begin: int, end: int, _kept: object = last) -> bool:
+        k = begin - first
+        try:
+            for k in range(begin - first, end - first):
+                for run, addresses, ask, arguments, answer, _ in stages:
+                    run(addresses[k])
+                    if defect[0] != 0.0:
+                        return False
+                    answer[:] = ask(*arguments)
+                finish(finishing[k])
+                if not defect[0] < RUNAWAY**2:
+                    return False
+                defect[0] = 0.0
+            k = end - first
+        except Exception:
+            # Whatever it is, the plain loop meets it again, and says where.
+            return False
+        finally:
+            record.steps = first + k
+        return True
 
     return take

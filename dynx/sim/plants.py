@@ -97,8 +97,9 @@ class DynxPlant(Plant):
             raise ArgumentError(
                 f"integrator is {shown(integrator)}; a plant of dynx has {', '.join(INTEGRATORS[:3])}"
             )
-        self.forward_dynamics = self._accelerate.dynamics.forward_dynamics
-        """a (nv,) of q, v, tau, by the engine and nothing else."""
+        self.dynamics = self._accelerate.dynamics
+        """What the engine answers, without loads."""
+        self._forward = self.dynamics.forward_dynamics
         self._plain = self._accelerate.is_plain
         self._singular = not loads.has_rotors and _is_singular(engine.model)
 
@@ -132,7 +133,7 @@ class DynxPlant(Plant):
 
     def _advance(self, t: float, tau: Floats) -> State:
         if self._plain:
-            state = self._scheme(self.forward_dynamics, self._q, self._v, tau)
+            state = self._scheme(self._forward, self._q, self._v, tau)
         else:
             state = self._scheme(self._accelerate, self._q, self._v, tau, t)
         self._q, self._v, _ = state

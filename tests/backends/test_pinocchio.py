@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from dynx.agreement.tolerances import BAR
 from dynx.backends import DerivedBackend, backend, backend_class, installed_backends, native_quantities
 from dynx.backends.derived import HOOK_OF_QUANTITY
-from dynx.backends.pinocchio import MAX_NV, PinocchioBackend
+from dynx.backends.pinocchio import MAX_NV, PinocchioBackend, engine_model
 from dynx.backends.reference import ReferenceBackend
 from dynx.errors import ClosedError, EngineError, EngineLimitError, NotInstalledError
 from dynx.model import Joint, Link, Model
@@ -191,6 +191,7 @@ def test_a_failure_to_build_is_an_engine_error(monkeypatch: pytest.MonkeyPatch) 
     def fail(*_: object) -> None:
         raise RuntimeError
 
+    engine_model.cache_clear()
     monkeypatch.setattr(pin, "Model", fail)
     with pytest.raises(EngineError, match="pinocchio cannot hold chain: RuntimeError: no message"):
         PinocchioBackend(chain(2))

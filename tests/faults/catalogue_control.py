@@ -107,8 +107,8 @@ CONTROL_FAULTS = (
     Fault(
         "glue_goes_on_with_what_is_no_number",
         "dynx.sim.glued_loop",
-        right="            if defect[0] != 0.0:\n                return False\n",
-        wrong="            if defect[0] > 0.0:\n                return False\n",
+        right="if defect[0] != 0.0:",
+        wrong="if defect[0] > 0.0:",
         caught_by=f"{GLUED}::test_no_plant_is_given_what_is_no_number",
     ),
     Fault(
@@ -121,8 +121,8 @@ CONTROL_FAULTS = (
     Fault(
         "glue_loses_steps_taken_before_ctrl_c",
         "dynx.sim.glued_loop",
-        right="            record.steps += 1\n        return True",
-        wrong="        record.steps += len(steps)\n        return True",
+        right="            record.steps = first + k\n",
+        wrong="            record.steps = first + k // 32 * 32\n",
         caught_by=f"{GLUED}::test_ctrl_c_in_the_middle_of_a_stage",
     ),
     Fault(

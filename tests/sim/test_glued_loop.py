@@ -13,6 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from dynx.backends.pinocchio import PinocchioBackend
 from dynx.control import (
     PD,
     PID,
@@ -29,8 +30,7 @@ from dynx.control.base import Controller, Measured
 from dynx.errors import ControlError, DivergedError
 from dynx.model import Model
 from dynx.model.loading import load
-from dynx.sim import Noise, Push, Rollout, RolloutInterrupted, glued_loop, simulate
-from dynx.sim.plants import DynxPlant
+from dynx.sim import Noise, Push, Rollout, RolloutInterrupted, glued_loop, simulate, simulation
 from dynx.spatial.scalar import Floats
 from dynx.testing.strategies import models
 from dynx.trajectory.base import Setpoint
@@ -214,49 +214,54 @@ def test_errors_are_those_of_the_plain_loop(kd: float) -> None:
         simulate(ARM, law, np.zeros(6), q0=np.zeros(6), v0=np.full(6, speed), duration=1.0)
 
 
+class Interrupting(PinocchioBackend):
+    """An engine whose 45th answer does not come, for Ctrl-C does."""
+
+    calls = 0
+
+    def _inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
+        self.calls += 1
+        if self.calls == 45:
+            raise KeyboardInterrupt
+        return super()._inverse_dynamics(q, v, a)
+
+
+class Failing(PinocchioBackend):
+    """An engine whose third torque is no number, and which keeps what it is asked about."""
+
+    def __init__(self, model: Model, *, validate: bool = True) -> None:
+        super().__init__(model, validate=validate)
+        self.calls = 0
+        self.given: list[Floats] = []
+
+    def _inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
+        self.calls += 1
+        return super()._inverse_dynamics(q, v, a) * (np.nan if self.calls >= 3 else 1.0)
+
+    def _forward_dynamics(self, q: Floats, v: Floats, tau: Floats) -> Floats:
+        self.given.append(tau.copy())
+        return super()._forward_dynamics(q, v, tau)
+
+
 @pytest.mark.parametrize("on", [True, False])
 def test_no_plant_is_given_what_is_no_number(on: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """An engine may not survive it."""
-    law = ComputedTorque(ARM, kp=400, kd=40)
-    engine = law._dynamics.inverse_dynamics
-    given: list[Floats] = []
-    law._dynamics.inverse_dynamics = lambda *asked: engine(*asked) * (np.nan if len(given) == 2 else 1.0)
-    made = DynxPlant.__init__
-
-    def watched(plant: DynxPlant, *arguments: Any, **options: Any) -> None:
-        made(plant, *arguments, **options)
-        forward = plant.forward_dynamics
-
-        def noted(q: Floats, v: Floats, tau: Floats) -> Floats:
-            given.append(tau.copy())
-            return np.asarray(forward(q, v, tau))
-
-        plant.forward_dynamics = noted
-
-    monkeypatch.setattr(DynxPlant, "__init__", watched)
+    plant = Failing(ARM)
+    monkeypatch.setattr(simulation, "backend", lambda name, model, validate: plant)
+    law = ComputedTorque(ARM, kp=400, kd=40, backend=Failing(ARM))
     with glue(on=on), pytest.raises(ControlError, match="not finite") as caught:
         simulate(ARM, law, np.zeros(6), duration=0.02)
     assert caught.value.step == 2
-    assert np.isfinite(given).all()
+    assert len(plant.given) == 2
+    assert np.isfinite(plant.given).all()
 
 
 def test_ctrl_c_in_the_middle_of_a_stage() -> None:
-    law = ComputedTorque(ARM, kp=400, kd=40)
-    engine = law._dynamics.inverse_dynamics
-    calls = 0
-
-    def interrupted(q: Floats, v: Floats, a: Floats) -> Floats:
-        nonlocal calls
-        calls += 1
-        if calls == 45:
-            raise KeyboardInterrupt
-        return np.asarray(engine(q, v, a))
-
-    with glue(on=False):
-        whole = simulate(ARM, law, tutorial_motion(), duration=0.1)
-    law._dynamics.inverse_dynamics = interrupted
+    law = ComputedTorque(ARM, kp=400, kd=40, backend=Interrupting(ARM))
     with glue(on=True), pytest.raises(RolloutInterrupted, match="after 44 of 100") as caught:
         simulate(ARM, law, tutorial_motion(), duration=0.1)
+    with glue(on=False):
+        whole = simulate(ARM, ComputedTorque(ARM, kp=400, kd=40), tutorial_motion(), duration=0.1)
     the_same(caught.value.rollout, whole.first(44))
 
 
