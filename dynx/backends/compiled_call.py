@@ -157,7 +157,7 @@ class KernelCall:
             # The arguments may be needed once more.
             answer = np.empty(shape)
         defect = self._evaluate(arrays, batch, answer)
-        if not self._trusting and not np.max(defect, initial=0.0) < SOUND:
+        if not self._trusting and not defect.max(initial=0.0) < SOUND:
             if self._validate:
                 checked = [check(array) for array, check in zip(arrays, self._checks, strict=True)]
                 if any(new is not old for new, old in zip(checked, arrays, strict=True)):

@@ -137,8 +137,8 @@ SIMD_FAULTS = (
     Fault(
         "compiled_batch_believed_without_its_check",
         "dynx.backends.compiled_call",
-        right="if not self._trusting and not np.max(defect, initial=0.0) < SOUND:",
-        wrong="if not self._trusting and np.max(defect, initial=0.0) > SOUND:",
+        right="if not self._trusting and not defect.max(initial=0.0) < SOUND:",
+        wrong="if not self._trusting and defect.max(initial=0.0) > SOUND:",
         caught_by="tests/backends/test_compiled_arguments.py::test_a_bad_number_anywhere",
     ),
     Fault(
