@@ -111,14 +111,14 @@ def require_memory(model: Model, work: Work) -> None:
     state = np.dtype(np.float64).itemsize * (model.nq + 3 * model.nv)
     answer = np.dtype(np.float64).itemsize * prod(answer_shape(model, work.quantity))
     needed = work.batch * (state + 2 * answer)
-    if needed > LARGEST_SHARE * _memory():
+    if needed > LARGEST_SHARE * memory():
         raise ArgumentError(
             f"{work.quantity} at a batch of {work.batch} needs {needed / 1e9:.3g} GB; this machine has "
-            f"{_memory() / 1e9:.3g} GB, of which a batch may take {LARGEST_SHARE:.0%}"
+            f"{memory() / 1e9:.3g} GB, of which a batch may take {LARGEST_SHARE:.0%}"
         )
 
 
-def _memory() -> float:
+def memory() -> float:
     """Bytes of memory that the machine has; infinity where the system does not say."""
     try:
         return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))

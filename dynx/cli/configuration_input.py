@@ -37,12 +37,13 @@ def open_backend(
         return backend("reference", model)
 
 
-def configuration(model: Model, given: Numbers, option: str = "--q") -> Floats:
-    """q: as given, or neutral with the joints that are given by name put in."""
+def configuration(model: Model, given: Numbers, option: str = "--q", default: Floats | None = None) -> Floats:
+    """q: as given, or `default` (neutral if None) with the joints that are given by name put in."""
     from dynx.model.configuration import checked_q
 
     base = ["x", "y", "z", "qx", "qy", "qz", "qw"] if model.floating else []
-    return checked_q(model, _filled(model, given, model.neutral(), base, option), option)
+    start = model.neutral() if default is None else default.copy()
+    return checked_q(model, _filled(model, given, start, base, option), option)
 
 
 def velocity(model: Model, given: Numbers, option: str) -> Floats:

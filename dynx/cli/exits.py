@@ -1,7 +1,7 @@
 """Exit codes of the command line, and how an error becomes one clear line and a code.
 
-0    done; for `agree`, all engines agree; for `ik`, the target was reached
-1    done, and the answer is no: engines differ, the target was not reached
+0    done; for `agree`, all engines agree; for `ik`, the target was reached; for `sim`, the end was
+1    done, and the answer is no: engines differ, the target was not reached, the simulation diverged
 2    some input cannot be used (`agree` still did the rest)
 70   a defect of dynx
 74   standard output cannot be written: the disk is full, say (EX_IOERR of sysexits.h)

@@ -20,6 +20,7 @@ from dynx.cli.commands.explain import explain
 from dynx.cli.commands.ik import ik
 from dynx.cli.commands.info import info
 from dynx.cli.commands.robots import robots
+from dynx.cli.commands.sim import sim
 from dynx.cli.exits import DONE, TRACEBACK_VARIABLE, closed_pipe_raised, report_failure
 
 
@@ -80,14 +81,16 @@ def _show_traceback(ctx: click.Context, option: click.Parameter, wanted: bool) -
       dynx agree ur5               do the installed engines agree on the UR5?
       dynx agree all --json a.json every robot of example-robot-data
       dynx doctor my.urdf          why do engines differ on my file, and how is it mended?
+      dynx sim --tutorial          how closely does each mode of control follow a motion?
       dynx bench panda             how fast are they on this machine?
       dynx explain DX101           what a cause means, and what each engine does
       dynx info panda              joints, limits, masses, frames
       dynx id ur5 --q 0,-1,1,0,0,0 torque that holds the arm there
 
     \b
-    Exit codes: 0 done (all agree), 1 the answer is no (some differ, target not reached),
-    2 some input cannot be used, 70 a defect of dynx, 74 the output cannot be written.
+    Exit codes: 0 done (all agree), 1 the answer is no (some differ, target not reached,
+    simulation diverged), 2 some input cannot be used, 70 a defect of dynx,
+    74 the output cannot be written.
     """,
 )
 @click.version_option(__version__, prog_name="dynx", message="%(prog)s %(version)s")
@@ -109,7 +112,7 @@ def cli(ctx: click.Context) -> None:
         click.echo(ctx.get_help())
 
 
-for _command in (agree, doctor, bench, explain, info, robots, backends, fk, jacobian, id_, fd, mass, ik):
+for _command in (agree, doctor, sim, bench, explain, info, robots, backends, fk, jacobian, id_, fd, mass, ik):
     cli.add_command(_command)
 
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any, TypeVar
 
 import click
 
-from dynx.errors import shown
+from dynx.errors import nearest, shown
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -17,7 +17,7 @@ def number_list(text: str) -> list[float] | dict[str, float]:
     """Numbers separated by commas or white space, or ``joint=value`` pairs as a dictionary."""
     words = text.replace(",", " ").split()
     if not any("=" in word for word in words):
-        return [_number(word) for word in words]
+        return [finite_number(word) for word in words]
     named: dict[str, float] = {}
     for word in words:
         name, value = _pair(word)
@@ -27,12 +27,32 @@ def number_list(text: str) -> list[float] | dict[str, float]:
     return named
 
 
+def plain_numbers(text: str) -> list[float]:
+    """Numbers separated by commas or white space, at least one."""
+    numbers = [finite_number(word) for word in text.replace(",", " ").split()]
+    if not numbers:
+        raise click.BadParameter("wanted a number, or several separated by commas")
+    return numbers
+
+
 def name_list(text: str) -> tuple[str, ...]:
     """Names separated by commas, each once, in order."""
     names = tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
     if not names:
         raise click.BadParameter("wanted names separated by commas")
     return names
+
+
+def one_of(names: Iterable[str]) -> Callable[[str], str]:
+    """A type for one of some names; of a wrong one the message says which is nearest."""
+    known = tuple(names)
+
+    def name(word: str) -> str:
+        if word not in known:
+            raise click.BadParameter(f"there is no {shown(word)}{nearest(word, known)}")
+        return word
+
+    return name
 
 
 def choice_pair(word: str) -> tuple[str, str]:
@@ -48,10 +68,11 @@ def _pair(word: str) -> tuple[str, float]:
     name, equals, text = word.rpartition("=")
     if not equals or not name:
         raise click.BadParameter(f"{shown(word)} is no joint=value, such as finger=0.02")
-    return name, _number(text)
+    return name, finite_number(text)
 
 
-def _number(word: str) -> float:
+def finite_number(word: str) -> float:
+    """One number, as Python writes it, that is neither NaN nor infinite."""
     try:
         number = float(word)
     except ValueError:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.backends.bullet_stepping import MotorCommand
@@ -18,6 +19,9 @@ from dynx.errors import UnsupportedFeatureError
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint
+
+AMPLE = 1e30
+"""What stands for no limit [N m or N]: Bullet multiplies it by the time step, and infinity makes NaN."""
 
 
 class EngineMotor(Controller[None]):
@@ -52,7 +56,8 @@ class EngineMotor(Controller[None]):
         """The most the motors may pull, the engine's default (which is ample) where none is given."""
         if force is None:
             return None
-        full: list[float] = checked_limit(self.model, force)[self._v_joints].tolist()
+        limits = checked_limit(self.model, force)[self._v_joints]
+        full: list[float] = np.minimum(limits, AMPLE).tolist()
         return full
 
 

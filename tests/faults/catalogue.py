@@ -16,6 +16,7 @@ from tests.faults.catalogue_rbd import RBD_FAULTS
 from tests.faults.catalogue_reader import READER_FAULTS
 from tests.faults.catalogue_records import RECORDS_FAULTS
 from tests.faults.catalogue_rules import RULES_FAULTS
+from tests.faults.catalogue_sim_command import SIM_COMMAND_FAULTS
 from tests.faults.catalogue_simd import SIMD_FAULTS
 from tests.faults.catalogue_spatial import SPATIAL_FAULTS
 from tests.faults.catalogue_trajectory import TRAJECTORY_FAULTS
@@ -39,5 +40,6 @@ FAULTS_BY_AREA: dict[str, tuple[Fault, ...]] = {
     "trajectory": TRAJECTORY_FAULTS,
     "control": CONTROL_FAULTS,
     "records": RECORDS_FAULTS,
+    "sim_command": SIM_COMMAND_FAULTS,
 }
 FAULTS: tuple[Fault, ...] = tuple(fault for faults in FAULTS_BY_AREA.values() for fault in faults)

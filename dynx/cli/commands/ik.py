@@ -8,10 +8,10 @@ import click
 
 from dynx.cli.heading import head, title
 from dynx.cli.options import frame_option, number_list, robot_options, sample_option
+from dynx.cli.target_input import POSE_HELP, target_pose
 
 if TYPE_CHECKING:
     from dynx.cli.configuration_input import Numbers
-    from dynx.spatial.scalar import Floats
 
 
 @click.command(short_help="Inverse kinematics: the configuration that reaches a target.")
@@ -21,8 +21,7 @@ if TYPE_CHECKING:
     type=number_list,
     required=True,
     metavar="NUMBERS",
-    help="x,y,z [m], then nothing (any rotation), roll,pitch,yaw [rad], or qx,qy,qz,qw; "
-    "or the 16 numbers of T_world_target, row by row.",
+    help=POSE_HELP,
 )
 @frame_option
 @sample_option("q", "Where to start (default: chosen by the solver)")
@@ -41,7 +40,7 @@ def ik(target: Numbers, frame: str | None, q: Numbers, as_json: bool, **robot: A
     from dynx.cli.configuration_input import chosen_frame, configuration, default_said, open_backend
     from dynx.cli.exits import ANSWER_IS_NO, DONE
 
-    wanted = _target(target)
+    wanted = target_pose(target, "--target")
     with open_backend(**robot) as engine:
         model = engine.model
         name = chosen_frame(model, frame)
@@ -90,31 +89,3 @@ def _outcome(result: dict[str, Any]) -> str:
     if result["success"]:
         return f"reached: {off} off, after {steps} and {restarts}"
     return f"not reached: the best that was found is {off} off, after {steps} and {restarts}"
-
-
-def _target(given: Numbers) -> Floats:
-    """A position (3,) or a pose (4, 4), from the numbers of ``--target``."""
-    import numpy as np
-
-    from dynx.errors import ArgumentError
-    from dynx.spatial.se3 import homogeneous
-    from dynx.spatial.so3 import rotation_from_quat, rotation_from_rpy
-
-    if not isinstance(given, list):
-        raise ArgumentError("--target takes numbers without names")
-    numbers = np.array(given)
-    if len(numbers) == 3:
-        return numbers
-    if len(numbers) == 6:
-        return homogeneous(rotation_from_rpy(numbers[3:]), numbers[:3])
-    if len(numbers) == 7:
-        norm = float(np.linalg.norm(numbers[3:]))
-        if abs(norm - 1.0) > 1e-3:
-            raise ArgumentError(f"--target: the quaternion has length {norm:.6g}; wanted 1")
-        return homogeneous(rotation_from_quat(numbers[3:] / norm), numbers[:3])
-    if len(numbers) == 16:
-        return numbers.reshape(4, 4)
-    raise ArgumentError(
-        "--target: wanted 3 numbers (position), 6 (and roll, pitch, yaw), 7 (and a quaternion xyzw) "
-        f"or 16 (a matrix); got {len(numbers)}"
-    )

@@ -1,0 +1,161 @@
+"""The experiments that this project grew from: one arm, one motion, every mode of control, on two plants.
+
+A six-axis arm goes along a cycloidal motion of 2 s in PyBullet, in steps of 1 ms, under a gravity of
+9.8 m/s^2: by the engine's position and velocity motors, by feed-forward torque, and by computed torque with
+the gains 400 and 40. The laws that lie between are added, and dynx's own plant beside PyBullet's stepper.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dynx.backends.registry import backend_class
+from dynx.control.base import Controller
+from dynx.control.engine_motors import EngineMotor
+from dynx.errors import (
+    ArgumentError,
+    BackendError,
+    DynxError,
+    ShapeError,
+    SimulationError,
+    UnsupportedFeatureError,
+)
+from dynx.model import Model
+from dynx.model.loading import load
+from dynx.sim.named_laws import LAWS, LawRequest, named_law
+from dynx.sim.rollout import Rollout
+from dynx.sim.simulation import simulate
+from dynx.spatial.scalar import Floats
+from dynx.trajectory import Trajectory, check, cycloidal
+
+ROBOT = "ur5"
+TO = (-1.5, -1.0, 1.0, -1.57, -1.57, -1.57)
+"""Where the motion of a six-axis arm ends [rad]; it begins at 0."""
+DURATION, DT, GRAVITY = 2.0, 1e-3, (0.0, 0.0, -9.8)
+BULLET, DYNX = PLANTS = ("pybullet", "pinocchio")
+"""PyBullet's own stepper, and dynx's semi-implicit Euler over Pinocchio's forward dynamics."""
+MODES = tuple(name for name, law in LAWS.items() if law.wants == "joints")
+"""All modes, from little knowledge of the robot to much."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """One mode on one plant: its record, and what kept it from being made or from reaching its end."""
+
+    rollout: Rollout | None = None
+    problem: str | None = None
+
+    @property
+    def failed(self) -> bool:
+        """Whether a simulation was begun and ended early."""
+        return self.rollout is not None and self.problem is not None
+
+    @property
+    def max_error(self) -> float | None:
+        """The largest error of any joint at any time [rad or m]; None if it did not reach the end."""
+        return None if self.rollout is None or self.failed else float(np.max(np.abs(self.rollout.error)))
+
+    @property
+    def rms_error(self) -> float | None:
+        """The root mean square over all joints and times [rad or m]; None if it did not reach the end."""
+        if self.rollout is None or self.failed:
+            return None
+        return float(np.sqrt(np.mean(self.rollout.error**2)))
+
+
+@dataclass(frozen=True)
+class Row:
+    """One mode of control on every plant."""
+
+    mode: str
+    what: str
+    outcomes: Mapping[str, Outcome] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Tutorial:
+    """The experiments of one robot and motion; `tutorial` makes them."""
+
+    model: Model
+    motion: Trajectory
+    dt: float = DT
+    plants: tuple[str, ...] = PLANTS
+    backend: str = DYNX
+
+    def rows(self) -> Iterator[Row]:
+        """Row by row, as it is done; a mode that cannot be had says why."""
+        missing = {plant: _missing(plant) for plant in self.plants}
+        for mode in MODES:
+            yield Row(
+                mode,
+                LAWS[mode].what,
+                {
+                    plant: self._outcome(mode, plant) if problem is None else Outcome(problem=problem)
+                    for plant, problem in missing.items()
+                },
+            )
+
+    def _outcome(self, mode: str, plant: str) -> Outcome:
+        try:
+            law = self._law(mode)
+            if isinstance(law, EngineMotor) and plant != BULLET:
+                return Outcome(problem="a motor inside PyBullet")
+            return Outcome(simulate(self.model, law, self.motion, plant=plant, dt=self.dt))
+        except SimulationError as error:
+            return Outcome(error.rollout, str(error))
+        except DynxError as error:
+            return Outcome(problem=str(error))
+
+    def _law(self, mode: str) -> Controller[object]:
+        return named_law(mode, LawRequest(self.model, self.motion.start.q, self.dt, backend=self.backend))
+
+
+def tutorial(
+    model: Model | None = None,
+    *,
+    start: ArrayLike | None = None,
+    to: ArrayLike | None = None,
+    duration: float = DURATION,
+    dt: float = DT,
+    plants: tuple[str, ...] = PLANTS,
+    backend: str = DYNX,
+) -> Tutorial:
+    """The tutorial's experiments; `model` is by default the UR5 in the tutorial's gravity.
+
+    The cycloidal motion goes from `start` (neutral by default) to `to` (by default `TO`, for an arm of six
+    joints) in `duration` [s], in steps of `dt`, on `plants`; `backend` is what the laws compute with.
+
+    Raises ArgumentError for a motion that is none, LimitError for one outside the robot's limits of
+    position and velocity, UnsupportedFeatureError for a floating base, BackendError for a backend that
+    cannot be used.
+    """
+    robot = load(ROBOT, gravity=GRAVITY) if model is None else model
+    if robot.floating:
+        raise UnsupportedFeatureError(f"the tutorial is one of arms, and {robot.name} has a floating base")
+    begin: Floats | ArrayLike = robot.neutral() if start is None else start
+    if to is None:
+        if robot.nq != len(TO):
+            raise ArgumentError(
+                f"the tutorial's motion is one of {len(TO)} coordinates and {robot.name} has {robot.nq}; "
+                "say where it is to go"
+            )
+        to = TO
+    motion = cycloidal(begin, to, duration, model=robot)
+    if motion.nq != robot.nq:
+        raise ShapeError(f"`to` has {motion.nq} numbers; {robot.name} needs {robot.nq}")
+    check(robot, motion, effort=False)
+    backend_class(backend).require_engine()
+    return Tutorial(robot, motion, dt, plants, backend)
+
+
+def _missing(plant: str) -> str | None:
+    """Why no robot can be simulated on a plant, if none can."""
+    try:
+        backend_class(plant).require_engine()
+    except BackendError as error:
+        return str(error)
+    return None

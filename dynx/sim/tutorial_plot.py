@@ -1,0 +1,60 @@
+"""The errors of all modes of control over time, on one page."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dynx.errors import NotInstalledError
+from dynx.sim.tutorial import BULLET, Row, Tutorial
+from dynx.sim.whole_file import whole_file
+
+STYLES = ("-", "--", "-.", ":")
+"""Told apart without colour too."""
+
+LEAST = 1e-16
+"""Errors below it are drawn there: they are rounding, and a logarithm has no zero."""
+
+
+def plot_rows(rows: Sequence[Row], tutorial: Tutorial, path: str | os.PathLike[str] | None = None) -> Any:
+    """A `matplotlib.figure.Figure` with a panel for each plant; saved at `path`.
+
+    Shown is the largest error of all joints at each time. Raises NotInstalledError without matplotlib
+    (``pip install 'dynx[plot]'``), ArgumentError where the file cannot be written.
+    """
+    try:
+        from matplotlib.figure import Figure
+    except ImportError as error:
+        raise NotInstalledError("a plot needs matplotlib: pip install 'dynx[plot]'") from error
+    figure = Figure(figsize=(7.0, 2.0 + 3.2 * len(tutorial.plants)), layout="constrained")
+    panels = figure.subplots(len(tutorial.plants), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
+    for axis, plant in zip(panels, tutorial.plants, strict=True):
+        for k, row in enumerate(rows):
+            rollout = row.outcomes[plant].rollout
+            style: dict[str, Any] = {
+                "color": f"C{k % 10}",
+                "linestyle": STYLES[k % len(STYLES)],
+                "lw": 1.3,
+                "label": row.mode,
+            }
+            if rollout is None:
+                axis.plot([], [], **style)
+                continue
+            largest = np.max(np.abs(rollout.error), axis=1)
+            axis.semilogy(rollout.t, np.maximum(largest, LEAST), **style)
+        own = "PyBullet's own stepper" if plant == BULLET else f"dynx's semi-implicit Euler over {plant}"
+        axis.set_title(own, fontsize=10)
+        axis.set_ylabel("largest error [rad or m]")
+        axis.grid(visible=True, color="0.9")
+    panels[-1].set_xlabel("time [s]")
+    figure.suptitle(f"{tutorial.model.name}: every mode of control on one motion", fontsize=11)
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=8)
+    if path is not None:
+        with whole_file(path) as file:
+            figure.savefig(file, format=Path(path).suffix[1:].lower(), dpi=200)
+    return figure
