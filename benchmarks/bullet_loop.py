@@ -1,7 +1,9 @@
-"""The tutorial's own loop: PyBullet and nothing else, as its user writes it.
+"""The tutorial's own loop in PyBullet, in two forms.
 
-What dynx does on the plant `pybullet` is done here by hand: motors released, damping off. The file that it
-reads has no meshes, and the reference is computed before the loop, as lists, which PyBullet takes fastest.
+`run` is the shortest form there is: PyBullet and nothing else, the reference computed before the loop, as
+lists, which PyBullet takes fastest. `run_with_numpy` is how a user of NumPy writes it, the reference
+computed in each step. What dynx does on the plant `pybullet` is done here by hand: motors released, damping
+off, a file without meshes.
 """
 
 from __future__ import annotations
@@ -9,9 +11,12 @@ from __future__ import annotations
 import tempfile
 from pathlib import Path
 
-from benchmarks.tutorial_motion import DT, GRAVITY, KD, KP, Task
+import numpy as np
+
+from benchmarks.tutorial_motion import DT, END, GRAVITY, KD, KP, STEPS, Task
 from benchmarks.urdf_for_peers import spelled_out
 from dynx.engines.pybullet import bullet
+from dynx.spatial.scalar import Floats
 
 Rows = list[list[float]]
 
@@ -73,6 +78,32 @@ class BulletWorld:
             torques.append(tau)
         states = joint_states(arm, joints, physicsClientId=client)
         positions.append([state[0] for state in states])
+        return positions
+
+    def run_with_numpy(self) -> Floats:
+        """The same with arrays, and with the cycloid evaluated where it is needed."""
+        engine, client, arm, joints = self._engine, self.client, self.arm, self.joints
+        for joint in joints:
+            engine.resetJointState(arm, joint, 0.0, 0.0, physicsClientId=client)
+        n, tf, way = len(self._wanted[0]), STEPS * DT, np.array(END)
+        positions, velocities, torques = np.empty((n + 1, 6)), np.empty((n + 1, 6)), np.empty((n, 6))
+        for k in range(n):
+            phase = 2.0 * np.pi * k * DT / tf
+            q_wanted = way / tf * (k * DT - tf / (2.0 * np.pi) * np.sin(phase))
+            v_wanted = way / tf * (1.0 - np.cos(phase))
+            a_wanted = way / tf * (2.0 * np.pi / tf) * np.sin(phase)
+            states = engine.getJointStates(arm, joints, physicsClientId=client)
+            q = np.array([state[0] for state in states])
+            v = np.array([state[1] for state in states])
+            a = a_wanted + KD * (v_wanted - v) + KP * (q_wanted - q)
+            tau = engine.calculateInverseDynamics(arm, list(q), list(v), list(a), physicsClientId=client)
+            engine.setJointMotorControlArray(
+                arm, joints, engine.TORQUE_CONTROL, forces=tau, physicsClientId=client
+            )
+            engine.stepSimulation(physicsClientId=client)
+            positions[k], velocities[k], torques[k] = q, v, tau
+        states = engine.getJointStates(arm, joints, physicsClientId=client)
+        positions[n] = [state[0] for state in states]
         return positions
 
     def close(self) -> None:

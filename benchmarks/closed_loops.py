@@ -26,6 +26,7 @@ from dynx.spatial.scalar import Floats
 
 TUTORIAL = "tutorial's loop, PyBullet alone"
 TUTORIAL_SUBSTEPS = "the same, 10 sub-steps"
+TUTORIAL_NUMPY = "tutorial's loop, with NumPy"
 BARE = "NumPy and pin, by hand"
 DYNX = "dynx, law and plant pinocchio"
 LOOPS = (
@@ -34,6 +35,7 @@ LOOPS = (
     "dynx, law pinocchio, plant pybullet",
     TUTORIAL,
     TUTORIAL_SUBSTEPS,
+    TUTORIAL_NUMPY,
     BARE,
 )
 
@@ -88,15 +90,16 @@ class DynxLoop(ClosedLoop):
 class TutorialLoop(ClosedLoop):
     """The tutorial's loop in PyBullet; it knows of sub-steps only as a setting of the engine."""
 
-    def __init__(self, name: str, task: Task, *, substeps: int) -> None:
+    def __init__(self, name: str, task: Task, *, substeps: int = 1, numpy: bool = False) -> None:
         super().__init__(name, task)
         # With 1 there is one step of 1 ms as well as with 0, and it was never slower.
         self.same_scheme = substeps == 1
         self._world = BulletWorld(task, substeps)
+        self._run: Callable[[], Floats | Rows] = self._world.run_with_numpy if numpy else self._world.run
 
-    def call(self) -> Rows:
+    def call(self) -> Floats | Rows:
         """The loop."""
-        return self._world.run()
+        return self._run()
 
     def close(self) -> None:
         """End the world."""
@@ -151,8 +154,9 @@ def closed_loop(name: str, task: Task) -> ClosedLoop:
         DYNX: partial(DynxLoop, name, task, law="pinocchio", plant="pinocchio"),
         LOOPS[1]: partial(DynxLoop, name, task, law="compiled", plant="compiled"),
         LOOPS[2]: partial(DynxLoop, name, task, law="pinocchio", plant="pybullet"),
-        TUTORIAL: partial(TutorialLoop, name, task, substeps=1),
+        TUTORIAL: partial(TutorialLoop, name, task),
         TUTORIAL_SUBSTEPS: partial(TutorialLoop, name, task, substeps=10),
+        TUTORIAL_NUMPY: partial(TutorialLoop, name, task, numpy=True),
         BARE: partial(LoopByHand, task),
     }
     return makers[name]()
