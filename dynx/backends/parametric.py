@@ -34,6 +34,7 @@ from dynx.simd.program import Program
 from dynx.simd.sign import sign_of
 from dynx.simd.threads import checked_threads
 from dynx.simd.trace import trace
+from dynx.spatial.inertia import RigidInertia
 from dynx.spatial.scalar import Array, Floats
 
 
@@ -108,11 +109,20 @@ class ParametricDynamics:
         """M (..., nv, nv), symmetric, armature included where it is a parameter."""
         return self._answer("mass_matrix", _mass_matrix, None, [self._arguments.q(q)], parameters)
 
-    def acceleration(self, parameters: Array, q: Array, v: Array, tau: Array) -> Array:
-        """The acceleration (nv,) of one sample, for arrays of symbols: to build on it in a trace."""
+    def acceleration(
+        self, parameters: Array, q: Array, v: Array, tau: Array, rotors: Array | None = None
+    ) -> Array:
+        """The acceleration (nv,) of one sample, for arrays of symbols: to build on it in a trace.
+
+        `rotors` (nv,) are inertias of rotors, added to the diagonal of the mass matrix.
+        """
         known = self._selection.read(parameters)
         mechanism = tidied(self._selection.remainder())
-        return _forward_dynamics(known.added_to(mechanism), known.joints, q, v, tau)
+        return _forward_dynamics(known.added_to(mechanism), known.joints, q, v, tau, rotors)
+
+    def root(self, parameters: Array) -> RigidInertia:
+        """The inertia of the root with what is fixed to it, for an array of symbols."""
+        return self._selection.read(parameters).added_to(self._selection.remainder()).root
 
     def _answer(
         self,
@@ -183,9 +193,17 @@ def _mass_matrix(mechanism: Mechanism, joints: Array | None, q: Array) -> Array:
     return np.asarray(S.T @ M @ S)
 
 
-def _forward_dynamics(mechanism: Mechanism, joints: Array | None, q: Array, v: Array, tau: Array) -> Array:
+def _forward_dynamics(
+    mechanism: Mechanism,
+    joints: Array | None,
+    q: Array,
+    v: Array,
+    tau: Array,
+    rotors: Array | None = None,
+) -> Array:
     bias = _inverse_dynamics(mechanism, joints, q, v, np.zeros(len(v)))
-    L, D = factors_of(mechanism, _mass_matrix(mechanism, joints, q))
+    M = _mass_matrix(mechanism, joints, q)
+    L, D = factors_of(mechanism, M if rotors is None else M + np.diag(rotors))
     return solved(L, D, tau - bias)
 
 

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from dynx.control.gains import checked_gain
 from dynx.errors import ArgumentError, shown
 from dynx.model import Model
-from dynx.spatial.scalar import Floats
+from dynx.spatial.scalar import Array, Floats, sign, tanh
 
 SLIP = 1e-2
 """Speed [rad/s or m/s] at which dry friction has 76 % of its size, by default."""
@@ -50,14 +50,19 @@ class JointFriction:
         own_friction = np.array(base + [joint.friction for joint in moving])
         self.damping = self._coefficients("damping", damping, own_damping, model, through)
         self.friction = self._coefficients("friction", friction, own_friction, model, through)
-        self.present = bool(self.damping.any() or self.friction.any())
+        self._dry = bool(self.friction.any())
+        self.present = bool(self.damping.any()) or self._dry
 
-    def __call__(self, v: Floats) -> Floats:
-        """The torque (..., nv) that is lost at velocity `v` (..., nv)."""
+    def __call__(self, v: Array) -> Array:
+        """The torque (..., nv) that is lost at velocity `v` (..., nv), arrays of any scalar."""
+        return self.lost(v, self.damping, self.friction)
+
+    def lost(self, v: Array, damping: Array, friction: Array) -> Array:
+        """The same with other coefficients, in the places of this one's."""
         speed = v if self._S is None else v @ self._S.T
-        lost = self.damping * speed
-        if self.friction.any():
-            lost = lost + self.friction * (np.tanh(speed / self.slip) if self.slip else np.sign(speed))
+        lost = damping * speed
+        if self._dry:
+            lost = lost + friction * (tanh(speed / self.slip) if self.slip else sign(speed))
         return np.asarray(lost if self._S is None else lost @ self._S)
 
     @staticmethod

@@ -11,6 +11,7 @@ from dynx.control.computed_torque import commanded_acceleration
 from dynx.control.gains import checked_gain, feedback_gains
 from dynx.control.task_space import TaskSpace
 from dynx.model import Model
+from dynx.rbd.linear import solve_columns
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint
 
@@ -57,6 +58,6 @@ class OperationalSpace(TaskSpace[None]):
         left = wanted - engine.jacobian_derivative(q, v, frame) @ v
         posture = commanded_acceleration(q, v, *setpoint, self.posture_kp, self.posture_kd)
         J = error.jacobian
-        inverse = np.linalg.solve(engine.mass_matrix(q), J.T)
-        a = posture + inverse @ np.linalg.solve(J @ inverse + self._ridge, left - J @ posture)
+        inverse = solve_columns(engine.mass_matrix(q), J.T)
+        a = posture + inverse @ solve_columns(J @ inverse + self._ridge, (left - J @ posture)[:, None])[:, 0]
         return self._dynamics.inverse_dynamics(q, v, a), None

@@ -17,6 +17,13 @@ def solve_positive(A: Array, b: Array) -> Array:
     return substituted(*factorised(A), b)
 
 
+def solve_columns(A: Array, B: Array) -> Array:
+    """X (n, m) with A X = B: for floats by LAPACK, for any other scalar as `solve_positive`."""
+    if A.dtype != object:
+        return np.asarray(np.linalg.solve(A, B))
+    return np.asarray(solve_positive(A, B.T).T)
+
+
 def factorised(A: Array) -> Factors:
     """L, whose row i holds the i entries left of the diagonal, and D, with A = L D L' and 1 on it."""
     n = A.shape[-1]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
 from typing import Any
 
@@ -11,19 +11,25 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.backends.parametric import ParametricDynamics
+from dynx.backends.solvability import Solvability
 from dynx.control.base import Controller
+from dynx.control.friction import SLIP, Coefficients
 from dynx.control.gains import checked_gain
 from dynx.control.saturation import checked_limit
 from dynx.errors import ArgumentError, shown
 from dynx.model import Model
-from dynx.model.configuration import checked_array
-from dynx.sim.batch_part import Part, PartDone
+from dynx.model.configuration import checked_array, checked_q
+from dynx.sim.batch_loads import BatchLoads, refuse_ambiguous
+from dynx.sim.batch_part import KernelOf, Part, PartDone, pushing
 from dynx.sim.batch_rollouts import BatchRollouts
 from dynx.sim.batch_store import Store
-from dynx.sim.clock import Clock
-from dynx.sim.fused import STATE, StepOf, innermost
+from dynx.sim.clock import WHOLE, Clock
+from dynx.sim.fused import StepOf
+from dynx.sim.loads import Push
 from dynx.sim.references import checked_reference
 from dynx.sim.sensors import Noise
+from dynx.sim.traced_law import innermost
+from dynx.sim.variations import MassScale, Payload, plant_model
 from dynx.simd.threads import checked_threads
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint, Trajectory
@@ -57,8 +63,16 @@ def simulate_batch(
     dt: float = 1e-3,
     duration: float | None = None,
     control_dt: float | None = None,
+    delay: float = 0.0,
     noise: Noise | None = None,
+    damping: Coefficients = False,
+    friction: Coefficients = False,
+    friction_slip: float = SLIP,
+    armature: Coefficients = False,
     effort_limits: bool | ArrayLike = False,
+    payload: Payload | Sequence[Payload] | None = None,
+    mass_scale: MassScale = 1.0,
+    pushes: Sequence[Push] = (),
     record_every: int = 0,
     check_reference: bool = True,
     threads: int | None = None,
@@ -73,49 +87,73 @@ def simulate_batch(
 
     - `parameters` (n, p) of `plant`, a `dynx.parametric` of the model: payloads, inertias, damping,
       dry friction (with the jump of ``sign(v)``) and armature that the controller does not know of
-    - `gains`: arrays (n,) or (n, nv) by the name that the law has them under, as ``{"kp": ...}``
-    - `q0`, `v0` (n, nv); one row is for all. By default the start of the reference, at rest
+    - `gains`: arrays (n,) or (n, size) by the name that the law has them under, as ``{"kp": ...}``
+    - `damping`, `friction`, `armature` (n,), (n, 1) or (n, joints); a number, numbers (joints,) or True
+      mean for all rollouts what they mean in `simulate`
+    - `q0` (n, nq), `v0` (n, nv); one row is for all. By default the start of the reference, and at rest
+      where `q0` is given
     - `noise` on what is measured, drawn for each part of `PART` rollouts from the seed and its number
 
-    `rollouts` is n, where none of these tells. Times [s], `effort_limits` and `noise` are those of
-    `simulate`. With `record_every` k every k-th state is kept.
+    `rollouts` is n, where none of these tells. Times [s], `delay`, `noise`, `friction_slip`,
+    `effort_limits`, `payload`, `mass_scale` and `pushes` are those of `simulate`. A `plant` together with
+    a payload or scaled masses is one of ``plant_model(model, payload, mass_scale)``. With `record_every`
+    k every k-th state is kept.
 
     Parts are done by `threads` threads (None: all processors) or by any `executor`, also one of
     processes or of a cluster; results are the same bit for bit. With `keep`, a folder, each part is
     stored there when it is done, and a run that is started again with the same arguments goes on from
     there. Ctrl-C raises BatchInterrupted, which has what was done. `progress` is told after each part.
 
-    Raises ArgumentError, GainError, LimitError as `simulate` does, and UnsupportedFeatureError for a
-    floating base and for laws that branch on what they measure. A rollout that diverges stops nothing:
-    `BatchRollouts.diverged` says when.
+    Raises ArgumentError, GainError, LimitError, SingularMassMatrixError as `simulate` does, and
+    UnsupportedFeatureError for laws that branch on what they measure. A rollout that diverges stops
+    nothing: `BatchRollouts.diverged` says when.
     """
     if not isinstance(controller, Controller):
         raise ArgumentError(f"controller is of type {type(controller).__name__}; wanted a dynx.control law")
-    if controller.model.joint_names != model.joint_names:
-        raise ArgumentError(f"the controller is one of {controller.model.name}; wanted one of {model.name}")
-    if plant is not None and plant.model != model:
-        raise ArgumentError(f"plant is one of {plant.model.name}; wanted dynx.parametric of {model.name}")
+    known = controller.model
+    if (known.joint_names, known.base) != (model.joint_names, model.base):
+        raise ArgumentError(f"the controller is one of {shown(known)}; wanted one of {shown(model)}")
+    moved = plant_model(model, payload, mass_scale)
+    if plant is not None and plant.model != moved:
+        scaled = "" if moved is model else ", with its payload and scaled masses (`plant_model`)"
+        raise ArgumentError(
+            f"plant is one of {plant.model.name}; wanted dynx.parametric of {model.name}{scaled}"
+        )
     if parameters is not None and plant is None:
         raise ArgumentError("parameters were given without the plant that they are of: dynx.parametric(...)")
     span = reference.duration if duration is None and isinstance(reference, Trajectory) else duration
     if span is None:
         raise ArgumentError("duration is not given, and the reference is no trajectory that has one")
-    clock = Clock.of(dt, span, control_dt, 0.0)
+    clock = Clock.of(dt, span, control_dt, delay)
     if isinstance(record_every, bool) or not isinstance(record_every, int) or record_every < 0:
         raise ArgumentError(f"record_every is {shown(record_every)}; wanted a whole number, 0 for no record")
     limit = None
     if effort_limits is not False:
         limit = checked_limit(model, None if effort_limits is True else effort_limits)
-    step = StepOf(model, controller, clock.dt, tuple(gains or ()), plant, noise is not None, limit)
+    made_for = controller.control_dt
+    if made_for is not None and abs(made_for - clock.control_dt) > WHOLE * clock.control_dt:
+        raise ArgumentError(
+            f"{controller.name} was made for control_dt = {made_for:.12g} s; it is {clock.control_dt:.12g} s"
+        )
+    loads = BatchLoads.of(moved, damping, friction, friction_slip, armature, pushes)
+    if plant is None and not loads.rotors.any():
+        Solvability(moved).refuse_singular(False)
+    delayed = clock.delay_steps > 0
+    step = StepOf(
+        moved, controller, clock.dt, tuple(gains or ()), plant, noise is not None, delayed, limit, loads
+    )
     setpoint_of = checked_reference(model, reference, within_limits=check_reference)
     assert setpoint_of is not None
     beginning = setpoint_of(np.zeros(1))
     rows = _Rows(rollouts)
+    at_rest = np.zeros(model.nv) if q0 is not None else beginning.v[0]
     start = {
-        "q": rows.of("q0", beginning.q[0] if q0 is None else q0, model.nq),
-        "v": rows.of("v0", beginning.v[0] if v0 is None else v0, model.nv),
+        "q": rows.of("q0", beginning.q[0] if q0 is None else checked_q(model, q0, "q0"), model.nq),
+        "v": rows.of("v0", at_rest if v0 is None else v0, model.nv),
     }
-    fixed: dict[str, Floats] = {}
+    fixed: dict[str, Floats] = {
+        name: rows.of(name, values, values.shape[1]) for name, values in loads.varied.items()
+    }
     if plant is not None:
         given = plant.parameters.defaults if parameters is None else parameters
         fixed["parameters"] = rows.of("parameters", given, len(plant.parameters.names))
@@ -123,30 +161,37 @@ def simulate_batch(
     for name, values in (gains or {}).items():
         fixed[f"gain_{name}"] = rows.of(name, _columns(values), getattr(law, name).size, spread=True)
     n = rows.count
+    refuse_ambiguous(loads, n, {"damping": damping, "friction": friction, "armature": armature})
     start = {name: rows.spread(array) for name, array in start.items()}
     fixed = {name: rows.spread(array) for name, array in fixed.items()}
     memory = controller.start()
-    start |= {name: np.zeros((n, model.nv)) for name in STATE[2:4]}
+    zeros = np.zeros((n, model.nv))
+    start |= {"worst": zeros, "squares": zeros}
+    if limit is not None:
+        start["cut"] = zeros
     if memory is not None:
         start["memory"] = np.tile(memory, (n, 1))
     deviations = None
     if noise is not None:
+        if not isinstance(noise.seed, int) or noise.seed < 0:
+            raise ArgumentError(f"seed is {shown(noise.seed)}; wanted a whole number, 0 or more")
         deviations = checked_gain("noise.q", noise.q, model.nv), checked_gain("noise.v", noise.v, model.nv)
-    controlled = step.kernel(controlled=True)
-    held = step.kernel(controlled=False) if clock.steps_per_control > 1 else None
+    wrenches = loads.wrenches(clock) if loads.pushes else np.zeros((clock.n_steps, 0))
+    kernels = _kernels(step, clock, wrenches)
     goals = setpoint_of(clock.times()[1:]).q
     setpoints = Setpoint(*setpoint_of(clock.control_times(controller.lead)))
     parts = [
         Part(
-            controlled,
-            held,
+            kernels,
             clock.steps_per_control,
+            min(clock.delay_steps, clock.n_steps),
             clock.n_steps,
             clock.dt,
             {name: array[first : first + PART] for name, array in start.items()},
             {name: array[first : first + PART] for name, array in fixed.items()},
             setpoints,
             goals,
+            wrenches,
             None if noise is None or deviations is None else ((noise.seed, first // PART), *deviations),
             record_every,
         )
@@ -163,6 +208,16 @@ def simulate_batch(
     except KeyboardInterrupt:
         raise BatchInterrupted(outcome()) from None
     return outcome()
+
+
+def _kernels(step: StepOf, clock: Clock, wrenches: Floats) -> KernelOf:
+    """The steps that there are: those with a push take the time for it only while it lasts."""
+    asked = np.arange(clock.n_steps) % clock.steps_per_control == 0
+    kinds = set(zip(asked.tolist(), pushing(wrenches), strict=True))
+    return {
+        (controlled, pushed): step.kernel(controlled=controlled, pushed=pushed)
+        for controlled, pushed in sorted(kinds)
+    }
 
 
 class _Rows:
@@ -262,8 +317,13 @@ def _joined(
     nv = model.nv
 
     def nothing(count: int) -> PartDone:
-        row, record = np.full((count, nv), np.nan), np.full((count, kept, nv), np.nan)
-        return PartDone(row, row, row, row, np.full(count, -1.0), record, record, record)
+        q, row, undone = (
+            np.full((count, model.nq), np.nan),
+            np.full((count, nv), np.nan),
+            np.full(count, -1.0),
+        )
+        q_record, record = np.full((count, kept, model.nq), np.nan), np.full((count, kept, nv), np.nan)
+        return PartDone(q, row, row, row, undone, q_record, record, record, row)
 
     outcomes = [done.get(number, nothing(part.count)) for number, part in enumerate(parts)]
     whole = PartDone(*(np.concatenate(arrays) for arrays in zip(*outcomes, strict=True)))
@@ -283,4 +343,5 @@ def _joined(
         whole.q_record,
         whole.v_record,
         whole.tau_record,
+        whole.saturated,
     )

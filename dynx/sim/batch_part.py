@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dynx.sim.fused import STATE
 from dynx.simd.kernel import Kernel
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint
@@ -24,24 +23,34 @@ BEYOND = 1e8
 class PartDone(NamedTuple):
     """The outcome of `count` rollouts."""
 
-    q: Floats  # (count, nv), at the end
+    q: Floats  # (count, nq), at the end
     v: Floats  # (count, nv), at the end
     max_error: Floats  # (count, nv)
     rms_error: Floats  # (count, nv)
     diverged: Floats  # (count,), the step by which it was noticed, or -1
-    q_record: Floats  # (count, kept, nv)
+    q_record: Floats  # (count, kept, nq)
     v_record: Floats  # (count, kept, nv)
     tau_record: Floats  # (count, kept, nv)
+    saturated: Floats  # (count, nv), the share of steps in which torque was cut
+
+
+KernelOf = dict[tuple[bool, bool], Kernel]
+"""Steps by whether the law is asked, and whether something pushes."""
+
+
+def pushing(wrenches: Floats) -> list[bool]:
+    """Whether anything pushes in each step, of `Part.wrenches`."""
+    return [bool(found) for found in np.count_nonzero(wrenches, axis=1)]
 
 
 @dataclass(frozen=True)
 class Part:
     """What a part needs: everything as arrays and machine code, so that it can be sent elsewhere."""
 
-    controlled: Kernel
-    held: Kernel | None
-    """The step with the torque of before, where the law is not asked at every step."""
+    kernels: KernelOf
     steps_per_control: int
+    delay_steps: int
+    """How old the state is that the law sees; memory holds so many."""
     n_steps: int
     dt: float
     start: dict[str, Floats]
@@ -49,9 +58,11 @@ class Part:
     fixed: dict[str, Floats]
     """Inputs that stay the same: parameters and gains (count, size)."""
     setpoints: Setpoint
-    """Of each control step, (n_controls, nv) each."""
+    """Of each control step, (n_controls, nq) and (n_controls, nv) twice."""
     goals: Floats
-    """Where the robot should be after each step, (n_steps, nv)."""
+    """Where the robot should be after each step, (n_steps, nq)."""
+    wrenches: Floats
+    """What pushes in each step, (n_steps, 6 of each push)."""
     noise: tuple[tuple[int, int], Floats, Floats] | None
     """The seed, the number of this part, and the standard deviations of q and v."""
     record_every: int
@@ -67,29 +78,41 @@ class Part:
 
 
 class _Run:
-    """Buffers of a part that is under way: the state is read from one set and written to the other."""
+    """Buffers of a part that is under way: the state is read from one set and written to the next.
+
+    As many sets take turns as the law sees back, so that nothing is copied for a late measurement. All
+    begin as the start: what the law sees of the time before.
+    """
 
     def __init__(self, part: Part) -> None:
         self._part = part
         # A kernel wants a vector full of samples; what is too much repeats the last one.
-        self._rows = max(part.count, part.controlled.image.lanes)
-        nv = part.start["q"].shape[1]
+        self._rows = max(part.count, *(kernel.image.lanes for kernel in part.kernels.values()))
+        nv = int(part.start["v"].shape[1])
         self._tau = np.zeros((self._rows, nv))
-        self._now = {name: self._padded(array) for name, array in part.start.items()}
-        self._next = {name: np.empty_like(array) for name, array in self._now.items()}
+        start = {name: self._padded(array) for name, array in part.start.items()}
+        # The rest of the state needs two sets, which take turns as well if the number of sets is even.
+        sets = 2 * ((part.delay_steps + 3) // 2)
+        pair = (start, {name: array.copy() for name, array in start.items()})
+        self._sets = [
+            {**pair[k % 2], **({} if k < 2 else {name: start[name].copy() for name in ("q", "v")})}
+            for k in range(sets)
+        ]
         self._fixed = {name: self._padded(array) for name, array in part.fixed.items()}
-        self._wanted = {name: np.zeros((1, nv)) for name in ("q_wanted", "v_wanted", "a_wanted", "goal")}
-        self._time = np.zeros((1, 1))
+        widths: dict[str, int] = {**dict.fromkeys(("v_wanted", "a_wanted"), nv), "t": 1, "held_for": 1}
+        widths |= dict.fromkeys(("q_wanted", "goal"), int(part.goals.shape[1]))
+        widths["wrenches"] = int(part.wrenches.shape[1])
+        self._common = {name: np.zeros((1, width)) for name, width in widths.items()}
+        self._pushing = pushing(part.wrenches)
         if part.noise is not None:
             self._random = np.random.default_rng(part.noise[0])
             self._noise = {name: np.zeros((self._rows, nv)) for name in ("noise_q", "noise_v")}
         else:
             self._noise = {}
         self._calls = {
-            (kernel is part.controlled, turn): self._bound(kernel, turn)
-            for kernel in (part.controlled, part.held)
-            if kernel is not None
-            for turn in (0, 1)
+            (*which, turn): self._bound(kernel, turn)
+            for which, kernel in part.kernels.items()
+            for turn in range(sets)
         }
         self._diverged = np.full(self._rows, -1.0)
         self._records: tuple[list[Floats], list[Floats], list[Floats]] = ([], [], [])
@@ -97,42 +120,63 @@ class _Run:
     def done(self) -> PartDone:
         """All steps."""
         part, n = self._part, self._part.count
+        sets, common = len(self._sets), self._common
         for step in range(part.n_steps):
             number, rest = divmod(step, part.steps_per_control)
             if rest == 0:
                 self._set_control(number)
-            self._wanted["goal"][0] = part.goals[step]
-            self._calls[rest == 0, step % 2]()
-            self._now, self._next = self._next, self._now
+            common["goal"][0] = part.goals[step]
+            pushed = self._pushing[step]
+            if pushed:
+                common["wrenches"][0] = part.wrenches[step]
+            self._calls[rest == 0, pushed, step % sets]()
+            now = self._sets[(step + 1) % sets]
             if part.record_every and (step + 1) % part.record_every == 0:
-                arrays = (self._now["q"], self._now["v"], self._tau)
-                for kept, array in zip(self._records, arrays, strict=True):
+                for kept, array in zip(self._records, (now["q"], now["v"], self._tau), strict=True):
                     kept.append(array[:n].copy())
             if (step + 1) % CHECK == 0:
-                self._look(step + 1)
-        self._look(part.n_steps)
-        q, v, worst, squares = (self._now[name][:n].copy() for name in STATE[:4])
-        record = [np.stack(kept, axis=1) if kept else np.zeros((n, 0, q.shape[1])) for kept in self._records]
-        return PartDone(q, v, worst, np.sqrt(squares / part.n_steps), self._diverged[:n].copy(), *record)
+                self._look(step + 1, now)
+        last = self._sets[part.n_steps % sets]
+        self._look(part.n_steps, last)
+        q, v, tau = (
+            np.stack(kept, axis=1) if kept else np.zeros((n, 0, array.shape[1]))
+            for kept, array in zip(self._records, (last["q"], last["v"], self._tau), strict=True)
+        )
+        return PartDone(
+            q=last["q"][:n].copy(),
+            v=last["v"][:n].copy(),
+            max_error=last["worst"][:n].copy(),
+            rms_error=np.sqrt(last["squares"][:n] / part.n_steps),
+            diverged=self._diverged[:n].copy(),
+            q_record=q,
+            v_record=v,
+            tau_record=tau,
+            saturated=last["cut"][:n] / part.n_steps if "cut" in last else np.zeros((n, self._tau.shape[1])),
+        )
 
     def _set_control(self, number: int) -> None:
         part = self._part
         for name, rows in zip(("q_wanted", "v_wanted", "a_wanted"), part.setpoints, strict=True):
-            self._wanted[name][0] = rows[number]
-        self._time[0, 0] = number * part.steps_per_control * part.dt
+            self._common[name][0] = rows[number]
+        first = number * part.steps_per_control
+        self._common["t"][0, 0] = first * part.dt
+        self._common["held_for"][0, 0] = min(part.steps_per_control, part.n_steps - first)
         if part.noise is not None:
             for (name, array), deviation in zip(self._noise.items(), part.noise[1:], strict=True):
                 self._random.standard_normal(out=array)
                 self._noise[name] *= deviation
 
     def _bound(self, kernel: Kernel, turn: int) -> Callable[[], None]:
-        source, target = (self._now, self._next) if turn == 0 else (self._next, self._now)
+        sets = len(self._sets)
+        source, target = self._sets[turn], self._sets[(turn + 1) % sets]
+        seen = self._sets[(turn - self._part.delay_steps) % sets]
         known = {
             **self._fixed,
             **self._noise,
-            **{name: np.broadcast_to(row, (self._rows, row.shape[1])) for name, row in self._wanted.items()},
-            "t": np.broadcast_to(self._time, (self._rows, 1)),
+            **{name: np.broadcast_to(row, (self._rows, row.size)) for name, row in self._common.items()},
             "tau": self._tau,
+            "q_seen": seen["q"],
+            "v_seen": seen["v"],
             **source,
         }
         answers = {"tau": self._tau, **target}
@@ -140,8 +184,8 @@ class _Run:
             [known[port.name] for port in kernel.inputs], [answers[port.name] for port in kernel.outputs]
         )
 
-    def _look(self, step: int) -> None:
-        state = np.maximum(np.abs(self._now["q"]).max(axis=1), np.abs(self._now["v"]).max(axis=1))
+    def _look(self, step: int, now: dict[str, Floats]) -> None:
+        state = np.maximum(np.abs(now["q"]).max(axis=1), np.abs(now["v"]).max(axis=1))
         new = (self._diverged < 0) & ~(state < BEYOND)
         self._diverged[new] = step
 

@@ -22,22 +22,23 @@ SCHEMA = "dynx.rollouts/1"
 class BatchRollouts:
     """The outcome of n rollouts, one in each row; rows that were not done are NaN.
 
-    Errors are those of the joints' positions at the ends of all steps, against the reference there.
+    Errors are those of the configuration at the ends of all steps, `model.difference` to the reference there.
     The record has the states after every `record_every` steps, and the torque that led there.
     """
 
     joint_names: Sequence[str]
     dt: float
-    q: Floats  # (n, nv), at the end
+    q: Floats  # (n, nq), at the end
     v: Floats  # (n, nv), at the end
     max_error: Floats  # (n, nv)
     rms_error: Floats  # (n, nv)
     diverged: Floats  # (n,), the time [s] by which a rollout was seen to diverge; NaN if it did not
     done: Any  # (n,) bool
     t: Floats  # (kept,), the times of the record [s]
-    q_record: Floats  # (n, kept, nv)
+    q_record: Floats  # (n, kept, nq)
     v_record: Floats  # (n, kept, nv)
     tau_record: Floats  # (n, kept, nv)
+    saturated: Floats  # (n, nv), the share of steps in which the effort limits cut the torque
 
     def __len__(self) -> int:
         return len(self.q)

@@ -56,8 +56,8 @@ class Store:
     def _path(self, part: Part) -> Path:
         digest = sha256()
         # Kernels count by what they compute; their machine code differs between processors.
-        numbers = (part.n_steps, part.dt, part.steps_per_control, part.noise, part.record_every)
-        arrays = (part.start, part.fixed, tuple(part.setpoints), part.goals)
-        code = [None if kernel is None else kernel.image for kernel in (part.controlled, part.held)]
+        numbers = (part.n_steps, part.dt, part.steps_per_control, part.delay_steps, part.record_every)
+        arrays = (part.start, part.fixed, tuple(part.setpoints), part.goals, part.wrenches, part.noise)
+        code = [(which, kernel.image) for which, kernel in sorted(part.kernels.items())]
         digest.update(pickle.dumps((numbers, arrays, code), protocol=4))
         return self._folder / f"{digest.hexdigest()[:32]}.npz"

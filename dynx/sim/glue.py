@@ -107,6 +107,12 @@ class Questions:
         self._asked.append(_Asked(question, fresh, tuple(named), (answer, shape), guarded))
         return self._symbols(answer, int(np.prod(shape))).reshape(shape)
 
+    def refuse_rounded_otherwise(self) -> None:
+        """Raise TraceError if what was traced so far is not rounded in a kernel as in NumPy."""
+        for node in self._graph.nodes:
+            if node.op not in ROUNDED_ALIKE:
+                raise TraceError(f"{node.op} is not rounded as NumPy rounds it")
+
     def glue(self, results: Mapping[str, Array]) -> Glue:
         """The stages, the last of which gives `results`."""
         cuts = []
@@ -145,11 +151,7 @@ class Questions:
     def _program(self, wanted: Mapping[str, Nodes]) -> Program:
         outputs = [Port(name, (len(nodes),)) for name, nodes in wanted.items()]
         results = [node for nodes in wanted.values() for node in nodes]
-        program = finished(self._graph, self._ports, outputs, results)
-        for node in program.nodes:
-            if node.op not in ROUNDED_ALIKE:
-                raise TraceError(f"{node.op} is not rounded as NumPy rounds it")
-        return _without_idle_inputs(program)
+        return _without_idle_inputs(finished(self._graph, self._ports, outputs, results))
 
 
 class AskedDynamics:

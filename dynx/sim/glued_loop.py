@@ -52,6 +52,8 @@ def glued(loop: Loop, record: Record) -> GluedLoop | None:
         return None
     if loop.stops is not None or not plant.model.nv:
         return None
+    if plant.model.floating and loop.sensors.noise is not None:
+        return None
     try:
         return GluedLoop(loop, plant)
     except TraceError:
@@ -64,10 +66,11 @@ class GluedLoop:
     def __init__(self, loop: Loop, plant: DynxPlant) -> None:
         """Raises TraceError for a law that cannot be traced."""
         self._loop, self._plant = loop, plant
-        nv = plant.model.nv
-        sizes = dict.fromkeys(("q", "v", "held", "seen_q", "seen_v", *SETPOINT, *NOISE), nv) | {"t": 1}
-        memory = None if loop.controller is None else loop.controller.start()
-        self._memory = 0 if memory is None else memory.size
+        nq, nv = plant.model.nq, plant.model.nv
+        sizes = dict.fromkeys(("v", "held", "seen_v", *SETPOINT, *NOISE), nv) | {"t": 1}
+        sizes |= dict.fromkeys(("q", "seen_q", "q_wanted"), nq)
+        self._start = None if loop.controller is None else loop.controller.start()
+        self._memory = 0 if self._start is None else self._start.size
         if self._memory:
             sizes["memory"] = self._memory
         self._asked = self._step(Questions(sizes), asked=True)
@@ -89,7 +92,7 @@ class GluedLoop:
         """One step of the plant, and of the law if it is `asked`."""
         loop, given = self._loop, questions.given
         results: dict[str, Array] = {}
-        tau, memory = given["held"], given.get("memory")
+        tau, memory = given["held"], given.get("memory", self._start)
         if loop.controller is None:
             tau = np.zeros(len(tau), dtype=object)
         elif asked:
@@ -99,6 +102,7 @@ class GluedLoop:
             measured = Measured(given["t"][0], q, v)
             law = asking_law(loop.controller, questions)
             tau, memory = law.torque(measured, Setpoint(*(given[name] for name in SETPOINT)), memory)
+            questions.refuse_rounded_otherwise()
             if loop.limit is not None:
                 results["wanted"] = tau
                 tau = clipped(tau, loop.limit)
@@ -110,7 +114,7 @@ class GluedLoop:
 
         q, v, a = self._plant.advanced(accelerate, given["q"], given["v"], tau)
         results |= {"tau": tau, "a": a, "next_q": q, "next_v": v}
-        if memory is not None:
+        if self._memory and memory is not None:
             results["next_memory"] = memory
         results["defect"] = np.array([v @ v], dtype=object)
         return questions.glue(results)
@@ -122,8 +126,9 @@ class GluedLoop:
         arrays = {"q": q, "v": v, "seen_q": q, "seen_v": v, "next_q": q, "next_v": v}
         arrays |= {"held": tau, "tau": tau, "wanted": np.empty_like(tau), "a": record.a}
         arrays["t"] = loop.clock.times()[:, None]
-        silence = np.broadcast_to(np.zeros(v.shape[1]), (loop.clock.n_controls, v.shape[1]))
-        setpoints = (silence, silence, silence) if loop.controller is None else loop.setpoints
+        nothing = [np.broadcast_to(np.zeros(x.shape[1]), (loop.clock.n_controls, x.shape[1])) for x in (q, v)]
+        silence = nothing[1]
+        setpoints = (nothing[0], silence, silence) if loop.controller is None else loop.setpoints
         # A reference may hand out its columns side by side.
         rows = [array if array[:1].flags.c_contiguous else np.ascontiguousarray(array) for array in setpoints]
         arrays |= dict(zip(SETPOINT, rows, strict=True))

@@ -121,8 +121,9 @@ class DynxPlant(Plant):
     @property
     def is_array_code(self) -> bool:
         """Whether a step is `advanced` over the engine's forward dynamics, for arrays of any scalar."""
-        fixed_steps = isinstance(self._scheme, SemiImplicitEuler | RungeKutta4)
-        return self._plain and fixed_steps and not self.model.floating
+        # Floats and symbols take the flow of a floating base in other roundings.
+        schemes = SemiImplicitEuler if self.model.floating else SemiImplicitEuler | RungeKutta4
+        return self._plain and isinstance(self._scheme, schemes)
 
     def advanced(self, accelerate: Accelerate, q: Array, v: Array, tau: Array) -> State:
         """One step from q, v, with `accelerate(q, v, tau)` in the place of the engine."""

@@ -183,6 +183,17 @@ def _of_root(graph: Graph, index: int, a: int) -> tuple[int, ...]:
     return (graph.apply("div", graph.constant(0.5), index),)
 
 
+def _of_tanh(graph: Graph, index: int, a: int) -> tuple[int, ...]:
+    """(1 - tanh) (1 + tanh)"""
+    one = graph.constant(1.0)
+    return (graph.apply("mul", graph.apply("sub", one, index), graph.apply("add", one, index)),)
+
+
+def _of_arctan(graph: Graph, index: int, a: int) -> tuple[int, ...]:
+    one = graph.constant(1.0)
+    return (graph.apply("div", one, graph.apply("add", one, graph.apply("mul", a, a))),)
+
+
 def _of_smaller(graph: Graph, index: int, a: int, b: int) -> tuple[int, ...]:
     return _of_larger(graph, index, b, a)
 
@@ -204,6 +215,9 @@ _DERIVATIVES: dict[str, Derivatives] = {
     "sqrt": _of_root,
     "sin": lambda graph, index, a: (graph.apply("cos", a),),
     "cos": lambda graph, index, a: (graph.apply("neg", graph.apply("sin", a)),),
+    "exp": lambda graph, index, a: (index,),
+    "tanh": _of_tanh,
+    "arctan": _of_arctan,
     "min": _of_smaller,
     "max": _of_larger,
 }

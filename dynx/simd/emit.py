@@ -16,10 +16,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import partial
 
+from dynx.simd.elementary import elementary
 from dynx.simd.expr import Op
 from dynx.simd.program import Program
 from dynx.simd.rows import Rows
-from dynx.simd.schedule import Segment, TrigGroup, places_of_kept, schedule
+from dynx.simd.schedule import ELEMENTARY, Segment, TrigGroup, places_of_kept, schedule
 from dynx.simd.target import Target
 from dynx.simd.text import Writer
 from dynx.simd.trigonometry import declarations, sines_and_cosines
@@ -219,6 +220,8 @@ class _Body:
             name = write.let(
                 f"select {write.mask} {first}, {write.vector} {args[0]}, {write.vector} {args[1]}"
             )
+        elif node.op in ELEMENTARY:
+            name = elementary(write, node.op, args[0], fma=self._fma)
         elif node.op == "neg":
             name = write.let(f"fneg {flags}{write.vector} {args[0]}")
         else:

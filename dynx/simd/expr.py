@@ -15,7 +15,22 @@ from typing import Any, Final, Literal, NamedTuple, NoReturn
 from dynx.errors import TraceError
 
 Op = Literal[
-    "input", "constant", "add", "sub", "mul", "div", "neg", "abs", "sqrt", "sin", "cos", "min", "max"
+    "input",
+    "constant",
+    "add",
+    "sub",
+    "mul",
+    "div",
+    "neg",
+    "abs",
+    "sqrt",
+    "sin",
+    "cos",
+    "exp",
+    "tanh",
+    "arctan",
+    "min",
+    "max",
 ]
 
 ARITY: Final[dict[Op, int]] = {
@@ -30,6 +45,9 @@ ARITY: Final[dict[Op, int]] = {
     "sqrt": 1,
     "sin": 1,
     "cos": 1,
+    "exp": 1,
+    "tanh": 1,
+    "arctan": 1,
     "min": 2,
     "max": 2,
 }
@@ -63,7 +81,8 @@ class Graph:
     """An arena of nodes in which arguments precede what is made of them.
 
     Operations are those of IEEE 754 in double precision, rounded to nearest; `min` and `max` give the
-    second argument if either is NaN (as the machine's instructions do); sin and cos are in radians.
+    second argument if either is NaN (as the machine's instructions do); sin, cos and arctan are in
+    radians, and like exp and tanh within 2 units in the last place.
     """
 
     def __init__(self, simplify: Simplify | None = None) -> None:
@@ -161,6 +180,25 @@ class Symbol:
     def cos(self) -> Symbol:
         """Cosine [rad]."""
         return self._alone("cos")
+
+    def exp(self) -> Symbol:
+        """Exponential."""
+        return self._alone("exp")
+
+    def tanh(self) -> Symbol:
+        """Hyperbolic tangent."""
+        return self._alone("tanh")
+
+    def arctan(self) -> Symbol:
+        """Arctangent [rad], between -pi/2 and pi/2."""
+        return self._alone("arctan")
+
+    def sign(self) -> Symbol:
+        """-1, 0 or 1."""
+        # It is made of other operations, on top of this module.
+        from dynx.simd.sign import sign_of
+
+        return sign_of(self)
 
     def minimum(self, other: Any) -> Symbol:
         """The smaller one; `other` if either is NaN."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from dynx.simd.expr import Symbol
 from dynx.simd.program import Program
-from dynx.spatial.scalar import Array, cos, sin, sqrt
+from dynx.spatial.scalar import Array, arctan, cos, exp, sin, sqrt, tanh
 
 
 def inlined(program: Program, inputs: Mapping[str, Array]) -> dict[str, Array]:
@@ -76,6 +76,9 @@ _MEANING: dict[str, Callable[..., Any]] = {
     "sqrt": _elementary(sqrt),
     "sin": _elementary(sin),
     "cos": _elementary(cos),
+    "exp": _elementary(exp),
+    "tanh": _elementary(tanh),
+    "arctan": _elementary(arctan),
     "min": _smaller,
     "max": _larger,
 }

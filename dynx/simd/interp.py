@@ -1,13 +1,14 @@
 """What a program means: it is evaluated operation by operation with NumPy.
 
 This is the oracle of the compiler, not a fast way to run anything. Its operations are those that
-`Graph` documents; its sine and cosine are the C library's, or those it is given.
+`Graph` documents; its sine and cosine are the C library's, and like its other elementary functions, which
+are NumPy's, they can be given.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Final
 
 import numpy as np
@@ -45,6 +46,11 @@ _MEANING: dict[Op, Callable[..., Floats]] = {
     "neg": np.negative,
     "abs": np.abs,
     "sqrt": np.sqrt,
+    "sin": sine,
+    "cos": cosine,
+    "exp": np.exp,
+    "tanh": np.tanh,
+    "arctan": np.arctan,
     # Not NumPy's: the second one if either is NaN, and of two zeros the second.
     "min": lambda a, b: _chosen(a < b, a, b),
     "max": lambda a, b: _chosen(a > b, a, b),
@@ -52,12 +58,15 @@ _MEANING: dict[Op, Callable[..., Floats]] = {
 
 
 def interpret(
-    program: Program, inputs: Sequence[Floats], *, sine: Function = sine, cosine: Function = cosine
+    program: Program, inputs: Sequence[Floats], functions: Mapping[Op, Function] | None = None
 ) -> list[Floats]:
-    """The outputs (n, port size) for the inputs (n, port size), port after port."""
+    """The outputs (n, port size) for the inputs (n, port size), port after port.
+
+    `functions` take the place of elementary functions, by the name of the operation.
+    """
     n = len(inputs[0]) if inputs else 1
     columns = [array[:, column] for array in inputs for column in range(array.shape[1])]
-    meaning = {**_MEANING, "sin": sine, "cos": cosine}
+    meaning = {**_MEANING, **(functions or {})}
     values: list[Floats] = []
     with np.errstate(all="ignore"):
         for node in program.nodes:

@@ -14,6 +14,8 @@ from dynx.simd.program import Program
 from dynx.simd.rows import tiles
 
 TRIG = frozenset({"sin", "cos"})
+ELEMENTARY = frozenset({"exp", "tanh", "arctan"})
+"""Functions that are some thirty operations each."""
 LEAVES = frozenset({"input", "constant"})
 """Operations that need no computing: they are read where they are used."""
 
@@ -52,11 +54,11 @@ def schedule(program: Program, lanes: int, longest: int) -> list[Segment]:
     A group of angles is not cut.
     """
     steps = list(_steps(program))
-    if sum(_size(step) for step in steps) > longest:
+    if sum(_size(program, step) for step in steps) > longest:
         longest = max(longest // 2, 1)
     segments, home, length = [Segment()], {}, 0
     for step in steps:
-        size = _size(step)
+        size = _size(program, step)
         if length and length + size > longest:
             segments.append(Segment())
             length = 0
@@ -88,9 +90,11 @@ def places_of_kept(program: Program, segments: Sequence[Segment]) -> dict[int, i
     return places
 
 
-def _size(step: Step) -> int:
+def _size(program: Program, step: Step) -> int:
     """Operations of a step, about."""
-    return 50 * len(step.angles) if isinstance(step, TrigGroup) else 1
+    if isinstance(step, TrigGroup):
+        return 50 * len(step.angles)
+    return 30 if program.nodes[step].op in ELEMENTARY else 1
 
 
 def _steps(program: Program) -> Iterator[Step]:

@@ -94,7 +94,7 @@ _FOLD: dict[Op, Callable[..., float]] = {
 
 
 def _fold(graph: Graph, op: Op, args: Args) -> int | None:
-    """An operation on constants is a constant. (sin and cos are left to the kernel's own.)"""
+    """An operation on constants is a constant. (Elementary functions are left to the kernel's own.)"""
     values = []
     for arg in args:
         node = graph.nodes[arg]
@@ -171,12 +171,12 @@ def _negated_term(graph: Graph, op: Op, args: Args) -> int | None:
 
 
 def _odd_and_even(graph: Graph, op: Op, args: Args) -> int | None:
-    """sin(-x), cos(-x), |-x|"""
+    """sin(-x), cos(-x), tanh(-x), arctan(-x), |-x|"""
     x = _negated(graph, args[0])
     if x is None:
         return None
-    even = graph.apply(op, x)
-    return graph.apply("neg", even) if op == "sin" else even
+    of_size = graph.apply(op, x)
+    return graph.apply("neg", of_size) if op in ("sin", "tanh", "arctan") else of_size
 
 
 def _power_of_two(graph: Graph, op: Op, args: Args) -> int | None:
@@ -296,7 +296,7 @@ EXACT: tuple[Rule, ...] = (
     Rule("negated-factor", ("mul", "div"), "exact", _negated_factor, ("neg",)),
     Rule("negated-multiple", ("neg",), "exact", _negated_multiple, ("mul", "div")),
     Rule("negated-term", ("add", "sub"), "exact", _negated_term, ("neg",)),
-    Rule("odd-and-even", ("sin", "cos", "abs"), "exact", _odd_and_even, ("neg",)),
+    Rule("odd-and-even", ("sin", "cos", "tanh", "arctan", "abs"), "exact", _odd_and_even, ("neg",)),
     Rule("power-of-two", ("div",), "exact", _power_of_two, ("constant",)),
 )
 

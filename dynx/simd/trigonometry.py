@@ -144,10 +144,10 @@ def _in_quadrant(write: Writer, x: str, k: str, sin: str, cos: str) -> SineCosin
     half = write.let(f"shl {integers} {k}, {write.integer_splat(62)}")
     odd = write.let(f"xor {integers} {half}, {below}")
     even = write.let(f"shl {integers} {after}, {write.integer_splat(62)}")
-    return SineCosine(_signed(write, s, odd), _signed(write, c, even))
+    return SineCosine(signed(write, s, odd), signed(write, c, even))
 
 
-def _signed(write: Writer, x: str, sign: str) -> str:
+def signed(write: Writer, x: str, sign: str) -> str:
     """-x where the first bit of `sign` is set."""
     first = write.let(f"and {write.integers} {sign}, {write.integer_splat(-(2**63))}")
     bits = write.let(f"bitcast {write.vector} {x} to {write.integers}")

@@ -33,6 +33,26 @@ def sqrt(x: Array) -> Array:
     return _elementwise("sqrt", x)
 
 
+def exp(x: Array) -> Array:
+    """Exponential of each element."""
+    return _elementwise("exp", x)
+
+
+def tanh(x: Array) -> Array:
+    """Hyperbolic tangent of each element."""
+    return _elementwise("tanh", x)
+
+
+def arctan(x: Array) -> Array:
+    """Arctangent of each element [rad], between -pi/2 and pi/2."""
+    return _elementwise("arctan", x)
+
+
+def sign(x: Array) -> Array:
+    """-1, 0 or 1 of each element."""
+    return _elementwise("sign", x)
+
+
 def clipped(x: Array, limit: Array) -> Array:
     """Each element cut to -limit and limit (the same number of them, or one); infinite is no limit."""
     x = np.asarray(x)
@@ -64,10 +84,11 @@ def _elementwise(function: str, x: Array) -> Array:
 
     def one(element: Any) -> Any:
         method = getattr(element, function, None)
-        if method is not None:
+        # To mpmath's numbers `exp` is their exponent.
+        if callable(method):
             return method()
         import mpmath
 
-        return getattr(mpmath, function)(element)
+        return getattr(mpmath, {"arctan": "atan"}.get(function, function))(element)
 
     return np.asarray(np.frompyfunc(one, 1, 1)(x), dtype=object)

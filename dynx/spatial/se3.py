@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from dynx.spatial.branchless import rotation_log
 from dynx.spatial.scalar import Array, Floats
 from dynx.spatial.so3 import quat_exp, quat_from_rotation, quat_log, rotate, skew
 
@@ -58,11 +59,11 @@ def se3_log(position: Floats, quat_xyzw: Floats) -> tuple[Floats, Floats]:
     return rotate(V_inverse, position), angular
 
 
-def pose_error(T_world_target: Floats, T_world_frame: Floats) -> tuple[Floats, Floats]:
-    """What is left to go from `frame` to `target`.
+def pose_error(T_world_target: Array, T_world_frame: Array) -> tuple[Array, Array]:
+    """What is left to go from `frame` to `target`, of floats or of symbols.
 
     Returns (position error [m] (..., 3), rotation vector [rad] (..., 3)), both in world axes.
     """
     position = T_world_target[..., :3, 3] - T_world_frame[..., :3, 3]
     R = T_world_target[..., :3, :3] @ np.swapaxes(T_world_frame[..., :3, :3], -1, -2)
-    return position, quat_log(quat_from_rotation(R))
+    return position, rotation_log(R) if R.dtype == object else quat_log(quat_from_rotation(R))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from tests.faults.catalogue_agreement import AGREEMENT_FAULTS
+from tests.faults.catalogue_batch import BATCH_FAULTS
 from tests.faults.catalogue_control import CONTROL_FAULTS
 from tests.faults.catalogue_doctor import DOCTOR_FAULTS
 from tests.faults.catalogue_drake import DRAKE_FAULTS
@@ -39,6 +40,7 @@ FAULTS_BY_AREA: dict[str, tuple[Fault, ...]] = {
     "simd": SIMD_FAULTS,
     "trajectory": TRAJECTORY_FAULTS,
     "control": CONTROL_FAULTS,
+    "batch": BATCH_FAULTS,
     "records": RECORDS_FAULTS,
     "sim_command": SIM_COMMAND_FAULTS,
 }

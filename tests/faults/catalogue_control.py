@@ -50,9 +50,9 @@ CONTROL_FAULTS = (
     ),
     Fault(
         "sim_floating_step_at_the_link_s_origin",
-        "dynx.sim.integrators",
-        right="rising = a[:3] + cross(w, v[:3]) + cross(a[3:6], c) + cross(w, cross(w, c))",
-        wrong="rising = a[:3] + cross(w, v[:3]) + cross(a[3:6], c)",
+        "dynx.sim.floating_step",
+        right="cross(a[3:6], center) + cross(w, lever)",
+        wrong="cross(a[3:6], center)",
         caught_by=f"{PHYSICS}::test_semi_implicit_euler_keeps_linear_momentum",
     ),
     Fault(
@@ -124,33 +124,5 @@ CONTROL_FAULTS = (
         right="            record.steps = first + k\n",
         wrong="            record.steps = first + k // 32 * 32\n",
         caught_by=f"{GLUED}::test_ctrl_c_in_the_middle_of_a_stage",
-    ),
-    Fault(
-        "batch_steps_by_explicit_euler",
-        "dynx.sim.fused",
-        right="q = q + self.dt * v\n            error",
-        wrong='q = given["q"] + self.dt * given["v"]\n            error',
-        caught_by="tests/sim/test_batch.py::test_a_rollout_is_that_of_simulate",
-    ),
-    Fault(
-        "batch_repeats_the_noise_of_its_first_part",
-        "dynx.sim.batch",
-        right="(noise.seed, first // PART)",
-        wrong="(noise.seed, 0)",
-        caught_by="tests/sim/test_batch.py::test_outcomes_do_not_depend_on_who_computes_them",
-    ),
-    Fault(
-        "batch_takes_the_kept_part_of_other_arguments",
-        "dynx.sim.batch_store",
-        right="arrays = (part.start, part.fixed, tuple(part.setpoints), part.goals)",
-        wrong="arrays = (tuple(part.setpoints), part.goals)",
-        caught_by="tests/sim/test_batch.py::test_ctrl_c_keeps_what_is_done",
-    ),
-    Fault(
-        "batch_forgets_what_the_law_remembers_between_controls",
-        "dynx.sim.fused",
-        right='tau, memory = given["tau"], given.get("memory")',
-        wrong='tau, memory = given["tau"], None if given.get("memory") is None else 0 * given["memory"]',
-        caught_by="tests/sim/test_batch.py::test_a_law_asked_at_some_steps_only",
     ),
 )

@@ -11,6 +11,7 @@ SIMD = "dynx.simd"
 TESTS = "tests/simd"
 STRICT = f"{TESTS}/test_emit.py::test_strict_code_is_the_interpreter_bit_for_bit"
 ANY_NUMBER = f"{TESTS}/test_kernel.py::test_any_number_of_samples"
+ELEMENTARY = f"{TESTS}/test_elementary.py::test_within_two_units_everywhere"
 TEST_PARAMETRIC = "tests/backends/test_parametric.py"
 TEST_FRAMES = "tests/backends/test_compiled_frames.py"
 
@@ -65,6 +66,48 @@ SIMD_FAULTS = (
         caught_by=f"{TESTS}/test_trigonometry.py::test_within_one_unit_beyond_it",
     ),
     Fault(
+        "simd_second_part_of_ln_2_left_out",
+        f"{SIMD}.elementary",
+        right="r = of.multiply_add(k, splat(-low), r)",
+        wrong="r = of.multiply_add(k, splat(-0.0 * low), r)",
+        caught_by=ELEMENTARY,
+    ),
+    Fault(
+        "simd_tanh_of_1_too_early",
+        f"{SIMD}.elementary",
+        right="FLAT = 20.0",
+        wrong="FLAT = 18.0",
+        caught_by=ELEMENTARY,
+    ),
+    Fault(
+        "simd_small_tanh_by_the_formula_of_large_ones",
+        f"{SIMD}.elementary",
+        right="SMALL = 0.55",
+        wrong="SMALL = 0.05",
+        caught_by=ELEMENTARY,
+    ),
+    Fault(
+        "simd_arctangent_of_a_polynomial_beyond_its_range",
+        f"{SIMD}.elementary",
+        right="MIDDLE, STEEP = 0.6,",
+        wrong="MIDDLE, STEEP = 0.8,",
+        caught_by=ELEMENTARY,
+    ),
+    Fault(
+        "simd_sign_lost_from_tanh",
+        f"{SIMD}.simplify",
+        right='op in ("sin", "tanh", "arctan") else',
+        wrong='op in ("sin", "arctan") else',
+        caught_by=f"{TESTS}/test_simplify.py::test_exact_rules_keep_every_bit",
+    ),
+    Fault(
+        "simd_derivative_of_tanh_of_the_wrong_argument",
+        f"{SIMD}.differentiate",
+        right='graph.apply("sub", one, index), graph.apply("add", one, index)',
+        wrong='graph.apply("sub", one, a), graph.apply("add", one, a)',
+        caught_by=f"{TESTS}/test_differentiate.py::test_each_operation_s_derivatives_are_limits_of_difference_quotients",
+    ),
+    Fault(
         "simd_every_group_the_last",
         f"{SIMD}.emit",
         right="%first = select i1 %late, i64 %last, i64 %i",
@@ -104,7 +147,7 @@ SIMD_FAULTS = (
         f"{SIMD}.differentiate",
         right='return inverse, graph.apply("neg", graph.apply("mul", index, inverse))',
         wrong='return inverse, graph.apply("mul", index, inverse)',
-        caught_by=f"{TESTS}/test_differentiate.py::test_derivatives_are_limits_of_difference_quotients",
+        caught_by=f"{TESTS}/test_differentiate.py::test_each_operation_s_derivatives_are_limits_of_difference_quotients",
     ),
     Fault(
         "regressor_products_of_inertia_mixed_up",

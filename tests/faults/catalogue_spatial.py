@@ -134,4 +134,25 @@ SPATIAL_FAULTS = (
         wrong="rotate(self.second_moment, angular)",
         caught_by=FREE_BODY,
     ),
+    Fault(
+        "branchless_logarithm_of_half_a_turn_is_none",
+        "dynx.spatial.branchless",
+        right="same_way = sign(sign(w) + 0.5)",
+        wrong="same_way = sign(w)",
+        caught_by="tests/spatial/test_branchless.py::test_every_largest_component_and_ties_between_them",
+    ),
+    Fault(
+        "branchless_path_of_a_twist_too_straight",
+        "dynx.spatial.branchless",
+        right="((1.0 - sin(angle) / angle) / (angle * angle)) * (W @ W)",
+        wrong="(1.0 - sin(angle) / angle) * (W @ W)",
+        caught_by="tests/spatial/test_branchless.py::test_of_rotations_and_poses",
+    ),
+    Fault(
+        "branchless_quaternion_of_its_first_component",
+        "dynx.spatial.branchless",
+        right="larger = 0.5 * (larger + abs(larger))",
+        wrong="larger = 0.0 * larger",
+        caught_by="tests/spatial/test_branchless.py::test_every_largest_component_and_ties_between_them",
+    ),
 )

@@ -249,11 +249,12 @@ def test_what_cannot_be_a_batch_is_refused(arm: Model, reference: Trajectory) ->
         (ArgumentError, "dt is", pd, {"dt": 0.0}),
         (ArgumentError, "multiple", pd, {"dt": 7e-4}),
         (ArgumentError, "threads", pd, {"threads": 0}),
+        (ArgumentError, "was made for control_dt", DiscreteComputedTorque(arm, control_dt=2e-3), {}),
+        (ArgumentError, "seed", pd, {"noise": Noise(1e-3, 1e-3, seed=-1)}),
     ]
     for error, said, law, options in bad:
         with pytest.raises(error, match=said):
             simulate_batch(arm, law, reference, **{"dt": DT, **options})
     floating = dynx.load("ur5", base="floating")
-    hold = floating.neutral()
-    with pytest.raises(UnsupportedFeatureError, match="fixed base"):
-        simulate_batch(floating, PD(floating, kp=1.0, kd=1.0), hold, duration=0.01)
+    with pytest.raises(ArgumentError, match="the controller is one of"):
+        simulate_batch(floating, pd, floating.neutral(), duration=0.01)

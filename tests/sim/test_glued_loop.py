@@ -134,14 +134,14 @@ def test_a_robot_without_a_controller() -> None:
 
 
 @settings(max_examples=10)
-@given(model=models(base="fixed", solvable=True), step=st.integers(1, 19), data=st.data())
+@given(model=models(solvable=True), step=st.integers(1, 19), data=st.data())
 def test_random_robots_resumed_at_any_step(model: Model, step: int, data: st.DataObject) -> None:
     law = PID(model, kp=20, ki=50, kd=4, control_dt=4e-3, limit=50.0)
     options: dict[str, Any] = {
         "duration": 0.02,
         "control_dt": 4e-3,
         "effort_limits": data.draw(st.sampled_from([1.0, 30.0])),
-        "noise": Noise(1e-3, 1e-3),
+        "noise": None if model.floating else Noise(1e-3, 1e-3),
         "check_reference": False,
     }
     rng = np.random.default_rng(data.draw(st.integers(0, 99)))
@@ -197,9 +197,19 @@ def test_compensated_friction_goes_the_plain_way(speed: str) -> None:
     both(ARM, law, np.zeros(6), q0=np.full(6, 0.1), duration=0.02, glued=False)
 
 
-def test_a_floating_base_goes_the_plain_way() -> None:
+@pytest.mark.parametrize("plant", ["pinocchio", "reference", "compiled"])
+@pytest.mark.parametrize("options", [{}, {"substeps": 3}, {"control_dt": 3e-3, "delay": 2e-3}])
+def test_a_floating_base(plant: str, options: dict[str, Any]) -> None:
     robot = load("solo12", base="floating")
-    both(robot, PD(robot, kp=5, kd=0.1), robot.neutral(), duration=0.01, glued=False)
+    law = PD(robot, kp=5, kd=0.1)
+    v0 = np.random.default_rng(0).normal(size=robot.nv)
+    both(robot, law, robot.neutral(), plant=plant, v0=v0, duration=0.06, **options)
+
+
+@pytest.mark.parametrize("options", [{"noise": Noise(1e-3, 1e-3)}, {"integrator": "rk4"}])
+def test_a_floating_base_that_goes_the_plain_way(options: dict[str, Any]) -> None:
+    robot = load("solo12", base="floating")
+    both(robot, PD(robot, kp=5, kd=0.1), robot.neutral(), duration=0.01, glued=False, **options)
 
 
 @pytest.mark.parametrize("kd", [-3e3, -1e306])

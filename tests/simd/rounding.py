@@ -60,6 +60,11 @@ def bounds(program: Program, inputs: Sequence[Floats], *, any_order: bool = Fals
                 error = e[0] / (np.sqrt(values[node.args[0]] - e[0]) + value) + fresh
             elif node.op in ("sin", "cos"):
                 error = e[0] + SINE
+            elif node.op in ("tanh", "arctan"):
+                # Their slopes are at most 1.
+                error = e[0] + 4 * fresh
+            elif node.op == "exp":
+                error = size * np.expm1(e[0]) + 4 * fresh
             else:
                 error = np.maximum.reduce(e)
             # To second order in UNIT, and where anything overflows there is no bound.

@@ -19,7 +19,7 @@ from dynx.simd.interp import interpret
 from dynx.simd.program import Port, Program, finished
 from dynx.simd.sign import sign
 from dynx.simd.trace import trace
-from dynx.spatial.scalar import Array, Floats, cos, sin, sqrt
+from dynx.spatial.scalar import Array, Floats, arctan, cos, exp, sin, sqrt, tanh
 from tests.simd.programs import RANDOM, SPECIAL, doubles
 
 DIGITS = 50
@@ -60,6 +60,9 @@ STEPS: tuple[Callable[[Array, Array], Array], ...] = (
     lambda a, b: sqrt(np.asarray(a * a + 0.25)),
     lambda a, b: sin(a),
     lambda a, b: cos(a),
+    lambda a, b: exp(np.asarray(-a * a)),
+    lambda a, b: tanh(a),
+    lambda a, b: arctan(a),
     smaller,
     larger,
 )
@@ -101,6 +104,20 @@ def assert_close(got: Array, wanted: Array) -> None:
     assert got.shape == wanted.shape
     size = max([1, *(abs(w) for w in wanted.ravel())])
     assert all(abs(g - w) <= CLOSE * size for g, w in zip(got.ravel(), wanted.ravel(), strict=True))
+
+
+@pytest.mark.parametrize("step", STEPS)
+@given(RANDOM)
+def test_each_operation_s_derivatives_are_limits_of_difference_quotients(
+    step: Callable[[Array, Array], Array], rng: np.random.Generator
+) -> None:
+    def function(x: Array) -> Array:
+        return np.asarray(step(np.asarray(x[0]), np.asarray(x[1]))).reshape(1)
+
+    program = trace(function, {"x": (2,)}, simplify=None)
+    point = random_point(program, rng)
+    found = inlined(differentiate(program, [("result", "x")], simplify=None), point)["dresult_dx"]
+    assert_close(found, quotient(program, point, "result", "x"))
 
 
 @given(smooth_programs(), RANDOM)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from llvmlite import binding
 
 from dynx.simd.emit import Settings, emit
-from dynx.simd.expr import ARITY, Graph, Simplify
+from dynx.simd.expr import ARITY, Graph, Op, Simplify
 from dynx.simd.interp import Function, interpret
 from dynx.simd.program import Port, Program, finished
 from dynx.simd.simplify import FAST, STRICT
@@ -30,6 +30,7 @@ from tests.simd.programs import (
 )
 from tests.simd.rounding import agree, bounds
 
+FUNCTIONS: tuple[Op, ...] = ("sin", "cos", "exp", "tanh", "arctan")
 TARGET = st.sampled_from(TARGETS)
 LANE = st.sampled_from(LANES)
 BATCH = st.integers(0, 17)
@@ -38,20 +39,21 @@ LAYOUTS = ("rows", "padded", "every second", "backwards", "one row")
 
 
 @functools.cache
-def own_trigonometry(target: Target) -> tuple[Function, Function]:
-    """Sine and cosine as the kernels of `target` compute them; `test_trigonometry` judges these."""
-    functions = []
-    for op in ("sin", "cos"):
+def own_functions(target: Target) -> dict[Op, Function]:
+    """Elementary functions as the kernels of `target` compute them; `test_trigonometry` and
+    `test_elementary` judge these."""
+    functions: dict[Op, Function] = {}
+    for op in FUNCTIONS:
         graph = Graph()
-        result = graph.literal("sin" if op == "sin" else "cos", graph.input(0))
+        result = graph.literal(op, graph.input(0))
         program = finished(graph, [Port("x", (1,))], [Port(op, (1,))], [result])
         machine = Machine(program, target, Settings(2, fast=False))
 
         def function(x: Floats, machine: Machine = machine) -> Floats:
             return np.asarray(machine([np.concatenate([x, x, x[:1]])[:, None]])[0][: len(x), 0])
 
-        functions.append(function)
-    return functions[0], functions[1]
+        functions[op] = function
+    return functions
 
 
 def laid_out(array: Floats, layout: str) -> Floats:
@@ -83,8 +85,7 @@ def test_strict_code_is_the_interpreter_bit_for_bit(
 ) -> None:
     n = lanes + min(more, 2 * lanes + 1)
     inputs = drawn(program, rng, n, special=True)
-    sine, cosine = own_trigonometry(target)
-    wanted = interpret(program, inputs, sine=sine, cosine=cosine)
+    wanted = interpret(program, inputs, own_functions(target))
     got = Machine(program, target, Settings(lanes, fast=False, segment=segment))(inputs)
     for port, a, b in zip(program.outputs, got, wanted, strict=True):
         assert same_bits(a, b), port

@@ -63,7 +63,7 @@ CASES: dict[str, list[Shape]] = {
         *(("neg", shape) for shape in _both_ways(("mul", "c", "x"), ("div", "c", "x"))),
     ],
     "negated-term": [*_both_ways(("add", "x", ("neg", "y"))), ("sub", "x", ("neg", "y"))],
-    "odd-and-even": [(op, ("neg", "x")) for op in ("sin", "cos", "abs")],
+    "odd-and-even": [(op, ("neg", "x")) for op in ("sin", "cos", "tanh", "arctan", "abs")],
     "power-of-two": [("div", "x", sign * 2.0**k) for k in (-1000, -3, 1, 52, 1000) for sign in (1.0, -1.0)],
     "zero-factor": [
         *_both_ways(("mul", "x", 0.0), ("mul", "x", -0.0)),

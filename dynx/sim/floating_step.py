@@ -1,0 +1,35 @@
+"""A step of semi-implicit Euler with a floating base, for arrays of any scalar.
+
+The base moves as Bullet has it (btMultiBody): the step is taken by the centre of mass of the root and by its
+angular velocity, both along the axes of the world. Those axes do not turn, so a body that nothing touches
+keeps its linear momentum exactly.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dynx.spatial.branchless import quat_exp
+from dynx.spatial.scalar import Array
+from dynx.spatial.so3 import cross, quat_product, rotate_back, rotation_from_quat
+
+
+def floating_step(q: Array, v: Array, a: Array, h: float, center: Array) -> tuple[Array, Array]:
+    """q (nq,) and v (nv,) after a step of length `h` [s] with acceleration `a` (nv,).
+
+    `center` (3,) [m] is the centre of mass of the root, in the axes of the base frame.
+    """
+    R, w = rotation_from_quat(q[3:7]), v[3:6]
+    lever = cross(w, center)
+    # The classical acceleration of the centre of mass: v is in axes that turn with the base.
+    rising = a[:3] + cross(w, v[:3]) + cross(a[3:6], center) + cross(w, lever)
+    linear = R @ (v[:3] + lever + h * rising)
+    angular = R @ (w + h * a[3:6])
+    quat = quat_product(quat_exp(h * angular), q[3:7])
+    quat = quat / np.sqrt(quat.dot(quat))
+    R_next = rotation_from_quat(quat)
+    at = q[:3] + R @ center + h * linear
+    w_next = rotate_back(R_next, angular)
+    joints = v[6:] + h * a[6:]
+    v_next = np.concatenate([rotate_back(R_next, linear) - cross(w_next, center), w_next, joints])
+    return np.concatenate([at - R_next @ center, quat, q[7:] + h * joints]), v_next

@@ -1,0 +1,37 @@
+"""A batch of rollouts, held against rollouts one by one."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from dynx.control.base import Controller
+from dynx.model import Model
+from dynx.sim import BatchRollouts, Rollout, simulate, simulate_batch
+from tests.sim.bars import EXACT_ON_DYNX, apart
+
+
+def assert_same(many: BatchRollouts, row: int, one: Rollout) -> None:
+    """That row of a batch recorded at every step is this rollout, to rounding."""
+    assert apart(many.q_record[row], one.q[1:]) < EXACT_ON_DYNX
+    assert apart(many.v_record[row], one.v[1:]) < EXACT_ON_DYNX
+    assert apart(many.tau_record[row], one.tau) < EXACT_ON_DYNX
+    assert apart(many.q[row], one.q[-1]) < EXACT_ON_DYNX
+    error = one.error[1:]
+    assert apart(many.max_error[row], np.max(np.abs(error), axis=0)) < EXACT_ON_DYNX
+    assert apart(many.rms_error[row], np.sqrt(np.mean(error**2, axis=0))) < EXACT_ON_DYNX
+    assert apart(many.saturated[row], np.mean(one.saturated, axis=0)) < EXACT_ON_DYNX
+
+
+def batch_and_one(
+    model: Model, law: Controller[Any], reference: Any, **options: Any
+) -> tuple[BatchRollouts, Rollout]:
+    """The same simulation as a batch of 3 and alone, and assert that they agree."""
+    one = simulate(model, law, reference, plant="compiled", **options)
+    many = simulate_batch(model, law, reference, rollouts=3, record_every=1, **options)
+    assert many.done.all()
+    assert np.isnan(many.diverged).all()
+    for row in range(3):
+        assert_same(many, row, one)
+    return many, one
