@@ -34,8 +34,9 @@ from dynx.simd.threads import checked_threads
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint, Trajectory
 
-PART = 2048
-"""Rollouts in one part: the state of so many stays in the caches, and a call is long against its start."""
+PART = 1024
+"""Rollouts in one part: the state of so many stays in the caches, a call is long against its start, and
+some thousand rollouts are dealt to the threads in about equal shares."""
 
 Progress = Callable[[int, int], object]
 """Called with the rollouts done and those asked for."""

@@ -7,7 +7,7 @@ such as sines and cosines, is computed once.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,6 +20,7 @@ from dynx.control.base import Controller, Measured
 from dynx.errors import ArgumentError, TraceError, UnsupportedFeatureError, shown
 from dynx.model import Mechanism, Model
 from dynx.sim.batch_loads import BatchLoads
+from dynx.sim.content import content_of
 from dynx.sim.floating_step import floating_step
 from dynx.sim.traced_law import innermost, traced_law
 from dynx.simd.cache import cached_kernel, recipe_of
@@ -32,6 +33,11 @@ from dynx.trajectory.base import Setpoint
 STATE = ("q", "v", "worst", "squares", "memory", "cut")
 """What a step takes and gives back: the robot's state, the largest error and the sum of squared errors
 of each coordinate, what the law remembers, and in how many steps a motor's torque was cut."""
+
+REMEMBERED = 32
+"""Steps kept for the next batch in this process."""
+
+_made: dict[Hashable, Kernel] = {}
 
 
 @dataclass(frozen=True)
@@ -70,6 +76,20 @@ class StepOf:
 
         Raises UnsupportedFeatureError for a law that branches on what it measures.
         """
+        try:
+            # A plant is never changed, and is held on to here, so that it can be told by what it is.
+            own = content_of({name: value for name, value in vars(self).items() if name != "plant"})
+            key = own, self.plant, controlled, pushed
+        except TypeError:
+            return self._traced(controlled=controlled, pushed=pushed)
+        kernel = _made.get(key)
+        if kernel is None:
+            kernel = _made[key] = self._traced(controlled=controlled, pushed=pushed)
+            if len(_made) > REMEMBERED:
+                _made.pop(next(iter(_made)), None)
+        return kernel
+
+    def _traced(self, *, controlled: bool, pushed: bool) -> Kernel:
         mechanism = tidied(self.model.mechanism)
         law = traced_law(self.controller, {})
 
