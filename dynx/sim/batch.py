@@ -23,7 +23,8 @@ from dynx.sim.batch_loads import BatchLoads, refuse_ambiguous
 from dynx.sim.batch_part import KernelOf, Part, PartDone, pushing
 from dynx.sim.batch_rollouts import BatchRollouts
 from dynx.sim.batch_store import Store
-from dynx.sim.clock import WHOLE, Clock
+from dynx.sim.checked_law import check_law
+from dynx.sim.clock import Clock
 from dynx.sim.fused import StepOf
 from dynx.sim.loads import Push
 from dynx.sim.references import checked_reference
@@ -111,9 +112,6 @@ def simulate_batch(
     """
     if not isinstance(controller, Controller):
         raise ArgumentError(f"controller is of type {type(controller).__name__}; wanted a dynx.control law")
-    known = controller.model
-    if (known.joint_names, known.base) != (model.joint_names, model.base):
-        raise ArgumentError(f"the controller is one of {shown(known)}; wanted one of {shown(model)}")
     moved = plant_model(model, payload, mass_scale)
     if plant is not None and plant.model != moved:
         scaled = "" if moved is model else ", with its payload and scaled masses (`plant_model`)"
@@ -126,16 +124,12 @@ def simulate_batch(
     if span is None:
         raise ArgumentError("duration is not given, and the reference is no trajectory that has one")
     clock = Clock.of(dt, span, control_dt, delay)
+    check_law(model, controller, clock)
     if isinstance(record_every, bool) or not isinstance(record_every, int) or record_every < 0:
         raise ArgumentError(f"record_every is {shown(record_every)}; wanted a whole number, 0 for no record")
     limit = None
     if effort_limits is not False:
         limit = checked_limit(model, None if effort_limits is True else effort_limits)
-    made_for = controller.control_dt
-    if made_for is not None and abs(made_for - clock.control_dt) > WHOLE * clock.control_dt:
-        raise ArgumentError(
-            f"{controller.name} was made for control_dt = {made_for:.12g} s; it is {clock.control_dt:.12g} s"
-        )
     loads = BatchLoads.of(moved, damping, friction, friction_slip, armature, pushes)
     if plant is None and not loads.rotors.any():
         Solvability(moved).refuse_singular(False)

@@ -17,9 +17,10 @@ from dynx.backends.compiled_kernels import evaluated, tidied
 from dynx.backends.mass_factors import factors_of, solved
 from dynx.backends.parametric import ParametricDynamics
 from dynx.control.base import Controller, Measured
-from dynx.errors import ArgumentError, TraceError, UnsupportedFeatureError, shown
+from dynx.errors import ArgumentError, DynxError, TraceError, UnsupportedFeatureError, shown
 from dynx.model import Mechanism, Model
 from dynx.sim.batch_loads import BatchLoads
+from dynx.sim.checked_law import Unchanged, is_row
 from dynx.sim.content import content_of
 from dynx.sim.floating_step import floating_step
 from dynx.sim.traced_law import innermost, traced_law
@@ -65,9 +66,10 @@ class StepOf:
                 known = ", ".join(key for key in arrays if not key.startswith("_"))
                 raise ArgumentError(f"{law.name} has no gain {shown(name)}; it has {known or 'none'}")
         memory = self.controller.start()
-        if memory is not None and not isinstance(memory, np.ndarray):
+        if memory is not None and not is_row(memory):
+            what = f"array {memory.shape}" if isinstance(memory, np.ndarray) else type(memory).__name__
             raise UnsupportedFeatureError(
-                f"{self.controller.name} remembers a {type(memory).__name__}; in a batch it may be an array"
+                f"{self.controller.name} remembers a {what}; in a batch it may be an array (n,) of float64"
             )
 
     def kernel(self, *, controlled: bool, pushed: bool) -> Kernel:
@@ -112,6 +114,13 @@ class StepOf:
             raise UnsupportedFeatureError(
                 f"{self.controller.name} cannot be fused with the plant, since it asks for values: {error}"
             ) from error
+        except DynxError:
+            raise
+        except Exception as error:
+            raise UnsupportedFeatureError(
+                f"{self.controller.name} cannot be fused with the plant: run on symbols in the place of "
+                f"numbers it failed with {type(error).__name__}: {error}"
+            ) from error
         return cached_kernel(recipe_of(program), lambda: program)
 
     def sizes(self, *, controlled: bool, pushed: bool) -> dict[str, tuple[int]]:
@@ -148,7 +157,20 @@ class StepOf:
             q, v = integrate(q, off) if self.model.floating else q + off, v + given["noise_v"]
         setpoint = Setpoint(given["q_wanted"], given["v_wanted"], given["a_wanted"])
         own = traced_law(law, {name: given[f"gain_{name}"] for name in self.gains})
+        watch = Unchanged(own)
         tau, memory = own.torque(Measured(given["t"][0], q, v), setpoint, given.get("memory"))
+        if watch.changed:
+            raise UnsupportedFeatureError(
+                f"{watch.changed}, which a batch would do once for all: let it return what it remembers"
+            )
+        if memory is not None and "memory" not in given:
+            raise UnsupportedFeatureError(
+                f"{own.name} returns something to remember, but its start() gives None"
+            )
+        if np.shape(tau) != given["v"].shape:
+            raise UnsupportedFeatureError(
+                f"the torque of {own.name} has shape {np.shape(tau)}; wanted {given['v'].shape}"
+            )
         outcome = {} if memory is None else {"memory": memory}
         if self.limit is None:
             return {"tau": tau, **outcome}

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from dynx.control.base import Measured
 from dynx.control.engine_motors import EngineMotor
 from dynx.errors import TraceError
+from dynx.sim.checked_law import is_row
 from dynx.sim.glue import Ask, Glue, Questions, asking_law
 from dynx.sim.loop import RUNAWAY, Loop
 from dynx.sim.plants import DynxPlant
@@ -70,6 +71,8 @@ class GluedLoop:
         sizes = dict.fromkeys(("v", "held", "seen_v", *SETPOINT, *NOISE), nv) | {"t": 1}
         sizes |= dict.fromkeys(("q", "seen_q", "q_wanted"), nq)
         self._start = None if loop.controller is None else loop.controller.start()
+        if self._start is not None and not is_row(self._start):
+            raise TraceError("what the law remembers is no array (n,) of float64")
         self._memory = 0 if self._start is None else self._start.size
         if self._memory:
             sizes["memory"] = self._memory

@@ -7,6 +7,7 @@ only the loop can see: a torque that is none, and a state that runs away.
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from math import hypot, isfinite
 from typing import Any
@@ -15,7 +16,8 @@ import numpy as np
 
 from dynx.control.base import Controller, Measured
 from dynx.control.engine_motors import EngineMotor
-from dynx.errors import ControlError, DivergedError
+from dynx.errors import ArgumentError, ControlError, DivergedError, shown
+from dynx.sim.checked_law import Unchanged
 from dynx.sim.clock import Clock
 from dynx.sim.plants import Plant
 from dynx.sim.record import Record
@@ -60,6 +62,8 @@ class Loop:
         begin = record.steps
         if begin == self.clock.n_steps:
             return
+        if begin:
+            self._refuse_changing(record)
         memory = self.remembered(record)
         plant.reset(Q[begin].copy(), V[begin].copy())
         q, v = Q[begin].copy(), V[begin].copy()
@@ -86,9 +90,9 @@ class Loop:
                     raise self._control_failed(k, record, f"{type(error).__name__}: {error}") from error
                 if motors is None:
                     if type(tau) is not np.ndarray or tau.shape != shape or tau.dtype is not FLOAT64:
-                        raise self._control_failed(k, record, f"no float64 array {shape} but {tau!r:.80}")
+                        tau = self._as_torque(k, record, tau)
                     if not isfinite(sum(tau.tolist())):
-                        raise self._control_failed(k, record, f"a torque that is not finite: {tau!r:.120}")
+                        raise self._control_failed(k, record, f"its torque is not finite: {shown(tau)}")
                     if limit is not None:
                         wanted, tau = tau, clipped(tau, limit)
                         flags = tau != wanted
@@ -114,6 +118,38 @@ class Loop:
             if told is not None and k >= tell:
                 tell = k + TELLING
                 told(k + 1)
+
+    def _as_torque(self, k: int, record: Record, given: Any) -> Floats:
+        """What a law gave as a float64 array (nv,), or ControlError."""
+        wanted = (self.plant.model.nv,)
+        try:
+            array = np.asarray(given)
+        except ValueError:
+            array = np.empty(0, dtype=object)
+        if array.dtype.kind not in "iuf":
+            raise self._control_failed(
+                k,
+                record,
+                f"its torque is of type {type(given).__name__}, not numbers {wanted}: {shown(given)}",
+            )
+        if array.shape != wanted:
+            raise self._control_failed(k, record, f"its torque has shape {array.shape}; wanted {wanted}")
+        return np.array(array, dtype=np.float64)
+
+    def _refuse_changing(self, record: Record) -> None:
+        """Refuse to go on with a law that has hidden what it remembers in itself."""
+        controller = self.controller
+        if controller is None or isinstance(controller, EngineMotor):
+            return
+        watch = Unchanged(controller)
+        # What goes wrong here goes wrong in its step too.
+        with suppress(Exception):
+            measured = self.sensors(0, record.q, record.v)
+            controller.torque(measured, self._setpoint(0), controller.start())
+        if watch.changed:
+            raise ArgumentError(
+                f"{watch.changed}, so a rollout under it cannot be resumed: let it return what it remembers"
+            )
 
     def remembered(self, record: Record) -> Any:
         """The controller's memory at the step where the loop begins.
@@ -156,5 +192,5 @@ class Loop:
         t, state = k * self.clock.dt, (record.q[k].copy(), record.v[k].copy())
         name = "" if self.controller is None else self.controller.name
         return ControlError(
-            f"controller {name} gave in step {k}, at {t:.6g} s: {why}", time=t, step=k, state=state
+            f"controller {name} failed in step {k}, at {t:.6g} s: {why}", time=t, step=k, state=state
         )

@@ -17,7 +17,8 @@ from dynx.control.saturation import checked_limit
 from dynx.errors import ArgumentError, SimulationError, shown
 from dynx.model import Model
 from dynx.model.configuration import checked_array, checked_q
-from dynx.sim.clock import WHOLE, Clock
+from dynx.sim.checked_law import check_law, numbers_of
+from dynx.sim.clock import Clock
 from dynx.sim.glued_loop import glued
 from dynx.sim.loads import Loads, Push
 from dynx.sim.loop import Loop
@@ -102,7 +103,8 @@ def simulate(
     not the controller's; `noise` is on what the controller sees.
 
     **Resuming.** With `resume` the first `step` steps (by default all) are taken from that record, and
-    the rest computed, with all else given as then: the outcome is that of one run, to the last bit.
+    the rest computed, with all else given as then: the outcome is that of one run, to the last bit. That
+    takes a law that keeps nothing to itself: what it remembers is its memory.
 
     **Long runs.** `progress` is called now and then with the steps taken and those asked for. Ctrl-C
     raises RolloutInterrupted, which has what was computed in ``.rollout`` and can be resumed.
@@ -120,7 +122,8 @@ def simulate(
         raise ArgumentError("duration is not given, and the reference is no trajectory that has one")
     clock = Clock.of(dt, span, control_dt, delay)
     moved = plant_model(model, payload, mass_scale)
-    _refuse_foreign(model, clock, controller)
+    if controller is not None:
+        check_law(model, controller, clock)
     setpoint_of = checked_reference(model, reference, within_limits=check_reference)
     loads = Loads(moved, damping, friction, friction_slip, armature, pushes, dt)
     limit = _effort_limits(model, controller, effort_limits)
@@ -130,6 +133,7 @@ def simulate(
         "plant": plant,
         "integrator": integrator or ("engine" if plant == "pybullet" else "semi_implicit"),
         "controller": "none" if controller is None else controller.name,
+        "law": {} if controller is None else numbers_of(controller),
         "dt": clock.dt,
         "control_dt": clock.control_dt,
         "delay": clock.delay_steps * clock.dt,
@@ -146,6 +150,7 @@ def simulate(
     }
     if resume is not None:
         _take_over(record, resume, len(resume) if step is None else step, moved, settings)
+        _refuse_other_reference(resume, record.steps, setpoint_of, clock)
     elif step is not None:
         raise ArgumentError("step is that of a rollout to resume, which is not given")
     options = {"method": method, "rtol": rtol, "atol": atol}
@@ -195,22 +200,6 @@ def _tell(progress: Progress, wanted: int, taken: int) -> None:
     progress(taken, wanted)
 
 
-def _refuse_foreign(model: Model, clock: Clock, controller: Controller[Any] | None) -> None:
-    """Refuse a controller of another robot, or made for another control step."""
-    if controller is None:
-        return
-    known = controller.model
-    if (known.joint_names, known.base) != (model.joint_names, model.base):
-        raise ArgumentError(
-            f"the controller is one of {shown(known)}, whose joints are not those of {shown(model)}"
-        )
-    made_for = controller.control_dt
-    if made_for is not None and abs(made_for - clock.control_dt) > WHOLE * clock.control_dt:
-        raise ArgumentError(
-            f"{controller.name} was made for control_dt = {made_for:.12g} s; it is {clock.control_dt:.12g} s"
-        )
-
-
 def _effort_limits(
     model: Model, controller: Controller[Any] | None, effort_limits: bool | ArrayLike
 ) -> Floats | None:
@@ -253,6 +242,20 @@ def _take_over(record: Record, rollout: Rollout, step: int, model: Model, settin
     record.a[:step], record.tau[:step] = rollout.a[:step], rollout.tau[:step]
     record.saturated[:step] = rollout.saturated[:step]
     record.steps = step
+
+
+def _refuse_other_reference(
+    rollout: Rollout, step: int, setpoint_of: SetpointOf | None, clock: Clock
+) -> None:
+    then = rollout.reference
+    if setpoint_of is None or then is None:
+        same = setpoint_of is None and then is None
+    else:
+        now = setpoint_of(clock.times()[: step + 1])
+        pairs = zip(then, now, strict=True)
+        same = all(np.allclose(old[: step + 1], new, rtol=1e-12, atol=1e-12) for old, new in pairs)
+    if not same:
+        raise ArgumentError("the rollout to resume followed another reference")
 
 
 def _plant(

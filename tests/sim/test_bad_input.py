@@ -152,9 +152,12 @@ class Faulty(Controller[None]):
     [
         (np.full(6, np.nan), "not finite"),
         (np.array([0, 0, np.inf, 0, 0, 0.0]), "not finite"),
-        (np.zeros(5), r"no float64 array \(6,\)"),
-        ([0.0] * 6, "no float64 array"),
-        (np.zeros(6, dtype=np.float32), "no float64 array"),
+        (np.zeros(5), r"its torque has shape \(5,\); wanted \(6,\)"),
+        (0.0, r"its torque has shape \(\); wanted \(6,\)"),
+        (["1"] * 6, r"its torque is of type list, not numbers \(6,\)"),
+        ([[1.0], [1.0, 2.0]], "not numbers"),
+        (np.zeros(6, dtype=complex), "not numbers"),
+        (None, "of type NoneType, not numbers"),
         (RuntimeError("no idea"), "RuntimeError: no idea"),
     ],
 )
