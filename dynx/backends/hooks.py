@@ -4,7 +4,8 @@ A backend implements two hooks, the placements of all frames and inverse dynamic
 has a derivation here from those two. It overrides those its engine computes natively. Hooks work
 in tree coordinates (every moving joint, mimic joints included; see `dynx.model.mechanism`) and
 receive float64 arrays that were checked: one sample, unless `vectorized` is set, in which case any
-leading batch axes. Hooks return arrays the caller may keep and change.
+leading batch axes. Those arrays may be written over once the hook has returned; what it returns the caller
+may keep and change.
 """
 
 from __future__ import annotations

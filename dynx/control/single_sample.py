@@ -31,10 +31,10 @@ class SingleSample:
 
     def in_this_thread(self, question: str) -> Any:
         """The same call for the calling thread alone, shorter still where the engine has one."""
-        usual = getattr(self, question)
-        if self.backend.model.mechanism.coupling is not None:
+        usual, backend = getattr(self, question), self.backend
+        if backend.model.mechanism.coupling is not None or _has_own_way(backend, question):
             return usual
-        return self.backend._in_this_thread(question) or usual
+        return backend._in_this_thread(question) or usual
 
     def __reduce__(self) -> tuple[Any, ...]:
         return SingleSample, (self.backend,)
@@ -42,11 +42,16 @@ class SingleSample:
 
 def _shortest(backend: Backend, question: str) -> Any:
     """The engine's hook itself, unless tree coordinates differ or the class has a quick way of its own."""
-    public = getattr(backend, question)
-    own_way = getattr(type(backend), question) is not getattr(Backend, question)
-    if own_way or backend.model.mechanism.coupling is not None:
-        return public
+    if _has_own_way(backend, question) or backend.model.mechanism.coupling is not None:
+        return getattr(backend, question)
     hook = getattr(backend, f"_{question}")
     # Without what turns the engine's exceptions into ours: the loop does that for all of a step.
     bare = getattr(hook, "__wrapped__", None)
     return hook if bare is None else partial(bare, backend)
+
+
+def _has_own_way(backend: Backend, question: str) -> bool:
+    """Whether its class, or it alone, answers otherwise than by the hook of its engine."""
+    own = vars(backend)
+    replaced = question in own or f"_{question}" in own
+    return replaced or getattr(type(backend), question) is not getattr(Backend, question)

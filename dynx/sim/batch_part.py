@@ -31,7 +31,7 @@ class PartDone(NamedTuple):
     q_record: Floats  # (count, kept, nq)
     v_record: Floats  # (count, kept, nv)
     tau_record: Floats  # (count, kept, nv)
-    saturated: Floats  # (count, nv), the share of steps in which torque was cut
+    saturated: Floats  # (count, nv), the share of steps with the motor at its limit
 
 
 KernelOf = dict[tuple[bool, bool], Kernel]

@@ -38,7 +38,7 @@ class BatchRollouts:
     q_record: Floats  # (n, kept, nq)
     v_record: Floats  # (n, kept, nv)
     tau_record: Floats  # (n, kept, nv)
-    saturated: Floats  # (n, nv), the share of steps in which the effort limits cut the torque
+    saturated: Floats  # (n, nv), the share of steps with the motor at its limit
 
     def __len__(self) -> int:
         return len(self.q)

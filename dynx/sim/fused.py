@@ -87,8 +87,8 @@ class StepOf:
         kernel = _made.get(key)
         if kernel is None:
             kernel = _made[key] = self._traced(controlled=controlled, pushed=pushed)
-            if len(_made) > REMEMBERED:
-                _made.pop(next(iter(_made)), None)
+            for old in list(_made)[:-REMEMBERED]:
+                _made.pop(old, None)
         return kernel
 
     def _traced(self, *, controlled: bool, pushed: bool) -> Kernel:
@@ -174,12 +174,12 @@ class StepOf:
         outcome = {} if memory is None else {"memory": memory}
         if self.limit is None:
             return {"tau": tau, **outcome}
-        wanted, tau = tau, clipped(tau, self.limit)
+        tau = clipped(tau, self.limit)
         bounded = np.isfinite(self.limit)
         cut = np.array(given["cut"])
         # Symbols also where a law gives plain numbers.
-        off = (wanted - tau + 0.0 * cut)[bounded]
-        cut[bounded] = cut[bounded] + given["held_for"] * sign(abs(off))
+        left = self.limit[bounded] - abs(tau[bounded] + 0.0 * cut[bounded])
+        cut[bounded] = cut[bounded] + given["held_for"] * (1.0 - sign(left))
         return {"tau": tau, "cut": cut, **outcome}
 
     def _acceleration(

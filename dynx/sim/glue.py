@@ -67,6 +67,8 @@ class Glue:
     """Writes the results of the step, in the order in which the step gives them."""
     sizes: Mapping[str, int]
     """Of what stages write for questions, and of answers."""
+    numbers: Mapping[str, Floats]
+    """Inputs that stay what they are."""
 
 
 class _Asked(NamedTuple):
@@ -87,6 +89,7 @@ class Questions:
         self._slot = 0
         self._asked: list[_Asked] = []
         self._written: dict[Nodes, str] = {}
+        self._numbers: dict[str, Floats] = {}
         self.given = {name: self._symbols(name, size) for name, size in inputs.items()}
 
     def ask(self, question: Ask, shape: Shape, *arguments: Array, guarded: bool = False) -> Array:
@@ -107,6 +110,12 @@ class Questions:
         self._asked.append(_Asked(question, fresh, tuple(named), (answer, shape), guarded))
         return self._symbols(answer, int(np.prod(shape))).reshape(shape)
 
+    def number(self, value: Floats) -> Array:
+        """Symbols for numbers (n,) of a law, so that laws with other gains have the same stages."""
+        name = f"number {len(self._numbers)}"
+        self._numbers[name] = value
+        return self._symbols(name, value.size)
+
     def refuse_rounded_otherwise(self) -> None:
         """Raise TraceError if what was traced so far is not rounded in a kernel as in NumPy."""
         for node in self._graph.nodes:
@@ -125,7 +134,7 @@ class Questions:
             cuts.append(Cut(kernel, question, arguments, answer))
             sizes[answer[0]] = int(np.prod(answer[1]))
         last = _kernel(self._program({name: self._indices(array) for name, array in results.items()}))
-        return Glue(tuple(cuts), last, sizes)
+        return Glue(tuple(cuts), last, sizes, self._numbers)
 
     def _symbols(self, name: str, size: int) -> Array:
         symbols = np.empty(size, dtype=object)
@@ -167,16 +176,30 @@ class AskedDynamics:
         raise TraceError(f"{name} is not asked for in a stage")
 
 
-def asking_law(controller: Controller[Any], questions: Questions) -> Controller[Any]:
-    """The same law, with `questions` in the place of its backend.
+def refuse_foreign_law(controller: Controller[Any]) -> None:
+    """Raise TraceError for a law that is not one of `dynx.control`, or holds such a one.
 
-    Raises TraceError for a law that is not one of `dynx.control`: what somebody else's does besides
-    answering, such as counting its calls, would be done once and never again.
+    What somebody else's does besides answering, such as counting its calls, would be done once and
+    never again.
     """
-    if not type(controller).__module__.startswith("dynx.control."):
+    kind, own = type(controller), vars(controller)
+    methods = (kind, kind.torque, kind.start)
+    if {"torque", "start"} & own.keys() or not all(
+        str(method.__module__).startswith("dynx.control.") for method in methods
+    ):
         raise TraceError(f"{controller.name} is not a law of dynx")
+    if "inner" in own:
+        refuse_foreign_law(own["inner"])
+
+
+def asking_law(controller: Controller[Any], questions: Questions) -> Controller[Any]:
+    """The same law with `questions` in the place of its backend, and symbols for its gains."""
     twin = copy.copy(controller)
     own = vars(twin)
+    for name, value in own.items():
+        # Whether there is a limit is asked where it is applied.
+        if type(value) is np.ndarray and value.dtype == np.float64 and value.ndim == 1 and name != "limit":
+            own[name] = questions.number(value)
     if "inner" in own:
         own["inner"] = asking_law(own["inner"], questions)
     if isinstance(own.get("_dynamics"), SingleSample):
@@ -210,6 +233,6 @@ def _kernel(program: Program) -> Kernel:
     if kernel is None:
         strict = Settings(host().lanes, fast=False)
         kernel = _made[recipe] = cached_kernel(recipe, lambda: program, settings=strict)
-        if len(_made) > REMEMBERED:
-            _made.pop(next(iter(_made)), None)
+        for old in list(_made)[:-REMEMBERED]:
+            _made.pop(old, None)
     return kernel

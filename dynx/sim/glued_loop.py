@@ -8,6 +8,7 @@ it.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from dynx.control.base import Measured
 from dynx.control.engine_motors import EngineMotor
 from dynx.errors import TraceError
 from dynx.sim.checked_law import is_row
-from dynx.sim.glue import Ask, Glue, Questions, asking_law
+from dynx.sim.glue import Ask, Glue, Questions, asking_law, refuse_foreign_law
 from dynx.sim.loop import RUNAWAY, Loop
 from dynx.sim.plants import DynxPlant
 from dynx.sim.record import Record
@@ -30,7 +31,10 @@ WORTH = 256
 """Steps from which on tracing pays."""
 
 AT_ONCE = 4096
-"""Steps whose calls are made ready together."""
+"""Most steps whose calls are made ready together."""
+
+TELLING = 0.1
+"""Time between two tellings of how far the loop is [s]."""
 
 MOST_SUBSTEPS = 16
 """Sub-steps that are traced one after another."""
@@ -46,10 +50,12 @@ NOISE = ("noise_q", "noise_v")
 
 def glued(loop: Loop, record: Record) -> GluedLoop | None:
     """The loop in stages, if it can be had and there are so many steps left that it pays."""
-    plant = loop.plant
-    if len(record) - record.steps < WORTH or isinstance(loop.controller, EngineMotor):
+    plant, left = loop.plant, len(record) - record.steps
+    if left < WORTH or isinstance(loop.controller, EngineMotor):
         return None
     if not isinstance(plant, DynxPlant) or not plant.is_array_code or plant.substeps > MOST_SUBSTEPS:
+        return None
+    if left < WORTH * plant.evaluations:
         return None
     if loop.stops is not None or not plant.model.nv:
         return None
@@ -57,7 +63,8 @@ def glued(loop: Loop, record: Record) -> GluedLoop | None:
         return None
     try:
         return GluedLoop(loop, plant)
-    except TraceError:
+    except Exception:
+        # What is wrong with a law, or not known of it, the plain loop finds out and says.
         return None
 
 
@@ -65,11 +72,15 @@ class GluedLoop:
     """A step in stages, once with the law asked and once with its torque held from before."""
 
     def __init__(self, loop: Loop, plant: DynxPlant) -> None:
-        """Raises TraceError for a law that cannot be traced."""
+        """Raises TraceError, and whatever a law raises, for a law that cannot be traced."""
         self._loop, self._plant = loop, plant
         nq, nv = plant.model.nq, plant.model.nv
         sizes = dict.fromkeys(("v", "held", "seen_v", *SETPOINT, *NOISE), nv) | {"t": 1}
         sizes |= dict.fromkeys(("q", "seen_q", "q_wanted"), nq)
+        if loop.controller is not None:
+            refuse_foreign_law(loop.controller)
+        if any(array.dtype != np.float64 for array in loop.setpoints):
+            raise TraceError("the reference is not in float64")
         self._start = None if loop.controller is None else loop.controller.start()
         if self._start is not None and not is_row(self._start):
             raise TraceError("what the law remembers is no array (n,) of float64")
@@ -84,17 +95,21 @@ class GluedLoop:
         begin, n = record.steps, len(record)
         self._plant.reset(record.q[begin], record.v[begin])
         arrays = self._arrays(record)
-        try:
-            while record.steps < n and self._chunk(record, arrays):
-                if self._loop.told is not None:
-                    self._loop.told(record.steps)
-        finally:
-            self._mark_saturated(record, arrays["wanted"], begin)
+        at_once = min(WORTH, AT_ONCE)
+        while record.steps < n:
+            first, began = record.steps, perf_counter()
+            if not self._chunk(record, arrays, at_once):
+                return
+            if self._loop.told is not None:
+                self._loop.told(record.steps)
+            each = (perf_counter() - began) / (record.steps - first)
+            at_once = min(max(int(TELLING / each), 1), AT_ONCE)
 
     def _step(self, questions: Questions, *, asked: bool) -> Glue:
         """One step of the plant, and of the law if it is `asked`."""
         loop, given = self._loop, questions.given
         results: dict[str, Array] = {}
+        unsound: Any = 0.0
         tau, memory = given["held"], given.get("memory", self._start)
         if loop.controller is None:
             tau = np.zeros(len(tau), dtype=object)
@@ -106,8 +121,11 @@ class GluedLoop:
             law = asking_law(loop.controller, questions)
             tau, memory = law.torque(measured, Setpoint(*(given[name] for name in SETPOINT)), memory)
             questions.refuse_rounded_otherwise()
+            if tau.shape != given["v"].shape:
+                raise TraceError(f"the torque has shape {tau.shape}")
+            # The sum that the plain loop looks at: a torque beyond all numbers is none, though it is cut.
+            unsound = 0.0 * sum(tau.tolist(), 0.0)
             if loop.limit is not None:
-                results["wanted"] = tau
                 tau = clipped(tau, loop.limit)
 
         forward = self._plant.dynamics.in_this_thread("forward_dynamics")
@@ -119,7 +137,7 @@ class GluedLoop:
         results |= {"tau": tau, "a": a, "next_q": q, "next_v": v}
         if self._memory and memory is not None:
             results["next_memory"] = memory
-        results["defect"] = np.array([v @ v], dtype=object)
+        results["defect"] = np.array([v @ v + unsound], dtype=object)
         return questions.glue(results)
 
     def _arrays(self, record: Record) -> dict[str, Floats]:
@@ -127,7 +145,7 @@ class GluedLoop:
         loop, n = self._loop, len(record)
         q, v, tau = record.q, record.v, record.tau
         arrays = {"q": q, "v": v, "seen_q": q, "seen_v": v, "next_q": q, "next_v": v}
-        arrays |= {"held": tau, "tau": tau, "wanted": np.empty_like(tau), "a": record.a}
+        arrays |= {"held": tau, "tau": tau, "a": record.a}
         arrays["t"] = loop.clock.times()[:, None]
         nothing = [np.broadcast_to(np.zeros(x.shape[1]), (loop.clock.n_controls, x.shape[1])) for x in (q, v)]
         silence = nothing[1]
@@ -154,10 +172,10 @@ class GluedLoop:
             return steps // clock.steps_per_control
         return steps
 
-    def _chunk(self, record: Record, arrays: Mapping[str, Floats]) -> bool:
+    def _chunk(self, record: Record, arrays: Mapping[str, Floats], at_once: int) -> bool:
         """Some steps, counted in the record as they are taken; False if something is wrong."""
         first, per = record.steps, self._loop.clock.steps_per_control
-        steps = np.arange(first, min(len(record), first + AT_ONCE))
+        steps = np.arange(first, min(len(record), first + at_once))
         walked = {name: Walked(array, self._row(name, steps)) for name, array in arrays.items()}
         last = first + len(steps)
         asked = _ready(self._asked, walked, record)
@@ -170,24 +188,14 @@ class GluedLoop:
                 return False
         return True
 
-    def _mark_saturated(self, record: Record, wanted: Floats, begin: int) -> None:
-        """Where the torque that acted is not what the law wanted when it was asked last."""
-        if self._loop.limit is None:
-            return
-        steps = np.arange(begin, record.steps)
-        asked = steps // self._loop.clock.steps_per_control * self._loop.clock.steps_per_control
-        cut = record.tau[asked] != wanted[asked]
-        # Torque commanded before the beginning was marked then.
-        earlier = record.saturated[max(begin - 1, 0)]
-        record.saturated[steps] = np.where((asked < begin)[:, None], earlier, cut)
-
 
 def _ready(glue: Glue, walked: Mapping[str, Walked], record: Record) -> Take:
     """The next steps of the record, those of `walked`, as calls."""
     first = record.steps
     still = np.zeros(len(walked["q"].rows), dtype=np.int64)
     places = {name: np.zeros((1, size)) for name, size in (*glue.sizes.items(), ("defect", 1))}
-    every = {**walked, **{name: Walked(place, still) for name, place in places.items()}}
+    numbers = {name: value[None] for name, value in glue.numbers.items()}
+    every = {**walked, **{name: Walked(place, still) for name, place in {**places, **numbers}.items()}}
 
     def walked_by(kernel: Kernel) -> Walk:
         inputs, outputs = ([every[port.name] for port in side] for side in (kernel.inputs, kernel.outputs))

@@ -58,7 +58,7 @@ class Loop:
         """
         plant, controller = self.plant, self.controller
         per_control, dt, limit = self.clock.steps_per_control, self.clock.dt, self.limit
-        Q, V, A, applied, saturated = record.q, record.v, record.a, record.tau, record.saturated
+        Q, V, A, applied = record.q, record.v, record.a, record.tau
         begin = record.steps
         if begin == self.clock.n_steps:
             return
@@ -67,7 +67,7 @@ class Loop:
         memory = self.remembered(record)
         plant.reset(Q[begin].copy(), V[begin].copy())
         q, v = Q[begin].copy(), V[begin].copy()
-        tau, flags, command = self._held(record)
+        tau, command = self._held(record)
         sensors = None if self.sensors.plain else self.sensors
         motors = controller if isinstance(controller, EngineMotor) else None
         setpoints = list(map(Setpoint, *self.setpoints))
@@ -94,8 +94,7 @@ class Loop:
                     if not isfinite(sum(tau.tolist())):
                         raise self._control_failed(k, record, f"its torque is not finite: {shown(tau)}")
                     if limit is not None:
-                        wanted, tau = tau, clipped(tau, limit)
-                        flags = tau != wanted
+                        tau = clipped(tau, limit)
             try:
                 if command is None:
                     q, v, a = step(t, tau)
@@ -112,8 +111,6 @@ class Loop:
             if not hypot(*v.tolist()) < RUNAWAY:
                 raise self._diverged(k, record, "the velocity is no number or beyond all bounds")
             applied[k], A[k], Q[k + 1], V[k + 1] = tau, a, q, v
-            if limit is not None:
-                saturated[k] = flags
             record.steps = k + 1
             if told is not None and k >= tell:
                 tell = k + TELLING
@@ -170,17 +167,17 @@ class Loop:
     def _setpoint(self, number: int) -> Setpoint:
         return Setpoint(*(array[number] for array in self.setpoints))
 
-    def _held(self, record: Record) -> tuple[Floats, Any, Any]:
-        """Torque, flags and command that the last control step before the beginning left."""
+    def _held(self, record: Record) -> tuple[Floats, Any]:
+        """Torque and command that the last control step before the beginning left."""
         begin = record.steps
         nothing = np.zeros(self.plant.model.nv)
         if begin % self.clock.steps_per_control == 0:
-            return nothing, False, None
+            return nothing, None
         if isinstance(self.controller, EngineMotor):
             number = begin // self.clock.steps_per_control
             measured = self.sensors(number * self.clock.steps_per_control, record.q, record.v)
-            return nothing, False, self.controller.command(measured, self._setpoint(number))
-        return record.tau[begin - 1].copy(), record.saturated[begin - 1].copy(), None
+            return nothing, self.controller.command(measured, self._setpoint(number))
+        return record.tau[begin - 1].copy(), None
 
     def _diverged(self, k: int, record: Record, why: str) -> DivergedError:
         t, state = k * self.clock.dt, (record.q[k].copy(), record.v[k].copy())

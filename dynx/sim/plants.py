@@ -125,6 +125,11 @@ class DynxPlant(Plant):
         schemes = SemiImplicitEuler if self.model.floating else SemiImplicitEuler | RungeKutta4
         return self._plain and isinstance(self._scheme, schemes)
 
+    @property
+    def evaluations(self) -> int:
+        """How often a step asks for the acceleration, where it `is_array_code`."""
+        return self.substeps * (4 if isinstance(self._scheme, RungeKutta4) else 1)
+
     def advanced(self, accelerate: Accelerate, q: Array, v: Array, tau: Array) -> State:
         """One step from q, v, with `accelerate(q, v, tau)` in the place of the engine."""
         q, v, first = self._scheme(accelerate, q, v, tau)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -18,7 +17,6 @@ class Record:
     v: Floats
     a: Floats
     tau: Floats
-    saturated: np.ndarray[Any, np.dtype[np.bool_]]
     steps: int = 0
 
     @classmethod
@@ -30,7 +28,6 @@ class Record:
             np.empty((n + 1, nv)),
             np.empty((n, nv)),
             np.empty((n, nv)),
-            np.zeros((n, nv), dtype=bool),
         )
         record.q[0], record.v[0] = q, v
         return record

@@ -42,7 +42,7 @@ class Rollout:
     """n steps of a robot in motion: states at n + 1 times, and what acted between them.
 
     Row k of `a`, `tau` and `saturated` belongs to the step from ``t[k]`` to ``t[k + 1]``: the torque that
-    acted on the plant, the acceleration as the step began, and where the torque was cut to the limits.
+    acted on the plant, the acceleration as the step began, and where a motor was at its limit.
     """
 
     model: Model

@@ -40,6 +40,8 @@ class Column(NamedTuple):
     v: slice
     units: tuple[str, str]
     """Of positions and of efforts."""
+    of_base: bool = False
+    """Whether positions are in the world and all else in the axes of the base."""
 
 
 def plot(rollout: Rollout, path: str | os.PathLike[str] | None) -> Any:
@@ -66,7 +68,7 @@ def plot(rollout: Rollout, path: str | os.PathLike[str] | None) -> Any:
 def _columns(model: Model) -> list[Column]:
     """The position of a floating base, and the joints in equal shares."""
     base_q, base_v = (7, 6) if model.floating else (0, 0)
-    base = Column(("base x", "base y", "base z"), slice(0, 3), slice(0, 3), ("m", "N"))
+    base = Column(("base x", "base y", "base z"), slice(0, 3), slice(0, 3), ("m", "N"), of_base=True)
     columns = [base] if model.floating else []
     joints = model.coordinate_joints
     shares = -(-len(joints) // PER_COLUMN) or (0 if columns else 1)
@@ -112,6 +114,9 @@ def _draw(rollout: Rollout, column: Column, axes: Any) -> None:
     speed = "; ".join(f"{unit}/s" for unit in length.split("; "))
     middle.set_ylabel(f"velocity [{speed}]" if rollout.reference is None else f"error q* - q [{length}]")
     efforts.set_ylabel(f"torque [{force}]" if "N m" in force else f"force [{force}]")
+    if column.of_base:
+        for axis, axes_of in ((positions, "world"), (middle, "base"), (efforts, "base")):
+            axis.set_ylabel(f"{axis.get_ylabel()} ({axes_of} axes)")
     efforts.set_xlabel("time [s]")
     for axis in axes:
         axis.grid(visible=True, color="0.9")

@@ -159,15 +159,16 @@ def simulate(
 
     def so_far() -> Rollout:
         n = record.steps
-        times = clock.times()[: n + 1]
+        times, tau = clock.times()[: n + 1], record.tau[:n]
+        at_limit = np.zeros(tau.shape, dtype=bool) if limit is None else np.abs(tau) >= limit
         return Rollout(
             moved,
             times,
             record.q[: n + 1],
             record.v[: n + 1],
             record.a[:n],
-            record.tau[:n],
-            record.saturated[:n],
+            tau,
+            at_limit,
             None if setpoint_of is None else setpoint_of(times),
             loads.rotors,
             settings,
@@ -238,9 +239,10 @@ def _take_over(record: Record, rollout: Rollout, step: int, model: Model, settin
         then = rollout.settings.get(name)
         if then != now:
             raise ArgumentError(f"the rollout to resume had {name} {shown(then)}; now it is {shown(now)}")
+    if not (np.array_equal(record.q[0], rollout.q[0]) and np.array_equal(record.v[0], rollout.v[0])):
+        raise ArgumentError("the rollout to resume started somewhere else: its q0 and v0 are others")
     record.q[: step + 1], record.v[: step + 1] = rollout.q[: step + 1], rollout.v[: step + 1]
     record.a[:step], record.tau[:step] = rollout.a[:step], rollout.tau[:step]
-    record.saturated[:step] = rollout.saturated[:step]
     record.steps = step
 
 

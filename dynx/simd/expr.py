@@ -208,6 +208,10 @@ class Symbol:
         """The larger one; `other` if either is NaN."""
         return self._with("max", other)
 
+    def bounded(self, most: Any) -> Symbol:
+        """This cut to -`most` and `most`; NaN stays NaN."""
+        return self._from("max", -most)._from("min", most)
+
     def _alone(self, op: Op) -> Symbol:
         return Symbol(self.graph, self.graph.apply(op, self.index))
 

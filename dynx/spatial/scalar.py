@@ -62,8 +62,8 @@ def clipped(x: Array, limit: Array) -> Array:
     def one(element: Any, most: Any) -> Any:
         if np.isinf(most):
             return element
-        if hasattr(element, "maximum"):
-            return element.maximum(-most).minimum(most)
+        if hasattr(element, "bounded"):
+            return element.bounded(most)
         return min(max(element, -most), most)
 
     return np.asarray(np.frompyfunc(one, 2, 1)(x, limit), dtype=object)

@@ -93,8 +93,8 @@ BATCH_FAULTS = (
     Fault(
         "batch_counts_a_cut_torque_once_however_long_it_is_held",
         "dynx.sim.fused",
-        right='given["held_for"] * sign(abs(off))',
-        wrong="sign(abs(off))",
+        right='given["held_for"] * (1.0 - sign(left))',
+        wrong="(1.0 - sign(left))",
         caught_by=AN_OPTION,
     ),
     Fault(

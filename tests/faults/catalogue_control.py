@@ -100,8 +100,8 @@ CONTROL_FAULTS = (
     Fault(
         "glue_traces_a_law_of_somebody_s_own",
         "dynx.sim.glue",
-        right='if not type(controller).__module__.startswith("dynx.control."):',
-        wrong="if controller is None:",
+        right='str(method.__module__).startswith("dynx.control.") for method in methods',
+        wrong="True for method in methods",
         caught_by=f"{GLUED}::test_a_law_of_one_s_own_is_asked_in_every_step",
     ),
     Fault(
@@ -112,11 +112,18 @@ CONTROL_FAULTS = (
         caught_by=f"{GLUED}::test_no_plant_is_given_what_is_no_number",
     ),
     Fault(
-        "glue_marks_motors_cut_before_it_began",
+        "glue_cuts_a_torque_that_is_beyond_all_numbers",
         "dynx.sim.glued_loop",
-        right="np.where((asked < begin)[:, None], earlier, cut)",
-        wrong="cut",
-        caught_by=f"{GLUED}::test_random_robots_resumed_at_any_step",
+        right="np.array([v @ v + unsound], dtype=object)",
+        wrong="np.array([v @ v], dtype=object)",
+        caught_by=f"{GLUED}::test_a_torque_beyond_all_numbers_is_not_cut_to_the_limits",
+    ),
+    Fault(
+        "limits_make_a_number_of_what_is_none",
+        "dynx.simd.expr",
+        right='return self._from("max", -most)._from("min", most)',
+        wrong='return self._with("max", -most)._with("min", most)',
+        caught_by="tests/simd/test_trace.py::test_cutting_keeps_what_is_no_number",
     ),
     Fault(
         "glue_loses_steps_taken_before_ctrl_c",

@@ -31,9 +31,10 @@ from dynx.errors import ControlError, DivergedError
 from dynx.model import Model
 from dynx.model.loading import load
 from dynx.sim import Noise, Push, Rollout, RolloutInterrupted, glued_loop, simulate, simulation
+from dynx.sim import glue as stages
 from dynx.spatial.scalar import Floats
 from dynx.testing.strategies import models
-from dynx.trajectory.base import Setpoint
+from dynx.trajectory.base import Setpoint, Trajectory
 from tests.oracles.closed_form import MODELS
 from tests.sim.bars import tutorial_motion, tutorial_robot
 from tests.sim.test_resume import the_same
@@ -115,7 +116,7 @@ def law_of(name: str, model: Model, options: dict[str, Any]) -> Controller[Any]:
 def test_the_record_is_that_of_the_plain_loop(law: str, option: str) -> None:
     options = OPTIONS[option]
     found = both(ARM, law_of(law, ARM, options), tutorial_motion(), duration=STEPS * 1e-3, **options)
-    if "effort_limits" in options and law != "saturated":
+    if "effort_limits" in options:
         assert found.saturated.any()
         assert not found.saturated.all()
 
@@ -222,6 +223,90 @@ def test_errors_are_those_of_the_plain_loop(kd: float) -> None:
     assert len(found) < 1000
     with pytest.raises(DivergedError if kd > -1e300 else ControlError):
         simulate(ARM, law, np.zeros(6), q0=np.zeros(6), v0=np.full(6, speed), duration=1.0)
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        PD(ARM, kp=1e308, kd=1e308),
+        Saturated(PD(ARM, kp=1e308, kd=1e308), limit=20.0),
+        PID(ARM, kp=1e308, ki=0.0, kd=0.0, control_dt=1e-3, limit=20.0),
+        PD(ARM, kp=5e307, kd=0.0),
+    ],
+    ids=["pd", "saturated", "pid", "sum"],
+)
+@pytest.mark.parametrize("limits", [False, 15.0])
+def test_a_torque_beyond_all_numbers_is_not_cut_to_the_limits(law: Controller[Any], limits: Any) -> None:
+    both(ARM, law, np.zeros(6), q0=np.full(6, 2.0), duration=0.02, effort_limits=limits)
+
+
+def test_a_law_whose_method_was_replaced_is_asked_each_time() -> None:
+    law = PD(ARM, kp=10, kd=1)
+    torque, asked = law.torque, [0]
+
+    def counted(*given: Any) -> Any:
+        asked[0] += 1
+        return torque(*given)
+
+    vars(law)["torque"] = counted
+    both(ARM, law, np.zeros(6), duration=STEPS * 1e-3, glued=False)
+    assert asked == [2 * STEPS]
+
+
+@pytest.mark.parametrize("question", ["inverse_dynamics", "_inverse_dynamics"])
+@pytest.mark.parametrize("where", ["class", "instance"])
+def test_an_engine_with_answers_of_its_own_is_believed(question: str, where: str) -> None:
+    class Own(PinocchioBackend):
+        """An engine that is off by 1 N m."""
+
+    engine = Own(ARM)
+    answer = getattr(PinocchioBackend(ARM), question)
+
+    def off(*given: Floats) -> Floats:
+        return np.asarray(answer(*given[-3:])) + 1.0
+
+    if where == "class":
+        setattr(Own, question, off)
+    else:
+        setattr(engine, question, off)
+    law = ComputedTorque(ARM, kp=400, kd=40, backend=engine)
+    found = both(ARM, law, np.zeros(6), duration=0.02)
+    right = simulate(ARM, ComputedTorque(ARM, kp=400, kd=40), np.zeros(6), duration=0.02)
+    np.testing.assert_allclose(found.tau[0], right.tau[0] + 1.0)
+
+
+def test_gains_are_inputs_of_one_kernel(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(stages, "_made", {})
+    for kp in (100.0, 200.0, 300.0):
+        both(ARM, ComputedTorque(ARM, kp=kp, kd=20.0), np.zeros(6), q0=np.full(6, 0.1), duration=0.02)
+    assert len(stages._made) == 3
+
+
+class Narrow(Trajectory):
+    """A motion in single precision."""
+
+    def inside(self, t: Floats) -> Setpoint:
+        rows: Any = (x.astype(np.float32) for x in tutorial_motion().inside(t))
+        return Setpoint(*rows)
+
+
+def test_a_reference_in_other_numbers() -> None:
+    wide = tutorial_motion()
+    narrow = Narrow(wide.duration, wide.start, wide.end)
+    assert narrow(np.full(3, 0.1)).q.dtype == np.float32
+    both(ARM, PD(ARM, kp=100, kd=10), narrow, duration=0.02, glued=False, check_reference=False)
+
+
+def test_no_controller_is_at_no_limit() -> None:
+    found = both(ARM, None, duration=0.05, q0=np.full(6, 0.3), effort_limits=5.0)
+    assert not found.saturated.any()
+
+
+def test_progress_is_told_in_time_where_steps_are_slow(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(glued_loop, "TELLING", 1e-6)
+    told: list[int] = []
+    simulate(ARM, q0=np.zeros(6), duration=0.5, progress=lambda taken, wanted: told.append(taken))
+    assert len(told) > 200
 
 
 class Interrupting(PinocchioBackend):

@@ -11,12 +11,15 @@ import numpy as np
 import pytest
 
 from dynx.errors import CompileError, TraceError
+from dynx.simd.emit import Settings
 from dynx.simd.expr import Symbol
 from dynx.simd.interp import interpret
+from dynx.simd.kernel import Kernel
 from dynx.simd.program import Port, Program
 from dynx.simd.simplify import FAST, STRICT
+from dynx.simd.target import host
 from dynx.simd.trace import trace
-from dynx.spatial.scalar import Array, cos, sin, sqrt
+from dynx.spatial.scalar import Array, clipped, cos, sin, sqrt
 
 
 def test_a_function_of_arrays() -> None:
@@ -173,3 +176,15 @@ def test_tracing_ends_with_a_check_of_what_it_made(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr("dynx.simd.trace.finished", lambda *_: broken)
     with pytest.raises(CompileError, match="a result is node 5 of 0"):
         trace(lambda x: x, {"x": (1,)})
+
+
+@pytest.mark.parametrize("fast", [True, False])
+def test_cutting_keeps_what_is_no_number(fast: bool) -> None:
+    limit = np.array([1.0, 1.0, 1.0, np.inf, 2.0])
+    program = trace(lambda x: clipped(x, limit), {"x": (5,)}, simplify=FAST if fast else STRICT)
+    x = np.array([[np.nan, np.inf, -3.0, np.nan, 0.5]])
+    found = np.empty((1, 5))
+    kernel = Kernel(program, settings=Settings(host().lanes, fast=fast))
+    kernel([x], [found])
+    np.testing.assert_array_equal(found, clipped(x, limit))
+    np.testing.assert_array_equal(found, [[np.nan, 1.0, -1.0, np.nan, 0.5]])
