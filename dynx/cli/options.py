@@ -44,12 +44,15 @@ def name_list(text: str) -> tuple[str, ...]:
 
 
 def one_of(names: Iterable[str]) -> Callable[[str], str]:
-    """A type for one of some names; of a wrong one the message says which is nearest."""
+    """A type for one of some names; of a wrong one the message says which is nearest, or all of them."""
     known = tuple(names)
 
     def name(word: str) -> str:
         if word not in known:
-            raise click.BadParameter(f"there is no {shown(word)}{nearest(word, known)}")
+            close = nearest(word, known)
+            # Where none is near, a set that is closed is said whole, however long it is.
+            clause = close if close.endswith("?") else f"; known: {', '.join(known)}"
+            raise click.BadParameter(f"there is no {shown(word)}{clause}")
         return word
 
     return name

@@ -7,10 +7,12 @@ from typing import Any
 import numpy as np
 
 from dynx._version import __version__
+from dynx.cli.sim_errors import base_error, frame_error, joint_error
+from dynx.cli.sim_overshoot import overshoot
 from dynx.cli.sim_request import Prepared
 from dynx.errors import DivergedError, SimulationError
 from dynx.model import Model
-from dynx.sim import Rollout
+from dynx.sim import Noise, Push, Rollout, RolloutInterrupted
 from dynx.spatial.scalar import Floats
 
 SCHEMA = 1
@@ -39,22 +41,25 @@ def document(
         "nq": model.nq,
         "nv": model.nv,
         **prepared.asked,
-        "settings": rollout.settings,
+        "settings": _settings(prepared, rollout),
         "payload": [
             {"frame": each.frame, "mass": each.mass, "center": list(each.center)}
             for each in prepared.arguments["payload"]
         ],
         "mass_scale": prepared.arguments["mass_scale"],
         "total_mass": rollout.model.total_mass,
-        "passive": _is_passive(prepared),
+        "passive": _is_passive(prepared, rollout),
         "status": _status(ended),
         "error": _error(ended),
+        "overshoot": _overshoot(prepared, ended),
         "dt": prepared.clock.dt,
         "steps": len(rollout),
         "steps_asked": prepared.clock.n_steps,
         "simulated": float(rollout.t[-1]),
         "seconds": seconds,
         **summary,
+        "base_error": base_error(rollout),
+        "frame_error": frame_error(rollout, prepared.motion.frame),
         "joints": _joints(model, rollout),
         "final": {"t": float(rollout.t[-1]), "q": rollout.q[-1].tolist(), "v": rollout.v[-1].tolist()},
     }
@@ -62,17 +67,11 @@ def document(
 
 def _summary(rollout: Rollout) -> Entry:
     """The numbers of the whole robot, over all joints and times."""
-    error = np.abs(rollout.error)
     with np.errstate(all="ignore"):
         of_all = rollout.summary()
-        row, column = np.unravel_index(int(np.argmax(error)), error.shape) if error.size else (0, 0)
-        known = rollout.reference is not None and error.size > 0
         return {
-            "max_error": float(error[row, column]) if known else None,
-            "max_error_joint": _names(rollout.model)[column] if known else None,
-            "max_error_time": float(rollout.t[row]) if known else None,
-            "rms_error": float(np.sqrt(np.mean(error**2))) if known else None,
-            "final_error": float(error[-1].max()) if known else None,
+            **joint_error(rollout),
+            "energy_change": float(np.max(np.abs(rollout.energy - rollout.energy[0]))),
             "energy_drift": of_all.energy_drift,
             "max_kinetic_energy": float(np.max(rollout.kinetic_energy)),
             "saturated": of_all.saturated,
@@ -116,11 +115,37 @@ def _units(model: Model) -> list[str]:
     return [*base, *("m" if kinds[name] == "prismatic" else "rad" for name in model.joint_names)]
 
 
-def _is_passive(prepared: Prepared) -> bool:
+def _settings(prepared: Prepared, rollout: Rollout) -> Entry:
+    """Those of the record, with objects where it has their Python text, and the inertia of the rotors."""
+    given, kept = prepared.arguments, rollout.settings
+    return {
+        **kept,
+        "joints": {**kept["joints"], "armature": np.diag(rollout.rotors).tolist()},
+        "noise": None if given["noise"] is None else _noise(given["noise"]),
+        "pushes": [_push(each) for each in given["pushes"]],
+    }
+
+
+def _noise(noise: Noise) -> Entry:
+    return {"q": np.asarray(noise.q).tolist(), "v": np.asarray(noise.v).tolist(), "seed": noise.seed}
+
+
+def _push(push: Push) -> Entry:
+    """One push; its `duration` None is for ever."""
+    return {
+        "frame": push.frame,
+        "wrench": np.asarray(push.wrench).tolist(),
+        "start": push.start,
+        "duration": push.duration if np.isfinite(push.duration) else None,
+        "reference": push.reference,
+    }
+
+
+def _is_passive(prepared: Prepared, rollout: Rollout) -> bool:
     """Whether nothing does work on the robot, so that its energy should stay what it is."""
-    given = prepared.arguments
-    loads = any(given[name] is not False for name in ("damping", "friction")) or given["pushes"]
-    return prepared.law is None and not loads and not given["position_limits"]
+    joints = rollout.settings["joints"]
+    loads = any(joints["damping"]) or any(joints["friction"]) or prepared.arguments["pushes"]
+    return prepared.law is None and not loads and not prepared.arguments["position_limits"]
 
 
 def _status(ended: SimulationError | KeyboardInterrupt | None) -> str:
@@ -131,8 +156,26 @@ def _status(ended: SimulationError | KeyboardInterrupt | None) -> str:
     return DIVERGED if isinstance(ended, DivergedError) else CONTROL_FAILED
 
 
+def _overshoot(prepared: Prepared, ended: object) -> Entry | None:
+    """The joint that a law of torque brakes too hard for the step, where that may be why it diverged."""
+    if not isinstance(ended, DivergedError):
+        return None
+    found = overshoot(prepared.law, prepared.arguments["q0"], prepared.clock.control_dt)
+    return None if found is None else found._asdict()
+
+
 def _error(ended: SimulationError | KeyboardInterrupt | None) -> Entry | None:
-    """Why it ended early, where and when; None also for one that was interrupted."""
+    """Why it ended early, where and when."""
+    if isinstance(ended, RolloutInterrupted):
+        kept = ended.rollout
+        return {
+            "type": "Interrupted",
+            "message": str(ended),
+            "time": float(kept.t[-1]),
+            "step": len(kept),
+            "q": kept.q[-1].tolist(),
+            "v": kept.v[-1].tolist(),
+        }
     if not isinstance(ended, SimulationError):
         return None
     q, v = ended.state

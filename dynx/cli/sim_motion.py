@@ -99,11 +99,10 @@ def planned(model: Model, asked: MotionInput) -> Motion:
     }
     if profile == "hold":
         wanted = start if asked.to is None else configuration(model, asked.to, "--to", start)
-        begin = wanted if asked.start is None else start
         span = DURATION if asked.duration is None else asked.duration
         reference = None if asked.controller == "none" and asked.to is None else wanted
-        said |= {"from": begin.tolist(), "to": None if reference is None else wanted.tolist()}
-        return Motion(reference, begin, span + asked.settle, frame, {**said, "duration": span})
+        said |= {"to": None if reference is None else wanted.tolist(), "duration": span}
+        return Motion(reference, start, span + asked.settle, frame, said)
     motion = _to_pose(model, asked, frame, start) if asked.to is None else _to(model, asked, profile, start)
     said |= {"to": motion.end.q.tolist(), "duration": motion.duration}
     span = motion.duration

@@ -115,7 +115,8 @@ motion = stacked(
         "--profile",
         type=one_of(PROFILES),
         metavar="NAME",
-        help=f"{', '.join(PROFILES[:-1])} or {PROFILES[-1]}, which wants --to at once (default: cycloidal).",
+        help=f"{', '.join(PROFILES[:-1])} or {PROFILES[-1]}, which wants --to at once: the response to "
+        "a step (default: cycloidal).",
     ),
     _seconds_option(
         "--duration",

@@ -93,6 +93,7 @@ def prepare(given: dict[str, Any]) -> Prepared:
         "law": given["controller"],
         "backend": given["backend"] if _computes(law) else None,
         "frame": motion.frame,
+        "frame_given": given["frame"] is not None,
         "motion": motion.said,
         "gains": _gains_of(law),
         "motor_limits": _limits_of_motors(model, given["effort_limits"], law),

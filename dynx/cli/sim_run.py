@@ -8,11 +8,12 @@ from dynx.cli.exits import ANSWER_IS_NO, BAD_INPUT, DONE, INTERRUPTED, complain
 from dynx.cli.interruption import interruptible
 from dynx.cli.progress import progress_bar
 from dynx.cli.sim_document import document
+from dynx.cli.sim_limits import limits_said
 from dynx.cli.sim_outputs import Outputs
 from dynx.cli.sim_request import Prepared
 from dynx.cli.sim_tables import show
 from dynx.cli.terminal import console, echo_json
-from dynx.errors import DynxError, SimulationError
+from dynx.errors import ArgumentError, DynxError, LimitError, SimulationError
 from dynx.sim import Rollout, RolloutInterrupted, simulate
 
 
@@ -28,6 +29,8 @@ def run_sim(prepared: Prepared, outputs: Outputs, *, as_json: bool) -> int:
         except KeyboardInterrupt:
             complain("interrupted before the first step")
             return interruption.code or INTERRUPTED
+        except LimitError as error:
+            raise ArgumentError(limits_said(error, prepared.model.name, ignorable=True)) from error
         seconds = time.perf_counter() - started
         interruption.finishing = True
         unwritten = _write(outputs, rollout)

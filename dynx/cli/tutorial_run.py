@@ -12,9 +12,10 @@ from dynx.cli.configuration_input import configuration
 from dynx.cli.exits import ANSWER_IS_NO, BAD_INPUT, DONE, complain, one_line
 from dynx.cli.interruption import interruptible
 from dynx.cli.progress import progress_bar
+from dynx.cli.sim_limits import limits_said
 from dynx.cli.terminal import console, counted, echo_json
 from dynx.cli.tutorial_tables import show
-from dynx.errors import DynxError
+from dynx.errors import ArgumentError, DynxError, LimitError
 from dynx.model.loading import load
 from dynx.sim.clock import Clock
 from dynx.sim.named_laws import NATURAL_FREQUENCY
@@ -121,4 +122,9 @@ def _experiments(robot: str | None, given: dict[str, Any]) -> Tutorial:
     to = None if given["to"] is None else configuration(model, given["to"], "--to", start)
     duration = DURATION if given["duration"] is None else given["duration"]
     Clock.of(given["dt"], duration, None, 0.0)
-    return tutorial(model, start=start, to=to, duration=duration, dt=given["dt"], backend=given["backend"])
+    try:
+        return tutorial(
+            model, start=start, to=to, duration=duration, dt=given["dt"], backend=given["backend"]
+        )
+    except LimitError as error:
+        raise ArgumentError(limits_said(error, model.name, ignorable=False)) from error

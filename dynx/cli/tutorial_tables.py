@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from dynx.cli.exits import one_line
-from dynx.cli.sim_tables import error_text
+from dynx.cli.sim_numbers import error_text
 from dynx.cli.tables import Table
 from dynx.cli.terminal import counted, number
 

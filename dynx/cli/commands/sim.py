@@ -49,6 +49,8 @@ def sim(ctx: click.Context, /, robot: str | None, tutorial: bool, **given: Any) 
 
     Torque tables and laws of your own are for Python: dynx.simulate.
 
+    There are no contacts: nothing stands on the ground, and links do not collide.
+
     Shown for each joint are the largest and the root mean square error, the largest speed, and the largest
     torque beside its limit.
 
