@@ -82,7 +82,8 @@ def _joints(model: Model, rollout: Rollout) -> list[Entry]:
     """One entry for each coordinate of v, those of a floating base first."""
     with np.errstate(all="ignore"):
         summary = rollout.summary()
-    limit: Floats = model.effort_limit
+    in_force = rollout.settings.get("effort_limits")
+    limit: Floats = model.effort_limit if in_force is None else np.array(in_force)
     entries = []
     for k, (name, unit) in enumerate(zip(_names(model), _units(model), strict=True)):
         known = rollout.reference is not None

@@ -106,10 +106,17 @@ class NamedLaw:
 
 
 def joint_inertia(model: Model, q: Floats) -> Floats:
-    """The inertia (n,) [kg m^2 or kg] that each joint sees at `q`, while the others hold still."""
+    """The inertia (n,) [kg m^2 or kg] that each joint sees at `q`, while the others hold still.
+
+    A floating base yields, and the other joints with it: then it is 1 / (M^-1)_ii, the least that a joint
+    sees whatever the others do, so that gains which suit it do not overshoot.
+    """
     with backend("reference", model, validate=False) as bodies:
         M: Floats = bodies.mass_matrix(q)
-    return np.maximum(np.diag(M)[6 if model.floating else 0 :], 0.0)
+    if not model.floating:
+        return np.maximum(np.diag(M), 0.0)
+    yielding = np.diag(np.linalg.pinv(M))[6:]
+    return np.divide(1.0, yielding, out=np.zeros_like(yielding), where=yielding > 0.0)
 
 
 def named_law(name: str, request: LawRequest) -> Controller[Any]:

@@ -116,3 +116,13 @@ def test_a_motor_limit_of_0_is_refused() -> None:
     for name in ("pid", "position-motor", "velocity-motor", "pd-motor"):
         with pytest.raises(LimitError, match="is 0"):
             law(name, limit=0.0)
+
+
+@pytest.mark.parametrize("name", ["pd", "pid"])
+def test_gains_of_a_floating_robot_do_not_overshoot(name: str) -> None:
+    """A base that yields makes joints lighter than the diagonal of the mass matrix says, up to 600 times."""
+    robot = load("ur5", base="floating")
+    start = robot.neutral()
+    law = named_law(name, LawRequest(robot, start, 1e-3))
+    rollout = simulate(robot, law, start, duration=0.2)
+    assert np.abs(rollout.v[:, 6:]).max() < 1.0
