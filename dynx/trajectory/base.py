@@ -25,7 +25,7 @@ class Setpoint(NamedTuple):
     a: Floats
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Trajectory(ABC):
     """A motion over ``0 <= t <= duration`` [s]: ``trajectory(t)`` is its `Setpoint`.
 
@@ -61,6 +61,9 @@ class Trajectory(ABC):
     def knots(self) -> Floats:
         """Times (n,), ascending from 0 to `duration`, between which the motion is smooth."""
         return np.array([0.0, self.duration])
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} of {self.nv} coordinates, {self.duration:.6g} s>"
 
     @abstractmethod
     def inside(self, t: Floats) -> Setpoint:

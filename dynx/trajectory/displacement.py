@@ -23,7 +23,7 @@ from dynx.trajectory.base import Setpoint, Trajectory, frozen_setpoint
 from dynx.trajectory.curve import Curve
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class DisplacementTrajectory(Trajectory):
     """`start.q` moved along a curve that begins at 0; `floating` is the model of a floating base."""
 

@@ -16,7 +16,7 @@ MEETING = 1e-9
 given numbers, not computed ones, so this is far above rounding and far below what a robot can show."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class JoinedTrajectory(Trajectory):
     """`parts` in order; part k begins at `begins[k]` [s]."""
 

@@ -43,7 +43,7 @@ BETWEEN = 4
 """Measurements of the deviation in each interval; a cubic is furthest off halfway or near it."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class LineTrajectory(PacedTrajectory):
     """A straight line in space, with how well it is followed."""
 

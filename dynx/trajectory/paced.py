@@ -15,7 +15,7 @@ _LOOKS = 1000
 """At how many times a law is looked at."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class PacedTrajectory(Trajectory):
     """`path`, a curve in s over [0, 1], travelled as `law`, a trajectory of one coordinate, says."""
 

@@ -183,3 +183,8 @@ def test_a_motion_of_your_own() -> None:
     rest = Setpoint(np.array([0.3]), np.zeros(1), np.zeros(1))
     made = Still(2.0, rest, rest)
     assert made([-1.0, 0.5, 3.0]).q.tolist() == [[0.3], [0.3], [0.3]]
+
+
+def test_a_motion_prints_in_one_line() -> None:
+    motion = cycloidal(np.zeros(6), np.ones(6), duration=2.0)
+    assert repr(motion) == f"<{type(motion).__name__} of 6 coordinates, 2 s>"
