@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import prod
@@ -11,6 +10,7 @@ import numpy as np
 
 from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
 from dynx.model import Model
+from dynx.simd.machine import LARGEST_SHARE, memory
 from dynx.spatial.scalar import Floats
 
 ARGUMENTS: dict[str, tuple[str, ...]] = {
@@ -29,9 +29,6 @@ OF_A_FRAME = frozenset({"forward_kinematics", "jacobian"})
 
 REACH = 2.0 * np.pi
 """Positions are drawn within the limits, and no farther than this from zero [rad or m]."""
-
-LARGEST_SHARE = 0.5
-"""Of the machine's memory, that the arrays of one work may take."""
 
 
 @dataclass(frozen=True)
@@ -116,11 +113,3 @@ def require_memory(model: Model, work: Work) -> None:
             f"{work.quantity} at a batch of {work.batch} needs {needed / 1e9:.3g} GB; this machine has "
             f"{memory() / 1e9:.3g} GB, of which a batch may take {LARGEST_SHARE:.0%}"
         )
-
-
-def memory() -> float:
-    """Bytes of memory that the machine has; infinity where the system does not say."""
-    try:
-        return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
-    except (AttributeError, OSError, ValueError):
-        return float("inf")

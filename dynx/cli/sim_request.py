@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dynx.backends.registry import backend_class
-from dynx.bench.work import LARGEST_SHARE, memory
 from dynx.cli.configuration_input import configuration, velocity
 from dynx.cli.sim_motion import Motion, MotionInput, planned
 from dynx.cli.sim_values import Coefficients, PayloadInput, PushInput
@@ -22,6 +21,7 @@ from dynx.model.loading import load
 from dynx.sim import Noise, Payload, Push, Rollout
 from dynx.sim.clock import Clock
 from dynx.sim.named_laws import Gains, LawRequest, named_law
+from dynx.simd.machine import LARGEST_SHARE, memory
 
 if TYPE_CHECKING:
     from dynx.model.model import Base

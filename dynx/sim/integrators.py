@@ -12,7 +12,6 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from scipy.integrate import BDF, DOP853, LSODA, RK23, RK45, Radau, solve_ivp
 
 from dynx.errors import ArgumentError, EngineError, nearest, shown
 from dynx.model import Model
@@ -27,7 +26,7 @@ from dynx.spatial.scalar import Array, Floats
 from dynx.spatial.so3 import quat_product, rotate, rotation_from_quat
 
 Accelerate = Callable[..., Floats]
-METHODS = {"RK23": RK23, "RK45": RK45, "DOP853": DOP853, "Radau": Radau, "BDF": BDF, "LSODA": LSODA}
+METHODS = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")
 """SciPy's integrators by name."""
 
 State = tuple[Floats, Floats, Floats]
@@ -141,10 +140,14 @@ class Adaptive:
         for name, tolerance in (("rtol", rtol), ("atol", atol)):
             if not isinstance(tolerance, int | float) or not 0.0 < tolerance < np.inf:
                 raise ArgumentError(f"{name} is {shown(tolerance)}; wanted a positive number")
-        self._method, self._rtol, self._atol = METHODS[method], float(rtol), float(atol)
+        self._method: Any = method
+        self._rtol, self._atol = float(rtol), float(atol)
 
     def __call__(self, accelerate: Accelerate, q: Floats, v: Floats, *given: Any) -> State:
         """One step. Raises EngineError where the method gives up."""
+        # Half a second, which only those who want it pay.
+        from scipy.integrate import solve_ivp
+
         flow, y = self._flow, np.concatenate([q, v])
         found = solve_ivp(
             lambda t, y: flow(accelerate, y, given),

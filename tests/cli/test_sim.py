@@ -34,7 +34,7 @@ KEYS = """
 def test_the_options_are_those_of_the_library() -> None:
     assert ("none", *LAWS) == sim_options.CONTROLLERS
     assert INTEGRATORS == sim_options.INTEGRATORS
-    assert tuple(METHODS) == sim_options.METHODS
+    assert sim_options.METHODS == METHODS
     options = {param.name: param for param in command.params}
     taken = command.make_context("sim", ["ur5"]).params
     for name, parameter in inspect.signature(simulate).parameters.items():
