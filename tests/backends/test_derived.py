@@ -24,8 +24,9 @@ def test_every_quantity_has_a_hook_and_every_hook_a_quantity() -> None:
         for name, member in vars(EngineHooks).items()
         if inspect.isfunction(member) and "engine's own" not in (member.__doc__ or "")
     }
-    # The placement of one frame serves forward kinematics too, and poses of bodies are no quantity.
-    assert hooks - {"_frame_placement", "_body_poses"} == set(HOOK_OF_QUANTITY.values())
+    # The placement of one frame serves forward kinematics too, and poses of bodies are no quantity,
+    # nor is a shorter way to one.
+    assert hooks - {"_frame_placement", "_body_poses", "_in_this_thread"} == set(HOOK_OF_QUANTITY.values())
     for quantity in HOOK_OF_QUANTITY:
         assert callable(getattr(Backend, quantity))
 

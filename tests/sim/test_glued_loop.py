@@ -360,6 +360,15 @@ def test_ctrl_c_in_the_middle_of_a_stage() -> None:
     the_same(caught.value.rollout, whole.first(44))
 
 
+@pytest.fixture
+def ctrl_c() -> Iterator[None]:
+    """Python's own handler: a process that was started in the background ignores Ctrl-C."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("ctrl_c")
 @pytest.mark.parametrize("on", [True, False])
 def test_ctrl_c_keeps_what_was_computed(on: bool) -> None:
     law = ComputedTorque(ARM, kp=400, kd=40)
