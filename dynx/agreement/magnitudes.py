@@ -199,8 +199,14 @@ class Magnitudes:
         return np.asarray(self.bias_torque + self.root_inertia * strength[:, None])
 
     def solved_torque(self, a: Floats) -> Floats:
-        """(n,) Largest entry of |M| |a| + |bias| + |tau|: what rounding in solving for `a` scales with."""
-        terms = np.einsum("nij,nj->ni", np.abs(self.mass_matrix), np.abs(a))
+        """(n,) Largest entry of |M| |a| + |bias| + |tau|: what rounding in solving for `a` scales with.
+
+        M_ii counts as what it counts as in `root_inertia`.
+        """
+        M = np.abs(self.mass_matrix)
+        diagonal = np.einsum("nii->ni", M)
+        terms = np.einsum("nij,nj->ni", M, np.abs(a))
+        terms = terms + np.maximum(self.root_inertia**2 - diagonal, 0.0) * np.abs(a)
         terms = terms + np.abs(self._bias) + np.abs(self.samples.tau) + self.bias_torque
         return np.asarray(np.max(terms, axis=-1, initial=0.0))
 

@@ -66,3 +66,19 @@ def test_a_tensor_that_breaks_the_triangle_inequality_counts_as_a_whole() -> Non
     sizes = Magnitudes(draw_samples(spindle, 2, 0))
     np.testing.assert_allclose(sizes.root_inertia[:, 3:] ** 2, 0.125)
     assert dynx.agree(spindle, ["reference", "pinocchio"], samples=2).agree
+
+
+def test_so_it_does_where_an_acceleration_is_put_back() -> None:
+    """A joint about the small moment of such a tensor: rounding of the large one is in the torque it takes."""
+    text = """<robot name="blade"><link name="hub"><inertial><mass value="1"/>
+        <inertia ixx="0.125" ixy="0" ixz="0" iyy="0.125" iyz="0" izz="0.125"/></inertial></link>
+        <link name="blade"><inertial><mass value="1"/>
+        <inertia ixx="0" ixy="0" ixz="0" iyy="0.125" iyz="0" izz="3e-8"/></inertial></link>
+        <joint name="spin" type="continuous"><parent link="hub"/><child link="blade"/><axis xyz="0 0 1"/>
+        </joint></robot>"""
+    blade = dynx.load(text, base="floating")
+    samples = draw_samples(blade, 2, 0)
+    a = np.zeros((2, 7))
+    a[:, 6] = 4e7
+    assert (Magnitudes(samples).solved_torque(a) >= 0.125 * 4e7).all()
+    assert dynx.agree(blade, ["reference", "pinocchio"], samples=6).agree
