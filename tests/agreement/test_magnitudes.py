@@ -69,7 +69,7 @@ def test_a_tensor_that_breaks_the_triangle_inequality_counts_as_a_whole() -> Non
 
 
 def test_so_it_does_where_an_acceleration_is_put_back() -> None:
-    """A joint about the small moment of such a tensor: rounding of the large one is in the torque it takes."""
+    """A joint about the small moment of such a tensor: the large one is in the rounding of its torque."""
     text = """<robot name="blade"><link name="hub"><inertial><mass value="1"/>
         <inertia ixx="0.125" ixy="0" ixz="0" iyy="0.125" iyz="0" izz="0.125"/></inertial></link>
         <link name="blade"><inertial><mass value="1"/>
