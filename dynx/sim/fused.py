@@ -31,10 +31,6 @@ from dynx.spatial.branchless import difference, integrate
 from dynx.spatial.scalar import Array, Floats, clipped, sign
 from dynx.trajectory.base import Setpoint
 
-STATE = ("q", "v", "worst", "squares", "memory", "cut")
-"""What a step takes and gives back: the robot's state, the largest error and the sum of squared errors
-of each coordinate, what the law remembers, and in how many steps a motor's torque was cut."""
-
 REMEMBERED = 32
 """Steps kept for the next batch in this process."""
 
@@ -150,7 +146,7 @@ class StepOf:
         return {name: (size,) for name, size in sizes.items()}
 
     def _commanded(self, law: Controller[Any], given: Mapping[str, Array]) -> dict[str, Array]:
-        """The torque of the law within the limits, what it remembers, and where it was cut."""
+        """The torque of the law within the limits, what it remembers, and how long motors were at their limits."""
         q, v = (given["q_seen"], given["v_seen"]) if self.delayed else (given["q"], given["v"])
         if self.noisy:
             off = given["noise_q"]
