@@ -146,7 +146,7 @@ class StepOf:
         return {name: (size,) for name, size in sizes.items()}
 
     def _commanded(self, law: Controller[Any], given: Mapping[str, Array]) -> dict[str, Array]:
-        """The torque of the law within the limits, what it remembers, and how long motors were at their limits."""
+        """The torque of the law within the limits, what it remembers, and how long motors were at limits."""
         q, v = (given["q_seen"], given["v_seen"]) if self.delayed else (given["q"], given["v"])
         if self.noisy:
             off = given["noise_q"]
