@@ -15,7 +15,7 @@ import numpy as np
 
 from benchmarks.tutorial_motion import DT, END, GRAVITY, KD, KP, STEPS, Task
 from benchmarks.urdf_for_peers import spelled_out
-from dynx.engines.pybullet import bullet
+from dynx.engines.pybullet.library import bullet
 from dynx.spatial.scalar import Floats
 
 Rows = list[list[float]]

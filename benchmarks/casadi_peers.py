@@ -16,8 +16,8 @@ import numpy as np
 from benchmarks.compiling_peer import CompilingPeer
 from benchmarks.jax_peers import version_of
 from benchmarks.urdf_for_peers import moving_joints, spelled_out
-from dynx.bench.ways import Prepared
-from dynx.bench.work import ARGUMENTS, Batch, Work
+from dynx.bench.cases import ARGUMENTS, Batch, Work
+from dynx.bench.implementations import Prepared
 from dynx.errors import NotInstalledError
 from dynx.model import Model
 from dynx.spatial.scalar import Floats

@@ -19,7 +19,7 @@ from benchmarks.simulator import Check, Simulator
 from benchmarks.tutorial_motion import AGREEMENT, DT, GRAVITY, KD, KP, TRACKING, Task
 from dynx.backends.registry import backend_class
 from dynx.bench.timing import Call
-from dynx.engines.pinocchio import pin
+from dynx.engines.pinocchio.library import pin
 from dynx.model import Model
 from dynx.sim import simulate
 from dynx.spatial.scalar import Floats

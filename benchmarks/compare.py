@@ -14,9 +14,9 @@ from collections.abc import Iterator, Sequence
 from benchmarks.compiling_peer import CompilingPeer
 from benchmarks.jax_peers import JaxPeer, OnDevice
 from benchmarks.peers import COMPILED, FRAMES, WAYS, make_way
+from dynx.bench.cases import ARGUMENTS, Work, draw_batch
+from dynx.bench.implementations import Way
 from dynx.bench.measurement import Measurement, measure
-from dynx.bench.ways import Way
-from dynx.bench.work import ARGUMENTS, Work, draw_batch
 from dynx.errors import DynxError
 from dynx.model import Model
 from dynx.model.loading import load

@@ -6,11 +6,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from dynx.backends.reference import ReferenceBackend
-from dynx.bench.ways import Role, Way
-from dynx.bench.work import Batch
+from dynx.bench.cases import Batch
+from dynx.bench.implementations import Role, Way
 from dynx.errors import EngineLimitError
 from dynx.model import Model
+from dynx.reference.backend import ReferenceBackend
 from dynx.spatial.scalar import Floats
 
 EASY_JOINTS = 8

@@ -22,7 +22,7 @@ from scipy.special import ellipk
 from benchmarks.closed_loops import pinocchio_model
 from benchmarks.tutorial_motion import DT, Task
 from dynx.backends import backend, installed_backends
-from dynx.engines.pinocchio import pin
+from dynx.engines.pinocchio.library import pin
 from dynx.model.loading import load
 from dynx.sim import simulate
 from dynx.spatial.scalar import Floats

@@ -20,8 +20,8 @@ import numpy as np
 
 from benchmarks.compiling_peer import CompilingPeer, place_on_last_link
 from benchmarks.urdf_for_peers import moving_joints, spelled_out
-from dynx.bench.ways import Prepared
-from dynx.bench.work import OF_A_FRAME, Batch, Work
+from dynx.bench.cases import OF_A_FRAME, Batch, Work
+from dynx.bench.implementations import Prepared
 from dynx.errors import EngineLimitError, NotInstalledError
 from dynx.model import Model
 from dynx.spatial.scalar import Floats

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from dynx.bench.ways import Prepared, Role, Way
-from dynx.bench.work import Batch, Work
+from dynx.bench.cases import Batch, Work
+from dynx.bench.implementations import Prepared, Role, Way
 from dynx.errors import EngineLimitError
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
@@ -24,8 +24,8 @@ class MujocoPeer(Way):
 
     def __init__(self, model: Model) -> None:
         # Imported here, for MuJoCo is an extra.
-        from dynx.backends.mujoco_tree import build_tree
-        from dynx.engines.mujoco import mujoco
+        from dynx.engines.mujoco.library import mujoco
+        from dynx.engines.mujoco.tree import build_tree
 
         self.version = f"mujoco {mujoco.__version__}"
         if model.mechanism.coupling is not None:

@@ -16,11 +16,11 @@ from benchmarks.casadi_peers import CasadiCode, CasadiMap
 from benchmarks.compiling_peer import CompilingPeer
 from benchmarks.jax_peers import AdamJax, Frax
 from benchmarks.mujoco_peers import MujocoInverse, MujocoRollout
-from dynx.bench.backend_ways import backend_way
+from dynx.bench.backend_implementations import backend_way
+from dynx.bench.cases import ARGUMENTS, Batch, Work, draw_batch
+from dynx.bench.implementations import Prepared, Way
 from dynx.bench.measurement import Preparation
-from dynx.bench.pinocchio_ways import BATCH, LOOP, PinocchioBatch, PinocchioLoop
-from dynx.bench.ways import Prepared, Way
-from dynx.bench.work import ARGUMENTS, Batch, Work, draw_batch
+from dynx.bench.pinocchio_implementations import BATCH, LOOP, PinocchioBatch, PinocchioLoop
 from dynx.model import Inertial, Joint, Link, Model, Pose
 from dynx.model.loading import load
 

@@ -21,7 +21,7 @@ from benchmarks.tutorial_motion import AGREEMENT, DT, GRAVITY, KD, KP, STEPS, TR
 from benchmarks.urdf_for_peers import spelled_out
 from dynx.bench.timing import Call
 from dynx.control import Controller, Measured
-from dynx.engines.pinocchio import pin
+from dynx.engines.pinocchio.library import pin
 from dynx.model import Model
 from dynx.sim import BatchRollouts, simulate_batch
 from dynx.spatial.scalar import Floats
@@ -260,6 +260,6 @@ def rollout_batch(name: str, size: Size, threads: int) -> Batch:
 
 def _modules() -> tuple[Any, Any]:
     """`mujoco` and `mujoco.rollout`, imported here, for MuJoCo is an extra."""
-    from dynx.engines.mujoco import mujoco
+    from dynx.engines.mujoco.library import mujoco
 
     return mujoco, import_module("mujoco.rollout")

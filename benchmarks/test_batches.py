@@ -31,7 +31,7 @@ from benchmarks.peers import (
 )
 from dynx.agreement.tolerances import BAR
 from dynx.backends import backend
-from dynx.bench.work import Work
+from dynx.bench.cases import Work
 from dynx.errors import EngineLimitError, NotInstalledError
 from dynx.model import Model
 from dynx.model.loading import load

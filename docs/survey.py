@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any
 
 import dynx
-from dynx.cli.workers import Workers
 from dynx.doctor import diagnose
+from dynx.workers import Workers
 
 SMALL = 1e-6
 """Differences below this are of rounding size; they are counted apart."""

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from dynx import control, errors, trajectory
     from dynx.agreement import AgreementReport, agree
     from dynx.backends import Backend, backend, installed_backends, register
-    from dynx.backends.derivatives import Derivatives
-    from dynx.backends.parametric import ParametricDynamics, parametric
+    from dynx.compiled.derivatives import Derivatives
+    from dynx.compiled.parametric import ParametricDynamics, parametric
     from dynx.doctor import DoctorReport, compare_as_loaded, diagnose
     from dynx.ik import IKResult
     from dynx.model import Model, Pose
@@ -67,12 +67,12 @@ __all__ = [
 _HOME = {
     "AgreementReport": "dynx.agreement",
     "Backend": "dynx.backends",
-    "Derivatives": "dynx.backends.derivatives",
+    "Derivatives": "dynx.compiled.derivatives",
     "DoctorReport": "dynx.doctor",
     "IKResult": "dynx.ik",
     "Model": "dynx.model",
     "Noise": "dynx.sim",
-    "ParametricDynamics": "dynx.backends.parametric",
+    "ParametricDynamics": "dynx.compiled.parametric",
     "Payload": "dynx.sim",
     "Pose": "dynx.model",
     "Push": "dynx.sim",
@@ -84,7 +84,7 @@ _HOME = {
     "inertial_parameters": "dynx.rbd.regressor",
     "installed_backends": "dynx.backends",
     "load": "dynx.model.loading",
-    "parametric": "dynx.backends.parametric",
+    "parametric": "dynx.compiled.parametric",
     "register": "dynx.backends",
     "robots": "dynx.model.library",
     "simulate": "dynx.sim",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dynx.cli.main import main
+from dynx.cli.shell.main import main
 
 if __name__ == "__main__":
     main()

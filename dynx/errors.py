@@ -32,6 +32,7 @@ No other exception reaches a caller because of his input; anything else is a def
 from __future__ import annotations
 
 import difflib
+import os
 from collections.abc import Iterable
 from typing import Any, Literal, NamedTuple
 
@@ -243,3 +244,12 @@ def _rebuild_simulation_error(
     kind: type[SimulationError], message: str, time: float, step: int, state: tuple[Any, Any]
 ) -> SimulationError:
     return kind(message, time=time, step=step, state=state)
+
+
+TRACEBACK_VARIABLE = "DYNX_TRACEBACK"
+"""Set to anything but 0 or nothing, this environment variable shows where an error was raised."""
+
+
+def traceback_wanted() -> bool:
+    """Whether `TRACEBACK_VARIABLE` asks for tracebacks."""
+    return os.environ.get(TRACEBACK_VARIABLE, "0") not in ("", "0")

@@ -20,9 +20,9 @@ from functools import cached_property
 import numpy as np
 
 from dynx.agreement.sampling import Samples
-from dynx.backends.reference import ReferenceBackend
 from dynx.model.mechanism import ROOT
 from dynx.rbd.kinematics import ancestry, body_poses
+from dynx.reference.backend import ReferenceBackend
 from dynx.spatial.inertia import RigidInertia
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import skew

@@ -14,11 +14,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from dynx.backends.reference import ReferenceBackend
 from dynx.errors import ArgumentError
 from dynx.model import Model
 from dynx.model.mechanism import ROOT
 from dynx.rbd.jacobians import REFERENCES
+from dynx.reference.backend import ReferenceBackend
 from dynx.spatial.scalar import Floats
 
 Kind = Literal["within", "anywhere", "straight", "limit", "turns"]

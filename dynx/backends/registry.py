@@ -28,12 +28,12 @@ GROUP = "dynx.backends"
 """The entry-point group: ``name = "package.module:BackendClass"``."""
 
 _BUILT_IN = {
-    "reference": "dynx.backends.reference:ReferenceBackend",
-    "pinocchio": "dynx.backends.pinocchio:PinocchioBackend",
-    "pybullet": "dynx.backends.pybullet:PyBulletBackend",
-    "mujoco": "dynx.backends.mujoco:MujocoBackend",
-    "drake": "dynx.backends.drake:DrakeBackend",
-    "compiled": "dynx.backends.compiled:CompiledBackend",
+    "reference": "dynx.reference.backend:ReferenceBackend",
+    "pinocchio": "dynx.engines.pinocchio.backend:PinocchioBackend",
+    "pybullet": "dynx.engines.pybullet.backend:PyBulletBackend",
+    "mujoco": "dynx.engines.mujoco.backend:MujocoBackend",
+    "drake": "dynx.engines.drake.backend:DrakeBackend",
+    "compiled": "dynx.compiled.backend:CompiledBackend",
 }
 _registered: dict[str, Loader] = {}
 

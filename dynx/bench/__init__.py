@@ -4,9 +4,9 @@
 `dynx bench` is the command, docs/bench.md the page.
 """
 
+from dynx.bench.cases import Work
 from dynx.bench.measurement import Measurement
 from dynx.bench.report import document
 from dynx.bench.session import Plan, Session, works
-from dynx.bench.work import Work
 
 __all__ = ["Measurement", "Plan", "Session", "Work", "document", "works"]

@@ -16,8 +16,8 @@ from dynx.agreement.comparison import judge
 from dynx.agreement.magnitudes import Magnitudes
 from dynx.agreement.quantities import largest, mass_scale, pose_scale
 from dynx.agreement.sampling import Kind, Samples
-from dynx.backends.reference import ReferenceBackend
-from dynx.bench.work import Batch
+from dynx.bench.cases import Batch
+from dynx.reference.backend import ReferenceBackend
 from dynx.spatial.scalar import Floats
 
 ENDS, BETWEEN = 16, 224

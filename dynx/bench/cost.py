@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from dynx.backends.compiled_kernels import compiles, evaluated, tidied
-from dynx.bench.work import ARGUMENTS
+from dynx.bench.cases import ARGUMENTS
+from dynx.compiled.kernels import compiles, evaluated, tidied
 from dynx.model import Model
 from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED
 from dynx.simd.program import Program

@@ -9,10 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dynx.bench.cases import Batch, Work, answer_shape
 from dynx.bench.checking import Judge, checked_rows
+from dynx.bench.implementations import Prepared, Way
 from dynx.bench.timing import Times, interleaved, once
-from dynx.bench.ways import Prepared, Way
-from dynx.bench.work import Batch, Work, answer_shape
 from dynx.errors import DynxError
 from dynx.model import Model
 from dynx.spatial.scalar import Floats

@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from dynx._version import __version__
+from dynx.bench.cases import Work
 from dynx.bench.cost import Cost
 from dynx.bench.measurement import Measurement
 from dynx.bench.roofline import Peak, roofline
 from dynx.bench.session import Session
-from dynx.bench.work import Work
 
 SCHEMA = 1
 

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from functools import cached_property, partial
 
 from dynx.backends.registry import installed_backends
-from dynx.bench.backend_ways import backend_way
+from dynx.bench.backend_implementations import backend_way
+from dynx.bench.cases import ARGUMENTS, Batch, Work, draw_batch, require_memory
 from dynx.bench.cost import Cost, cost_of, program_of
+from dynx.bench.implementations import Prepared, Role, Way
 from dynx.bench.machine import load, measured_peak
 from dynx.bench.measurement import Measurement, measure
 from dynx.bench.roofline import Peak
-from dynx.bench.ways import Prepared, Role, Way
-from dynx.bench.work import ARGUMENTS, Batch, Work, draw_batch, require_memory
 from dynx.errors import ArgumentError, DynxError, NotInstalledError
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
@@ -154,7 +154,7 @@ def _backend(model: Model, name: str, threads: int) -> list[Way]:
 
 
 def _peers(model: Model, threads: int) -> list[Way]:
-    from dynx.bench.pinocchio_ways import pinocchio_ways  # imports the engine
+    from dynx.bench.pinocchio_implementations import pinocchio_ways  # imports the engine
 
     return list(pinocchio_ways(model, threads))
 

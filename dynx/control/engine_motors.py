@@ -7,11 +7,11 @@ itself. So they give a `MotorCommand`, and their `torque` refuses.
 from __future__ import annotations
 
 from abc import abstractmethod
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dynx.backends.bullet_stepping import MotorCommand
 from dynx.control.base import Controller, Measured
 from dynx.control.gains import checked_gain
 from dynx.control.saturation import checked_limit
@@ -22,6 +22,17 @@ from dynx.trajectory.base import Setpoint
 
 AMPLE = 1e30
 """What stands for no limit [N m or N]: Bullet multiplies it by the time step, and infinity makes NaN."""
+
+
+class MotorCommand(NamedTuple):
+    """What `setJointMotorControlArray` is told: one number per joint each, None for the engine's default."""
+
+    mode: str
+    positions: list[float] | None = None
+    velocities: list[float] | None = None
+    forces: list[float] | None = None
+    position_gains: list[float] | None = None
+    velocity_gains: list[float] | None = None
 
 
 class EngineMotor(Controller[None]):

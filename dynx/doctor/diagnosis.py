@@ -8,11 +8,11 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 
 from dynx.agreement.tolerances import BAR
-from dynx.doctor.attribution import Attribution, Attributor
-from dynx.doctor.examination import LOADING, TORQUE, Examination, Laboratory
-from dynx.doctor.given_file import without_meshes
-from dynx.doctor.given_lines import at_given_lines
-from dynx.doctor.mending import Mending, Place, all_but, detections, mend, place, readable, treated
+from dynx.doctor.examine.engine_input import without_meshes
+from dynx.doctor.examine.examination import LOADING, TORQUE, Examination, Laboratory
+from dynx.doctor.examine.line_map import at_given_lines
+from dynx.doctor.prove.attribution import Attribution, Attributor
+from dynx.doctor.prove.mending import Mending, Place, all_but, detections, mend, place, readable, treated
 from dynx.doctor.report import (
     DoctorReport,
     Failure,
@@ -25,7 +25,7 @@ from dynx.model import Model
 from dynx.model.configuration import checked_base
 from dynx.model.loading import read_description
 from dynx.model.model import Base
-from dynx.model.xml_source import XmlSource
+from dynx.model.xml.source import XmlSource
 from dynx.rules import Case, Detection, Rule, all_rules
 from dynx.rules.choices import checked_choices
 
@@ -258,8 +258,8 @@ def _with_counterexamples(
     seed: int,
     say: Progress,
 ) -> tuple[Unexplained, ...]:
-    from dynx.doctor.counterexample import smallest
-    from dynx.doctor.single_state import difference_of
+    from dynx.doctor.counterexample.search import smallest
+    from dynx.doctor.counterexample.state_error import difference_of
 
     found = []
     for each in unexplained:

@@ -42,7 +42,7 @@ from typing import Any
 
 from dynx._version import __version__
 from dynx.loaded.difference import Deviation
-from dynx.model.xml_text import TextForm
+from dynx.model.xml.text import TextForm
 from dynx.rules.rule import Kind
 
 SCHEMA = 1

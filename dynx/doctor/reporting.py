@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import combinations
 
-from dynx.doctor.attribution import Attribution
-from dynx.doctor.examination import QUANTITIES, TORQUE, Examination, Laboratory
-from dynx.doctor.mending import Mending, Place, place
+from dynx.doctor.examine.examination import QUANTITIES, TORQUE, Examination, Laboratory
+from dynx.doctor.examine.right_answers import refereed
+from dynx.doctor.prove.attribution import Attribution
+from dynx.doctor.prove.mending import Mending, Place, place
 from dynx.doctor.report import DoctorReport, EngineResult, Finding, PairError, RunTimeCall
-from dynx.doctor.truth import refereed
 from dynx.loaded import loader_class
 from dynx.loaded.difference import model_difference
 from dynx.rules import Case, Detection, Rule

@@ -11,10 +11,10 @@ from dynx.loaded.robot import LoadedRobot
 from dynx.model import Model
 
 _CLASSES = {
-    "pinocchio": "dynx.loaded.pinocchio:LoadedPinocchio",
-    "pybullet": "dynx.loaded.pybullet:LoadedPyBullet",
-    "mujoco": "dynx.loaded.mujoco:LoadedMujoco",
-    "drake": "dynx.loaded.drake:LoadedDrake",
+    "pinocchio": "dynx.engines.pinocchio.as_loaded:LoadedPinocchio",
+    "pybullet": "dynx.engines.pybullet.as_loaded:LoadedPyBullet",
+    "mujoco": "dynx.engines.mujoco.as_loaded:LoadedMujoco",
+    "drake": "dynx.engines.drake.as_loaded:LoadedDrake",
 }
 
 ENGINES = tuple(_CLASSES)

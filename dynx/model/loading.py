@@ -10,11 +10,11 @@ from pathlib import PurePath
 from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, DescriptionError, RobotNotFoundError, nearest, shown
-from dynx.model.file_reading import printable, read_file
+from dynx.files.reading import printable, read_file
 from dynx.model.library import find, robots
 from dynx.model.model import STANDARD_GRAVITY, Base, Model
 from dynx.model.package_paths import StrPath
-from dynx.model.urdf_reader import read_urdf
+from dynx.model.urdf.reader import read_urdf
 
 _SUFFIXES = (".urdf", ".xacro", ".xml")
 

@@ -211,7 +211,7 @@ class Model:
 
     def to_urdf(self) -> str:
         """The model as URDF text, in canonical form; `dynx.load` of it gives an equal model."""
-        from dynx.model.urdf_writer import write_urdf
+        from dynx.model.urdf.writer import write_urdf
 
         return write_urdf(self)
 

@@ -16,7 +16,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from dynx.errors import DescriptionError, NotInstalledError, escaped
-from dynx.model.file_reading import printable, read_file
+from dynx.files.reading import printable, read_file
 from dynx.model.package_paths import StrPath, find_package
 
 MAX_SECONDS = 60.0

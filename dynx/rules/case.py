@@ -11,7 +11,7 @@ from dynx.model import Model
 from dynx.model.elements import Inertial, Vector
 from dynx.model.loading import read_model
 from dynx.model.model import STANDARD_GRAVITY, Base
-from dynx.model.xml_source import SourceElement, XmlSource
+from dynx.model.xml.source import SourceElement, XmlSource
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from dynx.errors import RobotNotFoundError
 from dynx.model.library import TRAPS, own_roots
-from dynx.model.xml_source import XmlSource
+from dynx.model.xml.source import XmlSource
 from dynx.rules.case import Case
 from dynx.rules.registry import find_rule
 from dynx.rules.rule import Rule

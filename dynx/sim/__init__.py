@@ -1,12 +1,12 @@
 """Simulation: plants, integrators, the closed loop, and its record; many rollouts at once."""
 
-from dynx.sim.batch import BatchInterrupted, simulate_batch
-from dynx.sim.batch_rollouts import BatchRollouts
-from dynx.sim.loads import Push
-from dynx.sim.rollout import Rollout, Summary
-from dynx.sim.sensors import Noise
+from dynx.sim.batch.batch import BatchInterrupted, simulate_batch
+from dynx.sim.batch.rollouts import BatchRollouts
+from dynx.sim.loop.sensors import Noise
+from dynx.sim.plants.loads import Push
+from dynx.sim.plants.model_error import Payload, plant_model
+from dynx.sim.record.rollout import Rollout, Summary
 from dynx.sim.simulation import RolloutInterrupted, simulate
-from dynx.sim.variations import Payload, plant_model
 
 __all__ = [
     "BatchInterrupted",

@@ -17,18 +17,18 @@ from dynx.control.saturation import checked_limit
 from dynx.errors import ArgumentError, SimulationError, shown
 from dynx.model import Model
 from dynx.model.configuration import checked_array, checked_q
-from dynx.sim.checked_law import check_law, numbers_of
-from dynx.sim.clock import Clock
-from dynx.sim.glued_loop import glued
-from dynx.sim.loads import Loads, Push
-from dynx.sim.loop import Loop
-from dynx.sim.plants import INTEGRATORS, DynxPlant, Plant
-from dynx.sim.record import Record
-from dynx.sim.references import SetpointOf, checked_reference, setpoints_of
-from dynx.sim.rollout import Rollout
-from dynx.sim.sensors import Noise, Sensors
-from dynx.sim.stops import Stops
-from dynx.sim.variations import MassScale, Payload, plant_model
+from dynx.sim.loop.clock import Clock
+from dynx.sim.loop.controller_checks import check_law, numbers_of
+from dynx.sim.loop.plain import Loop
+from dynx.sim.loop.references import SetpointOf, checked_reference, setpoints_of
+from dynx.sim.loop.sensors import Noise, Sensors
+from dynx.sim.loop.staged import glued
+from dynx.sim.loop.stops import Stops
+from dynx.sim.plants.loads import Loads, Push
+from dynx.sim.plants.model_error import MassScale, Payload, plant_model
+from dynx.sim.plants.plant import INTEGRATORS, DynxPlant, Plant
+from dynx.sim.record.record import Record
+from dynx.sim.record.rollout import Rollout
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Trajectory
 
@@ -271,7 +271,7 @@ def _plant(
         if name != "pybullet":
             raise ArgumentError(f"the engine {shown(name)} has no stepper here; PyBullet has one")
         # Only this plant needs PyBullet.
-        from dynx.sim.bullet_plant import BulletPlant
+        from dynx.engines.pybullet.plant import BulletPlant
 
         return BulletPlant(model, loads, dt, substeps=substeps)
     engine = backend(name, model, validate=False)

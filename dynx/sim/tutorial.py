@@ -26,8 +26,8 @@ from dynx.errors import (
 )
 from dynx.model import Model
 from dynx.model.loading import load
-from dynx.sim.named_laws import LAWS, LawRequest, named_law
-from dynx.sim.rollout import Rollout
+from dynx.sim.named_controllers import LAWS, LawRequest, named_law
+from dynx.sim.record.rollout import Rollout
 from dynx.sim.simulation import simulate
 from dynx.spatial.scalar import Floats
 from dynx.trajectory import Trajectory, check, cycloidal

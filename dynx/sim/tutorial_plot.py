@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from dynx.errors import NotInstalledError
+from dynx.files.writing import whole_file
 from dynx.sim.tutorial import BULLET, Row, Tutorial
-from dynx.sim.whole_file import whole_file
 
 STYLES = ("-", "--", "-.", ":")
 """Told apart without colour too."""

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 import pytest
 
 from dynx.backends.registry import backend_class
-from dynx.cli.inputs import ALL, expand, is_library_name
 from dynx.errors import DynxError, RobotNotFoundError, shown
 from dynx.loaded.registry import ENGINES
+from dynx.model.expansion import ALL, expand, is_library_name
 from dynx.model.loading import load
 from dynx.model.model import Base
 
@@ -126,6 +126,6 @@ def _baseline(config: pytest.Config) -> Baseline | None:
         raise pytest.UsageError(f"--dynx-tolerance is {option.dynx_tolerance}; wanted it between 0 and 1")
     if option.dynx_baseline is None:
         return None
-    from dynx.cli.doctor_outputs import load_baseline
+    from dynx.cli.doctor.outputs import load_baseline
 
     return load_baseline(os.path.join(config.invocation_params.dir, option.dynx_baseline))

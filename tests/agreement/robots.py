@@ -7,11 +7,11 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dynx.backends.reference import ReferenceBackend
 from dynx.model import Inertial, Joint, Limits, Link, Mimic, Model, Pose
 from dynx.model.elements import JointDynamics
 from dynx.model.model import Base
 from dynx.rbd.jacobians import Reference
+from dynx.reference.backend import ReferenceBackend
 from dynx.spatial.scalar import Floats
 
 BODY = Inertial(1.5, Pose((0.1, -0.05, 0.2), (0.3, -0.2, 0.1)), 0.02, 0.001, -0.002, 0.03, 0.0015, 0.025)

@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from dynx.agreement import AgreementReport, agree
 from dynx.agreement.tolerances import BAR
 from dynx.backends import installed_backends
-from dynx.backends.reference import ReferenceBackend
 from dynx.errors import ArgumentError, ClosedError, UnknownBackendError
 from dynx.model import Model
 from dynx.model.model import Base
+from dynx.reference.backend import ReferenceBackend
 from dynx.testing.strategies import models
 from tests.agreement.robots import DEFECTS, Broken, arm, massless_finger, pendulum, rock
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from dynx.agreement import agree
-from dynx.backends.reference import ReferenceBackend
 from dynx.model.loading import load
+from dynx.reference.backend import ReferenceBackend
 from dynx.spatial.scalar import Floats
 
 MODEL = load("double_pendulum")

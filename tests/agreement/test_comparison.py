@@ -8,8 +8,8 @@ from dynx.agreement.comparison import compare, judge
 from dynx.agreement.magnitudes import Magnitudes
 from dynx.agreement.quantities import QUANTITIES
 from dynx.agreement.sampling import draw_samples
-from dynx.backends.reference import ReferenceBackend
 from dynx.errors import EngineError
+from dynx.reference.backend import ReferenceBackend
 from dynx.spatial.scalar import Floats
 from tests.agreement.robots import Broken, arm
 

@@ -8,8 +8,8 @@ from dynx.agreement import tolerances
 from dynx.agreement.magnitudes import Magnitudes
 from dynx.agreement.quantities import QUANTITIES
 from dynx.agreement.sampling import draw_samples
-from dynx.backends.reference import ReferenceBackend
 from dynx.model import Model
+from dynx.reference.backend import ReferenceBackend
 from dynx.testing.strategies import models
 
 BOUNDS = {

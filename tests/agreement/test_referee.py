@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from dynx.agreement import Referee
 from dynx.agreement.referee import DIGITS, exactly
-from dynx.backends.reference import ReferenceBackend
+from dynx.reference.backend import ReferenceBackend
 from tests.agreement.robots import arm, pendulum
 
 numbers = st.floats(-10.0, 10.0)

@@ -6,8 +6,8 @@ import numpy as np
 
 from dynx._version import __version__
 from dynx.agreement import AgreementReport, Comparison, agree, refused_report, results_document
-from dynx.backends.reference import ReferenceBackend
 from dynx.errors import DescriptionError
+from dynx.reference.backend import ReferenceBackend
 from tests.agreement.robots import GravityUpsideDown, arm
 
 RESULT_KEYS = {

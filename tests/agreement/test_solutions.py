@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dynx.agreement import agree
-from dynx.backends.reference import ReferenceBackend
+from dynx.reference.backend import ReferenceBackend
 from dynx.spatial.scalar import Floats
 from tests.agreement.robots import Broken, arm
 

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dynx.backends import Backend
-from dynx.backends.pinocchio import PinocchioBackend
+from dynx.engines.pinocchio.backend import PinocchioBackend
 from dynx.errors import (
     ArgumentError,
     DTypeError,

@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 
 from dynx.backends import Backend
 from dynx.backends.hooks import solve_mass_matrix
-from dynx.backends.pinocchio import PinocchioBackend
-from dynx.backends.reference import ReferenceBackend
+from dynx.engines.pinocchio.backend import PinocchioBackend
 from dynx.errors import ClosedError, SingularMassMatrixError
 from dynx.model import Joint, JointDynamics, Link, Model
 from dynx.model.elements import Inertial, Pose
+from dynx.reference.backend import ReferenceBackend
 from dynx.spatial.scalar import Floats
 from dynx.testing.strategies import models
 from tests.backends.robots import (

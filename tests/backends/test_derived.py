@@ -9,9 +9,9 @@ import pytest
 from dynx.backends import Backend, DerivedBackend, native_quantities
 from dynx.backends.derived import HOOK_OF_QUANTITY
 from dynx.backends.hooks import EngineHooks
-from dynx.backends.pinocchio import PinocchioBackend
-from dynx.backends.reference import ReferenceBackend
+from dynx.engines.pinocchio.backend import PinocchioBackend
 from dynx.errors import ClosedError
+from dynx.reference.backend import ReferenceBackend
 from dynx.spatial.scalar import Floats
 from tests.backends.robots import all_quantities, assert_close, assert_same, chain, mixed_robot, motion
 

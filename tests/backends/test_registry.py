@@ -20,8 +20,8 @@ from dynx.backends import (
     register,
     unregister,
 )
-from dynx.backends.reference import ReferenceBackend
 from dynx.errors import ArgumentError, BackendError, NotInstalledError, UnknownBackendError
+from dynx.reference.backend import ReferenceBackend
 from tests.backends.robots import chain
 
 BUILT_IN = ("reference", "pinocchio", "pybullet", "mujoco", "drake", "compiled")

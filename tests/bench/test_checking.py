@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 import dynx
-from dynx.backends.reference import ReferenceBackend
+from dynx.bench.cases import ARGUMENTS, OF_A_FRAME, draw_batch
 from dynx.bench.checking import ENDS, Judge, checked_rows
-from dynx.bench.work import ARGUMENTS, OF_A_FRAME, draw_batch
 from dynx.errors import SingularMassMatrixError
 from dynx.model import Joint, Link, Model
 from dynx.model.model import Base
+from dynx.reference.backend import ReferenceBackend
 from dynx.spatial.scalar import Floats
 
 ROBOTS = ("double_pendulum", "panda")

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import dynx
+from dynx.bench.cases import ARGUMENTS, answer_shape
 from dynx.bench.cost import SINE_COSINE_PAIRS, SINE_COSINE_SINGLES, Cost, cost_of, program_of
-from dynx.bench.work import ARGUMENTS, answer_shape
 from dynx.simd.text import Writer
 from dynx.simd.trace import trace
 from dynx.simd.trigonometry import sines_and_cosines

@@ -9,12 +9,12 @@ import pytest
 
 import dynx
 from dynx.bench import measurement
+from dynx.bench.cases import ARGUMENTS, Batch, Work, draw_batch
+from dynx.bench.implementations import Prepared
 from dynx.bench.measurement import LOST, TRIAL, measure
 from dynx.bench.timing import Call, Times
-from dynx.bench.ways import Prepared
-from dynx.bench.work import ARGUMENTS, Batch, Work, draw_batch
 from dynx.spatial.scalar import Floats
-from tests.bench.ways import Failing, Scaled, Silent
+from tests.bench.implementations import Failing, Scaled, Silent
 
 MODEL = dynx.load("double_pendulum")
 BATCH = draw_batch(MODEL, MODEL.frame_names[-1], 40)

@@ -7,13 +7,13 @@ import json
 import pytest
 
 import dynx
+from dynx.bench.cases import Work
 from dynx.bench.cost import Cost
 from dynx.bench.measurement import Measurement
 from dynx.bench.report import SCHEMA, document, is_wrong, result, wrong
 from dynx.bench.session import works
 from dynx.bench.timing import Times
-from dynx.bench.work import Work
-from tests.bench.ways import PEAK, Scaled, session_of
+from tests.bench.implementations import PEAK, Scaled, session_of
 
 WORK = Work("inverse_dynamics", 65536)
 COST = Cost(bytes=192, operations=750, multiply_adds=400)

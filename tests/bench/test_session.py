@@ -6,13 +6,13 @@ import pytest
 
 import dynx
 from dynx.backends.registry import installed_backends
+from dynx.bench.cases import Work
 from dynx.bench.cost import cost_of, program_of
 from dynx.bench.measurement import Measurement
 from dynx.bench.session import BATCHES, WORTH_THREADS, Plan, Session, all_ways, works
-from dynx.bench.work import Work
 from dynx.errors import ArgumentError, EngineLimitError, UnknownNameError
 from dynx.model import Link, Model
-from tests.bench.ways import PEAK, Scaled, session_of
+from tests.bench.implementations import PEAK, Scaled, session_of
 
 MODEL = dynx.load("double_pendulum")
 FRAME = MODEL.frame_names[-1]

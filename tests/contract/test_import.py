@@ -31,7 +31,7 @@ def test_import_dynx_imports_nothing_heavy() -> None:
         "import dynx; dynx.load, dynx.backend, dynx.Model, dynx.installed_backends",
         "import dynx.backends, dynx.model, dynx.rbd, dynx.ik",
         "import dynx.agreement",
-        "import dynx.cli.main",
+        "import dynx.cli.shell.main",
         "import dynx; dynx.backend('reference', dynx.load('<robot name=\"r\"><link name=\"l\"/></robot>'))",
     ],
 )

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from dynx.backends import installed_backends
-from dynx.backends.bullet_inertia import ballast_for
-from dynx.backends.bullet_stepping import MotorCommand, SteppingClient
-from dynx.backends.bullet_urdf import bullet_tree
 from dynx.control import PD, ComputedTorque, PDMotor, PositionMotor, TorqueMotor, VelocityMotor
-from dynx.engines.pybullet import bullet
+from dynx.control.engine_motors import MotorCommand
+from dynx.engines.pybullet.canonical_urdf import bullet_tree
+from dynx.engines.pybullet.inertia import ballast_for
+from dynx.engines.pybullet.library import bullet
+from dynx.engines.pybullet.stepping import SteppingClient
 from dynx.errors import ArgumentError, GainError, UnsupportedFeatureError
 from dynx.model import Model
 from dynx.model.loading import load

@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 
 from dynx.agreement.tolerances import BAR
-from dynx.doctor.given_file import without_meshes
-from dynx.doctor.truth import TILTED, draw_states, free_model
+from dynx.doctor.examine.engine_input import without_meshes
+from dynx.doctor.examine.right_answers import TILTED, draw_states, free_model
 from dynx.model.model import Base
-from dynx.model.xml_source import XmlSource
+from dynx.model.xml.source import XmlSource
 
 SCRIPTS = {name: Path(__file__).with_name(f"raw_{name}.py") for name in ("pinocchio", "pybullet")}
 

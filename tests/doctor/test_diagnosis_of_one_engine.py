@@ -8,11 +8,11 @@ from typing import Any
 
 import pytest
 
-from dynx.backends.reference import ReferenceBackend
 from dynx.doctor import DoctorReport, diagnose
-from dynx.doctor.examination import LOADING, TORQUE
+from dynx.doctor.examine.examination import LOADING, TORQUE
 from dynx.loaded import LoadedRobot
 from dynx.model import Inertial
+from dynx.reference.backend import ReferenceBackend
 from dynx.spatial.scalar import Floats
 from tests.doctor.wilful_engine import HEAVY, NAME, SECRET, WilfulEngine
 from tests.rules.documents import case_of, joint, link

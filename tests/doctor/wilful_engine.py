@@ -9,13 +9,13 @@ from typing import ClassVar
 
 import numpy as np
 
-from dynx.backends.reference import ReferenceBackend
-from dynx.doctor.examination import Examination, Laboratory
-from dynx.doctor.truth import free_model
+from dynx.doctor.examine.examination import Examination, Laboratory
+from dynx.doctor.examine.right_answers import free_model
 from dynx.errors import EngineError
 from dynx.loaded import LoadedModel, LoadedRobot
 from dynx.model import Inertial, Model
-from dynx.model.xml_source import XmlSource
+from dynx.model.xml.source import XmlSource
+from dynx.reference.backend import ReferenceBackend
 from dynx.rules import Case
 from dynx.spatial.scalar import Floats
 

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from tests.faults.fault import Fault
 
-TRUTH = "dynx.doctor.truth"
-EXAMINATION = "dynx.doctor.examination"
-ATTRIBUTION = "dynx.doctor.attribution"
-MENDING = "dynx.doctor.mending"
+TRUTH = "dynx.doctor.examine.right_answers"
+EXAMINATION = "dynx.doctor.examine.examination"
+ATTRIBUTION = "dynx.doctor.prove.attribution"
+MENDING = "dynx.doctor.prove.mending"
 DIAGNOSIS = "dynx.doctor.diagnosis"
 REPORT = "dynx.doctor.report"
-GIVEN_FILE = "dynx.doctor.given_file"
-TEST_TRUTH = "tests/doctor/test_truth.py"
-TEST_EXAMINATION = "tests/doctor/test_examination.py"
-TEST_ATTRIBUTION = "tests/doctor/test_attribution.py"
-TEST_MENDING = "tests/doctor/test_mending.py"
+GIVEN_FILE = "dynx.doctor.examine.engine_input"
+TEST_TRUTH = "tests/doctor/examine/test_right_answers.py"
+TEST_EXAMINATION = "tests/doctor/examine/test_examination.py"
+TEST_ATTRIBUTION = "tests/doctor/prove/test_attribution.py"
+TEST_MENDING = "tests/doctor/prove/test_mending.py"
 TEST_DIAGNOSIS = "tests/doctor/test_diagnosis_of_one_engine.py"
 TEST_REPORT = "tests/doctor/test_report.py"
-TEST_GIVEN_FILE = "tests/doctor/test_given_file.py"
+TEST_GIVEN_FILE = "tests/doctor/examine/test_engine_input.py"
 FORMATS = "tests/doctor/formats"
 
 DOCTOR_FAULTS = (

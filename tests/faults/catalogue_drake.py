@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from tests.faults.fault import Fault
 
-DRAKE = "dynx.backends.drake"
-PLANT = "dynx.backends.drake_plant"
-COORDINATES = "dynx.engines.drake_coordinates"
-LOADED = "dynx.loaded.drake"
-DESCRIPTION = "dynx.loaded.drake_description"
-SETTINGS = "dynx.loaded.drake_settings"
-TEST_DRAKE = "tests/backends/test_drake.py"
-TEST_COORDINATES = "tests/backends/test_drake_coordinates.py"
-TEST_LOADED = "tests/loaded/test_drake.py"
+DRAKE = "dynx.engines.drake.backend"
+PLANT = "dynx.engines.drake.multibody_plant"
+COORDINATES = "dynx.engines.drake.coordinates"
+LOADED = "dynx.engines.drake.as_loaded"
+DESCRIPTION = "dynx.engines.drake.loaded_description"
+SETTINGS = "dynx.engines.drake.settings"
+TEST_DRAKE = "tests/engines/drake/test_backend.py"
+TEST_COORDINATES = "tests/engines/drake/test_coordinates.py"
+TEST_LOADED = "tests/engines/drake/test_as_loaded.py"
 FREE_BODY = "tests/oracles/test_closed_forms.py::test_backend_matches_closed_form[free_body-drake]"
 REFERENCE = f"{TEST_DRAKE}::test_it_answers_as_the_reference_does"
 

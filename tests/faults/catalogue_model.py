@@ -11,7 +11,7 @@ MECHANISM = "dynx.model.mechanism"
 CONFIGURATION = "dynx.model.configuration"
 COORDINATES = "tests/contract/test_coordinates.py"
 BODIES = "tests/contract/test_bodies.py"
-REFUSALS = "tests/model/test_urdf_refusals.py"
+REFUSALS = "tests/model/urdf/test_refusals.py"
 REFUSED = f"{REFUSALS}::test_a_bad_description_is_refused_with_line_and_reason"
 
 MODEL_FAULTS = (

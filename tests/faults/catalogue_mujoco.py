@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from tests.faults.fault import Fault
 
-MUJOCO = "dynx.backends.mujoco"
-TREE = "dynx.backends.mujoco_tree"
-PROJECTION = "dynx.backends.mujoco_projection"
-LOADED = "dynx.loaded.mujoco"
-LOADED_FILE = "dynx.loaded.mujoco_file"
-CONTENTS = "dynx.loaded.mujoco_contents"
+MUJOCO = "dynx.engines.mujoco.backend"
+TREE = "dynx.engines.mujoco.tree"
+PROJECTION = "dynx.engines.mujoco.projection"
+LOADED = "dynx.engines.mujoco.as_loaded"
+LOADED_FILE = "dynx.engines.mujoco.file_loading"
+CONTENTS = "dynx.engines.mujoco.loaded_description"
 CLOSED_FORM = "tests/oracles/test_closed_forms.py::test_backend_matches_closed_form"
-NATIVE = "tests/backends/test_mujoco.py::test_native_answers_are_those_derived_and_those_of_the_reference"
-TEST_LOADED = "tests/loaded/test_mujoco.py"
+NATIVE = (
+    "tests/engines/mujoco/test_backend.py::test_native_answers_are_those_derived_and_those_of_the_reference"
+)
+TEST_LOADED = "tests/engines/mujoco/test_as_loaded.py"
 MUJOCO_FREE_BODY = f"{CLOSED_FORM}[free_body-mujoco]"
 
 MUJOCO_FAULTS = (

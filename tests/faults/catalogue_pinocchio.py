@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from tests.faults.fault import Fault
 
-PINOCCHIO = "dynx.backends.pinocchio"
+PINOCCHIO = "dynx.engines.pinocchio.backend"
 COORDINATES = "tests/contract/test_coordinates.py"
 REFERENCES = "tests/contract/test_references.py"
 FORCES = "tests/contract/test_forces.py"
 CLOSED_FORM = "tests/oracles/test_closed_forms.py::test_backend_matches_closed_form"
-TEST_PINOCCHIO = "tests/backends/test_pinocchio.py"
+TEST_PINOCCHIO = "tests/engines/pinocchio/test_backend.py"
 NATIVE = f"{TEST_PINOCCHIO}::test_native_answers_are_those_derived_and_those_of_the_reference"
 
 PINOCCHIO_FAULTS = (

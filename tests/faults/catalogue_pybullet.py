@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from tests.faults.fault import Fault
 
-PYBULLET = "dynx.backends.pybullet"
-CLIENT = "dynx.backends.bullet_client"
-ROBOT = "dynx.backends.bullet_robot"
-INERTIA = "dynx.backends.bullet_inertia"
-URDF = "dynx.backends.bullet_urdf"
+PYBULLET = "dynx.engines.pybullet.backend"
+CLIENT = "dynx.engines.pybullet.client"
+ROBOT = "dynx.engines.pybullet.robot"
+INERTIA = "dynx.engines.pybullet.inertia"
+URDF = "dynx.engines.pybullet.canonical_urdf"
 COORDINATES = "tests/contract/test_coordinates.py"
 REFERENCES = "tests/contract/test_references.py"
 LIFECYCLE = "tests/contract/test_lifecycle.py"
 CLOSED_FORM = "tests/oracles/test_closed_forms.py::test_backend_matches_closed_form"
-TEST_PYBULLET = "tests/backends/test_pybullet.py"
-TEST_INERTIAS = "tests/backends/test_pybullet_inertias.py"
-TEST_LIFECYCLE = "tests/backends/test_pybullet_lifecycle.py"
+TEST_PYBULLET = "tests/engines/pybullet/test_backend.py"
+TEST_INERTIAS = "tests/engines/pybullet/test_inertias_of_robots.py"
+TEST_LIFECYCLE = "tests/engines/pybullet/test_lifecycle.py"
 BULLET_FREE_BODY = f"{CLOSED_FORM}[free_body-pybullet]"
 STEPPER = f"{TEST_PYBULLET}::test_the_stepper_has_no_clamp_limits_motors_or_damping"
 
@@ -176,14 +176,14 @@ PYBULLET_FAULTS = (
         INERTIA,
         right="second = second + longdouble(inertia.mass) * (arm @ arm)",
         wrong="second = second - longdouble(inertia.mass) * (arm @ arm)",
-        caught_by="tests/backends/test_bullet_inertia.py::test_principal_inertia_rebuilds_the_body",
+        caught_by="tests/engines/pybullet/test_inertia.py::test_principal_inertia_rebuilds_the_body",
     ),
     Fault(
         "bullet_negative_moments_rounded_to_zero",
         INERTIA,
         right="values = np.where((values < 0) & (values >= -noise), 0, values)",
         wrong="values = np.where(values < 0, 0, values)",
-        caught_by="tests/backends/test_bullet_inertia.py::test_a_negative_moment_needs_ballast",
+        caught_by="tests/engines/pybullet/test_inertia.py::test_a_negative_moment_needs_ballast",
     ),
     Fault(
         "bullet_children_of_the_root_not_moved_to_its_com",

@@ -25,7 +25,10 @@ PLANAR_3R = f"{CLOSED_FORMS}::test_backend_matches_closed_form[planar_3r-referen
 CART_POLE = f"{CLOSED_FORMS}::test_backend_matches_closed_form[cart_pole-reference]"
 EXACT = "tests/rbd/test_identities.py"
 FEWER = "tests/rbd/test_base_parameters.py"
-NATIVE = "tests/backends/test_pinocchio.py::test_native_answers_are_those_derived_and_those_of_the_reference"
+NATIVE = (
+    "tests/engines/pinocchio/test_backend.py"
+    "::test_native_answers_are_those_derived_and_those_of_the_reference"
+)
 
 RBD_FAULTS = (
     Fault(

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from tests.faults.fault import Fault
 
-JOINTS = "dynx.model.urdf_joints"
-LINKS = "dynx.model.urdf_links"
-VALUES = "dynx.model.urdf_values"
-XML = "dynx.model.xml_reading"
-XML_TEXT = "dynx.model.xml_text"
-WRITER = "dynx.model.urdf_writer"
-READER = "tests/model/test_urdf_reader.py"
-REFUSALS = "tests/model/test_urdf_refusals.py"
+JOINTS = "dynx.model.urdf.joints"
+LINKS = "dynx.model.urdf.links"
+VALUES = "dynx.model.urdf.values"
+XML = "dynx.model.xml.reading"
+XML_TEXT = "dynx.model.xml.text"
+WRITER = "dynx.model.urdf.writer"
+READER = "tests/model/urdf/test_reader.py"
+REFUSALS = "tests/model/urdf/test_refusals.py"
 REFUSED = f"{REFUSALS}::test_a_bad_description_is_refused_with_line_and_reason"
 
 READER_FAULTS = (
@@ -20,7 +20,7 @@ READER_FAULTS = (
         XML,
         right="self._parser.StartDoctypeDeclHandler = self._doctype",
         wrong="self._parser.StartDoctypeDeclHandler = None",
-        caught_by="tests/model/test_xml_reading.py::test_a_document_type_is_refused_with_its_line",
+        caught_by="tests/model/xml/test_reading.py::test_a_document_type_is_refused_with_its_line",
     ),
     Fault(
         "line_number_off_by_one",
@@ -34,7 +34,7 @@ READER_FAULTS = (
         XML_TEXT,
         right=r'return stripped, len(re.findall(r"\r\n|\r|\n", front))',
         wrong="return stripped, 0 * len(front)",
-        caught_by="tests/model/test_xml_reading.py::test_what_is_not_xml_is_refused_with_its_line",
+        caught_by="tests/model/xml/test_reading.py::test_what_is_not_xml_is_refused_with_its_line",
     ),
     Fault(
         "byte_order_mark_kept",
@@ -42,7 +42,7 @@ READER_FAULTS = (
         right='return "\\ufeff" + _strictly(data[len(mark) :], encoding, source), encoding',
         wrong="return _strictly(data, 'latin-1', source), 'latin-1'",
         caught_by=(
-            "tests/model/test_xml_reading.py::test_text_is_read_by_its_mark_its_declaration_or_as_utf8"
+            "tests/model/xml/test_reading.py::test_text_is_read_by_its_mark_its_declaration_or_as_utf8"
         ),
     ),
     Fault(
@@ -170,7 +170,7 @@ READER_FAULTS = (
         WRITER,
         right="return repr(max(-sys.float_info.max, min(sys.float_info.max, float(value))))",
         wrong='return f"{max(-1e308, min(1e308, float(value))):.15g}"',
-        caught_by="tests/model/test_urdf_writer.py::test_a_random_model_is_read_back_equal",
+        caught_by="tests/model/urdf/test_writer.py::test_a_random_model_is_read_back_equal",
     ),
     Fault(
         "package_path_may_lead_out",
@@ -181,9 +181,9 @@ READER_FAULTS = (
     ),
     Fault(
         "directory_opened_as_a_file",
-        "dynx.model.file_reading",
+        "dynx.files.reading",
         right="if stat.S_ISDIR(status.st_mode):",
         wrong="if status.st_size < 0:",
-        caught_by="tests/model/test_file_reading.py::test_a_directory_is_refused",
+        caught_by="tests/files/test_reading.py::test_a_directory_is_refused",
     ),
 )

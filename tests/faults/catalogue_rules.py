@@ -13,24 +13,24 @@ DX216 = "dynx.rules.catalogue.dx216_upper_limit_missing"
 DX217 = "dynx.rules.catalogue.dx217_joint_named_root_joint"
 DX301 = "dynx.rules.catalogue.dx301_damping_in_inverse_dynamics"
 DX401 = "dynx.rules.catalogue.dx401_decimal_comma"
-IMPOSSIBLE = "dynx.rules.impossible_inertia"
-PHYSICAL = "dynx.rules.physical_inertia"
-LUMPING = "dynx.rules.lumping"
-EDITS = "dynx.rules.inertial_edits"
-EDITING = "dynx.rules.editing"
-NUMBERS = "dynx.rules.number_text"
+IMPOSSIBLE = "dynx.rules.inertia.impossible"
+PHYSICAL = "dynx.rules.inertia.physical"
+LUMPING = "dynx.rules.inertia.merging"
+EDITS = "dynx.rules.inertia.edits"
+EDITING = "dynx.rules.text.editing"
+NUMBERS = "dynx.rules.text.number_text"
 DIFFERENCE = "dynx.loaded.difference"
-SOURCE = "dynx.model.xml_source"
+SOURCE = "dynx.model.xml.source"
 DETECTIONS = "tests/rules/test_dx1_detections.py"
 REMEDIES = "tests/rules/test_dx1_remedies.py"
 JOINTS = "tests/rules/test_dx2_joints.py"
 DYNAMICS = "tests/rules/test_dx3_joint_dynamics.py"
 MISSING_LIMITS = "tests/rules/test_missing_limits.py"
 TEXT = "tests/rules/test_dx4_text.py"
-NUMBER_TEXT = "tests/rules/test_number_text.py"
+NUMBER_TEXT = "tests/rules/text/test_number_text.py"
 OPTIONAL = "tests/rules/test_dx51.py"
 TEST_DIFFERENCE = "tests/loaded/test_difference.py"
-TEST_SOURCE = "tests/model/test_xml_source.py"
+TEST_SOURCE = "tests/model/xml/test_source.py"
 
 RULES_FAULTS = (
     # -- DX101 to DX107 ------------------------------------------------------------------------
@@ -145,7 +145,7 @@ RULES_FAULTS = (
         NUMBERS,
         right="return repr(float(value) + 0.0)",
         wrong='return f"{value:.15g}"',
-        caught_by="tests/rules/test_number_text.py::test_a_number_is_written_as_it_was",
+        caught_by="tests/rules/text/test_number_text.py::test_a_number_is_written_as_it_was",
     ),
     Fault(
         "dx301_damping_of_zero_is_damping",

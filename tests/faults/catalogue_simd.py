@@ -12,8 +12,8 @@ TESTS = "tests/simd"
 STRICT = f"{TESTS}/test_emit.py::test_strict_code_is_the_interpreter_bit_for_bit"
 ANY_NUMBER = f"{TESTS}/test_kernel.py::test_any_number_of_samples"
 ELEMENTARY = f"{TESTS}/test_elementary.py::test_within_two_units_everywhere"
-TEST_PARAMETRIC = "tests/backends/test_parametric.py"
-TEST_FRAMES = "tests/backends/test_compiled_frames.py"
+TEST_PARAMETRIC = "tests/compiled/test_parametric.py"
+TEST_FRAMES = "tests/compiled/test_frames.py"
 
 SIMD_FAULTS = (
     Fault(
@@ -165,56 +165,56 @@ SIMD_FAULTS = (
     ),
     Fault(
         "parametric_armature_forgotten_in_the_mass_matrix",
-        "dynx.backends.parametric",
+        "dynx.compiled.parametric",
         right="M[base + k, base + k] + joints[k, 2]",
         wrong="M[base + k, base + k] + 0 * joints[k, 2]",
         caught_by=f"{TEST_PARAMETRIC}::test_the_models_own_parameters_give_its_own_answers",
     ),
     Fault(
         "compiled_factor_without_fill_in",
-        "dynx.backends.mass_factors",
+        "dynx.compiled.mass_factors",
         right="A[i, j] = A[i, j] or np.any(A[i, :j] & A[j, :j])",
         wrong="A[i, j] = A[i, j]",
-        caught_by="tests/backends/test_mass_factors.py::test_zeros_between_branches_stay_unless_a_mimic_joint_fills_them",
+        caught_by="tests/compiled/test_mass_factors.py::test_zeros_between_branches_stay_unless_a_mimic_joint_fills_them",
     ),
     Fault(
         "compiled_batch_believed_without_its_check",
-        "dynx.backends.compiled_call",
+        "dynx.compiled.call",
         right="if not self._trusting and not defect.max(initial=0.0) < SOUND:",
         wrong="if not self._trusting and defect.max(initial=0.0) > SOUND:",
-        caught_by="tests/backends/test_compiled_arguments.py::test_a_bad_number_anywhere",
+        caught_by="tests/compiled/test_arguments.py::test_a_bad_number_anywhere",
     ),
     Fault(
         "compiled_singular_mass_matrix_not_noticed",
-        "dynx.backends.compiled_kernels",
+        "dynx.compiled.kernels",
         right="defect = defect + np.sum(abs(found)) * (SOUND / LARGEST)",
         wrong="defect = defect + 0 * np.sum(abs(found)) * (SOUND / LARGEST)",
-        caught_by="tests/backends/test_compiled_arguments.py::test_a_configuration_without_an_acceleration",
+        caught_by="tests/compiled/test_arguments.py::test_a_configuration_without_an_acceleration",
     ),
     Fault(
         "compiled_frame_moved_by_joints_beyond_it",
-        "dynx.backends.compiled_frames",
+        "dynx.compiled.frames",
         right="np.sum(shares[k:]) for k in range(1, len(shares))",
         wrong="np.sum(shares[k:]) for k in range(len(shares) - 1)",
         caught_by=f"{TEST_FRAMES}::test_any_frame_of_any_robot",
     ),
     Fault(
         "compiled_references_of_a_frame_exchanged",
-        "dynx.backends.compiled_frames",
+        "dynx.compiled.frames",
         right='place[_LOCAL], place[_WORLD] = reference == "local", reference == "world"',
         wrong='place[_WORLD], place[_LOCAL] = reference == "local", reference == "world"',
         caught_by=f"{TEST_FRAMES}::test_any_frame_of_any_robot",
     ),
     Fault(
         "compiled_acceleration_at_a_world_origin_that_moves_along",
-        "dynx.backends.compiled_frames",
+        "dynx.compiled.frames",
         right=" + skew(self.stays * twist[:3]) @ x[3:]",
         wrong="",
         caught_by=f"{TEST_FRAMES}::test_any_frame_of_any_robot",
     ),
     Fault(
         "compiled_place_known_to_the_first_sample_only",
-        "dynx.backends.compiled_call",
+        "dynx.compiled.call",
         right="room.input_rows[-1][...] = self._place",
         wrong="room.input_rows[-1][:1] = self._place",
         caught_by=f"{TEST_FRAMES}::test_every_way_gives_the_same_bits",

@@ -10,10 +10,10 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from dynx.backends.reference import ReferenceBackend
 from dynx.loaded import LoadedRobot
 from dynx.model import Inertial, Model
 from dynx.model.elements import JointDynamics
+from dynx.reference.backend import ReferenceBackend
 from dynx.spatial.scalar import Floats
 from dynx.testing.strategies import models
 from dynx.testing.strategies.geometry import Strategy

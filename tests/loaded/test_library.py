@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 
 from dynx.agreement.tolerances import BAR
-from dynx.backends.reference import ReferenceBackend
-from dynx.doctor.given_file import without_meshes, written
+from dynx.doctor.examine.engine_input import without_meshes, written
+from dynx.engines.pinocchio.as_loaded import LoadedPinocchio
 from dynx.errors import DynxError, EngineError
 from dynx.loaded.difference import model_difference
-from dynx.loaded.pinocchio import LoadedPinocchio
 from dynx.model import Model
 from dynx.model.library import EXAMPLE_ROBOT_DATA, robots
 from dynx.model.loading import load
 from dynx.model.model import Base
-from dynx.model.xml_source import XmlSource
+from dynx.model.xml.source import XmlSource
+from dynx.reference.backend import ReferenceBackend
 from tests.backends.robots import motion
 from tests.loaded.files import TILTED, assert_alike, error
 
@@ -65,7 +65,7 @@ def test_pinocchio_loads_it_as_dynx_reads_it(name: str, base: Base) -> None:
 @pytest.mark.parametrize("name", SOURCES)
 def test_pybullet_differs_where_the_model_difference_says_so(name: str, base: Base) -> None:
     pytest.importorskip("pybullet")
-    from dynx.loaded.pybullet import LoadedPyBullet
+    from dynx.engines.pybullet.as_loaded import LoadedPyBullet
 
     model = in_tree_coordinates(SOURCES[name], base)
     reference = ReferenceBackend(model)
@@ -98,7 +98,7 @@ def _refusal(model: Model) -> str | None:
 
 
 def test_some_robots_are_loaded_alike_and_most_are_not() -> None:
-    bullet = pytest.importorskip("dynx.loaded.pybullet")
+    bullet = pytest.importorskip("dynx.engines.pybullet.as_loaded")
     alike = []
     for name in ("ur5", "solo12", "panda", "talos", "g1"):
         model = in_tree_coordinates(SOURCES[name], "fixed")

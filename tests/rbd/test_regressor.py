@@ -9,8 +9,7 @@ import pytest
 from hypothesis import given
 
 from dynx.backends import DerivedBackend
-from dynx.backends.pinocchio import PinocchioBackend
-from dynx.backends.reference import ReferenceBackend
+from dynx.engines.pinocchio.backend import PinocchioBackend
 from dynx.model import Inertial, Joint, Link, Model
 from dynx.rbd import rnea
 from dynx.rbd.kinematics import body_poses
@@ -22,6 +21,7 @@ from dynx.rbd.regressor import (
     link_inertia,
     parameters_of,
 )
+from dynx.reference.backend import ReferenceBackend
 from dynx.spatial.scalar import Array
 from dynx.testing.strategies import models, samples
 from tests.backends.robots import BASES, assert_close, chain, mixed_robot, motion

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from dynx.model.model import Base
-from dynx.model.xml_source import XmlSource
+from dynx.model.xml.source import XmlSource
 from dynx.rules import Case
 
 LIMIT = '<limit lower="-1" upper="1" effort="10" velocity="5"/>'

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dynx.doctor.examination import change
-from dynx.doctor.truth import Truth, draw_states, find_truth
+from dynx.doctor.examine.examination import change
+from dynx.doctor.examine.right_answers import Truth, draw_states, find_truth
 from dynx.rules import Case
 from dynx.spatial.scalar import Floats
 

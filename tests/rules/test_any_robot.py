@@ -6,9 +6,9 @@ from hypothesis import given, note
 from hypothesis import strategies as st
 
 from dynx.agreement.tolerances import BAR
-from dynx.doctor.truth import TILTED
+from dynx.doctor.examine.right_answers import TILTED
 from dynx.model.model import Base
-from dynx.model.xml_source import XmlSource
+from dynx.model.xml.source import XmlSource
 from dynx.rules import Case, Rule, all_rules
 from dynx.testing.strategies import urdf_text
 from tests.rules.readings import distance

@@ -9,12 +9,12 @@ import pytest
 from packaging.specifiers import SpecifierSet
 
 from dynx.agreement.tolerances import BAR
-from dynx.doctor.truth import TILTED
+from dynx.doctor.examine.right_answers import TILTED
 from dynx.errors import UnknownNameError
 from dynx.loaded import ENGINES
-from dynx.model.xml_source import SourceElement, XmlSource
+from dynx.model.xml.source import SourceElement, XmlSource
 from dynx.rules import Case, Detection, Rule, all_rules, find_rule
-from dynx.rules.rigid_groups import rigid_groups
+from dynx.rules.inertia.rigid_groups import rigid_groups
 from dynx.rules.traps import find_trap, trap_case
 from tests.rules.readings import distance
 

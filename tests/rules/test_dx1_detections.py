@@ -7,15 +7,15 @@ from collections.abc import Callable
 import pytest
 
 from dynx.agreement.tolerances import BAR
+from dynx.engines.pybullet.inertia_checks import diagonalisation_error
 from dynx.model.elements import Inertial, Pose
 from dynx.model.library import OWN_MODELS, robots
 from dynx.model.model import Base
-from dynx.model.xml_source import Edit, XmlSource
+from dynx.model.xml.source import Edit, XmlSource
 from dynx.rules import Case, all_rules, find_rule
-from dynx.rules.bullet_inertias import diagonalisation_error
-from dynx.rules.impossible_inertia import NUMBERS_OF_THE_FILE
-from dynx.rules.inertial_edits import inertial_edits, with_inertials
-from dynx.rules.rigid_groups import rigid_groups
+from dynx.rules.inertia.edits import inertial_edits, with_inertials
+from dynx.rules.inertia.impossible import NUMBERS_OF_THE_FILE
+from dynx.rules.inertia.rigid_groups import rigid_groups
 from tests.rules.documents import case_of, joint, link
 
 RULES = [rule for rule in all_rules() if "DX101" <= rule.id <= "DX113"]

@@ -12,10 +12,10 @@ import dynx
 from dynx.model import Inertial, Model
 from dynx.model.library import EXAMPLE_ROBOT_DATA, robots
 from dynx.model.model import Base
-from dynx.model.xml_source import XmlSource
+from dynx.model.xml.source import XmlSource
 from dynx.rules import Case, Remedy, all_rules, find_rule
-from dynx.rules.central_inertia import CentralInertia
-from dynx.rules.inertial_edits import inertial_edits
+from dynx.rules.inertia.central import CentralInertia
+from dynx.rules.inertia.edits import inertial_edits
 from dynx.spatial.scalar import Floats
 from dynx.testing.strategies import models
 from tests.rules.documents import case_of, joint, link

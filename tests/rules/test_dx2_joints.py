@@ -10,12 +10,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dynx.backends.reference import ReferenceBackend
 from dynx.model import Model
 from dynx.model.loading import load
-from dynx.model.xml_source import XmlSource
+from dynx.model.xml.source import XmlSource
+from dynx.reference.backend import ReferenceBackend
 from dynx.rules import Case, find_rule
-from dynx.rules.joint_splitting import TYPES
+from dynx.rules.joints.splitting import TYPES
 from dynx.spatial.so3 import rotation_from_rpy
 from dynx.testing.strategies import unit_vectors
 from tests.rules.trap_cases import assert_same_robot, changed_lines, mended, only, trap

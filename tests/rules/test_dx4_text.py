@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 
 from dynx.model.library import find
 from dynx.model.loading import load
-from dynx.model.xml_source import XmlSource
+from dynx.model.xml.source import XmlSource
 from dynx.rules import Case, all_rules, find_rule
 from dynx.rules.catalogue.dx413_line_too_long import LONGEST
-from dynx.rules.misspelled_numbers import MisspelledNumberRule
-from dynx.rules.numeric_attributes import NumericAttribute, numeric_attributes
+from dynx.rules.text.misspelled_numbers import MisspelledNumberRule
+from dynx.rules.text.numeric_attributes import NumericAttribute, numeric_attributes
 from dynx.testing.strategies import urdf_text
 from tests.rules.trap_cases import assert_same_robot, changed_lines, mended, only, trap
 

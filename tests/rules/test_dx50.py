@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dynx.model.xml_source import XmlSource
+from dynx.model.xml.source import XmlSource
 from dynx.rules import Case, Rule, find_rule
 from dynx.spatial.so3 import rotation_from_rpy
 from tests.rules.documents import case_of, joint, link, visual

@@ -14,9 +14,9 @@ import pytest
 from packaging.specifiers import SpecifierSet
 
 from dynx.agreement.tolerances import BAR
-from dynx.doctor.examination import Examination, Laboratory
-from dynx.doctor.mending import mend
-from dynx.doctor.truth import Truth
+from dynx.doctor.examine.examination import Examination, Laboratory
+from dynx.doctor.examine.right_answers import Truth
+from dynx.doctor.prove.mending import mend
 from dynx.errors import ModelError
 from dynx.loaded import installed_engines, loader_class
 from dynx.rules import Case, Rule, all_rules

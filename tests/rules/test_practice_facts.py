@@ -12,8 +12,8 @@ from typing import Any
 
 import pytest
 
-from dynx.doctor.given_file import without_meshes, written
-from dynx.doctor.truth import free_model
+from dynx.doctor.examine.engine_input import without_meshes, written
+from dynx.doctor.examine.right_answers import free_model
 from dynx.engines.silence import silence
 from dynx.loaded import LoadedJoint, installed_engines, load_as, loader_class
 from dynx.rules.traps import find_trap, trap_case

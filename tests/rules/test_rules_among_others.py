@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from dynx.model.xml_source import XmlSource
+from dynx.model.xml.source import XmlSource
 from dynx.rules import Case, find_rule
 from dynx.rules.traps import trap_case
 

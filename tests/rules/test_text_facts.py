@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from dynx.doctor.given_file import written
+from dynx.doctor.examine.engine_input import written
 from dynx.engines.silence import silence
 from dynx.errors import EngineError
 from dynx.loaded import LoadedInertial, LoadedJoint, installed_engines, load_as
-from dynx.model.xml_source import XmlSource
+from dynx.model.xml.source import XmlSource
 from tests.rules.documents import LIMIT, case_of, joint, link
 
 SOUND = case_of(

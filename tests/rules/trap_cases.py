@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from dynx.backends.reference import ReferenceBackend
 from dynx.model import Model
-from dynx.model.xml_source import XmlSource
+from dynx.model.xml.source import XmlSource
+from dynx.reference.backend import ReferenceBackend
 from dynx.rules import Case, Detection, Remedy, find_rule
 
 TRAPS = Path(__file__).parents[2] / "models" / "traps"

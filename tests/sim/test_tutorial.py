@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dynx.backends import installed_backends
-from dynx.backends.pybullet import PyBulletBackend
+from dynx.engines.pybullet.backend import PyBulletBackend
 from dynx.errors import (
     ArgumentError,
     LimitError,

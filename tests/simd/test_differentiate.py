@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from dynx.errors import CompileError
 from dynx.simd.differentiate import Order, differentiate
 from dynx.simd.expr import Graph, Op
-from dynx.simd.inline import inlined
+from dynx.simd.inlining import inlined
 from dynx.simd.interp import interpret
 from dynx.simd.program import Port, Program, finished
 from dynx.simd.sign import sign

@@ -40,7 +40,7 @@ MASSLESS_ELBOW = """\
 
 WRONG = """
 import dynx
-from dynx.backends.reference import ReferenceBackend
+from dynx.reference.backend import ReferenceBackend
 
 class Heavy(ReferenceBackend):
     name = "heavy"

@@ -27,10 +27,10 @@ from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 from dynx.rules.case import Case
-from dynx.rules.inertial_edits import with_inertials, zero_inertial
-from dynx.rules.lumping import lumped_into
-from dynx.rules.massless_links import heaviest_welded_to_root
-from dynx.rules.rigid_groups import rigid_groups, static_links
+from dynx.rules.inertia.edits import with_inertials, zero_inertial
+from dynx.rules.inertia.massless_links import heaviest_welded_to_root
+from dynx.rules.inertia.merging import lumped_into
+from dynx.rules.inertia.rigid_groups import rigid_groups, static_links
 from dynx.rules.rule import Detection, Remedy, Rule
 
 _UNTOUCHED = "world"

@@ -28,10 +28,10 @@ from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 from dynx.rules.case import Case
-from dynx.rules.inertial_edits import line_of, with_inertials
-from dynx.rules.lumping import lumped_into
-from dynx.rules.physical_inertia import lifted, on_the_edge, principal_moments
-from dynx.rules.rigid_groups import rigid_groups
+from dynx.rules.inertia.edits import line_of, with_inertials
+from dynx.rules.inertia.merging import lumped_into
+from dynx.rules.inertia.physical import lifted, on_the_edge, principal_moments
+from dynx.rules.inertia.rigid_groups import rigid_groups
 from dynx.rules.rule import Detection, Remedy, Rule
 
 _ROUNDS = 4

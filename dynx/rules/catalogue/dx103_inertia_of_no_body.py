@@ -25,8 +25,8 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from dynx.rules.impossible_inertia import ImpossibleInertia
-from dynx.rules.physical_inertia import Fault
+from dynx.rules.inertia.impossible import ImpossibleInertia
+from dynx.rules.inertia.physical import Fault
 
 
 class InertiaOfNoBody(ImpossibleInertia):

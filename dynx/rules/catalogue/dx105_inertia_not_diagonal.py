@@ -25,12 +25,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
-from dynx.rules.bullet_inertias import diagonalisation_error, read_by_bullet
+from dynx.engines.pybullet.inertia_checks import diagonalisation_error, read_by_bullet
 from dynx.rules.case import Case
-from dynx.rules.central_inertia import CentralInertia
-from dynx.rules.inertial_edits import line_of, with_inertials
-from dynx.rules.physical_inertia import clear_fault, lifted, on_the_edge
-from dynx.rules.rigid_groups import rigid_groups
+from dynx.rules.inertia.central import CentralInertia
+from dynx.rules.inertia.edits import line_of, with_inertials
+from dynx.rules.inertia.physical import clear_fault, lifted, on_the_edge
+from dynx.rules.inertia.rigid_groups import rigid_groups
 from dynx.rules.rule import Detection, Remedy, Rule
 
 _NOTICEABLE = 1e-14

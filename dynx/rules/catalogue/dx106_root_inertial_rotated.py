@@ -25,8 +25,8 @@ from typing import ClassVar
 import numpy as np
 
 from dynx.rules.case import Case
-from dynx.rules.central_inertia import CentralInertia
-from dynx.rules.inertial_edits import line_of, with_inertials
+from dynx.rules.inertia.central import CentralInertia
+from dynx.rules.inertia.edits import line_of, with_inertials
 from dynx.rules.rule import Detection, Remedy, Rule
 from dynx.spatial.so3 import rotation_from_rpy
 

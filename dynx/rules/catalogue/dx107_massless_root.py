@@ -26,10 +26,10 @@ from collections.abc import Mapping, Sequence
 from typing import ClassVar, Literal
 
 from dynx.rules.case import Case
-from dynx.rules.inertial_edits import with_inertials
-from dynx.rules.lumping import lumped_into
-from dynx.rules.massless_links import heaviest_welded_to_root, with_least_inertia
-from dynx.rules.rigid_groups import rigid_groups
+from dynx.rules.inertia.edits import with_inertials
+from dynx.rules.inertia.massless_links import heaviest_welded_to_root, with_least_inertia
+from dynx.rules.inertia.merging import lumped_into
+from dynx.rules.inertia.rigid_groups import rigid_groups
 from dynx.rules.rule import Detection, Remedy, Rule
 
 

@@ -27,10 +27,10 @@ from typing import ClassVar
 import numpy as np
 
 from dynx.rules.case import Case
-from dynx.rules.inertial_edits import with_inertials
-from dynx.rules.lumping import lumped_into
-from dynx.rules.physical_inertia import SMALLEST_MASS
-from dynx.rules.rigid_groups import rigid_groups
+from dynx.rules.inertia.edits import with_inertials
+from dynx.rules.inertia.merging import lumped_into
+from dynx.rules.inertia.physical import SMALLEST_MASS
+from dynx.rules.inertia.rigid_groups import rigid_groups
 from dynx.rules.rule import Detection, Remedy, Rule
 
 

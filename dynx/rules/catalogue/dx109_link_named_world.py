@@ -26,7 +26,7 @@ from collections.abc import Mapping, Sequence
 from typing import ClassVar, Literal
 
 from dynx.rules.case import Case
-from dynx.rules.renaming import fresh_name, renaming_link
+from dynx.rules.joints.renaming import fresh_name, renaming_link
 from dynx.rules.rule import Detection, Remedy, Rule
 
 _WORLD = "world"

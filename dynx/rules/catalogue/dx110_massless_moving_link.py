@@ -22,7 +22,7 @@ from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 from dynx.rules.case import Case
-from dynx.rules.massless_links import massless_links, with_least_inertia
+from dynx.rules.inertia.massless_links import massless_links, with_least_inertia
 from dynx.rules.rule import Detection, Remedy, Rule
 
 

@@ -31,10 +31,10 @@ import numpy as np
 
 from dynx.model.elements import Inertial
 from dynx.rules.case import Case
-from dynx.rules.central_inertia import CentralInertia
-from dynx.rules.inertial_edits import line_of, with_inertials
-from dynx.rules.lumping import lumped_into, written
-from dynx.rules.physical_inertia import (
+from dynx.rules.inertia.central import CentralInertia
+from dynx.rules.inertia.edits import line_of, with_inertials
+from dynx.rules.inertia.merging import lumped_into, written
+from dynx.rules.inertia.physical import (
     ENOUGH,
     ROUNDING,
     SMALLEST_MASS,
@@ -45,7 +45,7 @@ from dynx.rules.physical_inertia import (
     nearest_moments,
     principal_moments,
 )
-from dynx.rules.rigid_groups import RigidGroup, rigid_groups
+from dynx.rules.inertia.rigid_groups import RigidGroup, rigid_groups
 from dynx.rules.rule import Detection, Remedy, Rule
 
 _NEGLIGIBLE = 1e-3

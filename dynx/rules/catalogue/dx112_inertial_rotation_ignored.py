@@ -23,9 +23,9 @@ from typing import ClassVar
 import numpy as np
 
 from dynx.rules.case import Case
-from dynx.rules.central_inertia import CentralInertia
-from dynx.rules.inertial_edits import line_of
-from dynx.rules.rigid_groups import rigid_groups
+from dynx.rules.inertia.central import CentralInertia
+from dynx.rules.inertia.edits import line_of
+from dynx.rules.inertia.rigid_groups import rigid_groups
 from dynx.rules.rule import Detection, Rule
 
 _VISIBLE = 1e-14

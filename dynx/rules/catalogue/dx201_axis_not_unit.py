@@ -24,11 +24,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from dynx.rules.attributes import vector_of
 from dynx.rules.case import Case
-from dynx.rules.editing import Correction, EditingRule, found_at
-from dynx.rules.joint_elements import SINGLE, elements_in_joints
-from dynx.rules.number_text import decimal
+from dynx.rules.joints.elements import SINGLE, elements_in_joints
+from dynx.rules.text.attributes import vector_of
+from dynx.rules.text.editing import Correction, EditingRule, found_at
+from dynx.rules.text.number_text import decimal
 
 _ROUNDING = 1e-15
 """How far from 1 the length of a unit vector can be after rounding; dynx leaves such an axis alone."""

@@ -20,11 +20,11 @@ from collections.abc import Iterable, Mapping
 from typing import ClassVar
 
 from dynx.rules.case import Case
-from dynx.rules.editing import Correction, EditingRule, found_at
 from dynx.rules.engine_versions import EVERY_ENGINE
-from dynx.rules.joint_elements import SINGLE, elements_in_joints
-from dynx.rules.number_text import is_number
+from dynx.rules.joints.elements import SINGLE, elements_in_joints
 from dynx.rules.rule import Stage
+from dynx.rules.text.editing import Correction, EditingRule, found_at
+from dynx.rules.text.number_text import is_number
 
 
 class AxisWithoutDirection(EditingRule):

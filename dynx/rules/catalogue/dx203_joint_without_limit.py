@@ -18,12 +18,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import ClassVar
 
-from dynx.model.xml_source import Edit, SourceElement
+from dynx.model.xml.source import Edit, SourceElement
 from dynx.rules.case import Case
-from dynx.rules.editing import Correction, EditingRule, found_at
-from dynx.rules.joint_elements import UNLIMITED, joints_of_type
-from dynx.rules.number_text import LARGEST
+from dynx.rules.joints.elements import UNLIMITED, joints_of_type
 from dynx.rules.rule import Stage
+from dynx.rules.text.editing import Correction, EditingRule, found_at
+from dynx.rules.text.number_text import LARGEST
 
 _ZERO = f'<limit lower="0" upper="0" effort="{LARGEST}" velocity="{LARGEST}"/>'
 

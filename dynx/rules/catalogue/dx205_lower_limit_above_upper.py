@@ -18,12 +18,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import ClassVar
 
-from dynx.rules.attributes import number_or_none
 from dynx.rules.case import Case
-from dynx.rules.editing import Correction, EditingRule, found_at
-from dynx.rules.joint_elements import SINGLE, elements_in_joints
-from dynx.rules.number_text import LARGEST
+from dynx.rules.joints.elements import SINGLE, elements_in_joints
 from dynx.rules.rule import Stage
+from dynx.rules.text.attributes import number_or_none
+from dynx.rules.text.editing import Correction, EditingRule, found_at
+from dynx.rules.text.number_text import LARGEST
 
 
 class LowerLimitAboveUpper(EditingRule):

@@ -20,11 +20,11 @@ from collections.abc import Iterable, Mapping
 from typing import ClassVar
 
 from dynx.errors import shown
-from dynx.model.xml_source import SourceElement
+from dynx.model.xml.source import SourceElement
 from dynx.rules.case import Case
-from dynx.rules.editing import Correction, EditingRule, found_at
-from dynx.rules.joint_elements import SINGLE, elements_in_joints
+from dynx.rules.joints.elements import SINGLE, elements_in_joints
 from dynx.rules.rule import Stage
+from dynx.rules.text.editing import Correction, EditingRule, found_at
 
 
 class MimicOfNothing(EditingRule):

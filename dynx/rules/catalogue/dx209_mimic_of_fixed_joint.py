@@ -22,11 +22,11 @@ from typing import ClassVar
 
 from dynx.errors import shown
 from dynx.model.elements import Joint
-from dynx.model.xml_source import Edit, SourceElement
+from dynx.model.xml.source import Edit, SourceElement
 from dynx.rules.case import Case
-from dynx.rules.editing import Correction, EditingRule, found_at
-from dynx.rules.joint_elements import SINGLE, elements_in_joints
-from dynx.rules.number_text import decimal
+from dynx.rules.joints.elements import SINGLE, elements_in_joints
+from dynx.rules.text.editing import Correction, EditingRule, found_at
+from dynx.rules.text.number_text import decimal
 
 
 class MimicOfFixedJoint(EditingRule):

@@ -25,13 +25,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import ClassVar
 
-from dynx.model.xml_source import Edit, SourceElement
-from dynx.rules.attributes import number_or_none
+from dynx.model.xml.source import Edit, SourceElement
 from dynx.rules.case import Case, end_of
-from dynx.rules.editing import Correction, EditingRule, found_at
-from dynx.rules.joint_elements import joints_of_type
-from dynx.rules.joint_splitting import TYPES, splitting
+from dynx.rules.joints.elements import joints_of_type
+from dynx.rules.joints.splitting import TYPES, splitting
 from dynx.rules.rule import Stage
+from dynx.rules.text.attributes import number_or_none
+from dynx.rules.text.editing import Correction, EditingRule, found_at
 
 
 class JointOfSeveralFreedoms(EditingRule):

@@ -21,8 +21,8 @@ from collections.abc import Iterable, Mapping
 from typing import ClassVar
 
 from dynx.rules.case import Case
-from dynx.rules.editing import Correction, EditingRule, found_at
-from dynx.rules.joint_elements import joints_of_type
+from dynx.rules.joints.elements import joints_of_type
+from dynx.rules.text.editing import Correction, EditingRule, found_at
 
 
 class FloatingJointAtRoot(EditingRule):

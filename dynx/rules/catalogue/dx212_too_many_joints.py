@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import ClassVar
 
-from dynx.loaded.bullet_file import MAX_JOINTS
+from dynx.engines.pybullet.file_checks import MAX_JOINTS
 from dynx.model import Model
 from dynx.model.elements import Link
 from dynx.rules.case import Case

@@ -17,11 +17,11 @@ from collections.abc import Iterable, Mapping
 from typing import ClassVar
 
 from dynx.errors import shown
-from dynx.model.xml_source import SourceElement
+from dynx.model.xml.source import SourceElement
 from dynx.rules.case import Case
-from dynx.rules.editing import Correction, EditingRule, found_at
+from dynx.rules.joints.transmissions import transmissions_drake_reads, type_of
 from dynx.rules.rule import Stage
-from dynx.rules.transmissions import transmissions_drake_reads, type_of
+from dynx.rules.text.editing import Correction, EditingRule, found_at
 
 
 class TransmissionOfNothing(EditingRule):

@@ -20,12 +20,12 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import ClassVar
 
 from dynx.errors import shown
-from dynx.model.xml_source import SourceElement
+from dynx.model.xml.source import SourceElement
 from dynx.rules.case import Case
-from dynx.rules.editing import Correction, EditingRule, found_at
-from dynx.rules.renaming import fresh_name
+from dynx.rules.joints.renaming import fresh_name
+from dynx.rules.joints.transmissions import moves_by_actuator, transmissions_drake_reads
 from dynx.rules.rule import Stage
-from dynx.rules.transmissions import moves_by_actuator, transmissions_drake_reads
+from dynx.rules.text.editing import Correction, EditingRule, found_at
 
 
 class ActuatorNamedTwice(EditingRule):

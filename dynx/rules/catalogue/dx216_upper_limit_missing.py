@@ -25,10 +25,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import ClassVar
 
-from dynx.rules.attributes import number_or_none
 from dynx.rules.case import Case
-from dynx.rules.editing import Correction, EditingRule, found_at
-from dynx.rules.joint_elements import elements_in_joints
+from dynx.rules.joints.elements import elements_in_joints
+from dynx.rules.text.attributes import number_or_none
+from dynx.rules.text.editing import Correction, EditingRule, found_at
 
 _UPPER_OF_PYBULLET = -1.0
 """What PyBullet has for an upper limit that is not given; URDF has 0."""

@@ -22,8 +22,8 @@ from collections.abc import Iterable, Mapping
 from typing import ClassVar, Literal
 
 from dynx.rules.case import Case
-from dynx.rules.editing import Correction, EditingRule, found_at
-from dynx.rules.renaming import fresh_name, renaming_joint
+from dynx.rules.joints.renaming import fresh_name, renaming_joint
+from dynx.rules.text.editing import Correction, EditingRule, found_at
 
 _RESERVED = "root_joint"
 

@@ -21,11 +21,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import ClassVar
 
-from dynx.rules.attributes import number_or_none
 from dynx.rules.case import Case
-from dynx.rules.editing import CallingRule, found_at
-from dynx.rules.joint_elements import SINGLE, elements_in_joints
+from dynx.rules.joints.elements import SINGLE, elements_in_joints
 from dynx.rules.rule import Detection
+from dynx.rules.text.attributes import number_or_none
+from dynx.rules.text.editing import CallingRule, found_at
 
 
 class DampingInInverseDynamics(CallingRule):

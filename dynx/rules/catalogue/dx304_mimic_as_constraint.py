@@ -25,8 +25,8 @@ from typing import ClassVar
 
 from dynx.errors import shown
 from dynx.rules.case import Case
-from dynx.rules.editing import CallingRule, found_at
 from dynx.rules.rule import Detection
+from dynx.rules.text.editing import CallingRule, found_at
 
 
 class MimicAsConstraint(CallingRule):

@@ -17,9 +17,9 @@ from collections.abc import Iterable, Mapping
 from typing import ClassVar
 
 from dynx.rules.case import Case
-from dynx.rules.editing import Correction, EditingRule, found_at
-from dynx.rules.joint_elements import elements_in_joints
+from dynx.rules.joints.elements import elements_in_joints
 from dynx.rules.rule import Stage
+from dynx.rules.text.editing import Correction, EditingRule, found_at
 
 
 class EmptyDynamics(EditingRule):

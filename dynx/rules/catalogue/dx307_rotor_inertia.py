@@ -19,11 +19,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import ClassVar
 
-from dynx.rules.attributes import number_or_none
 from dynx.rules.case import Case
-from dynx.rules.editing import CallingRule
+from dynx.rules.joints.transmissions import moves_by_actuator
 from dynx.rules.rule import Detection
-from dynx.rules.transmissions import moves_by_actuator
+from dynx.rules.text.attributes import number_or_none
+from dynx.rules.text.editing import CallingRule
 
 _TAG = "drake:rotor_inertia"
 

@@ -19,10 +19,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import ClassVar
 
-from dynx.model.xml_source import SourceElement
+from dynx.model.xml.source import SourceElement
 from dynx.rules.case import Case
-from dynx.rules.editing import CallingRule
 from dynx.rules.rule import Detection
+from dynx.rules.text.editing import CallingRule
 
 
 class ContactsAsForces(CallingRule):

@@ -30,8 +30,8 @@ from typing import ClassVar
 
 from dynx.rules.case import Case
 from dynx.rules.engine_versions import EVERY_ENGINE
-from dynx.rules.misspelled_numbers import MisspelledNumberRule
-from dynx.rules.number_text import Fault, Misspelling
+from dynx.rules.text.misspelled_numbers import MisspelledNumberRule
+from dynx.rules.text.number_text import Fault, Misspelling
 
 
 class DecimalComma(MisspelledNumberRule):

@@ -22,8 +22,8 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 from dynx.rules.engine_versions import EVERY_ENGINE
-from dynx.rules.misspelled_numbers import MisspelledNumberRule
-from dynx.rules.number_text import Fault
+from dynx.rules.text.misspelled_numbers import MisspelledNumberRule
+from dynx.rules.text.number_text import Fault
 
 
 class CommaBetweenNumbers(MisspelledNumberRule):

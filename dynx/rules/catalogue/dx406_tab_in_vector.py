@@ -21,8 +21,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar
 
-from dynx.rules.misspelled_numbers import MisspelledNumberRule
-from dynx.rules.number_text import Fault
+from dynx.rules.text.misspelled_numbers import MisspelledNumberRule
+from dynx.rules.text.number_text import Fault
 
 
 class TabInVector(MisspelledNumberRule):

@@ -18,11 +18,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar
 
-from dynx.model.xml_source import Edit
+from dynx.model.xml.source import Edit
 from dynx.rules.case import Case
-from dynx.rules.misspelled_numbers import MisspelledNumberRule
-from dynx.rules.number_text import Fault, Misspelling
-from dynx.rules.numeric_attributes import NumericAttribute
+from dynx.rules.text.misspelled_numbers import MisspelledNumberRule
+from dynx.rules.text.number_text import Fault, Misspelling
+from dynx.rules.text.numeric_attributes import NumericAttribute
 
 
 class EmptyVector(MisspelledNumberRule):

@@ -22,14 +22,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import ClassVar
 
-from dynx.model.xml_source import Edit, SourceElement
+from dynx.model.xml.source import Edit, SourceElement
 from dynx.rules.case import Case
-from dynx.rules.editing import Correction, EditingRule, found_at
-from dynx.rules.element_text import text_in
 from dynx.rules.engine_versions import EVERY_ENGINE
-from dynx.rules.inertial_edits import ZERO_TENSOR, zero_inertial
-from dynx.rules.number_text import is_number
+from dynx.rules.inertia.edits import ZERO_TENSOR, zero_inertial
 from dynx.rules.rule import Stage
+from dynx.rules.text.editing import Correction, EditingRule, found_at
+from dynx.rules.text.element_text import text_in
+from dynx.rules.text.number_text import is_number
 
 
 class IncompleteInertial(EditingRule):

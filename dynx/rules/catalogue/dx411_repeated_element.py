@@ -18,10 +18,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import ClassVar
 
-from dynx.model.xml_source import SourceElement
+from dynx.model.xml.source import SourceElement
 from dynx.rules.case import Case
-from dynx.rules.editing import Correction, EditingRule, found_at
 from dynx.rules.rule import Stage
+from dynx.rules.text.editing import Correction, EditingRule, found_at
 
 _ONCE = {
     "link": ("inertial",),

@@ -18,8 +18,8 @@ from pathlib import PurePath
 from typing import ClassVar
 
 from dynx.rules.case import Case
-from dynx.rules.editing import Correction, EditingRule, found_at
 from dynx.rules.rule import Stage
+from dynx.rules.text.editing import Correction, EditingRule, found_at
 
 
 class RobotWithoutName(EditingRule):

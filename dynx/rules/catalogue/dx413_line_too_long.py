@@ -22,10 +22,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import ClassVar
 
-from dynx.model.xml_source import Edit, SourceElement, Span
+from dynx.model.xml.source import Edit, SourceElement, Span
 from dynx.rules.case import Case
-from dynx.rules.editing import Correction, EditingRule, found_at
 from dynx.rules.rule import Stage
+from dynx.rules.text.editing import Correction, EditingRule, found_at
 
 LONGEST = 8191
 """Bytes that PyBullet reads at once."""

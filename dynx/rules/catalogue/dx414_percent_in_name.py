@@ -19,9 +19,9 @@ from typing import ClassVar
 
 from dynx.errors import shown
 from dynx.rules.case import Case
-from dynx.rules.editing import Correction, EditingRule, found_at
-from dynx.rules.renaming import fresh_name, renaming_joint, renaming_link
+from dynx.rules.joints.renaming import fresh_name, renaming_joint, renaming_link
 from dynx.rules.rule import Stage
+from dynx.rules.text.editing import Correction, EditingRule, found_at
 
 
 class PercentInName(EditingRule):

@@ -18,8 +18,8 @@ from typing import ClassVar
 
 from dynx.errors import shown
 from dynx.rules.case import Case
-from dynx.rules.editing import Correction, EditingRule, found_at
 from dynx.rules.rule import Stage
+from dynx.rules.text.editing import Correction, EditingRule, found_at
 
 
 class MaterialDefinedTwice(EditingRule):

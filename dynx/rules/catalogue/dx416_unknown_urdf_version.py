@@ -17,8 +17,8 @@ from typing import ClassVar
 
 from dynx.errors import shown
 from dynx.rules.case import Case
-from dynx.rules.editing import Correction, EditingRule, found_at
 from dynx.rules.rule import Stage
+from dynx.rules.text.editing import Correction, EditingRule, found_at
 
 _KNOWN = ("1.0", "1.1", "1.2")
 

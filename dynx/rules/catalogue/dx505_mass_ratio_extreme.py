@@ -20,7 +20,7 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 from dynx.rules.case import Case
-from dynx.rules.rigid_groups import rigid_groups
+from dynx.rules.inertia.rigid_groups import rigid_groups
 from dynx.rules.rule import Detection, Kind, Rule
 
 _RATIO = 1e6

@@ -17,8 +17,8 @@ from collections.abc import Iterable, Mapping
 from typing import ClassVar
 
 from dynx.rules.case import Case
-from dynx.rules.editing import Correction, OptionalEditingRule, found_at
-from dynx.rules.number_text import decimal
+from dynx.rules.text.editing import Correction, OptionalEditingRule, found_at
+from dynx.rules.text.number_text import decimal
 
 
 class MimicChain(OptionalEditingRule):

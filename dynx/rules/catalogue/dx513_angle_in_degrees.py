@@ -18,11 +18,11 @@ from collections.abc import Iterator, Sequence
 from typing import ClassVar
 
 from dynx.errors import DescriptionError
-from dynx.model.xml_source import SourceElement
-from dynx.rules.attributes import origin_of
+from dynx.model.xml.source import SourceElement
 from dynx.rules.case import Case
-from dynx.rules.editing import found_at
 from dynx.rules.rule import Detection, Kind, Rule
+from dynx.rules.text.attributes import origin_of
+from dynx.rules.text.editing import found_at
 
 _TWO_TURNS = 4.0 * math.pi
 _STEP, _SMALLEST, _LARGEST = 5.0, 30.0, 360.0

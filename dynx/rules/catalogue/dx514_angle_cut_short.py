@@ -19,8 +19,8 @@ from collections.abc import Iterable, Mapping
 from typing import ClassVar
 
 from dynx.rules.case import Case
-from dynx.rules.editing import Correction, OptionalEditingRule, found_at
-from dynx.rules.joint_elements import elements_in_joints
+from dynx.rules.joints.elements import elements_in_joints
+from dynx.rules.text.editing import Correction, OptionalEditingRule, found_at
 
 
 class AngleCutShort(OptionalEditingRule):

@@ -18,11 +18,11 @@ import difflib
 from collections.abc import Collection, Iterator, Sequence
 from typing import ClassVar
 
-from dynx.model.xml_source import SourceElement
+from dynx.model.xml.source import SourceElement
 from dynx.rules.case import Case
-from dynx.rules.editing import found_at
-from dynx.rules.inertial_edits import MOMENTS
+from dynx.rules.inertia.edits import MOMENTS
 from dynx.rules.rule import Detection, Kind, Rule
+from dynx.rules.text.editing import found_at
 
 _ELEMENTS = {
     "robot": ("link", "joint", "material", "transmission"),

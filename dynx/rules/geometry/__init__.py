@@ -2,6 +2,6 @@
 
 from dynx.rules.geometry.extent import Extent
 from dynx.rules.geometry.mesh_files import MeshNotFoundError, find_mesh
-from dynx.rules.geometry.welded import welded_extents
+from dynx.rules.geometry.rigid_shapes import welded_extents
 
 __all__ = ["Extent", "MeshNotFoundError", "find_mesh", "welded_extents"]

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from dynx.errors import DynxError
-from dynx.model.file_reading import read_file
+from dynx.files.reading import read_file
 from dynx.rules.geometry.collada import collada_points
 from dynx.spatial.scalar import Floats
 

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dynx.cli.terminal import json_text
+from dynx.cli.shell.terminal import json_text
 from dynx.doctor.formats import baseline_document, read_baseline
 from dynx.doctor.formats.baseline import Baseline, differences
 from dynx.doctor.report import DoctorReport, EngineResult

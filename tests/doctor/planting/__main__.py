@@ -12,8 +12,8 @@ import time
 from collections import Counter
 from collections.abc import Sequence
 
-from dynx.cli.workers import Workers
 from dynx.model.model import Base
+from dynx.workers import Workers
 from tests.doctor.planting.catalogue import EXEMPT, PLANTERS
 from tests.doctor.planting.judging import Verdict, work
 from tests.doctor.planting.plan import Trial, alone, in_pairs

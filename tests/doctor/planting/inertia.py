@@ -7,7 +7,7 @@ from decimal import Decimal
 import numpy as np
 
 from dynx.model.elements import Inertial
-from dynx.model.xml_source import Edit, SourceElement
+from dynx.model.xml.source import Edit, SourceElement
 from tests.doctor.planting.site import NotHere, Planted, Planter, Site
 
 MOMENTS = ("ixx", "iyy", "izz")

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from random import Random
 
 from dynx.model.model import Base
-from dynx.model.xml_source import XmlSource
+from dynx.model.xml.source import XmlSource
 from tests.doctor.planting.catalogue import PLANTERS
 from tests.doctor.planting.robots import ROBOTS, bases, clean_skeleton, clean_text
 from tests.doctor.planting.site import NotHere, Planted, Site

@@ -10,7 +10,7 @@ from typing import TypeVar
 from dynx.model import Model
 from dynx.model.elements import Joint
 from dynx.model.model import Base
-from dynx.model.xml_source import Edit, SourceElement, XmlSource
+from dynx.model.xml.source import Edit, SourceElement, XmlSource
 from tests.doctor.planting.skeleton import Skeleton
 
 Place = tuple[str, "str | None", "str | None"]

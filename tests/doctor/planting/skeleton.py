@@ -10,9 +10,9 @@ from functools import cached_property
 
 import numpy as np
 
-from dynx.backends.reference import ReferenceBackend
 from dynx.model import Model
 from dynx.model.elements import Inertial
+from dynx.reference.backend import ReferenceBackend
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import rotation_from_rpy
 

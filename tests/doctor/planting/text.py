@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from dynx.model.xml_source import Edit, SourceElement
+from dynx.model.xml.source import Edit, SourceElement
 from tests.doctor.planting.inertia import MOMENTS, PRODUCTS
 from tests.doctor.planting.joints import limited, moving
 from tests.doctor.planting.site import NotHere, Planted, Planter, Site

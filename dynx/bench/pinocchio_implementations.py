@@ -1,0 +1,192 @@
+"""Pinocchio itself as a peer: its C++ batches, its binding in a loop, and the C++ within the binding.
+
+The engine's model is the one of the backend `pinocchio` (the same links and joints, see
+`dynx.engines.pinocchio.backend.engine_model`). To the engine a mimic joint is one more coordinate, so a robot
+that has some is given to it with those joints set free, at the same states.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import Any, ClassVar
+
+import numpy as np
+
+from dynx.bench.cases import Batch, Work
+from dynx.bench.implementations import Prepared, Role, Way
+from dynx.bench.timing import Call
+from dynx.engines.pinocchio.backend import engine_model
+from dynx.engines.pinocchio.library import pin
+from dynx.model import Model
+from dynx.spatial.scalar import Floats
+
+BATCH, LOOP, INSIDE = "pinocchio C++ batch", "pinocchio binding", "pinocchio C++ call"
+"""Names of the three: `rneaInParallel` and `abaInParallel`, a Python loop over the binding, and the same
+loop less what a call costs without the work."""
+
+
+FEWEST_CALLS = 1024
+"""So many samples are needed to tell the C++ from the rest of a call."""
+
+_ONE_JOINT_ANSWER = {"forward_kinematics": (4, 4), "jacobian": (6, 1), "mass_matrix": (1, 1)}
+"""Shape of the answers of a robot with one joint, where it is not (1,)."""
+
+
+class PinocchioWay(Way):
+    """What the three have in common: the engine's model, and the samples in its coordinates."""
+
+    role: Role = "peer"
+    version = f"pinocchio {pin.__version__}"
+    threads = 1
+    whole = False
+
+    def __init__(self, model: Model) -> None:
+        self.model = without_mimics(model)
+        self._engine, self._frame_ids = engine_model(self.model)
+
+    def samples(self, batch: Batch) -> Batch:
+        """With mimic joints as coordinates of their own, at the same state.
+
+        Each torque is shared among the joints that follow one coordinate so that it does the same work.
+        """
+        coupling = batch.model.mechanism.coupling
+        if coupling is None:
+            return batch
+        S = coupling.matrix()
+        tau = batch.tau / np.sum(S * S, axis=0)
+        arrays = (coupling.expand_q(batch.q), *(each @ S.T for each in (batch.v, batch.a, tau)))
+        return Batch(self.model, batch.frame, *map(np.ascontiguousarray, arrays))
+
+
+class PinocchioBatch(PinocchioWay):
+    """`rneaInParallel` and `abaInParallel`: OpenMP threads over the columns of column-major matrices.
+
+    A row-major array of samples is, transposed, such a matrix: nothing has to be rearranged.
+    """
+
+    name = BATCH
+    whole = True
+    _in_parallel: ClassVar[dict[str, str]] = {
+        "inverse_dynamics": "rneaInParallel",
+        "forward_dynamics": "abaInParallel",
+    }
+
+    def __init__(self, model: Model, threads: int) -> None:
+        super().__init__(model)
+        self.threads = threads
+        self._pool = pin.ModelPool(self._engine, threads)
+
+    def does(self, work: Work) -> bool:
+        """The two that Pinocchio offers, for more than one sample."""
+        return work.batch > 1 and work.quantity in self._in_parallel
+
+    def prepare(self, work: Work, batch: Batch, out: Floats) -> Prepared:
+        """Ready."""
+        ask = getattr(pin, self._in_parallel[work.quantity])
+        columns = [each.T for each in batch.arguments(work.quantity)]
+        answers, threads, pool = out.T, self.threads, self._pool
+
+        def call() -> Floats:
+            ask(threads, pool, *columns, answers)
+            return out
+
+        return Prepared(call)
+
+
+class PinocchioLoop(PinocchioWay):
+    """The binding called once for each sample, the answers put into one array."""
+
+    name = LOOP
+
+    def prepare(self, work: Work, batch: Batch, out: Floats) -> Prepared:
+        """Ready."""
+        frame = self._frame_ids[batch.model.frame_index(batch.frame)]
+        ask = _binding_call(self._engine, work.quantity, frame)
+        return Prepared(_looped(ask, work, batch, out))
+
+
+class PinocchioInside(PinocchioLoop):
+    """The C++ within those calls: the same loop, less a loop over a model of one joint.
+
+    Both convert arguments and answers, look up the overload, and write one row; what the second does
+    besides is one joint's share of the work, by which this is too short rather than too long.
+    """
+
+    name = INSIDE
+
+    def does(self, work: Work) -> bool:
+        """Of few calls there is too little to be told from the noise."""
+        return work.batch >= FEWEST_CALLS
+
+    def prepare(self, work: Work, batch: Batch, out: Floats) -> Prepared:
+        """Ready."""
+        full = super().prepare(work, batch, out)
+        engine, frame = _one_joint()
+        n = len(batch)
+        one = Batch(batch.model, batch.frame, *(np.zeros((n, 1)) for _ in range(4)))
+        least = np.zeros((n, *_ONE_JOINT_ANSWER.get(work.quantity, (1,))))
+        ask = _binding_call(engine, work.quantity, frame)
+        return Prepared(full.call, _looped(ask, work, one, least))
+
+
+def pinocchio_ways(model: Model, threads: int) -> Iterator[PinocchioWay]:
+    """The three ways; only the batches use threads."""
+    yield PinocchioBatch(model, threads)
+    yield PinocchioLoop(model)
+    yield PinocchioInside(model)
+
+
+def without_mimics(model: Model) -> Model:
+    """The same mechanism with every mimic joint a joint of its own."""
+    if model.mechanism.coupling is None:
+        return model
+    return replace(model, joints=tuple(replace(joint, mimic=None) for joint in model.joints))
+
+
+def _binding_call(engine: Any, quantity: str, frame: int) -> Callable[..., Floats]:
+    """What a user of the binding writes for one sample."""
+    data = engine.createData()
+    rnea, aba, crba, jacobian = pin.rnea, pin.aba, pin.crba, pin.computeFrameJacobian
+    forward, update, axes = pin.forwardKinematics, pin.updateFramePlacement, pin.LOCAL_WORLD_ALIGNED
+
+    def placement(q: Floats) -> Floats:
+        forward(engine, data, q)
+        T: Floats = update(engine, data, frame).homogeneous
+        return T
+
+    calls: dict[str, Callable[..., Floats]] = {
+        "forward_kinematics": placement,
+        "jacobian": lambda q: jacobian(engine, data, q, frame, axes),
+        "inverse_dynamics": lambda q, v, a: rnea(engine, data, q, v, a),
+        "forward_dynamics": lambda q, v, tau: aba(engine, data, q, v, tau),
+        "mass_matrix": lambda q: crba(engine, data, q),
+    }
+    return calls[quantity]
+
+
+def _looped(ask: Callable[..., Floats], work: Work, batch: Batch, out: Floats) -> Call:
+    """`ask` for every sample; for a single one nothing but the call."""
+    rows = list(zip(*batch.arguments(work.quantity), strict=True))
+    if work.batch == 1:
+        sample = rows[0]
+        return lambda: ask(*sample)
+
+    # Of a robot with one joint the binding returns its Jacobian as a vector.
+    answers = out[..., 0] if out.shape[1:] == (6, 1) else out
+
+    def call() -> Floats:
+        for k, sample in enumerate(rows):
+            answers[k] = ask(*sample)
+        return out
+
+    return call
+
+
+def _one_joint() -> tuple[Any, int]:
+    """A model of one turning joint and a frame at its end."""
+    engine = pin.Model()
+    joint = engine.addJoint(0, pin.JointModelRZ(), pin.SE3.Identity(), "joint")
+    engine.appendBodyToJoint(joint, pin.Inertia.Random(), pin.SE3.Identity())
+    frame = pin.Frame("end", joint, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME)
+    return engine, int(engine.addFrame(frame, False))

@@ -1,0 +1,249 @@
+"""Tables of an agreement document: everything shown is a function of the document alone."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from dynx.cli.agree.task import Entry, counts, label, verdict
+from dynx.cli.shell.exits import one_line
+from dynx.cli.shell.tables import Table
+from dynx.cli.shell.terminal import counted
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.text import Text
+
+Check = dict[str, Any]
+"""An entry of ``quantities`` or ``identities``."""
+
+_TITLES: dict[str | None, str] = {
+    None: "largest error of one engine against another",
+    "referee": "error against the referee (50 digits)",
+    "derived": "native answer against what follows from the engine's own poses and inverse dynamics",
+}
+"""Titles of the tables, by the partner in a pair that is no backend; None where both are backends."""
+
+_SOLVED_TO_TOLERANCE = "inverse_kinematics"
+"""Found by iteration up to a tolerance that is asked for: its error says nothing of digits."""
+
+_SHOWN_DIFFERENCES = 6
+"""Differences listed for each robot of many; the JSON document has all."""
+
+
+def show_one(out: Console, entry: Entry) -> None:
+    """The full report of one robot: quantities by pair, identities by backend, notes."""
+    if verdict(entry) == "refused":
+        out.print(f"{label(entry)}: refused")
+        return
+    out.print(
+        f"{label(entry)}, {entry['base']} base, nq {entry['nq']}, nv {entry['nv']}, "
+        f"{counted(entry['samples'], 'sample')}, seed {entry['seed']}  ({one_line(entry['source'])})",
+        style="bold",
+    )
+    checks: list[Check] = entry["quantities"]
+    for judge, title in _TITLES.items():
+        group = [check for check in checks if _judge(check) == judge]
+        if group:
+            out.print(f"\n{title}, relative", style="bold")
+            out.print(_pivot(group, "quantity", "pair", "max_rel_error"))
+    identities: list[Check] = entry["identities"]
+    if identities:
+        out.print("\nerror of each engine in the laws of mechanics, relative", style="bold")
+        out.print(_pivot(identities, "identity", "backend", "max_error"))
+    out.print()
+    for note in dict.fromkeys(filter(None, (check["note"] for check in [*checks, *identities]))):
+        out.print(f"* {one_line(note)}")
+    for note in entry["notes"]:
+        out.print(f"note: {one_line(note)}", style="yellow")
+    _show_differences(out, entry, None)
+    out.print(_conclusion(entry))
+
+
+def show_many(out: Console, entries: Sequence[Entry]) -> None:
+    """One line for each robot, the differences, and a summary."""
+    pairs = list(dict.fromkeys(c["pair"] for e in entries for c in e["quantities"] if _judge(c) is None))
+    met = {_judge(check) for entry in entries for check in entry["quantities"]}
+    judges = [judge for judge in _TITLES if judge is not None and judge in met]
+    headings = [_heading(pair) for pair in pairs]
+    right = ["nv", *headings, *judges, "s"]
+    table = Table("robot", "nv", *headings, *judges, "verdict", "s", right=right, keys=1)
+    for entry in entries:
+        checks: list[Check] = entry["quantities"]
+        cells = [_worst([check for check in checks if check["pair"] == pair]) for pair in pairs]
+        cells += [_worst([check for check in checks if _judge(check) == judge]) for judge in judges]
+        refused = verdict(entry) == "refused"
+        table.add_row(
+            label(entry),
+            "" if refused else str(entry["nv"]),
+            *cells,
+            _verdict_text(entry),
+            "" if entry["seconds"] is None else f"{entry['seconds']:.1f}",
+        )
+    out.print(
+        "largest relative error over all quantities but inverse kinematics",
+        style="bold",
+    )
+    out.print(table)
+    out.print()
+    for entry in entries:
+        _show_differences(out, entry, _SHOWN_DIFFERENCES)
+
+
+def show_summary(out: Console, entries: Sequence[Entry], seconds: float, left: int) -> None:
+    """The last line: how many agree, differ, were refused, and were not done."""
+    count = counts(entries)
+    parts = [f"{count[word]} {word}" for word in ("agree", "differ", "refused")]
+    if left:
+        parts.append(f"{left} not done")
+    out.print(f"{counted(count['robots'], 'robot')}: {', '.join(parts)}; {seconds:.1f} s")
+
+
+def _pivot(checks: Sequence[Check], row_key: str, column_key: str, error_key: str) -> Table:
+    """Rows by quantity or identity, a column for each pair or backend, then digits and verdict."""
+    columns = list(dict.fromkeys(check[column_key] for check in checks))
+    headings = [_heading(column) for column in columns]
+    right = [*headings, "tolerance", "digits"]
+    table = Table(row_key, *headings, "tolerance", "digits", "verdict", right=right, keys=1)
+    for row in dict.fromkeys(check[row_key] for check in checks):
+        of_row = [check for check in checks if check[row_key] == row]
+        by_column = {check[column_key]: check for check in of_row}
+        worst = max(of_row, key=lambda check: _severity(check, error_key))
+        table.add_row(
+            row.replace("_", " "),
+            *(_cell(by_column.get(column), error_key) for column in columns),
+            f"{worst['tolerance']:.1e}",
+            _digits(worst[error_key]),
+            _agreement(all(check["agree"] for check in of_row)),
+        )
+    return table
+
+
+def _judge(check: Check) -> str | None:
+    partner = check["pair"].partition("~")[2]
+    return partner if partner in _TITLES else None
+
+
+def _heading(pair: str) -> str:
+    """A pair in two lines; one with a judge in one, since the title names the judge."""
+    first, _, partner = pair.partition("~")
+    return first if not partner or partner in _TITLES else f"{first}\n~{partner}"
+
+
+def _severity(check: Check, error_key: str) -> float:
+    error = check[error_key]
+    if error is None:
+        return -1.0 if check["agree"] else math.inf
+    return math.inf if not check["tolerance"] else error / check["tolerance"]
+
+
+def _cell(check: Check | None, error_key: str) -> Text:
+    from rich.text import Text
+
+    if check is None:
+        return Text("")
+    mark = "*" if check["note"] else ""
+    return Text(_error(check[error_key], check["agree"]) + mark, "" if check["agree"] else "bold red")
+
+
+def _worst(checks: Sequence[Check]) -> Text:
+    from rich.text import Text
+
+    if not checks:
+        return Text("")
+    agree = all(check["agree"] for check in checks)
+    known = _rounding_errors(checks)
+    failed = any(check["max_rel_error"] is None and not check["agree"] for check in checks)
+    text = "none" if failed else _error(max(known, default=None), agree)
+    return Text(text, "" if agree else "bold red")
+
+
+def _rounding_errors(checks: Sequence[Check]) -> list[float]:
+    """The relative errors that there are, but those of what is solved to a tolerance."""
+    return [
+        check["max_rel_error"]
+        for check in checks
+        if check["max_rel_error"] is not None
+        and (check["quantity"] != _SOLVED_TO_TOLERANCE or not check["agree"])
+    ]
+
+
+def _error(error: float | None, agree: bool) -> str:
+    """An error in two digits; one that is no number is ``none`` where an answer was missing."""
+    if error is None:
+        return "-" if agree else "none"
+    return "0" if error == 0.0 else f"{error:.1e}"
+
+
+def _digits(error: float | None) -> str:
+    """How many decimal digits agree, at most the 16 of a double."""
+    if error is None or math.isnan(error):
+        return "-"
+    if error == 0.0:
+        return "16.0"
+    return f"{min(16.0, max(0.0, -math.log10(error))):.1f}"
+
+
+def _agreement(agree: bool) -> Text:
+    from rich.text import Text
+
+    return Text("agree", "green") if agree else Text("DIFFER", "bold red")
+
+
+def _verdict_text(entry: Entry) -> Text:
+    from rich.text import Text
+
+    if verdict(entry) == "refused":
+        return Text(f"refused ({entry['error']['type']})", "yellow")
+    return _agreement(entry["agree"])
+
+
+def _show_differences(out: Console, entry: Entry, limit: int | None) -> None:
+    """What differs: quantity, pair, error, and where the worst sample was."""
+    failed = [
+        *((check, check["quantity"], check["pair"], check["max_rel_error"]) for check in entry["quantities"]),
+        *((check, check["identity"], check["backend"], check["max_error"]) for check in entry["identities"]),
+    ]
+    lines = [_difference(*each) for each in failed if not each[0]["agree"]]
+    for line in lines[:limit]:
+        out.print(f"{label(entry)}: {line}", style="red")
+    if limit is not None and len(lines) > limit:
+        out.print(f"{label(entry)}: and {len(lines) - limit} more", style="red")
+    for suspect in entry["suspects"][:limit]:
+        evidence = one_line("; ".join(suspect["evidence"]))
+        what = suspect["quantity"].replace("_", " ")
+        out.print(f"{label(entry)}: suspect {suspect['backend']}, {what}: {evidence}", style="red")
+
+
+def _difference(check: Check, what: str, who: str, error: float | None) -> str:
+    worst = check["worst_sample"]
+    where = "" if worst is None else f", sample {worst['index']} ({worst['kind']})"
+    if worst is not None and worst["frame"] is not None:
+        where += f", frame {one_line(worst['frame'])}"
+    why = f" ({one_line(check['note'])})" if check["note"] else ""
+    return (
+        f"{what.replace('_', ' ')} of {who}: error {_error(error, False)}, "
+        f"tolerance {check['tolerance']:.1e}{where}{why}"
+    )
+
+
+def _conclusion(entry: Entry) -> Text:
+    """Who agrees, and how well: the digits are those of what is solved neither by iteration nor by steps."""
+    from rich.text import Text
+
+    engines: list[str] = entry["backends"]
+    agree: bool = entry["agree"]
+    if len(engines) == 1:
+        words = "agrees with" if agree else "DIFFERS from"
+        text, whose = f"{engines[0]} alone {words} the referee and the laws of mechanics", "its"
+    else:
+        text = f"{', '.join(engines[:-1])} and {engines[-1]} {'agree' if agree else 'DIFFER'}"
+        whose = "their"
+    worst = max(_rounding_errors(entry["quantities"]), default=None)
+    if agree and worst is not None:
+        text += (
+            f"; {whose} answers to {_digits(worst)} digits or more "
+            "(inverse kinematics and numerical derivatives apart)"
+        )
+    return Text(f"{text}; {entry['seconds']:.1f} s", "bold green" if agree else "bold red")

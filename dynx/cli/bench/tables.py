@@ -1,0 +1,103 @@
+"""Tables of a bench document: everything shown is a function of the document alone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from dynx.cli.shell.exits import one_line
+from dynx.cli.shell.tables import Table
+from dynx.cli.shell.terminal import counted
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.text import Text
+
+Entry = dict[str, Any]
+
+
+_QUIET = 0.5
+"""Programs that wanted to run before this one; with more, the machine was not quiet."""
+
+
+def show(out: Console, made: Entry) -> None:
+    """The robot, the machine, and a table for each work."""
+    out.print(
+        f"{one_line(made['robot'])}, {made['base']} base, nq {made['nq']}, nv {made['nv']}, "
+        f"frame {one_line(made['frame'])}, {counted(made['repetitions'], 'repetition')}"
+        f"  ({one_line(made['source'])})",
+        style="bold",
+    )
+    out.print(made["processor"])
+    if made["load"] is not None and made["load"] > _QUIET:
+        out.print(f"load {made['load']:.1f} before the run: others were busy, and times vary", style="yellow")
+    for peak in made["peaks"]:
+        out.print(
+            f"{counted(peak['threads'], 'thread')}: copies {peak['copy_bandwidth'] / 1e9:.3g} GB/s (read and "
+            f"written), multiplies and adds {2e-9 * peak['multiply_adds']:.3g} GFLOP/s"
+        )
+    for result in made["results"]:
+        _show_result(out, result)
+    if made["not_done"]:
+        out.print(f"\n{counted(len(made['not_done']), 'work')} not done", style="yellow")
+
+
+def _show_result(out: Console, result: Entry) -> None:
+    quantity = result["quantity"].replace("_", " ")
+    batch = "one sample" if result["batch"] == 1 else f"batch {result['batch']}"
+    out.print(f"\n{quantity}, {batch}, {counted(result['threads'], 'thread')}", style="bold")
+    ways: list[Entry] = result["ways"]
+    peers = [way["way"] for way in ways if way["role"] == "peer" and way["ns"] is not None]
+    bounded = any(way["roofline"] is not None for way in ways)
+    ratios = ["faster than\n" + peer.replace(" ", "\n", 1) for peer in peers]
+    limits = ["of copy\nbandwidth", "of multiply-\nadd peak", "binds"] if bounded else []
+    right = ["threads", "samples", "ns per\nsample", "spread", *ratios, *limits[:2]]
+    table = Table("", "threads", "samples", "ns per\nsample", "spread", *ratios, *limits, right=right, keys=1)
+    for way in sorted(ways, key=_speed):
+        cells = [way["way"], str(way["threads"]), str(way["samples"]), _ns(way["ns"]), _spread(way)]
+        cells += [_ratio(way["ratios"].get(peer)) for peer in peers]
+        table.add_row(*cells, *(_limits(way["roofline"]) if bounded else []))
+    out.print(table)
+    for problem in dict.fromkeys(way["problem"] for way in ways if way["problem"] is not None):
+        out.print(_problem(problem, [way for way in ways if way["problem"] == problem]))
+
+
+def _speed(way: Entry) -> tuple[bool, float]:
+    """The fastest first, what was not timed last."""
+    return way["ns"] is None, way["ns"] or 0.0
+
+
+def _ns(ns: float | None) -> str:
+    if ns is None:
+        return "-"
+    return f"{ns:.3g}" if ns < 1000.0 else f"{ns:.0f}"
+
+
+def _spread(way: Entry) -> str:
+    """The distance of the quartiles over the median."""
+    if not way["ns"]:
+        return "-"
+    low, high = way["ns_quartiles"]
+    return f"{(high - low) / way['ns']:.0%}"
+
+
+def _ratio(ratio: float | None) -> str:
+    """How many times faster."""
+    if ratio is None:
+        return "-"
+    return f"{ratio:.2f}x" if ratio < 10.0 else f"{ratio:.0f}x"
+
+
+def _limits(roofline: Entry | None) -> Sequence[str]:
+    if roofline is None:
+        return ("", "", "")
+    return (f"{roofline['memory_share']:.0%}", f"{roofline['arithmetic_share']:.0%}", roofline["binds"])
+
+
+def _problem(problem: str, ways: Sequence[Entry]) -> Text:
+    """What kept some ways from being timed."""
+    from rich.text import Text
+
+    wrong = any(way["error"] is not None for way in ways) and all(way["ns"] is None for way in ways)
+    names = ", ".join(way["way"] for way in ways)
+    return Text(f"{names}: {one_line(problem)}", "bold red" if wrong else "yellow")

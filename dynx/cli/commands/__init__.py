@@ -1,1 +1,0 @@
-"""One module per command. They import click at their head and all else when they run."""

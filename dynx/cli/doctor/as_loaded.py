@@ -1,0 +1,178 @@
+"""``dynx agree --as-loaded``: what engines make of a file themselves, with no search for causes."""
+
+from __future__ import annotations
+
+import math
+import shlex
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from dynx.cli.doctor.conclusion import refusal
+from dynx.cli.doctor.outputs import Outputs
+from dynx.cli.doctor.tables import error_text, show_engines, show_errors
+from dynx.cli.doctor.task import DoctorTask, check_engines, doctor_run, missing_engines, refused
+from dynx.cli.doctor.text import heading, sentence
+from dynx.cli.shell.exits import ANSWER_IS_NO, BAD_INPUT, DONE, complain, one_line, short_line
+from dynx.cli.shell.run import Run, carry_out
+from dynx.cli.shell.tables import Table
+from dynx.cli.shell.terminal import console, counted
+from dynx.doctor.formats import wording
+from dynx.doctor.formats.vote import Vote, largest_error, vote, worst
+from dynx.model.expansion import expand
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.text import Text
+
+    from dynx.doctor.report import DoctorReport
+    from dynx.model.model import Base
+
+
+def compare(
+    robots: Sequence[str],
+    base: Base,
+    engines: tuple[str, ...] | None,
+    samples: int | None,
+    seed: int,
+    *,
+    jobs: int | None,
+    timeout: float,
+    json_path: str | None,
+    quiet: bool,
+) -> int:
+    """Compare, write and show; the exit code, which is that of ``dynx agree``."""
+    outputs = Outputs(json=json_path)
+    outputs.check()
+    check_engines(engines)
+    inputs = expand(robots)
+    outputs.keep_apart((each.robot for each in inputs), (), None)
+    run = doctor_run([DoctorTask(each.robot, base, engines, samples, seed, causes=False) for each in inputs])
+    for index, each in enumerate(inputs):
+        if each.refusal is not None:
+            run.record(index, refused(run.tasks[index], each.refusal))
+    return carry_out(run, jobs, timeout, quiet, lambda: _conclude(run, outputs, engines, quiet))
+
+
+def _conclude(
+    run: Run[DoctorTask, DoctorReport], outputs: Outputs, engines: tuple[str, ...] | None, quiet: bool
+) -> int:
+    reports = run.results
+    outputs.write(reports, run.not_done)
+    if not quiet:
+        out = console(err=outputs.on_stdout)
+        if len(run.tasks) == 1:
+            for report in reports:
+                _show_one(out, report)
+        else:
+            _show_many(out, reports, run.seconds, len(run.not_done))
+        for line in missing_engines(reports) if engines is None else ():
+            out.print(f"note: {one_line(line)}", style="yellow")
+    for report in reports:
+        if report.error is not None:
+            complain(refusal(report))
+    if any(report.error is not None for report in reports):
+        return BAD_INPUT
+    return DONE if all(report.alike for report in reports) else ANSWER_IS_NO
+
+
+def _show_one(out: Console, report: DoctorReport) -> None:
+    who = f"{short_line(report.robot)}, {report.base} base"
+    if report.error is not None:
+        out.print(f"{who}: not examined", style="yellow")
+        return
+    words = "all engines load it alike" if report.alike else "engines DIFFER on this file"
+    out.print(f"{who}: {words}", style="bold green" if report.alike else "bold red")
+    if report.source is not None:
+        out.print(f"({short_line(report.source)})", style="dim")
+    show_engines(out, report)
+    show_errors(out, report, mended=False)
+    _show_pairs(out, report)
+    found = vote(report)
+    heading(out, "vote")
+    for line in vote_lines(report, found):
+        sentence(out, line, 2)
+    if not report.alike:
+        base = "" if report.base == "fixed" else f" --base {report.base}"
+        out.print()
+        out.print(
+            f"why, and how to mend it: dynx doctor {shlex.quote(short_line(report.robot))}{base}",
+            style="bold",
+        )
+
+
+def _show_pairs(out: Console, report: DoctorReport) -> None:
+    """Each engine against each other."""
+    pairs = list(dict.fromkeys(pair.engines for pair in report.pairs))
+    if not pairs:
+        return
+    heading(out, "relative difference of two engines, as loaded")
+    heads = ["\n~".join(pair) for pair in pairs]
+    table = Table("quantity", *heads, right=heads, keys=1)
+    by_cell = {(pair.quantity, pair.engines): pair.relative_error for pair in report.pairs}
+    for quantity in dict.fromkeys(pair.quantity for pair in report.pairs):
+        cells = [by_cell.get((quantity, pair)) for pair in pairs]
+        table.add_row(
+            wording.quantity(quantity),
+            *("" if error is None else error_text(error, report.tolerance) for error in cells),
+        )
+    out.print(table)
+
+
+def _show_many(out: Console, reports: Sequence[DoctorReport], seconds: float, left: int) -> None:
+    engines = list(dict.fromkeys(each.engine for report in reports for each in report.engines))
+    table = Table("robot", *engines, "alone", "verdict", right=engines, keys=1)
+    for report in reports:
+        results = {each.engine: each for each in report.engines}
+        cells: list[str | Text] = []
+        for engine in engines:
+            result = results.get(engine)
+            far = None if result is None else worst(result)
+            if result is not None and result.refused is not None:
+                cells.append("refuses")
+            else:
+                cells.append("" if far is None else error_text(far[1], report.tolerance))
+        found = vote(report)
+        every = len(found.alone) == len(found.groups) > 2
+        alone = "each" if every else ", ".join(found.alone)
+        words = "alike" if report.alike else "DIFFER"
+        table.add_row(short_line(report.robot), *cells, alone, words if report.error is None else "refused")
+    out.print("largest relative error of each engine against what the file says, as loaded", style="bold")
+    out.print(table)
+    refusals = sum(report.error is not None for report in reports)
+    same = sum(report.alike for report in reports)
+    parts = [f"{same} alike", f"{len(reports) - same - refusals} differ", f"{refusals} refused"]
+    parts += [f"{left} not done"] if left else []
+    out.print()
+    out.print(f"{counted(len(reports), 'robot')}: {', '.join(parts)}; {seconds:.1f} s")
+
+
+def vote_lines(report: DoctorReport, found: Vote) -> list[str]:
+    """The vote in sentences: who agrees, who stands alone, and who is right by the file."""
+    if not found.groups:
+        return ["no engine loads the file"]
+    lines = [f"{_and(group)} agree with each other" for group in found.groups if len(group) > 1]
+    if len(found.alone) == len(found.groups) > 1:
+        lines.append("no two engines agree")
+    else:
+        lines += [f"{engine} stands alone" for engine in found.alone]
+    lines += [f"{engine} does not load the file" for engine in found.refused]
+    wrong = [
+        each.engine for each in report.engines if each.refused is None and each.engine not in found.right
+    ]
+    if found.right:
+        has = "has" if len(found.right) == 1 else "have"
+        lines.append(f"{_and(found.right)} {has} the answer that follows from the file itself")
+    for engine in report.engines:
+        far = worst(engine)
+        if engine.engine in wrong and far is not None:
+            quantity, error = far
+            missing = f"gives no answer for {wording.quantity(quantity)}"
+            off = f"is off by up to {wording.size(error)} ({wording.quantity(quantity)})"
+            lines.append(f"{engine.engine} {off if math.isfinite(error) else missing}")
+    if largest_error(report) <= report.tolerance:
+        lines.append(f"nothing differs by more than {report.tolerance:g}")
+    return lines
+
+
+def _and(names: Sequence[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

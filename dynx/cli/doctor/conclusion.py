@@ -1,0 +1,148 @@
+"""What `dynx doctor` does when the robots are done: files, tables, errors, exit code."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from dynx.cli.doctor.mending import write_mended
+from dynx.cli.doctor.outputs import Outputs, save_counterexamples
+from dynx.cli.doctor.tables import show_many, show_one, show_summary
+from dynx.cli.doctor.task import DoctorTask, missing_engines
+from dynx.cli.shell.exits import ANSWER_IS_NO, BAD_INPUT, DONE, complain, one_line, short_line
+from dynx.cli.shell.run import Run
+from dynx.cli.shell.terminal import console, counted
+from dynx.doctor.formats.baseline import Baseline
+from dynx.errors import DynxError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from dynx.doctor.report import DoctorReport
+
+_SHOWN_DIFFERENCES = 6
+"""Differences listed for each robot against a baseline."""
+
+
+class Conclusion:
+    """Everything that becomes of the reports of a run.
+
+    `targets` are the files that mended descriptions go to, one per input (so one per task where any is
+    not None), `folder` is for counterexamples, `engines` what the user asked for.
+    """
+
+    def __init__(
+        self,
+        run: Run[DoctorTask, DoctorReport],
+        outputs: Outputs,
+        baseline: Baseline | None,
+        targets: Sequence[str | None],
+        in_place: bool,
+        folder: str,
+        engines: Sequence[str] | None,
+    ) -> None:
+        self._run = run
+        self._outputs = outputs
+        self._baseline = baseline
+        self._targets = targets
+        self._in_place = in_place
+        self._folder = folder
+        self._engines = engines
+        self._problems: list[str] = []
+
+    def reach(self, *, quiet: bool) -> int:
+        """Write and show everything; the exit code."""
+        reports = self._run.results
+        # First the files: a pipe that closes while the table is written must not lose them.
+        self._outputs.write(reports, self._run.not_done, self._baseline, command())
+        mended = self._mend()
+        saved = [self._saved(report) for report in reports]
+        if not quiet:
+            self._show(console(err=self._outputs.on_stdout), saved, mended)
+        refusals = [refusal(report) for report in reports if report.error is not None]
+        for problem in dict.fromkeys([*refusals, *self._problems]):
+            complain(problem)
+        if self._problems or any(report.error is not None for report in reports):
+            return BAD_INPUT
+        return ANSWER_IS_NO if any(self._fails(report) for report in reports) else DONE
+
+    def _fails(self, report: DoctorReport) -> bool:
+        """Whether a report says that engines differ in what is not known; just written is known."""
+        if self._baseline is not None:
+            return not report.alike and bool(self._baseline.compare(report).new)
+        return not report.alike and self._outputs.baseline is None
+
+    def _mend(self) -> Mapping[int, str]:
+        """Write the mended descriptions; where they went, by the number of the result."""
+        written: dict[int, str] = {}
+        done = {task: number for number, task in enumerate(self._run.done)}
+        for index, path in enumerate(self._targets):
+            if path is None or index not in done:
+                continue
+            report = self._run.results[done[index]]
+            try:
+                if write_mended(path, report, over_input=self._in_place):
+                    written[done[index]] = path
+            except DynxError as error:
+                self._problems.append(str(error))
+        return written
+
+    def _saved(self, report: DoctorReport) -> Mapping[int, str]:
+        try:
+            return save_counterexamples(self._folder, report)
+        except DynxError as error:
+            self._problems.append(str(error))
+            return {}
+
+    def _show(self, out: Console, saved: Sequence[Mapping[int, str]], mended: Mapping[int, str]) -> None:
+        reports = self._run.results
+        if len(self._run.tasks) <= 2 and len({task.robot for task in self._run.tasks}) == 1:
+            for number, report in enumerate(reports):
+                if number:
+                    out.print()
+                show_one(out, report, saved[number], mended.get(number))
+        else:
+            show_many(out, reports)
+            show_summary(out, reports, self._run.seconds, len(self._run.not_done))
+            for files in saved:
+                for file in dict.fromkeys(files.values()):
+                    out.print(f"counterexample: {one_line(file)}")
+            if mended:
+                same = sum(reports[number].mended is None for number in mended)
+                copies = f", {same} of them as it was read" if same else ""
+                out.print(f"{counted(len(mended), 'file')} written{copies}", style="bold green")
+        if self._engines is None:
+            for line in missing_engines(reports):
+                out.print(f"note: {one_line(line)}", style="yellow")
+        if self._baseline is not None:
+            for report in reports:
+                self._show_comparison(out, report)
+
+    def _show_comparison(self, out: Console, report: DoctorReport) -> None:
+        assert self._baseline is not None
+        found = self._baseline.compare(report)
+        who = f"{short_line(report.robot)}, {report.base} base"
+        if found.known or found.new or found.vanished:
+            out.print(
+                f"{who}: {len(found.known)} known, {len(found.new)} new, {len(found.vanished)} gone",
+                style="bold red" if found.new else "bold",
+            )
+        for word, style, group in (("new", "red", found.new), ("gone", "green", found.vanished)):
+            for each in group[:_SHOWN_DIFFERENCES]:
+                out.print(f"  {word}: {each.place} ({', '.join(sorted(each.engines))})", style=style)
+            if len(group) > _SHOWN_DIFFERENCES:
+                out.print(f"  {word}: and {len(group) - _SHOWN_DIFFERENCES} more", style=style)
+
+
+def refusal(report: DoctorReport) -> str:
+    """Why a robot could not be examined; most messages name its file already."""
+    assert report.error is not None
+    message = report.error.message
+    return message if report.robot in message else f"{short_line(report.robot)}: {message}"
+
+
+def command() -> str:
+    """The command line in force, to be run again."""
+    return shlex.join(["dynx", *map(one_line, sys.argv[1:])])

@@ -1,0 +1,118 @@
+"""Where mended descriptions go: decided before hours of work, and never over what was read."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import PurePath
+from typing import TYPE_CHECKING
+
+from dynx.cli.shell.output_file import check_writable, make_folder, require_apart, write_bytes
+from dynx.errors import ArgumentError, shown
+from dynx.model.expansion import RobotInput, is_library_name
+
+if TYPE_CHECKING:
+    from dynx.doctor.report import DoctorReport
+
+
+def planned_targets(
+    inputs: Sequence[RobotInput], out: str | None, *, in_place: bool, bases: int
+) -> list[str | None]:
+    """The file to be written for each input, None where nothing is to be mended."""
+    if out is not None and in_place:
+        raise ArgumentError("--fix and --in-place exclude each other")
+    if (out is not None or in_place) and bases > 1:
+        raise ArgumentError("a file is mended for one base: --base fixed or --base floating")
+    if in_place:
+        return [*in_place_targets(inputs)]
+    return [None] * len(inputs) if out is None else [*targets(inputs, out)]
+
+
+def targets(inputs: Sequence[RobotInput], out: str) -> list[str]:
+    """The file to be written for each input; ArgumentError where one could not be, or is an input.
+
+    One robot named itself goes to the file `out`, or into it where it is a directory; several go into
+    the directory `out`, those found below a directory under the same path as there.
+    """
+    several = len(inputs) > 1 or any(each.folder is not None for each in inputs)
+    if several or os.path.isdir(out) or out.endswith(("/", os.sep)):
+        if os.path.lexists(out) and not os.path.isdir(out):
+            raise ArgumentError(f"--fix {shown(out, 300)} is a file; several robots need a directory")
+        paths = [os.path.join(out, _name(each)) for each in inputs]
+    else:
+        paths = [out]
+        check_writable(out)
+    taken: dict[str, str] = {}
+    for path, each in zip(paths, inputs, strict=True):
+        other = taken.setdefault(os.path.normcase(path), each.robot)
+        if other != each.robot:
+            both = f"{shown(other, 200)} and {shown(each.robot, 200)}"
+            raise ArgumentError(f"{both} would both be written to {shown(path, 300)}")
+    try:
+        require_apart(paths, (each.robot for each in inputs), "the file that is read")
+    except ArgumentError as error:
+        raise ArgumentError(f"--fix: {error}; --in-place mends it there") from None
+    return paths
+
+
+def in_place_targets(inputs: Sequence[RobotInput]) -> list[str]:
+    """The inputs as the files to be written; ArgumentError for what is no file of the user's."""
+    for each in inputs:
+        if each.refusal is None and (not os.path.isfile(each.robot) or is_library_name(each.robot)):
+            raise ArgumentError(
+                f"--in-place needs files; {shown(each.robot, 200)} is none (--fix writes another)"
+            )
+        if each.robot.endswith(".xacro"):
+            raise ArgumentError(f"{shown(each.robot, 200)} is a program that makes a URDF: --fix writes that")
+        if each.refusal is None:
+            check_writable(each.robot)
+    return [each.robot for each in inputs]
+
+
+def require_other_file(path: str, read: str) -> None:
+    """Raise ArgumentError where `path` is the file that was read."""
+    try:
+        same = os.path.samefile(path, read)
+    except (OSError, ValueError):  # one of them is not there
+        same = False
+    if same:
+        raise ArgumentError(f"--fix {shown(path, 300)} is the file that is read; --in-place mends it there")
+
+
+def write_mended(path: str, report: DoctorReport, *, over_input: bool) -> bool:
+    """Write the mended description of a report; False where there is none to write.
+
+    Where nothing in the text has to change it is written as it was read, so that the file is there in
+    any case. The encoding, the byte-order mark and the line ends are those that were read. A file that
+    was changed since it was read is not written over.
+    """
+    from dynx.model.xml.source import XmlSource
+
+    text = report.mended
+    if text is None and not over_input:
+        text = report.text
+    if text is None or report.error is not None:
+        return False
+    if not over_input and report.source is not None:
+        require_other_file(path, report.source)
+    if over_input:
+        _require_unchanged(path, report)
+    make_folder(path)
+    write_bytes(path, (report.form or XmlSource(text, path).form).encode(text))
+    return True
+
+
+def _require_unchanged(path: str, report: DoctorReport) -> None:
+    from dynx.files.reading import read_file
+    from dynx.model.xml.source import XmlSource
+
+    if XmlSource(read_file(path), path).text != report.text:
+        raise ArgumentError(f"{shown(path, 300)} was changed while it was examined, and is left as it is")
+
+
+def _name(each: RobotInput) -> str:
+    if each.folder is not None:
+        return os.path.relpath(each.robot, each.folder)
+    name = PurePath(each.robot).name
+    stem = name.removesuffix(".xacro").removesuffix(".urdf")
+    return f"{stem or 'robot'}.urdf"

@@ -1,0 +1,141 @@
+"""The files that `dynx doctor` writes besides its tables."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from dynx.cli.shell.output_file import check_writable, make_folder, require_apart, write_text
+from dynx.cli.shell.terminal import echo_json, json_text
+from dynx.errors import ArgumentError, shown
+
+if TYPE_CHECKING:
+    from dynx.doctor.formats.baseline import Baseline
+    from dynx.doctor.report import Counterexample, DoctorReport, Unexplained
+
+STDOUT = "-"
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """Where each format goes; None where it was not asked for, and for JSON `STDOUT` is allowed."""
+
+    json: str | None = None
+    html: str | None = None
+    junit: str | None = None
+    sarif: str | None = None
+    baseline: str | None = None
+
+    def check(self) -> None:
+        """Raise ArgumentError for a path that plainly cannot be written, or that is given twice."""
+        paths = [path for path in vars(self).values() if path is not None]
+        for path in paths:
+            if path != STDOUT or path is not self.json:
+                check_writable(path)
+            if paths.count(path) > 1:
+                raise ArgumentError(f"two formats would be written to {path!r}")
+
+    def keep_apart(self, read: Iterable[str], mended: Iterable[str | None], baseline: str | None) -> None:
+        """Raise ArgumentError for a path at which a robot is read, a mended file goes or the baseline lies.
+
+        To write a new baseline over the one that is compared with is to accept what is new.
+        """
+        paths = [
+            path for path in (self.json, self.html, self.junit, self.sarif) if path not in (None, STDOUT)
+        ]
+        known = [] if baseline is None else [baseline]
+        every = paths if self.baseline is None else [*paths, self.baseline]
+        require_apart(every, read, "a robot that is read")
+        require_apart(paths, known, "the baseline")
+        targets = {os.path.realpath(path) for path in mended if path is not None}
+        for path in every:
+            if os.path.realpath(path) in targets:
+                raise ArgumentError(f"{shown(path, 300)} is where a mended file goes")
+
+    @property
+    def on_stdout(self) -> bool:
+        """Whether standard output carries JSON, so that tables go elsewhere."""
+        return self.json == STDOUT
+
+    def write(
+        self,
+        reports: Sequence[DoctorReport],
+        not_done: Sequence[str],
+        baseline: Baseline | None = None,
+        command: str | None = None,
+    ) -> None:
+        """Write all that was asked for; `command` is what a page says to run again."""
+        from dynx.doctor import formats
+
+        if self.json is not None:
+            self._json(reports, not_done)
+        texts: dict[str | None, Callable[[], str]] = {
+            self.html: lambda: formats.html_page(reports, command=command, baseline=baseline),
+            self.junit: lambda: formats.junit_xml(reports, baseline),
+            self.sarif: lambda: json_text(formats.sarif_document(reports, baseline)) + "\n",
+            self.baseline: lambda: self._known(reports),
+        }
+        for path, text in texts.items():
+            if path is not None:
+                write_text(path, text())
+
+    def _json(self, reports: Sequence[DoctorReport], not_done: Sequence[str]) -> None:
+        from dynx.doctor.report import results_document
+
+        document = results_document(reports, len(not_done))
+        if not_done:
+            document["not_done"] = list(not_done)
+        if self.json == STDOUT:
+            echo_json(document)
+        elif self.json is not None:
+            write_text(self.json, json_text(document) + "\n")
+
+    def _known(self, reports: Sequence[DoctorReport]) -> str:
+        from dynx.doctor.formats import baseline_document
+
+        return json_text(baseline_document(reports, os.path.dirname(self.baseline or ""))) + "\n"
+
+
+def load_baseline(path: str) -> Baseline:
+    """The baseline in a file; ArgumentError where there is none."""
+    from dynx.doctor.formats import read_baseline
+    from dynx.files.reading import read_file
+
+    return read_baseline(read_file(path).decode("utf-8", "replace"), path)
+
+
+def save_counterexamples(folder: str, report: DoctorReport) -> Mapping[int, str]:
+    """Write the counterexamples of a report into a directory; their files by number."""
+    saved: dict[int, str] = {}
+    written: dict[str, str] = {}
+    for number, each in enumerate(report.unexplained):
+        found = each.counterexample
+        if found is None:
+            continue
+        if found.urdf not in written:
+            stem = os.path.basename(report.robot).removesuffix(".urdf")
+            name = _file_name(f"{stem}-{report.base}-{each.engine}-{each.quantity}")
+            path = os.path.normpath(os.path.join(folder, f"{name}.counterexample.urdf"))
+            make_folder(path)
+            write_text(path, _with_state(found, each))
+            written[found.urdf] = path
+        saved[number] = written[found.urdf]
+    return saved
+
+
+def _with_state(found: Counterexample, each: Unexplained) -> str:
+    """The URDF, in ASCII, with the state at which the difference shows in a comment behind it."""
+    lines = [
+        f"{symbol} = {list(values)}" for symbol, values in (("q", found.q), ("v", found.v), ("a", found.a))
+    ]
+    what = re.sub(r"[^\w ]", "_", f"{each.engine} {each.quantity}", flags=re.ASCII)
+    comment = "\n".join([f"{what}, relative error {found.relative_error:.3g} at", *lines])
+    text = re.sub(r"""encoding\s*=\s*("[^"]*"|'[^']*')""", 'encoding="UTF-8"', found.urdf, count=1)
+    return f"{text.rstrip()}\n<!-- {comment} -->\n".encode("ascii", "xmlcharrefreplace").decode("ascii")
+
+
+def _file_name(text: str) -> str:
+    return re.sub(r"[^A-Za-z0-9._-]+", "_", text)[:100].lstrip(".-") or "robot"

@@ -1,0 +1,290 @@
+"""The reports of `dynx doctor` on a terminal: everything shown is a function of the reports alone."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, get_args
+
+from dynx.cli.doctor.text import STYLES, block, heading, sentence
+from dynx.cli.shell.exits import one_line, short_line
+from dynx.cli.shell.tables import Table
+from dynx.cli.shell.terminal import counted
+from dynx.doctor.formats import wording
+from dynx.doctor.formats.causes import ROUNDING, Cause, Status, causes, severity, status
+from dynx.doctor.formats.vote import largest_error
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from rich.console import Console
+    from rich.text import Text
+
+    from dynx.doctor.report import DoctorReport, EngineResult, Finding
+
+_SHOWN_PLACES = 4
+"""Places of one rule on a terminal; ``--json`` and ``--html`` have all."""
+
+_SHOWN_RULES = 3
+"""Rules in the line of one robot among many."""
+
+
+def show_one(out: Console, report: DoctorReport, saved: Mapping[int, str], mended: str | None) -> None:
+    """The full report of one robot.
+
+    `saved` says where the counterexample of each unexplained difference was written, by its number,
+    `mended` where the mended description was.
+    """
+    show_verdict(out, report)
+    if report.error is not None:
+        return
+    show_engines(out, report)
+    show_errors(out, report)
+    found = causes(report)
+    _show_causes(out, "causes", [each for each in found if each.worst is not None])
+    rest = [each for each in found if each.worst is None]
+    present = [each for each in rest if each.kind == "difference"]
+    _show_causes(out, "present, without effect on this base", present)
+    practice = [each for each in rest if each.kind == "practice"]
+    _show_causes(out, "bad practice", practice)
+    _show_list(out, "decided where the file is ambiguous", report.choices)
+    _show_calls(out, report)
+    _show_unexplained(out, report, saved)
+    _show_next(out, report, mended)
+
+
+def show_verdict(out: Console, report: DoctorReport) -> None:
+    """The first line: robot, base, verdict, and the file."""
+    if report.error is not None:  # whose words are said on standard error
+        out.print(f"{short_line(report.robot)}, {report.base} base: not examined", style="yellow")
+        return
+    style = "bold green" if report.alike else "bold" if report.explained else "bold red"
+    out.print(f"{short_line(report.robot)}, {report.base} base: {one_line(report.verdict)}", style=style)
+    if report.source is not None:
+        out.print(f"({short_line(report.source)})", style="dim")
+
+
+def show_engines(out: Console, report: DoctorReport) -> None:
+    """Each engine with its version and the exact call that loads the file."""
+    heading(out, "each engine loads the file as its users do")
+    for each in report.engines:
+        out.print(f"  {each.engine} {one_line(each.version)}", style="bold")
+        for line in each.call.splitlines():
+            out.print(f"      {wording.name(line, 500)}", style="dim")
+        if each.refused is not None:
+            sentence(out, f"refuses the file: {one_line(each.refused)}", 6, "red")
+            after = "loads the mended file" if each.refused_after is None else "refuses the mended file too"
+            if report.mended is not None:
+                sentence(out, after, 6, "green" if each.refused_after is None else "red")
+
+
+def show_errors(out: Console, report: DoctorReport, *, mended: bool = True) -> None:
+    """Distance of each engine from the file by quantity, before mending and, if wanted, after."""
+    asked = [each for each in report.engines if each.before or each.after]
+    rows = list(dict.fromkeys(key for each in asked for key in (*each.before, *each.after)))
+    if not rows:
+        return
+    mended = mended and report.mended is not None
+    title = "error against what the file says"
+    calls = " with the calls below" if report.calls else ""
+    heading(out, f"{title}: as loaded -> mended{calls}" if mended else f"{title}, as loaded")
+    names = [each.engine for each in asked]
+    table = Table("quantity", *names, right=names, keys=1)
+    for key in rows:
+        table.add_row(
+            wording.quantity(key), *(_change(each, key, report.tolerance, mended) for each in asked)
+        )
+    out.print(table)
+    if "inverse_dynamics" in rows and "forward_dynamics" not in rows:
+        sentence(out, "forward dynamics is not compared: the mass matrix is singular", 1, "dim")
+    known = f", what the file says known to {report.referee:.0e}" if report.referee else ""
+    out.print(
+        f" tolerance {report.tolerance:g}, {counted(report.samples, 'sample')}, seed {report.seed}{known}",
+        style="dim",
+    )
+
+
+def show_many(out: Console, reports: Sequence[DoctorReport]) -> None:
+    """One line for each robot and base."""
+    bases = len({report.base for report in reports}) > 1
+    columns = ["robot", *(["base"] if bases else []), "verdict", "error", "left", "causes"]
+    table = Table(*columns, right=["error", "left"], keys=1)
+    for report in reports:
+        left = report.residual if report.error is None else None
+        table.add_row(
+            short_line(report.robot),
+            *([report.base or ""] if bases else []),
+            _verdict_text(report),
+            _largest(report),
+            "" if left is None else error_text(left, report.tolerance),
+            _rules(report),
+        )
+    out.print("largest relative error of any engine, as loaded (refused: by one of them)", style="bold")
+    out.print("and what is left of it after mending", style="bold")
+    out.print(table)
+    out.print()
+
+
+def show_summary(out: Console, reports: Sequence[DoctorReport], seconds: float, left: int) -> None:
+    """The last line: how many are alike, explained, unexplained, refused, and not done."""
+    verdicts = [status(report) for report in reports]
+    parts = [f"{verdicts.count(word)} {word}" for word in get_args(Status)]
+    if left:
+        parts.append(f"{left} not done")
+    bases = len({report.base for report in reports}) > 1
+    what = counted(len(reports), "examination" if bases else "robot")
+    out.print(f"{what}: {', '.join(parts)}; {seconds:.1f} s")
+
+
+def _show_causes(out: Console, title: str, found: Sequence[Cause]) -> None:
+    if not found:
+        return
+    heading(out, title)
+    for cause in found:
+        out.print(_cause_line(cause))
+        sentence(out, one_line(cause.title), 6)
+        out.print(f"      {_extent(cause)}")
+        _show_places(out, cause)
+        if cause.advice and (cause.worst is not None or cause.kind == "practice"):
+            sentence(out, f"-> {one_line(cause.advice)}", 6)
+
+
+def _show_places(out: Console, cause: Cause) -> None:
+    for finding in cause.findings[:_SHOWN_PLACES]:
+        said = [each for each in (wording.effects(finding), wording.name(finding.message, 300)) if each]
+        sentence(out, f"{_place(finding)}: {'; '.join(said)}", 6, "dim")
+    if len(cause.findings) > _SHOWN_PLACES:
+        out.print(f"      and {len(cause.findings) - _SHOWN_PLACES} more", style="dim")
+
+
+def _place(finding: Finding) -> str:
+    line = "" if finding.line is None else f"line {finding.line}, "
+    return f"{line}{wording.part(finding)}"
+
+
+def _cause_line(cause: Cause) -> Text:
+    """Rule, how large, where it counts; loud only where it is more than rounding."""
+    from rich.text import Text
+
+    worst = cause.worst
+    line = Text(f"  {wording.name(cause.rule)} {wording.name(cause.name)}", STYLES[cause.severity])
+    if worst is not None:
+        line.append(f"  {wording.effect(worst)}", STYLES[cause.severity])
+        if cause.severity == "warning":
+            line.append(" (rounding)", "dim")
+    if worst is not None and not cause.proved:
+        line.append("  not proved", "bold red")
+    return line
+
+
+def _extent(cause: Cause) -> str:
+    """How many places, in which engines."""
+    engines = f" in {', '.join(map(wording.name, cause.engines))}" if cause.engines else ""
+    return f"{counted(len(cause.findings), 'place')}{engines}"
+
+
+def _show_list(out: Console, title: str, items: Sequence[str]) -> None:
+    if items:
+        heading(out, title)
+        for item in items:
+            sentence(out, one_line(item), 2)
+
+
+def _show_calls(out: Console, report: DoctorReport) -> None:
+    if report.calls:
+        heading(out, "what no URDF can mend: to be called after loading")
+        for call in report.calls:
+            out.print(f"  {wording.name(call.engine)}")
+            block(out, call.code, 6)
+
+
+def _show_unexplained(out: Console, report: DoctorReport, saved: Mapping[int, str]) -> None:
+    if not report.unexplained:
+        return
+    heading(out, "unexplained: no rule accounts for", "bold red")
+    for number, each in enumerate(report.unexplained):
+        where = "" if each.joint is None else f", worst at joint {wording.name(each.joint)}"
+        what = f"{wording.quantity(each.quantity)} of {wording.name(each.engine)}"
+        sentence(out, f"{what}: {wording.relative(each.relative_error)}{where}", 2, "red")
+        found = each.counterexample
+        if found is not None:
+            file = saved.get(number)
+            joints = counted(found.moving_joints, "moving joint")
+            at = "" if file is None else f": {one_line(file)}"
+            sentence(out, f"smallest robot that shows it, {joints}{at}", 6)
+            for symbol, values in (("q", found.q), ("v", found.v), ("a", found.a)):
+                sentence(out, f"{symbol} = [{', '.join(f'{value:g}' for value in values)}]", 6, "dim")
+
+
+def _show_next(out: Console, report: DoctorReport, mended: str | None) -> None:
+    out.print()
+    if mended is not None:
+        said = "nothing to change in the text; copied to" if report.mended is None else "mended:"
+        out.print(f"{said} {one_line(mended)}", style="bold green")
+    elif report.mended is not None:
+        base = "" if report.base == "fixed" else f" --base {report.base}"
+        robot = shlex.quote(short_line(report.robot))
+        out.print(f"to mend it: dynx doctor {robot}{base} --fix OUT.urdf", style="bold")
+    if report.findings:
+        rule = causes(report)[0].rule
+        out.print(f"more about a rule: dynx explain {shlex.quote(wording.name(rule))}", style="dim")
+    if not report.alike:
+        left = f"what is left after mending: {wording.relative(report.residual)}"
+        out.print(f"{left}; {report.seconds:.1f} s", style="dim")
+
+
+def _change(engine: EngineResult, key: str, tolerance: float, mended: bool) -> Text:
+    """One number where nothing had to change, else two."""
+    from rich.text import Text
+
+    before, after = engine.before.get(key), engine.after.get(key)
+    if before is None:
+        first = Text("refused" if engine.refused is not None else "-", "red")
+    else:
+        first = error_text(before, tolerance)
+    if after is None or not mended or (before is not None and before <= tolerance and after <= tolerance):
+        return first
+    return Text.assemble(first, " -> ", error_text(after, tolerance))
+
+
+def error_text(error: float, tolerance: float) -> Text:
+    """An error, loud as it is large."""
+    from rich.text import Text
+
+    if error <= tolerance:
+        return Text(wording.relative(error), "green")
+    return Text(wording.relative(error), STYLES["warning" if error <= ROUNDING else "error"])
+
+
+def _largest(report: DoctorReport) -> Text:
+    from rich.text import Text
+
+    if report.error is not None:
+        return Text("")
+    if any(each.refused is not None for each in report.engines):
+        return Text("refused", STYLES["error"])
+    return error_text(largest_error(report), report.tolerance)
+
+
+def _rules(report: DoctorReport) -> Text:
+    from rich.text import Text
+
+    found = [cause for cause in causes(report) if cause.worst is not None]
+    parts = [Text(wording.name(cause.rule), STYLES[cause.severity]) for cause in found[:_SHOWN_RULES]]
+    if len(found) > _SHOWN_RULES:
+        parts.append(Text(f"+{len(found) - _SHOWN_RULES}"))
+    return Text(" ").join(parts)
+
+
+def _verdict_text(report: DoctorReport) -> Text:
+    from rich.text import Text
+
+    word = status(report)
+    if word == "refused":  # why is said on standard error
+        return Text("refused", "yellow")
+    if word == "alike":
+        return Text("alike", "green")
+    if word == "unexplained":
+        return Text("UNEXPLAINED", "bold red")
+    alarming = any(severity(finding) == "error" for finding in report.differences)
+    return Text("explained", "" if alarming else "dim")

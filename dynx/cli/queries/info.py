@@ -1,0 +1,179 @@
+"""``dynx info``: what a robot description says, as dynx reads it."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from dynx.cli.shell.options import json_flag, model_options
+
+if TYPE_CHECKING:
+    from rich.tree import Tree
+
+    from dynx.cli.shell.tables import Table
+    from dynx.model import Joint, Model
+    from dynx.model.model import Base
+
+
+@click.command(short_help="Show the tree, joints, masses and frames of a robot.")
+@click.argument("robot")
+@model_options
+@json_flag
+def info(robot: str, base: Base, lock: tuple[tuple[str, float], ...], as_json: bool) -> None:
+    """Show what dynx reads in a robot description: tree, joints, masses, frames, notes.
+
+    A note is something that was ignored or read as meant, and that could matter.
+
+    \b
+    Examples:
+      dynx info ur5
+      dynx info path/to/robot.urdf --base floating
+      dynx info panda --lock panda_finger_joint1=0.02 --json
+    """
+    from dynx.cli.shell.terminal import echo_json
+    from dynx.model.loading import load
+
+    model = load(robot, base=base, lock=dict(lock))
+    if as_json:
+        echo_json(document(model))
+    else:
+        _show(model)
+
+
+def document(model: Model) -> dict[str, Any]:
+    """The model as ``dynx info --json`` writes it; limits that are not there are null."""
+    return {
+        "schema": 1,
+        "name": model.name,
+        "source": model.source,
+        "base": model.base,
+        "root": model.root,
+        "gravity": list(model.gravity),
+        "nq": model.nq,
+        "nv": model.nv,
+        "joint_names": list(model.joint_names),
+        "frame_names": list(model.frame_names),
+        "total_mass": model.total_mass,
+        "joints": [_joint_entry(joint) for joint in model.joints],
+        "links": [
+            {
+                "name": link.name,
+                "mass": 0.0 if link.inertial is None else link.inertial.mass,
+                "has_inertial": link.inertial is not None,
+                "line": link.line,
+            }
+            for link in model.links
+        ],
+        "notes": [{"message": note.message, "line": note.line} for note in model.notes],
+    }
+
+
+def _joint_entry(joint: Joint) -> dict[str, Any]:
+    limits, dynamics, mimic = joint.limits, joint.dynamics, joint.mimic
+    return {
+        "name": joint.name,
+        "type": joint.type,
+        "parent": joint.parent,
+        "child": joint.child,
+        "axis": list(joint.axis) if joint.moves else None,
+        "lower": limits.lower,
+        "upper": limits.upper,
+        "velocity": limits.velocity,
+        "effort": limits.effort,
+        "damping": dynamics.damping,
+        "friction": dynamics.friction,
+        "armature": dynamics.armature,
+        "mimic": None
+        if mimic is None
+        else {"joint": mimic.joint, "multiplier": mimic.multiplier, "offset": mimic.offset},
+        "locked_at": joint.locked_at,
+        "line": joint.line,
+    }
+
+
+def _show(model: Model) -> None:
+    from dynx.cli.shell.exits import one_line
+    from dynx.cli.shell.terminal import PIPE_WIDTH, console, counted
+
+    out = console()
+    out.print(f"{one_line(model.name)}  ({one_line(model.source)})", style="bold")
+    out.print(
+        f"{model.base} base, nq {model.nq}, nv {model.nv}, {counted(len(model.links), 'link')}, "
+        f"{counted(len(model.frame_names), 'frame')}, {model.total_mass:.6g} kg, "
+        f"gravity {_vector(model.gravity)} m/s^2"
+    )
+    out.print()
+    wide = console()
+    wide.width = PIPE_WIDTH  # rich cuts the lines of a tree at the width, names and all
+    wide.print(_tree(model))
+    if any(joint.moves for joint in model.joints):
+        out.print()
+        out.print(_joint_table(model))
+        out.print()
+    added = [frame.name for frame in model.extra_frames]
+    if added:
+        out.print(f"frames besides the links: {', '.join(map(one_line, added))}")
+    for note in model.notes:
+        out.print(f"note: {one_line(note)}", style="yellow")
+
+
+def _tree(model: Model) -> Tree:
+    from rich.text import Text
+    from rich.tree import Tree
+
+    from dynx.cli.shell.exits import one_line
+    from dynx.cli.shell.terminal import number
+
+    def label(link: str, joint: Joint | None) -> Text:
+        inertial = model.link(link).inertial
+        text = Text(one_line(link))
+        text.append("  no mass" if inertial is None else f"  {number(inertial.mass)} kg", style="dim")
+        if joint is not None:
+            kind = joint.type if joint.locked_at is None else f"locked at {number(joint.locked_at)}"
+            text.append(f"  <- {one_line(joint.name)} ({kind})", style="cyan" if joint.moves else "dim")
+        return text
+
+    # Joints come in depth-first order, so the parent's branch is there before its children.
+    branches = {model.root: Tree(label(model.root, None))}
+    for joint in model.joints:
+        branches[joint.child] = branches[joint.parent].add(label(joint.child, joint))
+    return branches[model.root]
+
+
+def _joint_table(model: Model) -> Table:
+    from dynx.cli.shell.exits import one_line
+    from dynx.cli.shell.tables import Table
+
+    right = ("q", "lower", "upper", "velocity", "effort")
+    table = Table("q", "joint", "type", "axis", *right[1:], "follows", right=right, keys=2)
+    index = {name: k + (7 if model.floating else 0) for k, name in enumerate(model.joint_names)}
+    for joint in model.joints:
+        if not joint.moves:
+            continue
+        limits = joint.limits
+        bounds = (limits.lower, limits.upper, limits.velocity, limits.effort)
+        table.add_row(
+            str(index.get(joint.name, "")),
+            one_line(joint.name),
+            joint.type,
+            _vector(joint.axis),
+            *(f"{bound:.4g}" if math.isfinite(bound) else "-" for bound in bounds),
+            _rule(joint),
+        )
+    return table
+
+
+def _rule(joint: Joint) -> str:
+    from dynx.cli.shell.exits import one_line
+    from dynx.cli.shell.terminal import number
+
+    if joint.mimic is None:
+        return ""
+    offset = "" if joint.mimic.offset == 0.0 else f" {joint.mimic.offset:+.6g}"
+    return f"{number(joint.mimic.multiplier)} * {one_line(joint.mimic.joint)}{offset}"
+
+
+def _vector(values: tuple[float, ...]) -> str:
+    return " ".join(f"{value + 0.0:.4g}" for value in values)

@@ -1,0 +1,190 @@
+"""What ``dynx sim --json`` writes: one simulation as a document of numbers and text."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from dynx._version import __version__
+from dynx.cli.sim.errors import base_error, frame_error, joint_error
+from dynx.cli.sim.overshoot import overshoot
+from dynx.cli.sim.request import Prepared
+from dynx.errors import DivergedError, SimulationError
+from dynx.model import Model
+from dynx.sim import Noise, Push, Rollout, RolloutInterrupted
+from dynx.spatial.scalar import Floats
+
+SCHEMA = 1
+
+Entry = dict[str, Any]
+
+DONE, DIVERGED, CONTROL_FAILED, INTERRUPTED = "done", "diverged", "control failed", "interrupted"
+"""How a simulation ended."""
+
+
+def document(
+    prepared: Prepared, rollout: Rollout, seconds: float, ended: SimulationError | KeyboardInterrupt | None
+) -> Entry:
+    """The simulation that was asked for, and what came of it; `ended` is what ended it early.
+
+    Numbers that are none (errors without a reference, limits that are not there) are null.
+    """
+    model, summary = prepared.model, _summary(rollout)
+    return {
+        "schema": SCHEMA,
+        "dynx": __version__,
+        "robot": model.name,
+        "source": model.source,
+        "base": model.base,
+        "gravity": list(model.gravity),
+        "nq": model.nq,
+        "nv": model.nv,
+        **prepared.asked,
+        "settings": _settings(prepared, rollout),
+        "payload": [
+            {"frame": each.frame, "mass": each.mass, "center": list(each.center)}
+            for each in prepared.arguments["payload"]
+        ],
+        "mass_scale": prepared.arguments["mass_scale"],
+        "total_mass": rollout.model.total_mass,
+        "passive": _is_passive(prepared, rollout),
+        "status": _status(ended),
+        "error": _error(ended),
+        "overshoot": _overshoot(prepared, ended),
+        "dt": prepared.clock.dt,
+        "steps": len(rollout),
+        "steps_asked": prepared.clock.n_steps,
+        "simulated": float(rollout.t[-1]),
+        "seconds": seconds,
+        **summary,
+        "base_error": base_error(rollout),
+        "frame_error": frame_error(rollout, prepared.motion.frame),
+        "joints": _joints(model, rollout),
+        "final": {"t": float(rollout.t[-1]), "q": rollout.q[-1].tolist(), "v": rollout.v[-1].tolist()},
+    }
+
+
+def _summary(rollout: Rollout) -> Entry:
+    """The numbers of the whole robot, over all joints and times."""
+    with np.errstate(all="ignore"):
+        of_all = rollout.summary()
+        return {
+            **joint_error(rollout),
+            "energy_change": float(np.max(np.abs(rollout.energy - rollout.energy[0]))),
+            "energy_drift": of_all.energy_drift,
+            "max_kinetic_energy": float(np.max(rollout.kinetic_energy)),
+            "saturated": of_all.saturated,
+        }
+
+
+def _joints(model: Model, rollout: Rollout) -> list[Entry]:
+    """One entry for each coordinate of v, those of a floating base first."""
+    with np.errstate(all="ignore"):
+        summary = rollout.summary()
+    in_force = rollout.settings.get("effort_limits")
+    limit: Floats = model.effort_limit if in_force is None else np.array(in_force)
+    entries = []
+    for k, (name, unit) in enumerate(zip(_names(model), _units(model), strict=True)):
+        known = rollout.reference is not None
+        entries.append(
+            {
+                "name": name,
+                "unit": unit,
+                "max_error": float(summary.max_error[k]) if known else None,
+                "rms_error": float(summary.rms_error[k]) if known else None,
+                "final_error": float(rollout.error[-1, k]) if known else None,
+                "max_speed": float(summary.max_speed[k]),
+                "max_torque": float(summary.max_torque[k]),
+                "effort_limit": float(limit[k]) if np.isfinite(limit[k]) else None,
+                "saturated": float(np.mean(rollout.saturated[:, k])) if len(rollout) else 0.0,
+            }
+        )
+    return entries
+
+
+def _names(model: Model) -> list[str]:
+    """What each coordinate of v is called; those of a floating base are along its own axes."""
+    base = ["base x", "base y", "base z", "base rx", "base ry", "base rz"] if model.floating else []
+    return [*base, *model.joint_names]
+
+
+def _units(model: Model) -> list[str]:
+    """``rad`` or ``m`` for each coordinate of v."""
+    kinds = {joint.name: joint.type for joint in model.joints}
+    base = ["m"] * 3 + ["rad"] * 3 if model.floating else []
+    return [*base, *("m" if kinds[name] == "prismatic" else "rad" for name in model.joint_names)]
+
+
+def _settings(prepared: Prepared, rollout: Rollout) -> Entry:
+    """Those of the record, with objects where it has their Python text, and the inertia of the rotors."""
+    given, kept = prepared.arguments, rollout.settings
+    return {
+        **kept,
+        "joints": {**kept["joints"], "armature": np.diag(rollout.rotors).tolist()},
+        "noise": None if given["noise"] is None else _noise(given["noise"]),
+        "pushes": [_push(each) for each in given["pushes"]],
+    }
+
+
+def _noise(noise: Noise) -> Entry:
+    return {"q": np.asarray(noise.q).tolist(), "v": np.asarray(noise.v).tolist(), "seed": noise.seed}
+
+
+def _push(push: Push) -> Entry:
+    """One push; its `duration` None is for ever."""
+    return {
+        "frame": push.frame,
+        "wrench": np.asarray(push.wrench).tolist(),
+        "start": push.start,
+        "duration": push.duration if np.isfinite(push.duration) else None,
+        "reference": push.reference,
+    }
+
+
+def _is_passive(prepared: Prepared, rollout: Rollout) -> bool:
+    """Whether nothing does work on the robot, so that its energy should stay what it is."""
+    joints = rollout.settings["joints"]
+    loads = any(joints["damping"]) or any(joints["friction"]) or prepared.arguments["pushes"]
+    return prepared.law is None and not loads and not prepared.arguments["position_limits"]
+
+
+def _status(ended: SimulationError | KeyboardInterrupt | None) -> str:
+    if ended is None:
+        return DONE
+    if isinstance(ended, KeyboardInterrupt):
+        return INTERRUPTED
+    return DIVERGED if isinstance(ended, DivergedError) else CONTROL_FAILED
+
+
+def _overshoot(prepared: Prepared, ended: object) -> Entry | None:
+    """The joint that a law of torque brakes too hard for the step, where that may be why it diverged."""
+    if not isinstance(ended, DivergedError):
+        return None
+    found = overshoot(prepared.law, prepared.arguments["q0"], prepared.clock.control_dt)
+    return None if found is None else found._asdict()
+
+
+def _error(ended: SimulationError | KeyboardInterrupt | None) -> Entry | None:
+    """Why it ended early, where and when."""
+    if isinstance(ended, RolloutInterrupted):
+        kept = ended.rollout
+        return {
+            "type": "Interrupted",
+            "message": str(ended),
+            "time": float(kept.t[-1]),
+            "step": len(kept),
+            "q": kept.q[-1].tolist(),
+            "v": kept.v[-1].tolist(),
+        }
+    if not isinstance(ended, SimulationError):
+        return None
+    q, v = ended.state
+    return {
+        "type": type(ended).__name__,
+        "message": str(ended),
+        "time": ended.time,
+        "step": ended.step,
+        "q": np.asarray(q).tolist(),
+        "v": np.asarray(v).tolist(),
+    }

@@ -1,0 +1,162 @@
+"""The motion that ``dynx sim`` is asked for: from where to where, by which profile, in which time."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Any
+
+from dynx import trajectory
+from dynx.cli.shell.configuration_input import chosen_frame, configuration
+from dynx.cli.shell.target_input import target_pose
+from dynx.cli.sim.options import PROFILES
+from dynx.errors import ArgumentError
+from dynx.model import Model
+from dynx.sim.loop.clock import positive
+from dynx.sim.named_controllers import LAWS
+from dynx.spatial.scalar import Floats
+from dynx.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from dynx.cli.shell.configuration_input import Numbers
+
+DURATION = 2.0
+"""Of a motion whose time is free [s]."""
+
+TIMED = {"cycloidal": trajectory.cycloidal, "cubic": trajectory.cubic, "quintic": trajectory.quintic}
+"""Profiles that take the time that they are given."""
+
+LIMITED = {"trapezoidal": ("acceleration",), "s-curve": ("acceleration", "jerk")}
+"""Profiles that are as fast as limits allow, and the limits that they need besides that of velocity."""
+
+Limit = float | list[float]
+
+
+@dataclass(frozen=True)
+class MotionInput:
+    """The options of a motion, by the names that click has for them."""
+
+    to: Numbers
+    to_pose: Numbers
+    frame: str | None
+    start: Numbers
+    profile: str | None
+    duration: float | None
+    settle: float
+    velocity: Limit | None
+    acceleration: Limit | None
+    jerk: Limit | None
+    controller: str
+    dt: float
+
+    @classmethod
+    def of(cls, given: dict[str, Any]) -> MotionInput:
+        """Those among all options of the command."""
+        return cls(**{field.name: given[field.name] for field in fields(cls)})
+
+    @property
+    def chosen(self) -> str:
+        """The profile that is asked for, or that follows from the rest."""
+        if self.profile is not None:
+            return self.profile
+        return "cycloidal" if self.goes else "hold"
+
+    @property
+    def goes(self) -> bool:
+        """Whether there is somewhere to go to."""
+        return self.to is not None or self.to_pose is not None
+
+    @property
+    def needs_frame(self) -> bool:
+        """Whether a frame takes part."""
+        law = LAWS.get(self.controller)
+        return self.to_pose is not None or (law is not None and law.wants == "frame")
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What is to be followed (None: nothing), where the robot begins, and how long it is simulated [s]."""
+
+    reference: Trajectory | Floats | None
+    begin: Floats
+    duration: float
+    frame: str | None
+    said: dict[str, Any]
+    """The same for the document."""
+
+
+def planned(model: Model, asked: MotionInput) -> Motion:
+    """The motion of `model` that the options mean. Raises ArgumentError where they contradict each other."""
+    _refuse_contradictions(asked)
+    frame = chosen_frame(model, asked.frame) if asked.needs_frame else None
+    start = configuration(model, asked.start, "--from", model.clip(model.neutral()))
+    profile = asked.chosen
+    said: dict[str, Any] = {
+        "profile": profile,
+        "line": None if asked.to_pose is None else target_pose(asked.to_pose, "--to-pose").tolist(),
+        "from": start.tolist(),
+        "settle": asked.settle,
+    }
+    if profile == "hold":
+        wanted = start if asked.to is None else configuration(model, asked.to, "--to", start)
+        span = DURATION if asked.duration is None else asked.duration
+        reference = None if asked.controller == "none" and asked.to is None else wanted
+        said |= {"to": None if reference is None else wanted.tolist(), "duration": span}
+        return Motion(reference, start, span + asked.settle, frame, said)
+    motion = _to_pose(model, asked, frame, start) if asked.to is None else _to(model, asked, profile, start)
+    said |= {"to": motion.end.q.tolist(), "duration": motion.duration}
+    span = motion.duration
+    if profile in LIMITED and asked.duration is None:
+        # The fastest motion ends between two steps: the robot is watched until the next.
+        dt = positive("--dt", asked.dt)
+        span = dt * math.ceil(motion.duration / dt - 1e-9)
+    return Motion(motion, start, span + asked.settle, frame, said)
+
+
+def _to(model: Model, asked: MotionInput, profile: str, start: Floats) -> Trajectory:
+    goal = configuration(model, asked.to, "--to", start)
+    if profile in TIMED:
+        duration = DURATION if asked.duration is None else asked.duration
+        return TIMED[profile](start, goal, duration, model=model)
+    limits: dict[str, Any] = {
+        "acceleration": asked.acceleration,
+        "velocity": asked.velocity,
+        "duration": asked.duration,
+    }
+    if profile == "s-curve":
+        return trajectory.s_curve(start, goal, jerk=_given(asked.jerk), model=model, **limits)
+    return trajectory.trapezoidal(start, goal, model=model, **limits)
+
+
+def _to_pose(model: Model, asked: MotionInput, frame: str | None, start: Floats) -> Trajectory:
+    duration = DURATION if asked.duration is None else asked.duration
+    law = TIMED[asked.chosen]([0.0], [1.0], duration)
+    return trajectory.line(model, str(frame), start, target_pose(asked.to_pose, "--to-pose"), law=law)
+
+
+def _refuse_contradictions(asked: MotionInput) -> None:
+    profile = asked.chosen
+    if asked.to is not None and asked.to_pose is not None:
+        raise ArgumentError("--to and --to-pose are both given; wanted one of them")
+    if not asked.goes and profile != "hold":
+        raise ArgumentError(f"--profile {profile} is a motion to --to or --to-pose, and neither is given")
+    if asked.to_pose is not None and profile not in TIMED:
+        raise ArgumentError(f"--to-pose takes a profile of {', '.join(TIMED)}; {profile} has none")
+    if asked.frame is not None and not asked.needs_frame:
+        raise ArgumentError("--frame is of --to-pose and of the laws operational-space and impedance")
+    needed = LIMITED.get(profile, ())
+    for name in needed:
+        if getattr(asked, name) is None:
+            raise ArgumentError(f"--profile {profile} needs --{name}")
+    allowed = ("velocity", *needed) if needed else ()
+    for name in ("velocity", "acceleration", "jerk"):
+        if name not in allowed and getattr(asked, name) is not None:
+            takers = [each for each in PROFILES if each in LIMITED and name in ("velocity", *LIMITED[each])]
+            raise ArgumentError(f"--{name} is of --profile {' and '.join(takers)}, not of {profile}")
+    if asked.settle < 0.0:
+        raise ArgumentError(f"--settle is {asked.settle:g}; wanted seconds, 0 or more")
+
+
+def _given(limit: Limit | None) -> Limit:
+    assert limit is not None
+    return limit

@@ -1,0 +1,76 @@
+"""The files that ``dynx sim`` writes: refused before the simulation rather than after it."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from importlib.util import find_spec
+from typing import TYPE_CHECKING
+
+from dynx.cli.shell.output_file import check_writable
+from dynx.errors import ArgumentError, NotInstalledError, shown
+
+if TYPE_CHECKING:
+    from dynx.sim import Rollout
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """Where the record goes, in the format that each name ends with, and the picture (None for none)."""
+
+    save: tuple[str, ...] = ()
+    plot: str | None = None
+
+    @property
+    def files(self) -> list[str]:
+        """All of them."""
+        return [*self.save, *([] if self.plot is None else [self.plot])]
+
+    def check(self) -> None:
+        """Raise ArgumentError for a file that plainly cannot be written.
+
+        NotInstalledError where a format needs a package that is missing.
+        """
+        for path in self.save:
+            check_record(path)
+        for path in self.files:
+            check_writable(path)
+            if self.files.count(path) > 1:
+                raise ArgumentError(f"{shown(path, 300)} would be written twice")
+        if self.plot is not None:
+            check_picture(self.plot)
+
+    def write(self, rollout: Rollout) -> None:
+        """Write all of them. Raises ArgumentError where the system does not let it."""
+        for path in self.save:
+            rollout.save(path)
+        if self.plot is not None:
+            rollout.plot(self.plot)
+
+
+def check_record(path: str) -> None:
+    """Raise ArgumentError for a name that ends with no format of records.
+
+    NotInstalledError where the format needs a package that is missing.
+    """
+    from dynx.sim.record.formats import WRITERS
+
+    suffix = os.path.splitext(path)[1].lower()
+    if suffix not in WRITERS:
+        raise ArgumentError(
+            f"--save {shown(path, 300)} ends with no format; wanted one of {', '.join(WRITERS)}"
+        )
+    if suffix == ".mcap" and find_spec("mcap") is None:
+        raise NotInstalledError("--save with .mcap needs mcap: pip install 'dynx[mcap]'")
+
+
+def check_picture(path: str) -> None:
+    """Raise NotInstalledError without matplotlib, ArgumentError for a name with no format of its."""
+    try:
+        from matplotlib.backend_bases import FigureCanvasBase
+    except ImportError as error:
+        raise NotInstalledError("--plot needs matplotlib: pip install 'dynx[plot]'") from error
+    formats = FigureCanvasBase.get_supported_filetypes()
+    if os.path.splitext(path)[1][1:].lower() not in formats:
+        listed = ", ".join(f".{name}" for name in sorted(formats))
+        raise ArgumentError(f"--plot {shown(path, 300)} ends with no format; wanted one of {listed}")

@@ -1,0 +1,130 @@
+"""All modes of control with progress, the document of their errors, and their table."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from dynx._version import __version__
+from dynx.cli.shell.configuration_input import configuration
+from dynx.cli.shell.exits import ANSWER_IS_NO, BAD_INPUT, DONE, complain, one_line
+from dynx.cli.shell.interruption import interruptible
+from dynx.cli.shell.progress import progress_bar
+from dynx.cli.shell.terminal import console, counted, echo_json
+from dynx.cli.sim.limits import limits_said
+from dynx.cli.sim.tutorial_tables import show
+from dynx.errors import ArgumentError, DynxError, LimitError
+from dynx.model.loading import load
+from dynx.sim.loop.clock import Clock
+from dynx.sim.named_controllers import NATURAL_FREQUENCY
+from dynx.sim.tutorial import DURATION, GRAVITY, MODES, ROBOT, Outcome, Row, Tutorial, tutorial
+from dynx.sim.tutorial_plot import plot_rows
+
+SCHEMA = 1
+
+
+def run_tutorial(robot: str | None, given: dict[str, Any], picture: str | None, *, as_json: bool) -> int:
+    """Do all modes and show them, also where Ctrl-C ended it early; the exit code.
+
+    `given` are the options of the command, by the names that click has for them.
+    """
+    experiments = _experiments(robot, given)
+    rows: list[Row] = []
+    with interruptible() as interruption:
+        try:
+            with progress_bar(len(MODES), words=MODES[0]) as advance:
+                for row in experiments.rows():
+                    rows.append(row)
+                    advance(len(rows), MODES[min(len(rows), len(MODES) - 1)])
+        except KeyboardInterrupt:
+            complain(f"interrupted: {counted(len(MODES) - len(rows), 'mode')} not done")
+        interruption.finishing = True
+        made = document(experiments, rows)
+        undrawn = None if picture is None else _draw(experiments, rows, picture)
+        if as_json:
+            echo_json(made)
+        else:
+            show(console(), made)
+        failed = [
+            f"{row.mode} on {plant}: {outcome.problem}"
+            for row in rows
+            for plant, outcome in row.outcomes.items()
+            if outcome.failed
+        ]
+        for complaint in [*failed, *([] if undrawn is None else [str(undrawn)])]:
+            complain(complaint)
+    if interruption.code is not None:
+        return interruption.code
+    if undrawn is not None:
+        return BAD_INPUT
+    return ANSWER_IS_NO if failed else DONE
+
+
+def _draw(experiments: Tutorial, rows: Sequence[Row], picture: str) -> DynxError | None:
+    """Draw the picture; why not, where it cannot be written. What is shown must not be lost by that."""
+    try:
+        plot_rows(rows, experiments, picture)
+    except DynxError as error:
+        return error
+    return None
+
+
+def document(experiments: Tutorial, rows: Sequence[Row]) -> dict[str, Any]:
+    """What ``dynx sim --tutorial --json`` writes."""
+    model, motion = experiments.model, experiments.motion
+    return {
+        "schema": SCHEMA,
+        "dynx": __version__,
+        "robot": model.name,
+        "source": model.source,
+        "base": model.base,
+        "gravity": list(model.gravity),
+        "joint_names": list(model.joint_names),
+        "from": motion.start.q.tolist(),
+        "to": motion.end.q.tolist(),
+        "duration": motion.duration,
+        "dt": experiments.dt,
+        "plants": list(experiments.plants),
+        "backend": experiments.backend,
+        "kp": NATURAL_FREQUENCY**2,
+        "kd": 2.0 * NATURAL_FREQUENCY,
+        "modes": [
+            {
+                "mode": row.mode,
+                "what": row.what,
+                "plants": {plant: _entry(outcome) for plant, outcome in row.outcomes.items()},
+            }
+            for row in rows
+        ],
+        "not_done": list(MODES[len(rows) :]),
+    }
+
+
+def _entry(outcome: Outcome) -> dict[str, Any]:
+    rollout = outcome.rollout
+    error = None if rollout is None or outcome.failed else np.abs(rollout.error)
+    return {
+        "max_error": outcome.max_error,
+        "rms_error": outcome.rms_error,
+        "final_error": None if error is None else float(error[-1].max()),
+        "joint_max_errors": None if error is None else error.max(axis=0).tolist(),
+        "steps": 0 if rollout is None else len(rollout),
+        "problem": None if outcome.problem is None else one_line(outcome.problem),
+    }
+
+
+def _experiments(robot: str | None, given: dict[str, Any]) -> Tutorial:
+    gravity = GRAVITY if given["gravity"] is None else given["gravity"]
+    model = load(robot or ROBOT, lock=dict(given["lock"]), gravity=gravity)
+    start = configuration(model, given["start"], "--from", model.clip(model.neutral()))
+    to = None if given["to"] is None else configuration(model, given["to"], "--to", start)
+    duration = DURATION if given["duration"] is None else given["duration"]
+    Clock.of(given["dt"], duration, None, 0.0)
+    try:
+        return tutorial(
+            model, start=start, to=to, duration=duration, dt=given["dt"], backend=given["backend"]
+        )
+    except LimitError as error:
+        raise ArgumentError(limits_said(error, model.name, ignorable=False)) from error

@@ -1,0 +1,345 @@
+"""The backend `compiled`: `dynx.rbd` traced for one robot and compiled for this processor.
+
+Every quantity becomes a kernel when it is first asked for, with the robot's constants folded in
+(`dynx.compiled.kernels`; one kernel serves many frames, see `dynx.compiled.frames`).
+Batches are evaluated several samples at a time and on several threads. What was compiled once is found
+in a cache afterwards (`dynx.simd.cache`).
+
+Safe to use from several threads, which may share one backend and its kernels.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dynx._version import __version__
+from dynx.backends.base import Backend, Forces
+from dynx.backends.evaluation import Evaluation, Reduction
+from dynx.compiled.arguments import BatchArguments
+from dynx.compiled.call import KernelCall, NumericCall, into
+from dynx.compiled.frames import chain_of, place_of
+from dynx.compiled.kernels import (
+    ON_CHAINS,
+    QUANTITIES,
+    chain_kernel,
+    compiles,
+    is_physical,
+    quantity_kernel,
+    tidied,
+)
+from dynx.model import Mechanism, Model
+from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED, Reference
+from dynx.simd.image import COMPILING
+from dynx.simd.kernel import Kernel
+from dynx.simd.target import compiler_version, host
+from dynx.simd.threads import checked_threads
+from dynx.spatial.scalar import Floats
+
+Call = Callable[..., Floats]
+
+_QUANTITY_OF_HOOK = {f"_{quantity}": quantity for quantity in QUANTITIES}
+
+
+class CompiledBackend(Backend):
+    """Kernels of `dynx.rbd` behind the interface of `Backend`.
+
+    `threads` bounds how many threads one batch is split over; None stands for all processors. Results
+    are the same bit for bit whatever their number.
+
+    `forward_kinematics`, `jacobian`, `inverse_dynamics`, `forward_dynamics` and `mass_matrix` take
+    `out`, a C-contiguous float64 array of the answer's shape, which they fill and return; what it
+    holds after an error is not defined.
+    """
+
+    name: ClassVar[str] = "compiled"
+    vectorized: ClassVar[bool] = True
+
+    _arguments: BatchArguments
+
+    def __init__(self, model: Model, *, threads: int | None = None, validate: bool = True) -> None:
+        """Raises ArgumentError for a number of threads that is none."""
+        super().__init__(model, validate=validate)
+        self._options["threads"] = threads
+        self._threads = checked_threads(threads)
+        self._arguments = BatchArguments(model)
+        self._tidy = tidied(self._mechanism)
+        self._evaluation = _Compiled(self._mechanism, self._call_of_hook)
+        self._all_frames = tuple(range(len(self._frame_index)))
+        # What hooks without arguments of their own ask for.
+        self._implied: dict[str, tuple[Any, ...]] = {
+            "frame_placements": self._all_frames,
+            "inertial_regressor": (len(model.links),),
+        }
+        self._eliminates = self._straight or is_physical(self._mechanism)
+        self._calls: dict[object, Call] = {}
+        self._chains: dict[object, Kernel] = {}
+        # The same by what the caller says: names, before they are looked up and checked.
+        self._asked: dict[object, Call] = {}
+
+    @property
+    def engine_version(self) -> str:
+        """``dynx`` and its version, the compiler's, and the processor."""
+        return f"dynx {__version__}, {compiler_version()}, {host().cpu}"
+
+    def _release(self) -> None:
+        # Calls that other threads are in keep their kernel until they end.
+        with COMPILING:
+            self._asked, self._calls, self._chains = {}, {}, {}
+
+    # -- with `out` ---------------------------------------------------------------------------
+
+    def forward_kinematics(
+        self, q: ArrayLike, frame: str | Sequence[str] | None = None, *, out: Floats | None = None
+    ) -> Floats:
+        """T_world_frame (..., 4, 4); for several frames, or None for all, (..., n, 4, 4)."""
+        if frame is not None and not isinstance(frame, str):
+            names = self._arguments.frames(frame)
+            # Picked from all, as lists are many and a kernel for each would round in its own way.
+            of_all = self._call_for("frame_placements", self._all_frames)
+            return into(out, of_all(q)[..., [self._index(name) for name in names], :, :])
+        call = self._asked.get(("forward_kinematics", frame))
+        if call is None:
+            self._arguments.refuse_closed()
+            key = ("forward_kinematics", frame)
+            if frame is None:
+                call = self._kept(key, "frame_placements", self._all_frames)
+            else:
+                call = self._kept(key, "frame_placement", (self._index(frame),))
+        return call(q, out=out)
+
+    def jacobian(
+        self,
+        q: ArrayLike,
+        frame: str,
+        *,
+        reference: str = LOCAL_WORLD_ALIGNED,
+        point: ArrayLike | None = None,
+        out: Floats | None = None,
+    ) -> Floats:
+        """J (..., 6, nv) with J v the velocity of `frame`, linear [m/s] then angular [rad/s]."""
+        if point is not None:
+            return into(out, super().jacobian(q, frame, reference=reference, point=point))
+        try:
+            call = self._asked["jacobian", frame, reference]
+        except (KeyError, TypeError):
+            self._arguments.refuse_closed()
+            axes = self._arguments.reference(reference)
+            call = self._kept(("jacobian", frame, reference), "jacobian", (self._index(frame), axes))
+        return call(q, out=out)
+
+    def inverse_dynamics(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        a: ArrayLike,
+        *,
+        external_forces: Forces | None = None,
+        force_reference: str = LOCAL_WORLD_ALIGNED,
+        joint_dynamics: bool = False,
+        out: Floats | None = None,
+    ) -> Floats:
+        """The torque tau (..., nv) that gives acceleration `a`: M a + bias - J' external forces."""
+        if external_forces is None and not joint_dynamics:
+            call = self._asked.get("inverse_dynamics")
+            if call is None:
+                call = self._named("inverse_dynamics")
+            return call(q, v, a, out)
+        tau = super().inverse_dynamics(
+            q,
+            v,
+            a,
+            external_forces=external_forces,
+            force_reference=force_reference,
+            joint_dynamics=joint_dynamics,
+        )
+        return into(out, tau)
+
+    def forward_dynamics(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        tau: ArrayLike,
+        *,
+        external_forces: Forces | None = None,
+        force_reference: str = LOCAL_WORLD_ALIGNED,
+        joint_dynamics: bool = False,
+        out: Floats | None = None,
+    ) -> Floats:
+        """The acceleration a (..., nv) that `tau` and the external forces give.
+
+        Raises SingularMassMatrixError, which names the joints, where a joint moves no inertia.
+        """
+        if external_forces is None and not joint_dynamics and self._eliminates:
+            call = self._asked.get("forward_dynamics")
+            if call is None:
+                self._arguments.refuse_closed()
+                self._solvability.refuse_singular(joint_dynamics)
+                call = self._named("forward_dynamics")
+            return call(q, v, tau, out)
+        a = super().forward_dynamics(
+            q,
+            v,
+            tau,
+            external_forces=external_forces,
+            force_reference=force_reference,
+            joint_dynamics=joint_dynamics,
+        )
+        return into(out, a)
+
+    def mass_matrix(self, q: ArrayLike, *, joint_dynamics: bool = False, out: Floats | None = None) -> Floats:
+        """M (..., nv, nv), symmetric."""
+        call = self._asked.get("mass_matrix")
+        if call is None:
+            call = self._named("mass_matrix")
+        M = call(q, out=out)
+        if joint_dynamics:
+            M += self._joint_terms.rotors
+        return M
+
+    # -- kernels ------------------------------------------------------------------------------
+
+    def _named(self, quantity: str) -> Call:
+        """A quantity without details, kept under its name."""
+        self._arguments.refuse_closed()
+        return self._kept(quantity, quantity)
+
+    def _kept(self, key: object, quantity: str, details: tuple[Any, ...] = ()) -> Call:
+        """How a quantity is answered, to be found under `key` the next time."""
+        call = self._call_for(quantity, details)
+        with COMPILING:
+            self._arguments.refuse_closed()
+            self._asked[key] = call
+        return call
+
+    def _call_for(self, quantity: str, details: tuple[Any, ...] = (), *, tree: bool = False) -> Call:
+        """How a quantity is answered, compiled if it was not asked for before."""
+        tree = tree and not self._straight
+        key = (quantity, details, tree)
+        call = self._calls.get(key)
+        if call is None:
+            # The lock that a fork waits for: a child must not find it taken.
+            with COMPILING:
+                self._arguments.refuse_closed()
+                call = self._calls.get(key)
+                if call is None:
+                    call = self._calls[key] = self._made(quantity, details, tree)
+        return call
+
+    def _made(self, quantity: str, details: tuple[Any, ...], tree: bool) -> Call:
+        checks = tuple(self._check(argument, tree) for argument in QUANTITIES[quantity].arguments)
+        divides = QUANTITIES[quantity].divides and not tree
+        refuse = self._arguments.finite_acceleration if divides else None
+        if not compiles(self._tidy, quantity):
+            return NumericCall(self._tidy, quantity, details, checks, tree=tree, refuse=refuse).answer
+        options: dict[str, Any] = {
+            "threads": self._threads,
+            "validate": self._validate and not tree,
+            "refuse": refuse,
+        }
+        if quantity not in ON_CHAINS:
+            kernel = quantity_kernel(self._tidy, quantity, details, tree=tree)
+            return KernelCall(kernel, checks, **options).answer
+        chain = chain_of(self._tidy, quantity, *details)
+        key = (quantity, chain, tree)
+        if key not in self._chains:
+            self._chains[key] = chain_kernel(self._tidy, quantity, chain, tree=tree)
+        place = place_of(self._tidy, chain, *details)
+        return KernelCall(self._chains[key], checks, place=place, **options).answer
+
+    def _check(self, argument: str, tree: bool) -> Callable[[Any], Floats]:
+        if tree:
+            return np.asarray
+        if argument == "q":
+            return self._arguments.q
+        return lambda value: self._arguments.v(value, argument)
+
+    # -- hooks, in tree coordinates -----------------------------------------------------------
+
+    def _hook(self, quantity: str, *arguments: Floats, details: tuple[Any, ...] = ()) -> Floats:
+        details = details or self._implied.get(quantity, ())
+        return self._call_for(quantity, details, tree=True)(*arguments)
+
+    def _call_of_hook(self, hook: str, details: tuple[Any, ...]) -> Call:
+        """The call in model coordinates that answers the question of a hook in tree coordinates."""
+        quantity = _QUANTITY_OF_HOOK[hook]
+        return self._call_for(quantity, details or self._implied.get(quantity, ()))
+
+    def _frame_placement(self, q: Floats, frame: int) -> Floats:
+        return self._hook("frame_placement", q, details=(frame,))
+
+    def _frame_placements(self, q: Floats) -> Floats:
+        return self._hook("frame_placements", q)
+
+    def _jacobian(self, q: Floats, frame: int, reference: Reference) -> Floats:
+        return self._hook("jacobian", q, details=(frame, reference))
+
+    def _jacobian_derivative(self, q: Floats, v: Floats, frame: int, reference: Reference) -> Floats:
+        return self._hook("jacobian_derivative", q, v, details=(frame, reference))
+
+    def _frame_velocity(self, q: Floats, v: Floats, frame: int, reference: Reference) -> Floats:
+        return self._hook("frame_velocity", q, v, details=(frame, reference))
+
+    def _frame_acceleration(
+        self, q: Floats, v: Floats, a: Floats, frame: int, reference: Reference
+    ) -> Floats:
+        return self._hook("frame_acceleration", q, v, a, details=(frame, reference))
+
+    def _inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
+        return self._hook("inverse_dynamics", q, v, a)
+
+    def _forward_dynamics(self, q: Floats, v: Floats, tau: Floats) -> Floats:
+        return self._hook("forward_dynamics", q, v, tau)
+
+    def _mass_matrix(self, q: Floats) -> Floats:
+        return self._hook("mass_matrix", q)
+
+    def _bias_torque(self, q: Floats, v: Floats) -> Floats:
+        return self._hook("bias_torque", q, v)
+
+    def _gravity_torque(self, q: Floats) -> Floats:
+        return self._hook("gravity_torque", q)
+
+    def _coriolis_matrix(self, q: Floats, v: Floats) -> Floats:
+        return self._hook("coriolis_matrix", q, v)
+
+    def _inertial_regressor(self, q: Floats, v: Floats, a: Floats) -> Floats:
+        return self._hook("inertial_regressor", q, v, a)
+
+    def _center_of_mass(self, q: Floats) -> Floats:
+        return self._hook("center_of_mass", q)
+
+    def _center_of_mass_jacobian(self, q: Floats) -> Floats:
+        return self._hook("center_of_mass_jacobian", q)
+
+    def _centroidal_momentum(self, q: Floats, v: Floats) -> Floats:
+        return self._hook("centroidal_momentum", q, v)
+
+    def _kinetic_energy(self, q: Floats, v: Floats) -> Floats:
+        return self._hook("kinetic_energy", q, v)
+
+    def _potential_energy(self, q: Floats) -> Floats:
+        return self._hook("potential_energy", q)
+
+
+class _Compiled(Evaluation):
+    """Asks the kernel of a hook's quantity in model coordinates: mimic joints are compiled into it."""
+
+    def __init__(self, mechanism: Mechanism, call_of_hook: Callable[[str, tuple[Any, ...]], Call]) -> None:
+        super().__init__(mechanism, vectorized=True)
+        self._call_of_hook = call_of_hook
+
+    def __call__(
+        self,
+        hook: Callable[..., Any],
+        tail: tuple[int, ...],
+        q: Floats,
+        *velocities: Floats,
+        args: tuple[Any, ...] = (),
+        reduce: Reduction | None = None,
+    ) -> Floats:
+        """As `Evaluation` does, which would bring arguments and answer to the tree and back."""
+        return self._call_of_hook(hook.__name__, args)(q, *velocities)

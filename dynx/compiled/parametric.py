@@ -1,0 +1,228 @@
+"""Dynamics in which chosen parameters are arguments, one value for each sample, rather than constants.
+
+For Monte Carlo studies, identification, and robots that pick something up: the kernel is compiled once,
+and every sample of a batch may have inertias, a payload or joint friction of its own.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dynx.backends.arguments import Arguments
+from dynx.backends.registry import refuse_other_than_model
+from dynx.compiled.kernels import tidied
+from dynx.compiled.mass_factors import factors_of, solved
+from dynx.compiled.parameters import Parameters, Selection
+from dynx.compiled.robot_kernel import (
+    argument_shapes,
+    evaluated,
+    model_torque,
+    robot_kernel,
+    tree_coordinates,
+)
+from dynx.errors import ArgumentError, shown
+from dynx.model import Mechanism, Model
+from dynx.model.configuration import checked_array
+from dynx.rbd import crba, rnea
+from dynx.simd.kernel import Kernel
+from dynx.simd.program import Program
+from dynx.simd.sign import sign_of
+from dynx.simd.threads import checked_threads
+from dynx.simd.trace import trace
+from dynx.spatial.inertia import RigidInertia
+from dynx.spatial.scalar import Array, Floats
+
+
+def parametric(
+    model: Model,
+    *,
+    links: Sequence[str] = (),
+    payload: str | None = None,
+    point_payload: str | None = None,
+    joint_dynamics: bool = False,
+    threads: int | None = None,
+) -> ParametricDynamics:
+    """The dynamics of `model` with parameters as arguments.
+
+    - `links`: all ten inertial parameters of each of these links, which replace those of the model
+    - `payload`: ten of a body fixed to this frame, about its origin and in its axes; zeros by default
+    - `point_payload`: mass and centre of mass in the axes of this frame, of a body without extent
+    - `joint_dynamics`: damping, dry friction and armature of every moving joint
+
+    `threads` bounds how many threads a batch is split over; None stands for all processors. Raises
+    UnknownNameError for a link or frame that is not there, ArgumentError for a link named twice.
+    """
+    refuse_other_than_model(model)
+    if isinstance(links, str):
+        raise ArgumentError(f"links is the text {shown(links)}; wanted a list of names: [{shown(links)}]")
+    selection = Selection(model, tuple(links), payload, point_payload, joint_dynamics)
+    return ParametricDynamics(selection, threads=threads)
+
+
+class ParametricDynamics:
+    """Inverse and forward dynamics and the mass matrix of one robot, as functions of its parameters.
+
+    Arrays are float64 with leading batch axes that broadcast: q (..., nq), v, a, tau (..., nv) and
+    `parameters` (..., n) in the order of ``self.parameters.names``; without them the model's own are
+    used. Mass and inertia may take any values, also such as no body can have. Where joint dynamics are
+    parameters they are part of every answer: the torque is that of the rigid bodies, plus
+    ``armature a + damping v + friction sign(v)`` of every joint, with sign(0) = 0.
+
+    Safe to use from several threads; pickled by its recipe. Raises errors of `dynx.errors` only.
+    """
+
+    def __init__(self, selection: Selection, *, threads: int | None = None) -> None:
+        """As `parametric` makes it. Raises ArgumentError for a number of threads that is none."""
+        self.model = selection.model
+        self.parameters: Parameters = selection.parameters()
+        self._selection = selection
+        self._option = threads
+        self._threads = checked_threads(threads)
+        self._arguments = Arguments(selection.model)
+        self._kernels: dict[str, Kernel] = {}
+        self._making = threading.Lock()
+
+    def inverse_dynamics(
+        self, q: ArrayLike, v: ArrayLike, a: ArrayLike, parameters: ArrayLike | None = None
+    ) -> Floats:
+        """The torque (..., nv) that gives acceleration `a`."""
+        arrays = [self._arguments.q(q), self._arguments.v(v), self._arguments.v(a, "a")]
+        return self._answer("inverse_dynamics", _inverse_dynamics, "a", arrays, parameters)
+
+    def forward_dynamics(
+        self, q: ArrayLike, v: ArrayLike, tau: ArrayLike, parameters: ArrayLike | None = None
+    ) -> Floats:
+        """The acceleration (..., nv) that `tau` gives, by factors of the mass matrix.
+
+        Raises SingularMassMatrixError where that is singular.
+        """
+        arrays = [self._arguments.q(q), self._arguments.v(v), self._arguments.v(tau, "tau")]
+        a = self._answer("forward_dynamics", _forward_dynamics, "tau", arrays, parameters)
+        return self._arguments.finite_acceleration(a)
+
+    def mass_matrix(self, q: ArrayLike, parameters: ArrayLike | None = None) -> Floats:
+        """M (..., nv, nv), symmetric, armature included where it is a parameter."""
+        return self._answer("mass_matrix", _mass_matrix, None, [self._arguments.q(q)], parameters)
+
+    def acceleration(
+        self, parameters: Array, q: Array, v: Array, tau: Array, rotors: Array | None = None
+    ) -> Array:
+        """The acceleration (nv,) of one sample, for arrays of symbols: to build on it in a trace.
+
+        `rotors` (nv,) are inertias of rotors, added to the diagonal of the mass matrix.
+        """
+        known = self._selection.read(parameters)
+        mechanism = tidied(self._selection.remainder())
+        return _forward_dynamics(known.added_to(mechanism), known.joints, q, v, tau, rotors)
+
+    def root(self, parameters: Array) -> RigidInertia:
+        """The inertia of the root with what is fixed to it, for an array of symbols."""
+        return self._selection.read(parameters).added_to(self._selection.remainder()).root
+
+    def _answer(
+        self,
+        question: str,
+        function: Callable[..., Array],
+        third: str | None,
+        arrays: list[Floats],
+        parameters: ArrayLike | None,
+    ) -> Floats:
+        if parameters is None:
+            values = self.parameters.defaults
+        else:
+            values = checked_array("parameters", parameters, len(self.parameters.names))
+        kernel = self._kernel(question, lambda: _program(self._selection, function, third))
+        (answer,) = evaluated(kernel, [*arrays, values], self._threads)
+        return answer
+
+    def _kernel(self, question: str, program: Callable[[], Program]) -> Kernel:
+        kernel = self._kernels.get(question)
+        if kernel is None:
+            with self._making:
+                kernel = self._kernels.get(question)
+                if kernel is None:
+                    key = ("parametric", question, self._selection.question)
+                    kernel = self._kernels[question] = robot_kernel(self.model, key, program)
+        return kernel
+
+    def __reduce__(self) -> tuple[Callable[..., ParametricDynamics], tuple[Selection, int | None]]:
+        return _rebuild, (self._selection, self._option)
+
+    def __repr__(self) -> str:
+        return f"<ParametricDynamics of {self.model.name}: {len(self.parameters.names)} parameters>"
+
+
+def _program(selection: Selection, function: Callable[..., Array], third: str | None) -> Program:
+    """Of q, v, a third argument and the parameters, or of q and the parameters alone."""
+    mechanism = tidied(selection.remainder())
+    shapes = argument_shapes(mechanism, third or "a")
+    if third is None:
+        shapes = {"q": shapes["q"]}
+
+    def answer(parameters: Array, **state: Array) -> Array:
+        known = selection.read(parameters)
+        return function(known.added_to(mechanism), known.joints, *state.values())
+
+    return trace(
+        lambda **arguments: answer(arguments.pop("parameters"), **arguments),
+        {**shapes, "parameters": (len(selection.parameters().names),)},
+    )
+
+
+def _inverse_dynamics(mechanism: Mechanism, joints: Array | None, q: Array, v: Array, a: Array) -> Array:
+    q, v, a = tree_coordinates(mechanism, q, v, a)
+    tau = rnea.inverse_dynamics(mechanism, q, v, a)
+    return model_torque(mechanism, tau + _joint_torque(mechanism, joints, v, a))
+
+
+def _mass_matrix(mechanism: Mechanism, joints: Array | None, q: Array) -> Array:
+    (q,) = tree_coordinates(mechanism, q)
+    M = crba.mass_matrix(mechanism, q)
+    if joints is not None:
+        base = 6 if mechanism.floating else 0
+        for k in range(len(mechanism.bodies)):
+            M[base + k, base + k] = M[base + k, base + k] + joints[k, 2]
+    if mechanism.coupling is None:
+        return M
+    S = mechanism.coupling.matrix()
+    return np.asarray(S.T @ M @ S)
+
+
+def _forward_dynamics(
+    mechanism: Mechanism,
+    joints: Array | None,
+    q: Array,
+    v: Array,
+    tau: Array,
+    rotors: Array | None = None,
+) -> Array:
+    bias = _inverse_dynamics(mechanism, joints, q, v, np.zeros(len(v)))
+    M = _mass_matrix(mechanism, joints, q)
+    L, D = factors_of(mechanism, M if rotors is None else M + np.diag(rotors))
+    return solved(L, D, tau - bias)
+
+
+def _joint_torque(mechanism: Mechanism, joints: Array | None, v: Array, a: Array) -> Array:
+    """What damping, friction and armature take, in tree coordinates."""
+    torque = np.zeros(len(v), dtype=object)
+    if joints is None:
+        return torque
+    base = 6 if mechanism.floating else 0
+    for k, (damping, friction, armature) in enumerate(joints):
+        speed, change = v[base + k], a[base + k]
+        torque[base + k] = damping * speed + friction * _sign(speed) + armature * change
+    return torque
+
+
+def _sign(x: Any) -> Any:
+    # A mimic joint with multiplier 0 has a constant for its speed.
+    return np.sign(x) if isinstance(x, (int, float)) else sign_of(x)
+
+
+def _rebuild(selection: Selection, threads: int | None) -> ParametricDynamics:
+    return ParametricDynamics(selection, threads=threads)

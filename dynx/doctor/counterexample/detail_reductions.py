@@ -1,0 +1,184 @@
+"""Ways to simplify what is left of a robot: elements and attributes dropped, numbers made round."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from xml.sax.saxutils import quoteattr
+
+from dynx.doctor.counterexample.tree_reductions import Cuts
+from dynx.model.xml.source import Edit, SourceElement, XmlSource
+from dynx.rules.text.number_text import is_number
+
+DIGITS = (1, 2, 3)
+"""Numbers are tried with so many significant digits."""
+
+_DYNAMIC = {
+    "link": {"inertial"},
+    "joint": {"origin", "parent", "child", "axis", "limit", "dynamics", "mimic"},
+}
+_NAMING = frozenset(["name", "type", "link", "joint", "filename"])
+
+Simpler = Callable[[SourceElement, str, str], str]
+"""From an element, the name of an attribute and a word in it that is a number: a simpler one."""
+
+
+def fewer_extras(source: XmlSource) -> Cuts:
+    """Drop what says nothing about dynamics: shapes, materials, transmissions, simulators' elements."""
+    extras = [element for element in source.root.children if element.tag not in _DYNAMIC]
+    for tag, dynamic in _DYNAMIC.items():
+        for part in source.root.all(tag):
+            extras += [element for element in part.children if element.tag not in dynamic]
+    return Cuts(extras, lambda chosen: source.edited(*_removing(source, chosen)))
+
+
+def fewer_elements(source: XmlSource) -> Cuts:
+    """Drop any element inside a link or a joint but a joint's ends."""
+    parts = [part for tag in _DYNAMIC for part in source.root.all(tag)]
+    inside = [element for part in parts for element in part.walk() if element is not part]
+    droppable = [element for element in inside if element.tag not in ("parent", "child")]
+    return Cuts(droppable, lambda chosen: source.edited(*_removing(source, chosen)))
+
+
+def fewer_attributes(source: XmlSource) -> Cuts:
+    """Drop attributes, names and references excepted."""
+    found = [
+        (element, attribute)
+        for element in source.root.walk()
+        for attribute in element.places
+        if attribute not in _NAMING
+    ]
+    return Cuts(
+        found,
+        lambda chosen: source.edited(*(source.removing_attribute(*each) for each in chosen)),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Rounding:
+    """Other words at some positions of an attribute that holds numbers."""
+
+    element: SourceElement
+    attribute: str
+    words: dict[int, str]
+
+
+def frame_axes(source: XmlSource) -> Cuts:
+    """Put the nearest axis of the frame for the axis of a joint."""
+    changes = []
+    for element, attribute, words in _numbers(source):
+        largest = max(range(len(words)), key=lambda k: abs(float(words[k])))
+        nearest = {k: "0" if k != largest else _unit(word) for k, word in enumerate(words)}
+        changed = any(complexity(new) < complexity(words[k]) for k, new in nearest.items())
+        if element.tag == "axis" and changed:
+            changes.append(_Rounding(element, attribute, nearest))
+    return Cuts(changes, lambda chosen: source.edited(*_rewriting(source, chosen)))
+
+
+def plain_numbers(source: XmlSource) -> Cuts:
+    """Put 0 for a number; 1 for a mass, a moment of inertia and a limit, -1 for a lower limit."""
+    return _roundings(source, _plain)
+
+
+def unit_numbers(source: XmlSource) -> Cuts:
+    """Put 1 or -1 for a number."""
+    return _roundings(source, lambda element, attribute, word: _unit(word))
+
+
+def round_numbers(source: XmlSource, digits: int) -> Cuts:
+    """Write numbers with so many significant digits."""
+    return _roundings(source, lambda element, attribute, word: shortest(f"{float(word):.{digits}g}"))
+
+
+def complexity(word: str) -> int:
+    """How much there is to a number: 0 for zero, 1 for one, else by the significant digits."""
+    value = abs(float(word))
+    if value in (0.0, 1.0):
+        return int(value)
+    return 1 + len(f"{value:.16e}".partition("e")[0].replace(".", "").rstrip("0"))
+
+
+def shortest(word: str) -> str:
+    """A number as few characters as read back the same; other words as they are."""
+    if not is_number(word):
+        return word
+    value = float(word)
+    return repr(int(value)) if value == int(value) and abs(value) < 1e6 else repr(value)
+
+
+def tidy(source: XmlSource, *, numbers: bool) -> str:
+    """The document with two blanks of indentation and without comments, one element to a line; numbers
+    as short as they can be if `numbers`."""
+    return "\n".join(_lines(source.root, "", numbers)) + "\n"
+
+
+def _lines(element: SourceElement, indent: str, numbers: bool) -> Iterator[str]:
+    written = "".join(
+        f" {name}={quoteattr(_tidied(value) if numbers and name not in _NAMING else value)}"
+        for name, value in element.attributes.items()
+    )
+    if not element.children:
+        yield f"{indent}<{element.tag}{written}/>"
+        return
+    yield f"{indent}<{element.tag}{written}>"
+    for child in element.children:
+        yield from _lines(child, indent + "  ", numbers)
+    yield f"{indent}</{element.tag}>"
+
+
+def _tidied(value: str) -> str:
+    return " ".join(shortest(word) for word in value.split(" "))
+
+
+def _removing(source: XmlSource, chosen: Sequence[SourceElement]) -> Iterator[Edit]:
+    """Edits that remove elements; what lies in another one goes with it."""
+    going = {id(element) for element in chosen}
+    for element in chosen:
+        above = element.parent
+        while above is not None and id(above) not in going:
+            above = above.parent
+        if above is None:
+            yield source.removing(element)
+
+
+def _roundings(source: XmlSource, simpler: Simpler) -> Cuts:
+    """Changes of single words of number attributes to simpler ones; an axis is changed as a whole."""
+    changes = []
+    for element, attribute, words in _numbers(source):
+        found = {k: simpler(element, attribute, word) for k, word in enumerate(words)}
+        found = {k: new for k, new in found.items() if complexity(new) < complexity(words[k])}
+        if element.tag != "axis":
+            changes += [_Rounding(element, attribute, {k: new}) for k, new in found.items()]
+    return Cuts(changes, lambda chosen: source.edited(*_rewriting(source, chosen)))
+
+
+def _numbers(source: XmlSource) -> Iterator[tuple[SourceElement, str, list[str]]]:
+    """The attributes that hold finite numbers and nothing else, with their words."""
+    for element in source.root.walk():
+        for attribute in element.places:
+            words = element.attributes[attribute].split()
+            if attribute not in _NAMING and words and all(map(is_number, words)):
+                yield element, attribute, words
+
+
+def _rewriting(source: XmlSource, chosen: Sequence[_Rounding]) -> Iterator[Edit]:
+    together: dict[tuple[int, str], list[_Rounding]] = {}
+    for change in chosen:
+        together.setdefault((id(change.element), change.attribute), []).append(change)
+    for (_, attribute), changes in together.items():
+        element = changes[0].element
+        words = element.attributes[attribute].split()
+        for change in changes:
+            for k, word in change.words.items():
+                words[k] = word
+        yield source.setting(element, attribute, " ".join(words))
+
+
+def _unit(word: str) -> str:
+    return "-1" if float(word) < 0.0 else "1"
+
+
+def _plain(element: SourceElement, attribute: str, word: str) -> str:
+    if element.tag == "limit":
+        return "-1" if attribute == "lower" else "1"
+    return "1" if element.tag == "mass" or attribute in ("ixx", "iyy", "izz") else "0"

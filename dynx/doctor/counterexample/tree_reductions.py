@@ -1,0 +1,100 @@
+"""Ways to cut a robot down: links merged into their neighbours, moving joints fixed.
+
+Nothing is preserved but that the document is a tree: what is wanted is a smaller robot that still shows
+a difference, not the same robot.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from dynx.model.xml.source import Edit, XmlSource
+from dynx.rules.case import end_of
+
+
+@dataclass(frozen=True)
+class Cuts:
+    """Changes to one document, and how some of them are made together."""
+
+    changes: Sequence[Any]
+    apply: Callable[[Sequence[Any]], XmlSource]
+
+
+def fewer_links(source: XmlSource) -> Cuts:
+    """Take links away with the joints above them; what they carried goes to the nearest link below the
+    root that stays. Limbs stand together in the list, so that whole ones go at once."""
+    return Cuts(_Tree(source).below_root(), lambda chosen: _Tree(source).without_children(chosen))
+
+
+def higher_links(source: XmlSource) -> Cuts:
+    """Take links away with a joint *below* them, whose child takes their place: the root too."""
+    return Cuts(_Tree(source).below_root(), lambda chosen: _Tree(source).without_parents(chosen))
+
+
+def fewer_moving_joints(source: XmlSource) -> Cuts:
+    """Make joints fixed."""
+    moving = [joint for joint in source.root.all("joint") if joint.attributes.get("type") != "fixed"]
+    return Cuts(
+        moving,
+        lambda chosen: source.edited(*(source.setting(joint, "type", "fixed") for joint in chosen)),
+    )
+
+
+class _Tree:
+    """The joints of a document with their ends, which cuts move."""
+
+    def __init__(self, source: XmlSource) -> None:
+        self._source = source
+        self._joints = source.root.all("joint")
+        self._ends = [[end_of(joint, "parent"), end_of(joint, "child")] for joint in self._joints]
+        self._gone_joints: set[int] = set()
+        self._gone_links: set[str] = set()
+
+    def below_root(self) -> list[int]:
+        """The joints depth first: joint k stands for the link that it carries."""
+        carried: dict[str, list[int]] = {}
+        for k, (parent, _) in enumerate(self._ends):
+            carried.setdefault(parent, []).append(k)
+        children = {child for _, child in self._ends}
+        order: list[int] = []
+        waiting = [k for root in carried if root not in children for k in reversed(carried[root])]
+        while waiting:
+            k = waiting.pop()
+            order.append(k)
+            waiting += reversed(carried.get(self._ends[k][1], []))
+        return order
+
+    def without_children(self, joints: Sequence[int]) -> XmlSource:
+        for k in joints:
+            parent, child = self._ends[k]
+            self._leave_out(k, child, parent)
+        return self._edited()
+
+    def without_parents(self, joints: Sequence[int]) -> XmlSource:
+        for k in joints:
+            parent, child = self._ends[k]
+            self._leave_out(k, parent, child)
+        return self._edited()
+
+    def _leave_out(self, k: int, link: str, other: str) -> None:
+        self._gone_joints.add(k)
+        self._gone_links.add(link)
+        self._ends = [[other if end == link else end for end in ends] for ends in self._ends]
+
+    def _edited(self) -> XmlSource:
+        source = self._source
+        edits: list[Edit] = []
+        for k, joint in enumerate(self._joints):
+            if k in self._gone_joints:
+                edits.append(source.removing(joint))
+                continue
+            for role, name in zip(("parent", "child"), self._ends[k], strict=True):
+                if name != end_of(joint, role):
+                    element = joint.first(role)
+                    assert element is not None
+                    edits.append(source.setting(element, "link", name))
+        links = source.root.all("link")
+        gone = [link for link in links if link.attributes.get("name") in self._gone_links]
+        return source.edited(*edits, *(source.removing(link) for link in gone))

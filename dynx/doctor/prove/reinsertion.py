@@ -1,0 +1,56 @@
+"""A cause put back into a mended file: mended of everything else, though dynx cannot read it so.
+
+The remedies about the robot need a file that can be read. Where one cause keeps dynx itself from reading
+it, the file is mended of all, and the lines of that cause are put back as they were.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from difflib import SequenceMatcher
+
+from dynx.errors import DescriptionError
+from dynx.model.xml.source import XmlSource
+
+Lines = tuple[int, int, int, int]
+"""First and end in one text, first and end in another, where the same lines stand."""
+
+
+def put_back(given: XmlSource, without: XmlSource, mended: XmlSource) -> XmlSource | None:
+    """The `mended` text with the lines of a cause as they are `given`.
+
+    `without` is the given text after the cause alone is taken away. None where other remedies changed
+    the same lines, or the cause comes down to no line, or the two cannot be told apart.
+    """
+    texts = (given.text, without.text, mended.text)
+    old, base, new = ([*text.splitlines(keepends=True)] for text in texts)
+    kept = [each[1:] for each in _opcodes(base, new) if each[0] == "equal"]
+    parts: list[str] = []
+    done = 0
+    for tag, first, last, start, end in _opcodes(base, old):
+        if tag == "equal":
+            continue
+        at = _counterpart(kept, first, last)
+        if at is None or at < done:
+            return None
+        parts += [*new[done:at], *old[start:end]]
+        done = at + (last - first)
+    if not parts:
+        return None
+    try:
+        return XmlSource("".join([*parts, *new[done:]]), given.source)
+    except DescriptionError:
+        # Where lines repeat, the two changes can be taken for others and cross.
+        return None
+
+
+def _opcodes(one: Sequence[str], other: Sequence[str]) -> Sequence[tuple[str, int, int, int, int]]:
+    return SequenceMatcher(None, one, other, autojunk=False).get_opcodes()
+
+
+def _counterpart(kept: Sequence[Lines], first: int, last: int) -> int | None:
+    """Where these lines of one text stand in the other, if they stand there unchanged."""
+    for begin, end, start, _ in kept:
+        if begin <= first and last <= end:
+            return start + first - begin
+    return None

@@ -1,0 +1,266 @@
+"""The backend `drake`: every quantity that Drake's `MultibodyPlant` computes, by Drake (Tedrake et al.).
+
+The plant is made body by body from the moving bodies of the `Model` (`drake_plant`), so that nothing of
+Drake's file reader takes part. It has no geometry, actuators, damping or limits and is continuous.
+
+Safe to use from several threads: the plant is never changed after it is made, and each thread has a
+context of its own, made on its first call. Calls hold the GIL, so threads give no speed.
+
+Jacobian derivatives and Coriolis matrices are derived: Drake has J v and dJ/dt v, not dJ/dt. Forward
+dynamics is Drake's articulated-body algorithm; where that refuses a body whose inertia is not positive
+(a file may state one, and the mass matrix be regular all the same), it is solved from the mass matrix.
+"""
+
+from __future__ import annotations
+
+from threading import local
+from typing import Any, ClassVar
+
+import numpy as np
+
+from dynx.backends.base import Backend
+from dynx.backends.engine_errors import engine_errors
+from dynx.engines.drake.library import (
+    DRAKE_FAILURES,
+    JacobianWrtVariable,
+    MultibodyForces,
+    drake_version,
+    gist,
+)
+from dynx.engines.drake.multibody_plant import build_plant
+from dynx.errors import DynxError, EngineError
+from dynx.model import Model
+from dynx.rbd.jacobians import Reference
+from dynx.spatial.scalar import Floats
+
+_V = JacobianWrtVariable.kV
+_HERE: Floats = np.zeros(3)
+_AT_WORLD = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+
+_mapped = engine_errors("drake", gist, DRAKE_FAILURES)
+
+
+class _Workspace(local):
+    """What Drake computes in, one for each thread that asks for it."""
+
+    def __init__(self, plant: Any) -> None:
+        self.context = plant.CreateDefaultContext()
+        self.forces = MultibodyForces(plant)
+        self.no_forces = MultibodyForces(plant)
+
+
+class DrakeBackend(Backend):
+    """Drake behind the interface of `Backend`.
+
+    A batch is a Python loop over the engine's calls. For batches the backend ``compiled`` gives the same
+    numbers, to rounding, about 400 times as fast: inverse dynamics of UR5, one thread, to one significant
+    figure (``dynx bench ur5 --batch 65536 --threads 1``; other quantities are in docs/bench.md).
+    """
+
+    name: ClassVar[str] = "drake"
+
+    def __init__(self, model: Model, *, validate: bool = True) -> None:
+        super().__init__(model, validate=validate)
+        try:
+            self._built = build_plant(self._mechanism)
+            self._plant = self._built.plant
+            self._workspace = _Workspace(self._plant)
+        except DynxError:
+            raise
+        except DRAKE_FAILURES as error:
+            raise EngineError(f"drake cannot hold {model.name}: {gist(error)}") from error
+        self._coordinates = self._built.coordinates
+        self._world = self._plant.world_frame()
+        self._gravity: Floats = np.array(model.gravity)
+        self._torque = self._plant.get_applied_generalized_force_input_port()
+        self._acceleration = self._plant.get_generalized_acceleration_output_port()
+        # Drake divides by the mass of what can be weighed; nothing and less than nothing it refuses.
+        self._weighs = float(self._plant.CalcTotalMass(self._workspace.context)) > 0.0
+
+    @property
+    def engine_version(self) -> str:
+        """``drake`` and the version of its distribution."""
+        return f"drake {drake_version()}"
+
+    def _release(self) -> None:
+        # Calls that other threads are in keep their own reference until they end.
+        del self._workspace, self._torque, self._acceleration, self._world, self._plant, self._built
+
+    # -- kinematics ---------------------------------------------------------------------------
+
+    @_mapped
+    def _frame_placements(self, q: Floats) -> Floats:
+        context, _ = self._placed(q)
+        where = self._plant.EvalBodyPoseInWorld
+        bodies = np.array([where(context, body).GetAsMatrix4() for body in self._built.bodies])
+        return np.asarray(bodies[self._built.body_of_frame] @ self._built.T_body_frame)
+
+    @_mapped
+    def _frame_placement(self, q: Floats, frame: int) -> Floats:
+        context, _ = self._placed(q)
+        T: Floats = self._built.frames[frame].CalcPoseInWorld(context).GetAsMatrix4()
+        return T
+
+    @_mapped
+    def _jacobian(self, q: Floats, frame: int, reference: Reference) -> Floats:
+        context, R = self._placed(q)
+        on_robot = self._built.frames[frame]
+        axes = on_robot if reference == "local" else self._world
+        point = _HERE
+        if reference == "world":
+            point = on_robot.CalcPoseInWorld(context).inverse().translation()
+        J = self._plant.CalcJacobianSpatialVelocity(context, _V, on_robot, point, self._world, axes)
+        return self._coordinates.forces_back(R, _linear_first(J))
+
+    @_mapped
+    def _frame_velocity(self, q: Floats, v: Floats, frame: int, reference: Reference) -> Floats:
+        context, _ = self._moving(q, v)
+        on_robot = self._built.frames[frame]
+        velocity = _linear_first(on_robot.CalcSpatialVelocityInWorld(context).get_coeffs())
+        return self._referred(velocity, on_robot, context, reference)
+
+    @_mapped
+    def _frame_acceleration(
+        self, q: Floats, v: Floats, a: Floats, frame: int, reference: Reference
+    ) -> Floats:
+        context, R = self._moving(q, v)
+        on_robot, world = self._built.frames[frame], self._world
+        J = self._plant.CalcJacobianSpatialVelocity(context, _V, on_robot, _HERE, world, world)
+        bias = self._plant.CalcBiasSpatialAcceleration(context, _V, on_robot, _HERE, world, world)
+        wanted = self._coordinates.accelerations(R, v, a)
+        # Drake's is the classical acceleration of the origin; the spatial one leaves out w x v.
+        acceleration = _linear_first(J @ wanted + bias.get_coeffs())
+        if reference != "local_world_aligned":
+            velocity = on_robot.CalcSpatialVelocityInWorld(context)
+            acceleration[:3] -= np.cross(velocity.rotational(), velocity.translational())
+        return self._referred(acceleration, on_robot, context, reference)
+
+    def _referred(self, motion: Floats, frame: Any, context: Any, reference: Reference) -> Floats:
+        """A spatial vector at the frame's origin, in world axes, as `reference` wants it."""
+        if reference == "local_world_aligned":
+            return motion
+        T = frame.CalcPoseInWorld(context)
+        if reference == "local":
+            R = T.rotation().matrix()
+            return np.concatenate([motion[:3] @ R, motion[3:] @ R])
+        motion[:3] += np.cross(T.translation(), motion[3:])
+        return motion
+
+    # -- dynamics -----------------------------------------------------------------------------
+
+    @_mapped
+    def _inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
+        if self.model.floating:
+            # Gravity is an acceleration of the base the other way; see `_upright`.
+            a = a.copy()
+            a[:3] -= self._gravity @ self._coordinates.attitude(q)
+            context, R = self._moving(_upright(q), v)
+            wanted = self._coordinates.accelerations(R, v, a)
+            tau = self._plant.CalcInverseDynamics(context, wanted, self._workspace.no_forces)
+            return self._coordinates.forces_back(R, tau)
+        context, R = self._moving(q, v)
+        plant, forces, coordinates = self._plant, self._workspace.forces, self._coordinates
+        plant.CalcForceElementsContribution(context, forces)
+        wanted = coordinates.accelerations(R, v, a)
+        return coordinates.forces_back(R, plant.CalcInverseDynamics(context, wanted, forces))
+
+    @_mapped
+    def _forward_dynamics(self, q: Floats, v: Floats, tau: Floats) -> Floats:
+        context, R = self._moving(q, v)
+        self._torque.FixValue(context, self._coordinates.forces(R, tau))
+        try:
+            vdot = self._acceleration.Eval(context)
+        except RuntimeError:
+            # A joint that carries an inertia which is not positive; see the head of this file.
+            return super()._forward_dynamics(q, v, tau)
+        return self._coordinates.accelerations_back(R, v, vdot)
+
+    @_mapped
+    def _mass_matrix(self, q: Floats) -> Floats:
+        context, R = self._placed(_upright(q) if self.model.floating else q)
+        plant = self._plant
+        # A body in counterweighted parts has no composite inertia that Drake could divide by its mass.
+        ask = plant.CalcMassMatrixViaInverseDynamics if self._built.counterweighted else plant.CalcMassMatrix
+        M = self._coordinates.matrix_back(R, ask(context))
+        return np.asarray(0.5 * (M + M.T))
+
+    @_mapped
+    def _bias_torque(self, q: Floats, v: Floats) -> Floats:
+        if self.model.floating:
+            # The base that has no acceleration in its own axes may have one in the world's, Drake's.
+            return self._inverse_dynamics(q, v, np.zeros_like(v))
+        context, R = self._moving(q, v)
+        bias = self._plant.CalcBiasTerm(context) - self._plant.CalcGravityGeneralizedForces(context)
+        return self._coordinates.forces_back(R, bias)
+
+    @_mapped
+    def _gravity_torque(self, q: Floats) -> Floats:
+        context, R = self._placed(q)
+        return self._coordinates.forces_back(R, -self._plant.CalcGravityGeneralizedForces(context))
+
+    # -- the whole body -----------------------------------------------------------------------
+
+    @_mapped
+    def _center_of_mass(self, q: Floats) -> Floats:
+        if not self._weighs:
+            return super()._center_of_mass(q)
+        context, _ = self._placed(q)
+        center: Floats = self._plant.CalcCenterOfMassPositionInWorld(context)
+        return center
+
+    @_mapped
+    def _center_of_mass_jacobian(self, q: Floats) -> Floats:
+        if not self._weighs:
+            return super()._center_of_mass_jacobian(q)
+        context, R = self._placed(q)
+        J = self._plant.CalcJacobianCenterOfMassTranslationalVelocity(context, _V, self._world, self._world)
+        return self._coordinates.forces_back(R, J)
+
+    @_mapped
+    def _centroidal_momentum(self, q: Floats, v: Floats) -> Floats:
+        if not self._weighs:
+            return super()._centroidal_momentum(q, v)
+        context, _ = self._moving(q, v)
+        center = self._plant.CalcCenterOfMassPositionInWorld(context)
+        momentum = self._plant.CalcSpatialMomentumInWorldAboutPoint(context, center)
+        return _linear_first(momentum.get_coeffs())
+
+    @_mapped
+    def _kinetic_energy(self, q: Floats, v: Floats) -> Floats:
+        context, _ = self._moving(q, v)
+        return np.asarray(self._plant.CalcKineticEnergy(context))
+
+    @_mapped
+    def _potential_energy(self, q: Floats) -> Floats:
+        context, _ = self._placed(q)
+        return np.asarray(self._plant.CalcPotentialEnergy(context))
+
+    # -- the state of the engine --------------------------------------------------------------
+
+    def _placed(self, q: Floats) -> tuple[Any, Floats]:
+        """This thread's context, at `q`, and the attitude of the base."""
+        context = self._workspace.context
+        self._plant.SetPositions(context, self._coordinates.positions(q))
+        return context, self._coordinates.attitude(q)
+
+    def _moving(self, q: Floats, v: Floats) -> tuple[Any, Floats]:
+        """This thread's context, at `q` and `v`, and the attitude of the base."""
+        context, R = self._placed(q)
+        self._plant.SetVelocities(context, self._coordinates.velocities(R, v))
+        return context, R
+
+
+def _upright(q: Floats) -> Floats:
+    """The configuration with the base at the world's frame, on which neither mass matrix nor motion depends.
+
+    Drake works in world axes: a slender robot turned there, and its answers turned back, would lose
+    the digits by which its small moment is smaller than its large ones.
+    """
+    q = q.copy()
+    q[:7] = _AT_WORLD
+    return q
+
+
+def _linear_first(spatial: Floats) -> Floats:
+    """Drake's angular before linear, in the order of dynx: (6, ...)."""
+    return np.concatenate([spatial[3:], spatial[:3]])

@@ -1,0 +1,132 @@
+"""A `MultibodyPlant` with the moving bodies of a mechanism, and where dynx finds things in it.
+
+Drake's `SpatialInertia` is mass, centre of mass and inertia per unit of mass, and is taken as it stands
+when its check is skipped, physical or not. Inertia without mass does not fit in: such a body is made of
+two parts welded together whose masses are s and -s, so that what remains is the inertia. Drake's inverse
+dynamics, energies and articulated-body algorithm add forces and 6 x 6 matrices, so the parts cancel to
+rounding; its composite-body mass matrix divides by the mass of the sum and must not be asked.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from dynx.engines.drake.coordinates import DrakeCoordinates
+from dynx.engines.drake.library import (
+    FixedOffsetFrame,
+    MultibodyPlant,
+    PrismaticJoint,
+    QuaternionFloatingJoint,
+    RevoluteJoint,
+    RigidTransform,
+    RotationMatrix,
+    SpatialInertia,
+    UnitInertia,
+)
+from dynx.model import Mechanism
+from dynx.model.mechanism import ROOT
+from dynx.spatial.inertia import RigidInertia
+from dynx.spatial.scalar import Array, Floats
+from dynx.spatial.se3 import homogeneous
+
+LARGEST = 1e150
+"""Length [m], or square of a radius of gyration [m^2], beyond which products with it may overflow."""
+
+
+@dataclass(frozen=True, eq=False)
+class BuiltPlant:
+    """A finalized plant.
+
+    `bodies` are the engine's bodies, the root first; `frames` the engine's frames by the number of
+    the dynx frame; `body_of_frame` (n_frames,) and `T_body_frame` (n_frames, 4, 4) place each frame in
+    `bodies`. `counterweighted` says whether some body is in parts of opposite mass.
+    """
+
+    plant: Any
+    coordinates: DrakeCoordinates
+    bodies: list[Any]
+    frames: list[Any]
+    body_of_frame: Array
+    T_body_frame: Floats
+    counterweighted: bool
+
+
+def build_plant(mechanism: Mechanism) -> BuiltPlant:
+    """The plant of a mechanism: one body for each of its bodies, numbered names."""
+    plant = MultibodyPlant(time_step=0.0)
+    plant.mutable_gravity_field().set_gravity_vector(np.array(mechanism.gravity))
+    bodies: list[Any] = []
+    counterweighted = False
+    for index, inertia in enumerate([mechanism.root, *(body.inertia for body in mechanism.bodies)]):
+        first, *others = _parts(inertia)
+        bodies.append(plant.AddRigidBody(f"{index}", first))
+        for number, part in enumerate(others):
+            counterweight = plant.AddRigidBody(f"{index}:{number}", part)
+            plant.WeldFrames(bodies[-1].body_frame(), counterweight.body_frame())
+            counterweighted = True
+
+    base: Any = None
+    if mechanism.floating:
+        base = plant.AddJoint(QuaternionFloatingJoint("base", plant.world_frame(), bodies[0].body_frame()))
+    else:
+        plant.WeldFrames(plant.world_frame(), bodies[0].body_frame())
+    joints: list[Any] = []
+    for index, body in enumerate(mechanism.bodies):
+        carrier = bodies[body.parent - ROOT].body_frame()
+        before = plant.AddFrame(FixedOffsetFrame(f"before:{index}", carrier, _pose(body.R, body.p)))
+        kind = RevoluteJoint if body.revolute else PrismaticJoint
+        moved = bodies[index + 1].body_frame()
+        joints.append(plant.AddJoint(kind(f"{index}", before, moved, np.array(body.axis))))
+    frames = []
+    for index, frame in enumerate(mechanism.frames):
+        carrier = bodies[frame.body - ROOT].body_frame()
+        placed = FixedOffsetFrame(f"frame:{index}", carrier, _pose(frame.R, frame.p))
+        frames.append(plant.AddFrame(placed))
+    plant.Finalize()
+
+    coordinates = DrakeCoordinates(
+        [joint.position_start() for joint in joints],
+        [joint.velocity_start() for joint in joints],
+        plant.num_positions(),
+        plant.num_velocities(),
+        None if base is None else (base.position_start(), base.velocity_start()),
+    )
+    placements = [homogeneous(np.asarray(frame.R), np.asarray(frame.p)) for frame in mechanism.frames]
+    return BuiltPlant(
+        plant,
+        coordinates,
+        bodies,
+        frames,
+        np.array([frame.body - ROOT for frame in mechanism.frames], dtype=int),
+        np.array(placements, dtype=float),
+        counterweighted,
+    )
+
+
+def _parts(inertia: RigidInertia) -> list[Any]:
+    """The inertia as one of Drake's; as several where it has too little mass to be divided by it."""
+    mass = float(inertia.mass)
+    if not (inertia.first_moment.any() or inertia.second_moment.any()):
+        return [_inertia(mass, inertia)]
+    largest = float(max(np.max(np.abs(inertia.first_moment)), np.max(np.abs(inertia.second_moment))))
+    if mass and largest < LARGEST * abs(mass):
+        return [_inertia(mass, inertia)]
+    nothing = RigidInertia(inertia.mass, np.zeros(3), np.zeros((3, 3)))
+    parts = [_inertia(largest, inertia), _inertia(-largest, nothing)]
+    return [*parts, _inertia(mass, nothing)] if mass else parts
+
+
+def _inertia(mass: float, moments: RigidInertia) -> Any:
+    """Drake's inertia of this mass, with the first and second moment of `moments`."""
+    divisor = mass or 1.0
+    G = moments.second_moment / divisor
+    unit = UnitInertia(G[0, 0], G[1, 1], G[2, 2], G[0, 1], G[0, 2], G[1, 2])
+    return SpatialInertia(mass, moments.first_moment / divisor, unit, skip_validity_check=True)
+
+
+def _pose(R: Array, p: Array) -> Any:
+    # Release builds of Drake, which the wheels are, take a matrix as it is.
+    return RigidTransform(RotationMatrix(np.asarray(R, dtype=float)), np.asarray(p, dtype=float))

@@ -1,0 +1,69 @@
+"""Remedies at run time for a robot that Drake has loaded."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from typing import Any
+
+import numpy as np
+
+from dynx.engines.drake.library import SpatialInertia, UnitInertia
+from dynx.model import Model
+from dynx.model.mechanism import float64, pose_arrays
+from dynx.spatial.inertia import inertia_about_origin
+
+CALLS: Mapping[str, str] = {
+    "drake.no_damping": (
+        "for i in plant.GetJointIndices():  # before plant.Finalize()\n"
+        "    joint = plant.get_mutable_joint(i)\n"
+        "    joint.set_default_damping_vector(0 * joint.default_damping_vector())"
+    ),
+    "drake.free_mimics": (
+        "for i in plant.GetConstraintIds(): plant.RemoveConstraint(i)  # before plant.Finalize()"
+    ),
+    "drake.no_rotors": (
+        "for i in plant.GetJointActuatorIndices():  # before plant.Finalize()\n"
+        "    plant.get_mutable_joint_actuator(i).set_default_rotor_inertia(0)"
+    ),
+    "drake.set_inertias": (
+        "# for each link that Drake warned of; I is about the link's origin, in its axes;\n"
+        "# where the file has no mass, m = 2**-200, for Drake holds an inertia per unit of mass\n"
+        "G = UnitInertia(*(I[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]] / m))\n"
+        "M = SpatialInertia(m, center_of_mass, G, skip_validity_check=True)\n"
+        "plant.GetBodyByName(link).SetSpatialInertiaInBodyFrame(context, M)"
+    ),
+}
+
+FEATHER = 2.0**-200
+"""Mass [kg] of a link whose file states an inertia and no mass: a power of two, so that dividing by it is
+exact, and too light for its weight to be seen beside any inertia."""
+
+
+def set_before_finalize(plant: Any, calls: Collection[str]) -> None:
+    """Apply those of `calls` that Drake takes before `Finalize`."""
+    if "drake.no_damping" in calls:
+        for index in plant.GetJointIndices():
+            joint = plant.get_mutable_joint(index)
+            joint.set_default_damping_vector(0.0 * joint.default_damping_vector())
+    if "drake.free_mimics" in calls:
+        for constraint in plant.GetConstraintIds():
+            plant.RemoveConstraint(constraint)
+    if "drake.no_rotors" in calls:
+        for index in plant.GetJointActuatorIndices():
+            plant.get_mutable_joint_actuator(index).set_default_rotor_inertia(0.0)
+
+
+def set_in_context(context: Any, bodies: Mapping[str, Any], model: Model, calls: Collection[str]) -> None:
+    """Apply those of `calls` that Drake takes in a context; the numbers are those of `model`."""
+    if "drake.set_inertias" not in calls:
+        return
+    for link in model.links:
+        if link.inertial is None or link.name not in bodies or link.name == "world":
+            continue
+        R, p = pose_arrays(link.inertial.origin, float64)
+        stated = inertia_about_origin(float64(link.inertial.mass), p, R, float64(link.inertial.tensor))
+        mass = float(stated.mass) or FEATHER
+        G = np.asarray(stated.second_moment / mass)
+        unit = UnitInertia(G[0, 0], G[1, 1], G[2, 2], G[0, 1], G[0, 2], G[1, 2])
+        inertia = SpatialInertia(mass, p, unit, skip_validity_check=True)
+        bodies[link.name].SetSpatialInertiaInBodyFrame(context, inertia)

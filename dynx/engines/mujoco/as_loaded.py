@@ -1,0 +1,170 @@
+"""A URDF as MuJoCo loads it from the file.
+
+Its answers are those of the calls that users make: `mj_inverse` and `mj_forward`, with whatever MuJoCo
+adds to the rigid bodies. Joint damping, dry friction, limits that are violated, `<mimic>` (an equality
+constraint) and shapes that touch all put forces into both; `CALLS` take them out, one by one.
+
+With a fixed base MuJoCo welds the root link, and all that hangs on fixed joints, into what carries
+them (`fusestatic`, the default for URDF): such links have no frame any more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+
+from dynx.engines.mujoco.file_loading import CALLS, FIXED, FLOATING, load_file
+from dynx.engines.mujoco.library import mujoco, silence_warnings
+from dynx.engines.mujoco.loaded_description import WORLD, describe_model
+from dynx.loaded.description import LoadedModel
+from dynx.loaded.robot import LoadedRobot, lacking_joints
+from dynx.model import Model
+from dynx.spatial.scalar import Floats
+
+
+class LoadedMujoco(LoadedRobot):
+    """The robot as `mujoco.MjModel.from_xml_path` gives it; see `LoadedRobot`."""
+
+    name: ClassVar[str] = "mujoco"
+    CALLS: ClassVar[Mapping[str, str]] = CALLS
+
+    def __init__(self, path: Path, model: Model, calls: Collection[str] = ()) -> None:
+        self._model = model
+        self._loaded = loaded = load_file(Path(path), model, calls)
+        self._gravity: Floats = np.array(loaded.opt.gravity)
+        loaded.opt.gravity[:] = model.gravity
+        self._bodies = [self._body(link.name) for link in model.links]
+        joints = [self._joint(name) for name in model.joint_names]
+        base = 6 if model.floating else 0
+        # Where dynx's coordinates are among MuJoCo's; the free joint comes first in both.
+        self._q = [int(loaded.jnt_qposadr[joint]) for joint in joints]
+        self._v = [*range(base), *(int(loaded.jnt_dofadr[joint]) for joint in joints)]
+        self._data = mujoco.MjData(loaded)
+
+    @classmethod
+    def engine_version(cls) -> str:
+        """The version of MuJoCo."""
+        return str(mujoco.__version__)
+
+    @classmethod
+    def load_call(cls, floating: bool) -> str:
+        """One line for a fixed base, three for a floating one."""
+        return FLOATING if floating else FIXED
+
+    def describe(self) -> LoadedModel:
+        """What MuJoCo holds."""
+        return describe_model(self._loaded, self._model, self._gravity)
+
+    def link_poses(self, q: Floats) -> Floats:
+        """T_world_link (n_links, 4, 4); NaN for links that MuJoCo has fused into others."""
+        self._place(q)
+        mujoco.mj_kinematics(self._loaded, self._data)
+        T = np.full((len(self._bodies), 4, 4), np.nan)
+        for index, body in enumerate(self._bodies):
+            if body is not None:
+                T[index] = np.eye(4)
+                T[index, :3, :3] = self._data.xmat[body].reshape(3, 3)
+                T[index, :3, 3] = self._data.xpos[body]
+        return T
+
+    def jacobian(self, q: Floats, link: str) -> Floats:
+        """`mj_jacBody` of a link frame, (6, nv)."""
+        body = self._bodies[self._model.frame_index(link)]
+        if body is None:
+            return np.full((6, len(self._v)), np.nan)
+        self._place(q)
+        mujoco.mj_kinematics(self._loaded, self._data)
+        mujoco.mj_comPos(self._loaded, self._data)
+        J = np.zeros((6, self._loaded.nv))
+        mujoco.mj_jacBody(self._loaded, self._data, J[:3], J[3:], body)
+        J = J[:, self._v]
+        if self._model.floating:
+            J[:, :3] = J[:, :3] @ self._base_rotation()
+        return J
+
+    def mass_matrix(self, q: Floats) -> Floats:
+        """`mj_fullM`, (nv, nv)."""
+        self._place(q)
+        mujoco.mj_forward(self._loaded, self._data)
+        M = np.zeros((self._loaded.nv, self._loaded.nv))
+        # Since 4.0 it takes the data, before it took their field qM.
+        if hasattr(self._data, "qM"):
+            mujoco.mj_fullM(self._loaded, M, self._data.qM)
+        else:
+            mujoco.mj_fullM(self._loaded, self._data, M)
+        M = M[np.ix_(self._v, self._v)]
+        if self._model.floating:
+            R = self._base_rotation()
+            M[:3] = R.T @ M[:3]
+            M[:, :3] = M[:, :3] @ R
+        return M
+
+    def inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
+        """`mj_inverse`, (nv,): less the damping and the constraint forces that MuJoCo finds."""
+        self._place(q, v)
+        self._data.qacc[self._v] = a
+        if self._model.floating:
+            self._data.qacc[:3] = self._base_rotation() @ (a[:3] + np.cross(v[3:6], v[:3]))
+        mujoco.mj_inverse(self._loaded, self._data)
+        tau = np.array(self._data.qfrc_inverse[self._v])
+        if self._model.floating:
+            tau[:3] = self._base_rotation().T @ tau[:3]
+        return tau
+
+    def forward_dynamics(self, q: Floats, v: Floats, tau: Floats) -> Floats:
+        """`mj_forward` with `tau` in `qfrc_applied`, (nv,)."""
+        self._place(q, v)
+        self._data.qfrc_applied[self._v] = tau
+        if self._model.floating:
+            self._data.qfrc_applied[:3] = self._base_rotation() @ tau[:3]
+        mujoco.mj_forward(self._loaded, self._data)
+        a = np.array(self._data.qacc[self._v])
+        if self._model.floating:
+            a[:3] = self._base_rotation().T @ a[:3] - np.cross(v[3:6], v[:3])
+        return a
+
+    def close(self) -> None:
+        """Release MuJoCo's model and data."""
+        vars(self).pop("_data", None)
+        vars(self).pop("_loaded", None)
+
+    # -- from dynx to MuJoCo ------------------------------------------------------------------
+
+    def _place(self, q: Floats, v: Floats | None = None) -> None:
+        """Everything as it was after loading, but for the state."""
+        data, base = self._data, 7 if self._model.floating else 0
+        mujoco.mj_resetData(self._loaded, data)
+        silence_warnings(data)
+        data.qpos[self._q] = q[base:]
+        if self._model.floating:
+            x, y, z, w = q[3:7]
+            data.qpos[:7] = [*q[:3], w, x, y, z]
+        if v is not None:
+            data.qvel[self._v] = v
+            if self._model.floating:
+                mujoco.mj_kinematics(self._loaded, data)
+                data.qvel[:3] = self._base_rotation() @ v[:3]
+
+    def _base_rotation(self) -> Floats:
+        """R of the base; MuJoCo has the base's linear velocity in world axes."""
+        R: Floats = self._data.xmat[self._loaded.jnt_bodyid[0]].reshape(3, 3)
+        return R
+
+    def _body(self, link: str) -> int | None:
+        """MuJoCo's body for a link; the world for a root of that name, as MuJoCo has it."""
+        if not link:
+            return None
+        number = int(mujoco.mj_name2id(self._loaded, mujoco.mjtObj.mjOBJ_BODY, link))
+        at_rest = number == WORLD and link == self._model.root and not self._model.floating
+        return number if number > WORLD or at_rest else None
+
+    def _joint(self, name: str) -> int:
+        number = int(mujoco.mj_name2id(self._loaded, mujoco.mjtObj.mjOBJ_JOINT, name))
+        one = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
+        if number < 0 or self._loaded.jnt_type[number] not in [int(kind) for kind in one]:
+            there = "not there" if number < 0 else "of several degrees"
+            raise lacking_joints(self.name, self._model, {name: there})
+        return number

@@ -1,0 +1,245 @@
+"""The backend `mujoco`: MuJoCo's kinematics, Jacobians, accelerations and LDL' solver.
+
+The engine's model is built from the links and joints of the `Model` (`mujoco_tree`), independently of
+`dynx.model.mechanism`; there are no limits, contacts, damping or actuators in it, so that nothing is
+left for MuJoCo's constraint solver. Mass matrix and torques are put together from MuJoCo's poses, axes,
+accelerations and inertias, for `mj_crb` and `mj_rne` lose digits (`mujoco_projection`). Tree coordinates are
+MuJoCo's own but for a floating base: its quaternion is (w, x, y, z), and its linear velocity is in
+world axes.
+
+Safe to use from several threads: the engine's workspace (`MjData`) exists once per thread, made on the
+thread's first call. MuJoCo lets go of the GIL in its calls.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from threading import local
+from typing import Any, ClassVar
+
+import numpy as np
+
+from dynx.backends.base import Backend
+from dynx.backends.engine_errors import engine_errors
+from dynx.engines.mujoco.library import mujoco, silent_data
+from dynx.engines.mujoco.projection import ProjectedDynamics
+from dynx.engines.mujoco.tree import ROOT, build_tree
+from dynx.errors import DynxError, EngineError
+from dynx.model import Model
+from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED, Reference
+from dynx.spatial.scalar import Floats
+from dynx.spatial.so3 import skew
+
+ORIGIN = np.zeros(3)
+ALMOST_SINGULAR = int(mujoco.mjtWarning.mjWARN_INERTIA)
+
+
+def _gist(error: BaseException) -> str:
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    return f"{type(error).__name__}: {lines[0] if lines else 'no message'}"
+
+
+_mapped = engine_errors("mujoco", _gist)
+
+
+class _Workspace(local):
+    """The engine's `MjData` and views into it, one for each thread that asks for it."""
+
+    def __init__(self, engine: Any) -> None:
+        self.data = data = silent_data(engine)
+        self.q, self.v, self.a = data.qpos, data.qvel, data.qacc
+        self.tau = data.qfrc_applied
+        self.p, self.R = data.xpos, data.xmat.reshape(-1, 3, 3)
+
+
+class MujocoBackend(Backend):
+    """MuJoCo behind the interface of `Backend`.
+
+    A batch is a Python loop over the engine's calls. For batches the backend ``compiled`` gives the same
+    numbers, to rounding, about 200 times as fast in forward dynamics, which is MuJoCo's own, and 8,000 times
+    in inverse dynamics, which is put together in Python (UR5, one thread, to one significant figure:
+    ``dynx bench ur5 --batch 65536 --threads 1``; other quantities are in docs/bench.md).
+    """
+
+    name: ClassVar[str] = "mujoco"
+
+    def __init__(self, model: Model, *, validate: bool = True) -> None:
+        """Raises EngineLimitError for a model that the engine has no room for."""
+        super().__init__(model, validate=validate)
+        try:
+            tree = build_tree(model)
+            self._engine, self._bodies = tree.model, tree.frames
+            self._workspace = _Workspace(self._engine)
+        except DynxError:
+            raise
+        except Exception as error:
+            raise EngineError(f"mujoco cannot hold {model.name}: {_gist(error)}") from error
+        self._nv = self._mechanism.nv
+        self._floating = model.floating
+        self._dynamics = ProjectedDynamics(self._engine, floating=model.floating)
+        self._masses_add = tree.masses_add
+        self._total_mass = float(self._engine.body_subtreemass[ROOT])
+
+    @property
+    def engine_version(self) -> str:
+        """``mujoco`` and the version of the library."""
+        return f"mujoco {mujoco.__version__}"
+
+    def _release(self) -> None:
+        # Calls that other threads are in keep their own reference until they end.
+        del self._workspace, self._engine
+
+    # -- kinematics ---------------------------------------------------------------------------
+
+    @_mapped
+    def _frame_placements(self, q: Floats) -> Floats:
+        work = self._placed(q)
+        T = np.zeros((len(self._bodies), 4, 4))
+        bodies = list(self._bodies)
+        T[:, :3, :3], T[:, :3, 3], T[:, 3, 3] = work.R[bodies], work.p[bodies], 1.0
+        return T
+
+    @_mapped
+    def _frame_placement(self, q: Floats, frame: int) -> Floats:
+        work, body = self._placed(q), self._bodies[frame]
+        T = np.zeros((4, 4))
+        T[:3, :3], T[:3, 3], T[3, 3] = work.R[body], work.p[body], 1.0
+        return T
+
+    @_mapped
+    def _jacobian(self, q: Floats, frame: int, reference: Reference) -> Floats:
+        work, body = self._placed(q), self._bodies[frame]
+        mujoco.mj_comPos(self._engine, work.data)
+        J = self._columns(work, mujoco.mj_jac, ORIGIN if reference == "world" else work.p[body], body)
+        if reference == "local":
+            return np.concatenate([work.R[body].T @ J[:3], work.R[body].T @ J[3:]])
+        return J
+
+    @_mapped
+    def _jacobian_derivative(self, q: Floats, v: Floats, frame: int, reference: Reference) -> Floats:
+        work, body = self._moving(q, v), self._bodies[frame]
+        p, R = work.p[body], work.R[body]
+        J = self._columns(work, mujoco.mj_jac, p, body)
+        dJ = self._columns(work, mujoco.mj_jacDot, p, body)
+        if self._floating:
+            # The base's linear columns are its axes, which turn with it.
+            root = work.R[ROOT] @ skew(v[3:6])
+            dJ[:3, :3] = root
+        if reference == LOCAL_WORLD_ALIGNED:
+            return dJ
+        velocity, turning = (J[:3] @ v, J[3:] @ v)
+        if reference == "local":
+            spin = skew(turning)
+            return np.concatenate([R.T @ (dJ[:3] - spin @ J[:3]), R.T @ (dJ[3:] - spin @ J[3:])])
+        return np.concatenate([dJ[:3] + skew(velocity) @ J[3:] + skew(np.array(p)) @ dJ[3:], dJ[3:]])
+
+    @_mapped
+    def _frame_velocity(self, q: Floats, v: Floats, frame: int, reference: Reference) -> Floats:
+        work, body = self._moving(q, v), self._bodies[frame]
+        twist = np.zeros(6)
+        kind = mujoco.mjtObj.mjOBJ_XBODY
+        mujoco.mj_objectVelocity(self._engine, work.data, kind, body, twist, reference == "local")
+        angular, linear = twist[:3], twist[3:]
+        if reference == "world":
+            linear = linear + np.cross(work.p[body], angular)
+        return np.concatenate([linear, angular])
+
+    # -- dynamics -----------------------------------------------------------------------------
+
+    @_mapped
+    def _inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
+        work = self._moving(q, v)
+        work.a[:] = a
+        if self._floating:
+            work.a[:3] = work.R[ROOT] @ (a[:3] + np.cross(v[3:6], v[:3]))
+        mujoco.mj_rnePostConstraint(self._engine, work.data)
+        return self._dynamics.torque(work.data, work.R[ROOT], work.p[ROOT])
+
+    @_mapped
+    def _forward_dynamics(self, q: Floats, v: Floats, tau: Floats) -> Floats:
+        work = self._moving(q, v)
+        work.tau[:] = tau
+        if self._floating:
+            work.tau[:3] = work.R[ROOT] @ tau[:3]
+        warned = work.data.warning[ALMOST_SINGULAR]
+        before = warned.number
+        mujoco.mj_forward(self._engine, work.data)
+        if warned.number != before:
+            # A pivot below 1e-15 was replaced by it: a matter of units, or of a mass matrix that is
+            # not positive definite.
+            return super()._forward_dynamics(q, v, tau)
+        a = np.array(work.a)
+        if self._floating:
+            a[:3] = work.R[ROOT].T @ a[:3] - np.cross(v[3:6], v[:3])
+        return a
+
+    @_mapped
+    def _mass_matrix(self, q: Floats) -> Floats:
+        work = self._placed(q)
+        return self._dynamics.mass_matrix(work.data, work.R[ROOT], work.p[ROOT])
+
+    # -- the whole body -----------------------------------------------------------------------
+
+    @_mapped
+    def _center_of_mass(self, q: Floats) -> Floats:
+        if not self._masses_add:
+            return super()._center_of_mass(q)
+        work = self._placed(q)
+        mujoco.mj_comPos(self._engine, work.data)
+        return np.array(work.data.subtree_com[ROOT])
+
+    @_mapped
+    def _center_of_mass_jacobian(self, q: Floats) -> Floats:
+        if not self._masses_add:
+            return super()._center_of_mass_jacobian(q)
+        work = self._placed(q)
+        mujoco.mj_comPos(self._engine, work.data)
+        J = np.zeros((3, self._nv))
+        mujoco.mj_jacSubtreeCom(self._engine, work.data, J, ROOT)
+        if self._floating:
+            J[:, :3] = J[:, :3] @ work.R[ROOT]
+        return J
+
+    @_mapped
+    def _centroidal_momentum(self, q: Floats, v: Floats) -> Floats:
+        if not self._masses_add:
+            return super()._centroidal_momentum(q, v)
+        data = self._moving(q, v).data
+        mujoco.mj_subtreeVel(self._engine, data)
+        linear = self._total_mass * data.subtree_linvel[ROOT]
+        return np.concatenate([linear, data.subtree_angmom[ROOT]])
+
+    @_mapped
+    def _potential_energy(self, q: Floats) -> Floats:
+        data = self._placed(q).data
+        mujoco.mj_energyPos(self._engine, data)
+        return np.array(data.energy[0])
+
+    # -- the engine's state -------------------------------------------------------------------
+
+    def _placed(self, q: Floats) -> _Workspace:
+        """The workspace of this thread with all bodies where `q` has them."""
+        work = self._workspace
+        work.q[:] = q
+        if self._floating:
+            work.q[3], work.q[4:7] = q[6], q[3:6]
+        mujoco.mj_kinematics(self._engine, work.data)
+        return work
+
+    def _moving(self, q: Floats, v: Floats) -> _Workspace:
+        """The same with the velocities of all bodies."""
+        work = self._placed(q)
+        work.v[:] = v
+        if self._floating:
+            work.v[:3] = work.R[ROOT] @ v[:3]
+        mujoco.mj_comPos(self._engine, work.data)
+        mujoco.mj_comVel(self._engine, work.data)
+        return work
+
+    def _columns(self, work: _Workspace, ask: Callable[..., None], point: Floats, body: int) -> Floats:
+        """A Jacobian of MuJoCo's, (6, nv), with the base's velocity in base axes."""
+        J = np.zeros((6, self._nv))
+        ask(self._engine, work.data, J[:3], J[3:], point, body)
+        if self._floating:
+            J[:3, :3] = J[:3, :3] @ work.R[ROOT]
+        return J

@@ -1,0 +1,93 @@
+"""MuJoCo loading a URDF file as its users have it do, and what would crash it."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from dynx.engines.mujoco.library import MAX_DEPTH, mujoco
+from dynx.engines.silence import silence
+from dynx.errors import EngineError, shown
+from dynx.loaded.opening import require_file
+from dynx.model import Model
+
+CALLS: Mapping[str, str] = {
+    "mujoco.no_damping": "model.dof_damping[:] = 0",
+    "mujoco.no_friction": "model.dof_frictionloss[:] = 0",
+    "mujoco.no_limits": "model.jnt_limited[:] = 0",
+    "mujoco.no_mimic": "model.eq_active0[:] = 0",
+    "mujoco.no_contacts": "model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT",
+}
+"""Remedies at run time: id -> the line of code, which comes after loading and before `mujoco.MjData`."""
+
+FIXED = "model = mujoco.MjModel.from_xml_path(path)"
+FLOATING = (
+    "spec = mujoco.MjSpec.from_file(path)\n"
+    "spec.worldbody.first_body().add_freejoint()\n"
+    "model = spec.compile()"
+)
+"""The documented way to let a URDF float: MuJoCo's reader has no option for it."""
+
+
+def load_file(path: Path, model: Model, calls: Collection[str]) -> Any:
+    """MuJoCo's model of the file, `calls` applied; EngineError with MuJoCo's words where it refuses."""
+    _refuse_crashes(path, model)
+    names: dict[str, Any] = {"mujoco": mujoco, "path": str(path)}
+    loading = FLOATING if model.floating else FIXED
+    try:
+        with _without_warnings():
+            # The lines that users are shown are those that run.
+            exec(loading, names)
+            for call, code in CALLS.items():
+                if call in calls:
+                    exec(code, names)
+    except Exception as error:
+        raise EngineError(f"mujoco refuses {path.name}: {_words(error)}") from error
+    loaded = names["model"]
+    if model.floating:
+        name = loaded.body(int(loaded.jnt_bodyid[0])).name if loaded.njnt else "nothing"
+        if name != model.root:
+            raise EngineError(
+                f"mujoco lets {shown(name)} float where the root of {path.name} is {shown(model.root)}"
+                + (": a root named 'world' is the world to MuJoCo" if model.root == "world" else "")
+            )
+    return loaded
+
+
+@contextmanager
+def _without_warnings() -> Iterator[None]:
+    """Keep what it warns of from stderr, from Python's warnings, and from a log file in the working
+    directory, which it writes unless a program takes the warnings."""
+    before = mujoco.get_mju_user_warning()
+    with silence(), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        mujoco.set_mju_user_warning(_ignore)
+        try:
+            yield
+        finally:
+            mujoco.set_mju_user_warning(before)
+
+
+def _ignore(message: str) -> None:
+    """Take a warning."""
+
+
+def _refuse_crashes(path: Path, model: Model) -> None:
+    require_file(path)
+    depth = {model.root: 1}
+    for joint in model.joints:
+        depth[joint.child] = depth[joint.parent] + 1
+    if max(depth.values()) > MAX_DEPTH:
+        raise EngineError(
+            f"mujoco was not asked: {path.name} has {max(depth.values())} links in a row, and it "
+            f"crashes on long chains (more than {MAX_DEPTH} are not tried)"
+        )
+
+
+def _words(error: Exception) -> str:
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    # Something like "Error: inertia must satisfy A + B >= C" and "Element name 'arm', id 2".
+    return "; ".join(lines[:2]) or type(error).__name__

@@ -1,0 +1,138 @@
+"""MuJoCo's model of a robot, built from links and joints: one body for each frame, one joint for each
+that moves.
+
+MuJoCo's compiler refuses inertias that a description can hold (no mass on a moving body, a broken
+triangle inequality, a negative principal moment). So it compiles the tree with stand-in inertias, and
+the numbers of the description are written into the compiled model: its algorithms take any, since
+they are affine in them. What the compiler derives from inertias and the algorithms here read is
+`body_subtreemass` alone, and written too. Stand-ins lie off the body frames, so that the compiler
+takes none of its short cuts for bodies whose inertia is diagonal.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from dynx.engines.mujoco.library import MAX_DEPTH, mujoco
+from dynx.errors import EngineError, EngineLimitError
+from dynx.model import Model
+from dynx.model.elements import Inertial, Pose
+from dynx.spatial.extended import eigen, longdouble
+from dynx.spatial.scalar import Array, Floats
+from dynx.spatial.so3 import quat_from_rotation, rotation_from_rpy
+
+MAX_NV = 1000
+"""Most tree velocities that are accepted: compiling a chain of as many takes 3 s, and time
+grows with their cube (measured, 4.0)."""
+
+WORLD = 0
+"""MuJoCo's body 0."""
+
+ROOT = 1
+"""MuJoCo's number for the root link."""
+
+
+@dataclass(frozen=True)
+class MujocoTree:
+    """MuJoCo's compiled model, and the number of the body that is each frame of `Model.frames`.
+
+    `masses_add` says whether centres of mass may be MuJoCo's own: there is mass, and none is negative.
+    """
+
+    model: Any
+    frames: tuple[int, ...]
+    masses_add: bool
+
+
+def build_tree(model: Model) -> MujocoTree:
+    """The tree of a robot; raises EngineLimitError where MuJoCo has no room for it."""
+    mechanism = model.mechanism
+    if mechanism.nv > MAX_NV:
+        raise EngineLimitError(
+            f"{model.name} has {mechanism.nv} degrees of freedom; the backend 'mujoco' takes at most {MAX_NV}"
+        )
+    spec = mujoco.MjSpec()
+    spec.compiler.degree = False
+    spec.compiler.fusestatic = False
+    spec.option.gravity = np.array(model.gravity)
+    # Frames are bodies; their numbers as names, so that no name of the description meets one of MuJoCo's.
+    numbers = {name: str(number) for number, name in enumerate(model.frame_names)}
+    root = _body(spec.worldbody, numbers[model.root], Pose())
+    if model.floating:
+        # Aligning would move the body frame to the centre of mass.
+        root.add_freejoint(align=False)
+    bodies, depths = {model.root: root}, {model.root: 1}
+    for joint in model.joints:
+        depths[joint.child] = depths[joint.parent] + 1
+        bodies[joint.child] = body = _body(bodies[joint.parent], numbers[joint.child], joint.origin)
+        if joint.moves:
+            slides = joint.type == "prismatic"
+            kind = mujoco.mjtJoint.mjJNT_SLIDE if slides else mujoco.mjtJoint.mjJNT_HINGE
+            body.add_joint(type=kind, axis=np.array(joint.axis))
+    for frame in model.extra_frames:
+        _body(bodies[frame.link], numbers[frame.name], frame.placement)
+    if max(depths.values()) > MAX_DEPTH:
+        raise EngineLimitError(
+            f"{model.name} has {max(depths.values())} links in a row; "
+            f"the backend 'mujoco' takes at most {MAX_DEPTH}"
+        )
+    compiled = spec.compile()
+    tree = tuple(compiled.body(numbers[name]).id for name in model.frame_names)
+    joints = [tree[model.frame_index(joint.child)] for joint in model.joints if joint.moves]
+    if list(compiled.jnt_bodyid[model.floating :]) != joints or compiled.nv != mechanism.nv:
+        raise EngineError(f"mujoco ordered the joints of {model.name} in a way that dynx does not know")
+    masses = _write_inertias(model, compiled, tree)
+    return MujocoTree(compiled, tree, masses_add=bool(masses.min() >= 0.0 and masses.sum() > mujoco.mjMINVAL))
+
+
+def _body(parent: Any, name: str, pose: Pose) -> Any:
+    body = parent.add_body(name=name, pos=np.array(pose.xyz), quat=_quat_wxyz(_rotation(pose)))
+    body.explicitinertial = True
+    body.mass = 1.0
+    body.inertia = np.array([1.0, 1.0, 1.0])
+    body.ipos = np.array([0.25, 0.5, 0.75])
+    body.iquat = np.array([0.5, 0.5, 0.5, 0.5])
+    return body
+
+
+def _write_inertias(model: Model, compiled: Any, tree: tuple[int, ...]) -> Floats:
+    """Put the numbers of the description in the place of the stand-ins; returns the masses, by body."""
+    compiled.body_mass[:] = 0.0
+    compiled.body_inertia[:] = 0.0
+    compiled.body_ipos[:] = 0.0
+    compiled.body_iquat[:] = [1.0, 0.0, 0.0, 0.0]
+    for link in model.links:
+        if link.inertial is not None:
+            number = tree[model.frame_index(link.name)]
+            moments, axes = _principal(link.inertial)
+            compiled.body_mass[number] = link.inertial.mass
+            compiled.body_inertia[number] = moments
+            compiled.body_ipos[number] = link.inertial.origin.xyz
+            compiled.body_iquat[number] = _quat_wxyz(axes)
+    masses = np.array(compiled.body_mass)
+    total = masses.copy()
+    for number in range(len(total) - 1, WORLD, -1):
+        total[compiled.body_parentid[number]] += total[number]
+    # MuJoCo refers all motion to the centre of mass of the tree, and without mass to that of its root
+    # body. Where negative masses are among them the former may be anywhere, and would cost digits.
+    compiled.body_subtreemass[:] = total if masses.min() >= 0.0 else 0.0
+    return masses
+
+
+def _principal(inertial: Inertial) -> tuple[Floats, Array]:
+    """Principal moments (3,), and their axes as the columns of a rotation (3, 3), in the link frame."""
+    tensor = inertial.tensor
+    moments, axes = eigen(longdouble(tensor))
+    return np.asarray(moments, dtype=np.float64), _rotation(inertial.origin) @ axes
+
+
+def _rotation(pose: Pose) -> Array:
+    return rotation_from_rpy(longdouble(pose.rpy))
+
+
+def _quat_wxyz(R: Array) -> Floats:
+    x, y, z, w = quat_from_rotation(np.asarray(R, dtype=np.float64))
+    return np.array([w, x, y, z])

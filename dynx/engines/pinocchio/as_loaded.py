@@ -1,0 +1,248 @@
+"""A URDF file as Pinocchio loads it: ``pin.buildModelFromUrdf`` and nothing more.
+
+Pinocchio has an order of joints of its own, counts a continuous joint as two numbers (cos, sin), and
+makes joints of several degrees of freedom where a file asks for them; here all of it is turned into
+the coordinates of dynx, by the names of the joints.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from dynx.engines.pinocchio.library import pin
+from dynx.engines.silence import overhear
+from dynx.errors import EngineError
+from dynx.loaded.description import LoadedInertial, LoadedJoint, LoadedModel
+from dynx.loaded.opening import require_file
+from dynx.loaded.robot import LoadedRobot, lacking_joints
+from dynx.model import Model
+from dynx.spatial.scalar import Floats
+
+MAX_NV = 200
+"""Most degrees of freedom that are asked about: the engine's workspace takes 64 nv^3 bytes, twice."""
+
+WORLD = 0
+"""Pinocchio's joint 0, the universe."""
+
+_TYPES = {"FreeFlyer": "floating", "Planar": "planar", "Spherical": "spherical"}
+
+
+class LoadedPinocchio(LoadedRobot):
+    """A robot as Pinocchio loads it; see `LoadedRobot`."""
+
+    name: ClassVar[str] = "pinocchio"
+
+    def __init__(self, path: Path, model: Model, calls: Collection[str] = ()) -> None:
+        require_file(path)
+        self._model = model
+        root = [pin.JointModelFreeFlyer()] if model.floating else []
+        said: list[str] = []
+        with self._mapped("buildModelFromUrdf"):
+            with overhear(said):
+                self._engine = pin.buildModelFromUrdf(str(path), *root)
+            if self._engine.nv > MAX_NV:
+                raise EngineError(
+                    f"{model.name} has {self._engine.nv} degrees of freedom in pinocchio; more than {MAX_NV} "
+                    "are not asked about, for its workspace grows with their cube"
+                )
+            self._data = self._engine.createData()
+        self._said = tuple(said)
+        self._default_gravity: Floats = np.array(self._engine.gravity.linear)
+        self._engine.gravity.linear = np.array(model.gravity)
+        self._neutral: Floats = np.array(pin.neutral(self._engine))
+        self._joints = self._find_joints()
+        self._links = {
+            frame.name: number
+            for number, frame in enumerate(self._engine.frames)
+            if frame.type == pin.FrameType.BODY
+        }
+        base = list(range(6)) if model.floating else []
+        # Where the coordinates of dynx are among the engine's velocities.
+        self._v = np.array(base + [int(joint.idx_v) for joint in self._joints], dtype=np.intp)
+
+    @classmethod
+    def engine_version(cls) -> str:
+        """The version of the library pinocchio, such as ``4.1.0``."""
+        return str(pin.__version__)
+
+    @classmethod
+    def load_call(cls, floating: bool) -> str:
+        """One line; the joint of a free base is given as the second argument."""
+        root = ", pinocchio.JointModelFreeFlyer()" if floating else ""
+        return f"model = pinocchio.buildModelFromUrdf(path{root})"
+
+    # -- answers ------------------------------------------------------------------------------
+
+    def link_poses(self, q: Floats) -> Floats:
+        """Poses of the engine's BODY frames."""
+        T = np.full((len(self._model.links), 4, 4), np.nan)
+        with self._mapped("framesForwardKinematics"):
+            pin.framesForwardKinematics(self._engine, self._data, self._configuration(q))
+            for k, link in enumerate(self._model.links):
+                if link.name in self._links:
+                    T[k] = self._data.oMf[self._links[link.name]].homogeneous
+        return T
+
+    def jacobian(self, q: Floats, link: str) -> Floats:
+        """``computeFrameJacobian`` in LOCAL_WORLD_ALIGNED."""
+        if link not in self._links:
+            return np.full((6, self._model.nv), np.nan)
+        with self._mapped("computeFrameJacobian"):
+            J = pin.computeFrameJacobian(
+                self._engine,
+                self._data,
+                self._configuration(q),
+                self._links[link],
+                pin.LOCAL_WORLD_ALIGNED,
+            )
+        # At one degree of freedom the binding returns a vector.
+        return np.asarray(J.reshape(6, self._engine.nv)[:, self._v])
+
+    def mass_matrix(self, q: Floats) -> Floats:
+        """``crba``."""
+        with self._mapped("crba"):
+            M = np.array(pin.crba(self._engine, self._data, self._configuration(q)))
+        # Some versions fill the upper triangle only.
+        M = np.triu(M) + np.triu(M, 1).T
+        return np.asarray(M[np.ix_(self._v, self._v)])
+
+    def inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
+        """``rnea``."""
+        with self._mapped("rnea"):
+            tau = pin.rnea(
+                self._engine, self._data, self._configuration(q), self._velocity(v), self._velocity(a)
+            )
+        return np.asarray(tau[self._v])
+
+    def forward_dynamics(self, q: Floats, v: Floats, tau: Floats) -> Floats:
+        """``aba``; where a joint that the model lacks is held, solved from ``crba`` and ``rnea``."""
+        if len(self._v) < self._engine.nv:
+            return self._solved_acceleration(q, v, tau)
+        with self._mapped("aba"):
+            a = pin.aba(
+                self._engine, self._data, self._configuration(q), self._velocity(v), self._velocity(tau)
+            )
+        return np.asarray(a[self._v])
+
+    def close(self) -> None:
+        """Nothing is held that the interpreter does not free."""
+
+    # -- what was loaded ----------------------------------------------------------------------
+
+    def describe(self) -> LoadedModel:
+        """From frames, joint models and the engine's vectors of limits.
+
+        Pinocchio keeps the inertia of a link on a fixed joint apart, and that of a link on a moving
+        joint only together with the links welded to it; those are named in `LoadedInertial.fused`.
+        """
+        engine = self._engine
+        base = self.link_poses(self._model.neutral())[0]
+        joints = {
+            name: self._describe_joint(number)
+            for number, name in enumerate(engine.names)
+            if number > (1 if self._model.floating else 0)
+        }
+        return LoadedModel(
+            engine=self.name,
+            links=dict(self._inertials()),
+            joints=joints,
+            base_frame=base,
+            gravity=self._default_gravity,
+            missing_links=tuple(link.name for link in self._model.links if link.name not in self._links),
+            remarks=self._said,
+        )
+
+    def _inertials(self) -> Iterator[tuple[str, LoadedInertial]]:
+        engine = self._engine
+        for name, number in self._links.items():
+            frame = engine.frames[number]
+            above = engine.frames[frame.parentFrame]
+            own, fused = frame.inertia, ()
+            if above.type == pin.FrameType.FIXED_JOINT:
+                own = above.inertia
+            elif frame.parentJoint != WORLD:
+                own = engine.inertias[frame.parentJoint]
+                fused = tuple(
+                    other
+                    for other, at in self._links.items()
+                    if other != name and engine.frames[at].parentJoint == frame.parentJoint
+                )
+            yield name, LoadedInertial(float(own.mass), np.array(own.lever), np.array(own.inertia), fused)
+
+    def _describe_joint(self, number: int) -> LoadedJoint:
+        engine, joint = self._engine, self._engine.joints[number]
+        frame = engine.frames[engine.getFrameId(engine.names[number], pin.FrameType.JOINT)]
+        parent = engine.frames[frame.parentFrame]
+        placement = (parent.placement.inverse() * engine.jointPlacements[number]).homogeneous
+        kind = joint.shortname().removeprefix("JointModel")
+        if joint.nv != 1:
+            return LoadedJoint(_TYPES.get(kind, kind), np.array(placement))
+        prismatic = kind.startswith("P")
+        unbounded = not prismatic and joint.nq == 2
+        at = joint.idx_v
+        state = joint.createData()
+        joint.calc(state, self._neutral)
+        axis = np.array(state.S).reshape(6)[slice(0, 3) if prismatic else slice(3, 6)]
+        limits = (
+            float(engine.lowerPositionLimit[joint.idx_q]),
+            float(engine.upperPositionLimit[joint.idx_q]),
+        )
+        return LoadedJoint(
+            type="prismatic" if prismatic else "continuous" if unbounded else "revolute",
+            placement=np.array(placement),
+            axis=axis,
+            limits=(-np.inf, np.inf) if unbounded else limits,
+            velocity=float(engine.velocityLimit[at]),
+            effort=float(engine.effortLimit[at]),
+            damping=float(engine.damping[at]),
+            friction=float(engine.friction[at]),
+            armature=float(engine.armature[at]),
+        )
+
+    # -- coordinates --------------------------------------------------------------------------
+
+    def _find_joints(self) -> list[Any]:
+        """The engine's joint for each coordinate of dynx."""
+        known = {name: self._engine.joints[number] for number, name in enumerate(self._engine.names)}
+        names = self._model.joint_names
+        wrong = {
+            name: str(known[name].shortname()) if name in known else "not there"
+            for name in names
+            if name not in known or known[name].nv != 1
+        }
+        if wrong:
+            raise lacking_joints(self.name, self._model, wrong)
+        return [known[name] for name in names]
+
+    def _configuration(self, q: Floats) -> Floats:
+        x: Floats = self._neutral.copy()
+        base = 7 if self._model.floating else 0
+        x[:base] = q[:base]
+        for joint, value in zip(self._joints, q[base:], strict=True):
+            if joint.nq == 1:
+                x[joint.idx_q] = value
+            else:
+                x[joint.idx_q : joint.idx_q + 2] = np.cos(value), np.sin(value)
+        return x
+
+    def _velocity(self, v: Floats) -> Floats:
+        x: Floats = np.zeros(self._engine.nv)
+        x[self._v] = v
+        return x
+
+    @contextmanager
+    def _mapped(self, call: str) -> Iterator[None]:
+        """The engine's exceptions as `EngineError`, in its own words."""
+        try:
+            yield
+        except EngineError:
+            raise
+        except Exception as error:
+            lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+            words = lines[-1] if lines else type(error).__name__
+            raise EngineError(f"pinocchio failed in {call} for {self._model.name}: {words}") from error

@@ -1,0 +1,391 @@
+"""The backend `pinocchio`: every quantity by Pinocchio's own algorithms (Carpentier et al., 2019).
+
+The engine's model is built from the links and joints of the `Model`, so its fixed joints are welded
+and its inertias lumped by Pinocchio, independently of `dynx.model.mechanism`. Coordinates need no
+conversion: Pinocchio's free-flyer has the conventions of dynx, and tree coordinates are added in
+the same depth-first order.
+
+Safe to use from several threads: the engine's workspace (`Data`) exists once per thread, made on the
+thread's first call. A `Data` takes 64 nv^3 bytes (measured, Pinocchio 4.1: 0.5 GB at 200 degrees of
+freedom), hence `MAX_NV`.
+
+Every array that the binding returns is a copy which the caller owns (`tests/backends/test_pinocchio`
+proves it), and its mass matrix is symmetric: the binding fills the triangle that CRBA leaves out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import cached_property, lru_cache, partial
+from threading import local
+from typing import Any, ClassVar
+
+import numpy as np
+
+from dynx.backends.base import Backend
+from dynx.backends.engine_errors import engine_errors
+from dynx.engines.pinocchio.library import pin
+from dynx.errors import DynxError, EngineError, EngineLimitError, shown
+from dynx.model import Model
+from dynx.model.elements import Inertial, Joint, Pose
+from dynx.rbd.jacobians import Reference
+from dynx.rbd.regressor import inertia_of, parameters_of
+from dynx.spatial.scalar import Floats
+
+MAX_NV = 200
+"""Most tree velocities (mimic joints count) that the backend accepts; see the head of this file."""
+
+LEAST_MASS = float(np.finfo(float).eps)
+"""Least mass [kg] that several bodies may have together, unless it is zero."""
+
+WORLD = 0
+"""Pinocchio's joint 0, the universe: it carries what a fixed base carries."""
+
+
+def _gist(error: BaseException) -> str:
+    """What the engine says, without the C++ signatures before and after it."""
+    _, _, said = str(error).rpartition("message:\n")
+    lines = [line.strip() for line in said.splitlines() if line.strip()]
+    return f"{type(error).__name__}: {lines[0] if lines else 'no message'}"
+
+
+_mapped = engine_errors("pinocchio", _gist)
+
+
+_FUNCTIONS: dict[str, Callable[..., Floats]] = {
+    "inverse_dynamics": pin.rnea,
+    "forward_dynamics": pin.aba,
+    "bias_torque": pin.nonLinearEffects,
+    "gravity_torque": pin.computeGeneralizedGravity,
+}
+"""What answers a hook at once: arrays in, one array out."""
+
+
+class _Workspace(local):
+    """The engine's `Data`, one for each thread that asks for it."""
+
+    def __init__(self, engine: Any) -> None:
+        self.data = engine.createData()
+
+
+class PinocchioBackend(Backend):
+    """Pinocchio behind the interface of `Backend`.
+
+    A batch is a Python loop over the engine's calls. For batches the backend ``compiled`` gives the same
+    numbers, to rounding, about 80 times as fast: inverse dynamics of UR5, one thread, to one significant
+    figure (``dynx bench ur5 --batch 65536 --threads 1``; other quantities are in docs/bench.md).
+    """
+
+    name: ClassVar[str] = "pinocchio"
+
+    def __init__(self, model: Model, *, validate: bool = True) -> None:
+        """Raises EngineLimitError for a model that the engine cannot hold without harm."""
+        super().__init__(model, validate=validate)
+        self._engine, self._frame_ids = engine_model(model)
+        self._workspace = _Workspace(self._engine)
+        self._axes = {
+            "local_world_aligned": pin.LOCAL_WORLD_ALIGNED,
+            "local": pin.LOCAL,
+            "world": pin.WORLD,
+        }
+        # At one degree of freedom the binding returns Jacobians as vectors; without any, its
+        # derivative of a Jacobian ends the process.
+        self._nv = self._mechanism.nv
+        # The engine's whole-body quantities leave out what is welded to the world.
+        at_rest = self._engine.inertias[WORLD]
+        self._rest_mass = float(at_rest.mass)
+        self._rest_moment: Floats = self._rest_mass * np.array(at_rest.lever)
+        self._moving_mass = float(sum(inertia.mass for inertia in self._engine.inertias[1:]))
+        self._total_mass = self._moving_mass + self._rest_mass
+        self._rest_energy = -float(np.dot(model.gravity, self._rest_moment))
+
+    @property
+    def engine_version(self) -> str:
+        """``pinocchio`` and the version of the library."""
+        return f"pinocchio {pin.__version__}"
+
+    @cached_property
+    def _lumped(self) -> tuple[list[int], Floats]:
+        """Made when a regressor is first asked for: it takes as long as all else that is made."""
+        return _lumping(self._engine, self._frame_ids[: len(self.model.links)])
+
+    def _release(self) -> None:
+        # Calls that other threads are in keep their own reference until they end.
+        del self._workspace, self._engine
+
+    # -- kinematics ---------------------------------------------------------------------------
+
+    @_mapped
+    def _frame_placements(self, q: Floats) -> Floats:
+        data = self._workspace.data
+        pin.framesForwardKinematics(self._engine, data, q)
+        placements = data.oMf
+        return np.array([placements[frame].homogeneous for frame in self._frame_ids])
+
+    @_mapped
+    def _frame_placement(self, q: Floats, frame: int) -> Floats:
+        data = self._workspace.data
+        pin.forwardKinematics(self._engine, data, q)
+        T: Floats = pin.updateFramePlacement(self._engine, data, self._frame_ids[frame]).homogeneous
+        return T
+
+    @_mapped
+    def _jacobian(self, q: Floats, frame: int, reference: Reference) -> Floats:
+        J: Floats = pin.computeFrameJacobian(
+            self._engine, self._workspace.data, q, self._frame_ids[frame], self._axes[reference]
+        )
+        return J if self._nv > 1 else J.reshape(6, self._nv)
+
+    @_mapped
+    def _jacobian_derivative(self, q: Floats, v: Floats, frame: int, reference: Reference) -> Floats:
+        if not self._nv:
+            return np.zeros((6, 0))
+        dJ: Floats = pin.frameJacobianTimeVariation(
+            self._engine, self._workspace.data, q, v, self._frame_ids[frame], self._axes[reference]
+        )
+        return dJ.reshape(6, self._nv)
+
+    @_mapped
+    def _frame_velocity(self, q: Floats, v: Floats, frame: int, reference: Reference) -> Floats:
+        engine, data, frame = self._engine, self._workspace.data, self._frame_ids[frame]
+        pin.forwardKinematics(engine, data, q, v)
+        pin.updateFramePlacement(engine, data, frame)
+        velocity: Floats = pin.getFrameVelocity(engine, data, frame, self._axes[reference]).vector
+        return velocity
+
+    @_mapped
+    def _frame_acceleration(
+        self, q: Floats, v: Floats, a: Floats, frame: int, reference: Reference
+    ) -> Floats:
+        engine, data, frame = self._engine, self._workspace.data, self._frame_ids[frame]
+        pin.forwardKinematics(engine, data, q, v, a)
+        pin.updateFramePlacement(engine, data, frame)
+        # d(J v)/dt is the classical acceleration where the origin moves with the frame and the
+        # axes stand still, the spatial one in the other two references.
+        ask = (
+            pin.getFrameClassicalAcceleration
+            if reference == "local_world_aligned"
+            else pin.getFrameAcceleration
+        )
+        acceleration: Floats = ask(engine, data, frame, self._axes[reference]).vector
+        return acceleration
+
+    # -- dynamics -----------------------------------------------------------------------------
+
+    def _in_this_thread(self, question: str) -> Callable[..., Floats] | None:
+        """The binding's function itself, with the `Data` of the calling thread."""
+        function = _FUNCTIONS.get(question)
+        hook = f"_{question}"
+        if function is None or getattr(type(self), hook) is not getattr(PinocchioBackend, hook):
+            return None
+        return partial(function, self._engine, self._workspace.data)
+
+    @_mapped
+    def _inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
+        tau: Floats = pin.rnea(self._engine, self._workspace.data, q, v, a)
+        return tau
+
+    @_mapped
+    def _forward_dynamics(self, q: Floats, v: Floats, tau: Floats) -> Floats:
+        a: Floats = pin.aba(self._engine, self._workspace.data, q, v, tau)
+        return a
+
+    @_mapped
+    def _mass_matrix(self, q: Floats) -> Floats:
+        M: Floats = pin.crba(self._engine, self._workspace.data, q)
+        return M
+
+    @_mapped
+    def _bias_torque(self, q: Floats, v: Floats) -> Floats:
+        tau: Floats = pin.nonLinearEffects(self._engine, self._workspace.data, q, v)
+        return tau
+
+    @_mapped
+    def _gravity_torque(self, q: Floats) -> Floats:
+        tau: Floats = pin.computeGeneralizedGravity(self._engine, self._workspace.data, q)
+        return tau
+
+    @_mapped
+    def _coriolis_matrix(self, q: Floats, v: Floats) -> Floats:
+        C: Floats = pin.computeCoriolisMatrix(self._engine, self._workspace.data, q, v)
+        return C
+
+    @_mapped
+    def _inertial_regressor(self, q: Floats, v: Floats, a: Floats) -> Floats:
+        joints, lumping = self._lumped
+        if not self._nv:
+            return np.zeros((0, 10 * len(joints)))
+        Y = pin.computeJointTorqueRegressor(self._engine, self._workspace.data, q, v, a)
+        of_joints: Floats = Y.reshape(self._nv, -1, 10).transpose(1, 0, 2)
+        of_links: Floats = of_joints[joints] @ lumping
+        return np.asarray(of_links.transpose(1, 0, 2).reshape(self._nv, -1))
+
+    # -- the whole body -----------------------------------------------------------------------
+
+    @_mapped
+    def _center_of_mass(self, q: Floats) -> Floats:
+        if not (self._moving_mass and self._total_mass):
+            return super()._center_of_mass(q)
+        moving: Floats = pin.centerOfMass(self._engine, self._workspace.data, q, False)
+        return (self._moving_mass * moving + self._rest_moment) / self._total_mass
+
+    @_mapped
+    def _center_of_mass_jacobian(self, q: Floats) -> Floats:
+        if not (self._moving_mass and self._total_mass):
+            return super()._center_of_mass_jacobian(q)
+        moving: Floats = pin.jacobianCenterOfMass(self._engine, self._workspace.data, q, False)
+        return (self._moving_mass / self._total_mass) * moving.reshape(3, self._nv)
+
+    @_mapped
+    def _centroidal_momentum(self, q: Floats, v: Floats) -> Floats:
+        if not (self._moving_mass and self._total_mass):
+            return super()._centroidal_momentum(q, v)
+        data = self._workspace.data
+        momentum: Floats = pin.computeCentroidalMomentum(self._engine, data, q, v).vector
+        if self._rest_mass:
+            moving = np.array(data.com[0])
+            center = (self._moving_mass * moving + self._rest_moment) / self._total_mass
+            momentum[3:] += np.cross(moving - center, momentum[:3])
+        return momentum
+
+    @_mapped
+    def _kinetic_energy(self, q: Floats, v: Floats) -> Floats:
+        return np.asarray(pin.computeKineticEnergy(self._engine, self._workspace.data, q, v))
+
+    @_mapped
+    def _potential_energy(self, q: Floats) -> Floats:
+        moving = pin.computePotentialEnergy(self._engine, self._workspace.data, q)
+        return np.asarray(moving + self._rest_energy)
+
+
+@lru_cache(maxsize=16)
+def engine_model(model: Model) -> tuple[Any, tuple[int, ...]]:
+    """Pinocchio's own model of `model`, and the number it gave to each frame of `model.frame_names`.
+
+    Made once for all backends of a model, which never change it. Its coordinates are those of the tree:
+    a mimic joint is one more. Raises EngineLimitError for a model that the engine cannot hold without
+    harm, EngineError where it refuses.
+    """
+    nv = model.mechanism.nv
+    if nv > MAX_NV:
+        raise EngineLimitError(
+            f"{model.name} has {nv} degrees of freedom; the backend 'pinocchio' "
+            f"takes at most {MAX_NV}, for the engine's memory grows with their cube"
+        )
+    try:
+        return _build(model)
+    except DynxError:
+        raise
+    except Exception as error:
+        raise EngineError(f"pinocchio cannot hold {model.name}: {_gist(error)}") from error
+
+
+def _build(model: Model) -> tuple[Any, tuple[int, ...]]:
+    engine = pin.Model()
+    engine.name = model.name
+    engine.gravity.linear = np.array(model.gravity)
+    carrier = WORLD
+    if model.floating:
+        carrier = engine.addJoint(WORLD, pin.JointModelFreeFlyer(), pin.SE3.Identity(), ":base")
+    # Where each link sits: the engine's joint that carries it, and its pose in that joint's frame.
+    here = {model.root: (carrier, pin.SE3.Identity())}
+    for index, joint in enumerate(model.joints):
+        carrier, T_carrier_parent = here[joint.parent]
+        T_carrier_joint = T_carrier_parent * _placement(joint.origin)
+        if joint.moves:
+            # Numbered, so that a name of ours cannot meet one of the engine's own.
+            name = f"{index}:{joint.name}"
+            number = engine.addJoint(carrier, _joint_model(joint), T_carrier_joint, name)
+            here[joint.child] = (number, pin.SE3.Identity())
+        else:
+            here[joint.child] = (carrier, T_carrier_joint)
+    for link in model.links:
+        if link.inertial is not None:
+            _weld(engine, *here[link.name], link.inertial, link.name)
+    _refuse_feathers(engine)
+    frame_ids = []
+    for index, frame in enumerate(model.frames):
+        carrier, T_carrier_link = here[frame.link]
+        T_carrier_frame = T_carrier_link * _placement(frame.placement)
+        made = pin.Frame(f"{index}:{frame.name}", carrier, 0, T_carrier_frame, pin.FrameType.OP_FRAME)
+        frame_ids.append(int(engine.addFrame(made, False)))
+    return engine, tuple(frame_ids)
+
+
+def _lumping(engine: Any, links: Sequence[int]) -> tuple[list[int], Floats]:
+    """How links add to the inertia of the joints that carry them.
+
+    For each link its joint, counted without the universe, and the matrix (10, 10) from its parameters
+    in the order of dynx to those of the joint in the engine's; zeros for what the universe carries.
+    """
+    theirs = [0, 1, 2, 3, 4, 5, 7, 6, 8, 9]  # the tensor goes down the columns of its upper triangle
+    joints, matrices = [], []
+    for link in links:
+        frame = engine.frames[link]
+        R, p = np.array(frame.placement.rotation), np.array(frame.placement.translation)
+        moved = [parameters_of(inertia_of(unit).seen_from(R, p)) for unit in np.eye(10)]
+        matrix = np.stack(moved, axis=-1)[theirs]
+        joints.append(max(int(frame.parentJoint) - 1, 0))
+        matrices.append(0.0 * matrix if frame.parentJoint == WORLD else matrix)
+    return joints, np.stack(matrices)
+
+
+def _placement(pose: Pose) -> Any:
+    return pin.SE3(pin.rpy.rpyToMatrix(np.array(pose.rpy)), np.array(pose.xyz))
+
+
+def _joint_model(joint: Joint) -> Any:
+    """The engine's joint; about a basis vector it has code of its own, which is faster."""
+    prismatic = joint.type == "prismatic"
+    if joint.axis == (1.0, 0.0, 0.0):
+        return pin.JointModelPX() if prismatic else pin.JointModelRX()
+    if joint.axis == (0.0, 1.0, 0.0):
+        return pin.JointModelPY() if prismatic else pin.JointModelRY()
+    if joint.axis == (0.0, 0.0, 1.0):
+        return pin.JointModelPZ() if prismatic else pin.JointModelRZ()
+    axis = np.array(joint.axis)
+    return pin.JointModelPrismaticUnaligned(axis) if prismatic else pin.JointModelRevoluteUnaligned(axis)
+
+
+def _weld(engine: Any, carrier: int, T_carrier_link: Any, inertial: Inertial, link: str) -> None:
+    """Add a link's inertia to the joint that carries it."""
+    if inertial.mass < 0.0:
+        raise EngineLimitError(
+            f"link {shown(link)} has mass {inertial.mass}; the backend 'pinocchio' cannot hold a negative one"
+        )
+    # The constructor refuses a tensor that no body can have; the attributes take it as it stands.
+    own = pin.Inertia.Zero()
+    own.mass, own.inertia = inertial.mass, inertial.tensor
+    placed = (T_carrier_link * _placement(inertial.origin)).act(own)
+    before = engine.inertias[carrier]
+    if _is_nothing(placed):
+        return
+    if _is_nothing(before):
+        engine.inertias[carrier] = placed
+        return
+    _refuse_feather(before.mass + placed.mass, link)
+    engine.appendBodyToJoint(carrier, placed, pin.SE3.Identity())
+
+
+def _is_nothing(inertia: Any) -> bool:
+    return not inertia.mass and not inertia.inertia.any()
+
+
+def _refuse_feathers(engine: Any) -> None:
+    """Refuse a joint that carries several bodies which together weigh next to nothing."""
+    own = [float(inertia.mass) for inertia in engine.inertias]
+    carried = list(own)
+    for joint in range(len(own) - 1, WORLD, -1):
+        if carried[joint] != own[joint]:
+            _refuse_feather(carried[joint], engine.names[joint].partition(":")[2])
+        carried[engine.parents[joint]] += carried[joint]
+
+
+def _refuse_feather(mass: float, carrier: str) -> None:
+    # Where the engine adds two inertias it divides by max(mass, eps): below eps the centre of mass
+    # of the sum, and with it the mass matrix, would be silently wrong.
+    if 0.0 < mass < LEAST_MASS:
+        raise EngineLimitError(
+            f"the bodies joined at {shown(carrier)} weigh {mass:.3g} kg together; the backend 'pinocchio' "
+            f"adds bodies rightly only from {LEAST_MASS:.2g} kg up, or when they weigh nothing"
+        )

@@ -1,0 +1,214 @@
+"""The backend `pybullet`: Bullet's inverse dynamics, mass matrix, Jacobian, kinematics and stepper.
+
+What it takes to get the same answers out of Bullet as out of other engines is in the modules beside
+this one: `bullet_inertia` (principal inertias, ballast), `bullet_urdf` (the file Bullet is given),
+`bullet_client` (loading and asking), `bullet_robot` (conventions).
+"""
+
+from __future__ import annotations
+
+from importlib.metadata import PackageNotFoundError, version
+from threading import RLock
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dynx.backends.base import Backend
+from dynx.engines.pybullet.inertia import Ballast, ballast_for
+from dynx.engines.pybullet.library import bullet
+from dynx.engines.pybullet.robot import BulletRobot
+from dynx.errors import ArgumentError, ClosedError, EngineError
+from dynx.model import Model
+from dynx.model.configuration import checked_array
+from dynx.model.mechanism import build_mechanism
+from dynx.rbd.jacobians import Reference
+from dynx.spatial.extended import longdouble
+from dynx.spatial.scalar import Floats
+
+REFINE_ABOVE = 16 * float(np.finfo(np.float64).eps)
+"""Residual, relative to the largest torque, below which an acceleration needs no refinement."""
+
+REFINE_BELOW = 1e-6
+"""Relative change above which a refinement is not one of rounding."""
+
+LOST = 1e-9
+"""Residual, relative to the terms it is the difference of, at which an acceleration is no answer."""
+
+
+class PyBulletBackend(Backend):
+    """PyBullet behind the interface of `Backend`; at most 121 moving joints.
+
+    Forward dynamics is Bullet's own stepper: what one step adds to the velocity, refined once where
+    it lost digits. It is solved from mass matrix and bias instead where Bullet cannot hold an inertia
+    as it stands (see `ballast`), and where the step left a velocity exactly as it was: the stepper
+    does not move a joint that carries less than 2.2e-16 kg m^2 (or kg).
+
+    Threads may share a backend: a lock lets one call in at a time (Bullet would hold the GIL
+    anyway). Each backend has a Bullet client of its own, two where there is ballast; Bullet has
+    1,024 of them, some 30 MB each, so close a backend that is done with. Picklable by its recipe.
+
+    A batch is a Python loop over the engine's calls. For batches the backend ``compiled`` gives the same
+    numbers, to rounding, about 300 times as fast: inverse dynamics of UR5, one thread, to one significant
+    figure (``dynx bench ur5 --batch 65536 --threads 1``; other quantities are in docs/bench.md).
+    """
+
+    name: ClassVar[str] = "pybullet"
+
+    def __init__(self, model: Model, *, validate: bool = True) -> None:
+        super().__init__(model, validate=validate)
+        engine = bullet()
+        self._lock = RLock()
+        mechanism = build_mechanism(model, longdouble)
+        self._ballast = ballast_for(mechanism)
+        copies = (1, 2) if self.ballast else (0,)
+        self._robots: list[BulletRobot] = []
+        try:
+            for times in copies:
+                self._robots.append(BulletRobot(engine, mechanism, self._ballast, times))
+        except BaseException:
+            self._release()
+            raise
+
+    @classmethod
+    def require_engine(cls) -> None:
+        """Raise NotInstalledError if PyBullet cannot be imported."""
+        bullet()
+
+    @property
+    def engine_version(self) -> str:
+        """``pybullet`` and the version of its distribution."""
+        try:
+            return f"pybullet {version('pybullet')}"
+        except PackageNotFoundError:
+            return "pybullet"
+
+    @property
+    def ballast(self) -> bool:
+        """Whether the model has an inertia that Bullet refuses, so that answers are extrapolated.
+
+        Inverse dynamics and mass matrix are then 2 f(I + s) - f(I + 2 s), exact because both are
+        affine in the inertia, and forward dynamics is solved from them instead of by the stepper.
+        """
+        return any(load != Ballast() for load in self._ballast)
+
+    def engine_inverse_kinematics(
+        self,
+        T_world_target: ArrayLike,
+        frame: str,
+        q0: ArrayLike,
+        *,
+        iterations: int = 200,
+        residual: float = 1e-9,
+        limits: bool = False,
+    ) -> Floats:
+        """The configuration (nq,) at which Bullet's own solver (damped least squares) stops.
+
+        `T_world_target` (4, 4) is where `frame` is wanted, `q0` (nq,) where to start; a floating
+        base stays where `q0` has it. `residual` [m] ends the iteration; `limits` adds Bullet's
+        null-space task. The answer often misses the target and may violate the limits: check it
+        by `forward_kinematics`, as `inverse_kinematics` does. Mimic joints are solved for as if free,
+        then brought to the nearest configuration (least squares).
+        """
+        q0 = self._arguments.q(q0)
+        index = self._index(frame)
+        target = checked_array("T_world_target", T_world_target, 4)
+        if target.shape != (4, 4) or q0.ndim != 1:
+            raise ArgumentError(
+                f"T_world_target has shape {target.shape} and q0 {q0.shape}; "
+                f"wanted (4, 4) and ({self.model.nq},)"
+            )
+        coupling = self._mechanism.coupling
+        base = 7 if self.model.floating else 0
+        tree_q = q0 if coupling is None else coupling.expand_q(q0)
+        # Null-space limits are for a tree without mimic joints, and must be finite.
+        bounds = (self.model.lower[base:], self.model.upper[base:])
+        bounded = limits and coupling is None and bool(np.isfinite(bounds).all())
+        with self._lock:
+            joints = self._robot().inverse_kinematics(
+                target, index, tree_q, bounds if bounded else None, int(iterations), float(residual)
+            )
+        if coupling is not None:
+            S = coupling.matrix()[-len(joints) :, -coupling.n_joints :]
+            joints = np.linalg.lstsq(S, joints - np.array(coupling.offset), rcond=None)[0]
+        return np.concatenate([q0[:base], joints])
+
+    # -- hooks --------------------------------------------------------------------------------
+
+    def _frame_placements(self, q: Floats) -> Floats:
+        with self._lock:
+            return self._robot().frame_placements(q)
+
+    def _frame_placement(self, q: Floats, frame: int) -> Floats:
+        with self._lock:
+            return self._robot().frame_placement(q, frame)
+
+    def _jacobian(self, q: Floats, frame: int, reference: Reference) -> Floats:
+        with self._lock:
+            return self._robot().jacobian(q, frame, reference)
+
+    def _inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
+        with self._lock:
+            return self._extrapolated([robot.inverse_dynamics(q, v, a) for robot in self._all_robots()])
+
+    def _mass_matrix(self, q: Floats) -> Floats:
+        with self._lock:
+            return self._extrapolated([robot.mass_matrix(q) for robot in self._all_robots()])
+
+    def _forward_dynamics(self, q: Floats, v: Floats, tau: Floats) -> Floats:
+        if self.ballast:
+            return super()._forward_dynamics(q, v, tau)
+        # What is too large for Bullet comes back infinite or NaN; the base sees it in the result.
+        with self._lock, np.errstate(over="ignore", invalid="ignore"):
+            a = self._robot().forward_dynamics(q, v, tau)
+            if a.all():
+                return self._refined(q, v, tau, a) if np.isfinite(a).all() else a
+        return super()._forward_dynamics(q, v, tau)
+
+    def _refined(self, q: Floats, v: Floats, tau: Floats, a: Floats) -> Floats:
+        """`a` after one step of iterative refinement, where rounding is all that ails it.
+
+        Under a root much lighter than what it carries, Bullet's inversion of the base's inertia
+        loses digits (ten at a ratio of 1e-6). A step that changes more is not taken: then something
+        else is wrong, which refinement must not hide. Raises EngineError where too few digits are left.
+        """
+        left = tau - self._inverse_dynamics(q, v, a)
+        if np.max(np.abs(left), initial=0.0) <= REFINE_ABOVE * np.max(np.abs(tau), initial=0.0):
+            return a
+        again = self._robot().forward_dynamics(q, v, tau + left)
+        if np.max(np.abs(again - a)) <= REFINE_BELOW * np.max(np.abs(a)):
+            return again
+        # Weight and velocity products may cancel; a bound on them is as good as themselves here.
+        fastest, gravity = np.max(np.abs(v)), np.linalg.norm(self._mechanism.gravity)
+        inertia = np.abs(self._mass_matrix(q))
+        unbalanced = np.max(inertia) * (fastest + fastest**2 + gravity)
+        terms = np.max(inertia @ np.abs(a)) + np.max(np.abs(tau)) + unbalanced
+        if np.max(np.abs(left)) > LOST * terms:
+            raise EngineError(
+                f"the stepper of pybullet loses its digits on {self.model.name}: the acceleration found "
+                f"misses the torque by {np.max(np.abs(left)) / terms:.1g}, relative "
+                "(are masses very unequal?)"
+            )
+        return a
+
+    # -- life cycle ---------------------------------------------------------------------------
+
+    def _release(self) -> None:
+        with self._lock:
+            while self._robots:
+                self._robots.pop().close()
+
+    def _robot(self) -> BulletRobot:
+        return self._all_robots()[0]
+
+    def _all_robots(self) -> list[BulletRobot]:
+        if not self._robots:
+            raise ClosedError(f"this backend of {self.model.name} was closed; make a new one")
+        return self._robots
+
+    @staticmethod
+    def _extrapolated(answers: list[Floats]) -> Floats:
+        if len(answers) == 1:
+            return answers[0]
+        once, twice = answers
+        return 2.0 * once - twice

@@ -1,0 +1,125 @@
+"""The canonical URDF that Bullet is given instead of the user's file.
+
+Moving bodies only, fixed joints welded; generated ASCII names (`b`, then `l0`, `j0`, ...); unit
+axes; short lines; no shapes, limits, damping or meshes. Principal moments are written as zero:
+Bullet replaces what fails its checks, so they are set after loading (`BulletClient`).
+
+The root link's frame is the root's inertial frame (centre of mass, principal axes), because
+Bullet's inverse dynamics, mass matrix and Jacobian are expressed there and nowhere else. With a
+fixed base the root has no inertia and the frame is the base frame.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from decimal import Decimal
+
+import numpy as np
+
+from dynx.engines.pybullet.inertia import Ballast, PrincipalInertia, principal_inertia
+from dynx.model.mechanism import ROOT, Mechanism
+from dynx.spatial.extended import longdouble
+from dynx.spatial.inertia import RigidInertia
+from dynx.spatial.scalar import Array
+from dynx.spatial.so3 import rotate_back, rpy_from_rotation
+
+NOTHING = RigidInertia(longdouble(0.0), longdouble(np.zeros(3)), longdouble(np.zeros((3, 3))))
+
+
+@dataclass(frozen=True)
+class BulletLink:
+    """A moving body as Bullet holds it; (R, p) places the joint frame in the parent's link frame."""
+
+    parent: int
+    revolute: bool
+    R: Array
+    p: Array
+    axis: Array
+    inertia: PrincipalInertia
+
+
+@dataclass(frozen=True)
+class BulletTree:
+    """A mechanism in Bullet's terms: the root's inertial frame, and links that start from it.
+
+    Masses and moments are those of the mechanism divided by `unit`, a power of two [kg]. Bullet's
+    checks compare with absolute numbers, about 1e-15, and refuse a sound body of 10 kg that turns
+    about an axis 1 m away; in units in which no moment exceeds 1 they pass. Forces scale alike.
+    """
+
+    floating: bool
+    root: PrincipalInertia
+    links: tuple[BulletLink, ...]
+    unit: float
+
+
+def bullet_tree(mechanism: Mechanism, ballast: tuple[Ballast, ...], times: int) -> BulletTree:
+    """The tree Bullet is given for a long-double `mechanism`, with `times` the ballast on board."""
+    root = principal_inertia(NOTHING)
+    sizes = [0.0]
+    if mechanism.floating:
+        loaded = ballast[0].added(mechanism.root, times)
+        root = principal_inertia(loaded, about_center=True)
+        sizes.append(float(np.max(root.moments)))
+    bodies = list(zip(mechanism.bodies, ballast[1:], strict=True))
+    inertias = [load.added(body.inertia, times) for body, load in bodies]
+    sizes += [float(np.max(np.abs(inertia.second_moment))) for inertia in inertias]
+    unit = 2.0 ** max(0, int(np.frexp(max(sizes))[1]))
+    links = []
+    for body, lumped in zip(mechanism.bodies, inertias, strict=True):
+        R, p = body.R, body.p
+        if body.parent == ROOT:
+            R, p = root.axes.T @ R, rotate_back(root.axes, p - root.center)
+        axis = body.axis / np.sqrt(body.axis @ body.axis)
+        inertia = _in_units(principal_inertia(lumped), unit)
+        links.append(BulletLink(body.parent, body.revolute, R, p, axis, inertia))
+    return BulletTree(mechanism.floating, _in_units(root, unit), tuple(links), unit)
+
+
+def write_bullet_urdf(tree: BulletTree) -> str:
+    """The tree as URDF text, in ASCII."""
+    lines = ['<robot name="r">', *_link("b", tree.root.mass, np.zeros(3), np.eye(3))]
+    for k, link in enumerate(tree.links):
+        lines += _link(f"l{k}", link.inertia.mass, link.inertia.center, link.inertia.axes)
+        lines += [
+            f'<joint name="j{k}" type="{"continuous" if link.revolute else "prismatic"}">',
+            f'<parent link="{"b" if link.parent == ROOT else f"l{link.parent}"}"/>',
+            f'<child link="l{k}"/>',
+            _origin(link.p, link.R),
+            f'<axis xyz="{_vector(link.axis)}"/>',
+            # A prismatic joint must have limits; lower above upper means that it has none.
+            '<limit lower="1" upper="-1" effort="0" velocity="0"/>',
+            "</joint>",
+        ]
+    return "\n".join([*lines, "</robot>", ""])
+
+
+def locale_free(number: float) -> str:
+    """The shortest decimal that reads back as `number`, without a decimal point.
+
+    Bullet reads numbers in the C locale in force, in which a point may end the number.
+    """
+    sign, digits, exponent = Decimal(repr(float(number))).as_tuple()
+    return f"{'-' if sign else ''}{''.join(map(str, digits))}e{exponent}"
+
+
+def _in_units(inertia: PrincipalInertia, unit: float) -> PrincipalInertia:
+    return replace(inertia, mass=inertia.mass / unit, moments=inertia.moments / unit)
+
+
+def _link(name: str, mass: float, center: Array, axes: Array) -> list[str]:
+    return [
+        f'<link name="{name}"><inertial>',
+        _origin(center, axes),
+        f'<mass value="{locale_free(mass)}"/>',
+        '<inertia ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"/>',
+        "</inertial></link>",
+    ]
+
+
+def _origin(p: Array, R: Array) -> str:
+    return f'<origin xyz="{_vector(p)}" rpy="{_vector(rpy_from_rotation(R))}"/>'
+
+
+def _vector(numbers: Array) -> str:
+    return " ".join(locale_free(float(number)) for number in numbers)

@@ -1,0 +1,84 @@
+"""What PyBullet is not given: files that are known to crash it (measured with pybullet 3.2.5 to 3.2.7).
+
+It checks nothing itself. A name is a printf format to it, an element without ``name`` or ``type`` or a
+graph that is no tree ends the process, and joint states have room for 127 joints.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from dynx.errors import EngineError, ModelError, shown
+from dynx.files.reading import read_file
+from dynx.loaded.opening import require_file
+from dynx.model import Model
+from dynx.model.elements import Note
+from dynx.model.topology import MAX_LINKS
+from dynx.model.xml.reading import Element, read_xml
+
+MAX_JOINTS = 127
+"""Joints, fixed ones included, of which Bullet tells the state: from the 128th on it fails."""
+
+LONGEST_NAME = 1000
+"""Bytes of a name: a joint's of 1,264 smashes Bullet's stack, a link's of 2,000 crashes it."""
+
+_OPAQUE = frozenset(["visual", "collision", "transmission", "gazebo", "sensor", "ros2_control"])
+
+
+def require_harmless(path: Path, model: Model) -> None:
+    """Raise EngineError, with the reason, for a file on which PyBullet is known to crash.
+
+    Its links and joints must be those of `model`, which dynx has checked to be one tree.
+    """
+    require_file(path)
+    try:
+        root = read_xml(
+            read_file(str(path)),
+            str(path),
+            list[Note](),
+            opaque=_OPAQUE,
+            at_most={"link": MAX_LINKS, "joint": MAX_LINKS},
+        )
+    except ModelError as error:
+        raise EngineError(f"pybullet is not given {model.name}: {error}") from error
+    for reason in _hazards(root, model):
+        raise EngineError(f"pybullet is not given {model.name}, which would crash it: {reason}")
+    joints = len(root.all("joint"))
+    if joints > MAX_JOINTS:
+        raise EngineError(
+            f"{model.name} has {joints} joints, fixed ones included; "
+            f"pybullet answers for at most {MAX_JOINTS}"
+        )
+
+
+def _hazards(root: Element, model: Model) -> Iterator[str]:
+    named = {"robot": [root], "link": root.all("link"), "joint": root.all("joint")}
+    for kind, elements in named.items():
+        for element in elements:
+            name = element.attributes.get("name", "")
+            if not name and kind != "robot":
+                yield f"line {element.line}: a <{kind}> without a name"
+            if "%" in name:
+                yield f"line {element.line}: the name of a <{kind}>, {shown(name)}, has a %"
+            if len(name.encode("utf-8")) > LONGEST_NAME:
+                yield f"line {element.line}: the name of a <{kind}> has {len(name)} characters"
+    for joint in named["joint"]:
+        if "type" not in joint.attributes:
+            yield f"line {joint.line}: joint {shown(joint.attributes['name'])} has no type"
+    # Each added frame stands in the file as a link on a fixed joint, under a name that is not kept.
+    added = {frame.name for frame in model.extra_frames}
+    links = [element.attributes["name"] for element in named["link"]]
+    if sorted(links) != sorted(added.union(link.name for link in model.links)):
+        yield "its <link> elements are not those of the tree that dynx read"
+    joints = sorted(map(_ends, named["joint"]))
+    wanted = {(joint.name, joint.parent, joint.child) for joint in model.joints}
+    if sorted(wanted) != [each for each in joints if each[2] not in added]:
+        yield "its <joint> elements are not those of the tree that dynx read"
+
+
+def _ends(joint: Element) -> tuple[str, str, str]:
+    """Name, parent and child; the first of several, as in the reader."""
+    ends = [joint.all(role)[:1] for role in ("parent", "child")]
+    parent, child = ("".join(element.attributes.get("link", "") for element in end) for end in ends)
+    return joint.attributes["name"], parent, child

@@ -1,0 +1,225 @@
+"""PyBullet's own stepper as a plant: its articulated-body algorithm and its scheme, and nothing else of it.
+
+`dynx.engines.pybullet.stepping` says what is switched off and why. Friction, pushes and armature are those
+of `dynx.sim.plants.loads`, given as torque, so that they mean what they mean in every plant.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+
+from dynx.control.engine_motors import EngineMotor, MotorCommand
+from dynx.engines.pybullet.backend import PyBulletBackend
+from dynx.engines.pybullet.canonical_urdf import bullet_tree
+from dynx.engines.pybullet.inertia import ballast_for
+from dynx.engines.pybullet.library import bullet
+from dynx.engines.pybullet.stepping import BaseState, SteppingClient
+from dynx.errors import EngineLimitError, UnsupportedFeatureError
+from dynx.model import Model
+from dynx.model.mechanism import build_mechanism
+from dynx.sim.plants.integrators import State
+from dynx.sim.plants.loads import Acceleration, Loads
+from dynx.sim.plants.plant import Plant
+from dynx.spatial.extended import longdouble
+from dynx.spatial.scalar import Floats
+from dynx.spatial.so3 import cross, quat_from_rotation, quat_product, rotate_back, rotation_from_quat
+
+
+class BulletPlant(Plant):
+    """One robot in a Bullet world of its own, stepped by Bullet.
+
+    Mimic joints and armature are unknown to Bullet's stepper. With them the acceleration is solved from
+    Bullet's mass matrix and bias, and the stepper is given the torque that brings exactly that about.
+    """
+
+    takes_motors: ClassVar[bool] = True
+
+    def __init__(self, model: Model, loads: Loads, dt: float, *, substeps: int = 1) -> None:
+        """Raises EngineLimitError for a robot with an inertia that Bullet's stepper does not take."""
+        super().__init__(model, dt, substeps)
+        mechanism = build_mechanism(model, longdouble)
+        ballast = ballast_for(mechanism)
+        if any(load.mass or load.rotational for load in ballast):
+            raise EngineLimitError(
+                f"{model.name} has an inertia that Bullet's stepper does not take as it stands (see dynx "
+                "doctor); the plant of another engine does"
+            )
+        tree = bullet_tree(mechanism, ballast, 0)
+        self._loads = loads
+        self._unit = tree.unit
+        self._floating = model.floating
+        self._base_nq, self._base_nv = (7, 6) if model.floating else (0, 0)
+        self._coupling = model.mechanism.coupling
+        self._S = np.eye(0) if self._coupling is None else self._coupling.matrix()
+        self._owners = np.flatnonzero([joint.mimic is None for joint in model.joints if joint.moves])
+        self._solves = self._coupling is not None or loads.has_rotors
+        # The root's inertial frame in the base frame.
+        self._center: Floats = np.asarray(tree.root.center, dtype=np.float64)
+        self._axes: Floats = quat_from_rotation(np.asarray(tree.root.axes, dtype=np.float64))
+        self._axes_back: Floats = self._axes * np.array([-1.0, -1.0, -1.0, 1.0])
+        self._h = dt / substeps
+        self._client = SteppingClient(bullet(), tree, model.name, gravity=list(model.gravity), dt=self._h)
+
+    @cached_property
+    def _engine(self) -> PyBulletBackend:
+        """Made when it is needed: it opens a client of its own."""
+        return PyBulletBackend(self.model, validate=False)
+
+    @cached_property
+    def _tree(self) -> PyBulletBackend:
+        """The same robot with its mimic joints free: what Bullet's stepper sees of it."""
+        joints = tuple(replace(joint, mimic=None) for joint in self.model.joints)
+        return PyBulletBackend(replace(self.model, joints=joints), validate=False)
+
+    @cached_property
+    def _accelerate(self) -> Acceleration:
+        return Acceleration(self._engine, self._loads)
+
+    def reset(self, q: Floats, v: Floats) -> None:
+        """Make this the state."""
+        self._q, self._v = q, v
+        self._place()
+
+    def step(self, t: float, tau: Floats) -> State:
+        """One step, or as many sub-steps."""
+        first = self._substep(t, tau)
+        for k in range(1, self.substeps):
+            self._substep(t + k * self._h, tau)
+        return self._q, self._v, first
+
+    def step_motors(self, t: float, command: MotorCommand) -> tuple[Floats, Floats, Floats, Floats]:
+        """The same with Bullet's motors; last the torque (nv,) that they gave in the first sub-step.
+
+        That is what the motion took, by inverse dynamics, less what the loads gave: Bullet's own report
+        leaves out PD_CONTROL.
+        """
+        command = self._in_units(command)
+        q, v = self._q, self._v
+        first, loads = self._motor_substep(t, command)
+        tau = self._engine.inverse_dynamics(q, v, first) - loads
+        for k in range(1, self.substeps):
+            self._motor_substep(t + k * self._h, command)
+        return self._q, self._v, first, tau
+
+    def refuse(self, controller: object) -> None:
+        """Bullet's motors know no rotors: refuse the two together."""
+        if isinstance(controller, EngineMotor) and self._loads.has_rotors:
+            raise UnsupportedFeatureError(
+                f"{controller.name} is a motor inside PyBullet, which knows no armature; use a law of torque"
+            )
+
+    def close(self) -> None:
+        """Give the clients back."""
+        self._client.close()
+        for made in ("_engine", "_tree"):
+            if made in self.__dict__:
+                self.__dict__[made].close()
+
+    # -- one step -----------------------------------------------------------------------------
+
+    def _substep(self, t: float, tau: Floats) -> Floats:
+        if self._solves:
+            tau = self._tree_torque(self._q, self._v, self._accelerate(self._q, self._v, tau, t))
+        elif self._loads.present:
+            tau = tau + self._loads.torque(self._engine, t, self._q, self._v)
+        self._client.apply((tau[self._base_nv :] / self._unit).tolist())
+        return self._advance(tau)
+
+    def _motor_substep(self, t: float, command: MotorCommand) -> tuple[Floats, Floats]:
+        """The acceleration, and the torque of the loads (nv,)."""
+        self._client.command(command)
+        loads: Floats = np.zeros(self.model.nv)
+        if self._loads.present:
+            loads = self._loads.torque(self._engine, t, self._q, self._v)
+            self._client.add((loads[self._base_nv :] / self._unit).tolist())
+        return self._advance(loads), loads
+
+    def _tree_torque(self, q: Floats, v: Floats, a: Floats) -> Floats:
+        """The torque of every joint of the tree, mimic joints too, that gives the acceleration `a`."""
+        coupling = self._coupling
+        if coupling is None:
+            return self._engine.inverse_dynamics(q, v, a)
+        S = self._S
+        return self._tree.inverse_dynamics(coupling.expand_q(q), S @ v, S @ a)
+
+    def _advance(self, tau: Floats) -> Floats:
+        """Push the base, let time run, read the state; the acceleration (nv,) that there was."""
+        v, h = self._v, self._h
+        if not self._floating:
+            self._client.advance()
+            joints, rates = self._joints()
+            self._read(joints, rates)
+            return (rates - v) / h
+        R, c, before = rotation_from_quat(self._q[3:7]), self._center, self._base
+        force, moment = R @ tau[:3], R @ (tau[3:6] - cross(c, tau[:3]))
+        self._client.push_base((force / self._unit).tolist(), (moment / self._unit).tolist(), before.position)
+        self._client.advance()
+        after = self._client.base_state()
+        joints, rates = self._joints()
+        # The acceleration at the beginning, from that of the root's centre of mass.
+        turning = rotate_back(R, np.subtract(after.angular, before.angular) / h)
+        rising = rotate_back(R, np.subtract(after.linear, before.linear) / h)
+        w = v[3:6]
+        linear = rising - cross(turning, c) - cross(w, cross(w, c)) - cross(w, v[:3])
+        a = np.concatenate([linear, turning, (rates - v[6:]) / h])
+        self._read(*self._base_coordinates(after, joints, rates))
+        return a
+
+    # -- between Bullet's state and ours ------------------------------------------------------
+
+    def _joints(self) -> tuple[Floats, Floats]:
+        """Positions and rates of the joints that own a coordinate."""
+        positions, rates = self._client.joint_states()
+        if self._coupling is None:
+            return np.array(positions), np.array(rates)
+        return np.array(positions)[self._owners], np.array(rates)[self._owners]
+
+    def _base_coordinates(self, base: BaseState, joints: Floats, rates: Floats) -> tuple[Floats, Floats]:
+        quat = quat_product(np.array(base.quat_xyzw), self._axes_back)
+        # Bullet changes the sign at will; of the two that are one attitude, that which follows smoothly.
+        quat /= np.copysign(np.sqrt(quat.dot(quat)), quat.dot(self._q[3:7]))
+        R = rotation_from_quat(quat)
+        w = rotate_back(R, np.array(base.angular))
+        linear = rotate_back(R, np.array(base.linear)) - cross(w, self._center)
+        position = np.array(base.position) - R @ self._center
+        return np.concatenate([position, quat, joints]), np.concatenate([linear, w, rates])
+
+    def _read(self, q: Floats, v: Floats) -> None:
+        self._q, self._v = q, v
+        if self._floating or self._coupling is not None:
+            # What is reported is the state: rounding of the conversion, or of a coupling, is not kept
+            # from it, and a rollout resumed from its record goes on to the last bit.
+            self._place()
+
+    def _place(self) -> None:
+        q, v = self._q, self._v
+        if self._coupling is not None:
+            q, v = self._coupling.expand_q(q), self._S @ v
+        base = None
+        if self._floating:
+            R = rotation_from_quat(q[3:7])
+            w, c = v[3:6], self._center
+            base = self._base = BaseState(
+                (q[:3] + R @ c).tolist(),
+                quat_product(q[3:7], self._axes).tolist(),
+                (R @ (v[:3] + cross(w, c))).tolist(),
+                (R @ w).tolist(),
+            )
+        self._client.place(q[self._base_nq :].tolist(), v[self._base_nv :].tolist(), base)
+
+    def _in_units(self, command: MotorCommand) -> MotorCommand:
+        """Forces, and the gains that are forces, in Bullet's unit of mass."""
+        command = command._replace(forces=self._scaled(command.forces))
+        if command.mode != "PD_CONTROL":
+            return command
+        return command._replace(
+            position_gains=self._scaled(command.position_gains),
+            velocity_gains=self._scaled(command.velocity_gains),
+        )
+
+    def _scaled(self, numbers: list[float] | None) -> list[float] | None:
+        return None if numbers is None else [x / self._unit for x in numbers]

@@ -1,0 +1,271 @@
+"""A robot in Bullet, asked and answering in the conventions of dynx.
+
+Bullet's world is here the inertial frame C of the root (centre of mass, principal axes), at every
+instant: the base never moves in Bullet, gravity turns instead, and the pose of the base is composed
+in NumPy. That is exact at every attitude, which Bullet's own decoding of the attitude is not, and
+one conversion, X, serves every quantity:
+
+    (angular, linear) of C  =  X (linear, angular) of the base frame.
+
+With a fixed base C is the base frame and there is nothing to convert.
+"""
+
+from __future__ import annotations
+
+from types import ModuleType
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dynx.engines.pybullet.canonical_urdf import bullet_tree
+from dynx.engines.pybullet.client import BulletClient
+from dynx.engines.pybullet.inertia import Ballast, PrincipalInertia
+from dynx.model.mechanism import ROOT, BodyFrame, Mechanism
+from dynx.rbd.jacobians import Reference
+from dynx.spatial.extended import longdouble
+from dynx.spatial.scalar import Array, Floats
+from dynx.spatial.se3 import homogeneous
+from dynx.spatial.so3 import cross, quat_from_rotation, skew
+
+_STILL = np.eye(4)
+
+
+class BulletRobot:
+    """A mechanism, with `times` the ballast, in a client of its own. All calls: one sample."""
+
+    def __init__(
+        self, engine: ModuleType, mechanism: Mechanism, ballast: tuple[Ballast, ...], times: int
+    ) -> None:
+        """`mechanism` is lumped in long double; Bullet gets it rounded once."""
+        tree = bullet_tree(mechanism, ballast, times)
+        self._floating = mechanism.floating
+        self._gravity: Floats = _rounded(mechanism.gravity)
+        self._T_base_C = _rounded(homogeneous(tree.root.axes, tree.root.center))
+        self._X = _rounded(_base_conversion(tree.root.axes, tree.root.center))
+        self._X_inverse = _rounded(_inverse_conversion(tree.root.axes, tree.root.center))
+        # Bullet's unit of mass, a power of two, so that going there and back is exact.
+        self._unit = tree.unit
+        self._inertias = [link.inertia for link in tree.links]
+        # A frame in the inertial frame of its body, where Bullet says where the body is.
+        self._frame_body = [frame.body for frame in mechanism.frames]
+        self._offsets = np.array([self._offset(frame) for frame in mechanism.frames])
+        self._points = [self._point(frame, tree.root) for frame in mechanism.frames]
+        self._frame_in_body = [_rounded(homogeneous(frame.R, frame.p)) for frame in mechanism.frames]
+        self._client = BulletClient(engine, tree, mechanism.name)
+
+    def close(self) -> None:
+        """Give the client back."""
+        self._client.close()
+
+    # -- kinematics ---------------------------------------------------------------------------
+
+    def frame_placements(self, q: Floats) -> Floats:
+        """T_world_frame of all frames (n, 4, 4)."""
+        joints = self._joints(q)
+        T_world_base, T_world_C = self._base(q)
+        # The root comes last, so that its index ROOT = -1 finds it.
+        T = np.zeros((len(joints) + 1, 4, 4))
+        T[-1] = T_world_base
+        if joints:
+            T[:-1] = T_world_C @ pose_matrices(*self._client.com_poses(joints))
+        return np.asarray(T[self._frame_body] @ self._offsets)
+
+    def frame_placement(self, q: Floats, frame: int) -> Floats:
+        """T_world_frame of one frame (4, 4)."""
+        T_world_base, T_world_C = self._base(q)
+        body = self._frame_body[frame]
+        if body == ROOT:
+            return np.asarray(T_world_base @ self._offsets[frame])
+        T_C_com = pose_matrices(*self._client.com_pose(self._joints(q), body))
+        return np.asarray(T_world_C @ T_C_com @ self._offsets[frame])
+
+    def jacobian(self, q: Floats, frame: int, reference: Reference) -> Floats:
+        """J (6, nv) of one frame, linear rows first."""
+        R_world_C = self._base(q)[1][:3, :3]
+        J = self._jacobian_in_C(q, frame)
+        if reference == "local":
+            R_frame_C = self.frame_placement(q, frame)[:3, :3].T @ R_world_C
+            return np.concatenate([R_frame_C @ J[:3], R_frame_C @ J[3:]])
+        linear, angular = R_world_C @ J[:3], R_world_C @ J[3:]
+        if reference == "world":
+            linear = linear + skew(self.frame_placement(q, frame)[:3, 3]) @ angular
+        return np.concatenate([linear, angular])
+
+    # -- dynamics -----------------------------------------------------------------------------
+
+    def inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
+        """tau (nv,)."""
+        if not v.size:
+            return np.zeros(0)
+        gravity = self._gravity_in_C(q)
+        if not self._floating:
+            tau = self._client.inverse_dynamics(q.tolist(), v.tolist(), a.tolist(), gravity)
+            return self._unit * tau
+        v_C, a_C = self._X @ v[:6], self._X @ a[:6]
+        # dv/dt in turning axes to the classical acceleration of the centre of mass.
+        a_C[3:] += cross(v_C[:3], v_C[3:])
+        tau = self._client.inverse_dynamics(
+            self._joints(q), [*v_C.tolist(), *v[6:].tolist()], [*a_C.tolist(), *a[6:].tolist()], gravity
+        )
+        # Bullet answers with the force first.
+        tau[:6] = self._X.T @ np.concatenate([tau[3:6], tau[:3]])
+        return self._unit * tau
+
+    def mass_matrix(self, q: Floats) -> Floats:
+        """M (nv, nv), symmetric."""
+        joints = self._joints(q)
+        if not (joints or self._floating):
+            return np.zeros((0, 0))
+        M = self._client.mass_matrix(joints)
+        if self._floating:
+            M[:6] = self._X.T @ M[:6]
+            M[:, :6] = M[:, :6] @ self._X
+        return np.asarray(0.5 * self._unit * (M + M.T))
+
+    def forward_dynamics(self, q: Floats, v: Floats, tau: Floats) -> Floats:
+        """a (nv,): the change of velocity in one step of Bullet's articulated-body algorithm."""
+        if not v.size:
+            return np.zeros(0)
+        gravity = self._gravity_in_C(q)
+        tau = tau / self._unit
+        if not self._floating:
+            return self._client.velocity_step(q.tolist(), v.tolist(), tau.tolist(), gravity)
+        v_C = self._X @ v[:6]
+        tau_C = self._X_inverse.T @ tau[:6]
+        a = self._client.velocity_step(
+            self._joints(q), [*v_C.tolist(), *v[6:].tolist()], [*tau_C.tolist(), *tau[6:].tolist()], gravity
+        )
+        a[3:6] -= cross(v_C[:3], v_C[3:])
+        a[:6] = self._X_inverse @ a[:6]
+        return a
+
+    # -- inverse kinematics -------------------------------------------------------------------
+
+    def inverse_kinematics(
+        self,
+        T_world_target: Floats,
+        frame: int,
+        q: Floats,
+        limits: tuple[Floats, Floats] | None,
+        iterations: int,
+        residual: float,
+    ) -> Floats:
+        """Joints (n,) at which Bullet's solver stopped, from those of `q`; the base stays put."""
+        body = self._frame_body[frame]
+        if body == ROOT:
+            return np.array(self._joints(q))
+        T_world_C = self._base(q)[1]
+        R_C_world = T_world_C[:3, :3].T
+        T_world_body = T_world_target @ np.linalg.inv(self._frame_in_body[frame])
+        position = R_C_world @ (T_world_body[:3, 3] - T_world_C[:3, 3])
+        axes = R_C_world @ T_world_body[:3, :3] @ _rounded(self._inertias[body].axes)
+        return self._client.inverse_kinematics(
+            self._joints(q),
+            body,
+            position.tolist(),
+            quat_from_rotation(axes).tolist(),
+            None if limits is None else (limits[0].tolist(), limits[1].tolist()),
+            iterations,
+            residual,
+        )
+
+    # -- frames -------------------------------------------------------------------------------
+
+    def _joints(self, q: Floats) -> list[float]:
+        joints: list[float] = (q[7:] if self._floating else q).tolist()
+        return joints
+
+    def _base(self, q: Floats) -> tuple[Floats, Floats]:
+        """T_world_base and T_world_C, (4, 4) each."""
+        if not self._floating:
+            return _STILL, _STILL
+        T = pose_matrices(q[:3], q[3:7])
+        return T, np.asarray(T @ self._T_base_C)
+
+    def _gravity_in_C(self, q: Floats) -> list[float]:
+        gravity = self._gravity
+        if self._floating:
+            gravity = self._base(q)[1][:3, :3].T @ gravity
+        answer: list[float] = gravity.tolist()
+        return answer
+
+    def _jacobian_in_C(self, q: Floats, frame: int) -> Floats:
+        """J (6, nv) of the velocity of the frame's origin, in the axes of C."""
+        joints = self._joints(q)
+        body = self._frame_body[frame]
+        if body != ROOT:
+            J = self._client.jacobian(joints, body, self._points[frame])
+            if self._floating:
+                J[:, :6] = J[:, :6] @ self._X
+            return J
+        J = np.zeros((6, len(q) - 1 if self._floating else len(q)))
+        if self._floating:
+            # A frame fixed to the base: the velocity of C, shifted to the frame's origin.
+            angular, linear = self._X[:3], self._X[3:]
+            J[:3, :6] = linear - skew(np.array(self._points[frame])) @ angular
+            J[3:, :6] = angular
+        return J
+
+    def _offset(self, frame: BodyFrame) -> Floats:
+        T = homogeneous(frame.R, frame.p)
+        if frame.body != ROOT:
+            inertia = self._inertias[frame.body]
+            R = inertia.axes.T @ frame.R
+            T = homogeneous(R, inertia.axes.T @ (frame.p - inertia.center))
+        return _rounded(T)
+
+    def _point(self, frame: BodyFrame, root: PrincipalInertia) -> list[float]:
+        """The frame's origin along the principal axes, from the origin of its body (root: from C)."""
+        if frame.body == ROOT:
+            point = root.axes.T @ (frame.p - root.center)
+        else:
+            point = self._inertias[frame.body].axes.T @ frame.p
+        answer: list[float] = _rounded(point).tolist()
+        return answer
+
+
+def pose_matrices(position: ArrayLike, quat_xyzw: ArrayLike) -> Floats:
+    """Homogeneous matrices (..., 4, 4) from positions (..., 3) and unit quaternions (..., 4).
+
+    The rotation is linear in the products of the quaternion's entries: one small matrix product,
+    some ten times as fast as entry by entry.
+    """
+    quat = np.asarray(quat_xyzw, dtype=np.float64)
+    products = quat[..., :, None] * quat[..., None, :]
+    T = (products.reshape(*quat.shape[:-1], 16) @ _FROM_PRODUCTS).reshape(*quat.shape[:-1], 4, 4)
+    T += _STILL
+    T[..., :3, 3] = position
+    return np.asarray(T)
+
+
+def _products_to_rotation() -> Floats:
+    """(16, 16): from the products of x, y, z, w, row by row, to the entries of [[R - 1, 0], [0, 0]]."""
+    K = np.zeros((4, 4, 4, 4))
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        K[j, j, i, i] = K[k, k, i, i] = -2.0
+        K[j, k, j, k] = K[j, k, k, j] = 2.0
+        K[i, 3, k, j], K[i, 3, j, k] = 2.0, -2.0
+    return K.reshape(16, 16)
+
+
+_FROM_PRODUCTS = _products_to_rotation()
+
+
+def _base_conversion(axes: Array, center: Array) -> Array:
+    """X (6, 6); see the head of this file."""
+    X = longdouble(np.zeros((6, 6)))
+    X[:3, 3:] = X[3:, :3] = axes.T
+    X[3:, 3:] = -axes.T @ skew(center)
+    return X
+
+
+def _inverse_conversion(axes: Array, center: Array) -> Array:
+    X = longdouble(np.zeros((6, 6)))
+    X[3:, :3] = X[:3, 3:] = axes
+    X[:3, :3] = skew(center) @ axes
+    return X
+
+
+def _rounded(numbers: Array) -> Floats:
+    return np.asarray(numbers, dtype=np.float64)

@@ -1,0 +1,112 @@
+"""URDF text to links, joints and frames, read as meant, with a note where it was not plain.
+
+Visual and collision shapes, materials, transmissions, sensors and simulators' own elements do not
+change rigid-body dynamics and are passed over; no mesh is looked for.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+
+from dynx.errors import escaped, nearest
+from dynx.model.elements import Frame, Joint, Link, Note
+from dynx.model.topology import MAX_LINKS
+from dynx.model.urdf.joints import FRAME_TAG, read_joint
+from dynx.model.urdf.links import read_link
+from dynx.model.urdf.values import Reading, name_fault
+from dynx.model.xml.reading import Element, read_xml
+
+_OPAQUE = frozenset(
+    ["visual", "collision", "contact", "material", "transmission", "gazebo", "sensor", "ros2_control"]
+)
+_KNOWN = _OPAQUE | {"link", "joint", "plugin", "static"}
+
+
+@dataclass(frozen=True)
+class UrdfContent:
+    """What a document says: parts in document order, not yet checked to form a tree."""
+
+    name: str | None
+    links: list[Link]
+    joints: list[Joint]
+    frames: list[Frame]
+    notes: list[Note]
+
+
+def read_urdf(data: str | bytes, source: str) -> UrdfContent:
+    """The content of a URDF document.
+
+    Raises DescriptionError for what is malformed, UnsupportedFeatureError for what dynx refuses; the
+    message begins with `source` and the line.
+    """
+    notes: list[Note] = []
+    at_most = {"link": MAX_LINKS, "joint": MAX_LINKS}
+    root = read_xml(data, source, notes, opaque=_OPAQUE, at_most=at_most)
+    reading = Reading(source, notes)
+    _require_robot(root, reading)
+    reading.ignore_unknown(root, _KNOWN)
+    link_elements, joint_elements = root.all("link"), root.all("joint")
+    links = [read_link(element, reading) for element in link_elements]
+    base_joint = _floating_base_joint(joint_elements, links)
+    frames, joints = [], []
+    for element in joint_elements:
+        joint = read_joint(element, reading, floating_is_base=element is base_joint)
+        if joint.type == "fixed" and element.all(FRAME_TAG):
+            frames.append(Frame(joint.child, joint.parent, joint.origin))
+        else:
+            joints.append(joint)
+    names = {frame.name for frame in frames}
+    links = [link for link in links if link.name not in names]
+    reading.note_ignored()
+    return UrdfContent(_robot_name(root, reading), links, joints, frames, notes)
+
+
+def _require_robot(root: Element, reading: Reading) -> None:
+    if root.tag != "robot":
+        other = {"sdf": " (SDF is not read)", "mujoco": " (MJCF is not read)"}.get(root.tag, "")
+        raise reading.error(root, f"the root element is <{escaped(root.tag)}>; wanted <robot>{other}")
+    for child in root.children:
+        if child.tag.startswith("xacro:"):
+            raise reading.unsupported(
+                child,
+                f"<{escaped(child.tag)}> is xacro that was not expanded; expand the file, or load it "
+                "under its name in .xacro with the extra 'xacro' installed",
+            )
+        if child.tag.lower() in ("link", "joint") and child.tag not in ("link", "joint"):
+            raise reading.error(
+                child, f"unknown element <{child.tag}>{nearest(child.tag, ['link', 'joint'])}"
+            )
+
+
+def _robot_name(root: Element, reading: Reading) -> str | None:
+    name = root.attributes.get("name", "")
+    fault = name_fault(name)
+    if fault is None:
+        return name
+    if name:
+        raise reading.error(root, f"the name of the robot {fault}")
+    reading.note(root, "the robot has no name; it is named after its file")
+    return None
+
+
+def _floating_base_joint(joints: list[Element], links: list[Link]) -> Element | None:
+    """The floating joint between an empty root link and the rest of the robot, if there is one.
+
+    Such a pair is a way of writing that the base moves freely. It carries no body, so reading the
+    joint as fixed leaves the choice to ``base=`` and loses nothing.
+    """
+    ends = []
+    for joint in joints:
+        parents, children = joint.all("parent"), joint.all("child")
+        if parents and children:
+            ends.append((joint, parents[0].attributes.get("link"), children[0].attributes.get("link")))
+    below = {child for _, _, child in ends}
+    carried = Counter(parent for _, parent, _ in ends)
+    empty = {link.name for link in links if link.inertial is None or link.inertial.mass == 0.0}
+    for joint, parent, _ in ends:
+        if joint.attributes.get("type") != "floating" or parent in below or parent not in empty:
+            continue
+        if carried[parent] == 1:
+            return joint
+    return None

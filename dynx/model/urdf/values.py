@@ -1,0 +1,150 @@
+"""Values of URDF attributes: names, numbers, vectors, poses; strict, and with the line in each error."""
+
+from __future__ import annotations
+
+import math
+import re
+import unicodedata
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+from dynx.errors import DescriptionError, UnsupportedFeatureError, escaped, shown
+from dynx.model.elements import ZERO, Note, Pose, Vector
+from dynx.model.xml.reading import Element
+
+MAX_NAME = 1000
+"""Longest name; PyBullet's stack is overrun by one of 1,264 characters."""
+
+_NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+_NOT_IN_XML = "\ufffe\uffff"
+
+
+@dataclass
+class Reading:
+    """One reading of one document: where it came from, and what the user should know about it."""
+
+    source: str
+    notes: list[Note] = field(default_factory=list)
+    _ignored: dict[tuple[str, str], tuple[int, int]] = field(default_factory=dict)
+
+    def error(self, element: Element, message: str) -> DescriptionError:
+        """The error to raise about `element`."""
+        return DescriptionError(message, source=self.source, line=element.line)
+
+    def unsupported(self, element: Element, message: str) -> UnsupportedFeatureError:
+        """The error to raise about a feature that dynx refuses."""
+        return UnsupportedFeatureError(message, source=self.source, line=element.line)
+
+    def note(self, element: Element, message: str) -> None:
+        """Tell the user how `element` was read."""
+        self.notes.append(Note(message, element.line))
+
+    def ignore_unknown(self, parent: Element, known: Iterable[str]) -> None:
+        """Count the elements in `parent` that are not `known`, for one note per tag."""
+        for child in parent.children:
+            if child.tag not in known:
+                count, line = self._ignored.get((parent.tag, child.tag), (0, child.line))
+                self._ignored[parent.tag, child.tag] = (count + 1, line)
+
+    def note_ignored(self) -> None:
+        """Turn what `ignore_unknown` counted into notes."""
+        for (inside, tag), (count, line) in self._ignored.items():
+            times = "" if count == 1 else f" ({count} times)"
+            self.notes.append(
+                Note(f"unknown element <{escaped(tag)}> in <{inside}> was ignored{times}", line)
+            )
+
+    def only(self, parent: Element, tag: str) -> Element | None:
+        """The one element of that tag; the first, with a note, where there are several."""
+        found = parent.all(tag)
+        if len(found) > 1:
+            self.note(found[1], f"<{parent.tag}> has {len(found)} <{tag}>; the first is used, as engines do")
+        return found[0] if found else None
+
+    def required(self, parent: Element, tag: str, what: str) -> Element:
+        """The one element of that tag, or an error."""
+        found = self.only(parent, tag)
+        if found is None:
+            raise self.error(parent, f"{what} has no <{tag}>")
+        return found
+
+    def attribute(self, element: Element, name: str, what: str) -> str:
+        """A required attribute, or an error."""
+        value = element.attributes.get(name)
+        if value is None:
+            raise self.error(element, f"<{element.tag}> of {what} has no attribute {name}")
+        return value
+
+    def name(self, element: Element, attribute: str, what: str) -> str:
+        """A required attribute that names something, or an error."""
+        value = element.attributes.get(attribute)
+        if value is None:
+            raise self.error(element, f'{what} has no {attribute}; wanted {attribute}="..."')
+        fault = name_fault(value)
+        if fault is not None:
+            raise self.error(element, f"the {attribute} of {what} {fault}")
+        return value
+
+    def number(self, element: Element, attribute: str, what: str) -> float:
+        """A required attribute that is one finite number, or an error."""
+        return self._parsed(element, attribute, self.attribute(element, attribute, what), what, "a number")
+
+    def number_or(self, element: Element, attribute: str, what: str, default: float) -> float:
+        """An attribute that is one finite number, or `default` where it is absent."""
+        if attribute not in element.attributes:
+            return default
+        return self.number(element, attribute, what)
+
+    def vector(self, element: Element, attribute: str, what: str) -> Vector:
+        """A required attribute that is three finite numbers separated by white space, or an error."""
+        text = self.attribute(element, attribute, what)
+        words = text.split()
+        wanted = "three numbers separated by white space"
+        if len(words) != 3:
+            raise self._unreadable(element, attribute, text, what, wanted)
+        x, y, z = (self._parsed(element, attribute, word, what, wanted, text) for word in words)
+        return (x, y, z)
+
+    def origin(self, parent: Element, what: str) -> Pose:
+        """The pose in ``<origin>``; what is absent or empty is zero."""
+        element = self.only(parent, "origin")
+        if element is None:
+            return Pose()
+        parts = {}
+        for attribute in ("xyz", "rpy"):
+            text = element.attributes.get(attribute)
+            parts[attribute] = ZERO if not (text and text.strip()) else self.vector(element, attribute, what)
+        return Pose(parts["xyz"], parts["rpy"])
+
+    def _parsed(
+        self, element: Element, attribute: str, word: str, what: str, wanted: str, text: str | None = None
+    ) -> float:
+        word = word.strip()
+        if _NUMBER.fullmatch(word):
+            value = float(word)
+            if math.isfinite(value):
+                return value
+        raise self._unreadable(element, attribute, word if text is None else text, what, wanted)
+
+    def _unreadable(
+        self, element: Element, attribute: str, text: str, what: str, wanted: str
+    ) -> DescriptionError:
+        hint = ""
+        if "${" in text or "$(" in text:
+            hint = "; this is xacro that was not expanded"
+        elif "," in text:
+            hint = "; decimals take a point and no comma is read"
+        message = f"{attribute} in <{element.tag}> of {what} is {shown(text)}; wanted {wanted}{hint}"
+        return self.error(element, message)
+
+
+def name_fault(name: str) -> str | None:
+    """What is wrong with a name, or None where it can be used."""
+    if not name:
+        return "is empty"
+    if len(name) > MAX_NAME:
+        return f"has {len(name)} characters; at most {MAX_NAME} are accepted"
+    for character in name:
+        if unicodedata.category(character) in ("Cc", "Cs", "Zl", "Zp") or character in _NOT_IN_XML:
+            return f"is {shown(name)}, which holds the control character U+{ord(character):04X}"
+    return None

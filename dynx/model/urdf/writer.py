@@ -1,0 +1,107 @@
+"""A model as URDF text in canonical form: every number the shortest that reads back the same."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+from xml.sax.saxutils import quoteattr
+
+from dynx.errors import DescriptionError
+from dynx.model.elements import Inertial, Joint, JointDynamics, Pose, Vector
+from dynx.model.urdf.joints import FRAME_TAG, LOCKED_TAG
+from dynx.model.urdf.values import name_fault
+
+if TYPE_CHECKING:
+    from dynx.model.model import Model
+
+
+def write_urdf(model: Model) -> str:
+    """`model` as URDF; reading it back gives an equal model, given the same base and gravity.
+
+    URDF has no word for the base and for gravity, so ``load`` must be told them again. A locked joint
+    is written as fixed, with its value in the extension ``<dynx_locked>``; an added frame as a
+    massless link on a fixed joint, marked by ``<dynx_frame>``; other readers skip both marks.
+    A limit of infinity is written as the largest double, which every engine can read.
+    Raises DescriptionError for a name that URDF cannot hold.
+    """
+    lines = ['<?xml version="1.0"?>', f"<robot name={_name(model.name)}>"]
+    for link in model.links:
+        if link.inertial is None:
+            lines.append(f"  <link name={_name(link.name)}/>")
+        else:
+            lines += [f"  <link name={_name(link.name)}>", *_inertial(link.inertial), "  </link>"]
+    for joint in model.joints:
+        lines += _joint(joint)
+    taken = {joint.name for joint in model.joints}
+    for frame in model.extra_frames:
+        name = f"{frame.name}_frame"
+        while name in taken:
+            name += "_"
+        taken.add(name)
+        lines.append(f"  <link name={_name(frame.name)}/>")
+        marked = Joint(name, "fixed", frame.link, frame.name, frame.placement)
+        lines += _joint(marked, f"    <{FRAME_TAG}/>")
+    lines += ["</robot>", ""]
+    return "\n".join(lines)
+
+
+def _inertial(inertial: Inertial) -> Iterator[str]:
+    yield "    <inertial>"
+    yield from _origin(inertial.origin, "      ")
+    yield f'      <mass value="{_number(inertial.mass)}"/>'
+    moments = " ".join(
+        f'{name}="{_number(getattr(inertial, name))}"' for name in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+    )
+    yield f"      <inertia {moments}/>"
+    yield "    </inertial>"
+
+
+def _joint(joint: Joint, *marks: str) -> Iterator[str]:
+    yield f'  <joint name={_name(joint.name)} type="{joint.type}">'
+    yield from _origin(joint.origin, "    ")
+    yield f"    <parent link={_name(joint.parent)}/>"
+    yield f"    <child link={_name(joint.child)}/>"
+    if joint.moves or joint.locked_at is not None:
+        yield from _motion(joint)
+    yield from marks
+    yield "  </joint>"
+
+
+def _motion(joint: Joint) -> Iterator[str]:
+    yield f'    <axis xyz="{_vector(joint.axis)}"/>'
+    limits, dynamics, mimic = joint.limits, joint.dynamics, joint.mimic
+    ends = f'lower="{_number(limits.lower)}" upper="{_number(limits.upper)}" '
+    if joint.type == "continuous":
+        ends = ""
+    yield f'    <limit {ends}velocity="{_number(limits.velocity)}" effort="{_number(limits.effort)}"/>'
+    if dynamics != JointDynamics():
+        armature = f' armature="{_number(dynamics.armature)}"' if dynamics.armature else ""
+        damping, friction = _number(dynamics.damping), _number(dynamics.friction)
+        yield f'    <dynamics damping="{damping}" friction="{friction}"{armature}/>'
+    if mimic is not None:
+        scale, offset = _number(mimic.multiplier), _number(mimic.offset)
+        yield f'    <mimic joint={_name(mimic.joint)} multiplier="{scale}" offset="{offset}"/>'
+    if joint.locked_at is not None:
+        yield f'    <{LOCKED_TAG} value="{_number(joint.locked_at)}"/>'
+
+
+def _origin(pose: Pose, indent: str) -> Iterator[str]:
+    if pose != Pose():
+        yield f'{indent}<origin xyz="{_vector(pose.xyz)}" rpy="{_vector(pose.rpy)}"/>'
+
+
+def _vector(vector: Vector) -> str:
+    return " ".join(map(_number, vector))
+
+
+def _number(value: float) -> str:
+    # `float` first: the repr of a NumPy scalar names its type.
+    return repr(max(-sys.float_info.max, min(sys.float_info.max, float(value))))
+
+
+def _name(name: str) -> str:
+    fault = name_fault(name)
+    if fault is not None:
+        raise DescriptionError(f"a name that URDF cannot hold: it {fault}")
+    return quoteattr(name)

@@ -1,0 +1,52 @@
+"""The shapes that the inertia of a link may stand for: its own, and those of links welded to it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from dynx.model import Link
+from dynx.rules.case import Case
+from dynx.rules.geometry.extent import Extent
+from dynx.rules.geometry.shapes import link_extent
+from dynx.rules.inertia.rigid_groups import RigidGroup, rigid_groups
+from dynx.spatial.scalar import Floats
+from dynx.spatial.se3 import homogeneous, inverse
+
+
+def welded_extents(case: Case) -> Iterator[tuple[Link, Extent]]:
+    """Each link with mass, and all that its mass may be spread over, in its link frame.
+
+    Descriptions put the shape of a part in one link and its mass in another that a fixed joint holds,
+    so every shape of the rigid group counts. A link is left out where its group has no shape, or one
+    whose size cannot be known (a mesh that is not there).
+    """
+    groups = rigid_groups(case)
+    known: dict[str, Extent | None] = {}
+    for link in case.model.links:
+        if link.inertial is None or link.inertial.mass == 0.0:
+            continue
+        group = groups[link.name]
+        if group.head not in known:
+            known[group.head] = _group_extent(case, group)
+        extent = known[group.head]
+        if extent is not None and not extent.empty:
+            yield link, extent.seen_from(inverse(_pose(group, link.name)))
+
+
+def _group_extent(case: Case, group: RigidGroup) -> Extent | None:
+    """All shapes of the group in the frame of its head; None where one cannot be known."""
+    parts = []
+    for name in group.links:
+        extent = link_extent(case.links[name], case.source.source)
+        if extent is None:
+            return None
+        parts.append(extent.seen_from(_pose(group, name)))
+    return Extent.union(parts)
+
+
+def _pose(group: RigidGroup, link: str) -> Floats:
+    """T_head_link (4, 4)."""
+    R, p = group.poses[link]
+    return homogeneous(R.astype(np.float64), p.astype(np.float64))

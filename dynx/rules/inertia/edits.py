@@ -1,0 +1,70 @@
+"""Writing ``<inertial>`` elements into a document."""
+
+from __future__ import annotations
+
+from dynx.model.elements import Inertial
+from dynx.model.xml.source import Edit, SourceElement, XmlSource
+from dynx.rules.case import Case
+from dynx.rules.text.number_text import decimal
+
+MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+
+ZERO_TENSOR = "<inertia {}/>".format(" ".join(f'{name}="0"' for name in MOMENTS))
+
+
+def zero_inertial() -> str:
+    """The text of an ``<inertial>`` that says there is no mass."""
+    return f'<inertial>\n  <mass value="0"/>\n  {ZERO_TENSOR}\n</inertial>'
+
+
+def inertial_edits(source: XmlSource, link: SourceElement, old: Inertial | None, new: Inertial) -> list[Edit]:
+    """Edits that make a link say `new` where it says `old`; numbers that stay keep their spelling."""
+    element = link.first("inertial")
+    if old is None or element is None:
+        return [source.inserting(link, _inertial_text(new), first=True)]
+    edits = []
+    origin = element.first("origin")
+    for name in ("xyz", "rpy"):
+        wanted = getattr(new.origin, name)
+        if wanted == getattr(old.origin, name):
+            continue
+        text = " ".join(map(decimal, wanted))
+        if origin is not None:
+            edits.append(source.setting(origin, name, text))
+    if origin is None and new.origin != old.origin:
+        edits.append(source.inserting(element, _origin_text(new), first=True))
+    mass, tensor = element.first("mass"), element.first("inertia")
+    if mass is not None and new.mass != old.mass:
+        edits.append(source.setting(mass, "value", decimal(new.mass)))
+    if tensor is not None:
+        changed = [name for name in MOMENTS if getattr(new, name) != getattr(old, name)]
+        edits += [source.setting(tensor, name, decimal(getattr(new, name))) for name in changed]
+    return edits
+
+
+def with_inertials(case: Case, inertials: dict[str, Inertial]) -> Case:
+    """The case with other inertials for the links named."""
+    edits: list[Edit] = []
+    for name, inertial in inertials.items():
+        edits += inertial_edits(case.source, case.links[name], case.inertials[name], inertial)
+    return case.with_source(case.source.edited(*edits))
+
+
+def line_of(case: Case, link: str, tag: str) -> int:
+    """The line of an element inside the ``<inertial>`` of a link, or of what is around it."""
+    element = case.links[link]
+    for inner in ("inertial", tag):
+        element = element.first(inner) or element
+    return element.line
+
+
+def _origin_text(inertial: Inertial) -> str:
+    xyz, rpy = (" ".join(map(decimal, vector)) for vector in (inertial.origin.xyz, inertial.origin.rpy))
+    return f'<origin xyz="{xyz}" rpy="{rpy}"/>'
+
+
+def _inertial_text(inertial: Inertial) -> str:
+    moments = " ".join(f'{name}="{decimal(getattr(inertial, name))}"' for name in MOMENTS)
+    mass = f'<mass value="{decimal(inertial.mass)}"/>'
+    lines = [_origin_text(inertial), mass, f"<inertia {moments}/>"]
+    return "\n".join(["<inertial>", *(f"  {line}" for line in lines), "</inertial>"])

@@ -1,0 +1,151 @@
+"""What the rules on tensors of no body share: the ways to deal with one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import ClassVar
+
+import numpy as np
+
+from dynx.model.elements import Inertial
+from dynx.rules.case import Case
+from dynx.rules.inertia.central import CentralInertia
+from dynx.rules.inertia.edits import line_of, with_inertials
+from dynx.rules.inertia.merging import lumped_into
+from dynx.rules.inertia.physical import (
+    ENOUGH,
+    Fault,
+    clear_fault,
+    lifted,
+    nearest_moments,
+    on_the_edge,
+    principal_moments,
+)
+from dynx.rules.inertia.rigid_groups import RigidGroup, rigid_groups
+from dynx.rules.rule import Detection, Remedy, Rule
+
+NUMBERS_OF_THE_FILE = ("pybullet.set_inertias", "pybullet.extrapolate_inertias", "drake.set_inertias")
+"""The calls at run time that make engines calculate with the numbers of the file."""
+
+
+class ImpossibleInertia(Rule):
+    """A tensor that no body can have, by more than rounding."""
+
+    fault: ClassVar[Fault]
+    engines: ClassVar[Mapping[str, str]] = {"pybullet": ">=3.2.7", "mujoco": ">=4.0.0", "drake": ">=1.51.1"}
+    advice = "Take the tensor from the CAD model again; in the meantime use the nearest that a body can have."
+    choices: ClassVar[Mapping[str, str]] = {
+        "fuse": "lump the link with links welded to it where that makes a body, which changes no equation "
+        "of motion; else as nearest",
+        "nearest": "put the nearest tensor that a body can have in its place",
+        "keep": "leave the numbers and give them to PyBullet and Drake after loading; MuJoCo cannot follow",
+    }
+
+    def detect(self, case: Case) -> Sequence[Detection]:
+        """Links whose tensor has the fault, static ones too: MuJoCo refuses the file for them."""
+        kept = self.chosen(case) == "keep" and case.calls.issuperset(NUMBERS_OF_THE_FILE)
+        groups = rigid_groups(case)
+        found = []
+        for link in case.model.links:
+            inertial = link.inertial
+            if inertial is None or clear_fault(inertial) != self.fault:
+                continue
+            if kept and (groups[link.name].static or _has_largest_on_y(inertial)):
+                continue
+            weight = ", held still by the world" if groups[link.name].static else ""
+            found.append(
+                Detection(
+                    link.name, None, line_of(case, link.name, "inertia"), self._message(inertial) + weight
+                )
+            )
+        return found
+
+    def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy | None:
+        """Lump, replace or keep, as chosen; the default lumps where that is enough."""
+        names = [detection.link for detection in detections if detection.link is not None]
+        decision, chosen = self.decision(case), self.chosen(case)
+        if chosen == "keep":
+            moving = [name for name in names if not rigid_groups(case)[name].static]
+            turned = {name: _with_largest_on_y(found) for name in moving if (found := case.inertials[name])}
+            mended = with_inertials(case, turned).with_calls(*NUMBERS_OF_THE_FILE)
+            return Remedy(mended, "gave PyBullet and Drake the numbers of the file after loading", decision)
+        fused: list[str] = []
+        if chosen == "fuse":
+            for name in names:
+                bodies = _fused(case, rigid_groups(case)[name], name)
+                if bodies is not None:
+                    case = with_inertials(case, bodies)
+                    fused.append(name)
+        replaced: dict[str, Inertial] = {}
+        for name in names:
+            inertial = case.inertials[name]
+            if inertial is not None and clear_fault(inertial) == self.fault:
+                replaced[name] = _nearest(case, inertial, name)
+        case = with_inertials(case, replaced)
+        parts = []
+        if fused:
+            parts.append(f"lumped the inertia of {_listed(fused)} with that of links welded to it")
+        if replaced:
+            parts.append(f"put the nearest that a body can have for the tensor of {_listed(replaced)}")
+        return Remedy(case, " and ".join(parts), decision, changes_physics=bool(replaced))
+
+    def _message(self, inertial: Inertial) -> str:
+        small, middle, large = (float(value) for value in principal_moments(inertial))
+        if self.fault == "negative":
+            return f"the principal moment {small:.6g} is negative"
+        return f"the principal moment {large:.6g} exceeds the sum of the others, {small:.6g} and {middle:.6g}"
+
+
+def _fused(case: Case, group: RigidGroup, name: str) -> dict[str, Inertial] | None:
+    """The link lumped with its parent, with what hangs on it, or with its whole group: the first that
+    makes a body; None where none does."""
+    ways: list[tuple[tuple[str, ...], str]] = []
+    if name in group.parents:
+        parent = group.parents[name]
+        ways.append(((parent, name), parent))
+    if below := group.below(name):
+        ways.append(((name, *below), name))
+    if len(group.links) > 1:
+        ways.append((group.links, group.head))
+    for links, into in ways:
+        # A link without mass is another rule's matter, which must not vanish under the hands of this one.
+        if not case.model.inertial(into).mass > 0.0:
+            continue
+        bodies = lumped_into(case, group, links, into)
+        new = bodies[into]
+        if new.mass > 0.0 and clear_fault(new) is None:
+            root = into == case.model.root
+            if on_the_edge(new, root=root, welded=into in group.parents):
+                bodies[into] = lifted(new)
+            return bodies
+    return None
+
+
+def _nearest(case: Case, inertial: Inertial, name: str) -> Inertial:
+    body = CentralInertia.of(inertial)
+    moments, axes = body.principal(inertial.origin.rpy)
+    near = body.about(nearest_moments(moments), axes)
+    if case.base == "fixed" and name == case.model.root:
+        near = CentralInertia.of(near).aligned()
+    return lifted(near, ENOUGH)
+
+
+def _with_largest_on_y(inertial: Inertial) -> Inertial:
+    """The same tensor in principal form, as Bullet's tree of inverse dynamics may still take it: that the
+    moment about y is at most the sum of the others is the one thing it does not ask."""
+    body = CentralInertia.of(inertial)
+    moments, axes = body.principal(inertial.origin.rpy)
+    largest = int(np.argmax(moments))
+    order = [(largest + shift) % 3 for shift in (-1, 0, 1)]
+    return body.about(moments[order], axes[:, order])
+
+
+def _has_largest_on_y(inertial: Inertial) -> bool:
+    products = inertial.ixy or inertial.ixz or inertial.iyz
+    return not products and inertial.iyy == max(inertial.ixx, inertial.iyy, inertial.izz)
+
+
+def _listed(names: Iterable[str]) -> str:
+    found = list(names)
+    shown = ", ".join(found[:5])
+    return shown if len(found) <= 5 else f"{shown} and {len(found) - 5} more"

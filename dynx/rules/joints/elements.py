@@ -1,0 +1,40 @@
+"""What the ``<joint>`` elements of a document say, for rules that must not ask for the model."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+
+from dynx.model.xml.source import Edit, SourceElement, XmlSource
+from dynx.rules.case import Case
+from dynx.rules.text.number_text import LARGEST
+
+SINGLE = ("revolute", "continuous", "prismatic")
+"""Types of joints with one coordinate."""
+
+UNLIMITED = f'<limit lower="-{LARGEST}" upper="{LARGEST}" effort="{LARGEST}" velocity="{LARGEST}"/>'
+"""A limit that no joint reaches, in numbers that every engine reads."""
+
+
+def joints_of_type(case: Case, types: Collection[str]) -> Iterator[SourceElement]:
+    """The joints of these types, in document order."""
+    for joint in case.source.root.all("joint"):
+        if joint.attributes.get("type") in types:
+            yield joint
+
+
+def elements_in_joints(
+    case: Case, tag: str, types: Collection[str] | None = None
+) -> Iterator[tuple[SourceElement, SourceElement]]:
+    """Each joint of these types (default: of any) that has such an element, with the first of them."""
+    for joint in case.source.root.all("joint"):
+        element = joint.first(tag)
+        if element is not None and (types is None or joint.attributes.get("type") in types):
+            yield joint, element
+
+
+def putting_axis(source: XmlSource, joint: SourceElement, xyz: str) -> Edit:
+    """Give a joint that axis, whether it has one or not."""
+    axis = joint.first("axis")
+    if axis is None:
+        return source.inserting(joint, f'<axis xyz="{xyz}"/>')
+    return source.setting(axis, "xyz", xyz)

@@ -1,0 +1,42 @@
+"""Values of attributes of a source element, read by the rules by which `dynx.load` reads them."""
+
+from __future__ import annotations
+
+from dynx.model.elements import Pose, Vector
+from dynx.model.urdf.values import Reading
+from dynx.model.xml.reading import Element
+from dynx.model.xml.source import SourceElement
+from dynx.rules.text.number_text import is_number
+
+
+def number_of(element: SourceElement, attribute: str) -> float | None:
+    """The finite number that an attribute holds; None where it is absent.
+
+    Raises DescriptionError for anything else, as `vector_of` and `origin_of` do.
+    """
+    if attribute not in element.attributes:
+        return None
+    return Reading("<string>").number(_plain(element), attribute, "this file")
+
+
+def number_or_none(element: SourceElement, attribute: str) -> float | None:
+    """The number that an attribute holds; None where it is absent or no finite number."""
+    text = element.attributes.get(attribute, "")
+    return float(text) if is_number(text) else None
+
+
+def vector_of(element: SourceElement, attribute: str) -> Vector | None:
+    """The three finite numbers that an attribute holds; None where it is absent."""
+    if attribute not in element.attributes:
+        return None
+    return Reading("<string>").vector(_plain(element), attribute, "this file")
+
+
+def origin_of(parent: SourceElement) -> Pose:
+    """The pose in the ``<origin>`` of an element; what is absent or empty is zero."""
+    origins = [_plain(child) for child in parent.all("origin")]
+    return Reading("<string>").origin(Element(parent.tag, {}, parent.line, origins), "this file")
+
+
+def _plain(element: SourceElement) -> Element:
+    return Element(element.tag, element.attributes, element.line)

@@ -1,0 +1,342 @@
+"""`simulate_batch`: many rollouts of one robot, in fused kernels, on all processors."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dynx.backends.solvability import Solvability
+from dynx.compiled.parametric import ParametricDynamics
+from dynx.control.base import Controller
+from dynx.control.friction import SLIP, Coefficients
+from dynx.control.gains import checked_gain
+from dynx.control.saturation import checked_limit
+from dynx.errors import ArgumentError, shown
+from dynx.model import Model
+from dynx.model.configuration import checked_array, checked_q
+from dynx.sim.batch.kernel import StepOf
+from dynx.sim.batch.loads import BatchLoads, refuse_ambiguous
+from dynx.sim.batch.part import KernelOf, Part, PartDone, pushing
+from dynx.sim.batch.rollouts import BatchRollouts
+from dynx.sim.batch.store import Store
+from dynx.sim.batch.traced_controller import innermost
+from dynx.sim.loop.clock import Clock
+from dynx.sim.loop.controller_checks import check_law
+from dynx.sim.loop.references import checked_reference
+from dynx.sim.loop.sensors import Noise
+from dynx.sim.plants.loads import Push
+from dynx.sim.plants.model_error import MassScale, Payload, plant_model
+from dynx.simd.threads import checked_threads
+from dynx.spatial.scalar import Floats
+from dynx.trajectory.base import Setpoint, Trajectory
+
+PART = 1024
+"""Rollouts in one part: the state of so many stays in the caches, a call is long against its start, and
+some thousand rollouts are dealt to the threads in about equal shares."""
+
+Progress = Callable[[int, int], object]
+"""Called with the rollouts done and those asked for."""
+
+
+class BatchInterrupted(KeyboardInterrupt):
+    """Ctrl-C in a batch; `rollouts` has what was done until then."""
+
+    def __init__(self, rollouts: BatchRollouts) -> None:
+        super().__init__(f"interrupted with {int(np.sum(rollouts.done))} of {len(rollouts)} rollouts done")
+        self.rollouts = rollouts
+
+
+def simulate_batch(
+    model: Model,
+    controller: Controller[Any],
+    reference: Trajectory | ArrayLike,
+    *,
+    rollouts: int | None = None,
+    plant: ParametricDynamics | None = None,
+    parameters: ArrayLike | None = None,
+    gains: Mapping[str, ArrayLike] | None = None,
+    q0: ArrayLike | None = None,
+    v0: ArrayLike | None = None,
+    dt: float = 1e-3,
+    duration: float | None = None,
+    control_dt: float | None = None,
+    delay: float = 0.0,
+    noise: Noise | None = None,
+    damping: Coefficients = False,
+    friction: Coefficients = False,
+    friction_slip: float = SLIP,
+    armature: Coefficients = False,
+    effort_limits: bool | ArrayLike = False,
+    payload: Payload | Sequence[Payload] | None = None,
+    mass_scale: MassScale = 1.0,
+    pushes: Sequence[Push] = (),
+    record_every: int = 0,
+    check_reference: bool = True,
+    threads: int | None = None,
+    executor: Executor | None = None,
+    keep: str | os.PathLike[str] | None = None,
+    progress: Progress | None = None,
+) -> BatchRollouts:
+    """Many rollouts of `model` under `controller` along `reference`: semi-implicit Euler, as `simulate`.
+
+    Law, dynamics and integrator are compiled into one kernel, one rollout in each lane of a vector.
+    What may differ from rollout to rollout has one row for each:
+
+    - `parameters` (n, p) of `plant`, a `dynx.parametric` of the model: payloads, inertias, damping,
+      dry friction (with the jump of ``sign(v)``) and armature that the controller does not know of
+    - `gains`: arrays (n,) or (n, size) by the name that the law has them under, as ``{"kp": ...}``
+    - `damping`, `friction`, `armature` (n,), (n, 1) or (n, joints); a number, numbers (joints,) or True
+      mean for all rollouts what they mean in `simulate`
+    - `q0` (n, nq), `v0` (n, nv); one row is for all. By default the start of the reference, and at rest
+      where `q0` is given
+    - `noise` on what is measured, drawn for each part of `PART` rollouts from the seed and its number
+
+    `rollouts` is n, where none of these tells. Times [s], `delay`, `noise`, `friction_slip`,
+    `effort_limits`, `payload`, `mass_scale` and `pushes` are those of `simulate`. A `plant` together with
+    a payload or scaled masses is one of ``plant_model(model, payload, mass_scale)``. With `record_every`
+    k every k-th state is kept.
+
+    Parts are done by `threads` threads (None: all processors) or by any `executor`, also one of
+    processes or of a cluster; results are the same bit for bit. With `keep`, a folder, each part is
+    stored there when it is done, and a run that is started again with the same arguments goes on from
+    there. Ctrl-C raises BatchInterrupted, which has what was done. `progress` is told after each part.
+
+    Raises ArgumentError, GainError, LimitError, SingularMassMatrixError as `simulate` does, and
+    UnsupportedFeatureError for laws that branch on what they measure. A rollout that diverges stops
+    nothing: `BatchRollouts.diverged` says when.
+    """
+    if not isinstance(controller, Controller):
+        raise ArgumentError(f"controller is of type {type(controller).__name__}; wanted a dynx.control law")
+    moved = plant_model(model, payload, mass_scale)
+    if plant is not None and plant.model != moved:
+        scaled = "" if moved is model else ", with its payload and scaled masses (`plant_model`)"
+        raise ArgumentError(
+            f"plant is one of {plant.model.name}; wanted dynx.parametric of {model.name}{scaled}"
+        )
+    if parameters is not None and plant is None:
+        raise ArgumentError("parameters were given without the plant that they are of: dynx.parametric(...)")
+    span = reference.duration if duration is None and isinstance(reference, Trajectory) else duration
+    if span is None:
+        raise ArgumentError("duration is not given, and the reference is no trajectory that has one")
+    clock = Clock.of(dt, span, control_dt, delay)
+    check_law(model, controller, clock)
+    if isinstance(record_every, bool) or not isinstance(record_every, int) or record_every < 0:
+        raise ArgumentError(f"record_every is {shown(record_every)}; wanted a whole number, 0 for no record")
+    limit = None
+    if effort_limits is not False:
+        limit = checked_limit(model, None if effort_limits is True else effort_limits)
+    loads = BatchLoads.of(moved, damping, friction, friction_slip, armature, pushes)
+    if plant is None and not loads.rotors.any():
+        Solvability(moved).refuse_singular(False)
+    delayed = clock.delay_steps > 0
+    step = StepOf(
+        moved, controller, clock.dt, tuple(gains or ()), plant, noise is not None, delayed, limit, loads
+    )
+    setpoint_of = checked_reference(model, reference, within_limits=check_reference)
+    assert setpoint_of is not None
+    beginning = setpoint_of(np.zeros(1))
+    rows = _Rows(rollouts)
+    at_rest = np.zeros(model.nv) if q0 is not None else beginning.v[0]
+    start = {
+        "q": rows.of("q0", beginning.q[0] if q0 is None else checked_q(model, q0, "q0"), model.nq),
+        "v": rows.of("v0", at_rest if v0 is None else v0, model.nv),
+    }
+    fixed: dict[str, Floats] = {
+        name: rows.of(name, values, values.shape[1]) for name, values in loads.varied.items()
+    }
+    if plant is not None:
+        given = plant.parameters.defaults if parameters is None else parameters
+        fixed["parameters"] = rows.of("parameters", given, len(plant.parameters.names))
+    law = innermost(controller)
+    for name, values in (gains or {}).items():
+        fixed[f"gain_{name}"] = rows.of(name, _columns(values), getattr(law, name).size, spread=True)
+    n = rows.count
+    refuse_ambiguous(loads, n, {"damping": damping, "friction": friction, "armature": armature})
+    start = {name: rows.spread(array) for name, array in start.items()}
+    fixed = {name: rows.spread(array) for name, array in fixed.items()}
+    memory = controller.start()
+    zeros = np.zeros((n, model.nv))
+    start |= {"worst": zeros, "squares": zeros}
+    if limit is not None:
+        start["cut"] = zeros
+    if memory is not None:
+        start["memory"] = np.tile(memory, (n, 1))
+    deviations = None
+    if noise is not None:
+        if not isinstance(noise.seed, int) or noise.seed < 0:
+            raise ArgumentError(f"seed is {shown(noise.seed)}; wanted a whole number, 0 or more")
+        deviations = checked_gain("noise.q", noise.q, model.nv), checked_gain("noise.v", noise.v, model.nv)
+    wrenches = loads.wrenches(clock) if loads.pushes else np.zeros((clock.n_steps, 0))
+    kernels = _kernels(step, clock, wrenches)
+    goals = setpoint_of(clock.times()[1:]).q
+    setpoints = Setpoint(*setpoint_of(clock.control_times(controller.lead)))
+    parts = [
+        Part(
+            kernels,
+            clock.steps_per_control,
+            min(clock.delay_steps, clock.n_steps),
+            clock.n_steps,
+            clock.dt,
+            {name: array[first : first + PART] for name, array in start.items()},
+            {name: array[first : first + PART] for name, array in fixed.items()},
+            setpoints,
+            goals,
+            wrenches,
+            None if noise is None or deviations is None else ((noise.seed, first // PART), *deviations),
+            record_every,
+        )
+        for first in range(0, n, PART)
+    ]
+    store = None if keep is None else Store(keep)
+    done: dict[int, PartDone] = {}
+
+    def outcome() -> BatchRollouts:
+        return _joined(model, clock, parts, done, record_every)
+
+    try:
+        _work(parts, done, checked_threads(threads), executor, store, progress, n)
+    except KeyboardInterrupt:
+        raise BatchInterrupted(outcome()) from None
+    return outcome()
+
+
+def _kernels(step: StepOf, clock: Clock, wrenches: Floats) -> KernelOf:
+    """The steps that there are: those with a push take the time for it only while it lasts."""
+    asked = np.arange(clock.n_steps) % clock.steps_per_control == 0
+    kinds = set(zip(asked.tolist(), pushing(wrenches), strict=True))
+    return {
+        (controlled, pushed): step.kernel(controlled=controlled, pushed=pushed)
+        for controlled, pushed in sorted(kinds)
+    }
+
+
+class _Rows:
+    """How many rollouts there are, from the arrays that have one row for each."""
+
+    def __init__(self, asked: int | None) -> None:
+        if asked is not None and (isinstance(asked, bool) or not isinstance(asked, int) or asked < 1):
+            raise ArgumentError(f"rollouts is {shown(asked)}; wanted a whole number above 0")
+        self._asked = asked
+        self._by = "rollouts"
+
+    @property
+    def count(self) -> int:
+        """The number; 1 where nothing says."""
+        return 1 if self._asked is None else self._asked
+
+    def of(self, name: str, values: ArrayLike, size: int, *, spread: bool = False) -> Floats:
+        """`values` as (size,) or (n, size), finite; `spread` lets a last axis of 1 stand for all."""
+        array = np.asarray(values, dtype=np.float64) if spread else checked_array(name, values, size)
+        if spread and array.ndim and array.shape[-1] == 1:
+            array = np.broadcast_to(array, (*array.shape[:-1], size))
+        array = checked_array(name, array, size)
+        if array.ndim > 2:
+            raise ArgumentError(f"{name} has shape {array.shape}; wanted ({size},) or one such row a rollout")
+        if array.ndim == 2:
+            if self._asked is not None and len(array) != self._asked:
+                raise ArgumentError(f"{name} has {len(array)} rows, {self._by} says {self._asked}")
+            self._asked, self._by = len(array), name
+            if not len(array):
+                raise ArgumentError(f"{name} has no rows: there would be no rollouts")
+        return array
+
+    def spread(self, array: Floats) -> Floats:
+        """(n, size)."""
+        return np.array(np.broadcast_to(array, (self.count, array.shape[-1])))
+
+
+def _columns(values: ArrayLike) -> Floats:
+    """(n,) as (n, 1), (n, size) as it is."""
+    array = np.asarray(values, dtype=np.float64)
+    return array[:, None] if array.ndim == 1 else array
+
+
+def _work(
+    parts: list[Part],
+    done: dict[int, PartDone],
+    threads: int,
+    executor: Executor | None,
+    store: Store | None,
+    progress: Progress | None,
+    n: int,
+) -> None:
+    """Do all parts that are not stored; `done` is filled as they end."""
+
+    def finished(number: int, outcome: PartDone) -> None:
+        done[number] = outcome
+        if progress is not None:
+            progress(sum(parts[k].count for k in done), n)
+
+    left = []
+    for number, part in enumerate(parts):
+        kept = None if store is None else store.read(part)
+        if kept is None:
+            left.append(number)
+        else:
+            finished(number, kept)
+    pool = ThreadPoolExecutor(threads, thread_name_prefix="dynx batch") if executor is None else executor
+    futures: dict[Future[PartDone], int] = {}
+    try:
+        for number in left:
+            futures[pool.submit(parts[number])] = number
+        waiting = set(futures)
+        while waiting:
+            ended, waiting = wait(waiting, timeout=0.5, return_when=FIRST_COMPLETED)
+            for future in ended:
+                number = futures[future]
+                outcome = future.result()
+                if store is not None:
+                    store.write(parts[number], outcome)
+                finished(number, outcome)
+    finally:
+        for future in futures:
+            future.cancel()
+        if executor is None:
+            pool.shutdown(wait=True, cancel_futures=True)
+        for future, number in futures.items():
+            if number not in done and future.done() and not future.cancelled() and not future.exception():
+                finished(number, future.result())
+                if store is not None:
+                    store.write(parts[number], future.result())
+
+
+def _joined(
+    model: Model, clock: Clock, parts: list[Part], done: dict[int, PartDone], record_every: int
+) -> BatchRollouts:
+    kept = clock.n_steps // record_every if record_every else 0
+    nv = model.nv
+
+    def nothing(count: int) -> PartDone:
+        q, row, undone = (
+            np.full((count, model.nq), np.nan),
+            np.full((count, nv), np.nan),
+            np.full(count, -1.0),
+        )
+        q_record, record = np.full((count, kept, model.nq), np.nan), np.full((count, kept, nv), np.nan)
+        return PartDone(q, row, row, row, undone, q_record, record, record, row)
+
+    outcomes = [done.get(number, nothing(part.count)) for number, part in enumerate(parts)]
+    whole = PartDone(*(np.concatenate(arrays) for arrays in zip(*outcomes, strict=True)))
+    finished = np.concatenate([np.full(part.count, k in done) for k, part in enumerate(parts)])
+    diverged = np.where(whole.diverged < 0, np.nan, whole.diverged * clock.dt)
+    times = clock.times()[record_every::record_every] if record_every else np.zeros(0)
+    return BatchRollouts(
+        tuple(model.joint_names),
+        clock.dt,
+        whole.q,
+        whole.v,
+        whole.max_error,
+        whole.rms_error,
+        diverged,
+        finished,
+        times,
+        whole.q_record,
+        whole.v_record,
+        whole.tau_record,
+        whole.saturated,
+    )

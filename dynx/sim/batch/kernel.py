@@ -1,0 +1,208 @@
+"""One step of a closed loop as one kernel: the law, the plant and the integrator, traced together.
+
+A controller is array code over a backend's answers. Here it is run on symbols, with `dynx.rbd` in the
+place of the backend, and what it computes is compiled with the dynamics of the plant: what both need,
+such as sines and cosines, is computed once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from dynx.compiled.kernels import evaluated, tidied
+from dynx.compiled.mass_factors import factors_of, solved
+from dynx.compiled.parametric import ParametricDynamics
+from dynx.control.base import Controller, Measured
+from dynx.errors import ArgumentError, DynxError, TraceError, UnsupportedFeatureError, shown
+from dynx.model import Mechanism, Model
+from dynx.sim.batch.fingerprint import content_of
+from dynx.sim.batch.loads import BatchLoads
+from dynx.sim.batch.traced_controller import innermost, traced_law
+from dynx.sim.loop.controller_checks import Unchanged, is_row
+from dynx.sim.plants.floating_step import floating_step
+from dynx.simd.cache import cached_kernel, recipe_of
+from dynx.simd.kernel import Kernel
+from dynx.simd.trace import trace
+from dynx.spatial.branchless import difference, integrate
+from dynx.spatial.scalar import Array, Floats, clipped, sign
+from dynx.trajectory.base import Setpoint
+
+REMEMBERED = 32
+"""Steps kept for the next batch in this process."""
+
+_made: dict[Hashable, Kernel] = {}
+
+
+@dataclass(frozen=True)
+class StepOf:
+    """What decides a step: checked, and not yet compiled."""
+
+    model: Model
+    """The robot that moves."""
+    controller: Controller[Any]
+    dt: float
+    gains: tuple[str, ...]
+    """Attributes of the law that are given for each rollout."""
+    plant: ParametricDynamics | None
+    noisy: bool
+    delayed: bool
+    """Whether the law sees an earlier state."""
+    limit: Floats | None
+    loads: BatchLoads
+
+    def __post_init__(self) -> None:
+        law = innermost(self.controller)
+        for name in self.gains:
+            if not isinstance(vars(law).get(name), np.ndarray):
+                arrays = [key for key, value in vars(law).items() if isinstance(value, np.ndarray)]
+                known = ", ".join(key for key in arrays if not key.startswith("_"))
+                raise ArgumentError(f"{law.name} has no gain {shown(name)}; it has {known or 'none'}")
+        memory = self.controller.start()
+        if memory is not None and not is_row(memory):
+            what = f"array {memory.shape}" if isinstance(memory, np.ndarray) else type(memory).__name__
+            raise UnsupportedFeatureError(
+                f"{self.controller.name} remembers a {what}; in a batch it may be an array (n,) of float64"
+            )
+
+    def kernel(self, *, controlled: bool, pushed: bool) -> Kernel:
+        """The kernel of a step: `controlled`, with the law asked, or with `tau` held from before; with
+        or without what pushes.
+
+        Raises UnsupportedFeatureError for a law that branches on what it measures.
+        """
+        try:
+            # A plant is never changed, and is held on to here, so that it can be told by what it is.
+            own = content_of({name: value for name, value in vars(self).items() if name != "plant"})
+            key = own, self.plant, controlled, pushed
+        except TypeError:
+            return self._traced(controlled=controlled, pushed=pushed)
+        kernel = _made.get(key)
+        if kernel is None:
+            kernel = _made[key] = self._traced(controlled=controlled, pushed=pushed)
+            for old in list(_made)[:-REMEMBERED]:
+                _made.pop(old, None)
+        return kernel
+
+    def _traced(self, *, controlled: bool, pushed: bool) -> Kernel:
+        mechanism = tidied(self.model.mechanism)
+        law = traced_law(self.controller, {})
+
+        def step(**given: Array) -> dict[str, Array]:
+            if controlled:
+                outcome = self._commanded(law, given)
+            else:
+                outcome = {name: given[name] for name in ("memory", "cut") if name in given}
+            tau = outcome["tau"] if controlled else given["tau"]
+            a = self._acceleration(mechanism, tau, given, pushed)
+            q, v = self._moved(a, given)
+            goal = given["goal"]
+            error = abs(difference(q, goal) if self.model.floating else goal - q)
+            worst = np.array([x.maximum(e) for x, e in zip(given["worst"], error, strict=True)])
+            return {"q": q, "v": v, "worst": worst, "squares": given["squares"] + error * error, **outcome}
+
+        try:
+            program = trace(step, self.sizes(controlled=controlled, pushed=pushed))
+        except TraceError as error:
+            raise UnsupportedFeatureError(
+                f"{self.controller.name} cannot be fused with the plant, since it asks for values: {error}"
+            ) from error
+        except DynxError:
+            raise
+        except Exception as error:
+            raise UnsupportedFeatureError(
+                f"{self.controller.name} cannot be fused with the plant: run on symbols in the place of "
+                f"numbers it failed with {type(error).__name__}: {error}"
+            ) from error
+        return cached_kernel(recipe_of(program), lambda: program)
+
+    def sizes(self, *, controlled: bool, pushed: bool) -> dict[str, tuple[int]]:
+        """The inputs of a step in their order, and their sizes."""
+        nq, nv = self.model.nq, self.model.nv
+        sizes = {"q": nq, "v": nv, "worst": nv, "squares": nv, "goal": nq}
+        if not controlled:
+            sizes["tau"] = nv
+        else:
+            sizes |= {"q_wanted": nq, "v_wanted": nv, "a_wanted": nv, "t": 1}
+            if self.delayed:
+                sizes |= {"q_seen": nq, "v_seen": nv}
+            if self.noisy:
+                sizes |= {"noise_q": nv, "noise_v": nv}
+            law = innermost(self.controller)
+            sizes |= {f"gain_{name}": getattr(law, name).size for name in self.gains}
+            if self.limit is not None:
+                sizes["held_for"] = 1
+        memory = self.controller.start()
+        if memory is not None:
+            sizes["memory"] = memory.size
+        if self.limit is not None:
+            sizes["cut"] = nv
+        if self.plant is not None:
+            sizes["parameters"] = len(self.plant.parameters.names)
+        sizes |= self.loads.sizes(pushed=pushed)
+        return {name: (size,) for name, size in sizes.items()}
+
+    def _commanded(self, law: Controller[Any], given: Mapping[str, Array]) -> dict[str, Array]:
+        """The torque of the law within the limits, what it remembers, and how long motors were at limits."""
+        q, v = (given["q_seen"], given["v_seen"]) if self.delayed else (given["q"], given["v"])
+        if self.noisy:
+            off = given["noise_q"]
+            q, v = integrate(q, off) if self.model.floating else q + off, v + given["noise_v"]
+        setpoint = Setpoint(given["q_wanted"], given["v_wanted"], given["a_wanted"])
+        own = traced_law(law, {name: given[f"gain_{name}"] for name in self.gains})
+        watch = Unchanged(own)
+        tau, memory = own.torque(Measured(given["t"][0], q, v), setpoint, given.get("memory"))
+        if watch.changed:
+            raise UnsupportedFeatureError(
+                f"{watch.changed}, which a batch would do once for all: let it return what it remembers"
+            )
+        if memory is not None and "memory" not in given:
+            raise UnsupportedFeatureError(
+                f"{own.name} returns something to remember, but its start() gives None"
+            )
+        if np.shape(tau) != given["v"].shape:
+            raise UnsupportedFeatureError(
+                f"the torque of {own.name} has shape {np.shape(tau)}; wanted {given['v'].shape}"
+            )
+        outcome = {} if memory is None else {"memory": memory}
+        if self.limit is None:
+            return {"tau": tau, **outcome}
+        tau = clipped(tau, self.limit)
+        bounded = np.isfinite(self.limit)
+        cut = np.array(given["cut"])
+        # Symbols also where a law gives plain numbers.
+        left = self.limit[bounded] - abs(tau[bounded] + 0.0 * cut[bounded])
+        cut[bounded] = cut[bounded] + given["held_for"] * (1.0 - sign(left))
+        return {"tau": tau, "cut": cut, **outcome}
+
+    def _acceleration(
+        self, mechanism: Mechanism, tau: Array, given: Mapping[str, Array], pushed: bool
+    ) -> Array:
+        q, v = given["q"], given["v"]
+        tau = self.loads.added_to(tau, mechanism, q, v, given, pushed=pushed)
+        rotors = self.loads.rotors_of(given)
+        if self.plant is not None:
+            return self.plant.acceleration(given["parameters"], q, v, tau, rotors)
+        if rotors is None:
+            return evaluated(mechanism, "forward_dynamics", (), q, v, tau)
+        M = evaluated(mechanism, "mass_matrix", (), q) + np.diag(rotors)
+        return solved(*factors_of(mechanism, M), tau - evaluated(mechanism, "bias_torque", (), q, v))
+
+    def _moved(self, a: Array, given: Mapping[str, Array]) -> tuple[Array, Array]:
+        """q and v at the end of the step."""
+        q, v = given["q"], given["v"]
+        if self.model.floating:
+            return floating_step(q, v, a, self.dt, self._center(given))
+        v = v + self.dt * a
+        return q + self.dt * v, v
+
+    def _center(self, given: Mapping[str, Array]) -> Array:
+        """The centre of mass of the root (3,)."""
+        root = self.model.mechanism.root if self.plant is None else self.plant.root(given["parameters"])
+        mass = root.mass[()]
+        if isinstance(mass, float | int) and not mass:
+            return np.zeros(3)
+        return np.asarray(root.first_moment / mass)

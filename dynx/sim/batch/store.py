@@ -1,0 +1,63 @@
+"""Parts that are done, kept in a folder, so that a run which was killed goes on where it was.
+
+A part is found again by the hash of all that decides it. Files are written under another name first
+and then renamed: what is there is whole.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import pickle
+import tempfile
+import zipfile
+from hashlib import sha256
+from pathlib import Path
+
+import numpy as np
+
+from dynx.errors import ArgumentError, shown
+from dynx.sim.batch.part import Part, PartDone
+
+
+class Store:
+    """A folder of outcomes; it may be shared by runs of different arguments."""
+
+    def __init__(self, folder: str | os.PathLike[str]) -> None:
+        """Raises ArgumentError if it cannot be made."""
+        self._folder = Path(folder)
+        try:
+            self._folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise ArgumentError(f"keep is {shown(folder)}, where no folder can be made: {error}") from error
+
+    def read(self, part: Part) -> PartDone | None:
+        """The outcome of a part, if it is there and whole."""
+        try:
+            with np.load(self._path(part), allow_pickle=False) as file:
+                return PartDone(*(file[name] for name in PartDone._fields))
+        except (OSError, ValueError, KeyError, zipfile.BadZipFile):
+            return None
+
+    def write(self, part: Part, outcome: PartDone) -> None:
+        """Keep the outcome. Raises ArgumentError where it cannot be written."""
+        path = self._path(part)
+        name = ""
+        try:
+            with tempfile.NamedTemporaryFile(dir=self._folder, suffix=".part", delete=False) as file:
+                name = file.name
+                np.savez(file, **outcome._asdict())
+            os.replace(name, path)
+        except OSError as error:
+            with contextlib.suppress(OSError):
+                os.unlink(name)
+            raise ArgumentError(f"a finished part cannot be kept in {self._folder}: {error}") from error
+
+    def _path(self, part: Part) -> Path:
+        digest = sha256()
+        # Kernels count by what they compute; their machine code differs between processors.
+        numbers = (part.n_steps, part.dt, part.steps_per_control, part.delay_steps, part.record_every)
+        arrays = (part.start, part.fixed, tuple(part.setpoints), part.goals, part.wrenches, part.noise)
+        code = [(which, kernel.image) for which, kernel in sorted(part.kernels.items())]
+        digest.update(pickle.dumps((numbers, arrays, code), protocol=4))
+        return self._folder / f"{digest.hexdigest()[:32]}.npz"

@@ -1,0 +1,124 @@
+"""What acts on the joints besides the motors: friction, pushes from outside, and the rotors' inertia.
+
+One text for every plant: as a function of time and state it gives a torque that is added to that of the
+motors, so a push or a damper means the same to every engine and every integrator.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dynx.backends import Backend
+from dynx.backends.hooks import solve_mass_matrix
+from dynx.backends.joint_dynamics import JointDynamicsTerms
+from dynx.control.friction import Coefficients, JointFriction
+from dynx.control.gains import checked_gain
+from dynx.control.single_sample import SingleSample
+from dynx.errors import ArgumentError, shown
+from dynx.model import Model
+from dynx.model.configuration import checked_array
+from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED, REFERENCES
+from dynx.sim.loop.clock import WHOLE
+from dynx.spatial.scalar import Floats
+
+
+@dataclass(frozen=True)
+class Push:
+    """A wrench (6,), force [N] then moment [N m], on `frame` from `start` [s] for `duration` [s].
+
+    Expressed at and in `reference`, as `external_forces` of a backend are. It acts in the physics steps
+    that begin in its time.
+    """
+
+    frame: str
+    wrench: ArrayLike
+    start: float = 0.0
+    duration: float = np.inf
+    reference: str = LOCAL_WORLD_ALIGNED
+
+    def checked(self, model: Model) -> Push:
+        """The same with its wrench as an array, or an error that says why not."""
+        model.frame_index(self.frame)
+        wrench = checked_array("wrench", self.wrench, 6)
+        if wrench.ndim != 1 or self.reference not in REFERENCES:
+            raise ArgumentError(
+                f"a push on {shown(self.frame)} has a wrench of shape {wrench.shape} in "
+                f"{shown(self.reference)}; wanted (6,) in one of {', '.join(REFERENCES)}"
+            )
+        if not self.duration > 0.0 or not np.isfinite(self.start):
+            raise ArgumentError(
+                f"a push on {shown(self.frame)} starts at {self.start} and lasts {self.duration}; "
+                "wanted finite, and positive, seconds"
+            )
+        return Push(self.frame, wrench, float(self.start), float(self.duration), self.reference)
+
+
+class Loads:
+    """Friction, pushes and armature of a plant, from what `dynx.simulate` is asked."""
+
+    def __init__(
+        self,
+        model: Model,
+        damping: Coefficients,
+        friction: Coefficients,
+        slip: float,
+        armature: Coefficients,
+        pushes: Sequence[Push],
+        dt: float,
+    ) -> None:
+        self.friction = JointFriction(model, damping, friction, slip)
+        self.pushes = tuple(push.checked(model) for push in pushes)
+        self.rotors = _rotors(model, armature)
+        """Inertia of the rotors (nv, nv), added to the mass matrix."""
+        self.has_rotors = bool(self.rotors.any())
+        self._early = WHOLE * dt
+
+    @property
+    def present(self) -> bool:
+        """Whether any torque is added at all."""
+        return self.friction.present or bool(self.pushes)
+
+    def torque(self, engine: Backend, t: float, q: Floats, v: Floats) -> Floats:
+        """The torque (nv,) of pushes less friction, in a step that began at `t`."""
+        tau = -self.friction(v)
+        for push in self.pushes:
+            since = t - push.start + self._early
+            if 0.0 <= since < push.duration:
+                tau = tau + engine.jacobian(q, push.frame, reference=push.reference).T @ push.wrench
+        return tau
+
+
+class Acceleration:
+    """The acceleration of a plant under a torque: one backend's forward dynamics, with the loads."""
+
+    def __init__(self, engine: Backend, loads: Loads) -> None:
+        self.dynamics = SingleSample(engine)
+        self._engine = engine
+        self._loads = loads
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether it is the backend's forward dynamics and nothing else."""
+        return not (self._loads.present or self._loads.has_rotors)
+
+    def __call__(self, q: Floats, v: Floats, tau: Floats, t: float) -> Floats:
+        """a (nv,) at state q, v under `tau`, in a step that began at `t`."""
+        if self._loads.present:
+            tau = tau + self._loads.torque(self._engine, t, q, v)
+        if not self._loads.has_rotors:
+            a: Floats = self.dynamics.forward_dynamics(q, v, tau)
+            return a
+        M = self.dynamics.mass_matrix(q) + self._loads.rotors
+        return solve_mass_matrix(M, tau - self.dynamics.bias_torque(q, v))
+
+
+def _rotors(model: Model, armature: Coefficients) -> Floats:
+    if isinstance(armature, bool):
+        return JointDynamicsTerms(model).rotors if armature else np.zeros((model.nv, model.nv))
+    base = 6 if model.floating else 0
+    joints = checked_gain("armature", armature, model.nv - base, per="one for each joint")
+    return np.diag(np.concatenate([np.zeros(base), joints]))

@@ -1,0 +1,62 @@
+"""Rollouts as tables of text, for spreadsheets and programs without NumPy's formats.
+
+The first line names the columns, in this order; ``c`` stands for each coordinate:
+
+| columns | what | unit |
+|---|---|---|
+| `t` | time | s |
+| `q:c`, `v:c` | position, velocity | rad, m, per second |
+| `q*:c`, `v*:c`, `a*:c`, `error:c` | reference and what was missing to it, where there was one | likewise |
+| `energy` | kinetic and potential | J |
+| `a:c`, `tau:c` | acceleration and torque in the step that begins here | per second squared; N m, N |
+| `saturated:c` | 1 where the motor was at its limit in that step, otherwise 0 | |
+
+Coordinates have the names of their joints. A floating base comes first: `x y z qx qy qz qw` in positions
+(of the base frame in the world, quaternion xyzw) and `vx vy vz wx wy wz` in rates (in the base frame).
+The last state begins no step: its last columns are empty. Numbers are the shortest text that gives the
+same float64 again. Text is UTF-8, and a name with a comma or a quote in it stands in quotes (RFC 4180).
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, BinaryIO
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from dynx.sim.record.rollout import Rollout
+
+
+def write_csv(rollout: Rollout, file: BinaryIO) -> None:
+    """A row for each state, with what acted from then on beside it."""
+    model = rollout.model
+    positions = [*(["x", "y", "z", "qx", "qy", "qz", "qw"] if model.floating else []), *model.joint_names]
+    rates = [*(["vx", "vy", "vz", "wx", "wy", "wz"] if model.floating else []), *model.joint_names]
+    columns = ["t", *_named("q", positions), *_named("v", rates)]
+    blocks = [rollout.t[:, None], rollout.q, rollout.v]
+    if rollout.reference is not None:
+        columns += [*_named("q*", positions), *_named("v*", rates), *_named("a*", rates)]
+        columns += _named("error", rates)
+        blocks += [*rollout.reference, rollout.error]
+    columns += ["energy", *_named("a", rates), *_named("tau", rates), *_named("saturated", rates)]
+    blocks.append(rollout.energy[:, None])
+    states = np.concatenate(blocks, axis=1)
+    acting = np.concatenate([rollout.a, rollout.tau], axis=1)
+    nothing = [""] * 3 * model.nv
+    file.write((",".join(_quoted(column) for column in columns) + "\n").encode())
+    for k, state in enumerate(states):
+        cells = [repr(x) for x in state.tolist()]
+        if k < len(acting):
+            cells += [repr(x) for x in acting[k].tolist()]
+            cells += ["1" if flag else "0" for flag in rollout.saturated[k].tolist()]
+        else:
+            cells += nothing
+        file.write((",".join(cells) + "\n").encode())
+
+
+def _named(kind: str, coordinates: list[str]) -> list[str]:
+    return [f"{kind}:{name}" for name in coordinates]
+
+
+def _quoted(text: str) -> str:
+    return '"' + text.replace('"', '""') + '"' if any(c in text for c in ',"\n\r') else text

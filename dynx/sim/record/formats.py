@@ -1,0 +1,123 @@
+"""Rollouts in files: which format a name stands for, and NumPy's ``.npz``, which `load` reads again."""
+
+from __future__ import annotations
+
+import json
+import os
+import struct
+import zipfile
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+
+from dynx.errors import ArgumentError, ModelError, shown
+from dynx.files.writing import whole_file
+from dynx.model.loading import load as load_model
+from dynx.sim.record.csv_file import write_csv
+from dynx.sim.record.mcap_file import write_mcap
+from dynx.sim.record.rollout import Rollout
+from dynx.trajectory.base import Setpoint
+
+SCHEMA = "dynx.rollout/1"
+"""What the file says it is; another number means another layout."""
+
+ARRAYS = ("t", "q", "v", "a", "tau", "saturated", "rotors")
+REFERENCE = ("reference_q", "reference_v", "reference_a")
+
+DAMAGED = (
+    *(OSError, EOFError, ValueError, KeyError, RuntimeError, MemoryError),
+    *(zipfile.BadZipFile, zlib.error, struct.error),
+)
+"""What zipfile and NumPy raise for a file that is not there or was changed after it was written."""
+
+
+def save(rollout: Rollout, path: str | os.PathLike[str]) -> None:
+    """Write `rollout` in the format that the name ends with: all of it, or nothing under that name.
+
+    Raises ArgumentError for another format or a file that cannot be written, NotInstalledError where
+    the format needs a package that is missing.
+    """
+    write = WRITERS.get(Path(path).suffix.lower())
+    if write is None:
+        formats = " or ".join([", ".join([*WRITERS][:-1]), [*WRITERS][-1]])
+        raise ArgumentError(f"a rollout is saved as {formats}, not as {shown(Path(path).name)}")
+    with whole_file(path) as file:
+        write(rollout, file)
+
+
+def load(path: str | os.PathLike[str]) -> Rollout:
+    """Read a ``.npz`` that `save` wrote. Raises ArgumentError for any other file.
+
+    The model comes back from the URDF text in the file; arrays are read without unpickling anything.
+    """
+    name = os.fspath(path)
+    entries = _entries(path)
+    if str(entries.get("schema")) != SCHEMA:
+        raise ArgumentError(f"{name} does not say {SCHEMA!r}, so it is no rollout of this version")
+    missing = [entry for entry in (*ARRAYS, "robot") if entry not in entries]
+    if missing:
+        raise ArgumentError(f"{name} lacks {', '.join(missing)}")
+    reference = None
+    if all(entry in entries for entry in REFERENCE):
+        reference = Setpoint(*(entries[entry] for entry in REFERENCE))
+    try:
+        robot: dict[str, Any] = json.loads(str(entries["robot"]))
+        model = load_model(robot["urdf"], base=robot["base"], gravity=robot["gravity"])
+        settings = dict(robot["settings"])
+    except (ValueError, KeyError, TypeError, ModelError) as error:
+        raise ArgumentError(f"the robot in {name} cannot be read: {error}") from error
+    n = len(entries["tau"]) if entries["tau"].ndim else 0
+    shapes = {"t": (n + 1,), "q": (n + 1, model.nq), "rotors": (model.nv, model.nv)}
+    shapes |= {"v": (n + 1, model.nv)} | dict.fromkeys(("a", "tau", "saturated"), (n, model.nv))
+    shapes |= zip(REFERENCE, ((n + 1, model.nq), (n + 1, model.nv), (n + 1, model.nv)), strict=True)
+    for entry, shape in shapes.items():
+        array, kind = entries.get(entry), np.dtype(bool if entry == "saturated" else float)
+        if array is not None and (array.shape != shape or array.dtype != kind):
+            raise ArgumentError(
+                f"{entry} in {name} is {array.dtype} {array.shape}; wanted {kind} {shape} as n is {n}"
+            )
+    return Rollout(
+        model, reference=reference, settings=settings, **{entry: entries[entry] for entry in ARRAYS}
+    )
+
+
+def _entries(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """All arrays of a ``.npz``."""
+    problem = "it is no .npz file, or a part of one"
+    try:
+        with open(path, "rb") as raw:
+            if zipfile.is_zipfile(raw):
+                raw.seek(0)
+                file = np.load(raw, allow_pickle=False)
+                if isinstance(file, np.lib.npyio.NpzFile):
+                    with file:
+                        return {name: file[name] for name in file.files}
+    except DAMAGED as error:
+        problem = str(error) or type(error).__name__
+    raise ArgumentError(f"{os.fspath(path)} cannot be read as a rollout: {problem}")
+
+
+def _write_npz(rollout: Rollout, file: BinaryIO) -> None:
+    model = rollout.model
+    robot = {
+        "urdf": model.to_urdf(),
+        "base": model.base,
+        "gravity": list(model.gravity),
+        "settings": rollout.settings,
+    }
+    arrays: dict[str, Any] = {name: getattr(rollout, name) for name in ARRAYS}
+    if rollout.reference is not None:
+        arrays.update(zip(REFERENCE, rollout.reference, strict=True))
+    # The energy is for readers without dynx; `load` computes it again.
+    np.savez(file, schema=SCHEMA, robot=json.dumps(robot), energy=rollout.energy, **arrays)
+
+
+WRITERS: dict[str, Callable[[Rollout, BinaryIO], None]] = {
+    ".npz": _write_npz,
+    ".csv": write_csv,
+    ".mcap": write_mcap,
+}
+"""By the end of the name."""

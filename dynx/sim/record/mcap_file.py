@@ -1,0 +1,73 @@
+"""Rollouts as MCAP recordings of ROS 2 messages, for PlotJuggler, Foxglove and ``ros2 bag``.
+
+`dynx.sim.record.ros_topics` says what is on which topic. Stamps are the times of the record, from 0 s on, in
+whole nanoseconds, as ROS has them. The metadata record ``dynx.rollout`` has the settings of the
+simulation and what else a `Rollout` knows: numbers and lists as JSON, text as it is.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, BinaryIO
+
+import numpy as np
+
+from dynx._version import __version__
+from dynx.errors import NotInstalledError
+from dynx.sim.record.ros_definitions import schema_name, schema_text
+from dynx.sim.record.ros_topics import topics_of
+
+if TYPE_CHECKING:
+    from dynx.sim.record.rollout import Rollout
+
+SCHEMA = "dynx.rollout.mcap/1"
+"""What the metadata record says that the recording is."""
+
+BLOCK = 1000
+"""States that are encoded at a time: a long recording needs no memory of its size."""
+
+ABOUT_CHANNEL = {"offered_qos_profiles": ""}
+"""The ROS 2 profile of MCAP wants this entry; empty, it leaves the quality of service to the player."""
+
+
+def write_mcap(rollout: Rollout, file: BinaryIO) -> None:
+    """Record `rollout`. Raises NotInstalledError without mcap (``pip install 'dynx[mcap]'``)."""
+    try:
+        from mcap.writer import Writer
+    except ImportError as error:
+        raise NotInstalledError("a .mcap file needs mcap: pip install 'dynx[mcap]'") from error
+    writer = Writer(file)
+    writer.start(profile="ros2", library=f"dynx {__version__}")
+    writer.add_metadata("dynx.rollout", _metadata(rollout))
+    schemas: dict[str, int] = {}
+    channels: dict[str, int] = {}
+    topics = topics_of(rollout)
+    for name, message in {topic.name: topic.message for topic in topics}.items():
+        if message not in schemas:
+            text = schema_text(message).encode()
+            schemas[message] = writer.register_schema(schema_name(message), "ros2msg", text)
+        channels[name] = writer.register_channel(name, "cdr", schemas[message], ABOUT_CHANNEL)
+    stamps = np.rint(rollout.t * 1e9).astype(np.int64)
+    times = stamps.tolist()
+    for begin in range(0, len(stamps), BLOCK):
+        messages = [
+            (k, channels[topic.name], data)
+            for topic in topics
+            for k, data in topic.encoded(stamps, begin, begin + BLOCK)
+        ]
+        for k, channel, data in sorted(messages, key=lambda message: message[0]):
+            writer.add_message(channel, times[k], data, times[k], sequence=k)
+    writer.finish()
+
+
+def _metadata(rollout: Rollout) -> dict[str, str]:
+    model = rollout.model
+    known = {
+        "schema": SCHEMA,
+        "robot": model.name,
+        "base": model.base,
+        "gravity": list(model.gravity),
+        "rotors": rollout.rotors.tolist(),
+        **rollout.settings,
+    }
+    return {name: value if isinstance(value, str) else json.dumps(value) for name, value in known.items()}

@@ -1,0 +1,151 @@
+"""A rollout on one page: where the joints went, what was missing, what the motors gave.
+
+Where nothing was wanted, the velocities stand in the place of the errors.
+
+Robots of many joints get several columns, so that no panel has more curves than can be told apart.
+"""
+
+from __future__ import annotations
+
+import os
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from dynx.errors import ArgumentError, NotInstalledError, shown
+from dynx.files.writing import whole_file
+from dynx.model import Model
+from dynx.spatial.scalar import Floats
+
+if TYPE_CHECKING:
+    from dynx.sim.record.rollout import Rollout
+
+STYLES = ("-", "--", "-.", ":")
+"""With the ten colours of matplotlib they are twenty kinds of curves, told apart without colour too."""
+
+PER_COLUMN = 12
+"""Curves in one panel at most."""
+
+NEAR = 0.5
+"""Share of an effort limit from which on it is drawn: one far above the curves would flatten them."""
+
+
+class Column(NamedTuple):
+    """Coordinates that share panels: their names, and where they are in q and in v."""
+
+    labels: tuple[str, ...]
+    q: slice
+    v: slice
+    units: tuple[str, str]
+    """Of positions and of efforts."""
+    of_base: bool = False
+    """Whether positions are in the world and all else in the axes of the base."""
+
+
+def plot(rollout: Rollout, path: str | os.PathLike[str] | None) -> Any:
+    """See `Rollout.plot`. The figure belongs to no window and no global state of matplotlib."""
+    try:
+        from matplotlib.figure import Figure
+    except ImportError as error:
+        raise NotInstalledError("a plot needs matplotlib: pip install 'dynx[plot]'") from error
+    columns = _columns(rollout.model)
+    figure = Figure(figsize=(7.0 if len(columns) == 1 else 3.8 * len(columns), 8.0), layout="constrained")
+    panels = figure.subplots(3, len(columns), sharex=True, squeeze=False)
+    for column, axes in zip(columns, panels.T, strict=True):
+        _draw(rollout, column, axes)
+    figure.suptitle(_plain(_title(rollout)), fontsize=11)
+    if path is not None:
+        kind = Path(path).suffix[1:].lower()
+        if kind not in figure.canvas.get_supported_filetypes():
+            raise ArgumentError(f"a plot is saved as .png, .pdf or .svg, not as {shown(Path(path).name)}")
+        with whole_file(path) as file:
+            figure.savefig(file, format=kind, dpi=200)
+    return figure
+
+
+def _columns(model: Model) -> list[Column]:
+    """The position of a floating base, and the joints in equal shares."""
+    base_q, base_v = (7, 6) if model.floating else (0, 0)
+    base = Column(("base x", "base y", "base z"), slice(0, 3), slice(0, 3), ("m", "N"), of_base=True)
+    columns = [base] if model.floating else []
+    joints = model.coordinate_joints
+    shares = -(-len(joints) // PER_COLUMN) or (0 if columns else 1)
+    ends = np.linspace(0, len(joints), shares + 1).round().astype(int).tolist()
+    for begin, end in pairwise(ends):
+        sliding = [joint.type == "prismatic" for joint in joints[begin:end]]
+        units = ("m", "N") if sliding and all(sliding) else ("rad", "N m")
+        labels = [joint.name for joint in joints[begin:end]]
+        if any(sliding) and not all(sliding):
+            units = ("rad; m", "N m; N")
+            labels = [name + " [m]" * slides for name, slides in zip(labels, sliding, strict=True)]
+        q, v = slice(base_q + begin, base_q + end), slice(base_v + begin, base_v + end)
+        columns.append(Column(tuple(labels), q, v, units))
+    return columns
+
+
+def _draw(rollout: Rollout, column: Column, axes: Any) -> None:
+    positions, middle, efforts = axes
+    t, (length, force) = rollout.t, column.units
+    q = rollout.q[:, column.q]
+    # What acts in a step acts until its end.
+    tau = np.concatenate([rollout.tau, rollout.tau[-1:]])[:, column.v]
+    limits = _effort_limits(rollout)[column.v]
+    curves, limit = {}, None
+    for k, label in enumerate(column.labels):
+        style: dict[str, Any] = {"color": f"C{k % 10}", "linestyle": STYLES[k % len(STYLES)], "lw": 1.3}
+        (curves[_plain(label)],) = positions.plot(t, q[:, k], **style)
+        if rollout.reference is not None:
+            wanted = positions.plot(t, rollout.reference.q[:, column.q][:, k], color="0.6", lw=0.8, zorder=0)
+        between = rollout.v if rollout.reference is None else rollout.error
+        middle.plot(t, between[:, column.v][:, k], **style)
+        efforts.step(t[: len(tau)], tau[:, k], where="post", **style)
+        if np.isfinite(limits[k]) and np.max(np.abs(tau[:, k]), initial=0.0) > NEAR * limits[k]:
+            for sign in (1.0, -1.0):
+                limit = efforts.axhline(
+                    sign * limits[k], color=style["color"], lw=0.9, linestyle=(0, (1, 3)), zorder=3
+                )
+    if rollout.reference is not None and curves:
+        curves["reference"] = wanted[0]
+    if limit is not None:
+        curves["effort limit"] = limit
+    positions.set_ylabel(f"position [{length}]")
+    speed = "; ".join(f"{unit}/s" for unit in length.split("; "))
+    middle.set_ylabel(f"velocity [{speed}]" if rollout.reference is None else f"error q* - q [{length}]")
+    efforts.set_ylabel(f"torque [{force}]" if "N m" in force else f"force [{force}]")
+    if column.of_base:
+        for axis, axes_of in ((positions, "world"), (middle, "base"), (efforts, "base")):
+            axis.set_ylabel(f"{axis.get_ylabel()} ({axes_of} axes)")
+    efforts.set_xlabel("time [s]")
+    for axis in axes:
+        axis.grid(visible=True, color="0.9")
+        axis.ticklabel_format(axis="y", scilimits=(-3, 4))
+        if len(rollout):
+            axis.set_xlim(t[0], t[-1])
+    if curves:
+        efforts.legend(
+            list(curves.values()),
+            list(curves),
+            loc="upper center",
+            bbox_to_anchor=(0.5, -0.2),
+            ncols=min(4 if len(axes[0].figure.axes) == 3 else 2, len(curves)),
+            fontsize=8,
+        )
+
+
+def _title(rollout: Rollout) -> str:
+    law, plant = (rollout.settings.get(name, "none") for name in ("controller", "plant"))
+    controller = "no controller" if law == "none" else law
+    return f"{rollout.model.name}: {controller}" + ("" if plant == "none" else f" on {plant}")
+
+
+def _effort_limits(rollout: Rollout) -> Floats:
+    """Those that cut the torques; if none did, those of the robot."""
+    cut = rollout.settings.get("effort_limits")
+    return rollout.model.effort_limit if cut is None else np.asarray(cut, dtype=np.float64)
+
+
+def _plain(text: str) -> str:
+    """`text` as matplotlib shows it as it is: no formula, and no name that is left out of a legend."""
+    return (" " if text.startswith("_") else "") + text.replace("$", r"\$")

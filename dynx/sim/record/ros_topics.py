@@ -1,0 +1,211 @@
+"""A rollout as topics of ROS 2 messages.
+
+| topic | type | what |
+|---|---|---|
+| `/joint_states` | sensor_msgs/JointState | positions, velocities and efforts of the joints |
+| `/accelerations` | trajectory_msgs/JointTrajectory | one point that has `accelerations` |
+| `/saturated` | sensor_msgs/JointState | `effort` is 1 where the motor was at its limit, otherwise 0 |
+| `/energy` | std_msgs/Float64 | kinetic and potential energy [J] |
+| `/reference` | sensor_msgs/JointState | positions and velocities that were wanted |
+| `/reference_accelerations` | trajectory_msgs/JointTrajectory | one point that has `accelerations` |
+| `/error` | sensor_msgs/JointState | `position` is what was missing to the reference |
+| `/robot_description` | std_msgs/String | the robot that moved as URDF, once, at the beginning |
+
+A floating base adds, with its pose in the frame ``world`` (``map``, where that is the root link itself)
+and all else in the axes of the root link:
+
+| topic | type | what |
+|---|---|---|
+| `/tf` | tf2_msgs/TFMessage | the pose of the root link |
+| `/base/odometry` | nav_msgs/Odometry | pose and velocity; covariances are 0 |
+| `/base/acceleration` | geometry_msgs/AccelStamped | the derivative of that velocity |
+| `/base/wrench` | geometry_msgs/WrenchStamped | what the controller asked of the base, which has no motor |
+| `/base/reference` | nav_msgs/Odometry | pose and velocity that were wanted |
+| `/base/reference_acceleration` | geometry_msgs/AccelStamped | likewise |
+| `/base/error` | geometry_msgs/TwistStamped | the displacement [m, rad] that leads to the reference |
+
+Every number is the float64 of the record. What acts from one state to the next is stamped with the time
+at which it begins, so the last state has no effort. Joints that follow others are not listed: the
+description says how they follow.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from dynx.sim.record.cdr import CdrMessages
+from dynx.spatial.scalar import Floats
+
+if TYPE_CHECKING:
+    from dynx.sim.record.rollout import Rollout
+
+NO_VALUES = np.zeros((0, 0))
+"""In place of a field of a joint state that is left out."""
+
+Stamps = np.ndarray[Any, np.dtype[np.int64]]
+"""Times in nanoseconds."""
+
+Encode = Callable[[CdrMessages, Stamps, slice], None]
+"""Appends all fields of the messages at a slice of the states, of which the stamps are given."""
+
+
+class Topic(NamedTuple):
+    """Messages of one type, one at each of the states `first` to `last` (exclusive)."""
+
+    name: str
+    message: str
+    first: int
+    last: int
+    encode: Encode
+
+    def encoded(self, stamps: Stamps, begin: int, end: int) -> list[tuple[int, bytes]]:
+        """Those of the states `begin` to `end` (exclusive), each with the number of its state."""
+        begin, end = max(begin, self.first), min(end, self.last)
+        if begin >= end:
+            return []
+        messages = CdrMessages(end - begin)
+        self.encode(messages, stamps[begin:end], slice(begin, end))
+        return list(zip(range(begin, end), messages.encoded(), strict=True))
+
+
+def topics_of(rollout: Rollout) -> list[Topic]:
+    """All topics of `rollout`; one that changes its layout at the last state is there twice."""
+    return [*_joint_topics(rollout), *(_base_topics(rollout) if rollout.model.floating else [])]
+
+
+def _joint_topics(rollout: Rollout) -> list[Topic]:
+    model, n = rollout.model, len(rollout)
+    base_q, base_v = (7, 6) if model.floating else (0, 0)
+    names = model.joint_names
+    flags = rollout.saturated[:, base_v:].astype(np.float64)
+
+    def joints(q: Floats, v: Floats = NO_VALUES, effort: Floats = NO_VALUES) -> Encode:
+        return _joint_states(names, q[:, base_q:], v[:, base_v:], effort[:, base_v:])
+
+    def topic(name: str, kind: str, encode: Encode, first: int = 0, last: int = n + 1) -> Topic:
+        return Topic(name, kind, first, last, encode)
+
+    state, points = "sensor_msgs/JointState", "trajectory_msgs/JointTrajectory"
+    topics = [
+        topic("/robot_description", "std_msgs/String", _text(model.to_urdf()), last=1),
+        topic("/joint_states", state, joints(rollout.q, rollout.v, rollout.tau), last=n),
+        topic("/joint_states", state, joints(rollout.q, rollout.v), first=n),
+        topic("/accelerations", points, _accelerations(names, rollout.a[:, base_v:]), last=n),
+        topic("/saturated", state, _joint_states(names, effort=flags), last=n),
+        topic("/energy", "std_msgs/Float64", _numbers(rollout.energy[:, None])),
+    ]
+    if rollout.reference is not None:
+        wanted = rollout.reference
+        topics += [
+            topic("/reference", state, joints(wanted.q, wanted.v)),
+            topic("/reference_accelerations", points, _accelerations(names, wanted.a[:, base_v:])),
+            topic("/error", state, _joint_states(names, rollout.error[:, base_v:])),
+        ]
+    return topics
+
+
+def _base_topics(rollout: Rollout) -> list[Topic]:
+    n, base = len(rollout), rollout.model.root
+
+    world = "world" if base != "world" else "map"
+
+    def topic(name: str, kind: str, encode: Encode, last: int = n + 1) -> Topic:
+        return Topic(name, kind, 0, last, encode)
+
+    def odometry(q: Floats, v: Floats) -> Encode:
+        return _odometry(world, base, q[:, :7], v[:, :6])
+
+    topics = [
+        topic("/tf", "tf2_msgs/TFMessage", _transform(world, base, rollout.q[:, :7])),
+        topic("/base/odometry", "nav_msgs/Odometry", odometry(rollout.q, rollout.v)),
+        topic("/base/acceleration", "geometry_msgs/AccelStamped", _stamped(base, rollout.a[:, :6]), n),
+        topic("/base/wrench", "geometry_msgs/WrenchStamped", _stamped(base, rollout.tau[:, :6]), n),
+    ]
+    if rollout.reference is not None:
+        q, v, a = rollout.reference
+        topics += [
+            topic("/base/reference", "nav_msgs/Odometry", odometry(q, v)),
+            topic("/base/reference_acceleration", "geometry_msgs/AccelStamped", _stamped(base, a[:, :6])),
+            topic("/base/error", "geometry_msgs/TwistStamped", _stamped(base, rollout.error[:, :6])),
+        ]
+    return topics
+
+
+def _joint_states(
+    names: Sequence[str],
+    position: Floats = NO_VALUES,
+    velocity: Floats = NO_VALUES,
+    effort: Floats = NO_VALUES,
+) -> Encode:
+    def encode(messages: CdrMessages, stamps: Stamps, states: slice) -> None:
+        _put_header(messages, stamps, "")
+        messages.put_string_sequence(names)
+        for values in (position, velocity, effort):
+            messages.put_float64_sequence(values[states])
+
+    return encode
+
+
+def _accelerations(names: Sequence[str], values: Floats) -> Encode:
+    def encode(messages: CdrMessages, stamps: Stamps, states: slice) -> None:
+        _put_header(messages, stamps, "")
+        messages.put_string_sequence(names)
+        messages.put_uint32(1)  # points
+        for field in (NO_VALUES, NO_VALUES, values[states], NO_VALUES):
+            messages.put_float64_sequence(field)
+        _put_time(messages, np.zeros_like(stamps))
+
+    return encode
+
+
+def _numbers(values: Floats) -> Encode:
+    return lambda messages, _, states: messages.put_float64s(values[states])
+
+
+def _text(text: str) -> Encode:
+    return lambda messages, _, states: messages.put_string(text)
+
+
+def _transform(world: str, base: str, pose: Floats) -> Encode:
+    def encode(messages: CdrMessages, stamps: Stamps, states: slice) -> None:
+        messages.put_uint32(1)  # transforms
+        _put_header(messages, stamps, world)
+        messages.put_string(base)
+        messages.put_float64s(pose[states])
+
+    return encode
+
+
+def _odometry(world: str, base: str, pose: Floats, velocity: Floats) -> Encode:
+    certain = np.zeros((1, 36))
+
+    def encode(messages: CdrMessages, stamps: Stamps, states: slice) -> None:
+        _put_header(messages, stamps, world)
+        messages.put_string(base)
+        for values in (pose[states], certain, velocity[states], certain):
+            messages.put_float64s(values)
+
+    return encode
+
+
+def _stamped(frame: str, values: Floats) -> Encode:
+    """Two vectors with a header: a twist, an acceleration, a wrench."""
+
+    def encode(messages: CdrMessages, stamps: Stamps, states: slice) -> None:
+        _put_header(messages, stamps, frame)
+        messages.put_float64s(values[states])
+
+    return encode
+
+
+def _put_header(messages: CdrMessages, stamps: Stamps, frame: str) -> None:
+    _put_time(messages, stamps)
+    messages.put_string(frame)
+
+
+def _put_time(messages: CdrMessages, nanoseconds: Stamps) -> None:
+    messages.put_int32(nanoseconds // 10**9)
+    messages.put_uint32(nanoseconds % 10**9)

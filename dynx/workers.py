@@ -1,0 +1,240 @@
+"""Worker processes that survive what they run: a crash or a hang costs one task, not the run.
+
+Engines are foreign code that can end the process or never return, and they hold the interpreter
+lock while they do. So each task runs in a child that is reused until it dies; only the task that it
+died of is marked. Each child is driven by one thread, which makes waiting portable and leaves the
+main thread free for Ctrl-C. Children are in a session of their own and never see Ctrl-C.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import queue
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from dynx.errors import traceback_wanted
+
+FailureKind = Literal["crash", "timeout", "defect"]
+
+_START = "import sys; sys.path[:] = sys.argv[1:]; from dynx.workers import serve; serve()"
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Why a task has no value: its process died, took too long, or raised (a defect of dynx)."""
+
+    kind: FailureKind
+    message: str
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of task number `index`: its `value`, or the `failure` that it met."""
+
+    index: int
+    value: Any = None
+    failure: Failure | None = None
+
+
+class Workers:
+    """Up to `size` processes that answer tasks with ``target(task)``.
+
+    `target` is a module-level function; tasks and values are pickled. `timeout` [s] bounds one
+    task, None does not. Use it as a context: leaving it ends the processes.
+    """
+
+    def __init__(self, target: Callable[[Any], Any], size: int, timeout: float | None = None) -> None:
+        self._target = target
+        self._size = size
+        self._timeout = timeout
+        self._lock = threading.Lock()
+        self._closed = False
+        self._alive: set[_Worker] = set()
+        self._threads: list[threading.Thread] = []
+
+    def __enter__(self) -> Workers:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def run(self, tasks: Sequence[Any]) -> Iterator[Outcome]:
+        """The outcome of every task, in the order in which they are done."""
+        waiting: queue.SimpleQueue[tuple[int, Any]] = queue.SimpleQueue()
+        for numbered in enumerate(tasks):
+            waiting.put(numbered)
+        outcomes: queue.SimpleQueue[Outcome] = queue.SimpleQueue()
+        for _ in range(min(self._size, len(tasks))):
+            thread = threading.Thread(target=self._drive, args=(waiting, outcomes), daemon=True)
+            self._threads.append(thread)
+            thread.start()
+        for _ in tasks:
+            yield outcomes.get()
+
+    def close(self) -> None:
+        """End every process, whatever it is doing."""
+        with self._lock:
+            self._closed = True
+            for worker in self._alive:
+                worker.kill()
+        for thread in self._threads:
+            thread.join()
+
+    def _drive(
+        self, waiting: queue.SimpleQueue[tuple[int, Any]], outcomes: queue.SimpleQueue[Outcome]
+    ) -> None:
+        worker: _Worker | None = None
+        try:
+            while not self._closed:
+                try:
+                    index, task = waiting.get_nowait()
+                except queue.Empty:
+                    return
+                if worker is not None and worker.ended:
+                    self._forget(worker)
+                    worker = None
+                worker = worker or self._start()
+                if worker is None:
+                    return
+                reply = worker.ask(task, self._timeout)
+                if isinstance(reply, Failure):
+                    outcomes.put(Outcome(index, failure=reply))
+                else:
+                    outcomes.put(Outcome(index, value=reply[0]))
+        finally:
+            if worker is not None:
+                self._forget(worker)
+
+    def _start(self) -> _Worker | None:
+        with self._lock:
+            if self._closed:
+                return None
+            worker = _Worker(self._target)
+            self._alive.add(worker)
+            return worker
+
+    def _forget(self, worker: _Worker) -> None:
+        worker.end()
+        with self._lock:
+            self._alive.discard(worker)
+
+
+class _Worker:
+    """One child process, and the pipes to it."""
+
+    def __init__(self, target: Callable[[Any], Any]) -> None:
+        # One thread of linear algebra each: the matrices are small and the workers are many.
+        environment = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", **os.environ}
+        self._process = subprocess.Popen(
+            [sys.executable, "-c", _START, *sys.path],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            env=environment,
+            start_new_session=True,
+        )
+        self._target = target
+        self._greeted = False
+        self._expired = False
+
+    @property
+    def ended(self) -> bool:
+        """Whether the process is no more, or will not be shortly."""
+        return self._expired or self._process.poll() is not None
+
+    def ask(self, task: Any, timeout: float | None) -> tuple[Any] | Failure:
+        """The value of one task, in a tuple of one, or why there is none."""
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        timer = None if timeout is None else threading.Timer(timeout, self._expire)
+        if timer is not None:
+            timer.daemon = True
+            timer.start()
+        try:
+            if not self._greeted:
+                pickle.dump(self._target, self._process.stdin)
+                self._greeted = True
+            pickle.dump(task, self._process.stdin)
+            self._process.stdin.flush()
+            reply: tuple[Any] | Failure = pickle.load(self._process.stdout)
+        except (EOFError, OSError, pickle.UnpicklingError):
+            code = self._process.wait()
+            if self._expired:
+                return Failure("timeout", f"took more than {timeout:g} s and was ended")
+            return Failure("crash", _how_it_ended(code))
+        finally:
+            if timer is not None:
+                timer.cancel()
+                timer.join()
+        return reply
+
+    def kill(self) -> None:
+        """End the process now."""
+        self._process.kill()
+
+    def end(self) -> None:
+        """Let an idle process go, and release what is held for it."""
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._process.kill()
+        self._process.wait()
+        self._process.stdout.close()
+        # Closing flushes what a dead process did not take, which fails, and closes all the same.
+        try:
+            self._process.stdin.close()
+        except OSError:
+            return
+
+    def _expire(self) -> None:
+        self._expired = True
+        self.kill()
+
+
+def serve() -> None:
+    """The child: answer tasks from standard input until it ends."""
+    replies = os.fdopen(os.dup(1), "wb")
+    _silence()
+    requests = sys.stdin.buffer
+    target = pickle.load(requests)
+    while True:
+        try:
+            task = pickle.load(requests)
+        except EOFError:
+            return
+        pickle.dump(_answer(target, task), replies)
+        replies.flush()
+
+
+def _answer(target: Callable[[Any], Any], task: Any) -> tuple[Any] | Failure:
+    try:
+        return (target(task),)
+    except Exception as error:  # the boundary of the process: nothing may pass it but a reply
+        import traceback
+
+        if traceback_wanted():
+            traceback.print_exc()
+        return Failure("defect", f"{type(error).__name__}: {error}")
+
+
+def _silence() -> None:
+    """Engines print to the C-level streams; standard output here carries pickles."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 1)
+    if not traceback_wanted():
+        os.dup2(nowhere, 2)
+    os.close(nowhere)
+
+
+def _how_it_ended(code: int) -> str:
+    if code < 0:
+        try:
+            return f"ended its process with {signal.Signals(-code).name}"
+        except ValueError:
+            return f"ended its process with signal {-code}"
+    return f"ended its process with exit code {code}"

@@ -1,0 +1,67 @@
+"""Ways whose answers are known, right or wrong, and a session of such ways."""
+
+from __future__ import annotations
+
+from dynx.bench.cases import OF_A_FRAME, Batch, Work
+from dynx.bench.implementations import Prepared, Role, Way
+from dynx.bench.roofline import Peak
+from dynx.bench.session import Plan, Session
+from dynx.errors import EngineError
+from dynx.model import Model
+from dynx.reference.backend import ReferenceBackend
+from dynx.spatial.scalar import Floats
+
+PEAK = Peak(threads=1, copy_bandwidth=10e9, multiply_adds=20e9)
+
+
+class Scaled(Way):
+    """The right answers times a factor; one sample of a batch, `spoilt`, gets a factor of its own."""
+
+    version = "reference"
+    threads = 1
+    whole = True
+
+    def __init__(
+        self, name: str, factor: float = 1.0, *, role: Role = "backend", spoilt: int | None = None
+    ) -> None:
+        self.name, self.role = name, role
+        self.closed = False
+        self.calls = 0
+        self._factor, self._spoilt = factor, spoilt
+
+    def prepare(self, work: Work, batch: Batch, out: Floats) -> Prepared:
+        arguments = list(batch.arguments(work.quantity))
+        frame = [batch.frame] if work.quantity in OF_A_FRAME else []
+        right = getattr(ReferenceBackend(batch.model), work.quantity)(*arguments, *frame)
+
+        def call() -> Floats:
+            self.calls += 1
+            out[...] = self._factor * right
+            if self._spoilt is not None:
+                out[self._spoilt] += 1e-6
+            return out
+
+        return Prepared(call)
+
+    def close(self) -> None:
+        self.closed = True
+
+
+class Silent(Scaled):
+    """Returns the array for the answers and writes none."""
+
+    def prepare(self, work: Work, batch: Batch, out: Floats) -> Prepared:
+        return Prepared(lambda: out)
+
+
+class Failing(Scaled):
+    """Cannot be made ready."""
+
+    def prepare(self, work: Work, batch: Batch, out: Floats) -> Prepared:
+        raise EngineError("no such luck")
+
+
+def session_of(ways: list[Way], model: Model, works: tuple[Work, ...], repetitions: int = 2) -> Session:
+    """A session of these ways on a machine whose peaks are known."""
+    plan = Plan(model, model.frame_names[-1], works, repetitions=repetitions)
+    return Session(plan, peak=lambda threads: PEAK, ways=lambda plan, threads: ways)

@@ -1,0 +1,48 @@
+"""Every backend as a way, on robots with mimic joints and with a floating base."""
+
+from __future__ import annotations
+
+import pytest
+
+import dynx
+from dynx.backends.registry import installed_backends
+from dynx.bench.backend_implementations import backend_way
+from dynx.bench.cases import ARGUMENTS, Work, draw_batch
+from dynx.bench.measurement import measure
+from dynx.errors import UnknownBackendError
+from dynx.model.model import Base
+
+
+@pytest.mark.parametrize("count", [1, 5])
+@pytest.mark.parametrize("name", installed_backends())
+@pytest.mark.parametrize("base", ["fixed", "floating"])
+def test_every_backend_answers_every_work(name: str, base: Base, count: int) -> None:
+    model = dynx.load("panda", base=base)
+    batch = draw_batch(model, "panda_hand", count)
+    way = backend_way(model, name, 1)
+    for quantity in ARGUMENTS:
+        (found,) = measure(Work(quantity, count), [way], batch, 1)
+        assert found.problem is None
+        assert found.times is not None
+
+
+def test_a_backend_with_threads_gets_them() -> None:
+    model = dynx.load("double_pendulum")
+    way = backend_way(model, "compiled", 2)
+    assert (way.name, way.threads, way.whole) == ("compiled", 2, True)
+    way = backend_way(model, "reference", 2)
+    assert (way.name, way.threads, way.whole) == ("reference", 1, False)
+
+
+def test_an_unknown_backend_is_refused() -> None:
+    with pytest.raises(UnknownBackendError):
+        backend_way(dynx.load("double_pendulum"), "nosuch", 1)
+
+
+def test_closing_closes_the_backend() -> None:
+    model = dynx.load("double_pendulum")
+    way = backend_way(model, "reference", 1)
+    way.close()
+    (found,) = measure(Work("mass_matrix", 1), [way], draw_batch(model, "tip", 1), 1)
+    assert found.problem is not None
+    assert "was closed" in found.problem

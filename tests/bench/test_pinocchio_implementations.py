@@ -1,0 +1,107 @@
+"""Pinocchio's own calls answer as the reference does, with mimic joints set free."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import dynx
+from dynx.bench.cases import ARGUMENTS, Work, draw_batch
+from dynx.bench.measurement import measure
+from dynx.bench.pinocchio_implementations import (
+    FEWEST_CALLS,
+    PinocchioBatch,
+    PinocchioInside,
+    PinocchioLoop,
+    pinocchio_ways,
+    without_mimics,
+)
+from dynx.model.model import Base
+
+ROBOTS: tuple[tuple[str, Base], ...] = (
+    ("pendulum", "fixed"),
+    ("ur5", "floating"),
+    ("panda", "fixed"),
+    ("panda", "floating"),
+)
+
+
+@pytest.mark.parametrize("count", [1, 5])
+@pytest.mark.parametrize(("robot", "base"), ROBOTS)
+def test_they_answer_rightly(robot: str, base: Base, count: int) -> None:
+    model = dynx.load(robot, base=base)
+    batch = draw_batch(model, model.frame_names[-1], count)
+    ways = list(pinocchio_ways(model, 2))
+    for quantity in ARGUMENTS:
+        for found in measure(Work(quantity, count, threads=2), ways, batch, 1):
+            assert found.problem is None
+            assert found.error is not None
+
+
+def test_the_batches_are_for_two_quantities_and_several_samples() -> None:
+    way = PinocchioBatch(dynx.load("pendulum"), 2)
+    done = {
+        (quantity, batch) for quantity in ARGUMENTS for batch in (1, 2) if way.does(Work(quantity, batch))
+    }
+    assert done == {("inverse_dynamics", 2), ("forward_dynamics", 2)}
+    assert way.threads == 2
+
+
+def test_the_batches_write_where_they_are_told() -> None:
+    model = dynx.load("panda")
+    way = PinocchioBatch(model, 1)
+    batch = way.samples(draw_batch(model, "panda_hand", 50))
+    out = np.full((50, way.model.nv), np.nan)
+    answers = way.prepare(Work("inverse_dynamics", 50), batch, out).call()
+    assert answers is out
+    assert np.isfinite(out).all()
+
+
+def test_mimic_joints_become_coordinates_at_the_same_state() -> None:
+    model = dynx.load("panda")
+    free = without_mimics(model)
+    assert (model.nv, free.nv) == (8, 9)
+    batch = draw_batch(model, "panda_hand", 6)
+    own = PinocchioLoop(model).samples(batch)
+    with dynx.backend("reference", model) as ours, dynx.backend("reference", free) as theirs:
+        for frame in ("panda_hand", "panda_rightfinger"):
+            np.testing.assert_array_equal(
+                ours.forward_kinematics(batch.q, frame), theirs.forward_kinematics(own.q, frame)
+            )
+        energy = theirs.kinetic_energy(own.q, own.v)
+        np.testing.assert_allclose(energy, ours.kinetic_energy(batch.q, batch.v), rtol=1e-14)
+    # The same work: tau v of both.
+    np.testing.assert_allclose(
+        np.sum(own.tau * own.v, axis=-1), np.sum(batch.tau * batch.v, axis=-1), rtol=1e-12, atol=1e-14
+    )
+
+
+def test_a_robot_without_them_stays_as_it_is() -> None:
+    model = dynx.load("ur5")
+    assert without_mimics(model) is model
+    batch = draw_batch(model, "tool0", 3)
+    assert PinocchioLoop(model).samples(batch) is batch
+
+
+@pytest.mark.parametrize("quantity", ARGUMENTS)
+def test_the_baseline_runs_on_a_model_of_one_joint(quantity: str) -> None:
+    model = dynx.load("pendulum")
+    way = PinocchioInside(model)
+    assert not way.does(Work(quantity, FEWEST_CALLS - 1))
+    work = Work(quantity, FEWEST_CALLS)
+    assert way.does(work)
+    (found,) = measure(work, [way], draw_batch(model, "tip", FEWEST_CALLS), 2)
+    # Of a robot with one joint nothing is left; what is left of others is not for a test to time.
+    assert found.error is not None
+    ready = way.prepare(work, draw_batch(model, "tip", 2), np.zeros((2, *answer_of(quantity))))
+    assert len(ready.calls) == 2
+
+
+def answer_of(quantity: str) -> tuple[int, ...]:
+    """The shape of the pendulum's answer."""
+    return {"forward_kinematics": (4, 4), "jacobian": (6, 1), "mass_matrix": (1, 1)}.get(quantity, (1,))
+
+
+def test_the_engine_is_named_with_its_version() -> None:
+    assert PinocchioLoop(dynx.load("pendulum")).version == f"pinocchio {pin.__version__}"

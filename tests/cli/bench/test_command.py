@@ -1,0 +1,197 @@
+"""`dynx bench`: table, document, exit codes, interruption. Nothing here depends on how long things take."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from io import StringIO
+from typing import Any
+
+import pytest
+from click.testing import CliRunner, Result
+from rich.console import Console
+
+import dynx
+from dynx.bench.cases import ARGUMENTS, Work
+from dynx.bench.implementations import Way
+from dynx.bench.report import document
+from dynx.bench.roofline import Peak
+from dynx.bench.session import BATCHES, QUICK_REPETITIONS, REPETITIONS
+from dynx.cli.bench.command import QUANTITIES
+from dynx.cli.bench.run import run_bench
+from dynx.cli.bench.tables import show
+from dynx.cli.shell.main import cli
+from tests.bench.implementations import Failing, Scaled, session_of
+
+QUICK = ["--quick", "--quantity", "inverse_dynamics", "--batch", "16", "--backends", "reference"]
+
+
+@pytest.fixture(autouse=True)
+def _known_machine(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The machine is not measured, which takes a second."""
+    peak = Peak(1, 10e9, 20e9)
+    monkeypatch.setattr(
+        "dynx.bench.session.Session.measure_machine", lambda self, n: self.peaks.update({n: peak})
+    )
+
+
+def bench(*arguments: str) -> Result:
+    return CliRunner().invoke(cli, ["bench", *arguments])
+
+
+def test_the_options_are_those_of_the_library() -> None:
+    assert tuple(ARGUMENTS) == QUANTITIES
+    text = " ".join(bench("--help").output.split())
+    one, few, many = BATCHES
+    assert f"(default: {one}, {few} and {many})" in text
+    assert f"{QUICK_REPETITIONS} repetitions instead of {REPETITIONS}" in text
+
+
+def test_a_table_for_each_work() -> None:
+    result = bench("double_pendulum", *QUICK, "--batch", "1")
+    assert result.exit_code == 0
+    assert result.stderr == ""
+    assert "2dof_planar, fixed base, nq 2, nv 2, frame link2, 5 repetitions" in result.stdout
+    assert "inverse dynamics, batch 16, 1 thread" in result.stdout
+    assert "inverse dynamics, one sample, 1 thread" in result.stdout
+    for name in ("reference", "pinocchio C++ batch", "pinocchio binding"):
+        assert name in result.stdout
+    assert "10 GB/s" in result.stdout
+    assert "40 GFLOP/s" in result.stdout
+
+
+def test_json_has_the_document_alone() -> None:
+    result = bench("double_pendulum", *QUICK, "--base", "fixed", "--seed", "7", "--threads", "1", "--json")
+    assert result.exit_code == 0
+    made: dict[str, Any] = json.loads(result.stdout)
+    assert (made["robot"], made["seed"], made["repetitions"]) == ("2dof_planar", 7, QUICK_REPETITIONS)
+    (work,) = made["results"]
+    assert (work["quantity"], work["batch"], work["threads"]) == ("inverse_dynamics", 16, 1)
+    assert [way["way"] for way in work["ways"]] == ["reference", "pinocchio C++ batch", "pinocchio binding"]
+    for way in work["ways"]:
+        assert way["error"] <= way["tolerance"]
+        assert way["ns"] > 0.0
+        assert set(way["ratios"]) == {"pinocchio C++ batch", "pinocchio binding"}
+    assert made["not_done"] == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "clue"),
+    [
+        (["nosuchrobot"], "nosuchrobot"),
+        (["double_pendulum", "--quantity", "speed"], "--quantity"),
+        (["double_pendulum", "--batch", "0"], "--batch"),
+        (["double_pendulum", "--batch", "many"], "--batch"),
+        (["double_pendulum", "--batch", str(10**11)], "GB"),
+        (["double_pendulum", "--threads", "0"], "--threads"),
+        (["double_pendulum", "--backends", "nosuch"], "nosuch"),
+        (["double_pendulum", "--frame", "nosuch"], "nosuch"),
+        (["double_pendulum", "--base", "flying"], "--base"),
+        (["double_pendulum", "--lock", "elbow"], "joint=value"),
+        (["double_pendulum", "extra"], "extra"),
+        ([], "ROBOT"),
+    ],
+)
+def test_arguments_that_cannot_be_used(arguments: list[str], clue: str) -> None:
+    result = bench(*arguments)
+    assert result.exit_code == 2
+    assert clue in result.stderr
+    assert result.stdout == ""
+    assert result.stderr.startswith("dynx: error: ")
+    assert result.stderr.count("\n") == 1
+
+
+def made_up(*ways: Way) -> tuple[int, str]:
+    """The exit code and the table of a session of these ways."""
+    model = dynx.load("double_pendulum")
+    with session_of([*ways], model, (Work("mass_matrix", 4),), repetitions=1) as session:
+        session.measure_machine(1)
+        code = run_bench(session, as_json=False)
+        out = StringIO()
+        found = [session.measure(work) for work in session.plan.works]
+        show(Console(file=out, width=10_000), document(session, found, "a processor"))
+    return code, out.getvalue()
+
+
+def test_a_wrong_answer_is_said_and_is_exit_code_1(capsys: pytest.CaptureFixture[str]) -> None:
+    code, table = made_up(Scaled("right"), Scaled("wrong", 1.5))
+    assert code == 1
+    err = capsys.readouterr().err
+    assert err.startswith("dynx: error: wrong, mass matrix: wrong answer, not timed: error ")
+    assert err.count("\n") == 1
+    assert "wrong: wrong answer, not timed" in table
+
+
+def test_an_engine_that_cannot_do_it_is_said_and_no_failure(capsys: pytest.CaptureFixture[str]) -> None:
+    code, table = made_up(Failing("one"), Scaled("right"), Failing("other"))
+    assert code == 0
+    assert capsys.readouterr().err == ""
+    assert "one, other: no such luck\n" in table
+
+
+def test_the_fastest_is_shown_first_and_what_was_not_timed_last() -> None:
+    model = dynx.load("double_pendulum")
+    work = Work("mass_matrix", 4)
+    with session_of([], model, (work,)) as session:
+        made = document(session, [], "a processor")
+    ways = [way("slow", 900.0), way("not timed", None), way("fast", 9.0)]
+    made["results"] = [{"quantity": "mass_matrix", "batch": 4, "threads": 1, "ways": ways}]
+    out = StringIO()
+    show(Console(file=out, width=10_000), made)
+    text = out.getvalue()
+    assert text.index(" fast ") < text.index(" slow ") < text.index(" not timed ")
+    assert "1 work not done" in text
+
+
+@pytest.mark.parametrize(("load", "said"), [(None, False), (0.2, False), (3.14, True)])
+def test_a_machine_that_was_busy_is_said(load: float | None, said: bool) -> None:
+    model = dynx.load("double_pendulum")
+    with session_of([], model, (Work("mass_matrix", 4),)) as session:
+        made = document(session, [], "a processor")
+    out = StringIO()
+    show(Console(file=out, width=10_000), {**made, "load": load})
+    assert ("load 3.1 before the run" in out.getvalue()) == said
+
+
+def way(name: str, ns: float | None) -> dict[str, Any]:
+    """The entry of a way."""
+    quartiles = None if ns is None else [ns, ns]
+    return {
+        "way": name,
+        "role": "backend",
+        "version": "",
+        "threads": 1,
+        "samples": 4,
+        "error": None,
+        "tolerance": None,
+        "problem": None,
+        "ns": ns,
+        "ns_quartiles": quartiles,
+        "ratios": {},
+        "roofline": None,
+    }
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no SIGINT to a child")
+def test_an_interrupted_run_shows_what_is_measured() -> None:
+    batches = [word for n in range(2, 400) for word in ("--batch", str(n))]
+    command = [sys.executable, "-m", "dynx", "bench", "double_pendulum", "--backends", "reference", "--json"]
+    for patience in (6.0, 24.0):
+        process = subprocess.Popen(
+            [*command, *batches], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
+        time.sleep(patience)
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=60.0)
+        assert process.returncode == 130
+        assert "Traceback" not in err
+        assert "not done" in err
+        made = json.loads(out)
+        assert len(made["results"]) + len(made["not_done"]) == 5 * 398
+        if made["results"]:
+            break
+    assert made["results"]
+    assert made["not_done"]

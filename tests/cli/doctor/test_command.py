@@ -1,0 +1,250 @@
+"""`dynx doctor` and `dynx agree --as-loaded` from end to end: real files, real engines, every output."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import pytest
+from click.testing import CliRunner, Result
+
+from dynx.agreement.tolerances import BAR
+from dynx.cli.doctor.mending import write_mended
+from dynx.cli.shell.main import cli
+from dynx.doctor.diagnosis import DEFAULT_SAMPLES, diagnose
+from dynx.errors import ArgumentError
+from tests.doctor.formats.test_sarif import require_valid
+
+QUICK = ["--engines", "pinocchio,pybullet", "--samples", "2", "--jobs", "1"]
+
+ARM = """<?xml version="1.0" encoding="ISO-8859-1"?>
+<robot name="arm">
+  <!-- für den Greifer -->
+  <link name="base"/>
+  <link name="tool">
+    <inertial>
+      <mass value="1.5"/>
+      <inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/>
+    </inertial>
+  </link>
+  <link name="camera"/>
+  <joint name="elbow" type="continuous">
+    <parent link="base"/>
+    <child link="tool"/>
+    <axis xyz="1 0 0"/>
+  </joint>
+  <joint name="mount" type="fixed">
+    <parent link="tool"/>
+    <child link="camera"/>
+    <origin xyz="0 0 0.5"/>
+  </joint>
+</robot>
+"""
+"""The camera weighs 1 kg in PyBullet and nothing in Pinocchio."""
+
+SOUND = ARM.replace('<link name="camera"/>', "").replace(ARM[ARM.index('  <joint name="mount"') : -9], "")
+
+
+def doctor(*arguments: str) -> Result:
+    """Run ``dynx doctor`` with two engines."""
+    return CliRunner().invoke(cli, ["doctor", *arguments, *QUICK])
+
+
+@pytest.fixture
+def arm(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A file on which PyBullet and Pinocchio differ, in the working directory."""
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "arm.urdf"
+    path.write_bytes(ARM.encode("latin-1"))
+    return path
+
+
+def test_a_difference_is_named_mended_and_gone(arm: Path, tmp_path: Path) -> None:
+    files = {key: str(tmp_path / f"out.{key}") for key in ("json", "html", "junit", "sarif")}
+    options = [word for key, path in files.items() for word in (f"--{key}", path)]
+    result = doctor("arm.urdf", "--fix", "mended.urdf", *options)
+    assert result.exit_code == 1, result.stderr
+    assert "DX101 link-without-inertial" in result.stdout
+    assert "link camera" in result.stdout
+    assert "p.loadURDF(path" in result.stdout
+    assert "mended: mended.urdf" in result.stdout
+
+    [entry] = json.loads(Path(files["json"]).read_text())["results"]
+    assert (entry["robot"], entry["base"], entry["explained"]) == ("arm.urdf", "fixed", True)
+    found = [each for each in entry["findings"] if each["link"] == "camera" and each["rule"] == "DX101"]
+    assert found[0]["line"] == ARM[: ARM.index('<link name="camera"')].count("\n") + 1
+    assert found[0]["proved"] is True
+    assert "DX101" in Path(files["html"]).read_text()
+    assert ElementTree.parse(files["junit"]).getroot().get("failures") != "0"
+    require_valid(json.loads(Path(files["sarif"]).read_text()))
+
+    mended = (tmp_path / "mended.urdf").read_bytes()
+    assert "für den Greifer".encode("latin-1") in mended
+    assert arm.read_bytes() == ARM.encode("latin-1")
+    again = doctor("mended.urdf")
+    assert again.exit_code == 0, again.stdout
+    assert "all engines load it alike" in again.stdout
+
+
+def test_a_baseline_accepts_what_is_known_and_nothing_else(arm: Path) -> None:
+    assert doctor("arm.urdf", "--write-baseline", "known.json", "--quiet").exit_code == 0
+    # The same finding on another line is the same finding.
+    arm.write_bytes(ARM.replace("<robot", "\n\n<robot").encode("latin-1"))
+    known = doctor("arm.urdf", "--baseline", "known.json")
+    assert known.exit_code == 0
+    assert "0 new, 0 gone" in known.stdout
+    arm.write_bytes(ARM.replace('"camera"', '"kamera"').encode("latin-1"))
+    other = doctor("arm.urdf", "--baseline", "known.json")
+    assert other.exit_code == 1
+    assert "new: DX101 link 'kamera'" in other.stdout
+    assert "gone: DX101 link 'camera'" in other.stdout
+
+
+def test_files_are_mended_in_place_only_when_asked(arm: Path) -> None:
+    assert doctor("arm.urdf", "--fix", "./arm.urdf").exit_code == 2
+    assert arm.read_bytes() == ARM.encode("latin-1")
+    arm.chmod(0o640)
+    assert doctor("arm.urdf", "--in-place", "--quiet").exit_code == 1
+    assert arm.read_bytes() != ARM.encode("latin-1")
+    assert arm.stat().st_mode & 0o777 == 0o640
+    mended = arm.read_bytes()
+    assert doctor("arm.urdf", "--in-place", "--quiet").exit_code == 0
+    assert arm.read_bytes() == mended
+
+
+def test_several_robots_and_bases(arm: Path, tmp_path: Path) -> None:
+    (tmp_path / "robots" / "deep").mkdir(parents=True)
+    (tmp_path / "robots" / "deep" / "sound.urdf").write_text(SOUND, encoding="latin-1")
+    (tmp_path / "robots" / "bad.urdf").write_text("no XML")
+    arm.rename(tmp_path / "robots" / "arm.urdf")
+    result = doctor("robots", "nosuch", "--json", "-", "--html", "all.html", "--fix", "mended")
+    assert result.exit_code == 2
+    made: dict[str, Any] = json.loads(result.stdout)
+    assert [each["robot"] for each in made["results"]] == [
+        "robots/arm.urdf", "robots/bad.urdf", "robots/deep/sound.urdf", "nosuch",
+    ]  # fmt: skip
+    assert made["summary"] == {
+        "robots": 4, "alike": 1, "explained": 1, "unexplained": 0, "refused": 2, "not_done": 0,
+    }  # fmt: skip
+    assert "4 robots: 1 alike, 1 explained, 0 unexplained, 2 refused" in result.stderr
+    written = {str(path.relative_to(tmp_path / "mended")) for path in (tmp_path / "mended").rglob("*.urdf")}
+    assert written == {"arm.urdf", os.path.join("deep", "sound.urdf")}
+    copied = (tmp_path / "mended" / "deep" / "sound.urdf").read_bytes()
+    assert copied == SOUND.encode("latin-1")
+    both = doctor("robots/arm.urdf", "--base", "both", "--json", "-")
+    assert [each["base"] for each in json.loads(both.stdout)["results"]] == ["fixed", "floating"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "clue"),
+    [
+        (["--engines", "bulet"], "pybullet"),
+        (["--choose", "DX101"], "rule=choice"),
+        (["--choose", "DX000=keep"], "DX000"),
+        (["--choose", "DX103=nosuch"], "nosuch"),
+        (["--choose", "DX105=keep"], "leaves no choice"),
+        (["--base", "both", "--fix", "x.urdf"], "--base fixed or"),
+        (["--in-place", "--fix", "x.urdf"], "exclude"),
+        (["--baseline", "none.json"], "none.json"),
+        (["--baseline", "arm.urdf"], "arm.urdf"),
+        (["--json", "x", "--html", "x"], "two formats"),
+        (["--sarif", "nosuch/x.sarif"], "nosuch"),
+        (["--tolerance", "-1"], "--tolerance"),
+        (["panda", "--fix", "arm.urdf"], "arm.urdf"),
+        (["--json", "arm.urdf"], "a robot that is read"),
+        (["--write-baseline", "./arm.urdf"], "a robot that is read"),
+        (["--fix", "x.urdf", "--html", "./x.urdf"], "where a mended file goes"),
+    ],
+)
+def test_arguments_that_cannot_be_used_cost_no_work(arguments: list[str], clue: str, arm: Path) -> None:
+    result = CliRunner().invoke(cli, ["doctor", "arm.urdf", *arguments])
+    assert result.exit_code == 2
+    assert clue in result.stderr
+    assert result.stderr.count("\n") == 1
+    assert sorted(os.listdir()) == ["arm.urdf"]
+
+
+def test_a_baseline_is_written_over_by_a_baseline_alone(arm: Path) -> None:
+    known = ["arm.urdf", "--baseline", "known.json", "--quiet"]
+    assert doctor("arm.urdf", "--write-baseline", "known.json", "--quiet").exit_code == 0
+    assert doctor(*known, "--write-baseline", "known.json").exit_code == 0
+    refused = doctor(*known, "--json", "known.json")
+    assert refused.exit_code == 2
+    assert "the baseline" in refused.stderr
+    assert doctor(*known).exit_code == 0
+
+
+def test_as_loaded_is_not_written_over_what_is_read(arm: Path) -> None:
+    for way in ([], ["--as-loaded"]):
+        result = CliRunner().invoke(cli, ["agree", "arm.urdf", *way, "--json", "arm.urdf"])
+        assert result.exit_code == 2
+        assert "a robot that is read" in result.stderr
+    assert arm.read_bytes() == ARM.encode("latin-1")
+
+
+def test_what_is_write_protected_is_not_mended_in_place(arm: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    # A new file could be put in its place, for which the permissions of the directory suffice.
+    monkeypatch.setattr(os, "access", lambda path, mode: mode != os.W_OK or Path(path).name != "arm.urdf")
+    result = doctor("arm.urdf", "--in-place", "--quiet")
+    assert result.exit_code == 2
+    assert "permission denied" in result.stderr
+    assert arm.read_bytes() == ARM.encode("latin-1")
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
+def test_a_pipe_that_nobody_reads_is_not_waited_for(arm: Path) -> None:
+    os.mkfifo("pipe")
+    result = doctor("arm.urdf", "--fix", "pipe", "--quiet")
+    assert result.exit_code == 2
+    assert "nobody reads from this pipe" in result.stderr
+
+
+def test_a_file_that_changed_meanwhile_is_left_as_it_is(arm: Path) -> None:
+    report = diagnose(str(arm), engines=["pinocchio", "pybullet"], samples=2)
+    newer = arm.read_bytes().replace(b"0.5", b"0.6")
+    arm.write_bytes(newer)
+    with pytest.raises(ArgumentError, match="changed while it was examined"):
+        write_mended(str(arm), report, over_input=True)
+    assert arm.read_bytes() == newer
+
+
+def test_the_help_states_the_defaults_of_the_library() -> None:
+    text = " ".join(CliRunner().invoke(cli, ["doctor", "--help"]).stdout.split())
+    assert f"Random states per robot (default: {DEFAULT_SAMPLES})" in text
+    assert f"[default: {BAR:g};" in text
+
+
+def test_in_place_never_touches_the_library(arm: Path) -> None:
+    result = CliRunner().invoke(cli, ["doctor", "ur5", "--in-place"])
+    assert result.exit_code == 2
+    assert "--in-place needs files" in result.stderr
+
+
+def test_as_loaded_prints_calls_errors_and_the_vote(arm: Path) -> None:
+    options = ["--backends", "pinocchio,pybullet", "--samples", "2", "--json", "x.json"]
+    result = CliRunner().invoke(cli, ["agree", "arm.urdf", "--as-loaded", *options])
+    assert result.exit_code == 1, result.output
+    for words in (
+        "pinocchio.buildModelFromUrdf(",
+        "p.loadURDF(path",
+        "mass matrix",
+        "pybullet is off by up to",
+    ):
+        assert words in result.stdout
+    assert "pinocchio has the answer that follows from the file" in result.stdout
+    assert "dynx doctor arm.urdf" in result.stdout
+    [entry] = json.loads(Path("x.json").read_text())["results"]
+    assert [each for each in entry["findings"] if each["effect"]] == []
+    assert {tuple(pair["engines"]) for pair in entry["pairs"]} == {("pinocchio", "pybullet")}
+    several = CliRunner().invoke(cli, ["agree", "arm.urdf", "nosuch", "--as-loaded", *options[:4]])
+    assert several.exit_code == 2
+    assert "1 differ, 1 refused" in several.stdout
+
+
+def test_as_loaded_takes_no_lock(arm: Path) -> None:
+    result = CliRunner().invoke(cli, ["agree", "arm.urdf", "--as-loaded", "--lock", "elbow=1"])
+    assert result.exit_code == 2
+    assert "--lock" in result.stderr

@@ -1,0 +1,289 @@
+"""The tables, the conclusion and the files of `dynx doctor`, from reports made by hand."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Sequence
+from dataclasses import replace
+from io import StringIO
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from rich.console import Console
+
+from dynx.cli.doctor.as_loaded import vote_lines
+from dynx.cli.doctor.conclusion import Conclusion
+from dynx.cli.doctor.mending import planned_targets, write_mended
+from dynx.cli.doctor.outputs import Outputs, save_counterexamples
+from dynx.cli.doctor.tables import show_many, show_one
+from dynx.cli.doctor.task import DoctorTask, doctor_run, examine, missing_engines
+from dynx.cli.shell.run import carry_out
+from dynx.doctor.formats import read_baseline
+from dynx.doctor.formats.baseline import Baseline
+from dynx.doctor.formats.vote import vote
+from dynx.doctor.report import DoctorReport, EngineResult, PairError
+from dynx.errors import ArgumentError, NotInstalledError
+from dynx.model.expansion import RobotInput
+from dynx.model.loading import load
+from tests.doctor.formats.reports import HOSTILE, MENDED, SMALL, TEXT, alike, differing, hostile, refused
+from tests.workers.targets import interrupt_at_a_pipe
+
+
+def concluded(
+    reports: Sequence[DoctorReport],
+    folder: Path,
+    baseline: Baseline | None = None,
+    *,
+    targets: Sequence[str | None] = (),
+    outputs: Outputs | None = None,
+    left: int = 0,
+    engines: Sequence[str] | None = ("pinocchio",),
+) -> int:
+    """The exit code of a run that gave these reports, and `left` robots without one."""
+    names = [report.robot for report in reports] + ["later"] * left
+    run = doctor_run([DoctorTask(name, "fixed") for name in names])
+    for number, report in enumerate(reports):
+        run.record(number, report)
+    files = [*targets, *[None] * (len(names) - len(targets))]
+    conclusion = Conclusion(run, outputs or Outputs(), baseline, files, False, str(folder), engines)
+    return conclusion.reach(quiet=False)
+
+
+@pytest.mark.parametrize(
+    ("reports", "code"),
+    [
+        ([alike()], 0),
+        ([differing()], 1),
+        ([alike(), differing()], 1),
+        ([differing(), refused()], 2),
+        ([], 0),
+    ],
+    ids=["alike", "differ", "one differs", "one refused", "none"],
+)
+def test_the_exit_code_is_that_of_the_worst(reports: list[DoctorReport], code: int, tmp_path: Path) -> None:
+    assert concluded(reports, tmp_path) == code
+
+
+def test_a_baseline_just_written_knows_everything(tmp_path: Path) -> None:
+    path = tmp_path / "known.json"
+    assert concluded([differing()], tmp_path, outputs=Outputs(baseline=str(path))) == 0
+    known = read_baseline(path.read_text(), str(path))
+    assert concluded([differing()], tmp_path, known) == 0
+    assert concluded([differing(link="another")], tmp_path, known) == 1
+
+
+def test_the_document_names_what_was_not_done(tmp_path: Path) -> None:
+    path = tmp_path / "x.json"
+    concluded([alike()], tmp_path, outputs=Outputs(json=str(path)), left=2)
+    document = json.loads(path.read_text())
+    assert document["summary"]["not_done"] == 2
+    assert document["not_done"] == ["later", "later"]
+
+
+def test_a_counterexample_is_a_file_that_loads(tmp_path: Path) -> None:
+    folder = tmp_path / "new"
+    saved = save_counterexamples(str(folder), differing())
+    [path] = {Path(file) for file in saved.values()}
+    assert path.parent == folder
+    assert load(path).frame_names == load(SMALL).frame_names
+    assert "q = [0.5]" in path.read_text()
+
+
+def test_a_folder_that_cannot_be_made_is_said_and_the_rest_is_done(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").write_text("")
+    assert concluded([differing()], tmp_path / "file" / "folder") == 2
+    found = capsys.readouterr()
+    assert "DX901" in found.out
+    assert "cannot be made" in found.err
+
+
+@given(st.text())
+def test_a_counterexample_stays_in_its_folder(name: str) -> None:
+    from tempfile import TemporaryDirectory
+
+    with TemporaryDirectory() as folder:
+        saved = save_counterexamples(folder, differing(name))
+        assert [Path(file).parent for file in saved.values()] == [Path(folder)]
+
+
+def shown(report: DoctorReport, width: int = 80) -> str:
+    """The report of one robot on a terminal of that width."""
+    out = StringIO()
+    show_one(Console(file=out, width=width, soft_wrap=True, markup=False, emoji=False), report, {}, None)
+    return out.getvalue()
+
+
+def test_one_robot_is_told_in_the_order_of_importance() -> None:
+    text = shown(differing())
+    order = [
+        *(
+            "1 difference without an explanation",
+            "p.loadURDF(path",
+            "refuses the file: inertia must be positive",
+        ),
+        *("1.9e+01 -> 4.0e-16", "DX901 planted-cause", "2 places in pybullet, mujoco"),
+        *(
+            "line 5, link tool: no mass matrix",
+            "line 3, link base: 1900 %",
+            "DX902 planted-rounding",
+            "(rounding)",
+        ),
+        *("bad practice", "DX903", "--choose DX901=keep", "p.changeDynamics(robot, link)"),
+        *("worst at joint elbow", "q = [0.5]", "--fix OUT.urdf"),
+    ]
+    places = [text.find(words) for words in order]
+    assert -1 not in places
+    assert places == sorted(places)
+
+
+def test_lines_fit_80_columns() -> None:
+    assert max(map(len, shown(differing()).splitlines())) <= 80
+
+
+@pytest.mark.parametrize(
+    "report", [hostile(), alike(), refused(HOSTILE)], ids=["differs", "alike", "refused"]
+)
+def test_names_cannot_write_on_the_terminal(report: DoctorReport) -> None:
+    out = StringIO()
+    show_many(Console(file=out, width=200, markup=False), [report])
+    for text in (shown(report), out.getvalue()):
+        assert all(c.isprintable() or c == "\n" for c in text)
+        assert "x" * 1000 not in text
+
+
+def test_a_library_robot_and_an_unknown_one_are_told_apart_in_the_worker() -> None:
+    report = examine(DoctorTask("nosuch", "fixed", ("pinocchio",)))
+    assert report.error is not None
+    assert report.error.type == "RobotNotFoundError"
+    assert report.robot == "nosuch"
+
+
+def test_a_missing_engine_is_a_line_that_says_what_to_install(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def absent(name: str) -> None:
+        raise NotInstalledError(f"the engine {name!r} needs a package: pip install 'dynx[{name}]'")
+
+    monkeypatch.setattr("dynx.loaded.registry.loader_class", absent)
+    assert [line.split("'")[1] for line in missing_engines([differing(), alike()])] == ["drake"]
+    assert missing_engines([refused()]) == []
+    concluded([differing()], tmp_path, engines=None)
+    assert "note: the engine 'drake' needs a package: pip install 'dynx[drake]'" in capsys.readouterr().out
+    concluded([differing()], tmp_path, engines=("pinocchio", "pybullet", "mujoco"))
+    assert "drake" not in capsys.readouterr().out
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no FIFO, and no SIGINT to another process")
+def test_an_interrupted_run_writes_what_is_done(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pipe = str(tmp_path / "second.fifo")
+    os.mkfifo(pipe)
+    run = doctor_run([DoctorTask(name, "fixed") for name in ("arm", pipe, "third")], interrupt_at_a_pipe)
+    record = run.record
+
+    def record_and_tell(index: int, result: DoctorReport) -> None:
+        record(index, result)
+        Path(pipe).write_text("the first is recorded")
+
+    monkeypatch.setattr(run, "record", record_and_tell)
+    outputs = Outputs(json=str(tmp_path / "x.json"))
+    conclusion = Conclusion(run, outputs, None, [None] * 3, False, str(tmp_path), None)
+    assert carry_out(run, 1, 0.0, True, lambda: conclusion.reach(quiet=True)) == 130
+    document = json.loads((tmp_path / "x.json").read_text())
+    assert [each["robot"] for each in document["results"]] == ["arm"]
+    assert document["not_done"] == [pipe, "third"]
+    assert "2 of 3 robots not done" in capsys.readouterr().err
+
+
+# -- where mended files go ----------------------------------------------------------------------
+
+
+def planned(out: str, *robots: RobotInput) -> list[str | None]:
+    """The files for these inputs."""
+    return planned_targets(robots, out, in_place=False, bases=1)
+
+
+def test_one_robot_goes_to_a_file_and_several_to_a_folder(tmp_path: Path) -> None:
+    out = str(tmp_path / "out")
+    assert planned(f"{out}.urdf", RobotInput("ur5")) == [f"{out}.urdf"]
+    assert planned(str(tmp_path), RobotInput("ur5")) == [str(tmp_path / "ur5.urdf")]
+    several = planned(
+        out, RobotInput("ur5"), RobotInput("x/arm.urdf.xacro"), RobotInput("d/e/f.urdf", folder="d")
+    )
+    assert several == [f"{out}/ur5.urdf", f"{out}/arm.urdf", f"{out}/e/f.urdf"]
+
+
+def test_no_two_robots_share_a_file_and_none_is_its_input(tmp_path: Path) -> None:
+    with pytest.raises(ArgumentError, match="both"):
+        planned(str(tmp_path / "out"), RobotInput("a/arm.urdf"), RobotInput("b/arm.urdf"))
+    path = tmp_path / "arm.urdf"
+    path.write_text(TEXT)
+    for out in (str(path), f"{tmp_path}/./arm.urdf", str(tmp_path)):
+        with pytest.raises(ArgumentError, match="in-place"):
+            planned(out, RobotInput(str(path)))
+    with pytest.raises(ArgumentError, match="directory"):
+        planned(str(path), RobotInput("a"), RobotInput("b"))
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "ISO-8859-1", "UTF-16", "cp1252", "Shift_JIS"])
+def test_the_declared_encoding_is_kept(encoding: str, tmp_path: Path) -> None:
+    text = MENDED.replace('version="1.0"', f'version="1.0" encoding="{encoding}"').replace(
+        "<!-- the tool", "<!-- \u00e9 \u30ed the tool"
+    )
+    path = tmp_path / "out.urdf"
+    assert write_mended(str(path), replace(differing(), mended=text), over_input=False)
+    kept = path.read_bytes().decode(encoding)
+    assert kept.replace("&#233;", "\u00e9").replace("&#12525;", "\u30ed") == text
+    assert not [each for each in tmp_path.iterdir() if each != path]
+
+
+def test_nothing_to_mend_is_a_copy_and_in_place_nothing(tmp_path: Path) -> None:
+    path = tmp_path / "out.urdf"
+    assert not write_mended(str(path), alike(), over_input=True)
+    assert not write_mended(str(path), refused(), over_input=False)
+    assert not path.exists()
+    assert write_mended(str(path), alike(), over_input=False)
+    assert path.read_text() == TEXT
+
+
+# -- the vote -----------------------------------------------------------------------------------
+
+
+def voters(*errors: float) -> DoctorReport:
+    """Engines a, b, c, ... that far from the file; any two differ by the difference of their errors."""
+    names = [chr(ord("a") + k) for k in range(len(errors))]
+    distance = dict(zip(names, errors, strict=True))
+    pairs = [
+        PairError((one, two), "mass matrix", abs(distance[one] - distance[two]))
+        for k, one in enumerate(names)
+        for two in names[k + 1 :]
+    ]
+    engines = [EngineResult(name, "1", "load", before={"mass matrix": distance[name]}) for name in names]
+    return DoctorReport("r", engines=tuple(engines), pairs=tuple(pairs), tolerance=1e-12)
+
+
+def test_who_stands_alone_and_who_is_right() -> None:
+    found = vote(voters(0.0, 0.5, 0.0, 1e-16))
+    assert found.groups == (("a", "c", "d"), ("b",))
+    assert found.alone == ("b",)
+    assert found.right == ("a", "c", "d")
+    assert vote(voters(0.5, 0.5, 0.0)).right == ("c",)  # the majority may be wrong
+    assert vote(voters(0.0, 0.0)).alone == ()
+    said = vote_lines(voters(0.5, 0.5, 0.0), vote(voters(0.5, 0.5, 0.0)))
+    assert "a and b agree with each other" in said
+    assert "c has the answer that follows from the file itself" in said
+    assert vote_lines(DoctorReport("r"), vote(DoctorReport("r"))) == ["no engine loads the file"]
+
+
+@given(st.lists(st.sampled_from([0.0, 1e-15, 0.25, 0.5, float("inf"), float("nan")]), max_size=5))
+def test_every_engine_is_in_one_group(errors: list[float]) -> None:
+    report = voters(*errors)
+    found = vote(report)
+    assert sorted(name for group in found.groups for name in group) == [e.engine for e in report.engines]
+    assert set(found.right) == {e.engine for e in report.engines if e.before["mass matrix"] <= 1e-12}

@@ -1,0 +1,219 @@
+"""`dynx info`, `robots`, `backends`, `fk`, `jacobian`, `id`, `fd`, `mass`, `ik`: documents and refusals."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dynx.backends import backend
+from dynx.cli.shell.configuration_input import default_frame
+from dynx.cli.shell.main import cli
+from dynx.cli.shell.options import number_list
+from dynx.cli.shell.terminal import counted
+from dynx.model.loading import load
+
+Q = [0.1, -1.5, 1.4, 0.2, 0.3, -0.4]
+Q_TEXT = ",".join(map(repr, Q))
+
+
+def answer(*arguments: str) -> dict[str, Any]:
+    """The JSON that a command writes."""
+    result = CliRunner().invoke(cli, [*arguments, "--json"])
+    assert result.exit_code == 0, result.stderr
+    found: dict[str, Any] = json.loads(result.stdout)
+    return found
+
+
+@given(st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=1))
+def test_a_list_of_numbers_is_read_exactly(numbers: list[float]) -> None:
+    assert number_list(",".join(map(repr, numbers))) == numbers
+    assert number_list(" ".join(map(repr, numbers))) == numbers
+
+
+def test_info() -> None:
+    found = answer("info", "ur5")
+    model = load("ur5")
+    assert found["name"] == model.name
+    assert found["base"] == "fixed"
+    assert (found["nq"], found["nv"]) == (6, 6)
+    assert tuple(found["joint_names"]) == model.joint_names
+    assert tuple(found["frame_names"]) == model.frame_names
+    assert found["total_mass"] == model.total_mass
+    assert found["notes"] == []
+    assert len(found["joints"]) == len(model.joints)
+
+
+def test_info_of_a_floating_robot_with_a_locked_joint() -> None:
+    found = answer("info", "ur5", "--base", "floating", "--lock", "elbow_joint=0.5")
+    assert (found["nq"], found["nv"]) == (12, 11)
+    assert [j["locked_at"] for j in found["joints"] if j["name"] == "elbow_joint"] == [0.5]
+
+
+@pytest.mark.parametrize("robot", ["panda", "talos"])
+def test_the_tree_shows_every_link(robot: str) -> None:
+    shown = CliRunner().invoke(cli, ["info", robot])
+    assert shown.exit_code == 0
+    assert all(link.name in shown.stdout for link in load(robot).links)
+
+
+def test_robots_are_all_listed() -> None:
+    names = {entry["name"]: entry for entry in answer("robots")["robots"]}
+    assert {"ur5", "panda", "talos", "xarm7", "z1"} <= set(names)
+    assert set(names["ur5"]) == {"name", "aliases", "source", "path"}
+
+
+def test_backends() -> None:
+    found = {entry["name"]: entry for entry in answer("backends")["backends"]}
+    assert found["reference"]["installed"] is True
+
+
+def test_id_is_the_backends() -> None:
+    v, a = [0.1] * 6, [0.2] * 6
+    vectors = ["--v", ",".join(map(repr, v)), "--a", ",".join(map(repr, a))]
+    found = answer("id", "ur5", "--q", Q_TEXT, *vectors, "--backend", "reference")
+    assert found["tau"] == backend("reference", load("ur5")).inverse_dynamics(Q, v, a).tolist()
+
+
+def test_fd_is_the_backends() -> None:
+    found = answer("fd", "ur5", "--q", Q_TEXT, "--tau", "shoulder_lift_joint=10", "--backend", "reference")
+    tau = [0.0, 10.0, 0.0, 0.0, 0.0, 0.0]
+    assert found["tau"] == tau
+    assert found["a"] == backend("reference", load("ur5")).forward_dynamics(Q, np.zeros(6), tau).tolist()
+
+
+def test_fk_jacobian_and_mass_are_the_backends() -> None:
+    engine = backend("reference", load("ur5"))
+    frame = default_frame(engine.model)
+    options = ["ur5", "--q", Q_TEXT, "--backend", "reference"]
+    assert frame == "tool0"
+    assert answer("fk", *options)["T_world_frame"] == engine.forward_kinematics(Q, frame).tolist()
+    assert answer("jacobian", *options)["jacobian"] == engine.jacobian(Q, frame).tolist()
+    assert answer("mass", *options)["mass_matrix"] == engine.mass_matrix(Q).tolist()
+
+
+def test_joints_by_name() -> None:
+    found = answer("fk", "ur5", "--q", "elbow_joint=0.5", "--backend", "reference")
+    assert found["q"] == [0.0, 0.0, 0.5, 0.0, 0.0, 0.0]
+
+
+def test_ik_reaches_what_fk_gave_and_says_when_it_does_not() -> None:
+    options = ["--frame", "tool0", "--backend", "reference"]
+    T = np.array(answer("fk", "ur5", "--q", Q_TEXT, *options)["T_world_frame"])
+    found = answer("ik", "ur5", "--target", ",".join(map(repr, T.ravel().tolist())), *options)
+    assert found["success"] is True
+    assert len(found["q"]) == 6
+    far = CliRunner().invoke(cli, ["ik", "asr_twodof", "--target", "99,0,0", "--backend", "reference"])
+    assert far.exit_code == 1
+    assert "not reached" in far.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "clue"),
+    [
+        (["id", "ur5", "--q", "1,2"], "--q has 2 numbers; ur5 needs 6: shoulder_pan_joint, "),
+        (["id", "ur5", "--v", "1"], "--v has 1 number; ur5 needs 6: shoulder_pan_joint, "),
+        (["id", "ur5", "--a", "1,2,3,4,5,6,7"], "--a has 7 numbers; ur5 needs 6: "),
+        (
+            ["fd", "talos", "--base", "floating", "--tau", "1"],
+            "--tau has 1 number; talos needs 38: base vx, ",
+        ),
+        (["fk", "talos", "--base", "floating", "--q", "1"], "--q has 1 number; talos needs 39: x, y, z, qx"),
+        (["ik", "ur5", "--target", "0,0,0", "--q", "0,0,0"], "--q has 3 numbers; ur5 needs 6"),
+        (["ik", "ur5", "--target", "0,0,0", "--q", "1e80,0,0,0,0,0"], "--q[0]"),
+        (["fk", "panda", "--q", "panda_finger_joint2=0.01"], "it follows 'panda_finger_joint1'"),
+        (["id", "ur5", "--lock", "elbow_joint=1", "--v", "elbow_joint=1"], "it is locked"),
+        (["id", "ur5", "--q", "0,nan,0,0,0,0"], "finite"),
+        (["id", "ur5", "--q", "0,one,0,0,0,0"], "'one'"),
+        (["id", "ur5", "--q", "elbow_joint=1,elbo=2"], "elbow_joint"),
+        (["id", "ur5", "--backend", "nosuch"], "nosuch"),
+        (["fk", "ur5", "--frame", "tool"], "tool0"),
+        (["fk", "ur5", "--base", "floating", "--q", ",".join("0" * 13)], "quaternion"),
+        (["ik", "ur5"], "--target"),
+        (["ik", "ur5", "--target", "1,2"], "3 numbers"),
+        (["ik", "ur5", "--target", "0,0,0,0,0,0,2"], "quaternion"),
+        (["info", "ur"], "did you mean"),
+        (["info", "/"], "directory"),
+    ],
+)
+def test_what_cannot_be_used_is_said_in_one_line(arguments: list[str], clue: str) -> None:
+    result = CliRunner().invoke(cli, arguments)
+    assert result.exit_code == 2
+    assert clue in result.stderr
+    assert result.stderr.count("\n") == 1
+    assert result.stdout == ""
+
+
+def test_a_position_has_no_rotation_error() -> None:
+    options = ["ur5", "--target", "0.4,0.2,0.3", "--backend", "reference"]
+    assert answer("ik", *options)["rotation_error"] is None
+    assert " rad" not in CliRunner().invoke(cli, ["ik", *options]).stdout
+    posed = answer("ik", "ur5", "--target", "0.4,0.2,0.3,0,0,0", "--backend", "reference")
+    assert 0.0 <= posed["rotation_error"] < 1e-6
+
+
+def test_what_was_counted_is_singular_or_plural() -> None:
+    assert [counted(count, "restart") for count in (0, 1, 2)] == ["0 restarts", "1 restart", "2 restarts"]
+
+
+@pytest.mark.parametrize("command", [["fk"], ["jacobian"], ["ik", "--target", "0.4,0.2,0.3"]])
+def test_the_frame_that_was_taken_by_default_is_said(command: list[str]) -> None:
+    arguments = [command[0], "ur5", *command[1:], "--backend", "reference"]
+    assert "tool0 ends" in CliRunner().invoke(cli, arguments).stdout
+    assert "--frame chooses" in CliRunner().invoke(cli, arguments).stdout
+    assert "--frame chooses" not in CliRunner().invoke(cli, [*arguments, "--frame", "tool0"]).stdout
+
+
+@pytest.mark.parametrize("width", [40, 60, 80, 120, None])
+@pytest.mark.parametrize("command", ["mass", "jacobian"])
+def test_a_wide_matrix_is_shown_whole(
+    command: str, width: int | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    arguments = [
+        command,
+        "talos",
+        "--base",
+        "floating",
+        "--backend",
+        "reference",
+        "--q",
+        "arm_left_4_joint=-1",
+    ]
+    found = answer(*arguments)
+    matrix = found["mass_matrix" if command == "mass" else "jacobian"]
+    if width is not None:
+        monkeypatch.setenv("COLUMNS", str(width))
+    lines = CliRunner().invoke(cli, arguments).stdout.splitlines()
+    names = found["velocity_names"]
+    rows = (
+        names if command == "mass" else [f"{kind} {axis}" for kind in ("linear", "angular") for axis in "xyz"]
+    )
+    for name, numbers in zip(rows, matrix, strict=True):
+        # The legend of the columns numbers the names, so no line of it starts with one.
+        shown = [line.removeprefix(f" {name} ").split() for line in lines if line.startswith(f" {name} ")]
+        assert [cell for part in shown for cell in part] == [f"{number + 0.0:.5g}" for number in numbers]
+    legend = " ".join(line.strip() for line in lines[lines.index("") :])
+    assert all(f"{k} {name}" in legend for k, name in enumerate(names))
+    if width is not None and width >= 60:
+        assert max(len(line) for line in lines[2:]) <= width
+
+
+@pytest.mark.parametrize(
+    "arguments", [["robots"], ["backends"], ["info", "panda"], ["mass", "ur5"], ["id", "ur5"], ["fk", "ur5"]]
+)
+def test_piped_lines_have_no_trailing_blanks(arguments: list[str]) -> None:
+    lines = CliRunner().invoke(cli, arguments).stdout.split("\n")
+    assert lines[0] != ""
+    assert [line for line in lines if line != line.rstrip()] == []
+
+
+@pytest.mark.parametrize("width", ["40", "60"])
+def test_no_name_of_a_tree_is_cut(width: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", width)
+    shown = CliRunner().invoke(cli, ["info", "talos"]).stdout
+    assert all(f"{joint.name} ({joint.type})" in shown for joint in load("talos").joints)

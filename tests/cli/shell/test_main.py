@@ -1,0 +1,127 @@
+"""The group of commands: help, start-up, and how errors leave."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import click
+import pytest
+from click.testing import CliRunner
+
+from dynx._version import __version__
+from dynx.agreement.agreement import DEFAULT_SAMPLES
+from dynx.cli.shell.main import CommandLine, cli
+
+
+def test_version() -> None:
+    assert CliRunner().invoke(cli, ["--version"]).output == f"dynx {__version__}\n"
+
+
+@pytest.mark.parametrize("name", [None, *cli.commands])
+def test_help_of_every_command_has_examples(name: str | None) -> None:
+    result = CliRunner().invoke(cli, ["--help"] if name is None else [name, "--help"])
+    assert result.exit_code == 0
+    assert "Examples:" in result.output
+
+
+def test_no_argument_gives_help() -> None:
+    result = CliRunner().invoke(cli, [])
+    assert result.exit_code == 0
+    assert "agree" in result.output
+
+
+def test_the_default_of_samples_is_that_of_agree() -> None:
+    assert f"(default: {DEFAULT_SAMPLES})" in CliRunner().invoke(cli, ["agree", "--help"]).output
+
+
+def test_starting_imports_nothing_slow() -> None:
+    script = (
+        "import sys, dynx.cli.shell.main; "
+        "print([n for n in ('numpy', 'rich', 'mpmath', 'pinocchio', 'pybullet') if n in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def broken() -> CommandLine:
+    """A command line with a defect."""
+
+    @click.command()
+    def fail() -> None:
+        raise KeyError("some\nthing")
+
+    group = CommandLine("broken")
+    group.add_command(fail)
+    return group
+
+
+def test_a_defect_is_one_line_and_70(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("DYNX_TRACEBACK", raising=False)
+    result = CliRunner().invoke(broken(), ["fail"])
+    assert result.exit_code == 70
+    assert "defect of dynx" in result.stderr
+    assert "KeyError" in result.stderr
+    assert result.stderr.count("\n") == 1
+
+
+def test_a_traceback_is_shown_when_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("DYNX_TRACEBACK", "1")
+    assert "Traceback" in CliRunner().invoke(broken(), ["fail"]).stderr
+
+
+def test_python_dash_m() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "dynx", "nosuch"], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 2
+    assert done.stderr.startswith("dynx: error: ")
+
+
+def closed_pipe(*arguments: str) -> tuple[int, bytes]:
+    """Exit code and standard error of a command whose reader is gone before it writes."""
+    command = [sys.executable, "-m", "dynx", *arguments]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        process.stdout.close()
+        said = process.stderr.read()
+    return process.returncode, said
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no SIGPIPE")
+@pytest.mark.parametrize(
+    "arguments",
+    [["--help"], ["--version"], ["fk", "--help"], ["robots"], ["robots", "--json"], ["id", "ur5"]],
+)
+def test_a_closed_pipe_is_not_the_answer_no(arguments: list[str]) -> None:
+    assert closed_pipe(*arguments) == (141, b"")
+
+
+FULL = Path("/dev/full")
+
+
+@pytest.mark.skipif(not FULL.exists(), reason="no device that is always full")
+@pytest.mark.parametrize("arguments", [["--help"], ["info", "ur5"], ["info", "ur5", "--json"]])
+def test_output_that_cannot_be_written_is_no_defect(arguments: list[str]) -> None:
+    with FULL.open("w") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "dynx", *arguments],
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
+        )
+    assert done.returncode == 74
+    assert done.stderr.startswith("dynx: error: standard output cannot be written")
+    assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="a POSIX shell")
+@pytest.mark.parametrize("arguments", ["info ur5", "info ur5 --json"])
+def test_no_standard_output_at_all(arguments: str) -> None:
+    script = f'"{sys.executable}" -m dynx {arguments} >&-'
+    done = subprocess.run(["sh", "-c", script], stderr=subprocess.PIPE, text=True, check=False)
+    assert done.returncode == 74
+    assert done.stderr.count("\n") == 1

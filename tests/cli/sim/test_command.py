@@ -1,0 +1,275 @@
+"""`dynx sim`: what is simulated, its table and its document."""
+
+from __future__ import annotations
+
+import inspect
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import dynx
+from dynx import control, trajectory
+from dynx.backends import installed_backends
+from dynx.cli.shell.configuration_input import default_frame
+from dynx.cli.sim import options as sim_options
+from dynx.cli.sim.command import sim as command
+from dynx.sim import Rollout, simulate
+from dynx.sim.named_controllers import LAWS
+from dynx.sim.plants.integrators import METHODS
+from dynx.sim.plants.plant import INTEGRATORS
+from tests.cli.sim.command import SHORT, document, sim
+
+needs_bullet = pytest.mark.skipif("pybullet" not in installed_backends(), reason="PyBullet is not installed")
+MOTORS = ("position-motor", "velocity-motor", "pd-motor")
+KEYS = """
+    schema dynx robot source base gravity nq nv law backend gains motor_limits frame frame_given motion
+    settings payload mass_scale total_mass passive status error overshoot dt steps steps_asked simulated
+    seconds max_error max_error_joint max_error_time rms_error final_error base_error frame_error
+    energy_change energy_drift max_kinetic_energy saturated joints final files
+"""
+"""Of the document, schema 1."""
+
+
+def test_the_options_are_those_of_the_library() -> None:
+    assert ("none", *LAWS) == sim_options.CONTROLLERS
+    assert INTEGRATORS == sim_options.INTEGRATORS
+    assert sim_options.METHODS == METHODS
+    options = {param.name: param for param in command.params}
+    taken = command.make_context("sim", ["ur5"]).params
+    for name, parameter in inspect.signature(simulate).parameters.items():
+        default = parameter.default
+        if name in options and isinstance(default, int | float | str) and not isinstance(default, bool):
+            if name == "mass_scale":  # several factors, each 1 by default
+                continue
+            assert taken[name] in (None, default), name
+            written = default if isinstance(default, str) else f"{default:g}"
+            assert f"(default: {written})" in options[name].to_info_dict()["help"], name
+
+
+def test_every_option_stands_under_one_heading_of_the_help() -> None:
+    grouped = [name for names in sim_options.GROUPS.values() for name in names]
+    assert sorted(grouped) == sorted(str(param.name) for param in command.params if param.name != "robot")
+    text = sim("--help").stdout
+    assert [text.index(f"\n{title}:") for title in sim_options.GROUPS] == sorted(
+        text.index(f"\n{title}:") for title in sim_options.GROUPS
+    )
+    assert all(name in text for name in sim_options.CONTROLLERS if name != "feed-forward-pd")
+
+
+def test_the_table_has_a_line_for_each_joint() -> None:
+    result = sim("ur5", *SHORT, "--effort-limits", "urdf")
+    assert result.exit_code == 0
+    assert result.stderr == ""
+    assert "ur5, fixed base: computed-torque computed by pinocchio, on pinocchio" in result.stdout
+    assert "cycloidal motion of 0.05 s; 50 steps of 0.001 s" in result.stdout
+    rows = [line.split() for line in result.stdout.splitlines() if line.startswith(" ")]
+    lines = {row[0]: row for row in rows if "_joint" in row[0]}
+    assert len(lines) == 6
+    made = document("ur5", *SHORT, "--effort-limits", "urdf")
+    elbow = made["joints"][2]
+    assert lines["elbow_joint"][1:] == [
+        "rad",
+        f"{elbow['max_error']:.1e}",
+        f"{elbow['rms_error']:.1e}",
+        f"{elbow['max_speed']:.4f}",
+        f"{elbow['max_torque']:.2f}",
+        "150",
+        f"{elbow['max_torque'] / 1.5:.0f}",
+        "%",
+    ]
+    assert "largest error " in result.stdout
+    assert "energy changed by " in result.stdout
+    assert "motors were at their limits in 0 % of the steps" in result.stdout
+    assert "simulated 0.05 s in " in result.stdout
+
+
+def test_the_document_says_all_that_was_asked_and_found() -> None:
+    made = document(
+        *(
+            "ur5",
+            *SHORT,
+            "--payload",
+            "tool0:2:0,0,0.1",
+            "--mass-scale",
+            "forearm_link=1.1",
+            "--settle",
+            "0.01",
+        ),
+        *("--noise-q", "1e-5", "--delay", "0.002", "--push", "tool0:1,0,0,0,0,0:0.01", "--damping", "0.5"),
+    )
+    assert made["schema"] == 1
+    assert set(made) == set(KEYS.split())
+    assert (made["robot"], made["base"], made["nq"], made["nv"]) == ("ur5", "fixed", 6, 6)
+    assert (made["law"], made["backend"], made["status"], made["error"]) == (
+        "computed-torque",
+        "pinocchio",
+        "done",
+        None,
+    )
+    assert made["gains"] == {"kp": [400.0] * 6, "kd": [40.0] * 6}
+    assert made["motion"]["profile"] == "cycloidal"
+    assert made["motion"]["to"] == [0.0, 0.0, 0.01, 0.0, 0.0, 0.0]
+    assert (made["steps"], made["steps_asked"], made["simulated"]) == (60, 60, pytest.approx(0.06))
+    assert made["payload"] == [{"frame": "tool0", "mass": 2.0, "center": [0.0, 0.0, 0.1]}]
+    assert made["total_mass"] == pytest.approx(dynx.load("ur5").total_mass + 2.0 + 0.1 * 2.275, rel=1e-2)
+    assert made["settings"]["plant"] == "pinocchio"
+    assert made["settings"]["delay"] == 0.002
+    assert len(made["settings"]["pushes"]) == 1
+    assert made["seconds"] > 0.0
+    assert not made["passive"]
+    assert [joint["name"] for joint in made["joints"]] == list(dynx.load("ur5").joint_names)
+    keys = "name unit max_error rms_error final_error max_speed max_torque effort_limit saturated"
+    assert all(set(joint) == set(keys.split()) for joint in made["joints"])
+    assert made["max_error"] == max(joint["max_error"] for joint in made["joints"])
+    worst = next(joint for joint in made["joints"] if joint["name"] == made["max_error_joint"])
+    assert worst["max_error"] == made["max_error"]
+    assert made["final_error"] == max(abs(joint["final_error"]) for joint in made["joints"])
+    assert len(made["final"]["q"]) == 6
+
+
+@needs_bullet
+def test_the_record_is_that_of_the_library(tmp_path: Path) -> None:
+    target = tmp_path / "out.npz"
+    arm = dynx.load("ur5", gravity=(0, 0, -9.8))
+    there = [-1.5, -1.0, 1.0, -1.57, -1.57, -1.57]
+    arguments = ["--to", ",".join(map(str, there)), "--plant", "pybullet", "--gravity", "0,0,-9.8"]
+    made = document("ur5", *arguments, "--dt", "0.002", "--save", str(target))
+    motion = trajectory.cycloidal(np.zeros(6), there, duration=2.0)
+    law = control.ComputedTorque(arm, kp=400, kd=40, backend="pinocchio")
+    rollout = simulate(arm, law, motion, plant="pybullet", dt=2e-3)
+    saved = Rollout.load(target)
+    np.testing.assert_array_equal(saved.q, rollout.q)
+    np.testing.assert_array_equal(saved.tau, rollout.tau)
+    assert made["max_error"] == np.abs(rollout.error).max()
+    assert made["files"] == [str(target)]
+
+
+@pytest.mark.parametrize("name", sim_options.CONTROLLERS)
+def test_every_law_runs(name: str) -> None:
+    if name in MOTORS and "pybullet" not in installed_backends():
+        pytest.skip("PyBullet is not installed")
+    start = "0.2,-1.4,1.2,0.1,0.5,0.2"
+    arguments = ["--from", start, "--duration", "0.05", "--frame", "tool0"]
+    arguments = arguments[:4] if name not in ("operational-space", "impedance") else arguments
+    gains = ["--kp", "300,300,300,30,30,30", "--kd", "30,30,30,3,3,3"] if name == "impedance" else []
+    plant = ["--plant", "pybullet"] if name in MOTORS else []
+    made = document("ur5", *arguments, "--controller", name, *gains, *plant)
+    assert made["steps"] == 50
+    assert made["law"] == name
+    if name == "none":
+        assert made["max_error"] is None
+    else:
+        assert made["max_error"] < 0.05
+
+
+@needs_bullet
+def test_motors_of_the_engine_are_held_to_limits() -> None:
+    motor = ["pendulum", "--to", "1", "--controller", "position-motor", "--plant", "pybullet", "--dt", "0.01"]
+    free, described, weak = (
+        document(*motor, *limits) for limits in ([], ["--effort-limits", "urdf"], ["--effort-limits", "1"])
+    )
+    # The description has no limit, which is no limit for the motor either.
+    assert free["max_error"] == described["max_error"] < 1e-3
+    assert (free["motor_limits"], described["motor_limits"], weak["motor_limits"]) == (None, [None], [1.0])
+    assert weak["joints"][0]["max_torque"] == pytest.approx(1.0)
+    assert weak["max_error"] > 0.5
+    assert "PyBullet held its motors to the limits" in sim(*motor, "--effort-limits", "1").stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "duration"),
+    [
+        (["--profile", "cubic"], 0.5),
+        (["--profile", "quintic"], 0.5),
+        (["--profile", "trapezoidal", "--acceleration", "2"], None),
+        (["--profile", "s-curve", "--acceleration", "2", "--jerk", "20", "--velocity", "0.3"], None),
+    ],
+)
+def test_profiles_lead_there(arguments: list[str], duration: float | None) -> None:
+    given = [] if duration is None else ["--duration", str(duration)]
+    made = document("ur5", "--to", "elbow_joint=0.2", *arguments, *given)
+    assert made["final"]["q"][2] == pytest.approx(0.2, abs=1e-3)
+    took = made["motion"]["duration"]
+    if duration is None:
+        # The robot is watched until the step in which the fastest motion ends.
+        assert took <= made["simulated"] < took + 1e-3
+    else:
+        assert took == made["simulated"] == duration
+
+
+def test_joints_that_are_not_named_stay() -> None:
+    made = document("ur5", "--from", "wrist_1_joint=0.3", "--to", "elbow_joint=0.01", "--duration", "0.05")
+    assert made["motion"]["to"] == [0.0, 0.0, 0.01, 0.3, 0.0, 0.0]
+
+
+def test_hold_wants_the_end_at_once() -> None:
+    made = document(
+        "ur5", "--from", "elbow_joint=0.1", "--to", "elbow_joint=0", "--profile", "hold", "--duration", "0.5"
+    )
+    assert made["max_error"] == pytest.approx(0.1)
+    assert made["final_error"] < 0.01
+
+
+def test_a_frame_goes_on_a_straight_line(tmp_path: Path) -> None:
+    target = tmp_path / "line.npz"
+    start = "0.2,-1.4,1.2,0.1,0.5,0.2"
+    made = document(
+        "ur5", "--from", start, "--to-pose", "0.4,0.2,0.5", "--duration", "0.5", "--save", str(target)
+    )
+    assert made["frame"] == default_frame(dynx.load("ur5"))
+    rollout = Rollout.load(target)
+    engine = dynx.backend("pinocchio", dynx.load("ur5"))
+    places = engine.forward_kinematics(rollout.q, made["frame"])[:, :3, 3]
+    np.testing.assert_allclose(places[-1], [0.4, 0.2, 0.5], atol=1e-3)
+    along = (places[-1] - places[0]) / np.linalg.norm(places[-1] - places[0])
+    off = places - places[0] - np.outer((places - places[0]) @ along, along)
+    assert np.abs(off).max() < 1e-3
+
+
+def test_friction_is_given_back() -> None:
+    losses = ["--friction", "0.5", "--damping", "1", "--controller", "discrete-computed-torque"]
+    without = document("ur5", *SHORT, *losses)
+    given = document("ur5", *SHORT, *losses, "--friction-compensation")
+    assert given["max_error"] < 1e-10 < without["max_error"]
+    assert given["settings"]["controller"].endswith("friction compensated")
+
+
+def test_a_passive_robot_keeps_its_energy() -> None:
+    made = document(
+        "pendulum", "--q0", "1.5", "--controller", "none", "--integrator", "rk4", "--duration", "1"
+    )
+    assert made["passive"]
+    assert made["energy_drift"] < 1e-10
+    assert made["max_error"] is made["joints"][0]["effort_limit"] is None
+    text = sim("pendulum", "--q0", "1.5", "--controller", "none", "--duration", "0.1").stdout
+    assert "energy drifted by " in text
+    assert "no error: there was nothing to follow" in text
+
+
+def test_a_robot_without_joints_is_no_defect() -> None:
+    for base in ("fixed", "floating"):
+        for law in ("none", "pd"):
+            arguments = ["free_body", "--base", base, "--controller", law, "--duration", "0.05"]
+            assert sim(*arguments).exit_code == 0
+            made = document(*arguments)
+            assert len(made["joints"]) == (6 if base == "floating" else 0)
+            assert made["steps"] == 50
+
+
+def test_a_floating_base_has_lines_of_its_own() -> None:
+    made = document("solo12", "--base", "floating", "--controller", "pd", "--duration", "0.05")
+    assert [joint["name"] for joint in made["joints"]][:6] == [
+        f"base {c}" for c in ("x", "y", "z", "rx", "ry", "rz")
+    ]
+    assert [joint["unit"] for joint in made["joints"]][:6] == ["m"] * 3 + ["rad"] * 3
+    assert made["max_error_joint"] in dynx.load("solo12").joint_names
+    assert made["base_error"]["position"]["max"] == pytest.approx(made["joints"][2]["max_error"])
+
+
+def test_one_factor_for_all_links_and_another_for_one() -> None:
+    arm = dynx.load("ur5")
+    forearm = arm.link("forearm_link").inertial
+    assert forearm is not None
+    made = document("ur5", *SHORT, "--mass-scale", "1.1", "--mass-scale", "forearm_link=2")
+    assert made["total_mass"] == pytest.approx(1.1 * arm.total_mass + 0.9 * forearm.mass)

@@ -1,0 +1,142 @@
+"""How `dynx sim` ends: files, exit codes, what diverges, what is interrupted and taken up again."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dynx.errors import ArgumentError
+from dynx.sim import Rollout
+from tests.cli.sim.command import SHORT, document, sim
+
+
+@pytest.mark.parametrize("ending", [".npz", ".csv"])
+def test_files_that_are_saved(ending: str, tmp_path: Path) -> None:
+    target = tmp_path / f"out{ending}"
+    assert sim("ur5", *SHORT, "--save", str(target)).exit_code == 0
+    assert target.stat().st_size > 1000
+    assert [path.name for path in tmp_path.iterdir()] == [target.name]
+
+
+def test_a_plot_is_drawn(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    target = tmp_path / "out.png"
+    assert sim("ur5", *SHORT, "--plot", str(target)).exit_code == 0
+    assert target.read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_record_is_resumed_to_the_last_bit(tmp_path: Path) -> None:
+    whole, part = tmp_path / "whole.npz", tmp_path / "part.npz"
+    noisy = ["--noise-v", "1e-3", "--payload", "tool0:1", "--control-dt", "0.002", "--controller", "pid"]
+    assert sim("ur5", *SHORT, *noisy, "--save", str(whole)).exit_code == 0
+    again = sim("ur5", *SHORT, *noisy, "--resume", str(whole), "--resume-step", "17", "--save", str(part))
+    assert again.exit_code == 0
+    np.testing.assert_array_equal(Rollout.load(part).q, Rollout.load(whole).q)
+    other = sim("ur5", *SHORT, "--resume", str(whole))
+    assert other.exit_code == 2
+    assert "the rollout to resume" in other.stderr
+
+
+DIVERGING = ["ur5", "--controller", "none", "--v0", "1,1,1,1,1,1", "--damping", "1e5"]
+
+
+def test_a_simulation_that_diverges_keeps_its_record(tmp_path: Path) -> None:
+    target = tmp_path / "out.npz"
+    result = sim(*DIVERGING, "--save", str(target))
+    assert result.exit_code == 1
+    assert result.stderr.count("\n") == 1
+    assert "diverged in step 2, at 0.002 s" in result.stderr
+    assert f"what was computed is in {target}" in result.stderr
+    assert "--resume" not in result.stderr
+    assert "2 steps of 0.001 s" in result.stdout
+    assert len(Rollout.load(target)) == 2
+    made = document(*DIVERGING, code=1)
+    assert (made["status"], made["steps"], made["steps_asked"]) == ("diverged", 2, 2000)
+    error = made["error"]
+    assert (error["type"], error["step"], error["time"], len(error["v"])) == ("DivergedError", 2, 0.002, 6)
+
+
+def test_a_law_without_a_torque_is_told_from_a_plant_that_diverges() -> None:
+    made = document("ur5", *SHORT, "--kp", "1e308", "--q0", "1,1,1,1,1,1", code=1)
+    assert made["status"] == "control failed"
+    assert made["error"]["type"] == "ControlError"
+    assert made["steps"] == 0
+
+
+def test_what_cannot_be_written_in_the_end_loses_nothing_else(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(self: Rollout, path: str) -> None:
+        raise ArgumentError(f"{path} cannot be written: no space left")
+
+    monkeypatch.setattr(Rollout, "save", full)
+    result = sim("ur5", *SHORT, "--save", str(tmp_path / "out.npz"))
+    assert result.exit_code == 2
+    assert "largest error" in result.stdout
+    assert result.stderr.endswith("cannot be written: no space left\n")
+
+
+def test_a_plot_without_matplotlib_names_the_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    monkeypatch.setitem(sys.modules, "matplotlib.backend_bases", None)
+    for arguments in (["ur5", *SHORT], ["--tutorial"]):
+        result = sim(*arguments, "--plot", str(tmp_path / "out.png"))
+        assert result.exit_code == 2
+        assert "pip install 'dynx[plot]'" in result.stderr
+        assert result.stdout == ""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no SIGINT to a child")
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_an_interrupted_run_keeps_what_is_done(number: int, code: int, tmp_path: Path) -> None:
+    target = tmp_path / "out.npz"
+    # A plant that is slow, so that there is something left to do.
+    start = [sys.executable, "-m", "dynx", "sim", "ur5", "--to", "elbow_joint=1", "--plant", "reference"]
+    start += ["--duration", "200", "--save", str(target)]
+    for patience in (4.0, 16.0, 64.0):
+        process = subprocess.Popen(start, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        time.sleep(patience)
+        process.send_signal(number)
+        out, err = process.communicate(timeout=60.0)
+        if target.exists() and len(Rollout.load(target)):
+            break
+    assert process.returncode == code
+    assert "Traceback" not in err
+    assert err.count("\n") == 1
+    assert "interrupted after " in err
+    assert f"the same command with --resume {target} goes on" in err
+    assert "largest error" in out
+    assert 0 < len(Rollout.load(target)) < 200_000
+
+
+def test_an_interrupted_run_is_taken_up_to_the_last_bit(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    part, rest, whole = (tmp_path / f"{name}.npz" for name in ("part", "rest", "whole"))
+    arguments = ["ur5", "--to", "elbow_joint=1", "--noise-q", "1e-5", "--dt", "0.0001"]
+    assert sim(*arguments, "--save", str(whole)).exit_code == 0
+
+    @contextmanager
+    def impatient(total: int, words: str) -> Iterator[Callable[[int, str], None]]:
+        def advance(taken: int, words: str) -> None:
+            if 0 < taken < total:
+                signal.raise_signal(signal.SIGINT)
+
+        yield advance
+
+    with monkeypatch.context() as patched:
+        patched.setattr("dynx.cli.sim.run.progress_bar", impatient)
+        interrupted = sim(*arguments, "--save", str(part))
+    assert interrupted.exit_code == 130
+    assert "interrupted after " in interrupted.stderr
+    assert 0 < len(Rollout.load(part)) < 20_000
+    assert sim(*arguments, "--resume", str(part), "--save", str(rest)).exit_code == 0
+    np.testing.assert_array_equal(Rollout.load(rest).q, Rollout.load(whole).q)

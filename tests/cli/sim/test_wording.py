@@ -1,0 +1,302 @@
+"""What `dynx sim` says in words: of what differs from the nominal run, of energy, errors and mistakes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+
+import dynx
+from dynx import control
+from dynx.cli.sim import options as sim_options
+from dynx.cli.sim.numbers import column_text, share_text
+from dynx.cli.sim.overshoot import overshoot
+from dynx.sim import simulate
+from tests.cli.sim.command import SHORT, document, sim
+
+ELBOW = ["ur5", "--to", "elbow_joint=1"]
+FALLING = ["solo12", "--base", "floating", "--controller", "pd", "--duration", "0.05"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--payload", "tool0:2"], "plant: payload 2 kg on tool0"),
+        (["--payload", "tool0:1"] * 4, "plant: 4 payloads"),
+        (["--mass-scale", "1.1"], "plant: masses times 1.1"),
+        (["--mass-scale", "forearm_link=1.1"], "plant: mass of forearm_link times 1.1"),
+        (["--mass-scale", "1.1", "--mass-scale", "forearm_link=2"], "plant: masses times 1.1 to 2"),
+        (["--friction", "0.5", "--damping", "1,2,1,1,1,1"], "plant: damping 1 to 2, friction 0.5"),
+        (["--armature", "0.1"], "plant: armature 0.1"),
+        (["--push", "tool0:1,0,0"], "plant: push on tool0 from 0 s"),
+        (["--push", "tool0:1,0,0:0.01:0.02"], "plant: push on tool0 from 0.01 s for 0.02 s"),
+        (["--position-limits"], "plant: stops at the limits of position"),
+        (["--substeps", "2"], "plant: 2 substeps"),
+        (["--noise-q", "1e-4", "--noise-v", "0.01"], "law: noise 0.0001 in q and 0.01 in v"),
+        (["--delay", "0.002"], "law: delay 0.002 s"),
+        (["--control-dt", "0.002"], "law: asked every 0.002 s"),
+        (["--friction", "0.5", "--delay", "0.002"], "plant: friction 0.5; law: delay 0.002 s"),
+    ],
+)
+def test_the_header_says_what_differs_from_the_nominal_run(arguments: list[str], said: str) -> None:
+    assert said in sim("ur5", *SHORT, *arguments).stdout.splitlines()
+
+
+def test_losses_of_a_floating_robot_are_those_of_its_joints() -> None:
+    losses = ["--friction", "0.5", "--armature", "0.1"]
+    assert "plant: friction 0.5, armature 0.1" in sim(*FALLING, *losses).stdout.splitlines()
+
+
+def test_the_header_of_a_nominal_run_says_no_more() -> None:
+    lines = sim("ur5", *SHORT, "--joint-dynamics").stdout.splitlines()
+    assert lines[2] == "kp 400, kd 40"
+    assert not any(line.startswith(("plant:", "law:")) for line in lines)
+
+
+def test_a_step_begins_where_every_profile_begins() -> None:
+    made = document("ur5", "--to", "elbow_joint=0.2", "--profile", "hold", "--duration", "0.5")
+    assert made["motion"]["from"] == [0.0] * 6
+    assert made["max_error"] == pytest.approx(0.2)
+    assert made["max_error_time"] == 0.0
+    assert made["joints"][2]["max_speed"] > 0.5
+
+
+SWING = ["pendulum", "--controller", "none", "--q0", "1", "--duration", "0.1"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (SWING, "energy drifted by "),
+        ([*SWING, "--damping", "urdf", "--friction", "urdf"], "energy changed by up to "),
+        (FALLING, "energy changed by up to "),
+        (["pendulum", "--controller", "none", "--duration", "0.1"], "nothing moved"),
+        # What moves by rounding alone has no kinetic energy that a change could be compared with.
+        (["ur5", "--controller", "gravity-pd", "--duration", "0.05"], "nothing moved"),
+    ],
+)
+def test_no_cause_is_made_up_for_a_change_of_energy(arguments: list[str], said: str) -> None:
+    lines = sim(*arguments).stdout.splitlines()
+    energy = [line for line in lines if line.startswith(("energy", "nothing moved"))]
+    assert len(energy) == 1
+    assert energy[0].startswith(said)
+    assert "work" not in energy[0]
+    assert (" times " in energy[0]) == (said == "energy drifted by ")
+
+
+def test_the_change_of_energy_is_that_of_the_record() -> None:
+    made = document(*SWING, "--damping", "1")
+    pendulum = dynx.load("pendulum")
+    energy = simulate(pendulum, q0=[1.0], duration=0.1, damping=1.0).energy
+    assert made["energy_change"] == np.abs(energy - energy[0]).max()
+    assert not made["passive"]
+
+
+def test_limits_that_are_broken_are_told_apart() -> None:
+    motion = ["--to", "elbow_joint=3,wrist_1_joint=3", "--duration", "0.1"]
+    result = sim("ur5", *motion)
+    assert result.exit_code == 2
+    assert result.stderr == (
+        "dynx: error: the motion breaks 2 limits of ur5: "
+        "velocity of 'elbow_joint' is 60 at 0.05 s, beyond 3.15; "
+        "velocity of 'wrist_1_joint' is 60 at 0.05 s, beyond 3.2 "
+        "(a longer --duration is slower; --ignore-limits follows it all the same)\n"
+    )
+    tutorial = sim("--tutorial", "--duration", "0.2").stderr
+    assert "; velocity of " in tutorial
+    assert "--ignore-limits" not in tutorial
+    assert tutorial.endswith("(a longer --duration is slower)\n")
+
+
+def test_the_document_has_objects_for_what_was_asked() -> None:
+    asked = ["--noise-q", "1e-5", "--noise-v", "1e-3", "--seed", "7", "--armature", "0.1"]
+    pushes = ["--push", "tool0:1,2,3", "--push", "tool0:0,0,0,0,0,1:0.01:0.02"]
+    settings = document("ur5", *SHORT, *asked, *pushes)["settings"]
+    assert settings["noise"] == {"q": 1e-5, "v": 1e-3, "seed": 7}
+    always, briefly = settings["pushes"]
+    assert always == {
+        "frame": "tool0",
+        "wrench": [1.0, 2.0, 3.0, 0.0, 0.0, 0.0],
+        "start": 0.0,
+        "duration": None,
+        "reference": always["reference"],
+    }
+    assert (briefly["start"], briefly["duration"]) == (0.01, 0.02)
+    assert settings["joints"]["armature"] == [0.1] * 6
+    assert document("ur5", *SHORT)["settings"]["noise"] is None
+
+
+def test_the_document_of_an_interrupted_run_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    @contextmanager
+    def impatient(total: int, words: str) -> Iterator[Callable[[int, str], None]]:
+        def advance(taken: int, words: str) -> None:
+            if 0 < taken < total:
+                raise KeyboardInterrupt
+
+        yield advance
+
+    monkeypatch.setattr("dynx.cli.sim.run.progress_bar", impatient)
+    made = document("ur5", "--to", "elbow_joint=1", "--dt", "0.0001", "--noise-q", "1e-5", code=130)
+    assert made["status"] == "interrupted"
+    error = made["error"]
+    assert (error["type"], error["step"]) == ("Interrupted", made["steps"])
+    assert error["message"] == f"interrupted after {made['steps']} of 20000 steps"
+    assert error["time"] == made["simulated"]
+    assert error["q"] == made["final"]["q"]
+
+
+def test_numbers_of_one_column_are_of_one_style() -> None:
+    assert column_text([0.000789, 0.01312, 0.9691]) == ["0.0008", "0.0131", "0.9691"]
+    assert column_text([0.3081, 76.84]) == ["0.31", "76.84"]
+    assert column_text([99.0, 12345.6]) == ["99", "12346"]
+    assert column_text([0.0, 3.5e-20]) == ["0.0e+00", "3.5e-20"]
+    assert column_text([1.5, 1.5e6]) == ["1.5e+00", "1.5e+06"]
+    assert column_text([0.0, 0.0]) == ["0", "0"]
+    assert column_text([]) == []
+
+
+@pytest.mark.parametrize(
+    ("share", "said"),
+    [
+        (0.0, "0 %"),
+        (3.5e-17, "<0.01 %"),
+        (9.9e-5, "<0.01 %"),
+        (7.3e-4, "0.07 %"),
+        (0.0021, "0.21 %"),
+        (0.06, "6.0 %"),
+        (0.51, "51 %"),
+        (0.997, "100 %"),
+        (290.0, ">9999 %"),
+    ],
+)
+def test_shares_are_no_wider_than_they_say(share: float, said: str) -> None:
+    assert share_text(share) == said
+
+
+@pytest.mark.parametrize("motion", [["--to", "panda_joint1=0.3"], ["--controller", "pd"]])
+def test_a_row_of_the_panda_fits_a_terminal_of_80(motion: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    lines = sim("panda", *motion, "--duration", "0.5").stdout.splitlines()
+    table = [line for line in lines if line.startswith(" ")]
+    assert len(table) == 2 + 1 + 8
+    assert all(len(line) <= 80 for line in table)
+
+
+def test_errors_of_a_floating_base_are_apart_from_those_of_joints() -> None:
+    arguments = [*FALLING, "--kp", "3", "--q0", "FL_KFE=0.1"]
+    made = document(*arguments)
+    assert made["max_error_joint"] == "FL_KFE"
+    assert made["max_error"] == pytest.approx(0.1)
+    dog = dynx.load("solo12", base="floating")
+    q0 = dog.neutral()
+    q0[7 + dog.joint_names.index("FL_KFE")] = 0.1
+    law = control.PD(dog, kp=3.0, kd=np.array(made["gains"]["kd"]))
+    error = simulate(dog, law, dog.neutral(), q0=q0, duration=0.05).error
+    position, rotation = (np.linalg.norm(error[:, part], axis=1) for part in (slice(3), slice(3, 6)))
+    assert made["base_error"]["position"]["max"] == pytest.approx(position.max(), rel=1e-9)
+    assert made["base_error"]["position"]["final"] == pytest.approx(position[-1], rel=1e-9)
+    assert made["base_error"]["rotation"]["max"] == pytest.approx(rotation.max(), rel=1e-9)
+    text = sim(*arguments).stdout
+    assert "largest error 1.0e-01 rad of FL_KFE at 0 s" in text
+    assert f"error of base: position {position.max():.1e} m at " in text
+    rows = [line for line in text.splitlines() if line.startswith(" base ")]
+    assert len(rows) == 6
+    assert all("(base axes)" in row for row in rows)
+
+
+def test_a_fixed_base_has_no_error() -> None:
+    made = document("ur5", *SHORT)
+    assert made["base_error"] is made["frame_error"] is None
+
+
+@pytest.mark.parametrize(
+    ("arguments", "name"),
+    [
+        ([*ELBOW, "--controller", "pd", "--kp", "400", "--kd", "40"], "wrist_3_joint"),
+        (
+            ["panda", "--to", "panda_joint1=1", "--controller", "impedance", "--kp", "500", "--kd", "50"],
+            "panda_joint7",
+        ),
+    ],
+)
+def test_gains_too_large_for_the_step_are_named(arguments: list[str], name: str) -> None:
+    result = sim(*arguments)
+    assert result.exit_code == 1
+    (line,) = (line for line in result.stdout.splitlines() if line.startswith("smaller gains"))
+    assert line.startswith("smaller gains or a smaller --dt: ")
+    assert f" at {name}, and above 2 a step overshoots" in line
+    made = document(*arguments, code=1)
+    assert made["overshoot"]["joint"] == name
+    assert made["overshoot"]["ratio"] > 2.0
+
+
+def test_the_ratio_is_that_of_the_mass_matrix() -> None:
+    arm = dynx.load("ur5")
+    inertia = np.diag(dynx.backend("reference", arm).mass_matrix(arm.neutral()))
+    found = overshoot(control.PD(arm, kp=1.0, kd=40.0), arm.neutral(), 2e-3)
+    assert found is not None
+    assert found.ratio == pytest.approx(40.0 * 2e-3 / inertia.min(), rel=1e-12)
+    assert found.joint == arm.joint_names[int(np.argmin(inertia))]
+    for law in (control.PD(arm, kp=1.0, kd=0.01), control.ComputedTorque(arm, kp=400, kd=40), None):
+        assert overshoot(law, arm.neutral(), 1e-3) is None
+
+
+def test_a_run_that_diverges_otherwise_blames_no_gains() -> None:
+    diverging = ["ur5", "--controller", "none", "--v0", "1,1,1,1,1,1", "--damping", "1e5"]
+    assert document(*diverging, code=1)["overshoot"] is None
+    assert "smaller gains" not in sim(*diverging).stdout
+    assert document("ur5", *SHORT)["overshoot"] is None
+
+
+LINE = ["ur5", "--from", "0.2,-1.4,1.2,0.1,0.5,0.2", "--to-pose", "0.4,0.2,0.5", "--duration", "0.5"]
+
+
+def test_the_frame_that_was_picked_is_in_the_header() -> None:
+    picked = "frame tool0 ends the longest chain of moving joints; --frame chooses another"
+    assert picked in sim(*LINE).stdout.splitlines()
+    named = sim(*LINE, "--frame", "wrist_3_link").stdout
+    assert "wrist_3_link along a straight line" in named
+    assert "longest chain" not in named
+    law = sim("ur5", *SHORT, "--controller", "operational-space", "--frame", "wrist_3_link").stdout
+    assert "operational-space of wrist_3_link computed by" in law
+
+
+def test_the_error_of_the_frame_itself() -> None:
+    beside = [0.25, -1.4, 1.2, 0.1, 0.5, 0.2]
+    arguments = [*LINE, "--q0", ",".join(map(str, beside))]
+    made = document(*arguments)
+    arm = dynx.load("ur5")
+    bodies = dynx.backend("pinocchio", arm)
+    wanted, found = bodies.forward_kinematics(np.array([made["motion"]["from"], beside]), "tool0")
+    error = made["frame_error"]
+    assert error["position"]["max"] == pytest.approx(np.linalg.norm(wanted[:3, 3] - found[:3, 3]), rel=0.02)
+    assert error["rotation"]["max"] == pytest.approx(0.05, rel=0.02)  # about the first joint's axis
+    assert error["position"]["final"] < 0.1 * error["position"]["max"]
+    ended = bodies.forward_kinematics(np.array(made["final"]["q"]), "tool0")[:3, 3]
+    assert error["position"]["final"] == pytest.approx(np.linalg.norm(ended - [0.4, 0.2, 0.5]), rel=1e-3)
+    text = sim(*arguments).stdout
+    assert f"error of tool0: position {error['position']['max']:.1e} m at " in text
+    assert f" rotation {error['rotation']['max']:.1e} rad at " in text
+
+
+def test_a_controller_that_is_none_of_them_lists_all() -> None:
+    result = sim(*ELBOW, "--controller", "lqr")
+    assert result.exit_code == 2
+    assert f"there is no 'lqr'; known: {', '.join(sim_options.CONTROLLERS)} " in result.stderr
+
+
+def test_the_help_says_what_is_not_simulated() -> None:
+    assert "nothing stands on the ground, and links do not collide" in sim("--help").stdout
+
+
+def test_a_plot_says_in_which_axes_a_base_is() -> None:
+    pytest.importorskip("matplotlib")
+    dog = dynx.load("solo12", base="floating")
+    figure = simulate(dog, control.PD(dog, kp=1.0, kd=0.1), dog.neutral(), duration=2e-3).plot()
+    labels = [axis.get_ylabel() for axis in figure.axes]
+    assert "position [m] (world axes)" in labels
+    assert "error q* - q [m] (base axes)" in labels
+    assert "force [N] (base axes)" in labels
+    assert sum("axes" in label for label in labels) == 3

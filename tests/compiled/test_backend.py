@@ -1,0 +1,183 @@
+"""The compiled backend: what it adds to the contract, and where its answers come from."""
+
+from __future__ import annotations
+
+import pickle
+import threading
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import dynx
+from dynx.backends import backend
+from dynx.backends.derived import HOOK_OF_QUANTITY, native_quantities
+from dynx.compiled import kernels
+from dynx.compiled.backend import CompiledBackend
+from dynx.compiled.call import FEW, KernelCall, NumericCall
+from dynx.compiled.kernels import QUANTITIES, is_physical
+from dynx.errors import ArgumentError, ClosedError
+from dynx.model import Inertial, Link, Mechanism, Model
+from dynx.simd.kernel import Kernel
+from tests.backends.robots import chain
+from tests.closeness import Closeness, samples_at
+from tests.compiled.robots import ROBOTS, TIP, made, state
+
+
+def test_it_is_found_by_name_and_says_what_it_is() -> None:
+    engine = dynx.backend("compiled", chain(1))
+    assert "compiled" in dynx.installed_backends()
+    for word in ("dynx", "llvmlite", "LLVM"):
+        assert word in engine.engine_version
+
+
+@pytest.mark.parametrize("threads", [0, -1, 2.0, "2", True])
+def test_odd_numbers_of_threads(threads: object) -> None:
+    with pytest.raises(ArgumentError, match="threads is"):
+        backend("compiled", chain(1), threads=threads)
+
+
+def test_pickling_keeps_the_threads() -> None:
+    assert pickle.loads(pickle.dumps(made(chain(1), threads=3)))._threads == 3
+
+
+def test_a_kernel_is_made_once_however_many_ask(monkeypatch: pytest.MonkeyPatch) -> None:
+    model = chain(3)
+    engine = made(model)
+    asked: list[str] = []
+    make = kernels.quantity_kernel
+
+    def counted(mechanism: Mechanism, name: str, details: tuple[Any, ...], *, tree: bool) -> Kernel:
+        asked.append(name)
+        return make(mechanism, name, details, tree=tree)
+
+    monkeypatch.setattr("dynx.compiled.backend.quantity_kernel", counted)
+    q, v, a = state(model)
+    start = threading.Barrier(6)
+
+    def ask() -> None:
+        start.wait()
+        engine.inverse_dynamics(q, v, a)
+
+    threads = [threading.Thread(target=ask) for _ in range(6)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert asked == ["inverse_dynamics"]
+
+
+def test_closing_while_others_ask() -> None:
+    """They get the right answer or ClosedError, and nothing is freed beneath them."""
+    model = ROBOTS["fixed"]
+    q, v, a = state(model, (5000,))
+    wanted = made(model).inverse_dynamics(q, v, a)
+    for _ in range(5):
+        engine = made(model)
+        wrong: list[object] = []
+
+        def ask(engine: CompiledBackend = engine, wrong: list[object] = wrong) -> None:
+            try:
+                while True:
+                    if not np.array_equal(engine.inverse_dynamics(q, v, a), wanted):
+                        wrong.append("answer")
+            except ClosedError:
+                return
+
+        threads = [threading.Thread(target=ask) for _ in range(3)]
+        for thread in threads:
+            thread.start()
+        engine.close()
+        for thread in threads:
+            thread.join(30)
+        assert not wrong
+
+
+# -- where the answers come from ---------------------------------------------------------------------
+
+
+def test_every_quantity_is_native() -> None:
+    assert native_quantities(CompiledBackend) >= set(QUANTITIES) - {"frame_placement", "frame_placements"}
+
+
+def owner(method: Any) -> object:
+    return method.__self__
+
+
+def test_mimic_joints_are_part_of_the_kernel() -> None:
+    """A call in model coordinates makes one kernel, whose inputs are those coordinates."""
+    engine = made(ROBOTS["mimic"])
+    q, v, a = state(engine.model)
+    engine.inverse_dynamics(q, v, a)
+    engine.bias_torque(q, v)
+    engine.forward_dynamics(q, v, a)
+    for answer in engine._calls.values():
+        call = owner(answer)
+        assert isinstance(call, KernelCall)
+        assert {port.shape for port in call._kernel.inputs} == {(engine.model.nv,)}
+
+
+def test_hooks_answer_in_tree_coordinates() -> None:
+    engine = made(ROBOTS["mimic"])
+    coupling = engine._mechanism.coupling
+    assert coupling is not None
+    q, v, a = state(engine.model, (3,))
+    S = coupling.matrix()
+    tree = engine._inverse_dynamics(coupling.expand_q(q), v @ S.T, a @ S.T)
+    Closeness(samples_at(engine.model, q, v, a)).check(
+        "inverse_dynamics", tree @ S, engine.inverse_dynamics(q, v, a)
+    )
+
+
+def test_an_unphysical_robot_with_mimic_joints_is_solved_with_pivots() -> None:
+    """Elimination without pivoting is not trusted with an indefinite mass matrix."""
+    model = ROBOTS["mimic"]
+    odd = replace(model.links[2].inertial or Inertial(1.0), ixx=-5.0)
+    links = [replace(link, inertial=odd) if k == 2 else link for k, link in enumerate(model.links)]
+    bad = Model.build("bad", links, model.joints)
+    assert is_physical(model.mechanism)
+    assert not is_physical(bad.mechanism)
+    engine = made(bad)
+    q, v, a = state(bad, (3,))
+    found = engine.forward_dynamics(q, v, a)
+    assert not any(key[0] == "forward_dynamics" for key in engine._calls if isinstance(key, tuple))
+    Closeness(samples_at(bad, q, v, found)).check("inverse_dynamics", engine.inverse_dynamics(q, v, found), a)
+
+
+@pytest.mark.parametrize("quantity", sorted({*QUANTITIES} & {*HOOK_OF_QUANTITY}))
+@pytest.mark.parametrize("robot", ["fixed", "floating mimic"])
+def test_what_is_not_compiled_is_evaluated(
+    quantity: str, robot: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model = ROBOTS[robot]
+    kernels, reference = made(model), backend("reference", model)
+    monkeypatch.setattr(kernels, "LONGEST", 0)
+    numbers = made(model)
+    q, v, a = state(model, (3,))
+    arguments: dict[str, Any] = {"q": q, "v": v, "a": a, "tau": a}
+    values = [arguments[name] for name in QUANTITIES[quantity].arguments]
+    frame = [TIP] if quantity.startswith(("jacobian", "frame")) else []
+    answers = [getattr(each, quantity)(*values, *frame) for each in (numbers, reference)]
+    np.testing.assert_array_equal(answers[0].shape, answers[1].shape)
+    close = Closeness(samples_at(model, q, v, a, a))
+    if quantity == "forward_dynamics":
+        quantity, answers = "inverse_dynamics", [reference.inverse_dynamics(q, v, answers[0]), a]
+        close = Closeness(samples_at(model, q, v, numbers.forward_dynamics(q, v, a)))
+    close.check(quantity, answers[0], answers[1])
+    assert numbers._calls
+    assert all(isinstance(owner(answer), NumericCall) for answer in numbers._calls.values())
+    assert not kernels._calls
+
+
+def test_robots_without_joints() -> None:
+    rock = Model.build("rock", [Link("rock", Inertial(2.0))], [])
+    for model in (rock, rock.with_base("floating")):
+        engine, reference = made(model), backend("reference", model)
+        for size in ((), (0,), (5,), (FEW + 1,)):
+            q, v, a = state(model, size)
+            assert engine.mass_matrix(q).shape == (*size, model.nv, model.nv)
+            for name in ("inverse_dynamics", "forward_kinematics", "kinetic_energy"):
+                given = {"inverse_dynamics": (q, v, a), "kinetic_energy": (q, v)}.get(name, (q,))
+                if name == "inverse_dynamics" or size:
+                    assert getattr(engine, name)(*given).shape == getattr(reference, name)(*given).shape

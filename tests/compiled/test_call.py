@@ -1,0 +1,131 @@
+"""Calls of kernels: `out`, and every way from arguments to a kernel gives the same bits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from dynx.compiled.backend import CompiledBackend
+from dynx.compiled.call import FEW
+from dynx.errors import ArgumentError, DTypeError, ShapeError
+from dynx.model import Model
+from dynx.spatial.scalar import Floats
+from tests.backends.robots import chain
+from tests.compiled.robots import ROBOTS, TIP, made, state
+
+Ask = Callable[..., Floats]
+
+WITH_OUT: dict[str, tuple[Ask, Callable[[Model], tuple[int, ...]]]] = {
+    "inverse_dynamics": (lambda e, q, v, a, **o: e.inverse_dynamics(q, v, a, **o), lambda m: (m.nv,)),
+    "joint dynamics": (
+        lambda e, q, v, a, **o: e.inverse_dynamics(q, v, a, joint_dynamics=True, **o),
+        lambda m: (m.nv,),
+    ),
+    "forward_dynamics": (lambda e, q, v, a, **o: e.forward_dynamics(q, v, a, **o), lambda m: (m.nv,)),
+    "pushed": (
+        lambda e, q, v, a, **o: e.forward_dynamics(q, v, a, external_forces={TIP: np.ones(6)}, **o),
+        lambda m: (m.nv,),
+    ),
+    "mass_matrix": (lambda e, q, v, a, **o: e.mass_matrix(q, **o), lambda m: (m.nv, m.nv)),
+    "with rotors": (
+        lambda e, q, v, a, **o: e.mass_matrix(q, joint_dynamics=True, **o),
+        lambda m: (m.nv, m.nv),
+    ),
+    "jacobian": (lambda e, q, v, a, **o: e.jacobian(q, TIP, reference="local", **o), lambda m: (6, m.nv)),
+    "jacobian at a point": (
+        lambda e, q, v, a, **o: e.jacobian(q, TIP, point=(0.1, 0.2, 0.3), **o),
+        lambda m: (6, m.nv),
+    ),
+    "placement": (lambda e, q, v, a, **o: e.forward_kinematics(q, TIP, **o), lambda m: (4, 4)),
+    "placements": (
+        lambda e, q, v, a, **o: e.forward_kinematics(q, **o),
+        lambda m: (len(m.frame_names), 4, 4),
+    ),
+    "two placements": (
+        lambda e, q, v, a, **o: e.forward_kinematics(q, [TIP, "link2"], **o),
+        lambda m: (2, 4, 4),
+    ),
+}
+
+
+@pytest.fixture(scope="module", params=ROBOTS)
+def engine(request: pytest.FixtureRequest) -> CompiledBackend:
+    return made(ROBOTS[request.param])
+
+
+@pytest.mark.parametrize("size", [(), (0,), (1,), (2, 3), (FEW + 5,)])
+@pytest.mark.parametrize(("ask", "tail"), WITH_OUT.values(), ids=WITH_OUT)
+def test_out(
+    engine: CompiledBackend, ask: Ask, tail: Callable[[Model], tuple[int, ...]], size: tuple[int, ...]
+) -> None:
+    given = state(engine.model, size)
+    wanted = ask(engine, *given)
+    out = np.full((*size, *tail(engine.model)), np.nan)
+    assert ask(engine, *given, out=out) is out
+    np.testing.assert_array_equal(out, wanted)
+
+
+@pytest.mark.parametrize("size", [(), (3,), (FEW + 5,)])
+@pytest.mark.parametrize(("ask", "tail"), WITH_OUT.values(), ids=WITH_OUT)
+def test_out_that_does_not_fit(
+    engine: CompiledBackend, ask: Ask, tail: Callable[[Model], tuple[int, ...]], size: tuple[int, ...]
+) -> None:
+    given = state(engine.model, size)
+    shape = (*size, *tail(engine.model))
+    locked = np.empty(shape)
+    locked.flags.writeable = False
+    for out, error in [
+        (np.empty((*shape, 1)), ShapeError),
+        (np.empty((2, *shape)), ShapeError),
+        (np.empty(shape, dtype=np.float32), DTypeError),
+        (np.empty(shape).tolist(), ArgumentError),
+        (locked, ArgumentError),
+        (np.empty((*shape[:-1], 2 * shape[-1]))[..., ::2], ArgumentError),
+    ]:
+        with pytest.raises(error, match="out"):
+            ask(engine, *given, out=out)
+
+
+@pytest.mark.parametrize("size", [(), (3,), (FEW + 5,)])
+def test_out_over_an_argument(engine: CompiledBackend, size: tuple[int, ...]) -> None:
+    """Also where the first look at the arguments finds a quaternion to be scaled."""
+    q, v, a = state(engine.model, size)
+    if engine.model.floating:
+        q[..., 3:7] *= 1.0 + 1e-9
+    wanted = engine.inverse_dynamics(q, v, a)
+    np.testing.assert_array_equal(engine.inverse_dynamics(q, v, a, out=v), wanted)
+    assert engine.inverse_dynamics(q, v, a, out=v) is v
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 8, FEW - 1, FEW, FEW + 1, 3 * FEW])
+def test_every_way_gives_the_same_bits(engine: CompiledBackend, n: int) -> None:
+    """One at a time, in the workspace, where the arrays lie, with strides, spread, by threads."""
+    q, v, a = state(engine.model, (n,))
+    whole = engine.inverse_dynamics(q, v, a)
+    for k in range(n):
+        np.testing.assert_array_equal(engine.inverse_dynamics(q[k], v[k], a[k]), whole[k])
+    doubled = [np.repeat(x, 2, axis=0)[::2] for x in (q, v, a)]
+    np.testing.assert_array_equal(engine.inverse_dynamics(*doubled), whole)
+    turned = [np.asfortranarray(x) for x in (q, v, a)]
+    np.testing.assert_array_equal(engine.inverse_dynamics(*turned), whole)
+    np.testing.assert_array_equal(engine.inverse_dynamics(q[:, None], v[:, None], a[:, None])[:, 0], whole)
+    spread = engine.inverse_dynamics(q, v[0], a[0])
+    np.testing.assert_array_equal(spread[0], whole[0])
+    np.testing.assert_array_equal(spread, engine.inverse_dynamics(q, np.tile(v[0], (n, 1)), a[:1]))
+
+
+def test_threads_change_nothing() -> None:
+    model = ROBOTS["floating"]
+    q, v, a = state(model, (20_000,))
+    answers = [made(model, threads=threads).inverse_dynamics(q, v, a) for threads in (1, 2, 5, None)]
+    for answer in answers[1:]:
+        np.testing.assert_array_equal(answer, answers[0])
+
+
+def test_a_batch_that_does_not_fit_into_memory() -> None:
+    model = chain(2)
+    q = np.broadcast_to(np.zeros(2), (10**14, 2))
+    with pytest.raises(MemoryError):
+        made(model).mass_matrix(q)

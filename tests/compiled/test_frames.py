@@ -1,0 +1,143 @@
+"""One kernel for all frames of a chain: it answers for each of them, and few kernels are made."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import numpy as np
+import pytest
+from hypothesis import given, note
+from hypothesis import strategies as st
+
+from dynx.backends import backend
+from dynx.compiled.backend import CompiledBackend
+from dynx.compiled.call import FEW
+from dynx.compiled.frames import chain_of, on_chain, place_of
+from dynx.compiled.kernels import ON_CHAINS, QUANTITIES, evaluated
+from dynx.model.mechanism import ROOT
+from dynx.rbd.jacobians import REFERENCES
+from dynx.rbd.kinematics import ancestry
+from dynx.spatial.scalar import Floats
+from dynx.testing.strategies import models, samples
+from tests.backends.robots import chain as a_chain
+from tests.closeness import Closeness, samples_at
+from tests.compiled.robots import ROBOTS, TIP, made, state
+
+each_quantity = pytest.mark.parametrize("quantity", sorted(ON_CHAINS))
+
+
+def asked(engine: Any, quantity: str, frame: str, reference: str, *given: Floats, **options: Any) -> Floats:
+    """A quantity of a frame, at q and as many of v and a as it takes."""
+    arguments = given[: len(QUANTITIES[quantity].arguments)]
+    answer: Floats = getattr(engine, quantity)(*arguments, frame, reference=reference, **options)
+    return answer
+
+
+@pytest.fixture(scope="module", params=ROBOTS)
+def engine(request: pytest.FixtureRequest) -> CompiledBackend:
+    return made(ROBOTS[request.param])
+
+
+@each_quantity
+@pytest.mark.parametrize("base", ["fixed", "floating"])
+@given(data=st.data())
+def test_any_frame_of_any_robot(
+    quantity: str, base: Literal["fixed", "floating"], data: st.DataObject
+) -> None:
+    """What is traced, evaluated on numbers, is what `dynx.rbd` gives for that frame."""
+    model = data.draw(models(base=base))
+    note(model.to_urdf())
+    mechanism, drawn = model.mechanism, data.draw(samples(model))
+    frame = data.draw(st.integers(0, len(mechanism.frames) - 1))
+    reference = REFERENCES[data.draw(st.sampled_from(sorted(REFERENCES)))]
+    coupling = mechanism.coupling
+    S = np.eye(model.nv) if coupling is None else coupling.matrix()
+    q = drawn.q if coupling is None else coupling.expand_q(drawn.q)
+    rates = [S @ drawn.v, S @ drawn.a][: len(QUANTITIES[quantity].arguments) - 1]
+    chain = chain_of(mechanism, quantity, frame, reference)
+    place = place_of(mechanism, chain, frame, reference)
+    got = on_chain(mechanism, quantity, chain, place, q, *rates).astype(float)
+    wanted = evaluated(mechanism, quantity, (frame, reference), q, *rates, tree=True)
+    if QUANTITIES[quantity].columns:
+        got, wanted = got @ S, wanted @ S
+    Closeness(samples_at(model, drawn.q, drawn.v, drawn.a)).check(quantity, got, wanted)
+
+
+@each_quantity
+@pytest.mark.parametrize("size", [(), (3,), (FEW + 5,)])
+def test_kernels_answer_for_every_frame(
+    engine: CompiledBackend, quantity: str, size: tuple[int, ...]
+) -> None:
+    model = engine.model
+    numeric = backend("reference", model)
+    given = state(model, size)
+    close = Closeness(samples_at(model, *given))
+    for frame in model.frame_names:
+        for reference in REFERENCES:
+            got, wanted = (asked(each, quantity, frame, reference, *given) for each in (engine, numeric))
+            close.check(quantity, got, wanted)
+
+
+@each_quantity
+def test_no_order_of_questions_changes_an_answer(quantity: str) -> None:
+    model = ROBOTS["floating"]
+    given = state(model, (5,))
+    questions = [(frame, reference) for frame in model.frame_names for reference in REFERENCES]
+    answers = []
+    for order in (questions, questions[::-1]):
+        engine = made(model)
+        answers.append({question: asked(engine, quantity, *question, *given) for question in order})
+    for question in questions:
+        np.testing.assert_array_equal(answers[0][question], answers[1][question])
+
+
+@each_quantity
+@pytest.mark.parametrize("reference", REFERENCES)
+def test_every_way_gives_the_same_bits(engine: CompiledBackend, quantity: str, reference: str) -> None:
+    """One at a time, as a small batch, as a large one, with strides, into `out`."""
+    given = state(engine.model, (FEW + 5,))
+    whole = asked(engine, quantity, TIP, reference, *given)
+    for n in (1, 2, 7):
+        some = asked(engine, quantity, TIP, reference, *(x[:n] for x in given))
+        np.testing.assert_array_equal(some, whole[:n])
+    one = asked(engine, quantity, TIP, reference, *(x[3] for x in given))
+    np.testing.assert_array_equal(one, whole[3])
+    strided = asked(engine, quantity, TIP, reference, *(x[::2] for x in given))
+    np.testing.assert_array_equal(strided, whole[::2])
+    if quantity == "jacobian":
+        out = np.full_like(whole, np.nan)
+        assert asked(engine, quantity, TIP, reference, *given, out=out) is out
+        np.testing.assert_array_equal(out, whole)
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_few_kernels_are_made(robot: str) -> None:
+    """One for each end of the tree, and one for each body in the Jacobian asked for most."""
+    engine, mechanism = made(ROBOTS[robot]), ROBOTS[robot].mechanism
+    given = state(engine.model)
+    for quantity in ON_CHAINS:
+        for frame in engine.model.frame_names:
+            for reference in REFERENCES:
+                asked(engine, quantity, frame, reference, *given)
+    ends = set(range(len(mechanism.bodies))) - {body.parent for body in mechanism.bodies}
+    assert len(engine._chains) == len(ON_CHAINS) * len(ends) + len(mechanism.bodies) + 1
+
+
+def test_a_chain_holds_the_body_of_its_frame() -> None:
+    mechanism = ROBOTS["fixed"].mechanism
+    for number, frame in enumerate(mechanism.frames):
+        own = chain_of(mechanism, "jacobian", number, "local_world_aligned")
+        shared = chain_of(mechanism, "frame_velocity", number, "local_world_aligned")
+        assert own.bodies == tuple(reversed(ancestry(mechanism, frame.body)))
+        assert frame.body == ROOT or frame.body in shared.bodies
+        for each in (own, shared):
+            parents = [mechanism.bodies[body].parent for body in each.bodies]
+            assert parents == [ROOT, *each.bodies[:-1]][: len(parents)]
+
+
+def test_closing_lets_go_of_the_chains() -> None:
+    engine = made(a_chain(1))
+    engine.frame_velocity(np.zeros(1), np.zeros(1), "link1")
+    assert engine._chains
+    engine.close()
+    assert not engine._chains

@@ -1,0 +1,93 @@
+"""Which kernels there are, what is folded into them, and when one is compiled anew."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import fields, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dynx.compiled import kernels as compiled_kernels
+from dynx.compiled.kernels import _fingerprint, _without_dust, compiles, tidied
+from dynx.model import Inertial, Joint, Link, Mechanism, Model, Pose
+from dynx.model.mechanism import build_mechanism
+from tests.backends.robots import chain, mixed_robot
+from tests.compiled.robots import ROBOTS, made, state
+
+
+def test_what_grows_too_long_is_not_compiled() -> None:
+    assert compiles(chain(30).mechanism, "mass_matrix")
+    assert not compiles(chain(60).mechanism, "mass_matrix")
+    assert compiles(chain(60).mechanism, "inverse_dynamics")
+    assert compiles(chain(9).mechanism, "inertial_regressor")
+    assert not compiles(chain(20).mechanism, "inertial_regressor")
+
+
+def test_dust_is_what_rounding_left() -> None:
+    """Right angles become exact, and nothing else changes."""
+    pose = Pose((0.1, 0.2, 0.3), (np.pi / 2, 0.0, -np.pi / 2))
+    links = [Link("a"), Link("b", Inertial(1.0, Pose((0.1, 0.0, 0.0)), 0.1, 0.0, 0.0, 0.1, 0.0, 0.1))]
+    model = Model.build("square", links, [Joint("j", "revolute", "a", "b", pose)]).with_frame("f", "b", pose)
+    before, after = model.mechanism, tidied(model.mechanism)
+    assert np.count_nonzero(before.bodies[0].R) > 3
+    for R in (after.bodies[0].R, after.frames[-1].R):
+        assert np.count_nonzero(R) == 3
+        np.testing.assert_array_equal(np.abs(R[R != 0.0]), 1.0)
+    np.testing.assert_array_equal(tidied(after).bodies[0].R, after.bodies[0].R)
+    oblique = mixed_robot().mechanism
+    for old, new in zip(oblique.bodies, _without_dust(oblique).bodies, strict=True):
+        np.testing.assert_array_equal(old.R, new.R)
+
+
+def _variants(mechanism: Mechanism) -> list[Mechanism]:
+    """Every number of the mechanism changed by its last bit, one after another."""
+    found = [
+        replace(mechanism, gravity=np.nextafter(mechanism.gravity, 99.0)),
+        replace(mechanism, floating=not mechanism.floating),
+        replace(mechanism, coupling=None),
+        replace(mechanism, bodies=mechanism.bodies[:-1]),
+        replace(mechanism, frames=mechanism.frames[:-1]),
+        replace(mechanism, root=replace(mechanism.root, mass=mechanism.root.mass + 1.0)),
+    ]
+    body, frame = mechanism.bodies[1], mechanism.frames[1]
+    inertia = body.inertia
+    changed_bodies = [replace(body, revolute=not body.revolute), replace(body, parent=-1)]
+    changed_bodies += [
+        replace(body, **{name: np.nextafter(getattr(body, name), 99.0)}) for name in ("R", "p", "axis")
+    ]
+    for name in (field.name for field in fields(inertia)):
+        changed = replace(inertia, **{name: np.nextafter(getattr(inertia, name), 99.0)})
+        changed_bodies.append(replace(body, inertia=changed))
+    first, *rest = mechanism.bodies
+    found += [replace(mechanism, bodies=(first, changed, *rest[1:])) for changed in changed_bodies]
+    for name in ("R", "p"):
+        moved = replace(frame, **{name: np.nextafter(getattr(frame, name), 99.0)})
+        found.append(replace(mechanism, frames=(mechanism.frames[0], moved, *mechanism.frames[2:])))
+    coupling = mechanism.coupling
+    assert coupling is not None
+    found.append(replace(mechanism, coupling=replace(coupling, offset=tuple(x + 1 for x in coupling.offset))))
+    found.append(replace(mechanism, coupling=replace(coupling, scale=tuple(2 * x for x in coupling.scale))))
+    return found
+
+
+def test_every_number_of_the_robot_is_in_the_key() -> None:
+    model = ROBOTS["mimic"]
+    variants = [model.mechanism, *_variants(model.mechanism)]
+    assert len({_fingerprint(variant) for variant in variants}) == len(variants)
+    assert _fingerprint(build_mechanism(model)) == _fingerprint(build_mechanism(model))
+
+
+def test_warm_from_the_cache_nothing_is_traced(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setitem(os.environ, "DYNX_CACHE_DIR", str(tmp_path))
+    monkeypatch.delenv("DYNX_CACHE", raising=False)
+    model = ROBOTS["floating"]
+    q, v, a = state(model)
+    cold = made(model).inverse_dynamics(q, v, a)
+
+    def traced(*_: object) -> None:
+        raise AssertionError("traced again")
+
+    monkeypatch.setattr(compiled_kernels, "trace", traced)
+    np.testing.assert_array_equal(made(model).inverse_dynamics(q, v, a), cold)

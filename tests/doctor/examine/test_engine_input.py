@@ -1,0 +1,30 @@
+"""What engines are given of a file: all that dynamics needs, in the encoding of the user."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from dynx.doctor.examine.engine_input import without_meshes, written
+from dynx.model.xml.source import XmlSource
+from tests.rules.documents import case_of, link
+
+BOX = '<collision><geometry><box size="1 1 1"/></geometry></collision>'
+MESH = '<{}><geometry><mesh filename="none.stl"/></geometry></{}>'
+
+
+def test_shapes_that_weigh_stay_and_files_that_may_be_missing_go() -> None:
+    seen = '<visual><geometry><box size="2 2 2"/></geometry></visual>'
+    meshes = [MESH.format(tag, tag) for tag in ("visual", "collision")]
+    case = case_of(link("a", BOX, meshes[1], seen), link("b", meshes[0]), MESH.format("gazebo", "gazebo"))
+    kept = case_of(link("a", BOX), link("b"), MESH.format("gazebo", "gazebo"))
+    assert without_meshes(case.source).text == kept.source.text
+
+
+def test_a_file_is_written_as_it_was_read_and_is_gone_afterwards(tmp_path: Path) -> None:
+    data = '<?xml version="1.0" encoding="iso-8859-1"?><robot name="é"><link name="ü"/></robot>'.encode(
+        "latin-1"
+    )
+    with written(without_meshes(XmlSource(data))) as path:
+        assert path.read_bytes() == data
+        assert path.suffix == ".urdf"
+    assert not path.exists()

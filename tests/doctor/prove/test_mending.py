@@ -1,0 +1,59 @@
+"""Which remedies are applied, and what is said of them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from dynx.agreement.tolerances import BAR
+from dynx.doctor.examine.examination import Laboratory
+from dynx.doctor.prove.mending import all_but, mend, place
+from dynx.loaded import installed_engines
+from dynx.rules import find_rule
+from tests.doctor.prove.test_attribution import Replaced
+from tests.rules.documents import case_of, link
+from tests.rules.trap_cases import trap
+
+
+@pytest.mark.parametrize(("rule_id", "choice"), [("DX509", "drop"), ("DX511", "direct"), ("DX514", "full")])
+def test_bad_practice_is_mended_where_the_user_chose_so(rule_id: str, choice: str) -> None:
+    kept, rule = trap(rule_id), find_rule(rule_id)
+    assert mend(kept).case.source.data == kept.source.data
+    mended = mend(trap(rule_id, **{rule_id: choice}))
+    assert not rule.detect(mended.case)
+    assert f"{rule_id}={choice}: {rule.choices[choice]}" in mended.choices[0]
+
+
+class Opinion(Replaced):
+    """A rule about practice that would edit if it were asked."""
+
+    kind = "practice"
+
+
+def test_practice_is_left_alone_whatever_its_rule_could_do() -> None:
+    rule, case = Opinion("old", "new"), case_of(link("base"), "<!-- old -->")
+    assert mend(case, [rule]).case is case
+    asked = mend(replace(case, choices={rule.id: "edit"}), [rule])
+    assert "<!-- new -->" in asked.case.source.text
+
+
+def test_a_change_of_the_physics_is_said() -> None:
+    replaced = mend(trap("DX103", DX103="nearest"))
+    assert [said for said in replaced.choices if said.startswith("DX103 changed the physics of the robot")]
+    assert not [said for said in mend(trap("DX101")).choices if "physics" in said]
+
+
+@pytest.mark.parametrize("rule_id", ["DX103", "DX104"])
+def test_the_numbers_of_the_file_are_kept_by_calls(rule_id: str) -> None:
+    kept = mend(trap(rule_id, **{rule_id: "keep"}))
+    engines = [engine for engine in ("pinocchio", "pybullet", "drake") if engine in installed_engines()]
+    after = Laboratory(engines, 3, 0).examine(kept.case)
+    assert all(after.worst(engine) <= BAR for engine in engines)
+
+
+def test_a_place_that_is_left_out_stays_as_it_is() -> None:
+    case, rule = trap("DX101"), find_rule("DX101")
+    (found,) = rule.detect(case)
+    assert mend(case, wanted=all_but({place(rule, found)})).case.source.data == case.source.data
+    assert not rule.detect(mend(case).case)

@@ -1,0 +1,202 @@
+"""What is Drake's own in the backend `drake`; `tests.contract` asks what all backends must answer."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dynx.backends import backend_class, installed_backends
+from dynx.errors import ClosedError, EngineError, NotInstalledError, SingularMassMatrixError
+from dynx.model import Inertial, Joint, Link, Model, Pose
+from dynx.model.elements import JointType
+from dynx.reference.backend import ReferenceBackend
+from dynx.spatial.scalar import Floats
+from tests.backends.independence import check_answers_belong_to_the_caller
+from tests.backends.robots import all_quantities, assert_close, assert_same, chain, mixed_robot, motion
+from tests.closeness import Closeness, samples_at
+
+pytest.importorskip("pydrake")
+from dynx.engines.drake.backend import DrakeBackend
+
+BASES = ("fixed", "floating")
+BODY = Inertial(1.5, Pose((0.1, 0.2, 0.3)), 0.5, 0.1, 0.0, 0.6, 0.1, 0.7)
+STRANGE = {
+    "negative moment": replace(BODY, iyy=-3.0, izz=-3.0),
+    "negative mass": replace(BODY, mass=-0.25),
+    "tiny mass": Inertial(1e-20, Pose((0.4, 0.5, 0.1)), 1e-20, 0.0, 0.0, 1e-20, 0.0, 1e-20),
+    "vanishing mass": Inertial(5e-324, Pose((0.4, 0.5, 0.1)), 0.5, 0.0, 0.0, 0.6, 0.2, 0.7),
+    "moment without mass": Inertial(0.0, Pose((0.4, 0.5, 0.1)), 0.5, 0.0, 0.0, 0.6, 0.2, 0.7),
+    "nothing": Inertial(),
+}
+
+
+def pair(first: Inertial, second: Inertial, base: str, kind: JointType = "revolute") -> Model:
+    """Two links, each on a joint, on a base of 2 kg."""
+    root = Inertial(2.0, Pose((0.3, 0.2, 0.1)), 1.0, 0.0, 0.0, 1.0, 0.0, 1.0)
+    links = [Link("root", root), Link("first", first), Link("second", second)]
+    joints = [
+        Joint("turn", "revolute", "root", "first", Pose((0.1, 0.2, 0.3), (0.4, 0.5, 0.6))),
+        Joint("next", kind, "first", "second", Pose((0.3, -0.2, 0.1), (0.1, 0.2, 0.3)), (0.0, 0.6, 0.8)),
+    ]
+    model = Model.build("pair", links, joints, gravity=(0.3, -0.7, -9.81))
+    return model.with_base("floating" if base == "floating" else "fixed")
+
+
+@pytest.mark.parametrize("base", BASES)
+@pytest.mark.parametrize("mimic", [False, True])
+def test_it_answers_as_the_reference_does(base: str, mimic: bool) -> None:
+    model = mixed_robot(base, mimic=mimic)
+    sample = motion(model)
+    condition = float(np.linalg.cond(ReferenceBackend(model).mass_matrix(sample[0])))
+    expected = all_quantities(ReferenceBackend(model), *sample)
+    for quantity, answer in all_quantities(DrakeBackend(model), *sample).items():
+        size = condition if quantity == "forward_dynamics" else 10.0
+        assert_close(answer, expected[quantity], size, what=quantity)
+
+
+@pytest.mark.parametrize("base", BASES)
+@pytest.mark.parametrize("kind", ["revolute", "prismatic", "fixed"])
+@pytest.mark.parametrize("strange", STRANGE)
+def test_inertias_that_no_body_can_have_are_used_as_they_stand(
+    strange: str, kind: JointType, base: str
+) -> None:
+    for model in (pair(BODY, STRANGE[strange], base, kind), pair(STRANGE[strange], BODY, base, kind)):
+        sample = motion(model)
+        expected = all_quantities(ReferenceBackend(model), *sample, forward_dynamics=False)
+        for quantity, answer in all_quantities(DrakeBackend(model), *sample, forward_dynamics=False).items():
+            assert_close(answer, expected[quantity], 10.0, what=quantity)
+
+
+def indefinite() -> Model:
+    """A robot whose mass matrix is regular and neither positive nor negative."""
+    return pair(replace(BODY, ixx=-0.9), BODY, "floating")
+
+
+@pytest.mark.parametrize(
+    "model",
+    [
+        indefinite(),
+        *(pair(BODY, STRANGE["negative mass"], base) for base in BASES),
+        *(pair(BODY, STRANGE["moment without mass"], base) for base in BASES),
+    ],
+    ids=["indefinite", "negative-fixed", "negative-floating", "massless-fixed", "massless-floating"],
+)
+def test_forward_dynamics_is_found_whatever_the_inertia(model: Model) -> None:
+    q, v, tau = motion(model)
+    a = DrakeBackend(model).forward_dynamics(q, v, tau)
+    near = Closeness(samples_at(model, q, v, a, tau))
+    near.check_solves(a, ReferenceBackend(model).inverse_dynamics(q, v, a), tau)
+
+
+def test_drake_itself_refuses_an_indefinite_mass_matrix() -> None:
+    model = indefinite()
+    q, v, tau = motion(model)
+    ours = DrakeBackend(model)
+    context, R = ours._moving(q, v)
+    ours._torque.FixValue(context, ours._coordinates.forces(R, tau))
+    with pytest.raises(RuntimeError, match="not positive-definite"):
+        ours._acceleration.Eval(context)
+
+
+def test_no_acceleration_where_nothing_has_inertia() -> None:
+    model = pair(BODY, Inertial(), "fixed")
+    with pytest.raises(SingularMassMatrixError, match="'next'"):
+        DrakeBackend(model).forward_dynamics(*motion(model))
+
+
+@pytest.mark.parametrize("n", [0, 1])
+@pytest.mark.parametrize("base", BASES)
+def test_a_robot_with_one_joint_or_none_has_arrays_of_the_usual_shapes(base: str, n: int) -> None:
+    model = chain(n).with_base("floating" if base == "floating" else "fixed")
+    sample = motion(model)
+    answers = all_quantities(DrakeBackend(model), *sample)
+    for quantity, expected in all_quantities(ReferenceBackend(model), *sample).items():
+        assert_close(answers[quantity], expected, 10.0, what=quantity)
+
+
+def test_names_of_the_engine_are_free_for_robots() -> None:
+    names = ("world", "WorldBody", "0")
+    joints = [Joint("world_welds_to_0", "revolute", "world", "WorldBody")]
+    joints.append(Joint("base", "revolute", "WorldBody", "0"))
+    model = Model.build("WorldModelInstance", [Link(name, BODY) for name in names], joints, base="floating")
+    sample = motion(model)
+    answers = all_quantities(DrakeBackend(model), *sample)
+    for quantity, expected in all_quantities(ReferenceBackend(model), *sample).items():
+        assert_close(answers[quantity], expected, 100.0, what=quantity)
+
+
+@pytest.mark.parametrize("base", BASES)
+def test_no_order_of_calls_changes_an_answer_and_answers_are_the_callers(base: str) -> None:
+    check_answers_belong_to_the_caller(DrakeBackend(mixed_robot(base)))
+
+
+def test_each_thread_has_a_context_of_its_own() -> None:
+    model = mixed_robot("floating")
+    engine = DrakeBackend(model)
+    with ThreadPoolExecutor(1) as pool:
+        other = pool.submit(lambda: engine._workspace.context).result()
+    assert other is not engine._workspace.context
+    samples = [motion(model, seed) for seed in range(16)]
+    expected = [all_quantities(engine, *sample) for sample in samples]
+    with ThreadPoolExecutor(4) as pool:
+        for answers, wanted in zip(
+            pool.map(lambda sample: all_quantities(engine, *sample), samples), expected, strict=True
+        ):
+            assert_same(answers, wanted)
+
+
+def test_a_call_that_close_overtakes_says_so() -> None:
+    engine = DrakeBackend(chain(2))
+    engine.close()
+    with pytest.raises(ClosedError, match="during a call"):
+        engine._mass_matrix(np.zeros(2))
+
+
+@pytest.mark.parametrize("raised", [ValueError, RuntimeError, SystemExit])
+def test_what_the_engine_raises_becomes_an_engine_error(raised: type[BaseException]) -> None:
+    class Broken:
+        def __getattr__(self, name: str) -> Callable[..., Any]:
+            def fail(*_: object) -> None:
+                raise raised("Failure at some.cc:7\nsecond line")
+
+            return fail
+
+    engine = DrakeBackend(chain(2))
+    engine._plant = Broken()
+    with pytest.raises(EngineError, match=r"chain: \w+: Failure at some.cc:7 second line$") as caught:
+        engine.mass_matrix(np.zeros(2))
+    assert type(caught.value.__cause__) is raised
+
+
+def test_without_validation_a_wrong_shape_that_the_engine_notices_is_still_an_engine_error() -> None:
+    engine = DrakeBackend(chain(2), validate=False)
+    wrong: Floats = np.zeros(3)
+    with pytest.raises(EngineError, match="drake failed on chain"):
+        engine.inverse_dynamics(wrong, np.zeros(2), np.zeros(2))
+
+
+def test_a_missing_engine_is_named_with_what_brings_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pydrake.math", None)
+    for module in [name for name in sys.modules if name.startswith("dynx.") and "drake" in name]:
+        monkeypatch.delitem(sys.modules, module)
+    with pytest.raises(NotInstalledError, match=r"the engine 'drake' needs .*pip install 'dynx\[drake\]'"):
+        backend_class("drake")
+    assert "drake" not in installed_backends()
+
+
+def test_importing_says_nothing_and_leaves_the_log_as_it_was() -> None:
+    program = (
+        "import logging; root = logging.getLogger(); before = (root.level, root.handlers[:])\n"
+        "import dynx.engines.drake.backend\n"
+        "assert (root.level, root.handlers) == before\n"
+        "assert not logging.getLogger('drake').handlers"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert (done.stdout, done.stderr) == ("", "")

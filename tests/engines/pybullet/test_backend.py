@@ -1,0 +1,136 @@
+"""The answers of PyBullet are those of the reference, at every attitude, gravity, speed and size."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dynx.engines.pybullet.backend import PyBulletBackend
+from dynx.engines.pybullet.client import MAX_JOINTS
+from dynx.errors import EngineLimitError
+from dynx.model import JointDynamics, Limits, Link, Model, Pose
+from dynx.model.loading import load
+from dynx.model.model import Base
+from dynx.reference.backend import ReferenceBackend
+from dynx.spatial.so3 import quat_from_rotation, rotation_from_rpy
+from dynx.testing.strategies import models
+from tests.backends.robots import BASES, BOX, all_quantities, assert_close, chain, mixed_robot, motion, pair
+from tests.closeness import Closeness, samples_at
+from tests.engines.pybullet.robots import assert_agrees, assert_solves
+
+pytest.importorskip("pybullet")
+
+
+# -- the same answers ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("mimic", [False, True])
+@pytest.mark.parametrize("base", BASES)
+def test_every_quantity_is_that_of_the_reference(base: Base, mimic: bool) -> None:
+    model = mixed_robot(base, mimic=mimic)
+    sample = motion(model, size=(5,))
+    engine = PyBulletBackend(model)
+    answers = all_quantities(engine, *sample)
+    assert not engine.ballast
+    for quantity, expected in all_quantities(ReferenceBackend(model), *sample).items():
+        size = float(np.linalg.cond(engine.mass_matrix(sample[0])).max())
+        assert_close(answers[quantity], expected, size if quantity == "forward_dynamics" else 1.0, quantity)
+
+
+@given(models(), st.integers(0, 9))
+def test_random_robots_agree(model: Model, seed: int) -> None:
+    assert_agrees(model, seed, samples=1)
+
+
+@given(models(physical=False), st.integers(0, 9))
+def test_inertias_that_no_body_can_have_agree(model: Model, seed: int) -> None:
+    # In the max norm: axes exist about which such a body has moments that cancel to nothing.
+    q, v, a = motion(model, seed)
+    reference = ReferenceBackend(model)
+    with PyBulletBackend(model) as engine:
+        assert_close(engine.inverse_dynamics(q, v, a), reference.inverse_dynamics(q, v, a))
+        assert_close(engine.mass_matrix(q), reference.mass_matrix(q))
+
+
+@given(models(solvable=True), st.integers(0, 9))
+def test_forward_dynamics_of_random_robots_agrees(model: Model, seed: int) -> None:
+    assert_solves(model, seed)
+
+
+@pytest.mark.parametrize("base", BASES)
+@pytest.mark.parametrize(
+    "name", ["romeo_laas_small", "allegro_right_hand", "hyq", "icub", "pr2", "quadrotor_base", "iris_simple"]
+)
+def test_robots_that_bullet_reads_otherwise(name: str, base: Base) -> None:
+    assert_agrees(load(name, base=base), samples=1)
+
+
+# -- attitudes, gravity, the stepper -----------------------------------------------------------------
+
+
+@pytest.mark.parametrize("pitch", [0.3, np.pi / 2 - 1e-9, np.pi / 2, -np.pi / 2])
+def test_attitudes_about_several_axes_and_at_the_poles(pitch: float) -> None:
+    model = mixed_robot("floating")
+    q, v, a = motion(model)
+    q[3:7] = quat_from_rotation(rotation_from_rpy(np.array([0.7, pitch, -1.1])))
+    with PyBulletBackend(model) as engine:
+        expected = ReferenceBackend(model).inverse_dynamics(q, v, a)
+        assert_close(engine.inverse_dynamics(q, v, a), expected)
+    near = Closeness(samples_at(model, q, v, tau=a))
+    with PyBulletBackend(model) as engine:
+        found = engine.forward_dynamics(q, v, a)
+    near.check_solves(found, ReferenceBackend(model).inverse_dynamics(q, v, found), a)
+
+
+@pytest.mark.parametrize("base", BASES)
+def test_the_stepper_has_no_clamp_limits_motors_or_damping(base: Base) -> None:
+    model = pair(BOX, BOX, base)
+    joints = [
+        replace(joint, limits=Limits(-0.1, 0.1, 1.0, 1.0), dynamics=JointDynamics(3.0, 2.0, 0.0))
+        for joint in model.joints
+    ]
+    # Speeds beyond Bullet's clamp of 100.
+    assert_solves(replace(model, joints=tuple(joints)), faster=1e3)
+    assert_solves(model, faster=1e3)
+
+
+def test_jacobian_of_a_frame_off_its_link() -> None:
+    model = load("ur5").with_frame("tip", "tool0", Pose((0.1, -0.2, 0.3), (0.4, 0.5, 0.6)))
+    assert_agrees(model)
+
+
+# -- size --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("base", BASES)
+def test_as_many_joints_as_bullet_answers_for(base: Base) -> None:
+    model = chain(MAX_JOINTS).with_base(base)
+    q, v, a = motion(model)
+    reference = ReferenceBackend(model)
+    with PyBulletBackend(model) as engine:
+        assert_close(engine.forward_kinematics(q), reference.forward_kinematics(q), size=MAX_JOINTS)
+        tau = engine.inverse_dynamics(q, v, a)
+        near = Closeness(samples_at(model, q, v, a, tau))
+        near.check("inverse_dynamics", tau, reference.inverse_dynamics(q, v, a))
+        near.check("mass_matrix", engine.mass_matrix(q), reference.mass_matrix(q))
+        found = engine.forward_dynamics(q, v, tau)
+        near.check_solves(found, reference.inverse_dynamics(q, v, found), tau)
+
+
+@pytest.mark.parametrize("n", [MAX_JOINTS + 1, 129, 200])
+def test_more_joints_are_refused(n: int) -> None:
+    with pytest.raises(EngineLimitError, match=f"chain has {n} moving joints"):
+        PyBulletBackend(chain(n))
+
+
+@pytest.mark.parametrize("base", BASES)
+def test_a_robot_without_joints(base: Base) -> None:
+    model = Model.build("stone", [Link("stone", BOX)], [], base=base)
+    sample = motion(model)
+    with PyBulletBackend(model) as engine:
+        for quantity, expected in all_quantities(ReferenceBackend(model), *sample).items():
+            assert_close(all_quantities(engine, *sample)[quantity], expected, what=quantity)

@@ -1,0 +1,87 @@
+"""Files that would crash PyBullet are refused with the reason, without asking it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from dynx.engines.pybullet.as_loaded import LoadedPyBullet
+from dynx.engines.pybullet.file_checks import LONGEST_NAME, MAX_JOINTS, require_harmless
+from dynx.errors import EngineError
+from dynx.model import Joint, Link, Model
+from tests.backends.robots import chain
+from tests.loaded.files import loaded
+
+bullet = pytest.importorskip("pybullet")
+
+TEXT = chain(2).to_urdf()
+CHANGES: dict[str, Callable[[str], str]] = {
+    "a <joint> without a name": lambda text: text.replace(' name="joint1"', ""),
+    "a <link> without a name": lambda text: text.replace('link name="link2"', 'link name=""'),
+    "'%n', has a %": lambda text: text.replace("link2", "%n"),
+    "'a%sb', has a %": lambda text: text.replace("joint1", "a%sb"),
+    "'100%', has a %": lambda text: text.replace('"chain"', '"100%"'),
+    f"has {LONGEST_NAME + 1} characters": lambda text: text.replace("joint1", "j" * (LONGEST_NAME + 1)),
+    "has 600 characters": lambda text: text.replace("link1", "ü" * 600),
+    "joint 'joint1' has no type": lambda text: text.replace('name="joint1" type="revolute"', 'name="joint1"'),
+    "its <joint> elements are not those": lambda text: text.replace("joint1", "joint0"),
+    "its <link> elements are not those": lambda text: text.replace("<robot ", '<robot version="1" ').replace(
+        "  <joint", '  <link name="alone"/>\n  <joint', 1
+    ),
+    "its <joint> elements are not those of the tree": lambda text: text.replace(
+        '<parent link="link1"/>', '<parent link="link2"/>'
+    ),
+    "document type": lambda text: text.replace("<robot", "<!DOCTYPE robot><robot", 1),
+    "not complete XML": lambda text: text.replace("</robot>", ""),
+}
+
+
+@pytest.mark.parametrize("reason", CHANGES)
+def test_what_crashes_it_is_not_handed_over(reason: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bullet, "loadURDF", lambda *args, **options: pytest.fail("it was asked"))
+    text = CHANGES[reason](TEXT)
+    assert text != TEXT
+    with (
+        pytest.raises(EngineError, match="pybullet is not given chain") as caught,
+        loaded(LoadedPyBullet, chain(2), text),
+    ):
+        pass
+    assert reason in str(caught.value)
+
+
+def test_what_is_no_file_is_not_handed_over(tmp_path: Path) -> None:
+    for path in (tmp_path, tmp_path / "none.urdf"):
+        with pytest.raises(EngineError, match="no regular file"):
+            LoadedPyBullet(path, chain(2))
+
+
+def test_names_at_the_bound_are_loaded() -> None:
+    first, second, joint = "a" * LONGEST_NAME, "b" * LONGEST_NAME, "j" * LONGEST_NAME
+    model = Model.build("long", [Link(first), Link(second)], [Joint(joint, "revolute", first, second)])
+    with loaded(LoadedPyBullet, model) as robot:
+        assert robot.describe().links.keys() == {first, second}
+
+
+def test_frames_that_dynx_added_count_as_links(tmp_path: Path) -> None:
+    model = chain(2).with_frame("tip", "link2")
+    path = tmp_path / "robot.urdf"
+    path.write_text(model.to_urdf())
+    require_harmless(path, model)
+
+
+def test_joints_beyond_those_it_answers_for_are_refused() -> None:
+    with (
+        pytest.raises(EngineError, match=f"has {MAX_JOINTS + 1} joints, fixed ones included"),
+        loaded(LoadedPyBullet, chain(MAX_JOINTS + 1)),
+    ):
+        pass
+
+
+def test_joints_that_it_makes_something_else_of_are_named() -> None:
+    model = chain(2)
+    for kind, word in (("floating", "fixed"), ("planar", "planar"), ("spherical", "spherical")):
+        text = model.to_urdf().replace('name="joint1" type="revolute"', f'name="joint1" type="{kind}"')
+        with pytest.raises(EngineError, match=f"'joint1' .{word}"), loaded(LoadedPyBullet, model, text):
+            pass

@@ -1,0 +1,110 @@
+"""The replay of PyBullet's loader and of its checks, against PyBullet."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from dynx.engines.pybullet.inertia_checks import diagonalisation_error, read_by_bullet, tree_may_refuse
+from dynx.engines.pybullet.library import bullet
+from dynx.engines.silence import silence
+from dynx.model.elements import Inertial, Pose
+from dynx.rules.case import Case
+from dynx.rules.inertia.edits import with_inertials
+from dynx.spatial.so3 import rotation_from_rpy
+from dynx.testing.strategies import inertials
+from tests.rules.documents import case_of, joint, link
+
+bodies = inertials("any").map(lambda inertial: inertial or Inertial(1.0, ixx=1.0, iyy=1.0, izz=1.0))
+coordinates = st.floats(-1.0, 1.0)
+
+
+def arm(inertial: Inertial) -> Case:
+    case = case_of(link("base"), link("arm"), joint("shoulder", "base", "arm"))
+    return with_inertials(case, {"arm": inertial})
+
+
+class Bullet:
+    """A client in which one robot after the other is loaded from one file."""
+
+    def __init__(self, folder: Path) -> None:
+        self.engine = bullet()
+        self.client = self.engine.connect(self.engine.DIRECT)
+        self.path = folder / "robot.urdf"
+        self.engine.setPhysicsEngineParameter(enableFileCaching=0, physicsClientId=self.client)
+
+    def load(self, case: Case) -> int:
+        self.path.write_text(case.source.text, encoding="utf-8")
+        with silence():
+            self.engine.resetSimulation(physicsClientId=self.client)
+            flags = self.engine.URDF_USE_INERTIA_FROM_FILE
+            body = self.engine.loadURDF(
+                str(self.path), useFixedBase=True, flags=flags, physicsClientId=self.client
+            )
+        return int(body)
+
+    def moments(self, case: Case) -> Any:
+        return self.engine.getDynamicsInfo(self.load(case), 0, physicsClientId=self.client)[2]
+
+    def refuses(self, case: Case) -> bool:
+        body = self.load(case)
+        try:
+            with silence():
+                self.engine.calculateMassMatrix(body, [0.0], physicsClientId=self.client)
+        except (SystemError, self.engine.error):
+            return True
+        return False
+
+
+@pytest.fixture(scope="module")
+def engine(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    client = Bullet(tmp_path_factory.mktemp("bullet"))
+    yield client
+    client.engine.disconnect(client.client)
+
+
+@given(inertial=bodies)
+def test_the_loader_is_replayed_to_the_last_bit(engine: Bullet, inertial: Inertial) -> None:
+    expected = read_by_bullet(inertial)
+    held = engine.moments(arm(inertial))
+    assert list(held) == ([0.0] * 3 if expected.zeroed else expected.moments.tolist())
+
+
+@given(st.tuples(coordinates, coordinates, coordinates), st.floats(0.1, 3.0), st.sampled_from((0.0, 0.1)))
+def test_what_the_tree_refuses_was_foreseen(
+    engine: Bullet, center: tuple[float, float, float], mass: float, moment: float
+) -> None:
+    # A point or a rod: the inertia about the origin has a moment of zero, or a sum of equal sides.
+    inertial = Inertial(mass, Pose(center), ixx=moment, iyy=moment)
+    if engine.refuses(arm(inertial)):
+        assert tree_may_refuse(inertial, welded=False)
+
+
+@settings(suppress_health_check=[HealthCheck.filter_too_much])
+@given(inertials("solid").map(lambda inertial: inertial or Inertial()))
+def test_a_solid_body_gives_no_cause(inertial: Inertial) -> None:
+    assert not read_by_bullet(inertial).zeroed
+    assert not tree_may_refuse(inertial, welded=False)
+
+
+def test_the_diagonalisation_is_roughest_where_moments_are_nearly_equal() -> None:
+    rough = Inertial(1.0, ixx=0.025, iyy=0.022, izz=0.025, ixy=-3e-5, ixz=-1e-5)
+    assert 1e-6 < diagonalisation_error(rough) < 3e-6
+    assert diagonalisation_error(Inertial(1.0, ixx=0.025, iyy=0.022, izz=0.025)) == 0.0
+    R = rotation_from_rpy(np.array([0.1, 0.2, 0.3]))
+    tensor = R @ np.diag([0.01, 0.02, 0.025]) @ R.T
+    turned = Inertial(
+        1.0,
+        ixx=float(tensor[0, 0]),
+        iyy=float(tensor[1, 1]),
+        izz=float(tensor[2, 2]),
+        ixy=float(tensor[0, 1]),
+        ixz=float(tensor[0, 2]),
+        iyz=float(tensor[1, 2]),
+    )
+    assert diagonalisation_error(turned) < 1e-9

@@ -1,0 +1,295 @@
+"""A description is read as it is meant, an untidy one too, with a note where it was not plain."""
+
+from __future__ import annotations
+
+import math
+import time
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dynx.errors import ModelError, UnsupportedFeatureError
+from dynx.model import JointDynamics, Limits, Mimic, Model, Pose
+from dynx.model.loading import load
+from dynx.model.urdf.values import MAX_NAME
+from dynx.testing.strategies import models, urdf_text
+from tests.model.descriptions import INERTIAL, chain, joint, link, robot
+
+
+def messages(model: Model) -> str:
+    return "\n".join(str(note) for note in model.notes)
+
+
+def test_everything_that_matters_is_read() -> None:
+    text = robot(
+        f'<link name="a">{INERTIAL}</link><link name="b"/><link name="c"/>'
+        '<joint name="one" type="prismatic"><origin xyz="1 2 3" rpy=".1 -.2 3e-1"/><parent link="a"/>'
+        '<child link="b"/><axis xyz="0 -1 0"/><limit lower="-1" upper="2" velocity="3" effort="4"/>'
+        '<dynamics damping="5" friction="6" armature="7"/></joint>'
+        '<joint name="two" type="continuous"><parent link="b"/><child link="c"/>'
+        '<mimic joint="one" multiplier="8" offset="9"/></joint>'
+    )
+    model = load(text)
+    inertial = model.inertial("a")
+    assert (inertial.mass, inertial.origin) == (2.5, Pose((0.1, 0.2, 0.3), (0.4, 0.5, 0.6)))
+    assert (inertial.ixx, inertial.iyy, inertial.izz) == (0.03, 0.04, 0.05)
+    assert (inertial.ixy, inertial.ixz, inertial.iyz) == (0.001, 0.002, 0.003)
+    one, two = model.joints
+    assert (one.type, one.parent, one.child) == ("prismatic", "a", "b")
+    assert one.origin == Pose((1.0, 2.0, 3.0), (0.1, -0.2, 0.3))
+    assert one.axis == (0.0, -1.0, 0.0)
+    assert one.limits == Limits(-1.0, 2.0, 3.0, 4.0)
+    assert one.dynamics == JointDynamics(5.0, 6.0, 7.0)
+    assert (two.type, two.mimic, two.axis) == ("continuous", Mimic("one", 8.0, 9.0), (1.0, 0.0, 0.0))
+    assert model.name == "test"
+    assert [note.message for note in model.notes] == [
+        "link 'b' has no <inertial>, so no mass, but 'one' moves it",
+        "link 'c' has no <inertial>, so no mass, but 'two' moves it",
+    ]
+
+
+LIMIT = '<limit lower="-1" upper="2" velocity="1" effort="1"/>'
+
+
+def test_the_longest_chain_and_the_longest_mimic_chain_are_read_quickly() -> None:
+    start = time.perf_counter()
+    assert load(chain(10_000)).nq == 9_999
+    lines = chain(10_000).splitlines()
+    following = [
+        line.replace("</joint>", f'<mimic joint="j{k + 1}"/></joint>') if k < 9_998 else line
+        for k, line in enumerate(lines[10_001:-1])
+    ]
+    model = load("\n".join([*lines[:10_001], *following, lines[-1]]))
+    assert model.joint_names == ("j9998",)
+    assert time.perf_counter() - start < 20.0
+
+
+def test_a_name_of_the_greatest_length_is_read() -> None:
+    name = "x" * MAX_NAME
+    assert load(robot(f'<link name="{name}"/>')).root == name
+
+
+PLAIN = load(joint('<origin xyz="1 2 3" rpy="0.1 0.2 0.3"/><axis xyz="0 0 1"/>'))
+UNTIDY: dict[str, tuple[str, str]] = {
+    "undeclared prefixes": ('<drake:x y:z="1"/>', "unknown element <drake:x> in <joint> was ignored"),
+    "an unknown element": ("<speed_of_light c='3'/>", "unknown element <speed_of_light>"),
+    "comments": ("<!-- <axis xyz='1 0 0'/> -->", ""),
+    "sensor calibration": ("<calibration rising='0'/><safety_controller k_velocity='1'/>", ""),
+    "text between": ("stray text", ""),
+    "a second axis": ("<axis xyz='1 0 0'/>", "<joint> has 2 <axis>; the first is used"),
+}
+
+
+@pytest.mark.parametrize("case", UNTIDY)
+def test_an_untidy_joint_is_read_as_meant(case: str) -> None:
+    inside, note = UNTIDY[case]
+    model = load(joint(f'<origin xyz="1 2 3" rpy="0.1 0.2 0.3"/><axis xyz="0 0 1"/>{inside}'))
+    assert model == PLAIN
+    extra = set(messages(model).splitlines()) - set(messages(PLAIN).splitlines())
+    assert (note in "\n".join(extra)) if note else not extra
+
+
+@pytest.mark.parametrize(
+    "vector",
+    [
+        "1 2 3",
+        " 1  2 3 ",
+        "1\t2\t3",
+        "1\n 2\r\n3",
+        "1&#10;2&#9;3",
+        "+1 2. 3.0e0",
+        "01 2e+0 .3E1",
+        "1\u00a02 3",
+    ],
+)
+def test_numbers_and_white_space_in_any_spelling(vector: str) -> None:
+    assert load(joint(f'<origin xyz="{vector}"/>')).joints[0].origin.xyz == (1.0, 2.0, 3.0)
+
+
+@pytest.mark.parametrize("origin", ["", "<origin/>", '<origin xyz="" rpy=" "/>', '<origin xyz="0 0 0"/>'])
+def test_an_origin_that_is_absent_or_empty_is_the_identity(origin: str) -> None:
+    assert load(joint(origin)).joints[0].origin == Pose()
+
+
+def test_elements_of_other_programs_are_passed_over() -> None:
+    inside = (
+        '<link name="a"><visual><geometry><mesh filename="package://gone/x.dae"/></geometry></visual>'
+        '<collision/><contact><lateral_friction value="1"/></contact></link>'
+        '<transmission><joint name="x"/></transmission><gazebo reference="a"><link name="y"/></gazebo>'
+        '<material name="red"/><ros2_control><joint name="z"/></ros2_control>'
+    )
+    model = load(robot(inside))
+    assert (len(model.links), len(model.joints), model.notes) == (1, 0, ())
+
+
+def test_an_unknown_element_is_noted_once_for_all_its_occurrences() -> None:
+    model = load(robot('<odd/>\n<odd/><link name="a"><strange/></link>'))
+    assert [str(note) for note in model.notes] == [
+        "line 2: unknown element <odd> in <robot> was ignored (2 times)",
+        "line 3: unknown element <strange> in <link> was ignored",
+    ]
+
+
+def test_names_may_be_of_any_script_and_hold_markup() -> None:
+    model = load(robot('<link name="Fuß &amp; &lt;脚&gt; &quot;1&quot; 100%"/>'))
+    assert model.root == 'Fuß & <脚> "1" 100%'
+
+
+@pytest.mark.parametrize("attribute", ["", 'name=""'])
+def test_a_robot_without_a_name_is_noted(attribute: str) -> None:
+    model = load(robot('<link name="a"/>', attribute))
+    assert model.name == "robot"
+    assert "no name" in messages(model)
+
+
+NOTED = {
+    "effort": (joint(limit='<limit lower="0" upper="1" velocity="1"/>'), "no effort limit; it is read as"),
+    "velocity": (joint(limit='<limit lower="0" upper="1" effort="1"/>'), "no velocity limit; it is read as"),
+    "lower": (joint(limit='<limit upper="1" effort="1"/>'), "no lower limit; URDF says it is then 0"),
+    "both": (joint(limit="<limit/>"), "no lower and no upper limit"),
+    "order": (joint(limit='<limit lower="2" upper="1"/>'), "lower limit 2.0 above upper limit 1.0"),
+    "continuous": (joint(limit=LIMIT, kind="continuous"), "its lower and upper limits were ignored"),
+    "negative velocity": (joint(limit='<limit velocity="-1"/>'), "velocity limit of joint 'j' is negative"),
+    "negative damping": (joint('<dynamics damping="-1"/>'), "damping of joint 'j' is negative"),
+    "axis": (joint('<axis xyz="0 0 2"/>'), "the axis of joint 'j' has length 2; it was scaled to 1"),
+    "rounded axis": (joint('<axis xyz="0.7071 0 0.7071"/>'), "has length 0.999"),
+    "second inertial": (link(INERTIAL * 2), "<link> has 2 <inertial>"),
+    "negative moment": (link(INERTIAL.replace("0.05", "-0.05")), "principal moment -0.05"),
+    "triangle": (link(INERTIAL.replace("0.05", "0.08")), "exceeds the sum of the others"),
+    "inertia without mass": (link(INERTIAL.replace("2.5", "0")), "is not zero though its mass is"),
+    "mimic of nobody": (joint('<mimic joint="k"/>'), "mimics 'k', which does not exist"),
+}
+
+
+@pytest.mark.parametrize("case", NOTED)
+def test_what_could_surprise_is_noted_with_its_line(case: str) -> None:
+    text, says = NOTED[case]
+    (note,) = [note for note in load(text).notes if says in note.message]
+    assert note.line is not None
+
+
+def test_limits_that_are_absent_or_the_largest_float_are_none() -> None:
+    limits = load(joint(limit='<limit lower="-1.7976931348623157e308" upper="1"/>')).joints[0].limits
+    assert limits == Limits(-math.inf, 1.0, math.inf, math.inf)
+
+
+@pytest.mark.parametrize(
+    ("limit", "ends"),
+    [("<limit/>", (0.0, 0.0)), ('<limit upper="1"/>', (0.0, 1.0)), ('<limit lower="-1"/>', (-1.0, 0.0))],
+)
+def test_an_end_that_is_absent_is_zero_as_the_format_says(limit: str, ends: tuple[float, float]) -> None:
+    limits = load(joint(limit=limit)).joints[0].limits
+    assert (limits.lower, limits.upper) == ends
+
+
+def test_numbers_of_an_impossible_inertia_are_used_as_they_stand() -> None:
+    assert load(link(INERTIAL.replace("0.05", "-0.05"))).inertial("a").izz == -0.05
+
+
+@pytest.mark.parametrize("exponent", [-320, -300, 0, 300, 307])
+def test_an_axis_of_any_length_becomes_a_unit_vector(exponent: int) -> None:
+    x, y, z = load(joint(f'<axis xyz="3e{exponent} 0 -4e{exponent}"/>')).joints[0].axis
+    # A length below the smallest normal float has few digits left.
+    digits = 4.0 * 2.0**-52 if exponent > -308 else 1e-3
+    assert y == 0.0
+    assert max(abs(x - 0.6), abs(z + 0.8)) <= digits
+
+
+def test_an_axis_of_unit_length_is_kept_to_the_last_digit() -> None:
+    axis = (0.5773502691896258, -0.5773502691896258, 0.5773502691896257)
+    assert load(joint(f'<axis xyz="{" ".join(map(repr, axis))}"/>')).joints[0].axis == axis
+
+
+def test_a_fixed_joint_has_no_axis_limits_or_mimic() -> None:
+    inside = '<axis xyz="0 0 0"/><limit lower="x"/><mimic joint="gone"/>'
+    model = load(joint(inside, kind="fixed", limit=""))
+    assert model == load(joint(kind="fixed", limit=""))
+    assert model.nq == 0
+
+
+FLOATING = robot(
+    '<link name="world"/>\n'
+    '<joint name="free" type="floating"><origin xyz="0 0 1"/>'
+    '<parent link="world"/><child link="body"/></joint>\n'
+    f'<link name="body">{INERTIAL}</link>'
+)
+
+
+def test_a_floating_joint_below_an_empty_root_is_what_base_says() -> None:
+    fixed, floating = load(FLOATING), load(FLOATING, base="floating")
+    assert (fixed.nq, fixed.nv, floating.nq, floating.nv) == (0, 0, 7, 6)
+    assert fixed.frame_names == floating.frame_names == ("world", "body")
+    (joint_read,) = fixed.joints
+    assert (joint_read.type, joint_read.origin.xyz) == ("fixed", (0.0, 0.0, 1.0))
+    assert "base='floating' lets the robot move freely" in messages(fixed)
+    assert floating.mechanism.root.mass == 2.5
+
+
+def test_a_floating_joint_elsewhere_is_refused() -> None:
+    second = '<joint name="j" type="fixed"><parent link="world"/><child link="c"/></joint>'
+    two_children = FLOATING.replace("</robot>", f'<link name="c"/>{second}</robot>')
+    for text in (
+        two_children,
+        FLOATING.replace('<link name="world"/>', f'<link name="world">{INERTIAL}</link>'),
+    ):
+        with pytest.raises(UnsupportedFeatureError, match="joint 'free' is floating"):
+            load(text)
+
+
+@given(st.data())
+def test_any_spelling_of_a_model_is_read_as_that_model(data: st.DataObject) -> None:
+    model = data.draw(models(from_urdf=True, physical=False))
+    assert load(data.draw(urdf_text(model)), base=model.base) == model
+
+
+REAL = load("panda").to_urdf().encode()
+ODD_BYTES = [
+    b"<",
+    b">",
+    b'"',
+    b"\0",
+    b"\xff",
+    b"&",
+    b"nan",
+    b"-",
+    b"1e999",
+    b"</robot>",
+    b"<robot>",
+    b"mimic",
+]
+
+
+@given(
+    st.lists(
+        st.tuples(
+            st.integers(0, len(REAL) - 1),
+            st.integers(0, 40),
+            st.one_of(st.sampled_from(ODD_BYTES), st.binary(max_size=8)),
+        ),
+        min_size=1,
+        max_size=6,
+    ),
+    st.sampled_from(["fixed", "floating"]),
+)
+def test_no_edit_of_a_real_file_gives_anything_but_a_model_or_our_error(
+    edits: list[tuple[int, int, bytes]], base: str
+) -> None:
+    data = REAL
+    for start, removed, added in edits:
+        data = data[:start] + added + data[start + removed :]
+    fault = ""
+    try:
+        model = load(data, base="floating" if base == "floating" else "fixed")
+    except ModelError as error:
+        fault = str(error)
+    else:
+        assert load(model.to_urdf(), base=model.base) == model
+    assert fault.isprintable()
+    assert len(fault) < 1000
+
+
+@given(st.one_of(st.text(), st.binary()))
+def test_no_text_at_all_gives_anything_but_our_error(data: str | bytes) -> None:
+    with pytest.raises(ModelError):
+        load(b"<" + data if isinstance(data, bytes) else "<" + data)

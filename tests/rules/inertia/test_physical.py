@@ -1,0 +1,78 @@
+"""Faults of tensors, and the nearest tensor that a body can have."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dynx.model.elements import Inertial, Pose
+from dynx.rules.inertia.central import CentralInertia
+from dynx.rules.inertia.physical import ENOUGH, clear_fault, lifted, nearest_moments, on_the_edge
+from dynx.testing.strategies import inertials
+
+EPS = float(np.finfo(float).eps)
+triples = st.tuples(*[st.floats(-2.0, 2.0)] * 3).map(np.array)
+G = np.ones((3, 3)) - np.eye(3)
+
+
+@given(triples)
+def test_the_nearest_moments_are_the_projection_on_the_cone_of_bodies(wanted: np.ndarray) -> None:
+    """y is the projection of x on a cone if y is in it, x - y is in the polar cone, and they are orthogonal
+    (Moreau's decomposition); the cone is spanned by the columns of G."""
+    nearest = np.asarray(nearest_moments(wanted), dtype=float)
+    rounding = 32 * EPS * max(float(np.max(np.abs(wanted))), 1e-300)
+    second_moments = np.linalg.solve(G, nearest)
+    assert np.all(second_moments >= -rounding)
+    assert np.all(G.T @ (wanted - nearest) <= rounding)
+    assert abs(nearest @ (wanted - nearest)) <= rounding * float(np.max(np.abs(wanted)))
+
+
+@given(inertials("solid").map(lambda inertial: inertial or Inertial()))
+def test_a_solid_body_has_no_fault_and_is_its_own_nearest(inertial: Inertial) -> None:
+    assert clear_fault(inertial) is None
+    assert not on_the_edge(inertial, root=False, welded=False)
+    moments = CentralInertia.of(inertial).moments()
+    rounding = 16 * EPS * float(moments[2])
+    np.testing.assert_allclose(nearest_moments(moments), moments, rtol=0, atol=rounding)
+
+
+@pytest.mark.parametrize(
+    ("moments", "fault"),
+    [
+        ((0.1, 0.2, 0.31), "triangle"),
+        ((0.1, 0.2, 0.3), None),
+        ((0.001, 0.009, 0.01), None),
+        ((0.1, 0.1, -0.01), "negative"),
+        ((1e-20, 1e-20, -1e-20), None),
+        ((0.0, 0.0, 0.0), None),
+    ],
+)
+def test_only_what_is_more_than_rounding_is_a_fault(
+    moments: tuple[float, float, float], fault: str | None
+) -> None:
+    x, y, z = moments
+    assert clear_fault(Inertial(1.0, ixx=x, iyy=y, izz=z)) == fault
+    assert clear_fault(Inertial(1.0, ixx=z, iyy=x, izz=y)) == fault
+
+
+def test_all_entries_alike_break_the_triangle_and_are_not_negative() -> None:
+    assert clear_fault(Inertial(1.0, Pose(), 1e-6, 1e-6, 1e-6, 1e-6, 1e-6, 1e-6)) == "triangle"
+
+
+@given(inertials("physical").map(lambda inertial: inertial or Inertial()))
+def test_what_was_lifted_is_off_the_edge_and_less_than_can_be_seen_away(inertial: Inertial) -> None:
+    if not on_the_edge(inertial, root=False, welded=False):
+        return
+    raised = lifted(inertial)
+    assert not on_the_edge(raised, root=False, welded=False)
+    size = float(np.max(np.diagonal(CentralInertia.of(inertial).about_origin())))
+    assert 0.0 < raised.ixx - inertial.ixx <= 64 * EPS * max(size, float(np.max(np.abs(inertial.tensor))))
+
+
+def test_a_floor_is_kept() -> None:
+    rod = Inertial(1.0, ixx=0.1, iyy=0.1)
+    raised = lifted(rod, ENOUGH)
+    assert raised.izz >= ENOUGH
+    assert raised.ixx - raised.iyy == 0.0

@@ -1,0 +1,112 @@
+"""Numbers with each fault are understood; plain ones are left alone."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dynx.rules.text.number_text import decimal, is_number, misspelled_number, misspelled_vector
+
+numbers = st.floats(allow_nan=False, allow_infinity=False)
+decimals = numbers.map(repr).filter(lambda text: "." in text)
+
+
+@given(numbers)
+def test_a_plain_number_has_no_fault(x: float) -> None:
+    assert is_number(repr(x))
+    assert misspelled_number(repr(x)) is None
+    assert misspelled_number(f"+{abs(x)!r}") is None
+    assert misspelled_number(f" \t\n{x!r}") is None
+
+
+@given(numbers)
+def test_a_number_is_written_as_it_was(x: float) -> None:
+    assert float(decimal(x)) == x
+    assert is_number(decimal(x))
+    assert decimal(-0.0) == "0.0"
+
+
+@given(st.lists(numbers, min_size=3, max_size=3), st.sampled_from([" ", "  "]))
+def test_a_plain_vector_has_no_fault(xyz: list[float], blank: str) -> None:
+    assert misspelled_vector(f" {blank.join(map(repr, xyz))} ") is None
+
+
+@given(decimals)
+def test_a_decimal_comma_is_read_as_the_point(text: str) -> None:
+    found = misspelled_number(text.replace(".", ","))
+    assert found is not None
+    assert (found.fault, found.meant) == ("comma", text)
+
+
+@given(st.lists(decimals, min_size=3, max_size=3), st.sampled_from([" ", ", ", "; "]))
+def test_decimal_commas_of_a_vector(words: list[str], between: str) -> None:
+    found = misspelled_vector(between.join(word.replace(".", ",") for word in words))
+    assert found is not None
+    assert (found.fault, found.meant.split()) == ("comma", words)
+
+
+@given(st.lists(decimals, min_size=3, max_size=3), st.sampled_from([",", ", ", " , ", ";"]))
+def test_commas_between_numbers(words: list[str], between: str) -> None:
+    found = misspelled_vector(between.join(words))
+    assert found is not None
+    assert (found.fault, found.meant.split()) == ("separator", words)
+
+
+@given(st.lists(numbers.map(repr), min_size=1, max_size=6).filter(lambda words: len(words) != 3))
+def test_a_vector_of_another_length_is_cut_or_filled(words: list[str]) -> None:
+    found = misspelled_vector(" ".join(words))
+    assert found is not None
+    assert (found.fault, found.meant.split()) == ("count", [*words, "0", "0"][:3])
+
+
+@given(decimals, st.sampled_from([".", "kg", " m", "rad", "%"]))
+def test_what_stands_behind_a_number_is_cut_off(text: str, rest: str) -> None:
+    found = misspelled_number(text + rest)
+    assert found is not None
+    assert (found.fault, found.meant) == ("rest", text)
+
+
+@given(st.lists(numbers.map(repr), min_size=3, max_size=3), st.sampled_from(["\t", "\n", " \n ", "\u00a0"]))
+def test_odd_white_space_of_a_vector(words: list[str], blank: str) -> None:
+    found = misspelled_vector(blank.join(words))
+    assert found is not None
+    assert (found.fault, found.meant.split()) == ("tab", words)
+
+
+@pytest.mark.parametrize(
+    ("written", "fault", "meant"),
+    [
+        ("2.5 ", "blank", "2.5"),
+        (" 2.5\n", "blank", "2.5"),
+        ("\u00a02.5", "blank", "2.5"),
+        ("inf", "infinite", "1.7976931348623157e+308"),
+        ("-Infinity", "infinite", "-1.7976931348623157e+308"),
+        ("1e999", "infinite", "1.7976931348623157e+308"),
+        ("-1e999", "infinite", "-1.7976931348623157e+308"),
+        ("-1.57.", "rest", "-1.57"),
+        ("1.5d-3", "rest", "1.5e-3"),
+        ("0x10", "rest", "16.0"),
+        ("1,250.5", "comma", "1250.5"),
+    ],
+)
+def test_single_numbers(written: str, fault: str, meant: str) -> None:
+    found = misspelled_number(written)
+    assert found is not None
+    assert (found.fault, found.meant) == (fault, meant)
+
+
+@pytest.mark.parametrize("written", ["heavy", "nan", "", "${mass}", "2.5${unit}", "1,2,3", "1-2", "--1"])
+def test_what_is_no_number_is_not_understood(written: str) -> None:
+    assert misspelled_number(written) is None
+
+
+@pytest.mark.parametrize("written", ["a b c", "$(optenv XYZ 1 2 3)", "${a} 0 0", "1,2,3,4", "1 2 nan"])
+def test_what_is_no_vector_is_not_understood(written: str) -> None:
+    assert misspelled_vector(written) is None
+
+
+def test_a_comma_can_part_thousands() -> None:
+    found = misspelled_number("1,250")
+    assert found is not None
+    assert (found.meant, found.otherwise) == ("1.250", "1250")

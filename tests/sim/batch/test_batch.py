@@ -1,0 +1,260 @@
+"""Batches of rollouts: each is the rollout that `simulate` computes, however they are dealt out."""
+
+from __future__ import annotations
+
+import multiprocessing
+import subprocess
+import sys
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import dynx
+from dynx import trajectory
+from dynx.control.base import Controller, Measured
+from dynx.control.computed_torque import ComputedTorque
+from dynx.control.discrete_computed_torque import DiscreteComputedTorque
+from dynx.control.feed_forward import FeedForward
+from dynx.control.gravity_compensation import GravityCompensatedPD
+from dynx.control.pd import PD
+from dynx.control.pid import PID
+from dynx.control.saturation import Saturated
+from dynx.errors import ArgumentError, UnsupportedFeatureError
+from dynx.model import Model
+from dynx.sim import Noise, Payload, simulate
+from dynx.sim import batch as batch_module
+from dynx.sim.batch.batch import BatchInterrupted, simulate_batch
+from dynx.sim.batch.part import Part, PartDone
+from dynx.sim.batch.rollouts import BatchRollouts
+from dynx.spatial.scalar import Floats
+from dynx.trajectory.base import Setpoint, Trajectory
+from tests.sim.bars import EXACT_ON_DYNX, apart
+
+DT = 1e-3
+STEPS = 60
+
+
+@pytest.fixture(scope="module")
+def arm() -> Model:
+    return dynx.load("ur5")
+
+
+@pytest.fixture(scope="module")
+def reference(arm: Model) -> Trajectory:
+    return trajectory.cycloidal(np.zeros(arm.nq), np.linspace(-0.05, 0.05, arm.nq), duration=DT * STEPS)
+
+
+def laws(arm: Model) -> dict[str, Controller[Any]]:
+    return {
+        "computed torque": ComputedTorque(arm, kp=400, kd=40),
+        "discrete": DiscreteComputedTorque(arm, control_dt=DT),
+        "feed-forward": FeedForward(arm),
+        "gravity": GravityCompensatedPD(arm, kp=200, kd=20),
+        "pd": PD(arm, kp=200, kd=20),
+        "pid": PID(arm, kp=200, ki=50, kd=20, control_dt=DT),
+        "saturated": Saturated(ComputedTorque(arm, kp=400, kd=40), limit=30.0),
+    }
+
+
+def close(found: Floats, wanted: Floats) -> bool:
+    """Two steppers of dynx differ by rounding only."""
+    return apart(found, wanted) < EXACT_ON_DYNX
+
+
+@pytest.mark.parametrize("name", list(laws(dynx.load("ur5"))))
+def test_a_rollout_is_that_of_simulate(arm: Model, reference: Trajectory, name: str) -> None:
+    law = laws(arm)[name]
+    one = simulate(arm, law, reference, dt=DT)
+    many = simulate_batch(arm, law, reference, dt=DT, rollouts=6, record_every=1)
+    assert close(many.q_record[3], one.q[1:])
+    assert close(many.v_record[3] * DT, one.v[1:] * DT)
+    assert close(many.tau_record[3], one.tau)
+    assert close(many.max_error[5], np.max(np.abs(one.error[1:]), axis=0))
+    assert close(many.rms_error[5], np.sqrt(np.mean(one.error[1:] ** 2, axis=0)))
+    assert many.done.all()
+    assert np.isnan(many.diverged).all()
+
+
+def test_a_law_asked_at_some_steps_only(arm: Model, reference: Trajectory) -> None:
+    for law in (ComputedTorque(arm, kp=400, kd=40), PID(arm, kp=200, ki=50, kd=20, control_dt=5 * DT)):
+        one = simulate(arm, law, reference, dt=DT, control_dt=5 * DT, effort_limits=True)
+        many = simulate_batch(
+            arm, law, reference, dt=DT, control_dt=5 * DT, rollouts=2, record_every=20, effort_limits=True
+        )
+        assert close(many.q_record[1], one.q[20::20])
+        assert np.allclose(many.t, one.t[20::20])
+
+
+def test_payloads_gains_and_starts_of_their_own(arm: Model, reference: Trajectory) -> None:
+    masses, gains = [0.0, 1.5, 3.0], [100.0, 200.0, 300.0]
+    starts = np.linspace(0.0, 0.01, 3)[:, None] * np.ones(6)
+    plant = dynx.parametric(arm, point_payload="tool0")
+    parameters = np.column_stack([masses, np.full((3, 3), 0.1)])
+    many = simulate_batch(
+        arm,
+        ComputedTorque(arm, kp=1.0, kd=40),
+        reference,
+        plant=plant,
+        parameters=parameters,
+        gains={"kp": gains},
+        q0=starts,
+        dt=DT,
+    )
+    for k, (mass, gain) in enumerate(zip(masses, gains, strict=True)):
+        payload = Payload("tool0", mass, (0.1, 0.1, 0.1))
+        law = ComputedTorque(arm, kp=gain, kd=40)
+        one = simulate(arm, law, reference, payload=payload, q0=starts[k], dt=DT)
+        assert close(many.q[k], one.q[-1])
+
+
+def equal(one: BatchRollouts, other: BatchRollouts) -> bool:
+    return all(
+        np.array_equal(getattr(one, field.name), getattr(other, field.name), equal_nan=True)
+        for field in fields(one)
+        if field.name != "joint_names"
+    )
+
+
+def test_outcomes_do_not_depend_on_who_computes_them(
+    arm: Model, reference: Trajectory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(batch_module, "PART", 5)
+    asked: dict[str, Any] = {"rollouts": 13, "noise": Noise(1e-4, 1e-3, seed=7), "dt": DT}
+    law = PD(arm, kp=200, kd=20)
+    one = simulate_batch(arm, law, reference, threads=1, **asked)
+    assert equal(one, simulate_batch(arm, law, reference, threads=3, **asked))
+    with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
+        assert equal(one, simulate_batch(arm, law, reference, executor=pool, **asked))
+    assert len(np.unique(one.q[:, 0])) == 13
+    other = simulate_batch(arm, law, reference, **{**asked, "noise": Noise(1e-4, 1e-3, seed=8)})
+    assert not np.array_equal(one.q, other.q)
+
+
+def test_ctrl_c_keeps_what_is_done(
+    arm: Model, reference: Trajectory, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(batch_module, "PART", 4)
+    law = PD(arm, kp=200, kd=20)
+    starts = np.linspace(0.0, 0.01, 16)[:, None] * np.ones(6)
+    whole = simulate_batch(arm, law, reference, q0=starts, dt=DT)
+
+    def stop(done: int, asked: int) -> None:
+        assert asked == 16
+        raise KeyboardInterrupt
+
+    with pytest.raises(BatchInterrupted) as caught:
+        simulate_batch(arm, law, reference, q0=starts, dt=DT, threads=1, keep=tmp_path, progress=stop)
+    part = caught.value.rollouts
+    assert 4 <= part.done.sum() <= 16
+    assert np.array_equal(part.q[part.done], whole.q[part.done])
+    assert np.isnan(part.q[~part.done]).all()
+    assert np.isfinite(part.quantiles()).all()
+
+    kept = len(list(tmp_path.glob("*.npz")))
+    assert kept >= 1
+    computed: list[int] = []
+    does = Part.__call__
+
+    def counted(part: Part) -> PartDone:
+        computed.append(part.count)
+        return does(part)
+
+    monkeypatch.setattr(Part, "__call__", counted)
+    again = simulate_batch(arm, law, reference, q0=starts, dt=DT, keep=tmp_path)
+    assert equal(again, whole)
+    assert len(computed) == 4 - kept
+
+
+KILLED = """
+import os, signal, sys, numpy as np, dynx
+from dynx import trajectory
+from dynx.control.pd import PD
+from dynx.sim.batch import batch
+batch.PART = 4
+arm = dynx.load("ur5")
+reference = trajectory.cycloidal(np.zeros(6), np.full(6, 0.05), duration=0.06)
+def kill(done, asked):
+    print(done, flush=True)
+    if done >= 8 and sys.argv[2] == "kill":
+        os.kill(os.getpid(), signal.SIGKILL)
+starts = np.linspace(0.0, 0.01, 16)[:, None] * np.ones(6)
+found = batch.simulate_batch(arm, PD(arm, kp=200, kd=20), reference, q0=starts, threads=1,
+                             keep=sys.argv[1], progress=kill)
+print("done", int(found.done.sum()))
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
+def test_a_killed_run_goes_on_from_what_was_kept(tmp_path: Path) -> None:
+    def run(mode: str) -> subprocess.CompletedProcess[str]:
+        command = [sys.executable, "-c", KILLED, str(tmp_path), mode]
+        return subprocess.run(command, capture_output=True, text=True, check=False)
+
+    killed = run("kill")
+    assert killed.returncode == -9, killed.stderr
+    kept = len(list(tmp_path.glob("*.npz")))
+    assert kept >= 2
+    (tmp_path / "half.part").write_bytes(b"PK")
+    again = run("on")
+    assert again.stdout.split()[-2:] == ["done", "16"], again.stderr
+    assert again.stdout.split()[kept - 1] == str(4 * kept)
+
+
+def test_a_rollout_that_diverges_leaves_the_others_alone(arm: Model) -> None:
+    reference = trajectory.cycloidal(np.zeros(6), np.full(6, 0.05), duration=0.5)
+    gains = np.array([200.0, 1e7, 200.0])
+    found = simulate_batch(arm, ComputedTorque(arm, kp=1.0, kd=40), reference, gains={"kp": gains}, dt=DT)
+    assert np.isnan(found.diverged[[0, 2]]).all()
+    assert 0.0 < found.diverged[1] <= 0.5
+    assert found.worst[1] == np.inf
+    assert np.isfinite(found.worst[[0, 2]]).all()
+
+
+def test_a_file_gives_them_back(arm: Model, reference: Trajectory, tmp_path: Path) -> None:
+    found = simulate_batch(arm, PD(arm, kp=200, kd=20), reference, rollouts=3, dt=DT, record_every=30)
+    found.save(tmp_path / "many.npz")
+    again = BatchRollouts.load(tmp_path / "many.npz")
+    assert equal(found, again)
+    assert again.joint_names == found.joint_names
+    for other in ("many.txt", "none.npz"):
+        with pytest.raises(ArgumentError):
+            found.save(tmp_path / other) if other == "many.txt" else BatchRollouts.load(tmp_path / other)
+
+
+class Branching(Controller[None]):
+    """A law that asks which way it goes."""
+
+    def __init__(self, model: Model) -> None:
+        self.model = model
+
+    def torque(self, measured: Measured, setpoint: Setpoint, memory: None) -> tuple[Floats, None]:
+        return (measured.v if measured.q[0] > 0.0 else -measured.v), None
+
+
+def test_what_cannot_be_a_batch_is_refused(arm: Model, reference: Trajectory) -> None:
+    pd = PD(arm, kp=200, kd=20)
+    plant = dynx.parametric(arm, point_payload="tool0")
+    bad: list[tuple[type[Exception], str, Controller[Any], dict[str, Any]]] = [
+        (UnsupportedFeatureError, "asks for values", Branching(arm), {}),
+        (ArgumentError, "no gain", pd, {"gains": {"kpp": 1.0}}),
+        (ArgumentError, "rollouts is", pd, {"rollouts": 0}),
+        (ArgumentError, "2 rows", pd, {"rollouts": 3, "q0": np.zeros((2, 6))}),
+        (ArgumentError, "without the plant", pd, {"parameters": np.zeros((2, 4))}),
+        (ArgumentError, "parameters", pd, {"plant": plant, "parameters": np.zeros((2, 3))}),
+        (ArgumentError, "record_every", pd, {"record_every": -1}),
+        (ArgumentError, "dt is", pd, {"dt": 0.0}),
+        (ArgumentError, "multiple", pd, {"dt": 7e-4}),
+        (ArgumentError, "threads", pd, {"threads": 0}),
+        (ArgumentError, "was made for control_dt", DiscreteComputedTorque(arm, control_dt=2e-3), {}),
+        (ArgumentError, "seed", pd, {"noise": Noise(1e-3, 1e-3, seed=-1)}),
+    ]
+    for error, said, law, options in bad:
+        with pytest.raises(error, match=said):
+            simulate_batch(arm, law, reference, **{"dt": DT, **options})
+    floating = dynx.load("ur5", base="floating")
+    with pytest.raises(ArgumentError, match="the controller is one of"):
+        simulate_batch(floating, pd, floating.neutral(), duration=0.01)

@@ -1,0 +1,100 @@
+"""A kernel of a batch is found again by what its step is made of, and by nothing less."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dynx.control import PD, ComputedTorque, FrictionCompensation, Saturated
+from dynx.control.base import Controller, Measured
+from dynx.sim import simulate, simulate_batch
+from dynx.sim.batch import kernel as fused
+from dynx.sim.batch.fingerprint import content_of
+from dynx.spatial.scalar import Floats
+from dynx.trajectory.base import Setpoint
+from tests.sim.bars import tutorial_motion, tutorial_robot
+
+ARM = tutorial_robot()
+
+
+def law(**gains: Any) -> ComputedTorque:
+    return ComputedTorque(ARM, **{"kp": 400.0, "kd": 40.0, **gains})
+
+
+def test_equal_things_are_equal_and_others_are_not() -> None:
+    assert content_of(law()) == content_of(law())
+    assert hash(content_of(law())) == hash(content_of(law()))
+    assert content_of(law()) == content_of(law(backend="reference"))
+    others: list[Any] = [
+        law(kp=401.0),
+        law(kd=[40.0] * 5 + [40.0 + 1e-14]),
+        PD(ARM, kp=400.0, kd=40.0),
+        Saturated(law()),
+        Saturated(law(), limit=10.0),
+        Saturated(law(kp=1.0), limit=10.0),
+        FrictionCompensation(law(), damping=0.1, friction=0.0),
+        FrictionCompensation(law(), damping=0.2, friction=0.0),
+        ComputedTorque(ARM.with_gravity((0.0, 0.0, 0.0)), kp=400.0, kd=40.0),
+    ]
+    contents = [content_of(thing) for thing in (law(), *others)]
+    assert len(set(contents)) == len(contents)
+
+
+def test_signs_of_zeros_are_told_apart() -> None:
+    assert content_of(0.0) != content_of(-0.0)
+    assert content_of(np.zeros(2)) != content_of(-np.zeros(2))
+    assert content_of(1) != content_of(True)
+    assert content_of(1) != content_of(1.0)
+
+
+class Scaled(PD):
+    """A law of somebody's own, which reads what is no attribute of it."""
+
+    def torque(self, measured: Measured, setpoint: Setpoint, memory: None) -> tuple[Floats, None]:
+        tau, memory = super().torque(measured, setpoint, memory)
+        return SCALE[0] * tau, memory
+
+
+SCALE = [1.0]
+
+
+def worst(controller: Controller[Any]) -> float:
+    found = simulate_batch(ARM, controller, tutorial_motion(), rollouts=4, duration=0.05)
+    return float(found.worst.max())
+
+
+def test_a_law_of_one_s_own_is_traced_each_time() -> None:
+    with pytest.raises(TypeError, match="Scaled"):
+        content_of(Scaled(ARM, kp=100.0, kd=10.0))
+    controller = Scaled(ARM, kp=100.0, kd=10.0)
+    before = worst(controller)
+    SCALE[0] = 3.0
+    try:
+        assert worst(controller) != before
+    finally:
+        SCALE[0] = 1.0
+    assert worst(controller) == before
+
+
+def test_a_changed_law_has_another_kernel() -> None:
+    controller = law()
+    worst(controller)
+    controller.kp = np.full(6, 100.0)
+    one = simulate(ARM, controller, tutorial_motion(), plant="compiled", duration=0.05)
+    assert worst(controller) == pytest.approx(np.abs(one.error).max(), rel=1e-9)
+
+
+def test_the_next_batch_traces_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    first = worst(law())
+    monkeypatch.setattr(fused, "trace", None)
+    assert worst(law()) == first
+
+
+def test_only_so_many_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fused, "_made", {})
+    monkeypatch.setattr(fused, "REMEMBERED", 2)
+    for kp in (1.0, 2.0, 3.0):
+        worst(PD(ARM, kp=kp, kd=1.0))
+    assert len(fused._made) == 2

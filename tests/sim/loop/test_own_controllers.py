@@ -1,0 +1,177 @@
+"""Laws that a user writes: what they may remember, give and do, and what is said where they may not."""
+
+from __future__ import annotations
+
+import copy
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dynx.backends import installed_backends
+from dynx.control import PID, ComputedTorque, OpenLoop, Saturated
+from dynx.control.base import Controller, Measured
+from dynx.errors import ArgumentError, ControlError, UnsupportedFeatureError
+from dynx.sim import Rollout, simulate, simulate_batch
+from dynx.trajectory import cycloidal
+from dynx.trajectory.base import Setpoint
+from tests.sim.bars import tutorial_motion, tutorial_robot
+from tests.sim.loop.test_resume import the_same
+
+ARM = tutorial_robot()
+REST = np.zeros(6)
+PLANTS = [name for name in ("pinocchio", "compiled", "pybullet") if name in installed_backends()]
+
+
+class Remembering(Controller[Any]):
+    """A damper that remembers how often it was asked, in the form that it is told."""
+
+    def __init__(self, start: Any, counted: Any) -> None:
+        self.model = ARM
+        self._begin, self._counted = start, counted
+
+    def start(self) -> Any:
+        return copy.deepcopy(self._begin)
+
+    def torque(self, measured: Measured, setpoint: Setpoint, memory: Any) -> tuple[Any, Any]:
+        return -measured.v, self._counted(memory)
+
+
+MEMORIES: dict[str, Remembering] = {
+    "float": Remembering(0.0, lambda memory: memory + 1.0),
+    "int": Remembering(0, lambda memory: memory + 1),
+    "tuple": Remembering((0, 0), lambda memory: (memory[0] + 1, 0)),
+    "list": Remembering([], lambda memory: [*memory, 1]),
+    "dict": Remembering({"n": 0}, lambda memory: {"n": memory["n"] + 1}),
+    "table": Remembering(np.zeros((2, 6)), lambda memory: memory + 1.0),
+    "integers": Remembering(np.zeros(3, dtype=int), lambda memory: memory + 1),
+    "later": Remembering(None, lambda memory: 1 if memory is None else memory + 1),
+}
+
+
+@pytest.mark.parametrize("plant", PLANTS)
+@pytest.mark.parametrize("kind", MEMORIES)
+def test_a_law_may_remember_anything(kind: str, plant: str) -> None:
+    law = MEMORIES[kind]
+    whole = simulate(ARM, law, REST, plant=plant, duration=0.3)
+    the_same(simulate(ARM, law, REST, plant=plant, duration=0.3, resume=whole.first(20)), whole)
+
+
+@pytest.mark.parametrize("kind", MEMORIES)
+def test_in_a_batch_it_remembers_numbers(kind: str) -> None:
+    with pytest.raises(UnsupportedFeatureError, match=r"remember"):
+        simulate_batch(ARM, MEMORIES[kind], REST, rollouts=4, duration=0.01)
+
+
+class Giving(Controller[None]):
+    """A law that gives what it is told to."""
+
+    def __init__(self, given: Any) -> None:
+        self.model = ARM
+        self._given = given
+
+    def torque(self, measured: Measured, setpoint: Setpoint, memory: None) -> tuple[Any, None]:
+        return self._given, None
+
+
+@pytest.mark.parametrize("plant", PLANTS)
+@pytest.mark.parametrize(
+    "given", [[1.0] * 6, (1,) * 6, np.ones(6, dtype=np.float32), np.ones(12)[::2], np.ones(6, dtype=">f8")]
+)
+def test_a_torque_may_be_any_numbers(given: Any, plant: str) -> None:
+    found = simulate(ARM, Giving(given), REST, plant=plant, duration=0.02)
+    the_same(found, simulate(ARM, Giving(np.ones(6)), REST, plant=plant, duration=0.02))
+
+
+@pytest.mark.parametrize("given", [np.ones(5), 1.0])
+def test_a_torque_of_another_shape_is_refused_in_a_batch(given: Any) -> None:
+    with pytest.raises(UnsupportedFeatureError, match=r"shape .* wanted \(6,\)"):
+        simulate_batch(ARM, Giving(given), REST, rollouts=4, duration=0.01)
+
+
+def test_what_a_law_cannot_do_with_symbols_is_said() -> None:
+    class Table(Giving):
+        def torque(self, measured: Measured, setpoint: Setpoint, memory: None) -> tuple[Any, None]:
+            return np.linalg.inv(np.diag(measured.q)) @ measured.v, None
+
+    with pytest.raises(UnsupportedFeatureError, match=r"Table cannot be fused .* failed with UFuncTypeError"):
+        simulate_batch(ARM, Table(None), REST, rollouts=4, duration=0.01)
+
+
+class Integrating(Controller[None]):
+    """An integral that is kept where nobody sees it."""
+
+    def __init__(self, in_place: bool) -> None:
+        self.model = ARM
+        self.total = np.zeros(6)
+        self._in_place = in_place
+
+    def torque(self, measured: Measured, setpoint: Setpoint, memory: None) -> tuple[Any, None]:
+        error = setpoint.q - measured.q
+        if self._in_place:
+            self.total += error
+        else:
+            self.total = self.total + error
+        return 10.0 * error + self.total, None
+
+
+@pytest.mark.parametrize("in_place", [True, False])
+@pytest.mark.parametrize("wrapped", [True, False])
+def test_a_law_that_changes_itself(in_place: bool, wrapped: bool) -> None:
+    def law() -> Controller[Any]:
+        inner = Integrating(in_place)
+        return Saturated(inner, limit=100.0) if wrapped else inner
+
+    whole = simulate(ARM, law(), REST, q0=REST + 0.1, duration=0.3)
+    assert len(whole) == 300
+    with pytest.raises(ArgumentError, match=r"changes itself \(attribute total\).*cannot be resumed"):
+        simulate(ARM, law(), REST, q0=REST + 0.1, duration=0.3, resume=whole.first(20))
+    with pytest.raises(UnsupportedFeatureError, match=r"changes itself|cannot be fused"):
+        simulate_batch(ARM, law(), REST, q0=REST + 0.1, rollouts=4, duration=0.01)
+
+
+def test_a_law_without_a_model_is_told_so() -> None:
+    class Nowhere(Controller[None]):
+        def torque(self, measured: Measured, setpoint: Setpoint, memory: None) -> tuple[Any, None]:
+            return np.zeros(6), None
+
+    for ask in (simulate, simulate_batch):
+        with pytest.raises(ArgumentError, match=r"Nowhere has no model; a law sets self\.model"):
+            ask(ARM, Nowhere(), REST, duration=0.01)
+
+
+def test_an_exception_reads_as_what_it_is() -> None:
+    class Dividing(Giving):
+        def torque(self, measured: Measured, setpoint: Setpoint, memory: None) -> tuple[Any, None]:
+            return 1 / 0, None
+
+    with pytest.raises(ControlError, match=r"Dividing failed in step 0, at 0 s: ZeroDivisionError: division"):
+        simulate(ARM, Dividing(None), REST, duration=0.01)
+
+
+def resumed(whole: Rollout, law: Controller[Any], reference: Any) -> Rollout:
+    return simulate(ARM, law, reference, duration=0.05, resume=whole, step=20)
+
+
+def test_a_record_is_not_resumed_with_other_gains_or_another_reference() -> None:
+    law = ComputedTorque(ARM, kp=400, kd=40)
+    whole = simulate(ARM, law, tutorial_motion(), duration=0.05)
+    the_same(
+        resumed(whole, ComputedTorque(ARM, kp=400, kd=40, backend="pinocchio"), tutorial_motion()), whole
+    )
+    with pytest.raises(ArgumentError, match=r"had law .*now it is"):
+        resumed(whole, ComputedTorque(ARM, kp=401, kd=40), tutorial_motion())
+    with pytest.raises(ArgumentError, match="followed another reference"):
+        resumed(whole, law, cycloidal(REST, REST + 0.01, duration=2.0))
+    with pytest.raises(ArgumentError, match="followed another reference"):
+        resumed(whole, law, REST)
+
+
+def test_the_numbers_of_a_law_are_in_the_record() -> None:
+    inner = PID(ARM, kp=1, ki=2, kd=3, control_dt=1e-3, limit=5.0)
+    found = simulate(ARM, Saturated(inner, limit=4.0), REST, duration=0.01).settings["law"]
+    assert found["limit"] == [4.0] * 6
+    assert found["inner"]["law"] == "PID"
+    assert (found["inner"]["ki"], found["inner"]["limit"]) == ([2.0] * 6, [5.0] * 6)
+    table = simulate(ARM, OpenLoop(ARM, np.ones((40, 6)), control_dt=1e-3), duration=0.01).settings["law"]
+    assert table["torques"].startswith("sha256 ")

@@ -1,0 +1,401 @@
+"""The loop in compiled stages gives the record of the plain loop, to the last bit."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from dynx.control import (
+    PD,
+    PID,
+    ComputedTorque,
+    DiscreteComputedTorque,
+    FeedForward,
+    FrictionCompensation,
+    GravityCompensatedPD,
+    OpenLoop,
+    Saturated,
+    Velocity,
+)
+from dynx.control.base import Controller, Measured
+from dynx.engines.pinocchio.backend import PinocchioBackend
+from dynx.errors import ControlError, DivergedError
+from dynx.model import Model
+from dynx.model.loading import load
+from dynx.sim import Noise, Push, Rollout, RolloutInterrupted, simulate, simulation
+from dynx.sim.loop import staged, stages
+from dynx.spatial.scalar import Floats
+from dynx.testing.strategies import models
+from dynx.trajectory.base import Setpoint, Trajectory
+from tests.oracles.closed_form import MODELS
+from tests.sim.bars import tutorial_motion, tutorial_robot
+from tests.sim.loop.test_resume import the_same
+
+ARM = tutorial_robot()
+STEPS = 70
+LAWS: dict[str, Callable[[Model, float], Controller[Any]]] = {
+    "computed torque": lambda m, dt: ComputedTorque(m, kp=400, kd=40),
+    "discrete": lambda m, dt: DiscreteComputedTorque(m, control_dt=dt),
+    "pid": lambda m, dt: PID(m, kp=300, ki=2000, kd=30, control_dt=dt, limit=500.0),
+    "gravity": lambda m, dt: GravityCompensatedPD(m, kp=200, kd=20, backend="reference"),
+    "feed-forward": lambda m, dt: FeedForward(m, kp=100, kd=10, backend="compiled"),
+    "velocity": lambda m, dt: Velocity(m, kd=30),
+    "saturated": lambda m, dt: Saturated(PD(m, kp=300, kd=30), limit=20.0),
+}
+OPTIONS: dict[str, dict[str, Any]] = {
+    "plain": {},
+    "rk4": {"integrator": "rk4"},
+    "substeps": {"substeps": 3},
+    "rate": {"control_dt": 3e-3},
+    "delay": {"delay": 2e-3},
+    "noise": {"noise": Noise(1e-4, 1e-3, seed=5)},
+    "limits": {"effort_limits": 15.0},
+    "all": {
+        "integrator": "rk4",
+        "substeps": 2,
+        "control_dt": 3e-3,
+        "delay": 5e-3,
+        "noise": Noise(1e-3, 1e-2, seed=2),
+        "effort_limits": 12.0,
+    },
+}
+
+
+@contextmanager
+def glue(*, on: bool, seen: list[bool] | None = None) -> Iterator[None]:
+    """Glue for rollouts of any length, or for none; `seen` is told whether it was used."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(staged, "WORTH", 1 if on else 10**9)
+        patch.setattr(staged, "AT_ONCE", 32)
+        if seen is not None:
+            run = staged.GluedLoop.run
+
+            def watched(loop: staged.GluedLoop, record: Any) -> None:
+                seen.append(True)
+                run(loop, record)
+
+            patch.setattr(staged.GluedLoop, "run", watched)
+        yield
+
+
+def outcome(*asked: Any, **options: Any) -> tuple[Rollout, str]:
+    """What was computed, and what went wrong."""
+    try:
+        return simulate(*asked, **options), ""
+    except (DivergedError, ControlError) as error:
+        return error.rollout, str(error)
+
+
+def both(*asked: Any, glued: bool = True, **options: Any) -> Rollout:
+    """One simulation in stages and plainly, which must be the same."""
+    seen: list[bool] = []
+    with glue(on=True, seen=seen):
+        quick, told = outcome(*asked, **options)
+    assert bool(seen) == glued
+    with glue(on=False):
+        plain, told_plainly = outcome(*asked, **options)
+    the_same(quick, plain)
+    assert told == told_plainly
+    return quick
+
+
+def law_of(name: str, model: Model, options: dict[str, Any]) -> Controller[Any]:
+    return LAWS[name](model, options.get("control_dt", 1e-3))
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("option", OPTIONS)
+def test_the_record_is_that_of_the_plain_loop(law: str, option: str) -> None:
+    options = OPTIONS[option]
+    found = both(ARM, law_of(law, ARM, options), tutorial_motion(), duration=STEPS * 1e-3, **options)
+    if "effort_limits" in options:
+        assert found.saturated.any()
+        assert not found.saturated.all()
+
+
+@pytest.mark.parametrize("plant", ["pinocchio", "reference", "compiled"])
+@pytest.mark.parametrize("robot", ["panda", "talos", "six_axis_arm"])
+def test_robots_and_plants(robot: str, plant: str) -> None:
+    model = load(MODELS / f"{robot}.urdf" if robot == "six_axis_arm" else robot)
+    law = ComputedTorque(model, kp=100, kd=20, backend=plant)
+    q = model.clip(model.neutral() + 0.1)
+    both(model, law, q, q0=q, plant=plant, duration=0.03)
+
+
+def test_a_robot_without_a_controller() -> None:
+    both(ARM, q0=np.full(6, 0.3), duration=STEPS * 1e-3)
+
+
+@settings(max_examples=10)
+@given(model=models(solvable=True), step=st.integers(1, 19), data=st.data())
+def test_random_robots_resumed_at_any_step(model: Model, step: int, data: st.DataObject) -> None:
+    law = PID(model, kp=20, ki=50, kd=4, control_dt=4e-3, limit=50.0)
+    options: dict[str, Any] = {
+        "duration": 0.02,
+        "control_dt": 4e-3,
+        "effort_limits": data.draw(st.sampled_from([1.0, 30.0])),
+        "noise": None if model.floating else Noise(1e-3, 1e-3),
+        "check_reference": False,
+    }
+    rng = np.random.default_rng(data.draw(st.integers(0, 99)))
+    options["q0"], options["v0"] = model.random(rng), rng.uniform(-1, 1, model.nv)
+    whole = both(model, law, model.neutral(), **options, glued=model.nv > 0)
+    step = min(step, len(whole))
+    with glue(on=True):
+        again, _ = outcome(model, law, model.neutral(), **options, resume=whole, step=step)
+    the_same(again, whole)
+
+
+class Counting(PD):
+    """A law of somebody's own, which does more than it says."""
+
+    asked = 0
+
+    def torque(self, measured: Measured, setpoint: Setpoint, memory: None) -> tuple[Floats, None]:
+        type(self).asked += 1
+        return super().torque(measured, setpoint, memory)
+
+
+def test_a_law_of_one_s_own_is_asked_in_every_step() -> None:
+    for law in (Counting(ARM, kp=10, kd=1), Saturated(Counting(ARM, kp=10, kd=1), limit=5.0)):
+        Counting.asked = 0
+        both(ARM, law, np.zeros(6), duration=STEPS * 1e-3, glued=False)
+        assert Counting.asked == 2 * STEPS
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"friction": 0.1},
+        {"armature": 0.1},
+        {"position_limits": True},
+        {"integrator": "adaptive"},
+        {"pushes": [Push("tool0", [1, 0, 0, 0, 0, 0])]},
+        {"substeps": 17},
+    ],
+)
+def test_what_stages_do_not_know_goes_the_plain_way(options: dict[str, Any]) -> None:
+    both(ARM, PD(ARM, kp=100, kd=10), np.zeros(6), duration=0.01, glued=False, **options)
+
+
+def test_torques_from_a_table_go_the_plain_way() -> None:
+    law = OpenLoop(ARM, np.ones((9, 6)), control_dt=1e-3)
+    both(ARM, law, duration=0.01, glued=False)
+
+
+@pytest.mark.parametrize("speed", ["measured", "setpoint"])
+def test_compensated_friction_goes_the_plain_way(speed: str) -> None:
+    """Its hyperbolic tangent is not rounded alike in NumPy and in a kernel."""
+    law = FrictionCompensation(PD(ARM, kp=100, kd=10), damping=0.5, friction=0.3, speed=speed)
+    both(ARM, law, np.zeros(6), q0=np.full(6, 0.1), duration=0.02, glued=False)
+
+
+@pytest.mark.parametrize("plant", ["pinocchio", "reference", "compiled"])
+@pytest.mark.parametrize("options", [{}, {"substeps": 3}, {"control_dt": 3e-3, "delay": 2e-3}])
+def test_a_floating_base(plant: str, options: dict[str, Any]) -> None:
+    robot = load("solo12", base="floating")
+    law = PD(robot, kp=5, kd=0.1)
+    v0 = np.random.default_rng(0).normal(size=robot.nv)
+    both(robot, law, robot.neutral(), plant=plant, v0=v0, duration=0.06, **options)
+
+
+@pytest.mark.parametrize("options", [{"noise": Noise(1e-3, 1e-3)}, {"integrator": "rk4"}])
+def test_a_floating_base_that_goes_the_plain_way(options: dict[str, Any]) -> None:
+    robot = load("solo12", base="floating")
+    both(robot, PD(robot, kp=5, kd=0.1), robot.neutral(), duration=0.01, glued=False, **options)
+
+
+@pytest.mark.parametrize("kd", [-3e3, -1e306])
+def test_errors_are_those_of_the_plain_loop(kd: float) -> None:
+    """Damping turned round drives the robot away, or its torque beyond all numbers."""
+    law = Velocity(ARM, kd=0.0)
+    law.kd = np.full(6, kd)
+    speed = 1e-3 if kd > -1e300 else 300.0
+    found = both(ARM, law, np.zeros(6), q0=np.zeros(6), v0=np.full(6, speed), duration=1.0)
+    assert len(found) < 1000
+    with pytest.raises(DivergedError if kd > -1e300 else ControlError):
+        simulate(ARM, law, np.zeros(6), q0=np.zeros(6), v0=np.full(6, speed), duration=1.0)
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        PD(ARM, kp=1e308, kd=1e308),
+        Saturated(PD(ARM, kp=1e308, kd=1e308), limit=20.0),
+        PID(ARM, kp=1e308, ki=0.0, kd=0.0, control_dt=1e-3, limit=20.0),
+        PD(ARM, kp=5e307, kd=0.0),
+    ],
+    ids=["pd", "saturated", "pid", "sum"],
+)
+@pytest.mark.parametrize("limits", [False, 15.0])
+def test_a_torque_beyond_all_numbers_is_not_cut_to_the_limits(law: Controller[Any], limits: Any) -> None:
+    both(ARM, law, np.zeros(6), q0=np.full(6, 2.0), duration=0.02, effort_limits=limits)
+
+
+def test_a_law_whose_method_was_replaced_is_asked_each_time() -> None:
+    law = PD(ARM, kp=10, kd=1)
+    torque, asked = law.torque, [0]
+
+    def counted(*given: Any) -> Any:
+        asked[0] += 1
+        return torque(*given)
+
+    vars(law)["torque"] = counted
+    both(ARM, law, np.zeros(6), duration=STEPS * 1e-3, glued=False)
+    assert asked == [2 * STEPS]
+
+
+@pytest.mark.parametrize("question", ["inverse_dynamics", "_inverse_dynamics"])
+@pytest.mark.parametrize("where", ["class", "instance"])
+def test_an_engine_with_answers_of_its_own_is_believed(question: str, where: str) -> None:
+    class Own(PinocchioBackend):
+        """An engine that is off by 1 N m."""
+
+    engine = Own(ARM)
+    answer = getattr(PinocchioBackend(ARM), question)
+
+    def off(*given: Floats) -> Floats:
+        return np.asarray(answer(*given[-3:])) + 1.0
+
+    if where == "class":
+        setattr(Own, question, off)
+    else:
+        setattr(engine, question, off)
+    law = ComputedTorque(ARM, kp=400, kd=40, backend=engine)
+    found = both(ARM, law, np.zeros(6), duration=0.02)
+    right = simulate(ARM, ComputedTorque(ARM, kp=400, kd=40), np.zeros(6), duration=0.02)
+    np.testing.assert_allclose(found.tau[0], right.tau[0] + 1.0)
+
+
+def test_gains_are_inputs_of_one_kernel(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(stages, "_made", {})
+    for kp in (100.0, 200.0, 300.0):
+        both(ARM, ComputedTorque(ARM, kp=kp, kd=20.0), np.zeros(6), q0=np.full(6, 0.1), duration=0.02)
+    assert len(stages._made) == 3
+
+
+class Narrow(Trajectory):
+    """A motion in single precision."""
+
+    def inside(self, t: Floats) -> Setpoint:
+        rows: Any = (x.astype(np.float32) for x in tutorial_motion().inside(t))
+        return Setpoint(*rows)
+
+
+def test_a_reference_in_other_numbers() -> None:
+    wide = tutorial_motion()
+    narrow = Narrow(wide.duration, wide.start, wide.end)
+    assert narrow(np.full(3, 0.1)).q.dtype == np.float32
+    both(ARM, PD(ARM, kp=100, kd=10), narrow, duration=0.02, glued=False, check_reference=False)
+
+
+def test_no_controller_is_at_no_limit() -> None:
+    found = both(ARM, None, duration=0.05, q0=np.full(6, 0.3), effort_limits=5.0)
+    assert not found.saturated.any()
+
+
+def test_progress_is_told_in_time_where_steps_are_slow(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(staged, "TELLING", 1e-6)
+    told: list[int] = []
+    simulate(ARM, q0=np.zeros(6), duration=0.5, progress=lambda taken, wanted: told.append(taken))
+    assert len(told) > 200
+
+
+class Interrupting(PinocchioBackend):
+    """An engine whose 45th answer does not come, for Ctrl-C does."""
+
+    calls = 0
+
+    def _inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
+        self.calls += 1
+        if self.calls == 45:
+            raise KeyboardInterrupt
+        return super()._inverse_dynamics(q, v, a)
+
+
+class Failing(PinocchioBackend):
+    """An engine whose third torque is no number, and which keeps what it is asked about."""
+
+    def __init__(self, model: Model, *, validate: bool = True) -> None:
+        super().__init__(model, validate=validate)
+        self.calls = 0
+        self.given: list[Floats] = []
+
+    def _inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
+        self.calls += 1
+        return super()._inverse_dynamics(q, v, a) * (np.nan if self.calls >= 3 else 1.0)
+
+    def _forward_dynamics(self, q: Floats, v: Floats, tau: Floats) -> Floats:
+        self.given.append(tau.copy())
+        return super()._forward_dynamics(q, v, tau)
+
+
+@pytest.mark.parametrize("on", [True, False])
+def test_no_plant_is_given_what_is_no_number(on: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An engine may not survive it."""
+    plant = Failing(ARM)
+    monkeypatch.setattr(simulation, "backend", lambda name, model, validate: plant)
+    law = ComputedTorque(ARM, kp=400, kd=40, backend=Failing(ARM))
+    with glue(on=on), pytest.raises(ControlError, match="not finite") as caught:
+        simulate(ARM, law, np.zeros(6), duration=0.02)
+    assert caught.value.step == 2
+    assert len(plant.given) == 2
+    assert np.isfinite(plant.given).all()
+
+
+def test_ctrl_c_in_the_middle_of_a_stage() -> None:
+    law = ComputedTorque(ARM, kp=400, kd=40, backend=Interrupting(ARM))
+    with glue(on=True), pytest.raises(RolloutInterrupted, match="after 44 of 100") as caught:
+        simulate(ARM, law, tutorial_motion(), duration=0.1)
+    with glue(on=False):
+        whole = simulate(ARM, ComputedTorque(ARM, kp=400, kd=40), tutorial_motion(), duration=0.1)
+    the_same(caught.value.rollout, whole.first(44))
+
+
+@pytest.fixture
+def ctrl_c() -> Iterator[None]:
+    """Python's own handler: a process that was started in the background ignores Ctrl-C."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("ctrl_c")
+@pytest.mark.parametrize("on", [True, False])
+def test_ctrl_c_keeps_what_was_computed(on: bool) -> None:
+    law = ComputedTorque(ARM, kp=400, kd=40)
+    told: list[tuple[int, int]] = []
+    options: dict[str, Any] = {"duration": 2.0}
+    motion = tutorial_motion()
+
+    def interrupt(taken: int, wanted: int) -> None:
+        told.append((taken, wanted))
+        if taken > 300:
+            assert threading.current_thread() is threading.main_thread()
+            signal.raise_signal(signal.SIGINT)
+
+    with glue(on=on):
+        with pytest.raises(RolloutInterrupted, match="of 2000 steps") as caught:
+            simulate(ARM, law, motion, **options, progress=interrupt)
+        part = caught.value.rollout
+        assert 300 < len(part) < 2000
+        assert len(part) == told[-1][0]
+        assert [taken for taken, _ in told] == sorted(taken for taken, _ in told)
+        the_same(simulate(ARM, law, motion, **options, resume=part), simulate(ARM, law, motion, **options))
+
+
+@pytest.mark.parametrize("on", [True, False])
+def test_progress_is_told_to_the_end(on: bool) -> None:
+    told: list[tuple[int, int]] = []
+    with glue(on=on):
+        simulate(ARM, q0=np.zeros(6), duration=0.5, progress=lambda *steps: told.append(steps))
+    assert told[-1] == (500, 500)
+    assert len(told) > 2

@@ -1,0 +1,66 @@
+"""Worker processes: only the task that kills its process is marked, and the rest is done."""
+
+from __future__ import annotations
+
+import time
+
+import pytest
+
+from dynx.cli.agree.run import agreement_run
+from dynx.cli.agree.task import AgreementTask, document
+from dynx.workers import Failure, Workers
+from tests.workers.targets import act, crash_on_panda
+
+
+def outcomes(tasks: list[str], size: int = 2, timeout: float | None = None) -> list[object]:
+    """What becomes of each task, in order: its name, or the failure."""
+    found: list[object] = [None] * len(tasks)
+    with Workers(act, size, timeout) as workers:
+        for outcome in workers.run(tasks):
+            found[outcome.index] = outcome.failure or outcome.value[0]
+    return found
+
+
+@pytest.mark.parametrize(("deadly", "message"), [("segfault", "SIGSEGV"), ("exit", "exit code 7")])
+def test_only_the_culprit_of_a_crash_is_marked(deadly: str, message: str) -> None:
+    found = outcomes(["a", deadly, "b", "c", deadly, "d"])
+    assert [found[k] for k in (0, 2, 3, 5)] == ["a", "b", "c", "d"]
+    for k in (1, 4):
+        failure = found[k]
+        assert isinstance(failure, Failure)
+        assert failure.kind == "crash"
+        assert message in failure.message
+
+
+def test_a_hang_is_ended_and_the_rest_is_done() -> None:
+    found = outcomes(["a", "hang", "b"], size=1, timeout=3.0)
+    assert found[0] == "a"
+    assert found[2] == "b"
+    assert isinstance(found[1], Failure)
+    assert found[1].kind == "timeout"
+
+
+def test_an_exception_and_printing_are_survived_by_the_process() -> None:
+    with Workers(act, 1) as workers:
+        values = list(workers.run(["a", "raise", "print", "b"]))
+    assert values[1].failure == Failure("defect", "ZeroDivisionError: no reason")
+    assert values[0].value[1] == values[2].value[1] == values[3].value[1]
+
+
+def test_leaving_ends_what_is_under_way() -> None:
+    started = time.monotonic()
+    with Workers(act, 2) as workers:
+        running = workers.run(["hang", "a", "hang"])
+        next(running)
+    assert time.monotonic() - started < 30.0
+
+
+def test_an_engine_crash_is_an_entry_of_the_document() -> None:
+    tasks = [AgreementTask(name, "fixed", (), ("reference",), 1, 0) for name in ("ur5", "panda", "z1")]
+    run = agreement_run(tasks, crash_on_panda)
+    run.measure(1, 120.0, show_progress=False)
+    made = document(run.results, run.not_done)
+    assert made["summary"] == {"robots": 3, "agree": 2, "differ": 0, "refused": 1, "not_done": 0}
+    assert [entry["robot"] for entry in made["results"]] == ["ur5", "panda", "z1"]
+    assert made["results"][1]["error"]["type"] == "EngineCrash"
+    assert "not_done" not in made
