@@ -1,41 +1,42 @@
-"""What a planted fault is."""
+"""Planted fault: one deliberate mistake in the source of dynx and the test that must notice it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-_ENGINES = {
-    "pybullet": ("pybullet", "bullet_"),
-    "pinocchio": ("pinocchio",),
-    "mujoco": ("mujoco",),
-    "pydrake": ("drake",),
-}
-"""Top-level module of an engine -> what marks a module or a test as needing it."""
+ENGINES = {"pybullet": "pybullet", "pinocchio": "pinocchio", "mujoco": "mujoco", "drake": "pydrake"}
+"""Name of an engine in modules and tests -> the top-level module that it is imported as."""
 
 
 @dataclass(frozen=True)
 class Fault:
-    """One deliberate mistake: in `module`, `right` becomes `wrong`; `caught_by` must then fail.
+    """One deliberate mistake: in `module`, `right` becomes `wrong`, and a test must then fail.
 
-    `right` must occur exactly once in the module's source, so that the catalogue follows the code.
+    `right` must occur exactly once in the source of the module, so that the catalogue follows the code.
     """
 
     name: str
     module: str
     right: str
     wrong: str
-    caught_by: str
+    test_file: str
+    test: str
+
+    @property
+    def caught_by(self) -> str:
+        """Test that must fail, as pytest names it."""
+        return f"{self.test_file}::{self.test}"
 
     @property
     def engine(self) -> str | None:
-        """The engine without which the fault, or the test that catches it, is not there."""
-        for engine, marks in _ENGINES.items():
-            if any(mark in self.module or mark in self.caught_by for mark in marks):
-                return engine
+        """Module to import for the engine that the fault or its test needs, or None."""
+        for engine, top_level in ENGINES.items():
+            if engine in self.module or engine in self.caught_by:
+                return top_level
         return None
 
     def planted(self, source: str) -> str:
-        """The source with the fault in it."""
+        """Return the source with the mistake in it; raise ValueError unless it fits exactly once."""
         count = source.count(self.right)
         if count != 1:
             raise ValueError(f"fault {self.name}: its text occurs {count} times in {self.module}, not once")
