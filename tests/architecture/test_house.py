@@ -1,0 +1,64 @@
+"""docs/architecture.md describes the code as it is, and the code keeps the sizes that it promises."""
+
+from __future__ import annotations
+
+import re
+from itertools import pairwise
+from pathlib import Path
+from statistics import median
+
+ROOT = Path(__file__).parents[2]
+PAGE = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+PROJECT = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+
+MAX_MEDIAN_LINES = 110
+MAX_MODULES_IN_FOLDER = 25
+FOLDERS_OF_INDEPENDENT_MODULES = {Path("dynx/rules/catalogue")}
+"""Folders whose modules are entries of one list, so that their number means nothing."""
+
+
+def rooms() -> set[str]:
+    """Names of the folders and modules directly in dynx, without those that every package has."""
+    entries = (path for path in (ROOT / "dynx").iterdir() if not path.name.startswith("_"))
+    return {path.stem for path in entries if path.is_dir() or path.suffix == ".py"}
+
+
+def sources() -> dict[Path, int]:
+    """Number of lines of each module of the project that is not empty."""
+    folders = ("dynx", "tests", "benchmarks", "docs")
+    paths = (path for folder in folders for path in ROOT.glob(f"{folder}/**/*.py"))
+    counted = {path.relative_to(ROOT): len(path.read_text(encoding="utf-8").splitlines()) for path in paths}
+    return {path: lines for path, lines in counted.items() if lines}
+
+
+def layers(text: str) -> list[list[str]]:
+    """The rooms of each layer of the import contract, from the top."""
+    block = re.search(r'type = "layers"\nlayers = \[\n(.*?)^\]', text, flags=re.MULTILINE | re.DOTALL)
+    assert block
+    return [re.findall(r"dynx\.(\w+)", line) for line in block.group(1).splitlines()]
+
+
+def test_every_room_has_a_line() -> None:
+    table = PAGE[PAGE.index("## The rooms") : PAGE.index("## How one text")]
+    assert set(re.findall(r"^\| `(\w+)` \|", table, flags=re.MULTILINE)) == rooms()
+
+
+def test_the_picture_has_the_rooms_in_the_order_of_the_import_contract() -> None:
+    picture = PAGE[PAGE.index("```text") : PAGE.index("Engines stand high")].splitlines()
+    drawn = {room: number for number, line in enumerate(picture) for room in re.findall(r"\w+", line[:28])}
+    heights = [[drawn[room] for room in layer] for layer in layers(PROJECT)]
+    for above, below in pairwise(heights):
+        assert max(above) <= min(below)
+    assert {room for layer in layers(PROJECT) for room in layer} == rooms()
+
+
+def test_modules_are_small() -> None:
+    assert median(sources().values()) <= MAX_MEDIAN_LINES
+
+
+def test_no_folder_is_a_heap() -> None:
+    folders: dict[Path, int] = {}
+    for path in sources():
+        folders[path.parent] = folders.get(path.parent, 0) + 1
+    heaps = {folder for folder, n in folders.items() if n > MAX_MODULES_IN_FOLDER}
+    assert heaps <= FOLDERS_OF_INDEPENDENT_MODULES
