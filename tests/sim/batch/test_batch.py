@@ -26,7 +26,7 @@ from dynx.control.saturation import Saturated
 from dynx.errors import ArgumentError, UnsupportedFeatureError
 from dynx.model import Model
 from dynx.sim import Noise, Payload, simulate
-from dynx.sim import batch as batch_module
+from dynx.sim.batch import batch as batch_module
 from dynx.sim.batch.batch import BatchInterrupted, simulate_batch
 from dynx.sim.batch.part import Part, PartDone
 from dynx.sim.batch.rollouts import BatchRollouts

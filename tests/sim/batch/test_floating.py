@@ -18,7 +18,7 @@ from dynx.control.base import Controller, Measured
 from dynx.errors import DivergedError
 from dynx.model import Model
 from dynx.sim import BatchRollouts, Noise, Payload, Push, simulate, simulate_batch
-from dynx.sim import batch as batch_module
+from dynx.sim.batch import batch as batch_module
 from dynx.sim.batch.part import Part, PartDone
 from dynx.sim.plants.floating_step import floating_step
 from dynx.spatial import so3
