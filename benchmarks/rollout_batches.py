@@ -20,7 +20,7 @@ from benchmarks.simulator import Check, Simulator
 from benchmarks.tutorial_motion import AGREEMENT, DT, GRAVITY, KD, KP, STEPS, TRACKING, Task
 from benchmarks.urdf_for_peers import spelled_out
 from dynx.bench.timing import Call
-from dynx.control import Controller, Measured
+from dynx.control import Controller, Measurement
 from dynx.engines.pinocchio.library import pin
 from dynx.model import Model
 from dynx.sim import BatchRollouts, simulate_batch
@@ -68,9 +68,9 @@ class NoTorque(Controller[None]):
     def __init__(self, model: Model) -> None:
         self.model = model
 
-    def torque(self, measured: Measured, setpoint: Setpoint, memory: None) -> tuple[Floats, None]:
+    def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
         """Zero (nv,)."""
-        return 0.0 * measured.v, None
+        return 0.0 * measurement.v, None
 
 
 class Batch(Simulator):
@@ -102,7 +102,7 @@ class DynxClosedLoops(Batch):
             Check("distance from the loop by hand [rad]", float(np.max(apart)), AGREEMENT),
         ]
 
-    def start(self) -> Call:
+    def initial_state(self) -> Call:
         """A single step."""
         return partial(self._simulated, DT)
 
@@ -135,7 +135,7 @@ class DynxFalls(Batch):
         """How far from the falls computed by hand."""
         return [apart_from_falls_by_hand(self.size, self.call().q)]
 
-    def start(self) -> Call:
+    def initial_state(self) -> Call:
         """A single step."""
         return partial(self._simulated, DT)
 

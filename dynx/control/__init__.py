@@ -1,6 +1,6 @@
-"""Controllers: one law per file, each a function of what is measured, what is wanted, and its memory."""
+"""Controllers: one law per file, each a function of what is measured, what is wanted, and its state."""
 
-from dynx.control.base import Controller, Measured, ModelBased
+from dynx.control.base import Controller, Measurement, ModelBased
 from dynx.control.computed_torque import ComputedTorque
 from dynx.control.discrete_computed_torque import DiscreteComputedTorque
 from dynx.control.engine_motors import EngineMotor, PDMotor, PositionMotor, TorqueMotor, VelocityMotor
@@ -28,7 +28,7 @@ __all__ = [
     "GravityCompensatedPD",
     "Impedance",
     "JointFriction",
-    "Measured",
+    "Measurement",
     "ModelBased",
     "OpenLoop",
     "OperationalSpace",

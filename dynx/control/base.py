@@ -1,4 +1,4 @@
-"""What a controller is: a function of what is measured, of what is wanted, and of its own memory.
+"""What a controller is: a function of what is measured, of what is wanted, and of its own state.
 
 Everything that a law remembers is handed to it and handed back: the same arguments give the same torque,
 whoever asked before. So a rollout can be resumed at any step, replayed, and dealt to several processes.
@@ -17,11 +17,11 @@ from dynx.model import Model
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint
 
-Memory = TypeVar("Memory")
+ControllerState = TypeVar("ControllerState")
 Self = TypeVar("Self", bound="Controller[Any]")
 
 
-class Measured(NamedTuple):
+class Measurement(NamedTuple):
     """What sensors say at time `t` [s]: configuration `q` (nq,) and velocity `v` (nv,)."""
 
     t: float
@@ -29,8 +29,8 @@ class Measured(NamedTuple):
     v: Floats
 
 
-class Controller(ABC, Generic[Memory]):
-    """A control law of one robot; `Memory` is the type of what it remembers (None for most).
+class Controller(ABC, Generic[ControllerState]):
+    """A control law of one robot; `ControllerState` is the type of what it remembers (None for most).
 
     A law of your own is a subclass with `torque`, and `start` where it remembers something. A controller
     is never changed after it is made. Several threads may share one if they may share its backend.
@@ -48,12 +48,14 @@ class Controller(ABC, Generic[Memory]):
     model: Model
     """The robot as the law knows it; that of the plant may be another."""
 
-    def start(self) -> Any:
-        """What is remembered before the first step; None for a law without memory."""
+    def initial_state(self) -> Any:
+        """What is remembered before the first step; None for a controller without a state of its own."""
         return None
 
     @abstractmethod
-    def torque(self, measured: Measured, setpoint: Setpoint, memory: Memory) -> tuple[Floats, Memory]:
+    def torque(
+        self, measurement: Measurement, setpoint: Setpoint, state: ControllerState
+    ) -> tuple[Floats, ControllerState]:
         """The torque tau (nv,) to apply until the next control step, and what to remember until then.
 
         The arrays handed in are not to be written to; those handed back must be new or never change.
@@ -69,7 +71,7 @@ class Controller(ABC, Generic[Memory]):
         return type(self).__name__
 
 
-class ModelBased(Controller[Memory]):
+class ModelBased(Controller[ControllerState]):
     """A law that evaluates the dynamics of its model, by the backend it is given.
 
     It commands every coordinate, so that a floating base, which no motor moves, is refused.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from numpy.typing import ArrayLike
 
 from dynx.backends import Backend
-from dynx.control.base import Measured, ModelBased
+from dynx.control.base import Measurement, ModelBased
 from dynx.control.gains import feedback_gains
 from dynx.model import Model
 from dynx.spatial.scalar import Array, Floats
@@ -37,9 +37,9 @@ class ComputedTorque(ModelBased[None]):
         super().__init__(model, backend)
         self.kp, self.kd = feedback_gains(model.nv, kp, kd, natural_frequency, damping_ratio)
 
-    def torque(self, measured: Measured, setpoint: Setpoint, memory: None) -> tuple[Floats, None]:
+    def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
         """The torque (nv,)."""
-        _, q, v = measured
+        _, q, v = measurement
         a = commanded_acceleration(q, v, *setpoint, self.kp, self.kd)
         return self._dynamics.inverse_dynamics(q, v, a), None
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dynx.backends import Backend
-from dynx.control.base import Measured, ModelBased
+from dynx.control.base import Measurement, ModelBased
 from dynx.errors import ArgumentError, shown
 from dynx.model import Model
 from dynx.spatial.scalar import Array, Floats
@@ -34,9 +34,9 @@ class DiscreteComputedTorque(ModelBased[None]):
         self.control_dt = float(control_dt)
         self._dt: Floats = np.full(model.nv, control_dt)
 
-    def torque(self, measured: Measured, setpoint: Setpoint, memory: None) -> tuple[Floats, None]:
+    def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
         """The torque (nv,); the setpoint is that of the end of the step."""
-        _, q, v = measured
+        _, q, v = measurement
         a = one_step_acceleration(q, v, setpoint.q, self._dt)
         return self._dynamics.inverse_dynamics(q, v, a), None
 

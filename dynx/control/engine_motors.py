@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dynx.control.base import Controller, Measured
+from dynx.control.base import Controller, Measurement
 from dynx.control.gains import checked_gain
 from dynx.control.saturation import checked_limit
 from dynx.errors import UnsupportedFeatureError
@@ -49,14 +49,14 @@ class EngineMotor(Controller[None]):
         self._q_joints = slice(base + 1 if base else 0, None)
         self._v_joints = slice(base, None)
 
-    def torque(self, measured: Measured, setpoint: Setpoint, memory: None) -> tuple[Floats, None]:
+    def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
         """Raises UnsupportedFeatureError: the engine's solver finds the torque, within its step."""
         raise UnsupportedFeatureError(
             f"{self.name} is a motor inside PyBullet, so it runs with plant='pybullet' only"
         )
 
     @abstractmethod
-    def command(self, measured: Measured, setpoint: Setpoint) -> MotorCommand:
+    def command(self, measurement: Measurement, setpoint: Setpoint) -> MotorCommand:
         """What the motors of all joints are told."""
 
     def _per_joint(self, name: str, number: ArrayLike) -> list[float]:
@@ -93,7 +93,7 @@ class PositionMotor(EngineMotor):
         self._velocity_gain = self._per_joint("velocity_gain", velocity_gain)
         self._force = self._forces(force)
 
-    def command(self, measured: Measured, setpoint: Setpoint) -> MotorCommand:
+    def command(self, measurement: Measurement, setpoint: Setpoint) -> MotorCommand:
         """Position and velocity of the setpoint."""
         return MotorCommand(
             "POSITION_CONTROL",
@@ -113,7 +113,7 @@ class VelocityMotor(EngineMotor):
         super().__init__(model)
         self._force = self._forces(force)
 
-    def command(self, measured: Measured, setpoint: Setpoint) -> MotorCommand:
+    def command(self, measurement: Measurement, setpoint: Setpoint) -> MotorCommand:
         """Velocity of the setpoint."""
         velocities = setpoint.v[self._v_joints].tolist()
         return MotorCommand("VELOCITY_CONTROL", velocities=velocities, forces=self._force)
@@ -129,7 +129,7 @@ class PDMotor(EngineMotor):
         self._kd = self._per_joint("kd", kd)
         self._force = self._forces(force)
 
-    def command(self, measured: Measured, setpoint: Setpoint) -> MotorCommand:
+    def command(self, measurement: Measurement, setpoint: Setpoint) -> MotorCommand:
         """Position and velocity of the setpoint, and the gains."""
         return MotorCommand(
             "PD_CONTROL",
@@ -148,13 +148,13 @@ class TorqueMotor(EngineMotor):
     """
 
     def __init__(self, inner: Controller[None]) -> None:
-        """`inner` is a law without memory."""
+        """`inner` is a controller without a state of its own."""
         super().__init__(inner.model)
         self.inner = inner
         self.lead, self.control_dt = inner.lead, inner.control_dt
         self.needs_setpoint = inner.needs_setpoint
 
-    def command(self, measured: Measured, setpoint: Setpoint) -> MotorCommand:
+    def command(self, measurement: Measurement, setpoint: Setpoint) -> MotorCommand:
         """The inner law's joint torques."""
-        tau, _ = self.inner.torque(measured, setpoint, None)
+        tau, _ = self.inner.torque(measurement, setpoint, None)
         return MotorCommand("TORQUE_CONTROL", forces=tau[self._v_joints].tolist())

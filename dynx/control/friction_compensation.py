@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from dynx.backends import Backend
-from dynx.control.base import Controller, Measured, Memory
+from dynx.control.base import Controller, ControllerState, Measurement
 from dynx.control.friction import SLIP, Coefficients, JointFriction
 from dynx.errors import ArgumentError, shown
 from dynx.spatial.scalar import Floats
@@ -14,7 +14,7 @@ from dynx.trajectory.base import Setpoint
 SPEEDS = ("measured", "setpoint")
 
 
-class FrictionCompensation(Controller[Memory]):
+class FrictionCompensation(Controller[ControllerState]):
     """tau = inner law + d v + f tanh(v / slip), with v measured or wanted.
 
     From the measured speed a plant's own friction cancels exactly, if the coefficients are its own; with
@@ -23,7 +23,7 @@ class FrictionCompensation(Controller[Memory]):
 
     def __init__(
         self,
-        inner: Controller[Memory],
+        inner: Controller[ControllerState],
         *,
         damping: Coefficients = True,
         friction: Coefficients = True,
@@ -41,16 +41,18 @@ class FrictionCompensation(Controller[Memory]):
         self._measured = speed == "measured"
         self._recipe = {"damping": damping, "friction": friction, "slip": slip, "speed": speed}
 
-    def start(self) -> Any:
+    def initial_state(self) -> Any:
         """As the inner law starts."""
-        return self.inner.start()
+        return self.inner.initial_state()
 
-    def torque(self, measured: Measured, setpoint: Setpoint, memory: Memory) -> tuple[Floats, Memory]:
+    def torque(
+        self, measurement: Measurement, setpoint: Setpoint, state: ControllerState
+    ) -> tuple[Floats, ControllerState]:
         """The inner law's torque (nv,) and what is lost."""
-        tau, memory = self.inner.torque(measured, setpoint, memory)
-        return tau + self.losses(measured.v if self._measured else setpoint.v), memory
+        tau, state = self.inner.torque(measurement, setpoint, state)
+        return tau + self.losses(measurement.v if self._measured else setpoint.v), state
 
-    def on(self, engine: str | Backend) -> FrictionCompensation[Memory]:
+    def on(self, engine: str | Backend) -> FrictionCompensation[ControllerState]:
         """The same with the inner law on another backend."""
         options: Any = self._recipe
         return FrictionCompensation(self.inner.on(engine), **options)

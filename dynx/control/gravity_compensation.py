@@ -5,7 +5,7 @@ from __future__ import annotations
 from numpy.typing import ArrayLike
 
 from dynx.backends import Backend
-from dynx.control.base import Measured, ModelBased
+from dynx.control.base import Measurement, ModelBased
 from dynx.control.gains import checked_gain
 from dynx.control.pd import pd_torque
 from dynx.model import Model
@@ -28,7 +28,9 @@ class GravityCompensatedPD(ModelBased[None]):
         self.kp = checked_gain("kp", kp, model.nv)
         self.kd = checked_gain("kd", kd, model.nv)
 
-    def torque(self, measured: Measured, setpoint: Setpoint, memory: None) -> tuple[Floats, None]:
+    def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
         """The torque (nv,)."""
-        weight = self._dynamics.gravity_torque(measured.q)
-        return weight + pd_torque(measured.q, measured.v, setpoint.q, setpoint.v, self.kp, self.kd), None
+        weight = self._dynamics.gravity_torque(measurement.q)
+        return weight + pd_torque(
+            measurement.q, measurement.v, setpoint.q, setpoint.v, self.kp, self.kd
+        ), None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from numpy.typing import ArrayLike
 
 from dynx.backends import Backend
-from dynx.control.base import Measured
+from dynx.control.base import Measurement
 from dynx.control.gains import checked_gain
 from dynx.control.task_space import TaskSpace
 from dynx.model import Model
@@ -40,9 +40,9 @@ class Impedance(TaskSpace[None]):
         self.damping = checked_gain("damping", damping, 6, per="linear then angular")
         self.joint_damping = checked_gain("joint_damping", joint_damping, model.nv)
 
-    def torque(self, measured: Measured, setpoint: Setpoint, memory: None) -> tuple[Floats, None]:
+    def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
         """The torque (nv,)."""
-        error = self._error(measured, setpoint)
+        error = self._error(measurement, setpoint)
         wrench = self.stiffness * error.pose + self.damping * error.twist
-        weight = self._dynamics.gravity_torque(measured.q)
-        return weight + error.jacobian.T @ wrench - self.joint_damping * measured.v, None
+        weight = self._dynamics.gravity_torque(measurement.q)
+        return weight + error.jacobian.T @ wrench - self.joint_damping * measurement.v, None

@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from dynx.control.base import Controller, Memory
+from dynx.control.base import Controller, ControllerState
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
 
 
-class JointSpace(Controller[Memory]):
+class JointSpace(Controller[ControllerState]):
     """A law that looks at joints alone; on a floating base it commands no force."""
 
     def __init__(self, model: Model) -> None:

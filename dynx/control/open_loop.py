@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dynx.control.base import Controller, Measured
+from dynx.control.base import Controller, Measurement
 from dynx.errors import ArgumentError, ShapeError, shown
 from dynx.model import Model
 from dynx.model.configuration import checked_array
@@ -31,7 +31,7 @@ class OpenLoop(Controller[None]):
         self._row_dt = float(control_dt)
         self._nothing: Floats = np.zeros(model.nv)
 
-    def torque(self, measured: Measured, setpoint: Setpoint, memory: None) -> tuple[Floats, None]:
+    def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
         """The torque (nv,) of the row."""
-        row = round(measured.t / self._row_dt)
+        row = round(measurement.t / self._row_dt)
         return (self.torques[row] if 0 <= row < len(self.torques) else self._nothing), None

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.backends import Backend
-from dynx.control.base import Measured
+from dynx.control.base import Measurement
 from dynx.control.computed_torque import commanded_acceleration
 from dynx.control.gains import checked_gain, feedback_gains
 from dynx.control.task_space import TaskSpace
@@ -49,11 +49,11 @@ class OperationalSpace(TaskSpace[None]):
         self.posture_kd = checked_gain("posture_kd", posture_kd, model.nv)
         self._ridge = float(checked_gain("damping", damping, 1, per="")[0]) ** 2 * np.eye(6)
 
-    def torque(self, measured: Measured, setpoint: Setpoint, memory: None) -> tuple[Floats, None]:
+    def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
         """The torque (nv,)."""
-        _, q, v = measured
+        _, q, v = measurement
         engine, frame = self._engine, self.frame
-        error = self._error(measured, setpoint)
+        error = self._error(measurement, setpoint)
         wanted = engine.frame_acceleration(*setpoint, frame) + self.kd * error.twist + self.kp * error.pose
         left = wanted - engine.jacobian_derivative(q, v, frame) @ v
         posture = commanded_acceleration(q, v, *setpoint, self.posture_kp, self.posture_kd)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from numpy.typing import ArrayLike
 
-from dynx.control.base import Measured
+from dynx.control.base import Measurement
 from dynx.control.gains import checked_gain
 from dynx.control.joint_space import JointSpace
 from dynx.model import Model
@@ -24,11 +24,16 @@ class PD(JointSpace[None]):
         self.kp = checked_gain("kp", kp, self._n_joints, per="one for each joint")
         self.kd = checked_gain("kd", kd, self._n_joints, per="one for each joint")
 
-    def torque(self, measured: Measured, setpoint: Setpoint, memory: None) -> tuple[Floats, None]:
+    def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
         """The torque (nv,)."""
         joints, rates = self._q_joints, self._v_joints
         tau = pd_torque(
-            measured.q[joints], measured.v[rates], setpoint.q[joints], setpoint.v[rates], self.kp, self.kd
+            measurement.q[joints],
+            measurement.v[rates],
+            setpoint.q[joints],
+            setpoint.v[rates],
+            self.kp,
+            self.kd,
         )
         return self._of_all(tau), None
 

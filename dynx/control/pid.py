@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dynx.control.base import Measured
+from dynx.control.base import Measurement
 from dynx.control.gains import checked_gain
 from dynx.control.joint_space import JointSpace
 from dynx.control.pd import pd_torque
@@ -21,7 +21,7 @@ class PID(JointSpace[Floats]):
 
     Anti-windup by back-calculation (Astrom and Murray, Feedback Systems, section 11.4): what the limits
     cut off runs back into z with the time constant `tracking_time`, so that z never holds more than the
-    motors can give. The memory is z (n,) [N m or N], the integral part of the torque.
+    motors can give. The state is z (n,) [N m or N], the integral part of the torque.
     """
 
     def __init__(
@@ -52,19 +52,24 @@ class PID(JointSpace[Floats]):
         self._share = min(1.0, self._dt / span)
         self.limit = checked_limit(model, limit)[self._v_joints]
 
-    def start(self) -> Floats:
+    def initial_state(self) -> Floats:
         """No integral yet."""
         return np.zeros(self._n_joints)
 
-    def torque(self, measured: Measured, setpoint: Setpoint, memory: Floats) -> tuple[Floats, Floats]:
+    def torque(self, measurement: Measurement, setpoint: Setpoint, state: Floats) -> tuple[Floats, Floats]:
         """The torque (nv,) within the limits, and the next integral part."""
         joints, rates = self._q_joints, self._v_joints
-        error = setpoint.q[joints] - measured.q[joints]
-        wanted = memory + pd_torque(
-            measured.q[joints], measured.v[rates], setpoint.q[joints], setpoint.v[rates], self.kp, self.kd
+        error = setpoint.q[joints] - measurement.q[joints]
+        wanted = state + pd_torque(
+            measurement.q[joints],
+            measurement.v[rates],
+            setpoint.q[joints],
+            setpoint.v[rates],
+            self.kp,
+            self.kd,
         )
         tau = clipped(wanted, self.limit)
-        integral = memory + self._dt * self.ki * error + self._share * (tau - wanted)
+        integral = state + self._dt * self.ki * error + self._share * (tau - wanted)
         return self._of_all(tau), integral
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.backends import Backend
-from dynx.control.base import Controller, Measured, Memory
+from dynx.control.base import Controller, ControllerState, Measurement
 from dynx.errors import GainError, LimitError, shown
 from dynx.model import Model
 from dynx.model.configuration import real_array
@@ -16,13 +16,13 @@ from dynx.spatial.scalar import Floats, clipped
 from dynx.trajectory.base import Setpoint
 
 
-class Saturated(Controller[Memory]):
+class Saturated(Controller[ControllerState]):
     """Another law, its torques cut to what the motors can give.
 
     `dynx.simulate(..., effort_limits=True)` cuts them in the plant instead, and records where.
     """
 
-    def __init__(self, inner: Controller[Memory], *, limit: ArrayLike | None = None) -> None:
+    def __init__(self, inner: Controller[ControllerState], *, limit: ArrayLike | None = None) -> None:
         """`limit` [N m or N]: one number or one for each joint, by default the effort limits of the model.
 
         Raises LimitError for a limit of 0, with which nothing could be done.
@@ -33,16 +33,18 @@ class Saturated(Controller[Memory]):
         self.needs_setpoint = inner.needs_setpoint
         self.limit = checked_limit(inner.model, limit)
 
-    def start(self) -> Any:
+    def initial_state(self) -> Any:
         """As the inner law starts."""
-        return self.inner.start()
+        return self.inner.initial_state()
 
-    def torque(self, measured: Measured, setpoint: Setpoint, memory: Memory) -> tuple[Floats, Memory]:
+    def torque(
+        self, measurement: Measurement, setpoint: Setpoint, state: ControllerState
+    ) -> tuple[Floats, ControllerState]:
         """The inner law's torque (nv,), within the limits."""
-        tau, memory = self.inner.torque(measured, setpoint, memory)
-        return clipped(tau, self.limit), memory
+        tau, state = self.inner.torque(measurement, setpoint, state)
+        return clipped(tau, self.limit), state
 
-    def on(self, engine: str | Backend) -> Saturated[Memory]:
+    def on(self, engine: str | Backend) -> Saturated[ControllerState]:
         """The same with the inner law on another backend."""
         return Saturated(self.inner.on(engine), limit=self.limit)
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dynx.backends import Backend
-from dynx.control.base import Measured, Memory, ModelBased
+from dynx.control.base import ControllerState, Measurement, ModelBased
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import pose_error
@@ -25,7 +25,7 @@ class TaskError(NamedTuple):
     """J (6, nv) of the frame where it is."""
 
 
-class TaskSpace(ModelBased[Memory]):
+class TaskSpace(ModelBased[ControllerState]):
     """A law about one frame. The setpoint is in joint space as for every law: what it wants of the frame is
     the pose, the velocity and the acceleration that the frame has there."""
 
@@ -38,10 +38,10 @@ class TaskSpace(ModelBased[Memory]):
     def _engine(self) -> Backend:
         return self._dynamics.backend
 
-    def _error(self, measured: Measured, setpoint: Setpoint) -> TaskError:
+    def _error(self, measurement: Measurement, setpoint: Setpoint) -> TaskError:
         engine, frame = self._engine, self.frame
-        J = engine.jacobian(measured.q, frame)
+        J = engine.jacobian(measurement.q, frame)
         wanted = engine.forward_kinematics(setpoint.q, frame)
-        linear, angular = pose_error(wanted, engine.forward_kinematics(measured.q, frame))
+        linear, angular = pose_error(wanted, engine.forward_kinematics(measurement.q, frame))
         wanted_twist = engine.jacobian(setpoint.q, frame) @ setpoint.v
-        return TaskError(np.concatenate([linear, angular]), wanted_twist - J @ measured.v, J)
+        return TaskError(np.concatenate([linear, angular]), wanted_twist - J @ measurement.v, J)

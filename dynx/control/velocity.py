@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from numpy.typing import ArrayLike
 
-from dynx.control.base import Measured
+from dynx.control.base import Measurement
 from dynx.control.gains import checked_gain
 from dynx.control.joint_space import JointSpace
 from dynx.model import Model
@@ -20,7 +20,7 @@ class Velocity(JointSpace[None]):
         super().__init__(model)
         self.kd = checked_gain("kd", kd, self._n_joints, per="one for each joint")
 
-    def torque(self, measured: Measured, setpoint: Setpoint, memory: None) -> tuple[Floats, None]:
+    def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
         """The torque (nv,)."""
         rates = self._v_joints
-        return self._of_all(self.kd * (setpoint.v[rates] - measured.v[rates])), None
+        return self._of_all(self.kd * (setpoint.v[rates] - measurement.v[rates])), None

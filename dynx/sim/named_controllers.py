@@ -49,7 +49,7 @@ class Gains:
 
 
 @dataclass(frozen=True)
-class LawRequest:
+class ControllerRequest:
     """What a law is made from; `start` (nq,) is where the inertia is looked at for gains of torque.
 
     `limit` is the most that motors give [N m or N], for the laws that want to know (PID, PyBullet's
@@ -96,12 +96,12 @@ class LawRequest:
 
 
 @dataclass(frozen=True)
-class NamedLaw:
-    """One entry of `LAWS`: what the law is, which `Gains` it takes, and how it is made."""
+class NamedController:
+    """One entry of `CONTROLLERS`: what the law is, which `Gains` it takes, and how it is made."""
 
     what: str
     takes: tuple[str, ...]
-    make: Callable[[LawRequest], Controller[Any]]
+    make: Callable[[ControllerRequest], Controller[Any]]
     wants: Literal["joints", "frame"] = "joints"
 
 
@@ -119,11 +119,11 @@ def joint_inertia(model: Model, q: Floats) -> Floats:
     return np.divide(1.0, yielding, out=np.zeros_like(yielding), where=yielding > 0.0)
 
 
-def named_law(name: str, request: LawRequest) -> Controller[Any]:
+def named_controller(name: str, request: ControllerRequest) -> Controller[Any]:
     """The law of that name. Raises UnknownNameError for another, GainError for gains it does not take."""
-    law = LAWS.get(name)
+    law = CONTROLLERS.get(name)
     if law is None:
-        raise UnknownNameError(f"no law is called {shown(name)}{nearest(name, LAWS)}")
+        raise UnknownNameError(f"no law is called {shown(name)}{nearest(name, CONTROLLERS)}")
     for gain in request.gains.given():
         if gain not in law.takes:
             takes = f"it takes {', '.join(law.takes)}" if law.takes else "it has no gains"
@@ -133,7 +133,7 @@ def named_law(name: str, request: LawRequest) -> Controller[Any]:
     return law.make(request)
 
 
-def _pid(request: LawRequest) -> Controller[Any]:
+def _pid(request: ControllerRequest) -> Controller[Any]:
     gains = request.torques()
     ki: ArrayLike | None = request.gains.ki
     if ki is None:
@@ -144,7 +144,7 @@ def _pid(request: LawRequest) -> Controller[Any]:
     return control.PID(request.model, **options)
 
 
-def _velocity(request: LawRequest) -> Controller[Any]:
+def _velocity(request: ControllerRequest) -> Controller[Any]:
     if request.gains.kd is not None:
         kd = checked_gain("kd", request.gains.kd, request.n_joints)
     else:
@@ -152,19 +152,19 @@ def _velocity(request: LawRequest) -> Controller[Any]:
     return control.Velocity(request.model, kd=kd)
 
 
-def _position_motor(request: LawRequest) -> Controller[Any]:
+def _position_motor(request: ControllerRequest) -> Controller[Any]:
     names = {"kp": "position_gain", "kd": "velocity_gain"}
     fractions: Any = {names[gain]: given for gain, given in request.gains.given().items()}
     return control.PositionMotor(request.model, **fractions, force=request.limit)
 
 
-def _operational_space(request: LawRequest) -> Controller[Any]:
+def _operational_space(request: ControllerRequest) -> Controller[Any]:
     posture = {name: gain for name, gain in request.gains.given().items() if name.startswith("posture")}
     options: Any = {**request.rates(6), **posture, "backend": request.backend}
     return control.OperationalSpace(request.model, str(request.frame), **options)
 
 
-def _impedance(request: LawRequest) -> Controller[Any]:
+def _impedance(request: ControllerRequest) -> Controller[Any]:
     gains = request.gains
     if gains.kp is None or gains.kd is None:
         raise GainError("impedance needs kp [N/m, N m/rad] and kd [N s/m, N m s/rad] of the frame")
@@ -180,52 +180,56 @@ def _impedance(request: LawRequest) -> Controller[Any]:
 
 _FEEDBACK = ("kp", "kd", "natural_frequency", "damping_ratio")
 
-LAWS: dict[str, NamedLaw] = {
-    "position-motor": NamedLaw("PyBullet's POSITION_CONTROL, its own gains", ("kp", "kd"), _position_motor),
-    "velocity-motor": NamedLaw(
+CONTROLLERS: dict[str, NamedController] = {
+    "position-motor": NamedController(
+        "PyBullet's POSITION_CONTROL, its own gains", ("kp", "kd"), _position_motor
+    ),
+    "velocity-motor": NamedController(
         "PyBullet's VELOCITY_CONTROL", (), lambda r: control.VelocityMotor(r.model, force=r.limit)
     ),
-    "pd-motor": NamedLaw(
+    "pd-motor": NamedController(
         "PyBullet's PD_CONTROL: pd inside the engine",
         _FEEDBACK,
         lambda r: control.PDMotor(r.model, **r.torques(), force=r.limit),
     ),
-    "velocity": NamedLaw("kd (v* - v): positions drift", _FEEDBACK[1:], _velocity),
-    "pd": NamedLaw(
+    "velocity": NamedController("kd (v* - v): positions drift", _FEEDBACK[1:], _velocity),
+    "pd": NamedController(
         "kp (q* - q) + kd (v* - v), no model", _FEEDBACK, lambda r: control.PD(r.model, **r.torques())
     ),
-    "pid": NamedLaw("pd and an integral, cut to the effort limits", ("ki", *_FEEDBACK), _pid),
-    "gravity-pd": NamedLaw(
+    "pid": NamedController("pd and an integral, cut to the effort limits", ("ki", *_FEEDBACK), _pid),
+    "gravity-pd": NamedController(
         "pd and the weight g(q)",
         _FEEDBACK,
         lambda r: control.GravityCompensatedPD(r.model, **r.torques(), backend=r.backend),
     ),
-    "feed-forward": NamedLaw(
+    "feed-forward": NamedController(
         "ID(q*, v*, a*), no feedback",
         (),
         lambda r: control.FeedForward(r.model, backend=r.backend),
     ),
-    "feed-forward-pd": NamedLaw(
+    "feed-forward-pd": NamedController(
         "ID(q*, v*, a*) and pd",
         _FEEDBACK,
         lambda r: control.FeedForward(r.model, **r.torques(), backend=r.backend),
     ),
-    "computed-torque": NamedLaw(
+    "computed-torque": NamedController(
         "ID(q, v, a* + kd (v* - v) + kp (q* - q))",
         _FEEDBACK,
         lambda r: control.ComputedTorque(r.model, **r.rates(), backend=r.backend),
     ),
-    "discrete-computed-torque": NamedLaw(
+    "discrete-computed-torque": NamedController(
         "the plant's own step, inverted",
         (),
         lambda r: control.DiscreteComputedTorque(r.model, control_dt=r.control_dt, backend=r.backend),
     ),
-    "operational-space": NamedLaw(
+    "operational-space": NamedController(
         "computed torque of a frame",
         (*_FEEDBACK, "posture_kp", "posture_kd"),
         _operational_space,
         "frame",
     ),
-    "impedance": NamedLaw("spring and damper of a frame", ("kp", "kd", "posture_kd"), _impedance, "frame"),
+    "impedance": NamedController(
+        "spring and damper of a frame", ("kp", "kd", "posture_kd"), _impedance, "frame"
+    ),
 }
 """From little knowledge of the robot to much, the task-space laws last."""

@@ -18,7 +18,7 @@ from dynx.errors import ArgumentError, SimulationError, shown
 from dynx.model import Model
 from dynx.model.configuration import checked_array, checked_q
 from dynx.sim.loop.clock import Clock
-from dynx.sim.loop.controller_checks import check_law, numbers_of
+from dynx.sim.loop.controller_checks import check_controller, controller_numbers
 from dynx.sim.loop.plain import Loop
 from dynx.sim.loop.references import SetpointOf, checked_reference, setpoints_of
 from dynx.sim.loop.sensors import Noise, Sensors
@@ -104,7 +104,7 @@ def simulate(
 
     **Resuming.** With `resume` the first `step` steps (by default all) are taken from that record, and
     the rest computed, with all else given as then: the outcome is that of one run, to the last bit. That
-    takes a law that keeps nothing to itself: what it remembers is its memory.
+    takes a controller whose state is an argument and a result of `torque`, not kept in itself.
 
     **Long runs.** `progress` is called now and then with the steps taken and those asked for. Ctrl-C
     raises RolloutInterrupted, which has what was computed in ``.rollout`` and can be resumed.
@@ -123,7 +123,7 @@ def simulate(
     clock = Clock.of(dt, span, control_dt, delay)
     moved = plant_model(model, payload, mass_scale)
     if controller is not None:
-        check_law(model, controller, clock)
+        check_controller(model, controller, clock)
     setpoint_of = checked_reference(model, reference, within_limits=check_reference)
     loads = Loads(moved, damping, friction, friction_slip, armature, pushes, dt)
     limit = _effort_limits(model, controller, effort_limits)
@@ -133,7 +133,7 @@ def simulate(
         "plant": plant,
         "integrator": integrator or ("engine" if plant == "pybullet" else "semi_implicit"),
         "controller": "none" if controller is None else controller.name,
-        "law": {} if controller is None else numbers_of(controller),
+        "law": {} if controller is None else controller_numbers(controller),
         "dt": clock.dt,
         "control_dt": clock.control_dt,
         "delay": clock.delay_steps * clock.dt,

@@ -17,7 +17,7 @@ from dynx.control import (
     GravityCompensatedPD,
     Impedance,
     JointFriction,
-    Measured,
+    Measurement,
     OperationalSpace,
 )
 from dynx.control.friction import LEAST_SLIP
@@ -86,7 +86,7 @@ def test_operational_space_gives_the_frame_its_acceleration(seed: int) -> None:
     v, v_wanted, a_wanted = rng.uniform(-1.0, 1.0, (3, robot.nv))
     law = OperationalSpace(robot, "panda_hand", kp=100.0, kd=20.0, posture_kp=9.0, damping=0.0)
     setpoint = Setpoint(wanted, v_wanted, a_wanted)
-    tau, _ = law.torque(Measured(0.0, q, v), setpoint, None)
+    tau, _ = law.torque(Measurement(0.0, q, v), setpoint, None)
     with backend("reference", robot) as engine:
         a = engine.forward_dynamics(q, v, tau)
         got = engine.frame_acceleration(q, v, a, "panda_hand")

@@ -90,7 +90,7 @@ SIMULATION_FAULTS = (
         "dynx.control.discrete_computed_torque",
         right="return ((q_next - q) / dt - v) / dt",
         wrong="return (q_next - q) / dt / dt",
-        test_file="tests/control/test_laws.py",
+        test_file="tests/control/test_controllers.py",
         test="test_the_discrete_law_lands_on_its_setpoint",
     ),
     Fault(

@@ -12,7 +12,7 @@ from dynx.control import (
     ComputedTorque,
     DiscreteComputedTorque,
     GravityCompensatedPD,
-    Measured,
+    Measurement,
     PositionMotor,
 )
 from dynx.control.base import Controller
@@ -138,8 +138,8 @@ class Faulty(Controller[None]):
         self.model = ARM
         self.answer = answer
 
-    def torque(self, measured: Measured, setpoint: Setpoint, memory: None) -> tuple[Floats, None]:
-        if measured.t < 4.5e-3:
+    def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
+        if measurement.t < 4.5e-3:
             return np.zeros(6), None
         if isinstance(self.answer, Exception):
             raise self.answer

@@ -13,7 +13,7 @@ from dynx.errors import GainError, LimitError, UnknownNameError
 from dynx.model import Model
 from dynx.model.loading import load
 from dynx.sim import simulate
-from dynx.sim.named_controllers import LAWS, Gains, LawRequest, joint_inertia, named_law
+from dynx.sim.named_controllers import CONTROLLERS, ControllerRequest, Gains, joint_inertia, named_controller
 from dynx.trajectory import Setpoint
 from tests.sim.bars import tutorial_robot
 
@@ -24,10 +24,10 @@ START = np.array([0.2, -1.3, 1.1, 0.3, 0.4, 0.1])
 def law(name: str, model: Model = ARM, **options: Any) -> Any:
     gains = {key: options.pop(key) for key in list(options) if key in Gains.__dataclass_fields__}
     options.setdefault("start", START if model is ARM else model.neutral())
-    return named_law(name, LawRequest(model, control_dt=1e-3, gains=Gains(**gains), **options))
+    return named_controller(name, ControllerRequest(model, control_dt=1e-3, gains=Gains(**gains), **options))
 
 
-@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize("name", CONTROLLERS)
 def test_every_law_can_be_had_by_its_name(name: str) -> None:
     needed: dict[str, Any] = {"impedance": {"kp": 1.0, "kd": 1.0}}.get(name, {})
     made = law(name, frame="tool0", **needed)
@@ -123,6 +123,6 @@ def test_gains_of_a_floating_robot_do_not_overshoot(name: str) -> None:
     """A base that yields makes joints lighter than the diagonal of the mass matrix says, up to 600 times."""
     robot = load("ur5", base="floating")
     start = robot.neutral()
-    law = named_law(name, LawRequest(robot, start, 1e-3))
+    law = named_controller(name, ControllerRequest(robot, start, 1e-3))
     rollout = simulate(robot, law, start, duration=0.2)
     assert np.abs(rollout.v[:, 6:]).max() < 1.0

@@ -13,7 +13,7 @@ from dynx.cli.sim.options import PROFILES
 from dynx.errors import ArgumentError
 from dynx.model import Model
 from dynx.sim.loop.clock import positive
-from dynx.sim.named_controllers import LAWS
+from dynx.sim.named_controllers import CONTROLLERS
 from dynx.spatial.scalar import Floats
 from dynx.trajectory import Trajectory
 
@@ -69,7 +69,7 @@ class MotionInput:
     @property
     def needs_frame(self) -> bool:
         """Whether a frame takes part."""
-        law = LAWS.get(self.controller)
+        law = CONTROLLERS.get(self.controller)
         return self.to_pose is not None or (law is not None and law.wants == "frame")
 
 

@@ -20,7 +20,7 @@ from dynx.model import Model
 from dynx.model.loading import load
 from dynx.sim import Noise, Payload, Push, Rollout
 from dynx.sim.loop.clock import Clock
-from dynx.sim.named_controllers import Gains, LawRequest, named_law
+from dynx.sim.named_controllers import ControllerRequest, Gains, named_controller
 from dynx.simd.machine import LARGEST_SHARE, memory
 
 if TYPE_CHECKING:
@@ -109,9 +109,9 @@ def _law(
         if gains.given() or given["friction_compensation"]:
             raise ArgumentError("--controller none has no gains, and no friction to give back")
         return None
-    law = named_law(
+    law = named_controller(
         given["controller"],
-        LawRequest(
+        ControllerRequest(
             model,
             motion.begin,
             clock.control_dt,

@@ -26,7 +26,7 @@ from dynx.sim.batch.rollouts import BatchRollouts
 from dynx.sim.batch.store import Store
 from dynx.sim.batch.traced_controller import innermost
 from dynx.sim.loop.clock import Clock
-from dynx.sim.loop.controller_checks import check_law
+from dynx.sim.loop.controller_checks import check_controller
 from dynx.sim.loop.references import checked_reference
 from dynx.sim.loop.sensors import Noise
 from dynx.sim.plants.loads import Push
@@ -124,7 +124,7 @@ def simulate_batch(
     if span is None:
         raise ArgumentError("duration is not given, and the reference is no trajectory that has one")
     clock = Clock.of(dt, span, control_dt, delay)
-    check_law(model, controller, clock)
+    check_controller(model, controller, clock)
     if isinstance(record_every, bool) or not isinstance(record_every, int) or record_every < 0:
         raise ArgumentError(f"record_every is {shown(record_every)}; wanted a whole number, 0 for no record")
     limit = None
@@ -159,13 +159,13 @@ def simulate_batch(
     refuse_ambiguous(loads, n, {"damping": damping, "friction": friction, "armature": armature})
     start = {name: rows.spread(array) for name, array in start.items()}
     fixed = {name: rows.spread(array) for name, array in fixed.items()}
-    memory = controller.start()
+    state = controller.initial_state()
     zeros = np.zeros((n, model.nv))
     start |= {"worst": zeros, "squares": zeros}
     if limit is not None:
         start["cut"] = zeros
-    if memory is not None:
-        start["memory"] = np.tile(memory, (n, 1))
+    if state is not None:
+        start["state"] = np.tile(state, (n, 1))
     deviations = None
     if noise is not None:
         if not isinstance(noise.seed, int) or noise.seed < 0:

@@ -16,7 +16,7 @@ import numpy as np
 from dynx.compiled.kernels import evaluated, tidied
 from dynx.compiled.mass_factors import factors_of, solved
 from dynx.compiled.parametric import ParametricDynamics
-from dynx.control.base import Controller, Measured
+from dynx.control.base import Controller, Measurement
 from dynx.errors import ArgumentError, DynxError, TraceError, UnsupportedFeatureError, shown
 from dynx.model import Mechanism, Model
 from dynx.sim.batch.fingerprint import content_of
@@ -61,11 +61,11 @@ class StepOf:
                 arrays = [key for key, value in vars(law).items() if isinstance(value, np.ndarray)]
                 known = ", ".join(key for key in arrays if not key.startswith("_"))
                 raise ArgumentError(f"{law.name} has no gain {shown(name)}; it has {known or 'none'}")
-        memory = self.controller.start()
-        if memory is not None and not is_row(memory):
-            what = f"array {memory.shape}" if isinstance(memory, np.ndarray) else type(memory).__name__
+        state = self.controller.initial_state()
+        if state is not None and not is_row(state):
+            what = f"array {state.shape}" if isinstance(state, np.ndarray) else type(state).__name__
             raise UnsupportedFeatureError(
-                f"{self.controller.name} remembers a {what}; in a batch it may be an array (n,) of float64"
+                f"{self.controller.name} has a state of type {what}; a batch takes an array (n,) of float64"
             )
 
     def kernel(self, *, controlled: bool, pushed: bool) -> Kernel:
@@ -95,7 +95,7 @@ class StepOf:
             if controlled:
                 outcome = self._commanded(law, given)
             else:
-                outcome = {name: given[name] for name in ("memory", "cut") if name in given}
+                outcome = {name: given[name] for name in ("state", "cut") if name in given}
             tau = outcome["tau"] if controlled else given["tau"]
             a = self._acceleration(mechanism, tau, given, pushed)
             q, v = self._moved(a, given)
@@ -135,9 +135,9 @@ class StepOf:
             sizes |= {f"gain_{name}": getattr(law, name).size for name in self.gains}
             if self.limit is not None:
                 sizes["held_for"] = 1
-        memory = self.controller.start()
-        if memory is not None:
-            sizes["memory"] = memory.size
+        state = self.controller.initial_state()
+        if state is not None:
+            sizes["state"] = state.size
         if self.limit is not None:
             sizes["cut"] = nv
         if self.plant is not None:
@@ -154,20 +154,18 @@ class StepOf:
         setpoint = Setpoint(given["q_wanted"], given["v_wanted"], given["a_wanted"])
         own = traced_law(law, {name: given[f"gain_{name}"] for name in self.gains})
         watch = Unchanged(own)
-        tau, memory = own.torque(Measured(given["t"][0], q, v), setpoint, given.get("memory"))
+        tau, state = own.torque(Measurement(given["t"][0], q, v), setpoint, given.get("state"))
         if watch.changed:
             raise UnsupportedFeatureError(
-                f"{watch.changed}, which a batch would do once for all: let it return what it remembers"
+                f"{watch.changed}, which a batch would do once for all: let it return its state"
             )
-        if memory is not None and "memory" not in given:
-            raise UnsupportedFeatureError(
-                f"{own.name} returns something to remember, but its start() gives None"
-            )
+        if state is not None and "state" not in given:
+            raise UnsupportedFeatureError(f"{own.name} returns a state, but its initial_state() returns None")
         if np.shape(tau) != given["v"].shape:
             raise UnsupportedFeatureError(
                 f"the torque of {own.name} has shape {np.shape(tau)}; wanted {given['v'].shape}"
             )
-        outcome = {} if memory is None else {"memory": memory}
+        outcome = {} if state is None else {"state": state}
         if self.limit is None:
             return {"tau": tau, **outcome}
         tau = clipped(tau, self.limit)

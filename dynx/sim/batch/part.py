@@ -56,7 +56,7 @@ class Part:
     start: dict[str, Floats]
     """What a step takes and gives back, as it is at the beginning, arrays (count, size): q and v, the largest
     error and the sum of squared errors of each coordinate (``worst``, ``squares``), what the law remembers
-    (``memory``), and in how many steps a motor was at its limit (``cut``)."""
+    (``state``), and in how many steps a motor was at its limit (``cut``)."""
     fixed: dict[str, Floats]
     """Inputs that stay the same: parameters and gains (count, size)."""
     setpoints: Setpoint

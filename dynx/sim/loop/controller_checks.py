@@ -17,7 +17,7 @@ LISTED = 64
 """Numbers in one attribute of a law that a record lists; of more it keeps a checksum."""
 
 
-def check_law(model: Model, controller: Controller[Any], clock: Clock) -> None:
+def check_controller(model: Model, controller: Controller[Any], clock: Clock) -> None:
     """Refuse a controller of another robot, or made for another control step, by an ArgumentError."""
     known = getattr(controller, "model", None)
     if not isinstance(known, Model):
@@ -33,14 +33,14 @@ def check_law(model: Model, controller: Controller[Any], clock: Clock) -> None:
         )
 
 
-def numbers_of(controller: Controller[Any]) -> dict[str, Any]:
+def controller_numbers(controller: Controller[Any]) -> dict[str, Any]:
     """The public numbers of a law and of the law inside it, such as gains, in types that JSON has."""
     found: dict[str, Any] = {}
     for name, value in sorted(vars(controller).items()):
         if name.startswith("_"):
             continue
         if isinstance(value, Controller):
-            found[name] = {"law": value.name, **numbers_of(value)}
+            found[name] = {"law": value.name, **controller_numbers(value)}
         elif isinstance(value, np.ndarray) and value.dtype.kind in "biuf":
             digest = sha256(np.ascontiguousarray(value).tobytes())
             found[name] = value.tolist() if value.size <= LISTED else f"sha256 {digest.hexdigest()}"
@@ -49,9 +49,9 @@ def numbers_of(controller: Controller[Any]) -> dict[str, Any]:
     return found
 
 
-def is_row(memory: Any) -> bool:
+def is_row(state: Any) -> bool:
     """Whether what a law remembers is what kernels can: numbers (n,) in float64."""
-    return isinstance(memory, np.ndarray) and memory.dtype == np.float64 and memory.ndim == 1
+    return isinstance(state, np.ndarray) and state.dtype == np.float64 and state.ndim == 1
 
 
 class Unchanged:

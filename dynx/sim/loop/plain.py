@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from dynx.control.base import Controller, Measured
+from dynx.control.base import Controller, Measurement
 from dynx.control.engine_motors import EngineMotor
 from dynx.errors import ArgumentError, ControlError, DivergedError, shown
 from dynx.sim.loop.clock import Clock
@@ -64,7 +64,7 @@ class Loop:
             return
         if begin:
             self._refuse_changing(record)
-        memory = self.remembered(record)
+        state = self.remembered(record)
         plant.reset(Q[begin].copy(), V[begin].copy())
         q, v = Q[begin].copy(), V[begin].copy()
         tau, command = self._held(record)
@@ -79,13 +79,13 @@ class Loop:
             t = k * dt
             if k == due and controller is not None:
                 due += per_control
-                measured = Measured(t, q, v) if sensors is None else sensors(k, Q, V)
+                measurement = Measurement(t, q, v) if sensors is None else sensors(k, Q, V)
                 setpoint = setpoints[k // per_control]
                 try:
                     if motors is not None:
-                        command = motors.command(measured, setpoint)
+                        command = motors.command(measurement, setpoint)
                     else:
-                        tau, memory = controller.torque(measured, setpoint, memory)
+                        tau, state = controller.torque(measurement, setpoint, state)
                 except Exception as error:
                     raise self._control_failed(k, record, f"{type(error).__name__}: {error}") from error
                 if motors is None:
@@ -141,28 +141,28 @@ class Loop:
         watch = Unchanged(controller)
         # What goes wrong here goes wrong in its step too.
         with suppress(Exception):
-            measured = self.sensors(0, record.q, record.v)
-            controller.torque(measured, self._setpoint(0), controller.start())
+            measurement = self.sensors(0, record.q, record.v)
+            controller.torque(measurement, self._setpoint(0), controller.initial_state())
         if watch.changed:
             raise ArgumentError(
-                f"{watch.changed}, so a rollout under it cannot be resumed: let it return what it remembers"
+                f"{watch.changed}, so a rollout under it cannot be resumed: let it return its state"
             )
 
     def remembered(self, record: Record) -> Any:
-        """The controller's memory at the step where the loop begins.
+        """The controller's state at the step where the loop begins.
 
         It is a function of what was measured until then, so it is not recorded but found again.
         """
         if self.controller is None:
             return None
-        memory = self.controller.start()
-        if memory is None or isinstance(self.controller, EngineMotor):
-            return memory
+        state = self.controller.initial_state()
+        if state is None or isinstance(self.controller, EngineMotor):
+            return state
         for number in range(-(-record.steps // self.clock.steps_per_control)):
             step = number * self.clock.steps_per_control
-            measured = self.sensors(step, record.q, record.v)
-            _, memory = self.controller.torque(measured, self._setpoint(number), memory)
-        return memory
+            measurement = self.sensors(step, record.q, record.v)
+            _, state = self.controller.torque(measurement, self._setpoint(number), state)
+        return state
 
     def _setpoint(self, number: int) -> Setpoint:
         return Setpoint(*(array[number] for array in self.setpoints))
@@ -175,8 +175,8 @@ class Loop:
             return nothing, None
         if isinstance(self.controller, EngineMotor):
             number = begin // self.clock.steps_per_control
-            measured = self.sensors(number * self.clock.steps_per_control, record.q, record.v)
-            return nothing, self.controller.command(measured, self._setpoint(number))
+            measurement = self.sensors(number * self.clock.steps_per_control, record.q, record.v)
+            return nothing, self.controller.command(measurement, self._setpoint(number))
         return record.tau[begin - 1].copy(), None
 
     def _diverged(self, k: int, record: Record, why: str) -> DivergedError:

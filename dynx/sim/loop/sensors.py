@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dynx.control.base import Measured
+from dynx.control.base import Measurement
 from dynx.control.gains import checked_gain
 from dynx.errors import ArgumentError, shown
 from dynx.model import Model
@@ -52,15 +52,15 @@ class Sensors:
         """Whether the state itself is what is measured."""
         return self.noise is None and not self._clock.delay_steps
 
-    def __call__(self, step: int, q: Floats, v: Floats) -> Measured:
+    def __call__(self, step: int, q: Floats, v: Floats) -> Measurement:
         """The measurement at physics step `step`, from the states (n, nq), (n, nv) until then.
 
         With a delay it is the state of that long ago; before the start, the state at the start.
         """
         seen = max(step - self._clock.delay_steps, 0)
-        measured = Measured(step * self._clock.dt, q[seen], v[seen])
+        measurement = Measurement(step * self._clock.dt, q[seen], v[seen])
         if self.noise is None:
-            return measured
+            return measurement
         number = step // self._clock.steps_per_control
         off_q, off_v = self.noise[0][number], self.noise[1][number]
-        return Measured(measured.t, self._model.integrate(measured.q, off_q), measured.v + off_v)
+        return Measurement(measurement.t, self._model.integrate(measurement.q, off_q), measurement.v + off_v)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dynx.control.base import Measured
+from dynx.control.base import Measurement
 from dynx.control.engine_motors import EngineMotor
 from dynx.errors import TraceError
 from dynx.sim.loop.controller_checks import is_row
@@ -81,12 +81,12 @@ class GluedLoop:
             refuse_foreign_law(loop.controller)
         if any(array.dtype != np.float64 for array in loop.setpoints):
             raise TraceError("the reference is not in float64")
-        self._start = None if loop.controller is None else loop.controller.start()
+        self._start = None if loop.controller is None else loop.controller.initial_state()
         if self._start is not None and not is_row(self._start):
             raise TraceError("what the law remembers is no array (n,) of float64")
-        self._memory = 0 if self._start is None else self._start.size
-        if self._memory:
-            sizes["memory"] = self._memory
+        self._state_size = 0 if self._start is None else self._start.size
+        if self._state_size:
+            sizes["state"] = self._state_size
         self._asked = self._step(Questions(sizes), asked=True)
         self._held = self._step(Questions(sizes), asked=False) if loop.clock.steps_per_control > 1 else None
 
@@ -110,16 +110,16 @@ class GluedLoop:
         loop, given = self._loop, questions.given
         results: dict[str, Array] = {}
         unsound: Any = 0.0
-        tau, memory = given["held"], given.get("memory", self._start)
+        tau, state = given["held"], given.get("state", self._start)
         if loop.controller is None:
             tau = np.zeros(len(tau), dtype=object)
         elif asked:
             q, v = given["seen_q"], given["seen_v"]
             if loop.sensors.noise is not None:
                 q, v = q + given["noise_q"], v + given["noise_v"]
-            measured = Measured(given["t"][0], q, v)
+            measurement = Measurement(given["t"][0], q, v)
             law = asking_law(loop.controller, questions)
-            tau, memory = law.torque(measured, Setpoint(*(given[name] for name in SETPOINT)), memory)
+            tau, state = law.torque(measurement, Setpoint(*(given[name] for name in SETPOINT)), state)
             questions.refuse_rounded_otherwise()
             if tau.shape != given["v"].shape:
                 raise TraceError(f"the torque has shape {tau.shape}")
@@ -135,8 +135,8 @@ class GluedLoop:
 
         q, v, a = self._plant.advanced(accelerate, given["q"], given["v"], tau)
         results |= {"tau": tau, "a": a, "next_q": q, "next_v": v}
-        if self._memory and memory is not None:
-            results["next_memory"] = memory
+        if self._state_size and state is not None:
+            results["next_state"] = state
         results["defect"] = np.array([v @ v + unsound], dtype=object)
         return questions.glue(results)
 
@@ -154,9 +154,9 @@ class GluedLoop:
         rows = [array if array[:1].flags.c_contiguous else np.ascontiguousarray(array) for array in setpoints]
         arrays |= dict(zip(SETPOINT, rows, strict=True))
         arrays |= dict(zip(NOISE, loop.sensors.noise or (silence, silence), strict=True))
-        if self._memory:
-            arrays["memory"] = arrays["next_memory"] = memory = np.empty((n + 1, self._memory))
-            memory[record.steps] = loop.remembered(record)
+        if self._state_size:
+            arrays["state"] = arrays["next_state"] = state = np.empty((n + 1, self._state_size))
+            state[record.steps] = loop.remembered(record)
         return arrays
 
     def _row(self, name: str, steps: Steps) -> Steps:

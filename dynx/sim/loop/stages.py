@@ -183,8 +183,8 @@ def refuse_foreign_law(controller: Controller[Any]) -> None:
     never again.
     """
     kind, own = type(controller), vars(controller)
-    methods = (kind, kind.torque, kind.start)
-    if {"torque", "start"} & own.keys() or not all(
+    methods = (kind, kind.torque, kind.initial_state)
+    if {"torque", "initial_state"} & own.keys() or not all(
         str(method.__module__).startswith("dynx.control.") for method in methods
     ):
         raise TraceError(f"{controller.name} is not a law of dynx")

@@ -15,7 +15,7 @@ from dynx.cli.shell.configuration_input import default_frame
 from dynx.cli.sim import options as sim_options
 from dynx.cli.sim.command import sim as command
 from dynx.sim import Rollout, simulate
-from dynx.sim.named_controllers import LAWS
+from dynx.sim.named_controllers import CONTROLLERS
 from dynx.sim.plants.integrators import METHODS
 from dynx.sim.plants.plant import INTEGRATORS
 from tests.cli.sim.command import SHORT, document, sim
@@ -32,7 +32,7 @@ KEYS = """
 
 
 def test_the_options_are_those_of_the_library() -> None:
-    assert ("none", *LAWS) == sim_options.CONTROLLERS
+    assert ("none", *CONTROLLERS) == sim_options.CONTROLLERS
     assert INTEGRATORS == sim_options.INTEGRATORS
     assert sim_options.METHODS == METHODS
     options = {param.name: param for param in command.params}

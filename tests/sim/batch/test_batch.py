@@ -15,7 +15,7 @@ import pytest
 
 import dynx
 from dynx import trajectory
-from dynx.control.base import Controller, Measured
+from dynx.control.base import Controller, Measurement
 from dynx.control.computed_torque import ComputedTorque
 from dynx.control.discrete_computed_torque import DiscreteComputedTorque
 from dynx.control.feed_forward import FeedForward
@@ -231,8 +231,8 @@ class Branching(Controller[None]):
     def __init__(self, model: Model) -> None:
         self.model = model
 
-    def torque(self, measured: Measured, setpoint: Setpoint, memory: None) -> tuple[Floats, None]:
-        return (measured.v if measured.q[0] > 0.0 else -measured.v), None
+    def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
+        return (measurement.v if measurement.q[0] > 0.0 else -measurement.v), None
 
 
 def test_what_cannot_be_a_batch_is_refused(arm: Model, reference: Trajectory) -> None:

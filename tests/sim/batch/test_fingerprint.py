@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dynx.control import PD, ComputedTorque, FrictionCompensation, Saturated
-from dynx.control.base import Controller, Measured
+from dynx.control.base import Controller, Measurement
 from dynx.sim import simulate, simulate_batch
 from dynx.sim.batch import kernel as fused
 from dynx.sim.batch.fingerprint import content_of
@@ -52,9 +52,9 @@ def test_signs_of_zeros_are_told_apart() -> None:
 class Scaled(PD):
     """A law of somebody's own, which reads what is no attribute of it."""
 
-    def torque(self, measured: Measured, setpoint: Setpoint, memory: None) -> tuple[Floats, None]:
-        tau, memory = super().torque(measured, setpoint, memory)
-        return SCALE[0] * tau, memory
+    def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
+        tau, state = super().torque(measurement, setpoint, state)
+        return SCALE[0] * tau, state
 
 
 SCALE = [1.0]

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 import dynx
 from dynx.control import PD, PID, Velocity
-from dynx.control.base import Controller, Measured
+from dynx.control.base import Controller, Measurement
 from dynx.errors import DivergedError
 from dynx.model import Model
 from dynx.sim import BatchRollouts, Noise, Payload, Push, simulate, simulate_batch
@@ -128,8 +128,8 @@ class Echo(Controller[None]):
     def __init__(self, model: Model) -> None:
         self.model = model
 
-    def torque(self, measured: Measured, setpoint: Setpoint, memory: None) -> tuple[Floats, None]:
-        return np.concatenate([measured.q[:6], 0.0 * measured.v[6:]]), None
+    def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
+        return np.concatenate([measurement.q[:6], 0.0 * measurement.v[6:]]), None
 
 
 def test_noise_displaces_the_base_along_its_own_axes() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dynx.backends import backend, installed_backends
-from dynx.control import PD, GravityCompensatedPD, Measured, OpenLoop, Saturated
+from dynx.control import PD, GravityCompensatedPD, Measurement, OpenLoop, Saturated
 from dynx.control.base import Controller
 from dynx.model import Model
 from dynx.model.loading import load
@@ -134,10 +134,10 @@ class Witness(Controller[None]):
 
     def __init__(self, robot: Model) -> None:
         self.model = robot
-        self.seen: list[Measured] = []
+        self.seen: list[Measurement] = []
 
-    def torque(self, measured: Measured, setpoint: Setpoint, memory: None) -> tuple[Floats, None]:
-        self.seen.append(measured)
+    def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
+        self.seen.append(measurement)
         return np.zeros(self.model.nv), None
 
 
@@ -146,9 +146,9 @@ def test_a_controller_sees_the_past() -> None:
     witness = Witness(robot)
     rollout = simulate(robot, witness, POSTURE, duration=0.02, delay=3e-3, control_dt=2e-3)
     assert [m.t for m in witness.seen] == pytest.approx([2e-3 * k for k in range(10)])
-    for k, measured in enumerate(witness.seen):
-        np.testing.assert_array_equal(measured.q, rollout.q[max(2 * k - 3, 0)])
-        np.testing.assert_array_equal(measured.v, rollout.v[max(2 * k - 3, 0)])
+    for k, measurement in enumerate(witness.seen):
+        np.testing.assert_array_equal(measurement.q, rollout.q[max(2 * k - 3, 0)])
+        np.testing.assert_array_equal(measurement.v, rollout.v[max(2 * k - 3, 0)])
 
 
 @pytest.mark.parametrize("base", ["fixed", "floating"])

@@ -10,7 +10,7 @@ import pytest
 
 from dynx.backends import installed_backends
 from dynx.control import PID, ComputedTorque, OpenLoop, Saturated
-from dynx.control.base import Controller, Measured
+from dynx.control.base import Controller, Measurement
 from dynx.errors import ArgumentError, ControlError, UnsupportedFeatureError
 from dynx.sim import Rollout, simulate, simulate_batch
 from dynx.trajectory import cycloidal
@@ -30,37 +30,37 @@ class Remembering(Controller[Any]):
         self.model = ARM
         self._begin, self._counted = start, counted
 
-    def start(self) -> Any:
+    def initial_state(self) -> Any:
         return copy.deepcopy(self._begin)
 
-    def torque(self, measured: Measured, setpoint: Setpoint, memory: Any) -> tuple[Any, Any]:
-        return -measured.v, self._counted(memory)
+    def torque(self, measurement: Measurement, setpoint: Setpoint, state: Any) -> tuple[Any, Any]:
+        return -measurement.v, self._counted(state)
 
 
-MEMORIES: dict[str, Remembering] = {
-    "float": Remembering(0.0, lambda memory: memory + 1.0),
-    "int": Remembering(0, lambda memory: memory + 1),
-    "tuple": Remembering((0, 0), lambda memory: (memory[0] + 1, 0)),
-    "list": Remembering([], lambda memory: [*memory, 1]),
-    "dict": Remembering({"n": 0}, lambda memory: {"n": memory["n"] + 1}),
-    "table": Remembering(np.zeros((2, 6)), lambda memory: memory + 1.0),
-    "integers": Remembering(np.zeros(3, dtype=int), lambda memory: memory + 1),
-    "later": Remembering(None, lambda memory: 1 if memory is None else memory + 1),
+STATES: dict[str, Remembering] = {
+    "float": Remembering(0.0, lambda state: state + 1.0),
+    "int": Remembering(0, lambda state: state + 1),
+    "tuple": Remembering((0, 0), lambda state: (state[0] + 1, 0)),
+    "list": Remembering([], lambda state: [*state, 1]),
+    "dict": Remembering({"n": 0}, lambda state: {"n": state["n"] + 1}),
+    "table": Remembering(np.zeros((2, 6)), lambda state: state + 1.0),
+    "integers": Remembering(np.zeros(3, dtype=int), lambda state: state + 1),
+    "later": Remembering(None, lambda state: 1 if state is None else state + 1),
 }
 
 
 @pytest.mark.parametrize("plant", PLANTS)
-@pytest.mark.parametrize("kind", MEMORIES)
-def test_a_law_may_remember_anything(kind: str, plant: str) -> None:
-    law = MEMORIES[kind]
+@pytest.mark.parametrize("kind", STATES)
+def test_a_controller_state_may_be_anything(kind: str, plant: str) -> None:
+    law = STATES[kind]
     whole = simulate(ARM, law, REST, plant=plant, duration=0.3)
     the_same(simulate(ARM, law, REST, plant=plant, duration=0.3, resume=whole.first(20)), whole)
 
 
-@pytest.mark.parametrize("kind", MEMORIES)
-def test_in_a_batch_it_remembers_numbers(kind: str) -> None:
-    with pytest.raises(UnsupportedFeatureError, match=r"remember"):
-        simulate_batch(ARM, MEMORIES[kind], REST, rollouts=4, duration=0.01)
+@pytest.mark.parametrize("kind", STATES)
+def test_in_a_batch_the_controller_state_is_numbers(kind: str) -> None:
+    with pytest.raises(UnsupportedFeatureError, match=r"state"):
+        simulate_batch(ARM, STATES[kind], REST, rollouts=4, duration=0.01)
 
 
 class Giving(Controller[None]):
@@ -70,7 +70,7 @@ class Giving(Controller[None]):
         self.model = ARM
         self._given = given
 
-    def torque(self, measured: Measured, setpoint: Setpoint, memory: None) -> tuple[Any, None]:
+    def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Any, None]:
         return self._given, None
 
 
@@ -91,8 +91,8 @@ def test_a_torque_of_another_shape_is_refused_in_a_batch(given: Any) -> None:
 
 def test_what_a_law_cannot_do_with_symbols_is_said() -> None:
     class Table(Giving):
-        def torque(self, measured: Measured, setpoint: Setpoint, memory: None) -> tuple[Any, None]:
-            return np.linalg.inv(np.diag(measured.q)) @ measured.v, None
+        def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Any, None]:
+            return np.linalg.inv(np.diag(measurement.q)) @ measurement.v, None
 
     with pytest.raises(UnsupportedFeatureError, match=r"Table cannot be fused .* failed with UFuncTypeError"):
         simulate_batch(ARM, Table(None), REST, rollouts=4, duration=0.01)
@@ -106,8 +106,8 @@ class Integrating(Controller[None]):
         self.total = np.zeros(6)
         self._in_place = in_place
 
-    def torque(self, measured: Measured, setpoint: Setpoint, memory: None) -> tuple[Any, None]:
-        error = setpoint.q - measured.q
+    def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Any, None]:
+        error = setpoint.q - measurement.q
         if self._in_place:
             self.total += error
         else:
@@ -132,7 +132,7 @@ def test_a_law_that_changes_itself(in_place: bool, wrapped: bool) -> None:
 
 def test_a_law_without_a_model_is_told_so() -> None:
     class Nowhere(Controller[None]):
-        def torque(self, measured: Measured, setpoint: Setpoint, memory: None) -> tuple[Any, None]:
+        def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Any, None]:
             return np.zeros(6), None
 
     for ask in (simulate, simulate_batch):
@@ -142,7 +142,7 @@ def test_a_law_without_a_model_is_told_so() -> None:
 
 def test_an_exception_reads_as_what_it_is() -> None:
     class Dividing(Giving):
-        def torque(self, measured: Measured, setpoint: Setpoint, memory: None) -> tuple[Any, None]:
+        def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Any, None]:
             return 1 / 0, None
 
     with pytest.raises(ControlError, match=r"Dividing failed in step 0, at 0 s: ZeroDivisionError: division"):

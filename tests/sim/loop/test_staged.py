@@ -25,7 +25,7 @@ from dynx.control import (
     Saturated,
     Velocity,
 )
-from dynx.control.base import Controller, Measured
+from dynx.control.base import Controller, Measurement
 from dynx.engines.pinocchio.backend import PinocchioBackend
 from dynx.errors import ControlError, DivergedError
 from dynx.model import Model
@@ -159,9 +159,9 @@ class Counting(PD):
 
     asked = 0
 
-    def torque(self, measured: Measured, setpoint: Setpoint, memory: None) -> tuple[Floats, None]:
+    def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
         type(self).asked += 1
-        return super().torque(measured, setpoint, memory)
+        return super().torque(measurement, setpoint, state)
 
 
 def test_a_law_of_one_s_own_is_asked_in_every_step() -> None:

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from dynx.control import ComputedTorque
-from dynx.control.base import Controller, Measured
+from dynx.control.base import Controller, Measurement
 from dynx.errors import NotInstalledError
 from dynx.model import Model
 from dynx.model.loading import load
@@ -41,9 +41,9 @@ class Thrust(Controller[None]):
     def __init__(self, model: Model) -> None:
         self.model = model
 
-    def torque(self, measured: Measured, setpoint: Setpoint, memory: None) -> tuple[Floats, None]:
+    def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
         """Something else at every state."""
-        return 3.0 - measured.v, None
+        return 3.0 - measurement.v, None
 
 
 Messages = dict[str, list[tuple[int, Any]]]

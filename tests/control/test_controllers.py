@@ -22,7 +22,7 @@ from dynx.control import (
     FrictionCompensation,
     GravityCompensatedPD,
     Impedance,
-    Measured,
+    Measurement,
     OpenLoop,
     OperationalSpace,
     Saturated,
@@ -43,16 +43,16 @@ the condition number of this arm's mass matrix (about 1e3)."""
 SEEDS = st.integers(0, 2**32 - 1)
 
 
-def situation(seed: int) -> tuple[Measured, Setpoint]:
+def situation(seed: int) -> tuple[Measurement, Setpoint]:
     """Any state and any setpoint."""
     rng = np.random.default_rng(seed)
     q, wanted = ARM.random(rng, 2)
     v, v_wanted, a_wanted = rng.uniform(-2.0, 2.0, (3, ARM.nv))
-    return Measured(float(rng.uniform(0, 1)), q, v), Setpoint(wanted, v_wanted, a_wanted)
+    return Measurement(float(rng.uniform(0, 1)), q, v), Setpoint(wanted, v_wanted, a_wanted)
 
 
-def torque(law: Controller[Any], measured: Measured, setpoint: Setpoint) -> Any:
-    return law.torque(measured, setpoint, law.start())[0]
+def torque(law: Controller[Any], measurement: Measurement, setpoint: Setpoint) -> Any:
+    return law.torque(measurement, setpoint, law.initial_state())[0]
 
 
 GAINS = np.array([400.0, 300.0, 200.0, 100.0, 50.0, 25.0])
@@ -73,34 +73,34 @@ LAWS: dict[str, Controller[Any]] = {
 
 @given(SEEDS)
 def test_formulas(seed: int) -> None:
-    measured, setpoint = situation(seed)
-    e, de = setpoint.q - measured.q, setpoint.v - measured.v
+    measurement, setpoint = situation(seed)
+    e, de = setpoint.q - measurement.q, setpoint.v - measurement.v
     pd = GAINS * e + 10.0 * de
-    np.testing.assert_array_equal(torque(LAWS["pd"], measured, setpoint), pd)
-    np.testing.assert_array_equal(torque(LAWS["velocity"], measured, setpoint), 10.0 * de)
-    weight = ENGINE.gravity_torque(measured.q)
-    np.testing.assert_array_equal(torque(LAWS["gravity"], measured, setpoint), weight + pd)
+    np.testing.assert_array_equal(torque(LAWS["pd"], measurement, setpoint), pd)
+    np.testing.assert_array_equal(torque(LAWS["velocity"], measurement, setpoint), 10.0 * de)
+    weight = ENGINE.gravity_torque(measurement.q)
+    np.testing.assert_array_equal(torque(LAWS["gravity"], measurement, setpoint), weight + pd)
     ahead = ENGINE.inverse_dynamics(*setpoint)
-    np.testing.assert_array_equal(torque(LAWS["feed-forward"], measured, setpoint), ahead + pd)
+    np.testing.assert_array_equal(torque(LAWS["feed-forward"], measurement, setpoint), ahead + pd)
 
 
 @given(SEEDS)
 def test_computed_torque_gives_the_acceleration_it_commands(seed: int) -> None:
-    measured, setpoint = situation(seed)
-    wanted = setpoint.a + 10.0 * (setpoint.v - measured.v) + GAINS * (setpoint.q - measured.q)
-    tau = torque(LAWS["computed"], measured, setpoint)
-    a = ENGINE.forward_dynamics(measured.q, measured.v, tau)
+    measurement, setpoint = situation(seed)
+    wanted = setpoint.a + 10.0 * (setpoint.v - measurement.v) + GAINS * (setpoint.q - measurement.q)
+    tau = torque(LAWS["computed"], measurement, setpoint)
+    a = ENGINE.forward_dynamics(measurement.q, measurement.v, tau)
     np.testing.assert_allclose(a, wanted, rtol=0.0, atol=BACKWARD * np.abs(wanted).max())
 
 
 @given(SEEDS)
 def test_the_discrete_law_lands_on_its_setpoint(seed: int) -> None:
-    measured, setpoint = situation(seed)
-    a = one_step_acceleration(measured.q, measured.v, setpoint.q, np.full(6, 1e-3))
-    landed = measured.q + 1e-3 * (measured.v + 1e-3 * a)
+    measurement, setpoint = situation(seed)
+    a = one_step_acceleration(measurement.q, measurement.v, setpoint.q, np.full(6, 1e-3))
+    landed = measurement.q + 1e-3 * (measurement.v + 1e-3 * a)
     np.testing.assert_allclose(landed, setpoint.q, rtol=0.0, atol=1e-14)
-    tau = torque(LAWS["discrete"], measured, setpoint)
-    np.testing.assert_array_equal(tau, ENGINE.inverse_dynamics(measured.q, measured.v, a))
+    tau = torque(LAWS["discrete"], measurement, setpoint)
+    np.testing.assert_array_equal(tau, ENGINE.inverse_dynamics(measurement.q, measurement.v, a))
     assert LAWS["discrete"].lead == 1
 
 
@@ -120,21 +120,23 @@ def test_the_same_question_has_the_same_answer(name: str, seed: int) -> None:
 
 @pytest.mark.parametrize("name", LAWS)
 def test_laws_pickle(name: str) -> None:
-    measured, setpoint = situation(7)
+    measurement, setpoint = situation(7)
     again = pickle.loads(pickle.dumps(LAWS[name]))
-    np.testing.assert_array_equal(torque(again, measured, setpoint), torque(LAWS[name], measured, setpoint))
+    np.testing.assert_array_equal(
+        torque(again, measurement, setpoint), torque(LAWS[name], measurement, setpoint)
+    )
     assert again.name == LAWS[name].name
 
 
 @pytest.mark.parametrize("engine", installed_backends())
 def test_any_engine_may_answer(engine: str) -> None:
-    measured, setpoint = situation(3)
+    measurement, setpoint = situation(3)
     for law in LAWS.values():
         other = law.on(engine)
         assert other.lead == law.lead
-        expected = torque(law, measured, setpoint)
+        expected = torque(law, measurement, setpoint)
         # Bars of agreement between engines are elsewhere; this is another order of magnitude altogether.
-        np.testing.assert_allclose(torque(other, measured, setpoint), expected, rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(torque(other, measurement, setpoint), expected, rtol=1e-9, atol=1e-9)
 
 
 def test_a_backend_of_another_robot_is_refused() -> None:
@@ -146,7 +148,7 @@ def test_a_table_of_torques() -> None:
     table = np.arange(18.0).reshape(3, 6)
     law = OpenLoop(ARM, table, control_dt=2e-3)
     _, setpoint = situation(0)
-    rows = [torque(law, Measured(k * 2e-3, np.zeros(6), np.zeros(6)), setpoint) for k in range(4)]
+    rows = [torque(law, Measurement(k * 2e-3, np.zeros(6), np.zeros(6)), setpoint) for k in range(4)]
     np.testing.assert_array_equal(rows, [*table, np.zeros(6)])
     with pytest.raises(ShapeError):
         OpenLoop(ARM, np.zeros(6), control_dt=1e-3)
