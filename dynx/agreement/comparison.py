@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -27,19 +26,6 @@ class WorstSample:
     tau: tuple[float, ...]
     frame: str | None = None
     reference: str | None = None
-
-    def to_dict(self) -> dict[str, Any]:
-        """For JSON."""
-        return {
-            "index": self.index,
-            "kind": self.kind,
-            "frame": self.frame,
-            "reference": self.reference,
-            "q": list(self.q),
-            "v": list(self.v),
-            "a": list(self.a),
-            "tau": list(self.tau),
-        }
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """The outcome of a comparison, and its JSON form (schema 1).
 
-    {"schema": 1, "dynx": version, "results": [...], "summary": {...}}
+    {"schema": 1, "dynx": version, "results": [...], "summary": {...}, "not_done": [...]}
 
 ``summary`` counts ``robots`` that have an entry and of them ``agree``, ``differ`` and ``refused``;
 ``not_done`` (0 but for an interrupted ``dynx agree``) counts those that have none.
@@ -24,9 +24,8 @@ An error that has no size (a refusal, a NaN, a wrong shape) is null, and `note` 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from dynx._version import __version__
@@ -34,6 +33,7 @@ from dynx.agreement.comparison import Comparison
 from dynx.agreement.identities import IdentityCheck
 from dynx.agreement.suspects import Suspect
 from dynx.errors import DynxError, UnknownNameError, nearest, shown
+from dynx.files.documents import document_of
 
 SCHEMA = 1
 
@@ -119,23 +119,51 @@ class AgreementReport:
 
     def to_dict(self) -> dict[str, Any]:
         """One entry of ``results``, of plain numbers, strings and lists."""
-        return {
-            "robot": self.robot,
-            "source": self.source,
-            "base": self.base,
-            "backends": list(self.backends),
-            "nq": self.nq,
-            "nv": self.nv,
-            "samples": self.samples,
-            "seed": self.seed,
-            "agree": self.agree,
-            "error": None if self.error is None else asdict(self.error),
-            "seconds": round(self.seconds, 4),
-            "quantities": [_row(row) for row in self.quantities],
-            "identities": [_row(row) for row in self.identities],
-            "suspects": [{**vars(suspect), "evidence": list(suspect.evidence)} for suspect in self.suspects],
-            "notes": list(self.notes),
-        }
+        return document_of(AgreementEntry, replace(self, seconds=round(self.seconds, 4)))
+
+
+@dataclass(frozen=True)
+class AgreementEntry:
+    """One robot in the JSON document of ``dynx agree``; sizes are null for a robot that was refused."""
+
+    robot: str
+    source: str | None
+    base: str | None
+    backends: tuple[str, ...]
+    nq: int | None
+    nv: int | None
+    samples: int | None
+    seed: int | None
+    agree: bool
+    error: Failure | None
+    seconds: float
+    quantities: tuple[Comparison, ...]
+    identities: tuple[IdentityCheck, ...]
+    suspects: tuple[Suspect, ...]
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class AgreementSummary:
+    """How many robots have an entry, and how many of them have each verdict."""
+
+    robots: int
+    agree: int
+    differ: int
+    refused: int
+    not_done: int
+
+
+@dataclass(frozen=True)
+class AgreementDocument:
+    """The JSON document of ``dynx agree``."""
+
+    schema: int
+    dynx: str
+    results: tuple[AgreementEntry, ...]
+    summary: AgreementSummary
+    not_done: tuple[str, ...]
+    """The robots that an interrupted run left out."""
 
 
 def refused_report(
@@ -174,11 +202,5 @@ def results_document(reports: Iterable[AgreementReport]) -> dict[str, Any]:
             "refused": refused,
             "not_done": 0,
         },
+        "not_done": [],
     }
-
-
-def _row(row: Comparison | IdentityCheck) -> dict[str, Any]:
-    entry = dict(vars(row))
-    entry["worst_sample"] = None if row.worst_sample is None else row.worst_sample.to_dict()
-    sizeless = [key for key, value in entry.items() if isinstance(value, float) and not math.isfinite(value)]
-    return {**entry, **dict.fromkeys(sizeless)}

@@ -1,6 +1,6 @@
 """What `dynx.diagnose` found out about one robot, and its JSON form (schema 1).
 
-    {"schema": 1, "dynx": version, "results": [...], "summary": {...}}
+    {"schema": 1, "dynx": version, "results": [...], "summary": {...}, "not_done": [...]}
 
 One entry of ``results`` per robot and base:
 
@@ -35,12 +35,12 @@ a proved cause), ``unexplained``, ``refused`` and ``not_done``.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from dynx._version import __version__
+from dynx.files.documents import document_of, to_json_values
 from dynx.loaded.difference import Deviation
 from dynx.model.xml.text import TextForm
 from dynx.rules.rule import Kind
@@ -213,106 +213,72 @@ class DoctorReport:
 
     def to_dict(self) -> dict[str, Any]:
         """One entry of ``results``, of plain numbers, strings and lists."""
-        return {
-            "robot": self.robot,
-            "source": self.source,
-            "base": self.base,
-            "engines": [
-                {
-                    "engine": each.engine,
-                    "version": each.version,
-                    "call": each.call,
-                    "refused": each.refused,
-                    "refused_after": each.refused_after,
-                    "before": {name: _number(error) for name, error in each.before.items()},
-                    "after": {name: _number(error) for name, error in each.after.items()},
-                }
-                for each in self.engines
-            ],
-            "findings": [_finding(finding) for finding in self.findings],
-            "explained": self.explained,
-            "residual": _number(self.residual),
-            "unexplained": [_unexplained(each) for each in self.unexplained],
-            "tolerance": self.tolerance,
-            "samples": self.samples,
-            "seed": self.seed,
-            "referee": _number(self.referee),
-            "choices": list(self.choices),
-            "calls": [dict(vars(call)) for call in self.calls],
-            "pairs": [
-                {
-                    "engines": list(pair.engines),
-                    "quantity": pair.quantity,
-                    "relative_error": _number(pair.relative_error),
-                    "joints": {name: _number(error) for name, error in pair.joints.items()},
-                }
-                for pair in self.pairs
-            ],
-            "model_difference": [_plain(vars(each)) for each in self.model_difference],
-            "error": None if self.error is None else dict(vars(self.error)),
-            "seconds": round(self.seconds, 4),
-        }
+        return document_of(DoctorEntry, replace(self, seconds=round(self.seconds, 4)))
 
 
-def results_document(reports: Iterable[DoctorReport], not_done: int = 0) -> dict[str, Any]:
-    """The JSON document of many reports; see the head of this file."""
+@dataclass(frozen=True)
+class DoctorEntry:
+    """One robot and base in the JSON document of ``dynx doctor``."""
+
+    robot: str
+    source: str | None
+    base: str | None
+    engines: tuple[EngineResult, ...]
+    findings: tuple[Finding, ...]
+    explained: bool
+    residual: float
+    unexplained: tuple[Unexplained, ...]
+    tolerance: float
+    samples: int
+    seed: int
+    referee: float
+    choices: tuple[str, ...]
+    calls: tuple[RunTimeCall, ...]
+    pairs: tuple[PairError, ...]
+    model_difference: tuple[Deviation, ...]
+    error: Failure | None
+    seconds: float
+
+
+@dataclass(frozen=True)
+class DoctorSummary:
+    """How many robots were examined, and how many of them have each verdict."""
+
+    robots: int
+    alike: int
+    explained: int
+    unexplained: int
+    refused: int
+    not_done: int
+
+
+@dataclass(frozen=True)
+class DoctorDocument:
+    """The JSON document of ``dynx doctor`` and ``dynx agree --as-loaded``."""
+
+    schema: int
+    dynx: str
+    results: tuple[DoctorEntry, ...]
+    summary: DoctorSummary
+    not_done: tuple[str, ...]
+    """The robots that an interrupted run left out."""
+
+
+def results_document(reports: Iterable[DoctorReport], not_done: Sequence[str] = ()) -> dict[str, Any]:
+    """The JSON document of many reports; `not_done` names the robots that an interrupted run left out."""
     reports = list(reports)
+    summary = DoctorSummary(
+        robots=len(reports),
+        alike=sum(report.alike for report in reports),
+        explained=sum(report.explained and not report.alike for report in reports),
+        unexplained=sum(bool(report.unexplained) for report in reports),
+        refused=sum(report.error is not None for report in reports),
+        not_done=len(not_done),
+    )
     return {
         "schema": SCHEMA,
         "dynx": __version__,
         "results": [report.to_dict() for report in reports],
-        "summary": {
-            "robots": len(reports),
-            "alike": sum(report.alike for report in reports),
-            "explained": sum(report.explained and not report.alike for report in reports),
-            "unexplained": sum(bool(report.unexplained) for report in reports),
-            "refused": sum(report.error is not None for report in reports),
-            "not_done": not_done,
-        },
+        "summary": to_json_values(summary),
+        "not_done": list(not_done),
     }
-
-
-def _finding(each: Finding) -> dict[str, Any]:
-    return {
-        **vars(each),
-        "engines": list(each.engines),
-        "effect": None if each.effect is None else _effect(each.effect),
-        "effects": {engine: _effect(effect) for engine, effect in each.effects.items()},
-    }
-
-
-def _effect(each: Effect) -> dict[str, Any]:
-    return {"quantity": each.quantity, "relative_error": _number(each.relative_error)}
-
-
-def _unexplained(each: Unexplained) -> dict[str, Any]:
-    found = each.counterexample
-    return {
-        "engine": each.engine,
-        "quantity": each.quantity,
-        "relative_error": _number(each.relative_error),
-        "joint": each.joint,
-        "counterexample": None
-        if found is None
-        else {
-            **vars(found),
-            "q": list(found.q),
-            "v": list(found.v),
-            "a": list(found.a),
-            "relative_error": _number(found.relative_error),
-        },
-    }
-
-
-def _number(value: float) -> float | None:
-    """JSON has no infinity and no NaN."""
-    return value if math.isfinite(value) else None
-
-
-def _plain(value: Any) -> Any:
-    """Numbers, texts, lists and objects with null in the place of every number that JSON does not have."""
-    if isinstance(value, Mapping):
-        return {key: _plain(each) for key, each in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(each) for each in value]
-    return _number(value) if isinstance(value, float) else value

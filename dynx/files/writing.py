@@ -1,8 +1,9 @@
-"""Writing a file: all of it, or nothing under its name."""
+"""Writing a file atomically: the whole content, or nothing under its name."""
 
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import secrets
 import shutil
@@ -15,19 +16,24 @@ from dynx.errors import ArgumentError, shown
 
 
 @contextmanager
-def whole_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
-    """A file to write into, which gets its name when the block ends well.
+def atomic_file(path: str | os.PathLike[str], mode: int = 0o666) -> Iterator[BinaryIO]:
+    """Open a file for writing that gets its name when the block ends without an error.
 
     Until then it has another name in the same folder. If the disk is full, or anything else ends the
     block early, it is deleted and what was there before stays. A link is followed, and the permissions
-    of a file that is replaced are kept. Raises ArgumentError where the system does not let it be written.
+    of a file that is replaced are kept; `mode` gives those of a new one, less the umask of the process.
+    A named pipe or a device is written directly. Raises ArgumentError where the system refuses.
     """
     target = Path(os.path.realpath(path))
     partial = target.with_name(f".dynx-{secrets.token_hex(8)}.part")
     try:
         if target.is_dir():
-            raise IsADirectoryError(0, "it is a directory")
-        with partial.open("xb") as file:
+            raise IsADirectoryError(errno.EISDIR, "it is a directory")
+        if target.exists() and not target.is_file():
+            with open(target, "wb", opener=_require_reader) as stream:
+                yield stream
+            return
+        with open(partial, "xb", opener=lambda name, flags: os.open(name, flags, mode)) as file:
             yield file
         if target.exists():
             shutil.copymode(target, partial)
@@ -36,6 +42,30 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
         with contextlib.suppress(OSError):
             partial.unlink()
         if isinstance(error, OSError):
-            why = error.strerror or str(error)
-            raise ArgumentError(f"{shown(os.fspath(path), 300)} cannot be written: {why}") from error
+            reason = error.strerror or str(error)
+            raise ArgumentError(f"{shown(os.fspath(path), 300)} cannot be written: {reason}") from error
         raise
+
+
+def write_bytes(path: str | os.PathLike[str], data: bytes, mode: int = 0o666) -> None:
+    """Write `data` to `path` as `atomic_file` does."""
+    with atomic_file(path, mode) as file:
+        file.write(data)
+
+
+def write_text(path: str | os.PathLike[str], text: str) -> None:
+    """Write `text`, which is ASCII, to `path` as `atomic_file` does."""
+    write_bytes(path, text.encode("ascii"))
+
+
+def _require_reader(path: str, flags: int) -> int:
+    """Open a file; OSError ENXIO for a named pipe without a reader, for which `open` would wait forever."""
+    try:
+        descriptor = os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
+    except OSError as error:
+        if error.errno == errno.ENXIO:
+            raise OSError(errno.ENXIO, "nobody reads from this pipe") from error
+        raise
+    if hasattr(os, "O_NONBLOCK"):
+        os.set_blocking(descriptor, True)
+    return descriptor

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from dynx.errors import NotInstalledError
-from dynx.files.writing import whole_file
+from dynx.files.writing import atomic_file
 from dynx.sim.tutorial import BULLET, Row, Tutorial
 
 STYLES = ("-", "--", "-.", ":")
@@ -55,6 +55,6 @@ def plot_rows(rows: Sequence[Row], tutorial: Tutorial, path: str | os.PathLike[s
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=8)
     if path is not None:
-        with whole_file(path) as file:
+        with atomic_file(path) as file:
             figure.savefig(file, format=Path(path).suffix[1:].lower(), dpi=200)
     return figure

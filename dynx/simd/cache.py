@@ -17,7 +17,6 @@ import contextlib
 import json
 import os
 import stat
-import tempfile
 from collections.abc import Callable
 from functools import cache
 from hashlib import sha256
@@ -25,7 +24,8 @@ from pathlib import Path
 
 import platformdirs
 
-from dynx.errors import CompileError
+from dynx.errors import ArgumentError, CompileError
+from dynx.files.writing import write_bytes
 from dynx.simd.emit import Settings
 from dynx.simd.image import Image, compiled
 from dynx.simd.kernel import Kernel
@@ -149,19 +149,10 @@ def _write(path: Path, image: Image) -> None:
     }
     head = json.dumps({**ports, "lanes": image.lanes}).encode()
     body = len(head).to_bytes(4, "little") + head + image.code
-    try:
-        handle, name = tempfile.mkstemp(suffix=".part", dir=path.parent)
-        try:
-            with os.fdopen(handle, "wb") as file:
-                file.write(_MAGIC + sha256(body).digest() + body)
-            os.replace(name, path)
-        except OSError:
-            with contextlib.suppress(OSError):
-                os.unlink(name)
-            return
+    # Only the user may read or write it, whatever the umask: it holds code that is run.
+    with contextlib.suppress(ArgumentError, OSError):
+        write_bytes(path, _MAGIC + sha256(body).digest() + body, mode=0o600)
         _make_room(path.parent)
-    except OSError:
-        return
 
 
 def _make_room(folder: Path) -> None:

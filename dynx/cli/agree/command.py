@@ -8,7 +8,9 @@ import click
 
 from dynx.cli.shell.exits import ANSWER_IS_NO, BAD_INPUT, DONE, complain
 from dynx.cli.shell.options import model_options, name_list, run_options
-from dynx.cli.shell.output_file import check_writable, require_apart, write_text
+from dynx.cli.shell.output_file import check_writable, require_apart
+from dynx.files.documents import json_text
+from dynx.files.writing import write_text
 
 if TYPE_CHECKING:
     from dynx.cli.agree.task import AgreementTask, Entry
@@ -109,7 +111,7 @@ def _report(run: Run[AgreementTask, Entry], json_path: str | None, quiet: bool) 
     """Write the document, the tables and the errors; the exit code."""
     from dynx.cli.agree.tables import show_many, show_one, show_summary
     from dynx.cli.agree.task import counts, document
-    from dynx.cli.shell.terminal import console, echo_json, json_text
+    from dynx.cli.shell.terminal import console, echo_json
 
     entries = run.results
     # First the document: a pipe that closes while the table is written must not lose it.

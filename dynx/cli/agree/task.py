@@ -70,11 +70,15 @@ def label(entry: Entry) -> str:
 def document(entries: Sequence[Entry], not_done: Sequence[str] = ()) -> dict[str, Any]:
     """What `dynx.agreement.results_document` makes of reports, made of their entries.
 
-    A run that was interrupted also names the robots that it did not come to.
+    `not_done` names the robots that an interrupted run left out.
     """
-    summary = {**counts(entries), "not_done": len(not_done)}
-    results = {"schema": SCHEMA, "dynx": __version__, "results": list(entries), "summary": summary}
-    return {**results, "not_done": list(not_done)} if not_done else results
+    return {
+        "schema": SCHEMA,
+        "dynx": __version__,
+        "results": list(entries),
+        "summary": {**counts(entries), "not_done": len(not_done)},
+        "not_done": list(not_done),
+    }
 
 
 def verdict(entry: Entry) -> str:

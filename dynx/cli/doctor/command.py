@@ -100,9 +100,10 @@ def doctor(
     """
     from dynx.cli.doctor.conclusion import Conclusion
     from dynx.cli.doctor.mending import planned_targets
-    from dynx.cli.doctor.outputs import Outputs, load_baseline
+    from dynx.cli.doctor.outputs import Outputs
     from dynx.cli.doctor.task import DoctorTask, check_engines, doctor_run, refused
     from dynx.cli.shell.run import carry_out
+    from dynx.doctor.formats.baseline import load_baseline
     from dynx.model.expansion import expand
     from dynx.rules.choices import checked_choices
 

@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from pathlib import PurePath
 from typing import TYPE_CHECKING
 
-from dynx.cli.shell.output_file import check_writable, make_folder, require_apart, write_bytes
+from dynx.cli.shell.output_file import check_writable, make_folder, require_apart
 from dynx.errors import ArgumentError, shown
+from dynx.files.writing import write_bytes
 from dynx.model.expansion import RobotInput, is_library_name
 
 if TYPE_CHECKING:

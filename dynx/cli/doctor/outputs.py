@@ -8,9 +8,11 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from dynx.cli.shell.output_file import check_writable, make_folder, require_apart, write_text
-from dynx.cli.shell.terminal import echo_json, json_text
+from dynx.cli.shell.output_file import check_writable, make_folder, require_apart
+from dynx.cli.shell.terminal import echo_json
 from dynx.errors import ArgumentError, shown
+from dynx.files.documents import json_text
+from dynx.files.writing import write_text
 
 if TYPE_CHECKING:
     from dynx.doctor.formats.baseline import Baseline
@@ -85,9 +87,7 @@ class Outputs:
     def _json(self, reports: Sequence[DoctorReport], not_done: Sequence[str]) -> None:
         from dynx.doctor.report import results_document
 
-        document = results_document(reports, len(not_done))
-        if not_done:
-            document["not_done"] = list(not_done)
+        document = results_document(reports, not_done)
         if self.json == STDOUT:
             echo_json(document)
         elif self.json is not None:
@@ -97,14 +97,6 @@ class Outputs:
         from dynx.doctor.formats import baseline_document
 
         return json_text(baseline_document(reports, os.path.dirname(self.baseline or ""))) + "\n"
-
-
-def load_baseline(path: str) -> Baseline:
-    """The baseline in a file; ArgumentError where there is none."""
-    from dynx.doctor.formats import read_baseline
-    from dynx.files.reading import read_file
-
-    return read_baseline(read_file(path).decode("utf-8", "replace"), path)
 
 
 def save_counterexamples(folder: str, report: DoctorReport) -> Mapping[int, str]:

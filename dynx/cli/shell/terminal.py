@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import errno
-import json
-import math
 import os
 import sys
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, TextIO
 
 import click
+
+from dynx.files.documents import json_text
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -33,11 +32,6 @@ def console(*, err: bool = False) -> Console:
     return Console(file=stream, width=width, soft_wrap=True, markup=False, emoji=False, highlight=False)
 
 
-def json_text(document: object) -> str:
-    """`document` as JSON that every parser reads: numbers that JSON does not know become null."""
-    return json.dumps(_finite(document), indent=2, ensure_ascii=True, allow_nan=False)
-
-
 def echo_json(document: object) -> None:
     """Write `document` to standard output."""
     click.echo(json_text(document), file=_standard_output())
@@ -58,13 +52,3 @@ def _standard_output() -> TextIO:
     if sys.stdout is None:
         raise OSError(errno.EBADF, os.strerror(errno.EBADF))
     return sys.stdout
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return {str(key): _finite(each) for key, each in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_finite(each) for each in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value

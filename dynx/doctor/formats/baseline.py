@@ -9,7 +9,7 @@ known where the file names all its engines, so that fewer engines at hand make n
 
 from __future__ import annotations
 
-import json
+import math
 import os
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -19,6 +19,8 @@ from typing import Any
 from dynx._version import __version__
 from dynx.doctor.report import DoctorReport
 from dynx.errors import ArgumentError, shown
+from dynx.files.documents import read_document, to_json_values
+from dynx.files.reading import read_file
 
 SCHEMA = 1
 
@@ -42,6 +44,24 @@ class Place:
         where += [f"joint {shown(self.joint)}"] if self.joint is not None else []
         where += [self.quantity.replace("_", " ")] if self.quantity is not None else []
         return f"{self.rule} {', '.join(where)}".strip()
+
+
+@dataclass(frozen=True)
+class KnownDifference(Place):
+    """One entry of the JSON document; `relative_error` is null where an engine gives no number."""
+
+    engines: tuple[str, ...] = field(kw_only=True)
+    relative_error: float | None = None
+
+
+@dataclass(frozen=True)
+class BaselineDocument:
+    """The JSON document that ``dynx doctor --write-baseline`` writes and ``--baseline`` reads."""
+
+    schema: int
+    known: tuple[KnownDifference, ...]
+    dynx: str = ""
+    """Version of dynx that wrote it."""
 
 
 @dataclass(frozen=True)
@@ -139,48 +159,38 @@ def robot_key(report: DoctorReport, folder: str) -> str:
 
 def baseline_document(reports: Iterable[DoctorReport], folder: str) -> dict[str, Any]:
     """The document in which everything that differs in these reports is known."""
-    known = [each for report in reports for each in differences(report, folder)]
-    known.sort(key=lambda each: tuple(str(value or "") for value in vars(each.place).values()))
-    return {
-        "schema": SCHEMA,
-        "dynx": __version__,
-        "known": [
-            {
-                **{name: value for name, value in vars(each.place).items() if value is not None},
-                "engines": sorted(each.engines),
-                "relative_error": each.relative_error if each.relative_error < float("inf") else None,
-            }
-            for each in known
-        ],
-    }
+    found = [each for report in reports for each in differences(report, folder)]
+    found.sort(key=lambda each: tuple(str(value or "") for value in vars(each.place).values()))
+    known = []
+    for each in found:
+        place = {name: value for name, value in vars(each.place).items() if value is not None}
+        known.append({**place, "engines": sorted(each.engines), "relative_error": each.relative_error})
+    document: dict[str, Any] = to_json_values({"schema": SCHEMA, "dynx": __version__, "known": known})
+    return document
 
 
 def read_baseline(text: str, path: str) -> Baseline:
     """The baseline in a file's text; ArgumentError, naming `path`, where it is none."""
     where = shown(path, 300)
     try:
-        document = json.loads(text)
-    except (ValueError, RecursionError) as error:
+        document = read_document(text, BaselineDocument)
+    except ArgumentError as error:
         raise ArgumentError(f"{where} is no baseline: {error}") from None
-    if not isinstance(document, dict) or not isinstance(document.get("known"), list):
-        raise ArgumentError(f"{where} is no baseline: wanted an object with a list 'known'")
-    if document.get("schema") != SCHEMA:
-        got = shown(document.get("schema"))
-        raise ArgumentError(f"{where} has schema {got}; this version of dynx reads schema {SCHEMA}")
-    return Baseline(os.path.dirname(path), tuple(_known(each, where) for each in document["known"]))
-
-
-def _known(entry: Any, where: str) -> Difference:
-    names = ("robot", "base", "rule", "link", "joint", "quantity")
-    if not isinstance(entry, dict):
-        raise ArgumentError(f"{where}: wanted an object in 'known', got {shown(entry)}")
-    values = {name: entry.get(name) for name in names}
-    engines = entry.get("engines")
-    texts = all(value is None or isinstance(value, str) for value in values.values())
-    if not texts or not isinstance(engines, list) or any(values[name] is None for name in names[:3]):
+    if document.schema != SCHEMA:
         raise ArgumentError(
-            f"{where}: an entry of 'known' needs robot, base, rule and a list of engines, got {shown(entry)}"
+            f"{where} has schema {document.schema}; this version of dynx reads schema {SCHEMA}"
         )
-    robot, base, rule = (str(values[name]) for name in names[:3])
-    place = Place(robot, base, rule, values["link"], values["joint"], values["quantity"])
-    return Difference(place, frozenset(map(str, engines)))
+    known = tuple(
+        Difference(
+            Place(each.robot, each.base, each.rule, each.link, each.joint, each.quantity),
+            frozenset(each.engines),
+            math.inf if each.relative_error is None else each.relative_error,
+        )
+        for each in document.known
+    )
+    return Baseline(os.path.dirname(path), known)
+
+
+def load_baseline(path: str) -> Baseline:
+    """Read the baseline in a file; ArgumentError where it is none, or RobotNotFoundError without one."""
+    return read_baseline(read_file(path).decode("utf-8", "replace"), path)

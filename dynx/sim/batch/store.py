@@ -6,10 +6,8 @@ and then renamed: what is there is whole.
 
 from __future__ import annotations
 
-import contextlib
 import os
 import pickle
-import tempfile
 import zipfile
 from hashlib import sha256
 from pathlib import Path
@@ -17,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from dynx.errors import ArgumentError, shown
+from dynx.files.writing import atomic_file
 from dynx.sim.batch.part import Part, PartDone
 
 
@@ -41,17 +40,8 @@ class Store:
 
     def write(self, part: Part, outcome: PartDone) -> None:
         """Keep the outcome. Raises ArgumentError where it cannot be written."""
-        path = self._path(part)
-        name = ""
-        try:
-            with tempfile.NamedTemporaryFile(dir=self._folder, suffix=".part", delete=False) as file:
-                name = file.name
-                np.savez(file, **outcome._asdict())
-            os.replace(name, path)
-        except OSError as error:
-            with contextlib.suppress(OSError):
-                os.unlink(name)
-            raise ArgumentError(f"a finished part cannot be kept in {self._folder}: {error}") from error
+        with atomic_file(self._path(part)) as file:
+            np.savez(file, **outcome._asdict())
 
     def _path(self, part: Part) -> Path:
         digest = sha256()

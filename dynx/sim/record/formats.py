@@ -14,7 +14,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from dynx.errors import ArgumentError, ModelError, shown
-from dynx.files.writing import whole_file
+from dynx.files.writing import atomic_file
 from dynx.model.loading import load as load_model
 from dynx.sim.record.csv_file import write_csv
 from dynx.sim.record.mcap_file import write_mcap
@@ -44,7 +44,7 @@ def save(rollout: Rollout, path: str | os.PathLike[str]) -> None:
     if write is None:
         formats = " or ".join([", ".join([*WRITERS][:-1]), [*WRITERS][-1]])
         raise ArgumentError(f"a rollout is saved as {formats}, not as {shown(Path(path).name)}")
-    with whole_file(path) as file:
+    with atomic_file(path) as file:
         write(rollout, file)
 
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from dynx.errors import ArgumentError, NotInstalledError, shown
-from dynx.files.writing import whole_file
+from dynx.files.writing import atomic_file
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
 
@@ -60,7 +60,7 @@ def plot(rollout: Rollout, path: str | os.PathLike[str] | None) -> Any:
         kind = Path(path).suffix[1:].lower()
         if kind not in figure.canvas.get_supported_filetypes():
             raise ArgumentError(f"a plot is saved as .png, .pdf or .svg, not as {shown(Path(path).name)}")
-        with whole_file(path) as file:
+        with atomic_file(path) as file:
             figure.savefig(file, format=kind, dpi=200)
     return figure
 

@@ -42,7 +42,7 @@ def test_the_document_has_the_shape_of_the_schema() -> None:
     result = agree("ur5", "nosuchrobot", "--json", "-")
     assert result.exit_code == 2
     made: dict[str, Any] = json.loads(result.stdout)
-    assert set(made) == {"schema", "dynx", "results", "summary"}
+    assert set(made) == {"schema", "dynx", "results", "summary", "not_done"}
     assert made["schema"] == 1
     good, bad = made["results"]
     keys = "robot source base backends nq nv samples seed agree error seconds quantities"

@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dynx.cli.shell.terminal import json_text
 from dynx.doctor.formats import baseline_document, read_baseline
 from dynx.doctor.formats.baseline import Baseline, differences
 from dynx.doctor.report import DoctorReport, EngineResult
 from dynx.errors import ArgumentError
+from dynx.files.documents import json_text
 from tests.doctor.formats.reports import HOSTILE, alike, differing, refused
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import json
 import os
-import stat
 import sys
 import zipfile
 from collections.abc import Iterator
@@ -19,7 +18,6 @@ import pytest
 
 from dynx.control import PD, ComputedTorque
 from dynx.errors import ArgumentError
-from dynx.files.writing import whole_file
 from dynx.model.loading import load
 from dynx.sim import Noise, Rollout, simulate
 from dynx.sim.record import csv_file, ros_topics
@@ -157,33 +155,6 @@ def test_a_folder_of_that_name(rollout: Rollout, tmp_path: Path) -> None:
     with pytest.raises(ArgumentError, match="directory"):
         rollout.save(tmp_path / "run.npz")
     assert [each.name for each in tmp_path.iterdir()] == ["run.npz"]
-
-
-def test_ctrl_c_leaves_nothing_half_written(tmp_path: Path) -> None:
-    def interrupted() -> None:
-        with whole_file(tmp_path / "run.csv") as file:
-            file.write(b"half")
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        interrupted()
-    assert not list(tmp_path.iterdir())
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="permissions and links of POSIX")
-def test_links_are_followed_and_permissions_kept(tmp_path: Path) -> None:
-    target, link = tmp_path / "run.csv", tmp_path / "link.csv"
-    with whole_file(target) as file:
-        file.write(b"first")
-    (tmp_path / "plain").write_bytes(b"")
-    assert target.stat().st_mode == (tmp_path / "plain").stat().st_mode
-    target.chmod(0o640)
-    link.symlink_to(target)
-    with whole_file(link) as file:
-        file.write(b"second")
-    assert link.is_symlink()
-    assert target.read_bytes() == b"second"
-    assert stat.S_IMODE(target.stat().st_mode) == 0o640
 
 
 @pytest.mark.parametrize("suffix", FORMATS)

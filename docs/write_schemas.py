@@ -1,0 +1,40 @@
+"""Write docs/schemas: the JSON Schema of each document that dynx writes.
+
+    python docs/write_schemas.py
+
+The schemas follow from the classes named here; tests/test_schemas.py holds them current and validates real
+documents by them.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from dynx.agreement.report import AgreementDocument
+from dynx.doctor.formats.baseline import BaselineDocument
+from dynx.doctor.report import DoctorDocument
+from dynx.files.documents import json_schema
+
+FOLDER = Path(__file__).with_name("schemas")
+
+
+def schemas() -> dict[str, dict[str, Any]]:
+    """The schema of each document, by the name of its file."""
+    return {
+        "agree": json_schema(AgreementDocument, "dynx agree --json"),
+        "baseline": json_schema(BaselineDocument, "dynx doctor --write-baseline", omits_defaults=True),
+        "doctor": json_schema(DoctorDocument, "dynx doctor --json"),
+    }
+
+
+def text(schema: dict[str, Any]) -> str:
+    """The text of a schema's file."""
+    return json.dumps(schema, indent=2) + "\n"
+
+
+if __name__ == "__main__":
+    FOLDER.mkdir(exist_ok=True)
+    for name, schema in schemas().items():
+        (FOLDER / f"{name}.json").write_text(text(schema), encoding="utf-8")

@@ -1,0 +1,86 @@
+"""JSON documents: built from typed classes, read into them strictly, and described by JSON Schema.
+
+Each document has one class that says its keys and types. A number that is not finite is written as null,
+because JSON has none: so every number of a schema may be null. This is the only module that uses msgspec.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from typing import Any, TypeVar
+
+from dynx.errors import ArgumentError
+
+SCHEMA_DIALECT = "https://json-schema.org/draft/2020-12/schema"
+
+T = TypeVar("T")
+
+
+def document_of(document_class: type[Any], source: object) -> dict[str, Any]:
+    """Build a document from the attributes of `source` that `document_class` has, checking their types."""
+    import msgspec
+
+    document: dict[str, Any] = to_json_values(msgspec.convert(source, document_class, from_attributes=True))
+    return document
+
+
+def to_json_values(value: Any) -> Any:
+    """Convert dataclasses, mappings and sequences to dicts and lists, and infinities and NaN to None."""
+    if isinstance(value, Mapping):
+        return {str(key): to_json_values(each) for key, each in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [to_json_values(each) for each in value]
+    if isinstance(value, float):
+        return float(value) if math.isfinite(value) else None
+    if is_dataclass(value):
+        return {field.name: to_json_values(getattr(value, field.name)) for field in fields(value)}
+    return value
+
+
+def json_text(document: object) -> str:
+    """Write a document as indented JSON in ASCII, which every parser reads."""
+    return json.dumps(to_json_values(document), indent=2, ensure_ascii=True, allow_nan=False)
+
+
+def read_document(text: str, document_class: type[T]) -> T:
+    """Read JSON into `document_class`; ArgumentError names the key whose value has another type.
+
+    Keys that the class does not have are ignored.
+    """
+    import msgspec
+
+    try:
+        return msgspec.convert(json.loads(text), document_class)
+    except msgspec.ValidationError as error:
+        raise ArgumentError(str(error)) from None
+    except (ValueError, RecursionError) as error:
+        raise ArgumentError(f"not JSON: {error}") from None
+
+
+def json_schema(document_class: type[Any], title: str, *, omits_defaults: bool = False) -> dict[str, Any]:
+    """Describe the documents of `document_class` by a JSON Schema that allows no other keys.
+
+    Every key is required, but where `omits_defaults` those that have a default may be left out.
+    """
+    import msgspec
+
+    schema = _published(msgspec.json.schema(document_class), omits_defaults)
+    return {"$schema": SCHEMA_DIALECT, "title": title, **schema}
+
+
+def _published(part: Any, omits_defaults: bool) -> Any:
+    """Let every number be null, forbid keys that are not listed, and leave out the defaults of Python."""
+    if isinstance(part, list):
+        return [_published(each, omits_defaults) for each in part]
+    if not isinstance(part, dict):
+        return part
+    part = {key: _published(each, omits_defaults) for key, each in part.items() if key != "default"}
+    if part.get("type") == "number":
+        part["type"] = ["number", "null"]
+    if "properties" in part and part.get("type") == "object":
+        part["additionalProperties"] = False
+        part["required"] = part.get("required", []) if omits_defaults else list(part["properties"])
+    return part

@@ -1,0 +1,89 @@
+"""The published JSON Schemas: current, and kept by the documents that dynx writes."""
+
+from __future__ import annotations
+
+import copy
+import json
+import runpy
+from pathlib import Path
+from typing import Any
+
+import pytest
+from jsonschema import Draft202012Validator
+
+from dynx import agree, diagnose, load
+from dynx.agreement import refused_report, results_document
+from dynx.doctor import results_document as doctor_document
+from dynx.doctor.formats.baseline import baseline_document
+from dynx.errors import DescriptionError
+from dynx.files.documents import json_text
+from tests.doctor.formats.reports import alike, differing, hostile, refused
+
+DOCS = Path(__file__).parents[1] / "docs"
+WRITER = runpy.run_path(str(DOCS / "write_schemas.py"))
+SCHEMAS: dict[str, dict[str, Any]] = WRITER["schemas"]()
+
+
+def errors(name: str, document: object) -> list[str]:
+    """What a validator finds wrong in a document, as it is written."""
+    found = Draft202012Validator(SCHEMAS[name]).iter_errors(json.loads(json_text(document)))
+    return [f"{error.json_path}: {error.message[:200]}" for error in found]
+
+
+def every_key(document: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
+    """The path of each key of the objects in a document."""
+    items = document.items() if isinstance(document, dict) else []
+    here = [(*path, key) for key, _ in items]
+    entries = list(items) if here else list(enumerate(document)) if isinstance(document, list) else []
+    return here + [found for key, value in entries for found in every_key(value, (*path, key))]
+
+
+@pytest.mark.parametrize("name", sorted(SCHEMAS))
+def test_a_published_schema_is_valid_and_current(name: str) -> None:
+    Draft202012Validator.check_schema(SCHEMAS[name])
+    published = (DOCS / "schemas" / f"{name}.json").read_text(encoding="utf-8")
+    assert published == WRITER["text"](SCHEMAS[name]), "run: python docs/write_schemas.py"
+
+
+def test_each_published_schema_has_a_document() -> None:
+    assert {path.stem for path in (DOCS / "schemas").glob("*.json")} == set(SCHEMAS)
+
+
+def test_documents_of_agree_keep_their_schema() -> None:
+    reports = [
+        agree(load("pendulum"), ["reference", "pinocchio"], samples=2),
+        refused_report("x", DescriptionError("no XML")),
+    ]
+    assert errors("agree", results_document(reports)) == []
+
+
+def test_documents_of_the_doctor_keep_their_schema() -> None:
+    found = diagnose(
+        DOCS.parent / "models" / "traps" / "dx101_link_without_inertial.urdf",
+        samples=2,
+        counterexamples=False,
+    )
+    assert found.findings
+    document = doctor_document([found, alike(), differing(), hostile(), refused()], not_done=["later"])
+    assert errors("doctor", document) == []
+
+
+def test_baselines_keep_their_schema() -> None:
+    assert errors("baseline", baseline_document([differing(), hostile()], "")) == []
+
+
+def test_a_key_too_few_or_too_many_is_an_error_wherever_it_is() -> None:
+    document = json.loads(json_text(doctor_document([differing()])))
+    # Maps have keys of their own: engines, quantities and joints.
+    maps = ("effects", "before", "after", "joints", "file", "engine_value")
+    paths = [path for path in every_key(document) if not set(maps).intersection(path[:-1])]
+    assert len(paths) > 80
+    for *owners, key in paths:
+        fewer, more = copy.deepcopy(document), copy.deepcopy(document)
+        inner, other = fewer, more
+        for owner in owners:
+            inner, other = inner[owner], other[owner]
+        del inner[key]
+        other[f"{key}_"] = None
+        assert errors("doctor", fewer)
+        assert errors("doctor", more)
