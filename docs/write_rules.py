@@ -54,7 +54,7 @@ def _table() -> str:
 
 
 def _section(rule: Rule) -> str:
-    _, _, body = rule.page().partition("\n")
+    _, _, body = rule.page().partition("\n\n")
     facts = [f"- kind: {rule.kind}"]
     if rule.engines:
         named = ", ".join(f"{engine} `{versions}`" for engine, versions in rule.engines.items())
@@ -65,7 +65,7 @@ def _section(rule: Rule) -> str:
     ]
     facts.append(f"- shown by: [{rule.trap()}](../models/traps/{rule.trap()})")
     heading = f'<a id="{rule.id.lower()}"></a>\n\n### {rule.id} {rule.name}\n\n**{_escaped(rule.title)}**'
-    return "\n".join([heading, _escaped(body), "", *facts, ""])
+    return "\n".join([heading, "", _escaped(body), "", *facts, ""])
 
 
 def _escaped(text: str) -> str:

@@ -1,10 +1,28 @@
 """Why engines differ on a file: a catalogue of causes, each with its detection and its remedy.
 
 One module of `dynx.rules.catalogue` is one rule; its docstring is the page that ``dynx explain`` prints.
+Other packages offer rules of their own in the entry-point group ``dynx.rules``.
 """
 
 from dynx.rules.case import Case
+from dynx.rules.editing import Correction, EditingRule, OptionalEditingRule, correction, found_at
+from dynx.rules.engine_versions import EVERY_ENGINE, measured_on
 from dynx.rules.registry import all_rules, find_rule
-from dynx.rules.rule import Detection, Remedy, Rule
+from dynx.rules.rule import CallingRule, Detection, Remedy, Rule
 
-__all__ = ["Case", "Detection", "Remedy", "Rule", "all_rules", "find_rule"]
+__all__ = [
+    "EVERY_ENGINE",
+    "CallingRule",
+    "Case",
+    "Correction",
+    "Detection",
+    "EditingRule",
+    "OptionalEditingRule",
+    "Remedy",
+    "Rule",
+    "all_rules",
+    "correction",
+    "find_rule",
+    "found_at",
+    "measured_on",
+]

@@ -1,30 +1,35 @@
-"""What a rule is: a cause of disagreement that can be detected in a file and, mostly, be removed."""
+"""A rule: a cause of disagreement between engines that is detected in a file and, mostly, removed from it."""
 
 from __future__ import annotations
 
 import inspect
+import re
+import sys
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 from packaging.specifiers import SpecifierSet
 
+from dynx.model.model import Base
 from dynx.rules.case import Case
 
 Kind = Literal["difference", "practice"]
-"""``difference``: engines give different numbers, or one refuses. ``practice``: bad practice, or a
-matter of one engine alone, with nothing for a comparison of numbers to find, and mended only where the
-user chose so."""
+"""``difference``: engines give different numbers, or at least one refuses the file. ``practice``: bad
+practice, or a matter of a single engine; no comparison of numbers shows it, and the file is changed only
+where the user chose so."""
 
 Stage = Literal["reading", "model"]
-"""``reading``: the text itself is doubtful, and dynx may refuse it until it is mended; such rules are
-applied first and must not touch `Case.model`. ``model``: about the robot; the document can be read."""
+"""``reading``: the cause is in the text, and dynx may refuse the file until it is removed; these rules are
+applied first and must not use `Case.model`. ``model``: the cause is in the robot that was read."""
+
+_HEADING = re.compile(r"([A-Z]+[0-9]{3}) ([a-z0-9]+(?:-[a-z0-9]+)+): (.+)", re.DOTALL)
 
 
 @dataclass(frozen=True)
 class Detection:
-    """One place where a rule applies: what is the matter there, in one sentence."""
+    """One place where a rule applies, with one sentence on what is wrong there."""
 
     link: str | None
     joint: str | None
@@ -34,11 +39,11 @@ class Detection:
 
 @dataclass(frozen=True)
 class Remedy:
-    """A case with the cause removed, and what was decided where there was a choice.
+    """A case from which the cause was removed, and the decision that was taken.
 
-    `changed` says what was done to the whole, such as "took <mimic> away"; `choice` is None or says what was
-    chosen and how to choose otherwise (``--choose DX103=keep``). `changes_physics` is true where the numbers
-    of the file had to be changed by more than rounding.
+    `changed` states the whole change, such as "removed <mimic>". `choice` states what was chosen and how to
+    choose otherwise (``--choose DX103=keep``), or is None where there is no choice. `changes_physics` is true
+    where numbers of the file changed by more than rounding.
     """
 
     case: Case
@@ -48,41 +53,57 @@ class Remedy:
 
 
 class Rule(ABC):
-    """A cause. The docstring of its module is its page: plain words, then what each engine does.
+    """A cause. The docstring of the module that defines the rule is its page.
 
-    `engines` maps an engine to the versions (PEP 440 specifier, such as ``>=3.2.5,<=3.2.7``) of which it
-    was *measured* that the rule holds; a test loads `trap` in the installed version and fails by name if
-    that version does otherwise. Engines that are not named read the file as dynx does.
+    The page begins with a heading, ``DX101 link-without-inertial: A link without ...``, which gives the `id`,
+    the `name` and the `title`. The body says what the cause is, what each engine does, and what to do.
     """
 
     id: ClassVar[str]
-    """``DX`` and three digits: 1 inertia, 2 joints, 3 joint dynamics, 4 text, 5 practice."""
+    """``DX`` and three digits, of which the first is the subject: 1 inertia, 2 joints, 3 joint dynamics,
+    4 text, 5 practice. Rules of other packages have a prefix of their own."""
 
     name: ClassVar[str]
-    """Words in kebab-case, such as ``link-without-inertial``."""
+    """Words joined by hyphens, such as ``link-without-inertial``."""
 
     title: ClassVar[str]
-    """The cause in one sentence of plain words."""
+    """The cause in one sentence."""
 
     kind: ClassVar[Kind] = "difference"
     stage: ClassVar[Stage] = "model"
+
     engines: ClassVar[Mapping[str, str]] = {}
+    """Engines that read the file otherwise than dynx, each with the versions (PEP 440 specifier, such as
+    ``>=3.2.5,<=3.2.7``) in which that was measured; a test loads the trap in the installed version and
+    fails if the engine behaves otherwise."""
+
     advice: ClassVar[str] = ""
     """What to do, in one sentence."""
 
     choices: ClassVar[Mapping[str, str]] = {}
-    """Ways to remove the cause where there are several, the first being the default: name -> what it does,
-    in the imperative."""
+    """Ways to remove the cause where there are several, the default first: name -> what it does, in the
+    imperative."""
 
-    trap_base: ClassVar[Literal["fixed", "floating"]] = "fixed"
+    trap_base: ClassVar[Base] = "fixed"
     """The base on which the trap shows the difference."""
 
     depends_on_state: ClassVar[bool] = False
-    """Whether the difference shows at some configurations alone, so that not to see it proves nothing."""
+    """Whether the difference shows at some states only, so that its absence at others proves nothing."""
+
+    def __init_subclass__(cls) -> None:
+        """Take `id`, `name` and `title` from the heading of the page, where the module has one."""
+        super().__init_subclass__()
+        if heading := _HEADING.fullmatch(cls.page().partition("\n\n")[0]):
+            cls.id, cls.name, title = heading.groups()
+            cls.title = " ".join(title.split())
 
     @abstractmethod
-    def detect(self, case: Case) -> Sequence[Detection]:
+    def occurrences(self, case: Case) -> Iterable[Detection]:
         """Every place in the file where the cause is present, in document order."""
+
+    def detect(self, case: Case) -> Sequence[Detection]:
+        """Every place that still has to be remedied, in document order."""
+        return list(self.occurrences(case))
 
     def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy | None:
         """The case without the cause in these places; None where nothing can remove it."""
@@ -93,7 +114,7 @@ class Rule(ABC):
         return case.choice(self.id, next(iter(self.choices)))
 
     def decision(self, case: Case) -> str | None:
-        """What was chosen, and how to choose otherwise; None where there is no choice."""
+        """A sentence on what was chosen and how to choose otherwise; None where there is no choice."""
         if not self.choices:
             return None
         chosen = self.chosen(case)
@@ -112,9 +133,27 @@ class Rule(ABC):
     @classmethod
     def page(cls) -> str:
         """The page of the rule: the docstring of its module."""
-        return inspect.cleandoc(inspect.getmodule(cls).__doc__ or "")
+        return inspect.cleandoc(getattr(sys.modules.get(cls.__module__), "__doc__", None) or "")
 
     @classmethod
     def trap(cls) -> str:
-        """Name of the file in ``models/traps`` that shows the cause alone."""
+        """Name of the file that shows the cause alone, in ``models/traps`` or beside the rule's module."""
         return f"{cls.id.lower()}_{cls.name.replace('-', '_')}.urdf"
+
+
+class CallingRule(Rule):
+    """A rule about forces that engines add at run time, which calls after loading switch off."""
+
+    calls: ClassVar[tuple[str, ...]]
+    """Ids of `LoadedRobot.CALLS`."""
+
+    changed: ClassVar[str]
+    """What was done, as in `Remedy.changed`."""
+
+    def detect(self, case: Case) -> Sequence[Detection]:
+        """The occurrences; none once the calls are made."""
+        return [] if case.calls.issuperset(self.calls) else super().detect(case)
+
+    def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy | None:
+        """The case with the calls, which act on the whole robot."""
+        return Remedy(case.with_calls(*self.calls), self.changed)

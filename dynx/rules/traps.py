@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from pathlib import Path
 
 from dynx.errors import RobotNotFoundError
@@ -13,16 +14,19 @@ from dynx.rules.rule import Rule
 
 
 def find_trap(rule: Rule | str) -> Path:
-    """The trap of a rule, or of its id or name, in the source tree or in the installed package.
+    """The trap of a rule, or of its id or name: beside dynx's own models, or beside the rule's module.
 
     Raises UnknownNameError where there is no such rule, RobotNotFoundError where its trap is missing.
     """
     found = find_rule(rule) if isinstance(rule, str) else rule
-    for root in own_roots():
-        path = root / TRAPS / found.trap()
+    beside_module = Path(inspect.getfile(type(found))).parent
+    for folder in (*(root / TRAPS for root in own_roots()), beside_module):
+        path = folder / found.trap()
         if path.is_file():
             return path
-    raise RobotNotFoundError(f"{found.id} has no trap: no file {TRAPS}/{found.trap()} among dynx's models")
+    raise RobotNotFoundError(
+        f"{found.id} has no trap: no file {found.trap()} in {TRAPS} of dynx's models or beside its module"
+    )
 
 
 def trap_case(rule: Rule | str) -> Case:

@@ -62,8 +62,8 @@ def test_title_and_advice_are_one_sentence(rule: Rule) -> None:
 
 @every_rule
 def test_the_page_begins_with_the_rule(rule: Rule) -> None:
-    first, _, body = rule.page().partition("\n")
-    assert first.startswith(f"{rule.id} {rule.name}: ")
+    heading, _, body = rule.page().partition("\n\n")
+    assert " ".join(heading.split()) == f"{rule.id} {rule.name}: {rule.title}"
     assert len(body.split()) >= 40
     assert all(f"--choose {rule.id}={choice}" in body for choice in list(rule.choices)[1:])
 

@@ -7,7 +7,7 @@ import pytest
 from dynx.loaded import ENGINES, loader_class
 from dynx.model.xml.source import XmlSource
 from dynx.rules import Case, find_rule
-from dynx.rules.text.editing import CallingRule
+from dynx.rules.rule import CallingRule
 from tests.rules.trap_cases import assert_same_robot, changed_lines, mended, only, trap
 
 CALLING = ("DX301", "DX302", "DX304", "DX306", "DX307", "DX308")

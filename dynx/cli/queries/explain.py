@@ -83,9 +83,13 @@ def _print_page(rule: Rule) -> None:
         return
     from rich.markdown import Markdown
 
-    heading, _, body = rule.page().partition("\n")
+    heading, _, body = rule.page().partition("\n\n")
     facts = "\n".join(f"- **{label}**: {value}" for label, value in _facts(rule))
-    out.print(Markdown(f"# {heading}\n{body}\n\n{facts}"), width=min(out.width, _WIDEST), soft_wrap=False)
+    out.print(
+        Markdown(f"# {' '.join(heading.split())}\n\n{body}\n\n{facts}"),
+        width=min(out.width, _WIDEST),
+        soft_wrap=False,
+    )
 
 
 def _facts(rule: Rule) -> Iterator[tuple[str, str]]:

@@ -1,1 +1,1 @@
-"""The rules, one module each: ``dx101_link_without_inertial.py`` defines the one subclass of `Rule` DX101."""
+"""One rule a module, named for its id and its name: ``dx123_words_of_the_name.py``."""

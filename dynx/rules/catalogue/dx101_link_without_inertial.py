@@ -1,4 +1,5 @@
-"""DX101 link-without-inertial: a link without <inertial> weighs 1 kg in one engine and nothing in another
+"""DX101 link-without-inertial: A link without <inertial> weighs 1 kg in PyBullet, its shapes' weight in
+MuJoCo, else nothing.
 
 A link that only marks a place, such as a tool flange or a camera frame, is often written without an
 ``<inertial>`` element. URDF does not say what such a link weighs.
@@ -21,32 +22,23 @@ engines then take the link for what it is in Pinocchio: a frame. On the floating
 mass to the world (DX107); that changes no equation of motion.
 """
 
-from __future__ import annotations
+from collections.abc import Iterable, Sequence
 
-from collections.abc import Mapping, Sequence
-from typing import ClassVar
-
-from dynx.rules.case import Case
+from dynx.rules import Case, Detection, Remedy, Rule, measured_on
 from dynx.rules.inertia.edits import with_inertials, zero_inertial
 from dynx.rules.inertia.massless_links import heaviest_welded_to_root
 from dynx.rules.inertia.merging import lumped_into
 from dynx.rules.inertia.rigid_groups import rigid_groups, static_links
-from dynx.rules.rule import Detection, Remedy, Rule
 
 _UNTOUCHED = "world"
 """The one name for which PyBullet takes a mass of zero."""
 
 
 class LinkWithoutInertial(Rule):
-    """DX101."""
-
-    id = "DX101"
-    name = "link-without-inertial"
-    title = "A link without <inertial> weighs 1 kg in PyBullet, its shapes' weight in MuJoCo, else nothing."
-    engines: ClassVar[Mapping[str, str]] = {"pybullet": ">=3.2.7", "mujoco": ">=4.0.0"}
+    engines = measured_on("pybullet", "mujoco")
     advice = "Write an <inertial>: the true one, or one of zero where the link is a mere frame."
 
-    def detect(self, case: Case) -> Sequence[Detection]:
+    def occurrences(self, case: Case) -> Iterable[Detection]:
         """Links that can move and have no ``<inertial>``."""
         static = static_links(case)
         message = "no <inertial>: 1 kg and 1 kg m^2 in PyBullet, nothing in Pinocchio and Drake"

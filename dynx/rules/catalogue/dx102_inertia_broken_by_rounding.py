@@ -1,4 +1,5 @@
-"""DX102 inertia-broken-by-rounding: the last digit decides whether an engine takes the inertia
+"""DX102 inertia-broken-by-rounding: Principal moments on the edge of what a body can have; rounding decides
+what engines do.
 
 The principal moments of a rigid body are never negative, and none exceeds the sum of the other two. For
 thin plates and rods, and for point masses seen from the joint, the two sides are equal; then the last
@@ -22,34 +23,24 @@ link's origin, to all three moments; a point mass on a fixed joint is lumped wit
 instead. The equations of motion change by a few 1e-15 of their size.
 """
 
-from __future__ import annotations
+from collections.abc import Iterable, Sequence
 
-from collections.abc import Mapping, Sequence
-from typing import ClassVar
-
-from dynx.rules.case import Case
+from dynx.rules import Case, Detection, Remedy, Rule, measured_on
 from dynx.rules.inertia.edits import line_of, with_inertials
 from dynx.rules.inertia.merging import lumped_into
 from dynx.rules.inertia.physical import lifted, on_the_edge, principal_moments
 from dynx.rules.inertia.rigid_groups import rigid_groups
-from dynx.rules.rule import Detection, Remedy, Rule
 
 _ROUNDS = 4
 
 
 class InertiaBrokenByRounding(Rule):
-    """DX102."""
-
-    id = "DX102"
-    name = "inertia-broken-by-rounding"
-    title = "Principal moments on the edge of what a body can have; rounding decides what engines do."
-    engines: ClassVar[Mapping[str, str]] = {"pybullet": ">=3.2.7", "mujoco": ">=4.0.0"}
+    engines = measured_on("pybullet", "mujoco")
     advice = "Raise the moments by a few units in the last place."
 
-    def detect(self, case: Case) -> Sequence[Detection]:
+    def occurrences(self, case: Case) -> Iterable[Detection]:
         """Links whose moments meet the triangle inequality with equality, to rounding, and fail a check."""
         groups = rigid_groups(case)
-        found = []
         for link in case.model.links:
             if link.inertial is None:
                 continue
@@ -65,8 +56,7 @@ class InertiaBrokenByRounding(Rule):
             )
             if large == 0.0:
                 message = "a point mass: its inertia about the origin of the link has a moment of zero"
-            found.append(Detection(link.name, None, line_of(case, link.name, "inertia"), message))
-        return found
+            yield Detection(link.name, None, line_of(case, link.name, "inertia"), message)
 
     def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy:
         """Each moved inside the edge, or lumped where it is a point on a fixed joint."""

@@ -1,4 +1,5 @@
-"""DX103 inertia-of-no-body: one principal moment exceeds the sum of the other two
+"""DX103 inertia-of-no-body: A principal moment of inertia exceeds the sum of the other two, which no body can
+have.
 
 Each principal moment of a body is the sum of two of three second moments of mass, so none can exceed the
 sum of the other two. A tensor that breaks this by more than rounding was mistyped, given in mixed units, or
@@ -21,18 +22,8 @@ with ``--choose DX103=nearest`` (never lump) or ``--choose DX103=keep``: the num
 prints the lines that give them to PyBullet and Drake after loading; MuJoCo then cannot follow.
 """
 
-from __future__ import annotations
-
-from typing import ClassVar
-
 from dynx.rules.inertia.impossible import ImpossibleInertia
-from dynx.rules.inertia.physical import Fault
 
 
 class InertiaOfNoBody(ImpossibleInertia):
-    """DX103."""
-
-    id = "DX103"
-    name = "inertia-of-no-body"
-    title = "A principal moment of inertia exceeds the sum of the other two, which no body can have."
-    fault: ClassVar[Fault] = "triangle"
+    fault = "triangle"

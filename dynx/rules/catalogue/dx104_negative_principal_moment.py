@@ -1,4 +1,5 @@
-"""DX104 negative-principal-moment: the inertia tensor has a negative principal moment
+"""DX104 negative-principal-moment: The inertia tensor has a negative principal moment, which no body can
+have.
 
 A moment of inertia is a sum of masses times squared distances and cannot be negative. A tensor with a
 negative principal moment mostly comes from the theorem of Steiner applied in the wrong direction or twice,
@@ -21,18 +22,8 @@ prints the lines that give them to PyBullet and Drake after loading. Where PyBul
 them all the same, its answers are extrapolated from those for two robots that it takes. MuJoCo cannot follow.
 """
 
-from __future__ import annotations
-
-from typing import ClassVar
-
 from dynx.rules.inertia.impossible import ImpossibleInertia
-from dynx.rules.inertia.physical import Fault
 
 
 class NegativePrincipalMoment(ImpossibleInertia):
-    """DX104."""
-
-    id = "DX104"
-    name = "negative-principal-moment"
-    title = "The inertia tensor has a negative principal moment, which no body can have."
-    fault: ClassVar[Fault] = "negative"
+    fault = "negative"

@@ -1,4 +1,5 @@
-"""DX105 inertia-not-diagonal: PyBullet turns a tensor to its principal axes only roughly
+"""DX105 inertia-not-diagonal: PyBullet turns a tensor with products of inertia to its principal axes only to
+a millionth.
 
 Bullet knows principal moments alone. Where ``ixy``, ``ixz`` or ``iyz`` is not zero, its loader turns the
 tensor to its principal axes by Jacobi's method and stops as soon as the products of inertia are below a
@@ -20,36 +21,26 @@ in the ``rpy`` of the inertial's origin, each with as many digits as a double ha
 precision. It is the same tensor. MuJoCo up to 3.13 ignored that ``rpy`` (DX112).
 """
 
-from __future__ import annotations
-
-from collections.abc import Mapping, Sequence
-from typing import ClassVar
+from collections.abc import Iterable, Sequence
 
 from dynx.engines.pybullet.inertia_checks import diagonalisation_error, read_by_bullet
-from dynx.rules.case import Case
+from dynx.rules import Case, Detection, Remedy, Rule, measured_on
 from dynx.rules.inertia.central import CentralInertia
 from dynx.rules.inertia.edits import line_of, with_inertials
 from dynx.rules.inertia.physical import clear_fault, lifted, on_the_edge
 from dynx.rules.inertia.rigid_groups import rigid_groups
-from dynx.rules.rule import Detection, Remedy, Rule
 
 _NOTICEABLE = 1e-14
 """Share of the tensor: a hundredth of what the comparison of engines can show."""
 
 
 class InertiaNotDiagonal(Rule):
-    """DX105."""
-
-    id = "DX105"
-    name = "inertia-not-diagonal"
-    title = "PyBullet turns a tensor with products of inertia to its principal axes only to a millionth."
-    engines: ClassVar[Mapping[str, str]] = {"pybullet": ">=3.2.7"}
+    engines = measured_on("pybullet")
     advice = "Give the principal moments, with the axes in the rpy of the inertial."
 
-    def detect(self, case: Case) -> Sequence[Detection]:
+    def occurrences(self, case: Case) -> Iterable[Detection]:
         """Links that can move and whose tensor PyBullet's diagonalisation does not reproduce."""
         groups = rigid_groups(case)
-        found = []
         for link in case.model.links:
             inertial = link.inertial
             if inertial is None or groups[link.name].static or read_by_bullet(inertial).zeroed:
@@ -57,8 +48,7 @@ class InertiaNotDiagonal(Rule):
             error = diagonalisation_error(inertial)
             if error > _NOTICEABLE:
                 message = f"PyBullet's diagonalisation of the tensor is off by {error:.1e} of its size"
-                found.append(Detection(link.name, None, line_of(case, link.name, "inertia"), message))
-        return found
+                yield Detection(link.name, None, line_of(case, link.name, "inertia"), message)
 
     def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy:
         """The same tensors in principal form."""

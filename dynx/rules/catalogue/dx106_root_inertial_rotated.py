@@ -1,4 +1,5 @@
-"""DX106 root-inertial-rotated: on a fixed base PyBullet takes the root's inertial frame for the world
+"""DX106 root-inertial-rotated: On a fixed base PyBullet takes the axes of the root's inertial frame for those
+of the world.
 
 The ``<inertial>`` of the root link has an ``rpy`` that is not zero. With the base fixed, nothing that the
 root weighs matters to the motion, so this ought to be without effect.
@@ -17,32 +18,23 @@ What to do: give the root's tensor in the axes of its link.
 It is the same body. Nothing is done for a floating base, where there is no such difference.
 """
 
-from __future__ import annotations
-
-from collections.abc import Mapping, Sequence
-from typing import ClassVar
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from dynx.rules.case import Case
+from dynx.rules import Case, Detection, Remedy, Rule, measured_on
 from dynx.rules.inertia.central import CentralInertia
 from dynx.rules.inertia.edits import line_of, with_inertials
-from dynx.rules.rule import Detection, Remedy, Rule
 from dynx.spatial.so3 import rotation_from_rpy
 
 _ROUNDING = 4.0 * float(np.finfo(float).eps)
 
 
 class RootInertialRotated(Rule):
-    """DX106."""
-
-    id = "DX106"
-    name = "root-inertial-rotated"
-    title = "On a fixed base PyBullet takes the axes of the root's inertial frame for those of the world."
-    engines: ClassVar[Mapping[str, str]] = {"pybullet": ">=3.2.7"}
+    engines = measured_on("pybullet")
     advice = "Give the root's tensor in the axes of its link, with rpy zero."
 
-    def detect(self, case: Case) -> Sequence[Detection]:
+    def occurrences(self, case: Case) -> Iterable[Detection]:
         """The root, on the fixed base, where its inertial frame is turned."""
         model = case.model
         inertial = case.inertials[model.root]

@@ -1,4 +1,4 @@
-"""DX107 massless-root: a root link of mass zero cannot float
+"""DX107 massless-root: With a free base PyBullet nails a robot to the world if its root link has no mass.
 
 Many robots begin with a link that is only a name, ``base_link`` say, and carry their body on it by a fixed
 joint. With the base fixed this is harmless. With the base free, the root is the body that moves:
@@ -20,34 +20,25 @@ and no result shows; ``--choose DX107=keep`` leaves it. In a robot without any m
 as a change of the physics.
 """
 
-from __future__ import annotations
+from collections.abc import Iterable, Sequence
 
-from collections.abc import Mapping, Sequence
-from typing import ClassVar, Literal
-
-from dynx.rules.case import Case
+from dynx.rules import Case, Detection, Remedy, Rule, measured_on
 from dynx.rules.inertia.edits import with_inertials
 from dynx.rules.inertia.massless_links import heaviest_welded_to_root, with_least_inertia
 from dynx.rules.inertia.merging import lumped_into
 from dynx.rules.inertia.rigid_groups import rigid_groups
-from dynx.rules.rule import Detection, Remedy, Rule
 
 
 class MasslessRoot(Rule):
-    """DX107."""
-
-    id = "DX107"
-    name = "massless-root"
-    title = "With a free base PyBullet nails a robot to the world if its root link has no mass."
-    engines: ClassVar[Mapping[str, str]] = {"pybullet": ">=3.2.7"}
+    engines = measured_on("pybullet")
     advice = "Give the root link the mass of the body it stands for."
-    choices: ClassVar[Mapping[str, str]] = {
+    choices = {
         "lump": "lump the heaviest link welded to the root into it; without one, give it the least mass",
         "keep": "leave the file as it is; PyBullet then nails the robot to the world",
     }
-    trap_base: ClassVar[Literal["fixed", "floating"]] = "floating"
+    trap_base = "floating"
 
-    def detect(self, case: Case) -> Sequence[Detection]:
+    def occurrences(self, case: Case) -> Iterable[Detection]:
         """The root, on the floating base, where the file says that its mass is zero."""
         model = case.model
         inertial = case.inertials[model.root]

@@ -1,4 +1,5 @@
-"""DX108 massless-link-with-inertia: a link of mass zero has moments of inertia
+"""DX108 massless-link-with-inertia: A link of mass zero has moments of inertia: Drake makes it 1 kg, MuJoCo
+drops or refuses it.
 
 Matter that has moments of inertia has mass. A file can say otherwise: a foot or a sensor whose mass was set
 to zero while its tensor stayed.
@@ -18,35 +19,25 @@ first; the massless link gets a zero tensor. That is the same rigid body. Where 
 link gets a mass of 2e-15 kg, which every engine takes for mass and no result shows.
 """
 
-from __future__ import annotations
-
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import ClassVar
 
 import numpy as np
 
-from dynx.rules.case import Case
+from dynx.rules import Case, Detection, Remedy, Rule, measured_on
 from dynx.rules.inertia.edits import with_inertials
 from dynx.rules.inertia.merging import lumped_into
 from dynx.rules.inertia.physical import SMALLEST_MASS
 from dynx.rules.inertia.rigid_groups import rigid_groups
-from dynx.rules.rule import Detection, Remedy, Rule
 
 
 class MasslessLinkWithInertia(Rule):
-    """DX108."""
-
-    id = "DX108"
-    name = "massless-link-with-inertia"
-    title = "A link of mass zero has moments of inertia: Drake makes it 1 kg, MuJoCo drops or refuses it."
-    engines: ClassVar[Mapping[str, str]] = {"drake": ">=1.51.1", "mujoco": ">=4.0.0"}
+    engines = measured_on("drake", "mujoco")
     advice = "Give the link its mass, or move the tensor into the link it is welded to."
 
-    def detect(self, case: Case) -> Sequence[Detection]:
+    def occurrences(self, case: Case) -> Iterable[Detection]:
         """Links that can move, of mass zero, with a tensor that is not zero."""
         groups = rigid_groups(case)
-        found = []
         for link in case.model.links:
             inertial = link.inertial
             if inertial is None or inertial.mass != 0.0 or groups[link.name].static:
@@ -54,8 +45,7 @@ class MasslessLinkWithInertia(Rule):
             largest = float(np.max(np.abs(inertial.tensor)))
             if largest > 0.0:
                 message = f"the mass is zero, and the largest entry of the tensor {largest:.6g}"
-                found.append(Detection(link.name, None, inertial.line, message))
-        return found
+                yield Detection(link.name, None, inertial.line, message)
 
     def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy:
         """The tensors put where there is mass."""

@@ -1,4 +1,4 @@
-"""DX109 link-named-world: the name "world" has a meaning of its own
+"""DX109 link-named-world: A link that is not the ground is named world, which engines take for the ground.
 
 URDF gives the name ``world`` no meaning. Engines do. As the root of a robot whose base is fixed it is what
 they expect and harmless. Elsewhere:
@@ -20,33 +20,24 @@ the link stands for the ground, load the robot with the base fixed.
 reference>`` too. Programs may ask for it by its old name: choose ``--choose DX109=keep`` to leave it.
 """
 
-from __future__ import annotations
+from collections.abc import Iterable, Sequence
 
-from collections.abc import Mapping, Sequence
-from typing import ClassVar, Literal
-
-from dynx.rules.case import Case
+from dynx.rules import Case, Detection, Remedy, Rule, measured_on
 from dynx.rules.joints.renaming import fresh_name, renaming_link
-from dynx.rules.rule import Detection, Remedy, Rule
 
 _WORLD = "world"
 
 
 class LinkNamedWorld(Rule):
-    """DX109."""
-
-    id = "DX109"
-    name = "link-named-world"
-    title = "A link that is not the ground is named world, which engines take for the ground."
-    engines: ClassVar[Mapping[str, str]] = {"drake": ">=1.51.1", "mujoco": ">=4.0.0"}
+    engines = measured_on("drake", "mujoco")
     advice = "Give the link another name, or load the robot with the base fixed."
-    choices: ClassVar[Mapping[str, str]] = {
+    choices = {
         "rename": "give the link another name, wherever the document names it",
         "keep": "leave the name; Drake and MuJoCo then do otherwise",
     }
-    trap_base: ClassVar[Literal["fixed", "floating"]] = "floating"
+    trap_base = "floating"
 
-    def detect(self, case: Case) -> Sequence[Detection]:
+    def occurrences(self, case: Case) -> Iterable[Detection]:
         """A link of that name, unless it is the root on the fixed base."""
         element = case.links.get(_WORLD)
         root = case.model.root

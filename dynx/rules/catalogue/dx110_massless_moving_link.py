@@ -1,4 +1,5 @@
-"""DX110 massless-moving-link: a joint carries a link that has neither mass nor inertia
+"""DX110 massless-moving-link: A joint carries a link without mass, which MuJoCo refuses though others hang on
+it.
 
 Links without mass between two joints are common: a shoulder of three axes is mostly written as three joints
 with two empty links between them. The motion is well defined, because something with mass hangs on them.
@@ -16,30 +17,21 @@ takes for nothing. In a robot of kilograms and metres that is below rounding. Ch
 to leave the file as it is. Where nothing beyond the joint has mass, see DX113.
 """
 
-from __future__ import annotations
+from collections.abc import Iterable, Sequence
 
-from collections.abc import Mapping, Sequence
-from typing import ClassVar
-
-from dynx.rules.case import Case
+from dynx.rules import Case, Detection, Remedy, Rule, measured_on
 from dynx.rules.inertia.massless_links import massless_links, with_least_inertia
-from dynx.rules.rule import Detection, Remedy, Rule
 
 
 class MasslessMovingLink(Rule):
-    """DX110."""
-
-    id = "DX110"
-    name = "massless-moving-link"
-    title = "A joint carries a link without mass, which MuJoCo refuses though others hang on it."
-    engines: ClassVar[Mapping[str, str]] = {"mujoco": ">=4.0.0"}
+    engines = measured_on("mujoco")
     advice = "For MuJoCo, give the link a mass and moments just above 1e-15 and 1e-14."
-    choices: ClassVar[Mapping[str, str]] = {
+    choices = {
         "least": "give the link the least mass and moments that MuJoCo takes",
         "keep": "leave the file as it is; MuJoCo refuses it",
     }
 
-    def detect(self, case: Case) -> Sequence[Detection]:
+    def occurrences(self, case: Case) -> Iterable[Detection]:
         """Links that a joint moves, that have neither mass nor tensor, and that carry something with mass."""
         message = "a joint carries the link, which has neither mass nor inertia"
         return [

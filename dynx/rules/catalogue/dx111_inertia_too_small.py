@@ -1,4 +1,4 @@
-"""DX111 inertia-too-small: a moment of inertia below what an engine takes for zero
+"""DX111 inertia-too-small: A moment of inertia is below 1e-14 kg m^2, which MuJoCo refuses.
 
 Some engines compare moments of inertia with fixed small numbers, whatever the size of the robot.
 
@@ -22,15 +22,12 @@ more than rounding of the robot's largest inertia. Nothing is done where it woul
 of that.
 """
 
-from __future__ import annotations
-
-from collections.abc import Mapping, Sequence
-from typing import ClassVar
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
 from dynx.model.elements import Inertial
-from dynx.rules.case import Case
+from dynx.rules import Case, Detection, Remedy, Rule, measured_on
 from dynx.rules.inertia.central import CentralInertia
 from dynx.rules.inertia.edits import line_of, with_inertials
 from dynx.rules.inertia.merging import lumped_into, written
@@ -46,22 +43,16 @@ from dynx.rules.inertia.physical import (
     principal_moments,
 )
 from dynx.rules.inertia.rigid_groups import RigidGroup, rigid_groups
-from dynx.rules.rule import Detection, Remedy, Rule
 
 _NEGLIGIBLE = 1e-3
 """Share of the robot's largest inertia that may be added to a body of it."""
 
 
 class InertiaTooSmall(Rule):
-    """DX111."""
-
-    id = "DX111"
-    name = "inertia-too-small"
-    title = "A moment of inertia is below 1e-14 kg m^2, which MuJoCo refuses."
-    engines: ClassVar[Mapping[str, str]] = {"mujoco": ">=4.0.0"}
+    engines = measured_on("mujoco")
     advice = "Raise the moment to 1e-14 kg m^2, or change the unit for a robot that is really so small."
 
-    def detect(self, case: Case) -> Sequence[Detection]:
+    def occurrences(self, case: Case) -> Iterable[Detection]:
         """Links with such a tensor, and moving links that are points or rods with what is welded to them."""
         groups = rigid_groups(case)
         inertials, found = case.inertials, {}

@@ -1,4 +1,4 @@
-"""DX112 inertial-rotation-ignored: old MuJoCo forgot the rpy of an inertial
+"""DX112 inertial-rotation-ignored: MuJoCo up to 3.13 ignores the rpy of an inertial.
 
 The ``<origin>`` of an ``<inertial>`` may turn the axes about which the tensor is given.
 
@@ -15,36 +15,26 @@ with what PyBullet wants (DX105), by 1e-9.
 dynx offers no remedy by edit: it would undo the one of DX105, and a newer MuJoCo needs none.
 """
 
-from __future__ import annotations
-
-from collections.abc import Mapping, Sequence
-from typing import ClassVar
+from collections.abc import Iterable
 
 import numpy as np
 
-from dynx.rules.case import Case
+from dynx.rules import Case, Detection, Rule, measured_on
 from dynx.rules.inertia.central import CentralInertia
 from dynx.rules.inertia.edits import line_of
 from dynx.rules.inertia.rigid_groups import rigid_groups
-from dynx.rules.rule import Detection, Rule
 
 _VISIBLE = 1e-14
 """Share of the largest moment."""
 
 
 class InertialRotationIgnored(Rule):
-    """DX112."""
-
-    id = "DX112"
-    name = "inertial-rotation-ignored"
-    title = "MuJoCo up to 3.13 ignores the rpy of an inertial."
-    engines: ClassVar[Mapping[str, str]] = {"mujoco": ">=3.3.7,<=3.13.0"}
+    engines = measured_on(mujoco=">=3.3.7,<=3.13.0")
     advice = "Use MuJoCo 4."
 
-    def detect(self, case: Case) -> Sequence[Detection]:
+    def occurrences(self, case: Case) -> Iterable[Detection]:
         """Links that can move and whose tensor changes where the rotation is left out."""
         groups = rigid_groups(case)
-        found = []
         for link in case.model.links:
             inertial = link.inertial
             if inertial is None or groups[link.name].static or not any(inertial.origin.rpy):
@@ -54,5 +44,4 @@ class InertialRotationIgnored(Rule):
             if change > _VISIBLE * size:
                 line = line_of(case, link.name, "origin")
                 message = f"without its rpy the tensor is off by {float(change) / size:.2g} of its size"
-                found.append(Detection(link.name, None, line, message))
-        return found
+                yield Detection(link.name, None, line, message)

@@ -1,4 +1,4 @@
-"""DX113 mass-matrix-singular: nothing beyond a joint has mass
+"""DX113 mass-matrix-singular: Nothing beyond a joint has mass, so the mass matrix is singular.
 
 At the end of some chains there are links whose inertia nobody entered: fingers, wheels, sensors that turn.
 No torque is needed to move them, so none can tell how they move: the mass matrix is singular, and forward
@@ -20,31 +20,22 @@ is an invented inertia, and the slightest torque spins it up. ``--choose DX113=k
 is.
 """
 
-from __future__ import annotations
+from collections.abc import Iterable, Sequence
 
-from collections.abc import Mapping, Sequence
-from typing import ClassVar
-
-from dynx.rules.case import Case
+from dynx.rules import Case, Detection, Remedy, Rule, measured_on
 from dynx.rules.inertia.massless_links import massless_links, with_least_inertia
-from dynx.rules.rule import Detection, Remedy, Rule
 
 
 class MassMatrixSingular(Rule):
-    """DX113."""
-
-    id = "DX113"
-    name = "mass-matrix-singular"
-    title = "Nothing beyond a joint has mass, so the mass matrix is singular."
     # The others show it in forward dynamics, which has no right answer to be compared with.
-    engines: ClassVar[Mapping[str, str]] = {"mujoco": ">=4.0.0"}
+    engines = measured_on("mujoco")
     advice = "Enter the inertia of the link, or make the joint fixed if it does not matter."
-    choices: ClassVar[Mapping[str, str]] = {
+    choices = {
         "least": "give the links the least mass and moments that all engines take, which changes the physics",
         "keep": "leave the file as it is; forward dynamics has no answer",
     }
 
-    def detect(self, case: Case) -> Sequence[Detection]:
+    def occurrences(self, case: Case) -> Iterable[Detection]:
         """Links that a joint moves where neither they nor anything beyond them has mass or a tensor."""
         message = "neither the link nor anything beyond its joint has mass: the mass matrix is singular"
         return [

@@ -1,4 +1,5 @@
-"""DX114 inertia-scaled-for-contact: PyBullet multiplies the inertia of a link by ``<inertia_scaling>``
+"""DX114 inertia-scaled-for-contact: A link has inertia_scaling, by which PyBullet alone multiplies its
+inertia.
 
 ``<contact><inertia_scaling value="3.0"/></contact>`` is an extension of PyBullet's, meant to make contacts of
 light links steadier. Many files that come with PyBullet, and files copied from them, have it.
@@ -16,25 +17,16 @@ What to do: take the tag away wherever the dynamics matters. ``dynx doctor --fix
 of ``<contact>`` in place.
 """
 
-from __future__ import annotations
-
-from collections.abc import Iterable, Mapping
-from typing import ClassVar
+from collections.abc import Iterable
 
 from dynx.model.xml.source import SourceElement
-from dynx.rules.case import Case
+from dynx.rules import Case, Correction, EditingRule, correction, measured_on
 from dynx.rules.text.attributes import number_or_none
-from dynx.rules.text.editing import Correction, EditingRule, found_at
 
 
 class InertiaScaledForContact(EditingRule):
-    """DX114."""
-
-    id = "DX114"
-    name = "inertia-scaled-for-contact"
-    title = "A link has inertia_scaling, by which PyBullet alone multiplies its inertia."
     advice = "Take <inertia_scaling> away."
-    engines: ClassVar[Mapping[str, str]] = {"pybullet": ">=3.2.7"}
+    engines = measured_on("pybullet")
     changed = "took <inertia_scaling> away"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
@@ -45,7 +37,7 @@ class InertiaScaledForContact(EditingRule):
                     scale = _scale(scaling)
                     if scale != 1.0:
                         message = f"PyBullet multiplies the moments of inertia of the link by {scale:g}"
-                        yield Correction(found_at(scaling, message), (case.source.removing(scaling),))
+                        yield correction(scaling, message, case.source.removing(scaling))
 
 
 def _scale(scaling: SourceElement) -> float:

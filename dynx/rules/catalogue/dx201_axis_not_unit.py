@@ -1,4 +1,4 @@
-"""DX201 axis-not-unit: the axis of a joint is a vector whose length is not 1
+"""DX201 axis-not-unit: The axis of a joint is not a unit vector.
 
 URDF says that ``<axis xyz="..."/>`` should have length 1. A wrong length says nothing about the direction,
 and most readers scale it away. Typical are axes such as ``0 0 -2`` or ``1 1 0``, and axes that were rounded
@@ -17,17 +17,13 @@ The effect is the deviation of the length from 1: 1e-7 for a rounded axis, 1 for
 What to do: write unit axes with 17 digits. ``dynx doctor --fix`` writes the axis that dynx uses.
 """
 
-from __future__ import annotations
-
-from collections.abc import Iterable, Mapping
-from typing import ClassVar
+from collections.abc import Iterable
 
 import numpy as np
 
-from dynx.rules.case import Case
+from dynx.rules import Case, Correction, EditingRule, correction, measured_on
 from dynx.rules.joints.elements import SINGLE, elements_in_joints
 from dynx.rules.text.attributes import vector_of
-from dynx.rules.text.editing import Correction, EditingRule, found_at
 from dynx.rules.text.number_text import decimal
 
 _ROUNDING = 1e-15
@@ -35,17 +31,8 @@ _ROUNDING = 1e-15
 
 
 class AxisNotUnit(EditingRule):
-    """DX201."""
-
-    id = "DX201"
-    name = "axis-not-unit"
-    title = "The axis of a joint is not a unit vector."
     advice = "Scale the axis to length 1 and write 17 digits."
-    engines: ClassVar[Mapping[str, str]] = {
-        "pybullet": ">=3.2.7",
-        "mujoco": ">=4.0.0",
-        "drake": ">=1.51.1",
-    }
+    engines = measured_on("pybullet", "mujoco", "drake")
     changed = "scaled the axes of joints to length 1"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
@@ -60,4 +47,4 @@ class AxisNotUnit(EditingRule):
                 message = f"the axis {axis.attributes['xyz']} has length {length:.9g}"
                 unit = case.model.joint(joint.attributes["name"]).axis
                 edit = case.source.setting(axis, "xyz", " ".join(map(decimal, unit)))
-                yield Correction(found_at(axis, message), (edit,))
+                yield correction(axis, message, edit)

@@ -1,4 +1,4 @@
-"""DX202 axis-without-direction: the axis of a joint that moves is zero, or says nothing
+"""DX202 axis-without-direction: The axis of a joint that moves is zero or empty.
 
 ``<axis xyz="0 0 0"/>`` and ``<axis/>`` give no direction to turn about or to slide along. Exporters write the
 first for fixed joints, where nobody looks at it; once the type is changed to ``revolute`` it matters. A joint
@@ -14,29 +14,18 @@ What to do: write the direction. The file does not have it, so ``dynx doctor --f
 (1, 0, 0). If the joint was never meant to move, ``--choose DX202=fixed`` makes it a fixed joint.
 """
 
-from __future__ import annotations
+from collections.abc import Iterable
 
-from collections.abc import Iterable, Mapping
-from typing import ClassVar
-
-from dynx.rules.case import Case
-from dynx.rules.engine_versions import EVERY_ENGINE
+from dynx.rules import EVERY_ENGINE, Case, Correction, EditingRule, correction
 from dynx.rules.joints.elements import SINGLE, elements_in_joints
-from dynx.rules.rule import Stage
-from dynx.rules.text.editing import Correction, EditingRule, found_at
 from dynx.rules.text.number_text import is_number
 
 
 class AxisWithoutDirection(EditingRule):
-    """DX202."""
-
-    id = "DX202"
-    name = "axis-without-direction"
-    title = "The axis of a joint that moves is zero or empty."
-    stage: ClassVar[Stage] = "reading"
+    stage = "reading"
     advice = "Write the direction of the axis, or make the joint fixed."
-    engines: ClassVar[Mapping[str, str]] = EVERY_ENGINE
-    choices: ClassVar[Mapping[str, str]] = {
+    engines = EVERY_ENGINE
+    choices = {
         "x": "make an axis without direction (1, 0, 0), URDF's default",
         "fixed": "make a joint whose axis has no direction fixed",
     }
@@ -53,6 +42,4 @@ class AxisWithoutDirection(EditingRule):
             else:
                 edit = case.source.setting(axis, "xyz", "1 0 0")
             what = "is zero" if words else "has no numbers"
-            yield Correction(
-                found_at(axis, f"the axis of a {joint.attributes['type']} joint {what}"), (edit,)
-            )
+            yield correction(axis, f"the axis of a {joint.attributes['type']} joint {what}", edit)

@@ -1,4 +1,4 @@
-"""DX203 joint-without-limit: a revolute or prismatic joint has no ``<limit>``
+"""DX203 joint-without-limit: A revolute or prismatic joint has no limit.
 
 URDF demands one: a joint that can turn for ever is called ``continuous``.
 
@@ -13,31 +13,21 @@ without any: a revolute joint becomes ``continuous``, a prismatic one gets the l
 in which they are not given; the joint then must not move in simulations that keep to limits.
 """
 
-from __future__ import annotations
-
-from collections.abc import Iterable, Mapping
-from typing import ClassVar
+from collections.abc import Iterable
 
 from dynx.model.xml.source import Edit, SourceElement
-from dynx.rules.case import Case
+from dynx.rules import Case, Correction, EditingRule, correction, measured_on
 from dynx.rules.joints.elements import UNLIMITED, joints_of_type
-from dynx.rules.rule import Stage
-from dynx.rules.text.editing import Correction, EditingRule, found_at
 from dynx.rules.text.number_text import LARGEST
 
 _ZERO = f'<limit lower="0" upper="0" effort="{LARGEST}" velocity="{LARGEST}"/>'
 
 
 class JointWithoutLimit(EditingRule):
-    """DX203."""
-
-    id = "DX203"
-    name = "joint-without-limit"
-    title = "A revolute or prismatic joint has no limit."
-    stage: ClassVar[Stage] = "reading"
+    stage = "reading"
     advice = 'Write the <limit> of the joint, or type="continuous".'
-    engines: ClassVar[Mapping[str, str]] = {"pinocchio": ">=4.1.0", "pybullet": ">=3.2.7"}
-    choices: ClassVar[Mapping[str, str]] = {
+    engines = measured_on("pinocchio", "pybullet")
+    choices = {
         "unlimited": "leave joints without limit unlimited: revolute ones become continuous",
         "zero": "give joints without limit lower and upper limits of 0",
     }
@@ -48,7 +38,7 @@ class JointWithoutLimit(EditingRule):
         for joint in joints_of_type(case, ("revolute", "prismatic")):
             if joint.first("limit") is None:
                 message = f"the joint is {joint.attributes['type']} and has no <limit>"
-                yield Correction(found_at(joint, message), (self._mended(case, joint),))
+                yield correction(joint, message, self._mended(case, joint))
 
     def _mended(self, case: Case, joint: SourceElement) -> Edit:
         if self.chosen(case) == "zero":

@@ -1,4 +1,4 @@
-"""DX204 limit-without-effort-or-velocity: a ``<limit>`` has no ``effort`` or no ``velocity``
+"""DX204 limit-without-effort-or-velocity: A limit does not say the largest effort or speed.
 
 URDF demands both, though neither enters any equation of motion.
 
@@ -13,27 +13,17 @@ What to do: write both. They are not in the file, so ``dynx doctor --fix`` write
 every engine reads and which dynx takes for "no limit".
 """
 
-from __future__ import annotations
+from collections.abc import Iterable
 
-from collections.abc import Iterable, Mapping
-from typing import ClassVar
-
-from dynx.rules.case import Case
+from dynx.rules import Case, Correction, EditingRule, correction, measured_on
 from dynx.rules.joints.elements import elements_in_joints
-from dynx.rules.rule import Stage
-from dynx.rules.text.editing import Correction, EditingRule, found_at
 from dynx.rules.text.number_text import LARGEST
 
 
 class LimitWithoutEffortOrVelocity(EditingRule):
-    """DX204."""
-
-    id = "DX204"
-    name = "limit-without-effort-or-velocity"
-    title = "A limit does not say the largest effort or speed."
-    stage: ClassVar[Stage] = "reading"
+    stage = "reading"
     advice = "Write effort and velocity into every <limit>."
-    engines: ClassVar[Mapping[str, str]] = {"pinocchio": ">=4.1.0"}
+    engines = measured_on("pinocchio")
     changed = "wrote the largest double for efforts and velocities that were not given"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
@@ -42,4 +32,4 @@ class LimitWithoutEffortOrVelocity(EditingRule):
             missing = [name for name in ("effort", "velocity") if name not in limit.attributes]
             if missing:
                 edits = tuple(case.source.setting(limit, name, LARGEST) for name in missing)
-                yield Correction(found_at(limit, f"<limit> has no {' and no '.join(missing)}"), edits)
+                yield correction(limit, f"<limit> has no {' and no '.join(missing)}", *edits)

@@ -1,4 +1,4 @@
-"""DX205 lower-limit-above-upper: the lower limit of a joint is above its upper limit
+"""DX205 lower-limit-above-upper: The lower limit of a joint is above its upper limit.
 
 The two ends were exchanged, or the sign of one was lost.
 
@@ -13,29 +13,19 @@ What to do: put the limits right. ``dynx doctor --fix`` exchanges them. ``--choo
 the largest double in place of both, which is what MuJoCo and PyBullet make of them.
 """
 
-from __future__ import annotations
+from collections.abc import Iterable
 
-from collections.abc import Iterable, Mapping
-from typing import ClassVar
-
-from dynx.rules.case import Case
+from dynx.rules import Case, Correction, EditingRule, correction, measured_on
 from dynx.rules.joints.elements import SINGLE, elements_in_joints
-from dynx.rules.rule import Stage
 from dynx.rules.text.attributes import number_or_none
-from dynx.rules.text.editing import Correction, EditingRule, found_at
 from dynx.rules.text.number_text import LARGEST
 
 
 class LowerLimitAboveUpper(EditingRule):
-    """DX205."""
-
-    id = "DX205"
-    name = "lower-limit-above-upper"
-    title = "The lower limit of a joint is above its upper limit."
-    stage: ClassVar[Stage] = "reading"
+    stage = "reading"
     advice = "Exchange the limits, or correct the one that is wrong."
-    engines: ClassVar[Mapping[str, str]] = {"drake": ">=1.51.1"}
-    choices: ClassVar[Mapping[str, str]] = {
+    engines = measured_on("drake")
+    choices = {
         "exchange": "exchange a lower limit above the upper with it",
         "unlimited": "write the largest double for both limits where the lower is above the upper",
     }
@@ -53,6 +43,4 @@ class LowerLimitAboveUpper(EditingRule):
                 written = (limit.attributes["upper"], limit.attributes["lower"])
             setting = case.source.setting
             edits = tuple(setting(limit, *each) for each in zip(("lower", "upper"), written, strict=True))
-            yield Correction(
-                found_at(limit, f"the lower limit {lower:g} is above the upper {upper:g}"), edits
-            )
+            yield correction(limit, f"the lower limit {lower:g} is above the upper {upper:g}", *edits)

@@ -1,4 +1,4 @@
-"""DX206 negative-effort-or-velocity: the largest effort or speed of a joint is negative
+"""DX206 negative-effort-or-velocity: The largest effort or speed of a joint is negative.
 
 ``-1`` for "no limit" is a habit from other formats; else a sign slipped in.
 
@@ -14,29 +14,19 @@ What to do: write what was meant. ``dynx doctor --fix`` takes the sign away. Whe
 limit", ``--choose DX206=unlimited`` writes the largest double instead.
 """
 
-from __future__ import annotations
+from collections.abc import Iterable
 
-from collections.abc import Iterable, Mapping
-from typing import ClassVar
-
-from dynx.rules.case import Case
+from dynx.rules import Case, Correction, EditingRule, correction, measured_on
 from dynx.rules.joints.elements import SINGLE, elements_in_joints
-from dynx.rules.rule import Stage
 from dynx.rules.text.attributes import number_or_none
-from dynx.rules.text.editing import Correction, EditingRule, found_at
 from dynx.rules.text.number_text import LARGEST
 
 
 class NegativeEffortOrVelocity(EditingRule):
-    """DX206."""
-
-    id = "DX206"
-    name = "negative-effort-or-velocity"
-    title = "The largest effort or speed of a joint is negative."
-    stage: ClassVar[Stage] = "reading"
+    stage = "reading"
     advice = "Write a limit of at least 0."
-    engines: ClassVar[Mapping[str, str]] = {"pinocchio": ">=4.1.0", "drake": ">=1.51.1"}
-    choices: ClassVar[Mapping[str, str]] = {
+    engines = measured_on("pinocchio", "drake")
+    choices = {
         "absolute": "take the sign of negative efforts and velocities away",
         "unlimited": "write the largest double for negative efforts and velocities",
     }
@@ -52,7 +42,7 @@ class NegativeEffortOrVelocity(EditingRule):
                     case.source.setting(limit, name, self._instead(case, limit.attributes[name]))
                     for name in below
                 )
-                yield Correction(found_at(limit, f"<limit> has {said}"), edits)
+                yield correction(limit, f"<limit> has {said}", *edits)
 
     def _instead(self, case: Case, written: str) -> str:
         return LARGEST if self.chosen(case) == "unlimited" else written.strip().removeprefix("-")

@@ -1,4 +1,4 @@
-"""DX207 safety-controller-without-gain: a ``<safety_controller>`` has no ``k_velocity``
+"""DX207 safety-controller-without-gain: A safety controller has no k_velocity.
 
 The element belongs to the PR2's controllers and to ROS; no engine simulates it. URDF demands its attribute
 ``k_velocity`` and makes the others optional.
@@ -10,26 +10,16 @@ What to do: take the element away unless a program of yours reads it, or complet
 adds ``k_velocity="0"``, with which the controller it describes does nothing.
 """
 
-from __future__ import annotations
+from collections.abc import Iterable
 
-from collections.abc import Iterable, Mapping
-from typing import ClassVar
-
-from dynx.rules.case import Case
+from dynx.rules import Case, Correction, EditingRule, correction, measured_on
 from dynx.rules.joints.elements import elements_in_joints
-from dynx.rules.rule import Stage
-from dynx.rules.text.editing import Correction, EditingRule, found_at
 
 
 class SafetyControllerWithoutGain(EditingRule):
-    """DX207."""
-
-    id = "DX207"
-    name = "safety-controller-without-gain"
-    title = "A safety controller has no k_velocity."
-    stage: ClassVar[Stage] = "reading"
+    stage = "reading"
     advice = "Write k_velocity, or take the <safety_controller> away."
-    engines: ClassVar[Mapping[str, str]] = {"pinocchio": ">=4.1.0"}
+    engines = measured_on("pinocchio")
     changed = "gave safety controllers without k_velocity one of 0"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
@@ -37,4 +27,4 @@ class SafetyControllerWithoutGain(EditingRule):
         for _, controller in elements_in_joints(case, "safety_controller"):
             if "k_velocity" not in controller.attributes:
                 edit = case.source.setting(controller, "k_velocity", "0")
-                yield Correction(found_at(controller, "<safety_controller> has no k_velocity"), (edit,))
+                yield correction(controller, "<safety_controller> has no k_velocity", edit)

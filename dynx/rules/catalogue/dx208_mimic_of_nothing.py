@@ -1,4 +1,4 @@
-"""DX208 mimic-of-nothing: a ``<mimic>`` has nothing to follow
+"""DX208 mimic-of-nothing: A mimic joint has nothing to follow.
 
 It names no joint, a joint that is not there, or its own; or it belongs to a fixed joint.
 
@@ -14,32 +14,18 @@ What to do: name the joint to follow, or take the tag away. ``dynx doctor --fix`
 joint moves freely, as in the engines that load the file.
 """
 
-from __future__ import annotations
-
-from collections.abc import Iterable, Mapping
-from typing import ClassVar
+from collections.abc import Iterable
 
 from dynx.errors import shown
 from dynx.model.xml.source import SourceElement
-from dynx.rules.case import Case
+from dynx.rules import Case, Correction, EditingRule, correction, measured_on
 from dynx.rules.joints.elements import SINGLE, elements_in_joints
-from dynx.rules.rule import Stage
-from dynx.rules.text.editing import Correction, EditingRule, found_at
 
 
 class MimicOfNothing(EditingRule):
-    """DX208."""
-
-    id = "DX208"
-    name = "mimic-of-nothing"
-    title = "A mimic joint has nothing to follow."
-    stage: ClassVar[Stage] = "reading"
+    stage = "reading"
     advice = "Name the joint to follow, or take <mimic> away."
-    engines: ClassVar[Mapping[str, str]] = {
-        "pinocchio": ">=4.1.0",
-        "mujoco": ">=4.0.0",
-        "drake": ">=1.51.1",
-    }
+    engines = measured_on("pinocchio", "mujoco", "drake")
     changed = "took <mimic> away from joints that had nothing to follow"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
@@ -48,7 +34,7 @@ class MimicOfNothing(EditingRule):
             message = _why_nothing(case, joint, mimic)
             if message is not None:
                 edits = tuple(case.source.removing(each) for each in joint.all("mimic"))
-                yield Correction(found_at(mimic, message), edits)
+                yield correction(mimic, message, *edits)
 
 
 def _why_nothing(case: Case, joint: SourceElement, mimic: SourceElement) -> str | None:

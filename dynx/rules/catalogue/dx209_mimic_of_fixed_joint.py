@@ -1,4 +1,4 @@
-"""DX209 mimic-of-fixed-joint: a joint follows one that cannot move
+"""DX209 mimic-of-fixed-joint: A mimic joint follows a joint that cannot move.
 
 The joint it follows was made fixed (a gripper that is not used, say) and the followers were forgotten. By
 what ``<mimic>`` means they cannot move either: their value is the offset.
@@ -15,29 +15,20 @@ What to do: make the joint fixed. ``dynx doctor --fix`` does so, and moves its o
 meant to move by itself, ``--choose DX209=free`` takes ``<mimic>`` away instead.
 """
 
-from __future__ import annotations
-
-from collections.abc import Iterable, Mapping
-from typing import ClassVar
+from collections.abc import Iterable
 
 from dynx.errors import shown
 from dynx.model.elements import Joint
 from dynx.model.xml.source import Edit, SourceElement
-from dynx.rules.case import Case
+from dynx.rules import Case, Correction, EditingRule, correction, measured_on
 from dynx.rules.joints.elements import SINGLE, elements_in_joints
-from dynx.rules.text.editing import Correction, EditingRule, found_at
 from dynx.rules.text.number_text import decimal
 
 
 class MimicOfFixedJoint(EditingRule):
-    """DX209."""
-
-    id = "DX209"
-    name = "mimic-of-fixed-joint"
-    title = "A mimic joint follows a joint that cannot move."
     advice = "Make the follower fixed too."
-    engines: ClassVar[Mapping[str, str]] = {"drake": ">=1.51.1"}
-    choices: ClassVar[Mapping[str, str]] = {
+    engines = measured_on("drake")
+    choices = {
         "fixed": "make a joint that mimics a fixed one fixed at its offset",
         "free": "let a joint that mimics a fixed one move freely",
     }
@@ -50,7 +41,7 @@ class MimicOfFixedJoint(EditingRule):
             joint = known[element.attributes["name"]]
             if not joint.moves:
                 message = f"the joint mimics {shown(mimic.attributes['joint'])}, which cannot move"
-                yield Correction(found_at(mimic, message), tuple(self._edits(case, element, joint)))
+                yield correction(mimic, message, *self._edits(case, element, joint))
 
     def _edits(self, case: Case, element: SourceElement, joint: Joint) -> Iterable[Edit]:
         source = case.source

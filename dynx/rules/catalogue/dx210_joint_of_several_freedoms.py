@@ -1,4 +1,4 @@
-"""DX210 joint-of-several-freedoms: a joint is spherical, planar or floating
+"""DX210 joint-of-several-freedoms: A joint is spherical, planar or floating.
 
 URDF knows ``planar`` and ``floating``; ``spherical`` and ``ball`` are extensions. Readers differ more over
 them than over anything else:
@@ -20,34 +20,21 @@ at 90 degrees, and limits of the joint are dropped. MuJoCo refuses massless link
 links in between weigh 2e-15 kg. ``--choose DX210=fixed`` makes the joint fixed instead.
 """
 
-from __future__ import annotations
-
-from collections.abc import Iterable, Mapping
-from typing import ClassVar
+from collections.abc import Iterable
 
 from dynx.model.xml.source import Edit, SourceElement
-from dynx.rules.case import Case, end_of
+from dynx.rules import Case, Correction, EditingRule, correction, measured_on
+from dynx.rules.case import end_of
 from dynx.rules.joints.elements import joints_of_type
 from dynx.rules.joints.splitting import TYPES, splitting
-from dynx.rules.rule import Stage
 from dynx.rules.text.attributes import number_or_none
-from dynx.rules.text.editing import Correction, EditingRule, found_at
 
 
 class JointOfSeveralFreedoms(EditingRule):
-    """DX210."""
-
-    id = "DX210"
-    name = "joint-of-several-freedoms"
-    title = "A joint is spherical, planar or floating."
-    stage: ClassVar[Stage] = "reading"
+    stage = "reading"
     advice = "Write joints of one freedom each, with massless links between them."
-    engines: ClassVar[Mapping[str, str]] = {
-        "pinocchio": ">=4.1.0",
-        "pybullet": ">=3.2.7",
-        "drake": ">=1.51.1",
-    }
-    choices: ClassVar[Mapping[str, str]] = {
+    engines = measured_on("pinocchio", "pybullet", "drake")
+    choices = {
         "split": "split a joint of several freedoms into joints of one, without its limits",
         "fixed": "make a joint of several freedoms fixed",
     }
@@ -63,7 +50,7 @@ class JointOfSeveralFreedoms(EditingRule):
                 edits: tuple[Edit, ...] = (case.source.setting(joint, "type", "fixed"),)
             else:
                 edits = tuple(splitting(case.source, joint))
-            yield Correction(found_at(joint, f"the joint is {kind}"), edits)
+            yield correction(joint, f"the joint is {kind}", *edits)
 
 
 def _is_the_base(case: Case, joint: SourceElement) -> bool:

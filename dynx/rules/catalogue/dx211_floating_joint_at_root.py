@@ -1,4 +1,4 @@
-"""DX211 floating-joint-at-root: an empty root link carries the robot by a floating joint
+"""DX211 floating-joint-at-root: A floating joint below an empty root says that the base moves freely.
 
 Some files say in this way that the robot moves freely: a link ``world`` without inertia, a joint of type
 ``floating``, and the robot below it. Whether the base is fixed or free is then said twice, in the file and
@@ -15,31 +15,19 @@ dynx reads the joint as fixed and leaves the decision to ``base=``.
 What to do: say it in one place. ``dynx doctor --fix`` makes the joint fixed.
 """
 
-from __future__ import annotations
+from collections.abc import Iterable
 
-from collections.abc import Iterable, Mapping
-from typing import ClassVar
-
-from dynx.rules.case import Case
+from dynx.rules import Case, Correction, EditingRule, correction, measured_on
 from dynx.rules.joints.elements import joints_of_type
-from dynx.rules.text.editing import Correction, EditingRule, found_at
 
 
 class FloatingJointAtRoot(EditingRule):
-    """DX211."""
-
-    id = "DX211"
-    name = "floating-joint-at-root"
-    title = "A floating joint below an empty root says that the base moves freely."
     advice = "Make the joint fixed, and say in the loading call whether the base is free."
-    engines: ClassVar[Mapping[str, str]] = {
-        "mujoco": ">=4.0.0",
-        "drake": ">=1.51.1",
-    }
+    engines = measured_on("mujoco", "drake")
     changed = "made the floating joint below the root fixed: the loading call says whether the base is free"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
         """The joint, of which there is at most one that dynx can read."""
         for joint in joints_of_type(case, ("floating",)):
             edit = case.source.setting(joint, "type", "fixed")
-            yield Correction(found_at(joint, "the joint below the root is floating"), (edit,))
+            yield correction(joint, "the joint below the root is floating", edit)

@@ -1,4 +1,4 @@
-"""DX212 too-many-joints: the robot has more joints than PyBullet can tell the state of
+"""DX212 too-many-joints: The robot has more joints than PyBullet can tell the state of.
 
 PyBullet 3.2.7 has room for 127 joints, and counts fixed ones. From the 128th on ``getJointState`` and
 ``getLinkState`` fail, so there are no positions; above 128 coordinates ``calculateInverseDynamics``,
@@ -14,32 +14,23 @@ the original file. ``--choose DX212=keep`` leaves them in, and PyBullet out. Whe
 them, or too many joints move, nothing mends it.
 """
 
-from __future__ import annotations
-
-from collections.abc import Iterator, Mapping, Sequence
-from typing import ClassVar
+from collections.abc import Iterable, Iterator, Sequence
 
 from dynx.engines.pybullet.file_checks import MAX_JOINTS
 from dynx.model import Model
 from dynx.model.elements import Link
-from dynx.rules.case import Case
-from dynx.rules.rule import Detection, Remedy, Rule
+from dynx.rules import Case, Detection, Remedy, Rule, measured_on
 
 
 class TooManyJoints(Rule):
-    """DX212."""
-
-    id = "DX212"
-    name = "too-many-joints"
-    title = "The robot has more joints than PyBullet can tell the state of."
     advice = "Drop links that are mere frames from the file for PyBullet."
-    engines: ClassVar[Mapping[str, str]] = {"pybullet": ">=3.2.7"}
-    choices: ClassVar[Mapping[str, str]] = {
+    engines = measured_on("pybullet")
+    choices = {
         "drop": "take frames without mass at the ends of the robot away until 127 joints are left",
         "keep": "keep all links; PyBullet then cannot hold the robot",
     }
 
-    def detect(self, case: Case) -> Sequence[Detection]:
+    def occurrences(self, case: Case) -> Iterable[Detection]:
         """The first joint too many, in document order."""
         joints = case.source.root.all("joint")
         if len(joints) <= MAX_JOINTS:

@@ -1,4 +1,4 @@
-"""DX213 joint-named-universe: a fixed joint has the name that Pinocchio gives to the world
+"""DX213 joint-named-universe: A fixed joint is named universe, which is Pinocchio's name for the world.
 
 Pinocchio 4.1 keeps a list of frames that begins with an entry ``universe``, which is the world. A fixed joint
 becomes a frame of its name, and is looked up by that name when the link behind it is attached: found is
@@ -16,26 +16,17 @@ transmissions and Gazebo references too; programs that look the joint up by its 
 with it.
 """
 
-from __future__ import annotations
+from collections.abc import Iterable
 
-from collections.abc import Iterable, Mapping
-from typing import ClassVar
-
-from dynx.rules.case import Case
+from dynx.rules import Case, Correction, EditingRule, correction, measured_on
 from dynx.rules.joints.renaming import fresh_name, renaming_joint
-from dynx.rules.text.editing import Correction, EditingRule, found_at
 
 _RESERVED = "universe"
 
 
 class JointNamedUniverse(EditingRule):
-    """DX213."""
-
-    id = "DX213"
-    name = "joint-named-universe"
-    title = "A fixed joint is named universe, which is Pinocchio's name for the world."
     advice = "Give the joint another name."
-    engines: ClassVar[Mapping[str, str]] = {"pinocchio": ">=4.1.0"}
+    engines = measured_on("pinocchio")
     changed = "gave the joint named universe another name"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
@@ -45,4 +36,4 @@ class JointNamedUniverse(EditingRule):
             return
         new = fresh_name(f"{_RESERVED}_joint", case.joints)
         edits = tuple(renaming_joint(case.source, _RESERVED, new))
-        yield Correction(found_at(joint, "the joint has the name of Pinocchio's world"), edits)
+        yield correction(joint, "the joint has the name of Pinocchio's world", *edits)

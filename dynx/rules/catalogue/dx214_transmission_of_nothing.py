@@ -1,4 +1,4 @@
-"""DX214 transmission-of-nothing: a ``<transmission>`` lacks a part, or is about a joint that is not there
+"""DX214 transmission-of-nothing: A transmission lacks a part, or is about a joint that is not there.
 
 Transmissions belong to ROS and its controllers. Of the engines only Drake looks at them, and it is strict:
 
@@ -11,28 +11,18 @@ What to do: complete the transmission or take it away. ``dynx doctor --fix`` tak
 dynamics depends on it. ROS controllers that were meant to use it need it completed instead.
 """
 
-from __future__ import annotations
-
-from collections.abc import Iterable, Mapping
-from typing import ClassVar
+from collections.abc import Iterable
 
 from dynx.errors import shown
 from dynx.model.xml.source import SourceElement
-from dynx.rules.case import Case
+from dynx.rules import Case, Correction, EditingRule, correction, measured_on
 from dynx.rules.joints.transmissions import transmissions_drake_reads, type_of
-from dynx.rules.rule import Stage
-from dynx.rules.text.editing import Correction, EditingRule, found_at
 
 
 class TransmissionOfNothing(EditingRule):
-    """DX214."""
-
-    id = "DX214"
-    name = "transmission-of-nothing"
-    title = "A transmission lacks a part, or is about a joint that is not there."
-    stage: ClassVar[Stage] = "reading"
+    stage = "reading"
     advice = "Complete the <transmission>, or take it away."
-    engines: ClassVar[Mapping[str, str]] = {"drake": ">=1.51.1"}
+    engines = measured_on("drake")
     changed = "took transmissions away that lack a part or a joint"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
@@ -40,7 +30,7 @@ class TransmissionOfNothing(EditingRule):
         for transmission in transmissions_drake_reads(case):
             message = _fault(case, transmission)
             if message is not None:
-                yield Correction(found_at(transmission, message), (case.source.removing(transmission),))
+                yield correction(transmission, message, case.source.removing(transmission))
 
 
 def _fault(case: Case, transmission: SourceElement) -> str | None:

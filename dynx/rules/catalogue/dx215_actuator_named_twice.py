@@ -1,4 +1,4 @@
-"""DX215 actuator-named-twice: the actuators of two transmissions have the same name
+"""DX215 actuator-named-twice: The actuators of two transmissions have the same name.
 
 Transmissions belong to ROS, where each stands by itself. Drake 1.51 reads them and makes an actuator of each,
 and its actuators need names of their own: it refuses the file, "already contains a joint actuator named".
@@ -14,29 +14,19 @@ PyBullet, has two actuators ``motor3``.
 What to do: give each actuator a name of its own. ``dynx doctor --fix`` adds a number to the later ones.
 """
 
-from __future__ import annotations
-
-from collections.abc import Iterable, Iterator, Mapping
-from typing import ClassVar
+from collections.abc import Iterable, Iterator
 
 from dynx.errors import shown
 from dynx.model.xml.source import SourceElement
-from dynx.rules.case import Case
+from dynx.rules import Case, Correction, EditingRule, correction, measured_on
 from dynx.rules.joints.renaming import fresh_name
 from dynx.rules.joints.transmissions import moves_by_actuator, transmissions_drake_reads
-from dynx.rules.rule import Stage
-from dynx.rules.text.editing import Correction, EditingRule, found_at
 
 
 class ActuatorNamedTwice(EditingRule):
-    """DX215."""
-
-    id = "DX215"
-    name = "actuator-named-twice"
-    title = "The actuators of two transmissions have the same name."
-    stage: ClassVar[Stage] = "reading"
+    stage = "reading"
     advice = "Give each actuator a name of its own."
-    engines: ClassVar[Mapping[str, str]] = {"drake": ">=1.51.1"}
+    engines = measured_on("drake")
     changed = "gave actuators of the same name different ones"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
@@ -50,9 +40,7 @@ class ActuatorNamedTwice(EditingRule):
                 new = fresh_name(name, taken)
                 taken.add(new)
                 edit = case.source.setting(actuator, "name", new)
-                yield Correction(
-                    found_at(actuator, f"a further actuator has the name {shown(name)}"), (edit,)
-                )
+                yield correction(actuator, f"a further actuator has the name {shown(name)}", edit)
             seen.add(name)
 
 

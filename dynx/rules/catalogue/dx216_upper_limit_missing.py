@@ -1,4 +1,5 @@
-"""DX216 upper-limit-missing: a ``<limit>`` has a ``lower`` of -1 or less, and no ``upper``
+"""DX216 upper-limit-missing: A limit has a lower end of -1 or less and no upper end, which PyBullet reads as
+-1.
 
 URDF reads an end that is not given as 0, so ``<limit lower="-2" .../>`` is the range -2 to 0. Hardly anybody
 who leaves an end away means that.
@@ -20,28 +21,19 @@ What to do: write the end that is meant. It is not in the file, so ``dynx doctor
 which is what URDF, Pinocchio and dynx read; the other three engines then have that range too.
 """
 
-from __future__ import annotations
+from collections.abc import Iterable
 
-from collections.abc import Iterable, Mapping
-from typing import ClassVar
-
-from dynx.rules.case import Case
+from dynx.rules import Case, Correction, EditingRule, correction, measured_on
 from dynx.rules.joints.elements import elements_in_joints
 from dynx.rules.text.attributes import number_or_none
-from dynx.rules.text.editing import Correction, EditingRule, found_at
 
 _UPPER_OF_PYBULLET = -1.0
 """What PyBullet has for an upper limit that is not given; URDF has 0."""
 
 
 class UpperLimitMissing(EditingRule):
-    """DX216."""
-
-    id = "DX216"
-    name = "upper-limit-missing"
-    title = "A limit has a lower end of -1 or less and no upper end, which PyBullet reads as -1."
     advice = "Write both ends of every range."
-    engines: ClassVar[Mapping[str, str]] = {"pybullet": ">=3.2.7"}
+    engines = measured_on("pybullet")
     changed = 'wrote upper="0" where a limit has no upper end'
     depends_on_state = True
 
@@ -52,4 +44,4 @@ class UpperLimitMissing(EditingRule):
             if "upper" in limit.attributes or lower is None or lower > _UPPER_OF_PYBULLET:
                 continue
             message = f"lower is {lower:g} and upper is not given, which is 0 in URDF and -1 in PyBullet"
-            yield Correction(found_at(limit, message), (case.source.setting(limit, "upper", "0"),))
+            yield correction(limit, message, case.source.setting(limit, "upper", "0"))

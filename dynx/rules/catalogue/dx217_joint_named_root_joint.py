@@ -1,4 +1,5 @@
-"""DX217 joint-named-root-joint: a joint has the name that Pinocchio gives to the joint of a free base
+"""DX217 joint-named-root-joint: A joint that moves is named root_joint, which is Pinocchio's name for the
+joint of a free base.
 
 ``pinocchio.buildModelFromUrdf(path, pinocchio.JointModelFreeFlyer())`` is how a robot is made to float. The
 free joint is called ``root_joint``, and its frame stands first in the list.
@@ -16,27 +17,18 @@ argument: ``buildModelFromUrdf(path, JointModelFreeFlyer(), "free_flyer")``. The
 because those who load it in the usual way are not warned.
 """
 
-from __future__ import annotations
+from collections.abc import Iterable
 
-from collections.abc import Iterable, Mapping
-from typing import ClassVar, Literal
-
-from dynx.rules.case import Case
+from dynx.rules import Case, Correction, EditingRule, correction, measured_on
 from dynx.rules.joints.renaming import fresh_name, renaming_joint
-from dynx.rules.text.editing import Correction, EditingRule, found_at
 
 _RESERVED = "root_joint"
 
 
 class JointNamedRootJoint(EditingRule):
-    """DX217."""
-
-    id = "DX217"
-    name = "joint-named-root-joint"
-    title = "A joint that moves is named root_joint, which is Pinocchio's name for the joint of a free base."
     advice = "Give the joint another name."
-    engines: ClassVar[Mapping[str, str]] = {"pinocchio": ">=4.1.0"}
-    trap_base: ClassVar[Literal["fixed", "floating"]] = "floating"
+    engines = measured_on("pinocchio")
+    trap_base = "floating"
     changed = "gave the joint named root_joint another name"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
@@ -46,4 +38,4 @@ class JointNamedRootJoint(EditingRule):
             return
         new = fresh_name(f"{_RESERVED}_1", case.joints)
         edits = tuple(renaming_joint(case.source, _RESERVED, new))
-        yield Correction(found_at(joint, "the joint has the name of Pinocchio's joint of a free base"), edits)
+        yield correction(joint, "the joint has the name of Pinocchio's joint of a free base", *edits)

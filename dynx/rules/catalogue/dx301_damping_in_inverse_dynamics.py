@@ -1,4 +1,5 @@
-"""DX301 damping-in-inverse-dynamics: a joint has damping, which some engines add to the torque
+"""DX301 damping-in-inverse-dynamics: A joint has damping, which some engines add to the torque and others do
+not.
 
 ``<dynamics damping="0.5"/>`` resists the speed of a joint. Whether inverse dynamics contains it is a
 convention, and there are two:
@@ -16,31 +17,17 @@ unless asked for ``joint_dynamics=True``; doctor compares that, and prints the c
 leave damping out.
 """
 
-from __future__ import annotations
+from collections.abc import Iterable
 
-from collections.abc import Iterable, Mapping
-from typing import ClassVar
-
-from dynx.rules.case import Case
+from dynx.rules import CallingRule, Case, Detection, found_at, measured_on
 from dynx.rules.joints.elements import SINGLE, elements_in_joints
-from dynx.rules.rule import Detection
 from dynx.rules.text.attributes import number_or_none
-from dynx.rules.text.editing import CallingRule, found_at
 
 
 class DampingInInverseDynamics(CallingRule):
-    """DX301."""
-
-    id = "DX301"
-    name = "damping-in-inverse-dynamics"
-    title = "A joint has damping, which some engines add to the torque and others do not."
     advice = "Decide whether torques include damping, and tell each engine."
-    engines: ClassVar[Mapping[str, str]] = {
-        "pybullet": ">=3.2.7",
-        "mujoco": ">=4.0.0",
-        "drake": ">=1.51.1",
-    }
-    calls: ClassVar[tuple[str, ...]] = ("pybullet.no_damping", "mujoco.no_damping", "drake.no_damping")
+    engines = measured_on("pybullet", "mujoco", "drake")
+    calls = ("pybullet.no_damping", "mujoco.no_damping", "drake.no_damping")
     changed = "compared without joint damping"
 
     def occurrences(self, case: Case) -> Iterable[Detection]:

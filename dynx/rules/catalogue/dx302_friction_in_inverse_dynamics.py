@@ -1,4 +1,5 @@
-"""DX302 friction-in-inverse-dynamics: a joint has dry friction, which MuJoCo adds to the torque
+"""DX302 friction-in-inverse-dynamics: A joint has dry friction, which MuJoCo adds to the torque and others do
+not.
 
 ``<dynamics friction="0.2"/>`` is a force against the motion, whatever the speed.
 
@@ -14,27 +15,17 @@ gives the rigid-body answer unless asked for ``joint_dynamics=True``; doctor com
 call that makes MuJoCo leave friction out.
 """
 
-from __future__ import annotations
+from collections.abc import Iterable
 
-from collections.abc import Iterable, Mapping
-from typing import ClassVar
-
-from dynx.rules.case import Case
+from dynx.rules import CallingRule, Case, Detection, found_at, measured_on
 from dynx.rules.joints.elements import SINGLE, elements_in_joints
-from dynx.rules.rule import Detection
 from dynx.rules.text.attributes import number_or_none
-from dynx.rules.text.editing import CallingRule, found_at
 
 
 class FrictionInInverseDynamics(CallingRule):
-    """DX302."""
-
-    id = "DX302"
-    name = "friction-in-inverse-dynamics"
-    title = "A joint has dry friction, which MuJoCo adds to the torque and others do not."
     advice = "Decide whether torques include friction, and tell MuJoCo."
-    engines: ClassVar[Mapping[str, str]] = {"mujoco": ">=4.0.0"}
-    calls: ClassVar[tuple[str, ...]] = ("mujoco.no_friction",)
+    engines = measured_on("mujoco")
+    calls = ("mujoco.no_friction",)
     changed = "compared without dry friction"
 
     def occurrences(self, case: Case) -> Iterable[Detection]:

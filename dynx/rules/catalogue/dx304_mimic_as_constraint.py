@@ -1,4 +1,4 @@
-"""DX304 mimic-as-constraint: a joint mimics another, and engines mean different things by it
+"""DX304 mimic-as-constraint: A joint mimics another: a constraint to some engines, nothing to others.
 
 ``<mimic joint="a" multiplier="2" offset="0.1"/>`` says that a joint is always at 2 a + 0.1.
 
@@ -18,26 +18,16 @@ the dynamics of the bodies is the same, and prints the calls that switch the con
 right, so ``dynx doctor --fix`` does not change it.
 """
 
-from __future__ import annotations
-
-from collections.abc import Iterable, Mapping
-from typing import ClassVar
+from collections.abc import Iterable
 
 from dynx.errors import shown
-from dynx.rules.case import Case
-from dynx.rules.rule import Detection
-from dynx.rules.text.editing import CallingRule, found_at
+from dynx.rules import CallingRule, Case, Detection, found_at, measured_on
 
 
 class MimicAsConstraint(CallingRule):
-    """DX304."""
-
-    id = "DX304"
-    name = "mimic-as-constraint"
-    title = "A joint mimics another: a constraint to some engines, nothing to others."
     advice = "Know whether mimic joints are free, constrained or dependent in your engine."
-    engines: ClassVar[Mapping[str, str]] = {"mujoco": ">=4.0.0", "drake": ">=1.51.1"}
-    calls: ClassVar[tuple[str, ...]] = ("mujoco.no_mimic", "drake.free_mimics")
+    engines = measured_on("mujoco", "drake")
+    calls = ("mujoco.no_mimic", "drake.free_mimics")
     changed = "compared with mimic joints free"
 
     def occurrences(self, case: Case) -> Iterable[Detection]:

@@ -1,4 +1,4 @@
-"""DX306 limits-as-forces: a joint has equal limits, so that it is beyond them wherever it is
+"""DX306 limits-as-forces: A joint has equal limits, to which some engines push it back.
 
 ``<limit lower="-2" upper="2"/>`` says where a joint can be. What happens beyond is not in URDF, and a joint
 whose limits are equal is beyond them everywhere else.
@@ -19,25 +19,15 @@ What to do: write the range of the joint, or ``type="fixed"`` (see DX508). Which
 file, so ``dynx doctor --fix`` does not change it; doctor prints the calls that switch limits off.
 """
 
-from __future__ import annotations
+from collections.abc import Iterable
 
-from collections.abc import Iterable, Mapping
-from typing import ClassVar
-
-from dynx.rules.case import Case
-from dynx.rules.rule import Detection
-from dynx.rules.text.editing import CallingRule, found_at
+from dynx.rules import CallingRule, Case, Detection, found_at, measured_on
 
 
 class LimitsAsForces(CallingRule):
-    """DX306."""
-
-    id = "DX306"
-    name = "limits-as-forces"
-    title = "A joint has equal limits, to which some engines push it back."
     advice = "Write the range of the joint, or switch its limits off."
-    engines: ClassVar[Mapping[str, str]] = {"pybullet": ">=3.2.7"}
-    calls: ClassVar[tuple[str, ...]] = ("pybullet.no_limits", "mujoco.no_limits")
+    engines = measured_on("pybullet")
+    calls = ("pybullet.no_limits", "mujoco.no_limits")
     changed = "compared without joint limits"
 
     def occurrences(self, case: Case) -> Iterable[Detection]:

@@ -1,4 +1,4 @@
-"""DX307 rotor-inertia: an actuator has a rotor whose inertia Drake adds to the joint
+"""DX307 rotor-inertia: An actuator has a rotor inertia, which Drake alone adds to its joint.
 
 ``<drake:rotor_inertia value="0.001"/>`` and ``<drake:gear_ratio value="10"/>`` in the ``<actuator>`` of a
 ``<transmission>`` are an extension of Drake's. A rotor behind a gear of ratio n resists the joint with n^2
@@ -14,29 +14,19 @@ What to do: decide whether the rotors belong to your robot. Pinocchio has ``mode
 change it; doctor compares the links alone and prints the call that makes Drake leave rotors out.
 """
 
-from __future__ import annotations
+from collections.abc import Iterable
 
-from collections.abc import Iterable, Mapping
-from typing import ClassVar
-
-from dynx.rules.case import Case
+from dynx.rules import CallingRule, Case, Detection, measured_on
 from dynx.rules.joints.transmissions import moves_by_actuator
-from dynx.rules.rule import Detection
 from dynx.rules.text.attributes import number_or_none
-from dynx.rules.text.editing import CallingRule
 
 _TAG = "drake:rotor_inertia"
 
 
 class RotorInertia(CallingRule):
-    """DX307."""
-
-    id = "DX307"
-    name = "rotor-inertia"
-    title = "An actuator has a rotor inertia, which Drake alone adds to its joint."
     advice = "Decide whether rotors belong to the robot, and tell each engine."
-    engines: ClassVar[Mapping[str, str]] = {"drake": ">=1.51.1"}
-    calls: ClassVar[tuple[str, ...]] = ("drake.no_rotors",)
+    engines = measured_on("drake")
+    calls = ("drake.no_rotors",)
     changed = "compared without rotors"
 
     def occurrences(self, case: Case) -> Iterable[Detection]:

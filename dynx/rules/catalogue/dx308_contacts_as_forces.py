@@ -1,4 +1,4 @@
-"""DX308 contacts-as-forces: links have collision shapes, whose contacts MuJoCo adds to the torque
+"""DX308 contacts-as-forces: Links have collision shapes, whose contacts MuJoCo adds to the torque.
 
 ``<collision>`` says which shape a link has for contacts. Two links that touch, or overlap because their
 shapes are larger than the links, push each other apart in a simulation.
@@ -14,27 +14,17 @@ What to do: know whether your torques contain contacts. The file is right, so ``
 change it; doctor compares without contacts and prints the call that makes MuJoCo leave them out.
 """
 
-from __future__ import annotations
-
-from collections.abc import Iterable, Mapping
-from typing import ClassVar
+from collections.abc import Iterable
 
 from dynx.model.xml.source import SourceElement
-from dynx.rules.case import Case
-from dynx.rules.rule import Detection
-from dynx.rules.text.editing import CallingRule
+from dynx.rules import CallingRule, Case, Detection, measured_on
 
 
 class ContactsAsForces(CallingRule):
-    """DX308."""
-
-    id = "DX308"
-    name = "contacts-as-forces"
-    title = "Links have collision shapes, whose contacts MuJoCo adds to the torque."
     advice = "Switch contacts off where the rigid-body answer is wanted."
-    engines: ClassVar[Mapping[str, str]] = {"mujoco": ">=4.0.0"}
+    engines = measured_on("mujoco")
     depends_on_state = True
-    calls: ClassVar[tuple[str, ...]] = ("mujoco.no_contacts",)
+    calls = ("mujoco.no_contacts",)
     changed = "compared without contacts"
 
     def occurrences(self, case: Case) -> Iterable[Detection]:

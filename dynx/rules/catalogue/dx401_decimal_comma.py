@@ -1,4 +1,4 @@
-"""DX401 decimal-comma: a number is written with a comma, as in ``<mass value="2,5"/>``
+"""DX401 decimal-comma: A number is written with a comma in place of a decimal point.
 
 URDF writes decimals with a point whatever the language of the computer, and so does XML Schema. Programs
 that print numbers by the locale in force (a CAD exporter on a German or French computer) write a comma.
@@ -23,35 +23,21 @@ with a comma between thousands. dynx takes the comma for a decimal point unless 
 ``--choose DX401=thousands``. A number with commas and a point, ``1,250.5``, leaves no choice.
 """
 
-from __future__ import annotations
-
-from collections.abc import Mapping
-from typing import ClassVar
-
-from dynx.rules.case import Case
-from dynx.rules.engine_versions import EVERY_ENGINE
+from dynx.rules import EVERY_ENGINE, Case
 from dynx.rules.text.misspelled_numbers import MisspelledNumberRule
-from dynx.rules.text.number_text import Fault, Misspelling
+from dynx.rules.text.number_text import Misspelling
 
 
 class DecimalComma(MisspelledNumberRule):
-    """DX401."""
-
-    id = "DX401"
-    name = "decimal-comma"
-    title = "A number is written with a comma in place of a decimal point."
     advice = "Write decimals with a point."
-    engines: ClassVar[Mapping[str, str]] = EVERY_ENGINE
-    choices: ClassVar[Mapping[str, str]] = {
+    engines = EVERY_ENGINE
+    choices = {
         "decimal": "read a comma in a number as its decimal point",
         "thousands": "read a comma in a number as standing between thousands",
     }
     changed = "wrote decimal points in place of commas"
-    fault: ClassVar[Fault] = "comma"
-
-    def said(self, written: str, meant: str) -> str:
-        """With the number meant."""
-        return f"with a comma where {meant} takes a point"
+    fault = "comma"
+    description = "with a comma where {meant} takes a point"
 
     def text_for(self, case: Case, misspelling: Misspelling) -> str:
         """By the user's choice."""

@@ -1,4 +1,4 @@
-"""DX402 comma-between-numbers: the numbers of a vector are parted by commas, as in ``xyz="1, 2, 3"``
+"""DX402 comma-between-numbers: The numbers of a vector are parted by commas in place of blanks.
 
 URDF parts the numbers of a vector by blanks. Commas or semicolons are what other formats use.
 
@@ -16,27 +16,13 @@ What to do: part numbers by blanks. ``dynx doctor --fix`` does so. ``0,2 0,5 0,1
 the commas stand for decimal points, see DX401.
 """
 
-from __future__ import annotations
-
-from collections.abc import Mapping
-from typing import ClassVar
-
-from dynx.rules.engine_versions import EVERY_ENGINE
+from dynx.rules import EVERY_ENGINE
 from dynx.rules.text.misspelled_numbers import MisspelledNumberRule
-from dynx.rules.text.number_text import Fault
 
 
 class CommaBetweenNumbers(MisspelledNumberRule):
-    """DX402."""
-
-    id = "DX402"
-    name = "comma-between-numbers"
-    title = "The numbers of a vector are parted by commas in place of blanks."
     advice = "Part the numbers of a vector by blanks alone."
-    engines: ClassVar[Mapping[str, str]] = EVERY_ENGINE
+    engines = EVERY_ENGINE
     changed = "parted the numbers of vectors by blanks in place of commas"
-    fault: ClassVar[Fault] = "separator"
-
-    def said(self, written: str, meant: str) -> str:
-        """With the vector meant."""
-        return f"with commas or semicolons between the numbers {meant}"
+    fault = "separator"
+    description = "with commas or semicolons between the numbers {meant}"

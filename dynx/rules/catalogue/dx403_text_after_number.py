@@ -1,4 +1,4 @@
-"""DX403 text-after-number: something stands behind a number, as in ``lower="-1.57."`` or ``"2.5kg"``
+"""DX403 text-after-number: A number is followed by something that is no part of it.
 
 A second point, a unit, a Fortran exponent (``1.5d-3``), a hexadecimal number.
 
@@ -19,31 +19,16 @@ become 25, so look at what it changed. Words with no number in front (``heavy``,
 mending and stay an error.
 """
 
-from __future__ import annotations
-
-from collections.abc import Mapping
-from typing import ClassVar
-
-from dynx.rules.case import Case
-from dynx.rules.engine_versions import EVERY_ENGINE
+from dynx.rules import EVERY_ENGINE, Case
 from dynx.rules.text.misspelled_numbers import MisspelledNumberRule
-from dynx.rules.text.number_text import Fault
 
 
 class TextAfterNumber(MisspelledNumberRule):
-    """DX403."""
-
-    id = "DX403"
-    name = "text-after-number"
-    title = "A number is followed by something that is no part of it."
     advice = "Write the bare number, in SI units."
-    engines: ClassVar[Mapping[str, str]] = EVERY_ENGINE
+    engines = EVERY_ENGINE
     changed = "kept the number where something stood behind it"
-    fault: ClassVar[Fault] = "rest"
-
-    def said(self, written: str, meant: str) -> str:
-        """With the number kept."""
-        return f"which is no decimal number; {meant} is what can be read of it"
+    fault = "rest"
+    description = "which is no decimal number; {meant} is what can be read of it"
 
     def decision(self, case: Case) -> str | None:
         """There is one reading; it is still a guess."""

@@ -1,4 +1,4 @@
-"""DX404 vector-of-wrong-length: a position, direction or set of angles has not three numbers
+"""DX404 vector-of-wrong-length: A vector has more or fewer than three numbers.
 
 ``rpy="-3.14159 1.57079 0 0"`` has one too many, ``xyz="0.2 0.1"`` one too few.
 
@@ -17,46 +17,29 @@ does, and adds zeros where numbers are missing, as a reader of the file would. W
 an origin, (1, 0, 0) for an axis.
 """
 
-from __future__ import annotations
-
-from collections.abc import Mapping
-from typing import ClassVar
-
 from dynx.model.xml.source import Edit
-from dynx.rules.case import Case
-from dynx.rules.engine_versions import EVERY_ENGINE
+from dynx.rules import EVERY_ENGINE, Case
 from dynx.rules.text.misspelled_numbers import MisspelledNumberRule
-from dynx.rules.text.number_text import Fault, Misspelling
+from dynx.rules.text.number_text import Misspelling
 from dynx.rules.text.numeric_attributes import NumericAttribute
 
 
 class VectorOfWrongLength(MisspelledNumberRule):
-    """DX404."""
-
-    id = "DX404"
-    name = "vector-of-wrong-length"
-    title = "A vector has more or fewer than three numbers."
     advice = "Write three numbers."
-    engines: ClassVar[Mapping[str, str]] = EVERY_ENGINE
-    choices: ClassVar[Mapping[str, str]] = {
+    engines = EVERY_ENGINE
+    choices = {
         "first": "keep the first three numbers of a vector, and add zeros where some are missing",
         "default": "take a vector without three numbers away",
     }
     changed = "made vectors have three numbers"
-    fault: ClassVar[Fault] = "count"
+    fault = "count"
+    description = "which has {count} numbers where three are wanted"
+    elements = ("origin", "axis")
 
-    def said(self, written: str, meant: str) -> str:
-        """With the count found."""
-        return f"which has {len(written.split())} numbers where three are wanted"
-
-    def applies(self, attribute: NumericAttribute) -> bool:
-        """Not to the size of a shape, which no default can replace."""
-        return attribute.element.tag in ("origin", "axis")
-
-    def mended(self, case: Case, attribute: NumericAttribute, misspelling: Misspelling) -> Edit:
+    def edit(self, case: Case, attribute: NumericAttribute, misspelling: Misspelling) -> Edit:
         """By the user's choice."""
         if self.chosen(case) == "first":
-            return super().mended(case, attribute, misspelling)
+            return super().edit(case, attribute, misspelling)
         if attribute.element.tag == "axis":
             return case.source.removing(attribute.element)
         return case.source.removing_attribute(attribute.element, attribute.name)

@@ -1,4 +1,4 @@
-"""DX405 blank-after-number: a blank stands behind a number, as in ``value="2.5 "``
+"""DX405 blank-after-number: White space stands behind a number, or a no-break space in front of it.
 
 It looks like the most harmless thing in a file. Pinocchio 4.1 (its reader is urdfdom) passes over white space
 in front of a number and wants nothing behind it:
@@ -19,32 +19,19 @@ link matters, of order 0.01 to 1.
 What to do: take the blank away. ``dynx doctor --fix`` does so and changes no digit.
 """
 
-from __future__ import annotations
-
-from collections.abc import Mapping
-from typing import ClassVar
-
+from dynx.rules import measured_on
 from dynx.rules.text.misspelled_numbers import MisspelledNumberRule
-from dynx.rules.text.number_text import Fault
 from dynx.rules.text.numeric_attributes import NumericAttribute
 
 _READ_ALL_THE_SAME = ("box", "sphere", "cylinder", "capsule", "mesh")
 
 
 class BlankAfterNumber(MisspelledNumberRule):
-    """DX405."""
-
-    id = "DX405"
-    name = "blank-after-number"
-    title = "White space stands behind a number, or a no-break space in front of it."
     advice = "Take the white space away."
-    engines: ClassVar[Mapping[str, str]] = {"pinocchio": ">=4.1.0"}
+    engines = measured_on("pinocchio")
     changed = "took white space around numbers away"
-    fault: ClassVar[Fault] = "blank"
-
-    def said(self, written: str, meant: str) -> str:
-        """The same for all."""
-        return "with white space that not every engine passes over"
+    fault = "blank"
+    description = "with white space that not every engine passes over"
 
     def applies(self, attribute: NumericAttribute) -> bool:
         """Not to the sizes of shapes, which all engines read so."""

@@ -1,4 +1,4 @@
-"""DX406 tab-in-vector: the numbers of a vector are parted by a tab, a line break or an odd blank
+"""DX406 tab-in-vector: The numbers of a vector are parted by a tab, a line break or an odd blank.
 
 XML calls tabs and line breaks white space like blanks, and a vector that is broken over two lines looks
 well. Copied text can hold a blank that is not one, such as the no-break space U+00A0.
@@ -16,26 +16,13 @@ matrix of a small arm.
 What to do: part numbers by blanks. ``dynx doctor --fix`` does so and changes no digit.
 """
 
-from __future__ import annotations
-
-from collections.abc import Mapping
-from typing import ClassVar
-
+from dynx.rules import measured_on
 from dynx.rules.text.misspelled_numbers import MisspelledNumberRule
-from dynx.rules.text.number_text import Fault
 
 
 class TabInVector(MisspelledNumberRule):
-    """DX406."""
-
-    id = "DX406"
-    name = "tab-in-vector"
-    title = "The numbers of a vector are parted by a tab, a line break or an odd blank."
     advice = "Part the numbers of a vector by blanks alone."
-    engines: ClassVar[Mapping[str, str]] = {"pinocchio": ">=4.1.0", "pybullet": ">=3.2.7"}
+    engines = measured_on("pinocchio", "pybullet")
     changed = "parted the numbers of vectors by blanks in place of tabs and line breaks"
-    fault: ClassVar[Fault] = "tab"
-
-    def said(self, written: str, meant: str) -> str:
-        """The same for all."""
-        return "with a tab, a line break or an odd blank among its numbers"
+    fault = "tab"
+    description = "with a tab, a line break or an odd blank among its numbers"

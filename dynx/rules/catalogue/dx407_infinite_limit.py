@@ -1,4 +1,4 @@
-"""DX407 infinite-limit: a limit is ``inf``, or a number too large for a double such as ``1e999``
+"""DX407 infinite-limit: A limit of a joint is infinite.
 
 ``<limit lower="-inf" upper="inf" effort="inf" velocity="inf"/>`` says what is meant, but URDF has no word
 for infinity, and what is no number to one engine is one to another.
@@ -14,31 +14,14 @@ or write a number that no joint reaches. ``dynx doctor --fix`` writes the larges
 inertias and positions have no such substitute and stay an error.
 """
 
-from __future__ import annotations
-
-from collections.abc import Mapping
-from typing import ClassVar
-
+from dynx.rules import measured_on
 from dynx.rules.text.misspelled_numbers import MisspelledNumberRule
-from dynx.rules.text.number_text import Fault
-from dynx.rules.text.numeric_attributes import NumericAttribute
 
 
 class InfiniteLimit(MisspelledNumberRule):
-    """DX407."""
-
-    id = "DX407"
-    name = "infinite-limit"
-    title = "A limit of a joint is infinite."
     advice = "Write a large finite number, or leave the limit away."
-    engines: ClassVar[Mapping[str, str]] = {"pinocchio": ">=4.1.0", "drake": ">=1.51.1"}
+    engines = measured_on("pinocchio", "drake")
     changed = "wrote the largest double in place of infinite limits"
-    fault: ClassVar[Fault] = "infinite"
-
-    def said(self, written: str, meant: str) -> str:
-        """The same for all."""
-        return "which is no finite number"
-
-    def applies(self, attribute: NumericAttribute) -> bool:
-        """To limits alone."""
-        return attribute.element.tag == "limit"
+    fault = "infinite"
+    description = "which is no finite number"
+    elements = ("limit",)

@@ -1,4 +1,4 @@
-"""DX408 empty-vector: the position or the angles of an origin are there but empty, as in ``xyz=""``
+"""DX408 empty-vector: An origin has a position or angles without numbers.
 
 A template whose variable was empty, or an exporter that had nothing to say. URDF's default for what is not
 given is zero, and a reader of the file takes an empty vector for that.
@@ -13,37 +13,21 @@ The effect is a file that does not load, or a link without mass: of order 0.01 t
 What to do: take the attribute away, or write ``0 0 0``. ``dynx doctor --fix`` takes it away.
 """
 
-from __future__ import annotations
-
-from collections.abc import Mapping
-from typing import ClassVar
-
 from dynx.model.xml.source import Edit
-from dynx.rules.case import Case
+from dynx.rules import Case, measured_on
 from dynx.rules.text.misspelled_numbers import MisspelledNumberRule
-from dynx.rules.text.number_text import Fault, Misspelling
+from dynx.rules.text.number_text import Misspelling
 from dynx.rules.text.numeric_attributes import NumericAttribute
 
 
 class EmptyVector(MisspelledNumberRule):
-    """DX408."""
-
-    id = "DX408"
-    name = "empty-vector"
-    title = "An origin has a position or angles without numbers."
     advice = "Take the empty attribute away."
-    engines: ClassVar[Mapping[str, str]] = {"pinocchio": ">=4.1.0", "drake": ">=1.51.1"}
+    engines = measured_on("pinocchio", "drake")
     changed = "took empty vectors of origins away"
-    fault: ClassVar[Fault] = "empty"
+    fault = "empty"
+    description = "without any number"
+    elements = ("origin",)
 
-    def said(self, written: str, meant: str) -> str:
-        """The same for all."""
-        return "without any number"
-
-    def applies(self, attribute: NumericAttribute) -> bool:
-        """To origins; an empty axis is DX202's."""
-        return attribute.element.tag == "origin"
-
-    def mended(self, case: Case, attribute: NumericAttribute, misspelling: Misspelling) -> Edit:
+    def edit(self, case: Case, attribute: NumericAttribute, misspelling: Misspelling) -> Edit:
         """Without the attribute."""
         return case.source.removing_attribute(attribute.element, attribute.name)

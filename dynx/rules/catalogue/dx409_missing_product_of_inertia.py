@@ -1,4 +1,4 @@
-"""DX409 missing-product-of-inertia: an ``<inertia>`` has no ``ixy``, ``ixz`` or ``iyz``
+"""DX409 missing-product-of-inertia: A tensor of inertia is written without its zero products.
 
 Whoever writes a tensor by hand leaves out the products of inertia that are zero. URDF wants all six numbers,
 and what engines do without them ranges from nothing to refusing the file.
@@ -14,28 +14,18 @@ not there was meant to be zero is the one reading that two engines share. A miss
 ``izz``) is not mended: nobody has a zero moment, and the number is not in the file.
 """
 
-from __future__ import annotations
+from collections.abc import Iterable
 
-from collections.abc import Iterable, Mapping
-from typing import ClassVar
-
-from dynx.rules.case import Case
-from dynx.rules.rule import Stage
-from dynx.rules.text.editing import Correction, EditingRule, found_at
+from dynx.rules import Case, Correction, EditingRule, correction, measured_on
 
 _MOMENTS = ("ixx", "iyy", "izz")
 _PRODUCTS = ("ixy", "ixz", "iyz")
 
 
 class MissingProductOfInertia(EditingRule):
-    """DX409."""
-
-    id = "DX409"
-    name = "missing-product-of-inertia"
-    title = "A tensor of inertia is written without its zero products."
-    stage: ClassVar[Stage] = "reading"
+    stage = "reading"
     advice = "Write all six numbers of the tensor."
-    engines: ClassVar[Mapping[str, str]] = {"pinocchio": ">=4.1.0", "mujoco": ">=4.0.0"}
+    engines = measured_on("pinocchio", "mujoco")
     changed = "wrote the products of inertia that were missing as 0"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
@@ -47,4 +37,4 @@ class MissingProductOfInertia(EditingRule):
                     if missing and all(name in tensor.attributes for name in _MOMENTS):
                         message = f"<inertia> has no {' and no '.join(missing)}"
                         edits = tuple(case.source.setting(tensor, name, "0") for name in missing)
-                        yield Correction(found_at(tensor, message), edits)
+                        yield correction(tensor, message, *edits)

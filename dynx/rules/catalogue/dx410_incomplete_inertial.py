@@ -1,4 +1,4 @@
-"""DX410 incomplete-inertial: an ``<inertial>`` has no mass, or no tensor of inertia
+"""DX410 incomplete-inertial: An inertial has no mass or no tensor of inertia.
 
 ``<inertial>`` needs both ``<mass value="..."/>`` and ``<inertia .../>``. Often ``<mass>2.5</mass>`` was
 written, which looks right and is not read by anybody.
@@ -17,31 +17,20 @@ without tensor stays as a point mass at the origin of the inertial, as in Pinocc
 ``--choose DX410=weightless`` drops that mass too.
 """
 
-from __future__ import annotations
-
-from collections.abc import Iterable, Mapping
-from typing import ClassVar
+from collections.abc import Iterable
 
 from dynx.model.xml.source import Edit, SourceElement
-from dynx.rules.case import Case
-from dynx.rules.engine_versions import EVERY_ENGINE
+from dynx.rules import EVERY_ENGINE, Case, Correction, EditingRule, correction
 from dynx.rules.inertia.edits import ZERO_TENSOR, zero_inertial
-from dynx.rules.rule import Stage
-from dynx.rules.text.editing import Correction, EditingRule, found_at
 from dynx.rules.text.element_text import text_in
 from dynx.rules.text.number_text import is_number
 
 
 class IncompleteInertial(EditingRule):
-    """DX410."""
-
-    id = "DX410"
-    name = "incomplete-inertial"
-    title = "An inertial has no mass or no tensor of inertia."
-    stage: ClassVar[Stage] = "reading"
+    stage = "reading"
     advice = "Give every <inertial> a <mass value> and an <inertia>."
-    engines: ClassVar[Mapping[str, str]] = EVERY_ENGINE
-    choices: ClassVar[Mapping[str, str]] = {
+    engines = EVERY_ENGINE
+    choices = {
         "point": "make an inertial without mass zero, one without tensor a point mass",
         "weightless": "make an inertial without mass or tensor zero",
     }
@@ -58,17 +47,17 @@ class IncompleteInertial(EditingRule):
         mass, tensor = inertial.first("mass"), inertial.first("inertia")
         if mass is not None and "value" in mass.attributes:
             if tensor is None:
-                yield Correction(
-                    found_at(inertial, "<inertial> has no <inertia>"), self._without_tensor(case, inertial)
+                yield correction(
+                    inertial, "<inertial> has no <inertia>", *self._without_tensor(case, inertial)
                 )
             return
         inside = "" if mass is None else text_in(case.source, mass)
         if mass is None or not is_number(inside):
             message = "<inertial> has no <mass>" if mass is None else "<mass> has no value"
-            yield Correction(found_at(inertial, message), (case.source.replacing(inertial, zero_inertial()),))
+            yield correction(inertial, message, case.source.replacing(inertial, zero_inertial()))
         else:
             edit = case.source.replacing(mass, f'<mass value="{inside}"/>')
-            yield Correction(found_at(mass, f"<mass> has {inside} between its tags and no value"), (edit,))
+            yield correction(mass, f"<mass> has {inside} between its tags and no value", edit)
 
     def _without_tensor(self, case: Case, inertial: SourceElement) -> tuple[Edit, ...]:
         if self.chosen(case) == "weightless":

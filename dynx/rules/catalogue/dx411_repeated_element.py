@@ -1,4 +1,4 @@
-"""DX411 repeated-element: an element that can be there once is there twice, such as two ``<origin>``
+"""DX411 repeated-element: An element that can be there once is there several times.
 
 It happens when files are merged or templates expanded. Readers that ask for "the" origin of a joint find
 the first one.
@@ -13,15 +13,10 @@ What to do: find out which one was meant and take the other away. ``dynx doctor 
 is what the engines use.
 """
 
-from __future__ import annotations
-
-from collections.abc import Iterable, Mapping
-from typing import ClassVar
+from collections.abc import Iterable
 
 from dynx.model.xml.source import SourceElement
-from dynx.rules.case import Case
-from dynx.rules.rule import Stage
-from dynx.rules.text.editing import Correction, EditingRule, found_at
+from dynx.rules import Case, Correction, EditingRule, correction, measured_on
 
 _ONCE = {
     "link": ("inertial",),
@@ -31,14 +26,9 @@ _ONCE = {
 
 
 class RepeatedElement(EditingRule):
-    """DX411."""
-
-    id = "DX411"
-    name = "repeated-element"
-    title = "An element that can be there once is there several times."
-    stage: ClassVar[Stage] = "reading"
+    stage = "reading"
     advice = "Keep the one that is meant; engines use the first."
-    engines: ClassVar[Mapping[str, str]] = {"mujoco": ">=4.0.0"}
+    engines = measured_on("mujoco")
     changed = "took away further elements of a kind of which engines use the first"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
@@ -53,7 +43,7 @@ def _in(case: Case, part: SourceElement) -> Iterable[Correction]:
     for child in part.children:
         if child.tag in seen and child.tag in _ONCE[part.tag]:
             message = f"a further <{child.tag}> in the same <{part.tag}>; engines use the first"
-            yield Correction(found_at(child, message), (case.source.removing(child),))
+            yield correction(child, message, case.source.removing(child))
         elif child.tag == "inertial":
             yield from _in(case, child)
         seen.add(child.tag)

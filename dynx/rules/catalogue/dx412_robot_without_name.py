@@ -1,4 +1,4 @@
-"""DX412 robot-without-name: the ``<robot>`` has no name, or an empty one
+"""DX412 robot-without-name: The robot has no name.
 
 URDF wants ``<robot name="...">``. Nothing in the dynamics depends on it, and still it decides whether the
 file loads.
@@ -11,30 +11,16 @@ What to do: give the robot a name. ``dynx doctor --fix`` writes the name of the 
 that came from none.
 """
 
-from __future__ import annotations
-
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from pathlib import PurePath
-from typing import ClassVar
 
-from dynx.rules.case import Case
-from dynx.rules.rule import Stage
-from dynx.rules.text.editing import Correction, EditingRule, found_at
+from dynx.rules import Case, Correction, EditingRule, correction, measured_on
 
 
 class RobotWithoutName(EditingRule):
-    """DX412."""
-
-    id = "DX412"
-    name = "robot-without-name"
-    title = "The robot has no name."
-    stage: ClassVar[Stage] = "reading"
+    stage = "reading"
     advice = 'Write <robot name="...">.'
-    engines: ClassVar[Mapping[str, str]] = {
-        "pinocchio": ">=4.1.0",
-        "pybullet": ">=3.2.7",
-        "drake": ">=1.51.1",
-    }
+    engines = measured_on("pinocchio", "pybullet", "drake")
     changed = "gave the robot a name"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
@@ -45,6 +31,4 @@ class RobotWithoutName(EditingRule):
         what = "an empty name" if "name" in root.attributes else "no name"
         source = PurePath(case.source.source)
         name = source.name.split(".")[0] if source.suffix in (".urdf", ".xacro", ".xml") else ""
-        yield Correction(
-            found_at(root, f"<robot> has {what}"), (case.source.setting(root, "name", name or "robot"),)
-        )
+        yield correction(root, f"<robot> has {what}", case.source.setting(root, "name", name or "robot"))

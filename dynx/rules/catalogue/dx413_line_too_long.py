@@ -1,4 +1,4 @@
-"""DX413 line-too-long: a line of more than 8191 bytes is cut by PyBullet in the middle of an element
+"""DX413 line-too-long: PyBullet cuts a line of more than 8191 bytes, and the cut falls into an element.
 
 PyBullet 3.2.7 reads a file line by line into 8192 bytes, and puts a line break where a line does not fit.
 Between elements that does no harm. Inside an element it can: where the cut falls into ``value="2.5"``, what
@@ -17,29 +17,19 @@ What to do: write one element per line. ``dynx doctor --fix`` breaks the lines c
 element and changes nothing else.
 """
 
-from __future__ import annotations
-
-from collections.abc import Iterable, Iterator, Mapping
-from typing import ClassVar
+from collections.abc import Iterable, Iterator
 
 from dynx.model.xml.source import Edit, SourceElement, Span
-from dynx.rules.case import Case
-from dynx.rules.rule import Stage
-from dynx.rules.text.editing import Correction, EditingRule, found_at
+from dynx.rules import Case, Correction, EditingRule, correction, measured_on
 
 LONGEST = 8191
 """Bytes that PyBullet reads at once."""
 
 
 class LineTooLong(EditingRule):
-    """DX413."""
-
-    id = "DX413"
-    name = "line-too-long"
-    title = "PyBullet cuts a line of more than 8191 bytes, and the cut falls into an element."
-    stage: ClassVar[Stage] = "reading"
+    stage = "reading"
     advice = "Write one element per line."
-    engines: ClassVar[Mapping[str, str]] = {"pybullet": ">=3.2.7"}
+    engines = measured_on("pybullet")
     changed = "broke lines of more than 8191 bytes in front of their elements"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
@@ -60,7 +50,7 @@ class LineTooLong(EditingRule):
                 )
                 edits = () if line.start in broken else tuple(_breaks(case.source.data, elements, line))
                 broken.add(line.start)
-                yield Correction(found_at(element, message), edits)
+                yield correction(element, message, *edits)
 
 
 def _long_lines(data: bytes) -> Iterator[Span]:

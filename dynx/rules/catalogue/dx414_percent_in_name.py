@@ -1,4 +1,4 @@
-"""DX414 percent-in-name: the name of the robot, a link or a joint has a ``%`` in it
+"""DX414 percent-in-name: A name has a % in it, which PyBullet takes for a printf format.
 
 PyBullet 3.2.7 puts names into the messages it prints, and uses some of them as the format of ``printf``:
 ``%p`` prints what is in memory, ``%s`` and ``%n`` read or write it and can end the process. Whether that
@@ -12,27 +12,17 @@ in the name and wherever the document mentions it (ends of joints, mimic joints,
 that look links or joints up by the old name must be changed with it.
 """
 
-from __future__ import annotations
-
-from collections.abc import Iterable, Mapping
-from typing import ClassVar
+from collections.abc import Iterable
 
 from dynx.errors import shown
-from dynx.rules.case import Case
+from dynx.rules import Case, Correction, EditingRule, correction, measured_on
 from dynx.rules.joints.renaming import fresh_name, renaming_joint, renaming_link
-from dynx.rules.rule import Stage
-from dynx.rules.text.editing import Correction, EditingRule, found_at
 
 
 class PercentInName(EditingRule):
-    """DX414."""
-
-    id = "DX414"
-    name = "percent-in-name"
-    title = "A name has a % in it, which PyBullet takes for a printf format."
-    stage: ClassVar[Stage] = "reading"
+    stage = "reading"
     advice = "Use letters, digits and _ in names."
-    engines: ClassVar[Mapping[str, str]] = {"pybullet": ">=3.2.7"}
+    engines = measured_on("pybullet")
     changed = "wrote _ in place of % in names"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
@@ -42,7 +32,7 @@ class PercentInName(EditingRule):
         if "%" in root.attributes.get("name", ""):
             name = root.attributes["name"]
             edit = source.setting(root, "name", name.replace("%", "_"))
-            yield Correction(found_at(root, _message("robot", name)), (edit,))
+            yield correction(root, _message("robot", name), edit)
         for kind, named, rename in (
             ("link", case.links, renaming_link),
             ("joint", case.joints, renaming_joint),
@@ -52,9 +42,7 @@ class PercentInName(EditingRule):
                 if "%" in name:
                     new = fresh_name(name.replace("%", "_"), taken)
                     taken.add(new)
-                    yield Correction(
-                        found_at(element, _message(kind, name)), tuple(rename(source, name, new))
-                    )
+                    yield correction(element, _message(kind, name), *rename(source, name, new))
 
 
 def _message(kind: str, name: str) -> str:

@@ -1,4 +1,4 @@
-"""DX415 material-defined-twice: two ``<material>`` of the robot have the same name
+"""DX415 material-defined-twice: Two materials of the robot have the same name.
 
 Materials are colours. Still a second definition of one decides whether the file loads:
 
@@ -11,26 +11,16 @@ What to do: keep one. ``dynx doctor --fix`` keeps the first and takes the others
 Materials inside ``<visual>`` are another matter and are left alone.
 """
 
-from __future__ import annotations
-
-from collections.abc import Iterable, Mapping
-from typing import ClassVar
+from collections.abc import Iterable
 
 from dynx.errors import shown
-from dynx.rules.case import Case
-from dynx.rules.rule import Stage
-from dynx.rules.text.editing import Correction, EditingRule, found_at
+from dynx.rules import Case, Correction, EditingRule, correction, measured_on
 
 
 class MaterialDefinedTwice(EditingRule):
-    """DX415."""
-
-    id = "DX415"
-    name = "material-defined-twice"
-    title = "Two materials of the robot have the same name."
-    stage: ClassVar[Stage] = "reading"
+    stage = "reading"
     advice = "Define each material once."
-    engines: ClassVar[Mapping[str, str]] = {"pinocchio": ">=4.1.0", "drake": ">=1.51.1"}
+    engines = measured_on("pinocchio", "drake")
     changed = "took further definitions of materials away"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
@@ -40,5 +30,5 @@ class MaterialDefinedTwice(EditingRule):
             name = material.attributes.get("name", "")
             if name in seen:
                 message = f"material {shown(name)} is defined a further time"
-                yield Correction(found_at(material, message), (case.source.removing(material),))
+                yield correction(material, message, case.source.removing(material))
             seen.add(name)

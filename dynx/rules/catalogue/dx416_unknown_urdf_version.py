@@ -1,4 +1,4 @@
-"""DX416 unknown-urdf-version: the ``version`` of the ``<robot>`` is none of URDF's
+"""DX416 unknown-urdf-version: The robot states a version that URDF does not have.
 
 ``<robot name="..." version="2.0">``: somebody counts his own revisions. The attribute is URDF's, and means
 the version of the format.
@@ -10,28 +10,18 @@ What to do: take the attribute away, or write ``version="1.0"``. ``dynx doctor -
 it a file counts as version 1.0.
 """
 
-from __future__ import annotations
-
-from collections.abc import Iterable, Mapping
-from typing import ClassVar
+from collections.abc import Iterable
 
 from dynx.errors import shown
-from dynx.rules.case import Case
-from dynx.rules.rule import Stage
-from dynx.rules.text.editing import Correction, EditingRule, found_at
+from dynx.rules import Case, Correction, EditingRule, correction, measured_on
 
 _KNOWN = ("1.0", "1.1", "1.2")
 
 
 class UnknownUrdfVersion(EditingRule):
-    """DX416."""
-
-    id = "DX416"
-    name = "unknown-urdf-version"
-    title = "The robot states a version that URDF does not have."
-    stage: ClassVar[Stage] = "reading"
+    stage = "reading"
     advice = "Take the attribute version away, or write 1.0."
-    engines: ClassVar[Mapping[str, str]] = {"pinocchio": ">=4.1.0"}
+    engines = measured_on("pinocchio")
     changed = "took the version of the robot away"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
@@ -40,4 +30,4 @@ class UnknownUrdfVersion(EditingRule):
         version = root.attributes.get("version")
         if root.tag == "robot" and version is not None and version not in _KNOWN:
             edit = case.source.removing_attribute(root, "version")
-            yield Correction(found_at(root, f"<robot> has version {shown(version)}"), (edit,))
+            yield correction(root, f"<robot> has version {shown(version)}", edit)

@@ -1,4 +1,4 @@
-"""DX417 unknown-collision-shape: a ``<collision>`` has a geometry that not every engine knows
+"""DX417 unknown-collision-shape: A collision has a shape that not every engine knows.
 
 ``<plane>`` and ``<cdf>`` are PyBullet's extensions to URDF, whose shapes are box, sphere, cylinder and mesh
 (and capsule in later versions).
@@ -13,28 +13,18 @@ What to do: write the shape as a box or a mesh where you need it in other engine
 the ``<collision>`` away. ``--choose DX417=keep`` leaves it, and MuJoCo out.
 """
 
-from __future__ import annotations
+from collections.abc import Iterable
 
-from collections.abc import Iterable, Mapping
-from typing import ClassVar
-
-from dynx.rules.case import Case
-from dynx.rules.rule import Stage
-from dynx.rules.text.editing import Correction, EditingRule, found_at
+from dynx.rules import Case, Correction, EditingRule, correction, measured_on
 
 _KNOWN = frozenset(["box", "sphere", "cylinder", "capsule", "mesh"])
 
 
 class UnknownCollisionShape(EditingRule):
-    """DX417."""
-
-    id = "DX417"
-    name = "unknown-collision-shape"
-    title = "A collision has a shape that not every engine knows."
-    stage: ClassVar[Stage] = "reading"
+    stage = "reading"
     advice = "Write the shape as a box, sphere, cylinder or mesh."
-    engines: ClassVar[Mapping[str, str]] = {"mujoco": ">=4.0.0"}
-    choices: ClassVar[Mapping[str, str]] = {
+    engines = measured_on("mujoco")
+    choices = {
         "remove": "take collisions of a shape that not every engine knows away",
         "keep": "keep them; MuJoCo then refuses the file",
     }
@@ -49,4 +39,4 @@ class UnknownCollisionShape(EditingRule):
                     continue
                 shapes = ", ".join(f"<{child.tag}>" for child in geometry.children) or "nothing"
                 edits = () if self.chosen(case) == "keep" else (case.source.removing(collision),)
-                yield Correction(found_at(collision, f"the geometry of <collision> is {shapes}"), edits)
+                yield correction(collision, f"the geometry of <collision> is {shapes}", *edits)

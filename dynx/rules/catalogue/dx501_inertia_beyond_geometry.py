@@ -1,4 +1,5 @@
-"""DX501 inertia-beyond-geometry: a moment of inertia larger than the link's own shape allows
+"""DX501 inertia-beyond-geometry: A moment of inertia is larger than any body of the link's shape and mass can
+have.
 
 A body of mass m that reaches at most R from an axis has a moment of inertia about that axis of at most
 m R^2, which it has if all of its mass sits at the far end; real parts have a third of that or less. The
@@ -15,34 +16,24 @@ robot does not make: torques are too large, and controllers tuned on them too st
 Nothing in the file says what the true tensor is, so there is no remedy by edit.
 """
 
-from __future__ import annotations
-
-from collections.abc import Iterator, Sequence
-from typing import ClassVar
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
 from dynx.model.elements import Inertial
-from dynx.rules.case import Case
+from dynx.rules import Case, Detection, Rule
 from dynx.rules.geometry import Extent, welded_extents
-from dynx.rules.rule import Detection, Kind, Rule
 
 _ROUNDING = 1e-9
 """Of a sphere's shell on a sphere's shape the bound is reached exactly; this is beyond any rounding."""
 
 
 class InertiaBeyondGeometry(Rule):
-    """DX501."""
-
-    id = "DX501"
-    name = "inertia-beyond-geometry"
-    title = "A moment of inertia is larger than any body of the link's shape and mass can have."
-    kind: ClassVar[Kind] = "practice"
+    kind = "practice"
     advice = "Export the tensor again, in kg m^2 and about the centre of mass."
 
-    def detect(self, case: Case) -> Sequence[Detection]:
+    def occurrences(self, case: Case) -> Iterable[Detection]:
         """Links with such a moment, one detection each, for the moment furthest beyond."""
-        found = []
         for link, extent in welded_extents(case):
             assert link.inertial is not None
             excess, moment, bound = max(_against_bounds(link.inertial, extent))
@@ -51,8 +42,7 @@ class InertiaBeyondGeometry(Rule):
                     f"a principal moment is {moment:.3g} kg m^2, {excess:.3g} times the {bound:.3g} that "
                     f"{link.inertial.mass:.3g} kg have at the farthest point of the link's shape"
                 )
-                found.append(Detection(link.name, None, link.inertial.line, message))
-        return found
+                yield Detection(link.name, None, link.inertial.line, message)
 
 
 def _against_bounds(inertial: Inertial, extent: Extent) -> Iterator[tuple[float, float, float]]:

@@ -1,4 +1,5 @@
-"""DX502 inertia-below-geometry: a tensor so small that the link is all but a point
+"""DX502 inertia-below-geometry: The inertia is that of a speck of matter, a hundred times smaller than the
+link's shape.
 
 A uniform body has a radius of gyration k = sqrt(I / m) of a fifth to a half of its size (a rod l/3.5, a
 ball d/3.2). Where even the largest k is below a hundredth of the diagonal of the link's own shape, the mass
@@ -12,34 +13,24 @@ conditioned, and simulators with a fixed step may shake or explode at such joint
 Nothing in the file says what the true tensor is, so there is no remedy by edit.
 """
 
-from __future__ import annotations
-
 import math
-from collections.abc import Sequence
-from typing import ClassVar
+from collections.abc import Iterable
 
 import numpy as np
 
-from dynx.rules.case import Case
+from dynx.rules import Case, Detection, Rule
 from dynx.rules.geometry.shapes import link_extent
-from dynx.rules.rule import Detection, Kind, Rule
 
 _SPECK = 0.01
 """Share of the shape's diagonal; all but 1 % of the mass is then within a tenth of it (Chebyshev)."""
 
 
 class InertiaBelowGeometry(Rule):
-    """DX502."""
-
-    id = "DX502"
-    name = "inertia-below-geometry"
-    title = "The inertia is that of a speck of matter, a hundred times smaller than the link's shape."
-    kind: ClassVar[Kind] = "practice"
+    kind = "practice"
     advice = "Export the tensor again, in kg m^2 and with enough digits."
 
-    def detect(self, case: Case) -> Sequence[Detection]:
+    def occurrences(self, case: Case) -> Iterable[Detection]:
         """Links with mass whose largest radius of gyration is below a hundredth of their own shape."""
-        found = []
         for link in case.model.links:
             if link.inertial is None or link.inertial.mass == 0.0:
                 continue
@@ -52,5 +43,4 @@ class InertiaBelowGeometry(Rule):
                 message = (
                     f"the largest radius of gyration is {gyration:.2g} m in a shape of {size:.2g} m across"
                 )
-                found.append(Detection(link.name, None, link.inertial.line, message))
-        return found
+                yield Detection(link.name, None, link.inertial.line, message)

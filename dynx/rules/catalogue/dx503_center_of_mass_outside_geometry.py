@@ -1,4 +1,4 @@
-"""DX503 center-of-mass-outside-geometry: the centre of mass lies outside the box that holds the link
+"""DX503 center-of-mass-outside-geometry: The centre of mass lies outside the box that holds the link's shape.
 
 Mass cannot be negative, so the centre of mass of a body lies within its convex hull, and so within any box
 that holds it. The rule takes the box, along the axes of the link frame, about all shapes of the link and
@@ -13,33 +13,23 @@ All engines use the numbers as they stand: gravity torques are wrong alike in ea
 Nothing in the file says where the centre truly is, so there is no remedy by edit.
 """
 
-from __future__ import annotations
-
-from collections.abc import Sequence
-from typing import ClassVar
+from collections.abc import Iterable
 
 import numpy as np
 
-from dynx.rules.case import Case
+from dynx.rules import Case, Detection, Rule
 from dynx.rules.geometry import welded_extents
-from dynx.rules.rule import Detection, Kind, Rule
 
 _MARGIN = 0.01
 """Share of the diagonal by which the box is widened."""
 
 
 class CenterOfMassOutsideGeometry(Rule):
-    """DX503."""
-
-    id = "DX503"
-    name = "center-of-mass-outside-geometry"
-    title = "The centre of mass lies outside the box that holds the link's shape."
-    kind: ClassVar[Kind] = "practice"
+    kind = "practice"
     advice = "Give the origin of the inertial in metres and in the frame of its own link."
 
-    def detect(self, case: Case) -> Sequence[Detection]:
+    def occurrences(self, case: Case) -> Iterable[Detection]:
         """Links whose centre of mass is outside, and by how much."""
-        found = []
         for link, extent in welded_extents(case):
             assert link.inertial is not None
             low, high = extent.box()
@@ -50,5 +40,4 @@ class CenterOfMassOutsideGeometry(Rule):
                     f"the centre of mass is {outside:.3g} m outside the box of {extent.diagonal():.3g} m "
                     "across that holds the link's shape"
                 )
-                found.append(Detection(link.name, None, link.inertial.line, message))
-        return found
+                yield Detection(link.name, None, link.inertial.line, message)

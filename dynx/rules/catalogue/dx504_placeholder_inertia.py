@@ -1,4 +1,5 @@
-"""DX504 placeholder-inertia: numbers that were put in because the element was needed
+"""DX504 placeholder-inertia: The inertia is a placeholder: the unit matrix, or one tensor for links of
+different mass.
 
 Two patterns are reported. A tensor that is exactly the unit matrix: 1 kg m^2 about every axis is the
 inertia of a steel ball of 0.15 m radius and 111 kg, and of hardly any link that has it in its file. And
@@ -12,36 +13,26 @@ Nothing in the file says what the true tensor is, so there is no remedy by edit.
 with mass spread evenly, are a better guess than any placeholder.
 """
 
-from __future__ import annotations
-
 from collections import defaultdict
-from collections.abc import Sequence
-from typing import ClassVar
+from collections.abc import Iterable
 
 from dynx.model import Inertial
-from dynx.rules.case import Case
-from dynx.rules.rule import Detection, Kind, Rule
+from dynx.rules import Case, Detection, Rule
 
 _LINKS = 3
 """How many links must share a tensor with equal moments."""
 
 
 class PlaceholderInertia(Rule):
-    """DX504."""
-
-    id = "DX504"
-    name = "placeholder-inertia"
-    title = "The inertia is a placeholder: the unit matrix, or one tensor for links of different mass."
-    kind: ClassVar[Kind] = "practice"
+    kind = "practice"
     advice = "Compute the inertia from the CAD model or from the link's shape and mass."
 
-    def detect(self, case: Case) -> Sequence[Detection]:
+    def occurrences(self, case: Case) -> Iterable[Detection]:
         """Links with mass whose tensor is the unit matrix, or shared as said above."""
         masses = defaultdict(list)
         for link in case.model.links:
             if link.inertial is not None and (moment := _equal_moments(link.inertial)):
                 masses[moment].append(link.inertial.mass)
-        found = []
         for link in case.model.links:
             moment = None if link.inertial is None else _equal_moments(link.inertial)
             if link.inertial is None or not moment:
@@ -55,8 +46,7 @@ class PlaceholderInertia(Rule):
                 )
             else:
                 continue
-            found.append(Detection(link.name, None, link.inertial.line, message))
-        return found
+            yield Detection(link.name, None, link.inertial.line, message)
 
 
 def _equal_moments(inertial: Inertial) -> float | None:

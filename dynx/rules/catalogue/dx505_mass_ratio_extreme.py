@@ -1,4 +1,4 @@
-"""DX505 mass-ratio-extreme: neighbouring bodies differ in mass by a factor of a million
+"""DX505 mass-ratio-extreme: Two bodies that a joint connects differ in mass by a factor of a million or more.
 
 Links that fixed joints hold together count as one body; a body without any mass is another matter and not
 reported here. A sum in double precision carries 16 digits; where a joint connects bodies a million apart,
@@ -14,34 +14,24 @@ sensor frame because an importer refused links without mass. Only the first can 
 second by who made the file, so there is no remedy by edit.
 """
 
-from __future__ import annotations
+from collections.abc import Iterable
 
-from collections.abc import Sequence
-from typing import ClassVar
-
-from dynx.rules.case import Case
+from dynx.rules import Case, Detection, Rule
 from dynx.rules.inertia.rigid_groups import rigid_groups
-from dynx.rules.rule import Detection, Kind, Rule
 
 _RATIO = 1e6
 
 
 class MassRatioExtreme(Rule):
-    """DX505."""
-
-    id = "DX505"
-    name = "mass-ratio-extreme"
-    title = "Two bodies that a joint connects differ in mass by a factor of a million or more."
-    kind: ClassVar[Kind] = "practice"
+    kind = "practice"
     advice = "Weld a frame that has no body of its own by a fixed joint, and give every mass in kilograms."
 
-    def detect(self, case: Case) -> Sequence[Detection]:
+    def occurrences(self, case: Case) -> Iterable[Detection]:
         """Moving joints between such bodies; the link named heads the lighter one."""
         heads = {name: group.head for name, group in rigid_groups(case).items()}
         mass = dict.fromkeys(heads.values(), 0.0)
         for link in case.model.links:
             mass[heads[link.name]] += 0.0 if link.inertial is None else link.inertial.mass
-        found = []
         for joint in case.model.joints:
             light, heavy = sorted((heads[joint.parent], heads[joint.child]), key=mass.__getitem__)
             if mass[light] > 0.0 and mass[heavy] >= _RATIO * mass[light]:
@@ -49,5 +39,4 @@ class MassRatioExtreme(Rule):
                     f"body {light} has {mass[light]:.3g} kg and its neighbour {heavy} {mass[heavy]:.3g} kg, "
                     f"{mass[heavy] / mass[light]:.1g} times as much"
                 )
-                found.append(Detection(light, joint.name, case.model.link(light).line, message))
-        return found
+                yield Detection(light, joint.name, case.model.link(light).line, message)

@@ -1,4 +1,4 @@
-"""DX506 effort-limit-zero: a joint that is allowed no force at all
+"""DX506 effort-limit-zero: The effort limit of a joint is zero, which says that its motor can do nothing.
 
 ``effort="0"`` is mostly written because URDF wants the attribute. It says that the motor can do nothing.
 
@@ -10,25 +10,16 @@ A joint that is moved by nothing (a passive wheel, a tendon's idler) has its zer
 joint, which needs no motor, is not reported. The true limit is not in the file, so there is no remedy.
 """
 
-from __future__ import annotations
+from collections.abc import Iterable
 
-from collections.abc import Sequence
-from typing import ClassVar
-
-from dynx.rules.case import Case
-from dynx.rules.rule import Detection, Kind, Rule
+from dynx.rules import Case, Detection, Rule
 
 
 class EffortLimitZero(Rule):
-    """DX506."""
-
-    id = "DX506"
-    name = "effort-limit-zero"
-    title = "The effort limit of a joint is zero, which says that its motor can do nothing."
-    kind: ClassVar[Kind] = "practice"
+    kind = "practice"
     advice = "Write the largest torque [N m] or force [N] that the motor gives at the joint."
 
-    def detect(self, case: Case) -> Sequence[Detection]:
+    def occurrences(self, case: Case) -> Iterable[Detection]:
         """Moving joints with a coordinate of their own and an effort limit of exactly zero."""
         return [
             Detection(None, joint.name, joint.line, "the effort limit is 0, so no torque is allowed")

@@ -1,4 +1,4 @@
-"""DX507 velocity-limit-zero: a joint that is not allowed to move
+"""DX507 velocity-limit-zero: The velocity limit of a joint is zero, which says that it must stand still.
 
 ``velocity="0"`` is mostly written because URDF wants the attribute. It says that the joint must stand still.
 
@@ -9,25 +9,16 @@ not read it. Dynamics is the same with all.
 The true limit is not in the file, so there is no remedy by edit.
 """
 
-from __future__ import annotations
+from collections.abc import Iterable
 
-from collections.abc import Sequence
-from typing import ClassVar
-
-from dynx.rules.case import Case
-from dynx.rules.rule import Detection, Kind, Rule
+from dynx.rules import Case, Detection, Rule
 
 
 class VelocityLimitZero(Rule):
-    """DX507."""
-
-    id = "DX507"
-    name = "velocity-limit-zero"
-    title = "The velocity limit of a joint is zero, which says that it must stand still."
-    kind: ClassVar[Kind] = "practice"
+    kind = "practice"
     advice = 'Write the largest speed [rad/s or m/s] of the joint, or type="fixed" if it never moves.'
 
-    def detect(self, case: Case) -> Sequence[Detection]:
+    def occurrences(self, case: Case) -> Iterable[Detection]:
         """Moving joints with a coordinate of their own and a velocity limit of exactly zero."""
         return [
             Detection(None, joint.name, joint.line, "the velocity limit is 0, so the joint must stand still")

@@ -1,4 +1,5 @@
-"""DX508 range-of-zero-width: a joint of type revolute or prismatic whose lower and upper limits are equal
+"""DX508 range-of-zero-width: The lower and upper limit of a joint are equal or absent, so it has no range to
+move in.
 
 A ``<limit>`` without ``lower`` and ``upper`` means 0 and 0: URDF's default for both is zero, not "none".
 So the joint has a coordinate and cannot move.
@@ -11,27 +12,17 @@ and drops them. The equations of motion are the same with all.
 Whether ``fixed``, ``continuous`` or a range was meant is not in the file, so there is no remedy by edit.
 """
 
-from __future__ import annotations
+from collections.abc import Iterable
 
-from collections.abc import Sequence
-from typing import ClassVar
-
-from dynx.rules.case import Case
-from dynx.rules.rule import Detection, Kind, Rule
+from dynx.rules import Case, Detection, Rule
 
 
 class RangeOfZeroWidth(Rule):
-    """DX508."""
-
-    id = "DX508"
-    name = "range-of-zero-width"
-    title = "The lower and upper limit of a joint are equal or absent, so it has no range to move in."
-    kind: ClassVar[Kind] = "practice"
+    kind = "practice"
     advice = 'Write the range of the joint, or type="continuous" if it has none, or type="fixed".'
 
-    def detect(self, case: Case) -> Sequence[Detection]:
+    def occurrences(self, case: Case) -> Iterable[Detection]:
         """Revolute and prismatic joints with a coordinate of their own and no range."""
-        found = []
         for joint in case.model.coordinate_joints:
             if joint.type == "continuous" or joint.limits.lower != joint.limits.upper:
                 continue
@@ -39,5 +30,4 @@ class RangeOfZeroWidth(Rule):
             absent = limit is not None and not {"lower", "upper"} & set(limit.attributes)
             why = "no lower and upper limit, which URDF reads as 0" if absent else "equal limits"
             message = f"the joint has {why}: its whole range is {joint.limits.lower:.6g}"
-            found.append(Detection(None, joint.name, joint.line, message))
-        return found
+            yield Detection(None, joint.name, joint.line, message)

@@ -1,4 +1,5 @@
-"""DX509 limits-on-continuous-joint: a joint without end has a lower or an upper limit
+"""DX509 limits-on-continuous-joint: A continuous joint has a lower or an upper limit, which has no meaning
+there.
 
 ``type="continuous"`` means a joint that turns for ever; its ``lower`` and ``upper`` have no meaning.
 Pinocchio and MuJoCo pass them over, PyBullet reports them in ``getJointInfo`` and does not apply them, and
@@ -10,26 +11,17 @@ away, so that every engine has a joint without end; ``dynx doctor --fix`` does s
 ``--choose DX509=drop``, and by default leaves them.
 """
 
-from __future__ import annotations
+from collections.abc import Iterable
 
-from collections.abc import Iterable, Mapping
-from typing import ClassVar
-
-from dynx.rules.case import Case
+from dynx.rules import Case, Correction, OptionalEditingRule, correction
 from dynx.rules.joints.elements import elements_in_joints
-from dynx.rules.text.editing import Correction, OptionalEditingRule, found_at
 
 _RANGE = ("lower", "upper")
 
 
 class LimitsOnContinuousJoint(OptionalEditingRule):
-    """DX509."""
-
-    id = "DX509"
-    name = "limits-on-continuous-joint"
-    title = "A continuous joint has a lower or an upper limit, which has no meaning there."
     advice = 'Take the range away, or write type="revolute" if the joint does have ends.'
-    choices: ClassVar[Mapping[str, str]] = {
+    choices = {
         "keep": "leave the limits of continuous joints, which mean nothing",
         "drop": "take the lower and upper limits of continuous joints away",
     }
@@ -42,4 +34,4 @@ class LimitsOnContinuousJoint(OptionalEditingRule):
             if written:
                 said = " and ".join(f'{end}="{limit.attributes[end]}"' for end in written)
                 edits = tuple(case.source.removing_attribute(limit, end) for end in written)
-                yield Correction(found_at(limit, f"{said} on a joint that turns for ever"), edits)
+                yield correction(limit, f"{said} on a joint that turns for ever", *edits)

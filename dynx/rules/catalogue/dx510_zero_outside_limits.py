@@ -1,4 +1,4 @@
-"""DX510 zero-outside-limits: the configuration of zeros is not allowed
+"""DX510 zero-outside-limits: Zero lies outside the range of a joint, and nearly every tool starts there.
 
 Nearly every tool starts at zero: PyBullet after loadURDF, RViz, MuJoCo's ``qpos0``, ``pinocchio.neutral``,
 Drake's default context. Where zero is outside the range of a joint, the first step of a simulation begins
@@ -9,30 +9,19 @@ It is legal and sometimes wanted (an elbow that cannot be stretched), so this is
 the zero means other numbers in every program that uses the robot.
 """
 
-from __future__ import annotations
+from collections.abc import Iterable
 
-from collections.abc import Sequence
-from typing import ClassVar
-
-from dynx.rules.case import Case
-from dynx.rules.rule import Detection, Kind, Rule
+from dynx.rules import Case, Detection, Rule
 
 
 class ZeroOutsideLimits(Rule):
-    """DX510."""
-
-    id = "DX510"
-    name = "zero-outside-limits"
-    title = "Zero lies outside the range of a joint, and nearly every tool starts there."
-    kind: ClassVar[Kind] = "practice"
+    kind = "practice"
     advice = "Give your programs a start configuration inside the limits."
 
-    def detect(self, case: Case) -> Sequence[Detection]:
+    def occurrences(self, case: Case) -> Iterable[Detection]:
         """Joints with a coordinate of their own whose range does not hold zero."""
-        found = []
         for joint in case.model.coordinate_joints:
             lower, upper = sorted((joint.limits.lower, joint.limits.upper))
             if not lower <= 0.0 <= upper:
                 message = f"the range {lower:.6g} to {upper:.6g} does not hold 0"
-                found.append(Detection(None, joint.name, joint.line, message))
-        return found
+                yield Detection(None, joint.name, joint.line, message)

@@ -1,4 +1,4 @@
-"""DX511 mimic-chain: a joint follows a joint that follows another
+"""DX511 mimic-chain: A mimic joint follows a joint that is itself a mimic joint.
 
 ``<mimic>`` is meant to name a joint that moves by itself. Where it names a follower, dynx multiplies the
 factors along the chain, which is what the words say, and so does joint_state_publisher. Pinocchio 4.1
@@ -11,24 +11,15 @@ offsets carried along: value = m2 (m1 x + b1) + b2 = (m2 m1) x + (m2 b1 + b2). I
 ``dynx doctor --fix`` does so with ``--choose DX511=direct``, and by default leaves the chain.
 """
 
-from __future__ import annotations
+from collections.abc import Iterable
 
-from collections.abc import Iterable, Mapping
-from typing import ClassVar
-
-from dynx.rules.case import Case
-from dynx.rules.text.editing import Correction, OptionalEditingRule, found_at
+from dynx.rules import Case, Correction, OptionalEditingRule, correction
 from dynx.rules.text.number_text import decimal
 
 
 class MimicChain(OptionalEditingRule):
-    """DX511."""
-
-    id = "DX511"
-    name = "mimic-chain"
-    title = "A mimic joint follows a joint that is itself a mimic joint."
     advice = "Let every mimic joint name the joint that is driven."
-    choices: ClassVar[Mapping[str, str]] = {
+    choices = {
         "keep": "leave followers that follow a follower",
         "direct": "let every follower name the joint that is driven, with the factors multiplied",
     }
@@ -48,4 +39,4 @@ class MimicChain(OptionalEditingRule):
                     case.source.setting(mimic, "multiplier", decimal(resolved.multiplier)),
                     case.source.setting(mimic, "offset", decimal(resolved.offset)),
                 )
-                yield Correction(found_at(mimic, message), edits)
+                yield correction(mimic, message, *edits)

@@ -1,4 +1,5 @@
-"""DX512 mimic-beyond-limits: following its leader takes a mimic joint out of its own limits
+"""DX512 mimic-beyond-limits: A mimic joint leaves its own limits while the joint it follows stays within its
+own.
 
 The leader has a range, the follower goes where multiplier and offset put it, and the follower's own
 ``<limit>`` says that it may not go all the way. One of the four numbers is wrong.
@@ -10,31 +11,21 @@ dynamics goes on. The equations of motion are the same with all.
 Which of the numbers is wrong is not in the file, so there is no remedy by edit.
 """
 
-from __future__ import annotations
-
 import math
-from collections.abc import Sequence
-from typing import ClassVar
+from collections.abc import Iterable
 
-from dynx.rules.case import Case
-from dynx.rules.rule import Detection, Kind, Rule
+from dynx.rules import Case, Detection, Rule
 
 _ROUNDING = 1e-3
 """Of the range it goes through: limits are often written with three digits."""
 
 
 class MimicBeyondLimits(Rule):
-    """DX512."""
-
-    id = "DX512"
-    name = "mimic-beyond-limits"
-    title = "A mimic joint leaves its own limits while the joint it follows stays within its own."
-    kind: ClassVar[Kind] = "practice"
+    kind = "practice"
     advice = "Give the follower the range that multiplier and offset make of the leader's."
 
-    def detect(self, case: Case) -> Sequence[Detection]:
+    def occurrences(self, case: Case) -> Iterable[Detection]:
         """Followers with limits that the leader's range, where it has one, does not respect."""
-        found = []
         for joint in case.model.joints:
             if joint.mimic is None or joint.type == "continuous":
                 continue
@@ -50,5 +41,4 @@ class MimicBeyondLimits(Rule):
                     f"goes from {low:.6g} to {high:.6g} while {leader.name} moves within its limits; "
                     f"its own are {lower:.6g} to {upper:.6g}"
                 )
-                found.append(Detection(None, joint.name, joint.line, message))
-        return found
+                yield Detection(None, joint.name, joint.line, message)

@@ -1,4 +1,4 @@
-"""DX513 angle-in-degrees: a number that is an angle in degrees, where URDF wants radians
+"""DX513 angle-in-degrees: An angle seems to be written in degrees, where URDF reads radians.
 
 Two patterns are reported. An ``rpy`` angle beyond two turns, 12.57 rad: nobody writes an orientation so,
 while 45, 90 and 180 are what one writes in degrees. And the limits of a revolute joint that are both whole
@@ -11,18 +11,13 @@ wrongly, or whose joint runs through its stops.
 That it is degrees is a guess, if a good one, so there is no remedy by edit; the message has the radians.
 """
 
-from __future__ import annotations
-
 import math
-from collections.abc import Iterator, Sequence
-from typing import ClassVar
+from collections.abc import Iterable, Iterator
 
 from dynx.errors import DescriptionError
 from dynx.model.xml.source import SourceElement
-from dynx.rules.case import Case
-from dynx.rules.rule import Detection, Kind, Rule
+from dynx.rules import Case, Detection, Rule, found_at
 from dynx.rules.text.attributes import origin_of
-from dynx.rules.text.editing import found_at
 
 _TWO_TURNS = 4.0 * math.pi
 _STEP, _SMALLEST, _LARGEST = 5.0, 30.0, 360.0
@@ -30,15 +25,10 @@ _MEANING_NONE = (-100.0, 100.0)
 
 
 class AngleInDegrees(Rule):
-    """DX513."""
-
-    id = "DX513"
-    name = "angle-in-degrees"
-    title = "An angle seems to be written in degrees, where URDF reads radians."
-    kind: ClassVar[Kind] = "practice"
+    kind = "practice"
     advice = "Write the angle in radians."
 
-    def detect(self, case: Case) -> Sequence[Detection]:
+    def occurrences(self, case: Case) -> Iterable[Detection]:
         """``<origin>``s with such an angle and revolute joints with such limits."""
         return sorted([*_origins(case), *_limits(case)], key=lambda detection: detection.line or 0)
 

@@ -1,4 +1,4 @@
-"""DX514 angle-cut-short: a quarter turn written as 1.57
+"""DX514 angle-cut-short: An angle is a multiple of pi/4 with only two or three decimals, such as 1.57.
 
 ``1.57`` is 0.0008 rad short of pi/2 and ``3.14`` 0.0016 rad short of pi: at the end of a one metre arm that
 is 0.8 and 1.6 mm, more than the repeatability of the robot. Axes that are parallel in the CAD model are not
@@ -12,25 +12,16 @@ What to do: write the angles in full, unless they were calibrated. ``dynx doctor
 ``--choose DX514=full``, which moves the links behind the joint by that little, and by default keeps them.
 """
 
-from __future__ import annotations
-
 import math
-from collections.abc import Iterable, Mapping
-from typing import ClassVar
+from collections.abc import Iterable
 
-from dynx.rules.case import Case
+from dynx.rules import Case, Correction, OptionalEditingRule, correction
 from dynx.rules.joints.elements import elements_in_joints
-from dynx.rules.text.editing import Correction, OptionalEditingRule, found_at
 
 
 class AngleCutShort(OptionalEditingRule):
-    """DX514."""
-
-    id = "DX514"
-    name = "angle-cut-short"
-    title = "An angle is a multiple of pi/4 with only two or three decimals, such as 1.57."
     advice = "Write angles in full: 1.5707963267948966."
-    choices: ClassVar[Mapping[str, str]] = {
+    choices = {
         "keep": "keep the angles as they are written",
         "full": "write multiples of pi/4 in full",
     }
@@ -48,7 +39,7 @@ class AngleCutShort(OptionalEditingRule):
                 message = f"rpy holds {word}, {off:.2g} rad from {angle!r}: {1e3 * off:.2g} mm at one metre"
                 full = [word if (angle := _meant(word)) is None else repr(angle) for word in words]
                 edit = case.source.setting(origin, "rpy", " ".join(full))
-                yield Correction(found_at(origin, message), (edit,))
+                yield correction(origin, message, edit)
 
 
 def _meant(word: str) -> float | None:

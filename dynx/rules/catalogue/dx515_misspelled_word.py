@@ -1,4 +1,4 @@
-"""DX515 misspelled-word: an element or attribute that no reader knows, one letter from one that all know
+"""DX515 misspelled-word: An element or attribute is spelled so that every reader skips it.
 
 URDF readers skip what they do not know, mostly in silence: with ``<intertial>`` the link has no mass, with
 ``<limit uper="1">`` the range ends at 0, with ``<dynamics dampng="1">`` nothing is damped. Reported are
@@ -12,17 +12,12 @@ All engines skip the same words. Mending the word changes the robot, and whether
 numbers is not in the file, so there is no remedy by edit.
 """
 
-from __future__ import annotations
-
 import difflib
-from collections.abc import Collection, Iterator, Sequence
-from typing import ClassVar
+from collections.abc import Collection, Iterable, Iterator, Sequence
 
 from dynx.model.xml.source import SourceElement
-from dynx.rules.case import Case
+from dynx.rules import Case, Detection, Rule, found_at
 from dynx.rules.inertia.edits import MOMENTS
-from dynx.rules.rule import Detection, Kind, Rule
-from dynx.rules.text.editing import found_at
 
 _ELEMENTS = {
     "robot": ("link", "joint", "material", "transmission"),
@@ -48,15 +43,10 @@ _CLOSE = 0.8
 
 
 class MisspelledWord(Rule):
-    """DX515."""
-
-    id = "DX515"
-    name = "misspelled-word"
-    title = "An element or attribute is spelled so that every reader skips it."
-    kind: ClassVar[Kind] = "practice"
+    kind = "practice"
     advice = "Spell the word as URDF does, and look at what it then says."
 
-    def detect(self, case: Case) -> Sequence[Detection]:
+    def occurrences(self, case: Case) -> Iterable[Detection]:
         """Every such word."""
         root = case.source.root
         return [found_at(*each) for part in root.children for each in _misspelled(part, root)]

@@ -1,4 +1,4 @@
-"""DX516 mesh-not-found: the file of a mesh is not where the description says
+"""DX516 mesh-not-found: The file of a mesh is not where the description says it is.
 
 Reported are meshes whose place is certain: a path relative to the description, a ``file://`` path, or a
 file in a package that was found (in the folders above the description, in ROS_PACKAGE_PATH or
@@ -15,27 +15,18 @@ Which file was meant is not in the description, so there is no remedy by edit; t
 nearest name.
 """
 
-from __future__ import annotations
+from collections.abc import Iterable
 
-from collections.abc import Sequence
-from typing import ClassVar
-
-from dynx.rules.case import Case
+from dynx.rules import Case, Detection, Rule
 from dynx.rules.geometry import MeshNotFoundError, find_mesh
 from dynx.rules.geometry.shapes import geometry_elements
-from dynx.rules.rule import Detection, Kind, Rule
 
 
 class MeshNotFound(Rule):
-    """DX516."""
-
-    id = "DX516"
-    name = "mesh-not-found"
-    title = "The file of a mesh is not where the description says it is."
-    kind: ClassVar[Kind] = "practice"
+    kind = "practice"
     advice = "Put the mesh there, or mend the path, capitals included."
 
-    def detect(self, case: Case) -> Sequence[Detection]:
+    def occurrences(self, case: Case) -> Iterable[Detection]:
         """The first place at which each missing mesh is named."""
         found, seen = [], set()
         for name, link in case.links.items():

@@ -9,6 +9,7 @@ import numpy as np
 
 from dynx.model.elements import Inertial
 from dynx.rules.case import Case
+from dynx.rules.engine_versions import measured_on
 from dynx.rules.inertia.central import CentralInertia
 from dynx.rules.inertia.edits import line_of, with_inertials
 from dynx.rules.inertia.merging import lumped_into
@@ -32,7 +33,7 @@ class ImpossibleInertia(Rule):
     """A tensor that no body can have, by more than rounding."""
 
     fault: ClassVar[Fault]
-    engines: ClassVar[Mapping[str, str]] = {"pybullet": ">=3.2.7", "mujoco": ">=4.0.0", "drake": ">=1.51.1"}
+    engines: ClassVar[Mapping[str, str]] = measured_on("pybullet", "mujoco", "drake")
     advice = "Take the tensor from the CAD model again; in the meantime use the nearest that a body can have."
     choices: ClassVar[Mapping[str, str]] = {
         "fuse": "lump the link with links welded to it where that makes a body, which changes no equation "
@@ -41,24 +42,20 @@ class ImpossibleInertia(Rule):
         "keep": "leave the numbers and give them to PyBullet and Drake after loading; MuJoCo cannot follow",
     }
 
-    def detect(self, case: Case) -> Sequence[Detection]:
+    def occurrences(self, case: Case) -> Iterable[Detection]:
         """Links whose tensor has the fault, static ones too: MuJoCo refuses the file for them."""
         kept = self.chosen(case) == "keep" and case.calls.issuperset(NUMBERS_OF_THE_FILE)
         groups = rigid_groups(case)
-        found = []
         for link in case.model.links:
             inertial = link.inertial
             if inertial is None or clear_fault(inertial) != self.fault:
                 continue
             if kept and (groups[link.name].static or _has_largest_on_y(inertial)):
                 continue
-            weight = ", held still by the world" if groups[link.name].static else ""
-            found.append(
-                Detection(
-                    link.name, None, line_of(case, link.name, "inertia"), self._message(inertial) + weight
-                )
+            message = self._message(inertial) + (
+                ", held still by the world" if groups[link.name].static else ""
             )
-        return found
+            yield Detection(link.name, None, line_of(case, link.name, "inertia"), message)
 
     def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy | None:
         """Lump, replace or keep, as chosen; the default lumps where that is enough."""

@@ -1,40 +1,42 @@
-"""Rules about one way of writing numbers that engines do not share."""
+"""Rules about one way of writing numbers that engines read differently."""
 
 from __future__ import annotations
 
-from abc import abstractmethod
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from typing import ClassVar
 
 from dynx.errors import shown
 from dynx.model.xml.source import Edit
 from dynx.rules.case import Case
+from dynx.rules.editing import Correction, EditingRule, correction
 from dynx.rules.rule import Stage
-from dynx.rules.text.editing import Correction, EditingRule, found_at
 from dynx.rules.text.number_text import Fault, Misspelling, misspelled_number, misspelled_vector
 from dynx.rules.text.numeric_attributes import NumericAttribute, numeric_attributes
 
 
 class MisspelledNumberRule(EditingRule):
-    """The rule about one fault of number texts, at every place where numbers stand."""
+    """A rule about one fault of number texts, wherever the file has numbers."""
 
     stage: ClassVar[Stage] = "reading"
     fault: ClassVar[Fault]
 
-    @abstractmethod
-    def said(self, written: str, meant: str) -> str:
-        """What is the matter with a text `written` (quoted), as the end of a sentence."""
+    description: ClassVar[str]
+    """The fault as the end of a sentence, in which ``{meant}`` stands for the corrected text and ``{count}``
+    for how many words were written."""
+
+    elements: ClassVar[Collection[str] | None] = None
+    """Tags of the elements in whose attributes the fault matters; None for all."""
 
     def applies(self, attribute: NumericAttribute) -> bool:
         """Whether the fault matters in this attribute."""
-        return True
+        return self.elements is None or attribute.element.tag in self.elements
 
     def text_for(self, case: Case, misspelling: Misspelling) -> str:
-        """The text to write instead."""
+        """The corrected text."""
         return misspelling.meant
 
-    def mended(self, case: Case, attribute: NumericAttribute, misspelling: Misspelling) -> Edit:
-        """The edit that writes it."""
+    def edit(self, case: Case, attribute: NumericAttribute, misspelling: Misspelling) -> Edit:
+        """The edit that corrects the attribute."""
         return case.source.setting(attribute.element, attribute.name, self.text_for(case, misspelling))
 
     def corrections(self, case: Case) -> Iterable[Correction]:
@@ -45,7 +47,6 @@ class MisspelledNumberRule(EditingRule):
             misspelling = find(text)
             if misspelling is None or misspelling.fault != self.fault or not self.applies(attribute):
                 continue
-            what = f"{attribute.name} of <{attribute.element.tag}> is {shown(text)}"
-            end = self.said(text, self.text_for(case, misspelling))
-            edit = self.mended(case, attribute, misspelling)
-            yield Correction(found_at(attribute.element, f"{what}, {end}"), (edit,))
+            end = self.description.format(meant=self.text_for(case, misspelling), count=len(text.split()))
+            message = f"{attribute.name} of <{attribute.element.tag}> is {shown(text)}, {end}"
+            yield correction(attribute.element, message, self.edit(case, attribute, misspelling))

@@ -35,7 +35,7 @@ class Replaced(Rule):
     def __init__(self, old: str, new: str, *, changes_physics: bool = False) -> None:
         self._old, self._new, self._changes = old, new, changes_physics
 
-    def detect(self, case: Case) -> Sequence[Detection]:
+    def occurrences(self, case: Case) -> Sequence[Detection]:
         return [Detection(None, None, None, "found")] if self._old in case.source.text else []
 
     def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy:

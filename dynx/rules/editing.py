@@ -1,4 +1,4 @@
-"""Rules that come down to corrections: places in the text, each with the edits that mend it."""
+"""Rules that correct the text: each place where the rule applies comes with the edits that correct it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from dynx.rules.rule import Detection, Kind, Remedy, Rule
 
 @dataclass(frozen=True)
 class Correction:
-    """One place where a rule applies, and what to do there; without edits nothing mends it."""
+    """One place where a rule applies, and the edits that correct it; no edits where nothing can."""
 
     detection: Detection
     edits: tuple[Edit, ...] = ()
@@ -31,11 +31,16 @@ def found_at(element: SourceElement, message: str) -> Detection:
     return Detection(link, joint, element.line, message)
 
 
+def correction(element: SourceElement, message: str, *edits: Edit) -> Correction:
+    """The correction of `element` by these edits."""
+    return Correction(found_at(element, message), edits)
+
+
 class EditingRule(Rule):
-    """A rule that says its corrections once, for finding their places and for mending them."""
+    """A rule whose corrections serve both to find the places and to correct them."""
 
     changed: ClassVar[str]
-    """What the remedy did, said once for all places; see `Remedy.changed`."""
+    """What the remedy did, stated once for all places; see `Remedy.changed`."""
 
     changes_physics: ClassVar[bool] = False
 
@@ -43,9 +48,9 @@ class EditingRule(Rule):
     def corrections(self, case: Case) -> Iterable[Correction]:
         """One for every place where the rule applies, in document order."""
 
-    def detect(self, case: Case) -> Sequence[Detection]:
+    def occurrences(self, case: Case) -> Iterable[Detection]:
         """The places of the corrections."""
-        return [each.detection for each in self.corrections(case)]
+        return (each.detection for each in self.corrections(case))
 
     def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy | None:
         """The edits of these places."""
@@ -58,33 +63,11 @@ class EditingRule(Rule):
 
 
 class OptionalEditingRule(EditingRule):
-    """An editing rule about practice: the text stays as it is unless the user chose a way to mend it."""
+    """An editing rule about practice: the text stays as it is unless the user chose another
+    of `choices` than the first, ``keep``."""
 
     kind: ClassVar[Kind] = "practice"
-    KEEP: ClassVar[str] = "keep"
-    """The first of `choices`, which leaves the text."""
 
     def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy | None:
         """The edits of these places, if they were chosen."""
-        return None if self.chosen(case) == self.KEEP else super().remedy(case, detections)
-
-
-class CallingRule(Rule):
-    """A rule about what engines add at run time: no text mends it, calls do."""
-
-    calls: ClassVar[tuple[str, ...]]
-    """Ids of `LoadedRobot.CALLS`."""
-
-    changed: ClassVar[str]
-
-    @abstractmethod
-    def occurrences(self, case: Case) -> Iterable[Detection]:
-        """Every place that makes engines add something, in document order, whatever was called."""
-
-    def detect(self, case: Case) -> Sequence[Detection]:
-        """The occurrences; none once the calls are made."""
-        return [] if case.calls.issuperset(self.calls) else list(self.occurrences(case))
-
-    def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy | None:
-        """The calls, which act on the whole robot."""
-        return Remedy(case.with_calls(*self.calls), self.changed)
+        return None if self.chosen(case) == "keep" else super().remedy(case, detections)

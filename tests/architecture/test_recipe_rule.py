@@ -1,0 +1,131 @@
+"""The recipe for a rule: one module and one trap, in dynx's catalogue or in a package of somebody else."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from importlib.metadata import EntryPoint, EntryPoints
+from pathlib import Path
+
+import pytest
+
+import dynx
+from dynx.doctor import diagnose
+from dynx.errors import DynxError
+from dynx.rules import Rule, all_rules, find_rule, registry
+from dynx.rules.traps import find_trap
+
+MODULE = '''"""ACME101 unweighed-link: A link has no <inertial>, which PyBullet reads as 1 kg.
+
+Our exporter leaves the ``<inertial>`` of camera frames out.
+
+What to do: write an inertial of zero.
+"""
+
+from collections.abc import Iterable
+
+from dynx.rules import Case, Correction, EditingRule, correction, measured_on
+
+ZERO = """<inertial>
+  <mass value="0"/>
+  <inertia ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"/>
+</inertial>"""
+
+
+class UnweighedLink(EditingRule):
+    advice = "Write an inertial of zero."
+    engines = measured_on("pybullet")
+    changed = "wrote inertials of zero"
+
+    def corrections(self, case: Case) -> Iterable[Correction]:
+        """Links below the root without one."""
+        for name, link in case.links.items():
+            if name != case.model.root and link.first("inertial") is None:
+                yield correction(link, "no <inertial>", case.source.inserting(link, ZERO, first=True))
+'''
+
+Install = Callable[..., None]
+
+
+@pytest.fixture
+def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """The folder of a package that follows the recipe; its trap is the one of DX101."""
+    (tmp_path / "acme101_unweighed_link.py").write_text(MODULE)
+    (tmp_path / "acme101_unweighed_link.urdf").write_bytes(find_trap("DX101").read_bytes())
+    monkeypatch.syspath_prepend(str(tmp_path))
+    yield tmp_path
+    sys.modules.pop("acme101_unweighed_link", None)
+
+
+@pytest.fixture
+def install(monkeypatch: pytest.MonkeyPatch) -> Iterator[Install]:
+    """A function that installs entry points in a dynx without DX101, for the time of a test."""
+    own = [rule for rule in all_rules() if rule.id != "DX101"]
+    monkeypatch.setattr(registry, "_own_rules", lambda: own)
+
+    def install(*values: str) -> None:
+        points = EntryPoints(EntryPoint(f"rule{k}", value, registry.GROUP) for k, value in enumerate(values))
+        monkeypatch.setattr(registry, "entry_points", lambda *, group: points.select(group=group))
+        all_rules.cache_clear()
+
+    install()
+    yield install
+    monkeypatch.undo()
+    all_rules.cache_clear()
+
+
+def test_a_module_and_a_trap_of_another_package_are_a_rule(package: Path, install: Install) -> None:
+    trap = package / "acme101_unweighed_link.urdf"
+    engines = ["pinocchio", "pybullet"]
+    assert not diagnose(trap, engines=engines, counterexamples=False).explained
+
+    install("acme101_unweighed_link:UnweighedLink")
+    rule = find_rule("unweighed-link")
+    assert all_rules()[-1] is rule
+    assert (rule.id, rule.name) == ("ACME101", "unweighed-link")
+    assert rule.title == "A link has no <inertial>, which PyBullet reads as 1 kg."
+    assert find_trap(rule) == trap
+
+    report = diagnose(trap, engines=engines, counterexamples=False)
+    assert report.explained
+    assert {(each.rule, each.proved) for each in report.differences} == {("ACME101", True)}
+    assert len(list(package.glob("acme101*.*"))) == 2
+
+
+def test_a_rule_of_dynx_is_a_module_that_no_other_names_and_a_trap() -> None:
+    folder = Path(dynx.__file__).parent
+    catalogue = folder / "rules" / "catalogue"
+    modules = sorted(catalogue.glob("dx*.py"))
+    assert len(modules) == sum(type(rule).__module__.startswith("dynx.") for rule in all_rules())
+    for path in folder.rglob("*.py"):
+        text = path.read_text(encoding="utf-8")
+        assert not any(module.stem in text for module in modules), path
+    for rule in all_rules():
+        assert find_trap(rule).is_file()
+
+
+@pytest.mark.parametrize(
+    ("value", "message"),
+    [
+        ("acme101_unweighed_link:Missing", "cannot be loaded: AttributeError"),
+        ("acme101_unweighed_link:ZERO", "is no subclass"),
+        ("pathlib:Path", "is no subclass"),
+        ("tests.architecture.test_recipe_rule:Headless", "does not begin with"),
+        ("dynx.rules.catalogue.dx102_inertia_broken_by_rounding:InertiaBrokenByRounding", "dx102 is taken"),
+    ],
+)
+def test_an_entry_point_that_is_no_rule_is_refused_by_name(
+    package: Path, install: Install, value: str, message: str
+) -> None:
+    install(value)
+    with pytest.raises(DynxError, match=message) as raised:
+        all_rules()
+    assert value in str(raised.value)
+
+
+class Headless(Rule):
+    """A rule whose module has no heading."""
+
+    def occurrences(self, case: object) -> tuple[()]:
+        """Nothing."""
+        return ()
