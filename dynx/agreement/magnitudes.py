@@ -261,7 +261,7 @@ class Magnitudes:
             for ancestor in [*ancestry(mechanism, index), ROOT]:
                 below[ancestor + 1].append(index + 1)
         mass = np.array([float(abs(inertia.mass)) for inertia in inertias])
-        spin = np.array([float(np.max(np.abs(inertia.second_moment))) for inertia in inertias])
+        spin = np.array([float(np.max(np.abs(inertia.rotational_inertia))) for inertia in inertias])
         share = np.array([SLENDER if _physical(inertia) else 1.0 for inertia in inertias])
         poses = body_poses(mechanism, self._q_tree)
         origin = np.stack([np.broadcast_to(p, (n, 3)) for p in poses.p], axis=1)
@@ -280,10 +280,10 @@ class Magnitudes:
 def _physical(inertia: RigidInertia) -> bool:
     """Whether some body has this inertia, to within rounding: no moment about the mass centre is negative,
     and none is larger than the other two together."""
-    size = float(np.max(np.abs(inertia.second_moment)))
+    size = float(np.max(np.abs(inertia.rotational_inertia)))
     if inertia.mass < 0.0:
         return False
     H = skew(inertia.first_moment)
-    central = inertia.second_moment + (H @ H / inertia.mass if inertia.mass > 0.0 else 0.0)
+    central = inertia.rotational_inertia + (H @ H / inertia.mass if inertia.mass > 0.0 else 0.0)
     least, middle, most = np.linalg.eigvalsh(central).tolist()
     return bool(min(least, least + middle - most) >= -4.0 * EPS * size)

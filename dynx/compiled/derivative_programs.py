@@ -8,14 +8,14 @@ from dynx.compiled.mass_factors import factors_of, filled_entries, solved
 from dynx.compiled.robot_kernel import argument_shapes, model_torque, tree_coordinates
 from dynx.model import Mechanism
 from dynx.rbd import aba, kinematics, rnea
-from dynx.rbd.base_parameters import regrouped
+from dynx.rbd.base_parameters import regroup_inertias
 from dynx.rbd.crba import mass_matrix
-from dynx.rbd.linear import solve_positive
-from dynx.rbd.tangent import displaced
+from dynx.rbd.linear import solve_positive_definite
 from dynx.simd.differentiate import differentiate
 from dynx.simd.inlining import inlined
 from dynx.simd.program import Program
 from dynx.simd.trace import trace
+from dynx.spatial.branchless import displace
 from dynx.spatial.scalar import Array
 from dynx.spatial.se3 import homogeneous
 
@@ -76,7 +76,7 @@ def acceleration(mechanism: Mechanism) -> Program:
         # The inertia that the drivers feel is not that of a tree.
         S = coupling.matrix()
         M = S.T @ mass_matrix(mechanism, *tree_coordinates(mechanism, q)) @ S
-        return solve_positive(M, tau - _torque(mechanism, q, v, np.zeros(len(v))))
+        return solve_positive_definite(M, tau - _torque(mechanism, q, v, np.zeros(len(v))))
 
     return trace(found, argument_shapes(mechanism, "tau"))
 
@@ -86,7 +86,7 @@ def pose_derivative(mechanism: Mechanism, frame: int) -> Program:
     shapes = argument_shapes(mechanism, "a")
 
     def pose(q: Array, d: Array) -> dict[str, Array]:
-        (tree,) = tree_coordinates(mechanism, displaced(q, d, floating=mechanism.floating))
+        (tree,) = tree_coordinates(mechanism, displace(q, d, floating=mechanism.floating))
         poses = kinematics.body_poses(mechanism, tree)
         return {"T": homogeneous(*kinematics.frame_pose(mechanism, poses, frame))}
 
@@ -96,7 +96,7 @@ def pose_derivative(mechanism: Mechanism, frame: int) -> Program:
 
 
 def _torque(mechanism: Mechanism, q: Array, v: Array, a: Array) -> Array:
-    tau = rnea.inverse_dynamics(regrouped(mechanism), *tree_coordinates(mechanism, q, v, a))
+    tau = rnea.inverse_dynamics(regroup_inertias(mechanism), *tree_coordinates(mechanism, q, v, a))
     return model_torque(mechanism, tau)
 
 
@@ -107,7 +107,7 @@ def _differentiated_torque(mechanism: Mechanism) -> Program:
     """
 
     def torque(q: Array, d: Array, v: Array, a: Array) -> dict[str, Array]:
-        return {"tau": _torque(mechanism, displaced(q, d, floating=mechanism.floating), v, a)}
+        return {"tau": _torque(mechanism, displace(q, d, floating=mechanism.floating), v, a)}
 
     shapes = argument_shapes(mechanism, "a")
     moved = {"q": shapes["q"], "d": shapes["v"], "v": shapes["v"], "a": shapes["a"]}

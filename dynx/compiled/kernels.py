@@ -36,10 +36,10 @@ from dynx.model.configuration import TOO_LARGE, UNIT
 from dynx.model.mechanism import Coupling
 from dynx.rbd import aba, centroidal, coriolis, crba, jacobians, kinematics, regressor, rnea
 from dynx.rbd.aba import inertia_matrix
-from dynx.rbd.base_parameters import aligned, regrouped
+from dynx.rbd.base_parameters import align_frames, regroup_inertias
 from dynx.rbd.jacobians import Reference
 from dynx.rbd.kinematics import body_poses
-from dynx.rbd.linear import solve_positive
+from dynx.rbd.linear import solve_positive_definite
 from dynx.simd.cache import cached_kernel, source_hash
 from dynx.simd.emit import Settings
 from dynx.simd.kernel import Kernel
@@ -129,7 +129,7 @@ def _frame_acceleration(
 
 
 def _inverse_dynamics(mechanism: Mechanism, q: Array, v: Array, a: Array) -> Array:
-    return rnea.inverse_dynamics(regrouped(mechanism), q, v, a)
+    return rnea.inverse_dynamics(regroup_inertias(mechanism), q, v, a)
 
 
 def _bias_torque(mechanism: Mechanism, q: Array, v: Array) -> Array:
@@ -213,7 +213,7 @@ def evaluated(
         S, (v, tau) = coupling.matrix(), rates
         q = coupling.expand_q(q)
         M = S.T @ crba.mass_matrix(mechanism, q) @ S
-        return np.asarray(solve_positive(M, tau - _bias_torque(mechanism, q, v @ S.T) @ S))
+        return np.asarray(solve_positive_definite(M, tau - _bias_torque(mechanism, q, v @ S.T) @ S))
     return _coupled(coupling, quantity, of_tree, q, *rates)
 
 
@@ -312,7 +312,7 @@ def tidied(mechanism: Mechanism) -> Mechanism:
     Inverse dynamics takes the inertias by base parameters as well (`dynx.rbd.base_parameters`). Forward
     dynamics does not: it would be a tenth faster and, on some robots, a hundred times less accurate.
     """
-    return _without_dust(aligned(_without_dust(mechanism)))
+    return _without_dust(align_frames(_without_dust(mechanism)))
 
 
 def _without_dust(mechanism: Mechanism) -> Mechanism:

@@ -6,7 +6,7 @@ import numpy as np
 
 from dynx.model import Mechanism
 from dynx.rbd.kinematics import ancestry
-from dynx.rbd.linear import Factors, factorised, substituted
+from dynx.rbd.linear import Factors, ldl_factors, solve_ldl
 from dynx.spatial.scalar import Array
 
 
@@ -20,12 +20,12 @@ def factors_of(mechanism: Mechanism, M: Array) -> Factors:
     A = np.zeros((nv, nv), dtype=object)
     for i, j in [*filled, *((i, i) for i in range(nv))]:
         A[i, j] = M[nv - 1 - i, nv - 1 - j]
-    return factorised(A)
+    return ldl_factors(A)
 
 
 def solved(L: list[list[Array]], D: list[Array], b: Array) -> Array:
     """M^-1 b for sides b (..., nv), from those factors."""
-    return substituted(L, D, b[..., ::-1])[..., ::-1]
+    return solve_ldl(L, D, b[..., ::-1])[..., ::-1]
 
 
 def filled_entries(mechanism: Mechanism) -> tuple[int, list[tuple[int, int]]]:

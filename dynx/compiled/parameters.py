@@ -10,7 +10,7 @@ import numpy as np
 from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
 from dynx.model import Mechanism, Model
 from dynx.model.mechanism import ROOT, build_mechanism
-from dynx.rbd.regressor import PARAMETERS, inertia_of, link_inertia, parameters_of
+from dynx.rbd.regressor import PARAMETERS, inertia_from_parameters, link_inertia, parameters_from_inertia
 from dynx.spatial.inertia import RigidInertia
 from dynx.spatial.scalar import Array, Floats
 from dynx.spatial.so3 import skew
@@ -53,7 +53,7 @@ class Known:
         inertia = {ROOT: mechanism.root, **{k: body.inertia for k, body in enumerate(mechanism.bodies)}}
         for number, added in self.bodies:
             frame = mechanism.frames[number]
-            inertia[frame.body] = inertia[frame.body] + added.seen_from(frame.R, frame.p)
+            inertia[frame.body] = inertia[frame.body] + added.transform(frame.R, frame.p)
         bodies = tuple(replace(body, inertia=inertia[k]) for k, body in enumerate(mechanism.bodies))
         return replace(mechanism, root=inertia[ROOT], bodies=bodies)
 
@@ -88,7 +88,7 @@ class Selection:
         defaults: list[Floats] = []
         for link in self.links:
             names += [f"{link}.{name}" for name in PARAMETERS]
-            defaults.append(parameters_of(link_inertia(self.model, link)))
+            defaults.append(parameters_from_inertia(link_inertia(self.model, link)))
         if self.payload is not None:
             names += [f"{self.payload}.payload.{name}" for name in PARAMETERS]
             defaults.append(np.zeros(len(PARAMETERS)))
@@ -115,9 +115,11 @@ class Selection:
     def read(self, parameters: Array) -> Known:
         """What an array (n,) of them says."""
         values = iter(parameters)
-        bodies = [(self.model.frame_index(link), inertia_of(_next(values, 10))) for link in self.links]
+        bodies = [
+            (self.model.frame_index(link), inertia_from_parameters(_next(values, 10))) for link in self.links
+        ]
         if self.payload is not None:
-            bodies.append((self.model.frame_index(self.payload), inertia_of(_next(values, 10))))
+            bodies.append((self.model.frame_index(self.payload), inertia_from_parameters(_next(values, 10))))
         if self.point_payload is not None:
             mass, *center = _next(values, len(POINT))
             bodies.append((self.model.frame_index(self.point_payload), _point_mass(mass, np.array(center))))

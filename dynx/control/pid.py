@@ -12,7 +12,7 @@ from dynx.control.pd import pd_torque
 from dynx.control.saturation import checked_limit
 from dynx.errors import ArgumentError, shown
 from dynx.model import Model
-from dynx.spatial.scalar import Floats, clipped
+from dynx.spatial.scalar import Floats, clamp
 from dynx.trajectory.base import Setpoint
 
 
@@ -68,7 +68,7 @@ class PID(JointSpace[Floats]):
             self.kp,
             self.kd,
         )
-        tau = clipped(wanted, self.limit)
+        tau = clamp(wanted, self.limit)
         integral = state + self._dt * self.ki * error + self._share * (tau - wanted)
         return self._of_all(tau), integral
 

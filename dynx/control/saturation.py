@@ -12,7 +12,7 @@ from dynx.control.base import Controller, ControllerState, Measurement
 from dynx.errors import GainError, LimitError, shown
 from dynx.model import Model
 from dynx.model.configuration import real_array
-from dynx.spatial.scalar import Floats, clipped
+from dynx.spatial.scalar import Floats, clamp
 from dynx.trajectory.base import Setpoint
 
 
@@ -42,7 +42,7 @@ class Saturated(Controller[ControllerState]):
     ) -> tuple[Floats, ControllerState]:
         """The inner law's torque (nv,), within the limits."""
         tau, state = self.inner.torque(measurement, setpoint, state)
-        return clipped(tau, self.limit), state
+        return clamp(tau, self.limit), state
 
     def on(self, engine: str | Backend) -> Saturated[ControllerState]:
         """The same with the inner law on another backend."""

@@ -174,7 +174,7 @@ def build_mechanism(model: Model, numbers: Numbers = float64) -> Mechanism:
         own = inertia_about_origin(
             numbers(link.inertial.mass), p_inertial, R_inertial, numbers(link.inertial.tensor)
         )
-        lumped[body] = lumped[body] + own.seen_from(R, p)
+        lumped[body] = lumped[body] + own.transform(R, p)
 
     frames = []
     for frame in model.frames:

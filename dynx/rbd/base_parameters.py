@@ -1,16 +1,16 @@
-"""The same dynamics in fewer numbers: frames along the joint axes, inertias by base parameters.
+"""Base inertial parameters: an equivalent mechanism with fewer non-zero numbers and the same dynamics.
 
-Torques do not determine how mass is spread over the links. What a joint cannot tell from outside may
-belong to either of the bodies that it joins: for a revolute joint whatever looks the same when turned
-about the axis and has no inertia about it, that is mass spread along the axis; for a prismatic joint
-rotational inertia without mass. Moved to the parent, wherever that body is, it leaves three of ten
-parameters of a body zero for good, six for a prismatic joint (Gautier and Khalil, Direct calculation of
-minimum set of inertial parameters of serial robots, 1990). Nor do torques know where on its axis a body's
-frame sits: its origin is moved to where the ways from joint to joint have the fewest components.
+Joint torques do not determine all inertial parameters of a body: some may be assigned to the parent of its
+joint instead. For a revolute joint these are the parameters of mass distributed along the axis, which do not
+change when the body rotates; for a prismatic joint, rotational inertia without mass. Regrouped with the
+parent's, they leave three of the ten parameters of a body zero (six for a prismatic joint), as in Gautier and
+Khalil, Direct calculation of minimum set of inertial parameters of serial robots, 1990. The origin of a body
+frame may also lie anywhere on the joint axis: it is moved to where the vectors between successive origins
+have the fewest non-zero components.
 
-Torque, mass matrix, energies, momentum and centre of mass stay what they are, as functions of the same
-coordinates, in the terms of real arithmetic; frames keep their names and places. What does not stay is which
-body has which inertia.
+In exact arithmetic, torque, mass matrix, energies, momentum and centre of mass of the whole robot stay the
+same functions of the same coordinates, and frames keep their names and poses. The inertia of a single body
+does not stay the same.
 """
 
 from __future__ import annotations
@@ -26,109 +26,109 @@ from dynx.spatial.inertia import RigidInertia
 from dynx.spatial.scalar import Array, sqrt
 from dynx.spatial.so3 import cross
 
-NOTHING = 1e-14
-"""A length [m] that is zero but for rounding."""
+ZERO_LENGTH = 1e-14
+"""Bound [m] below which a length counts as zero."""
 
-Z = np.array([0, 0, 1])
-"""The axis of every revolute joint of a mechanism that was `aligned`."""
-
-
-def reduced(mechanism: Mechanism) -> Mechanism:
-    """`regrouped` of `aligned`."""
-    return regrouped(aligned(mechanism))
+Z_AXIS = np.array([0, 0, 1])
+"""Axis of every revolute joint of a mechanism after `align_frames`."""
 
 
-def aligned(mechanism: Mechanism) -> Mechanism:
-    """Every body in a frame of which z is the axis of its joint, its origin slid along that axis if that
-    saves numbers.
+def align_frames(mechanism: Mechanism) -> Mechanism:
+    """Return the mechanism with new body frames, whose z axes are the axes of revolute joints.
 
-    A body on a prismatic joint has the axes of its parent, and its origin when the joint is at 0.
+    The origin is moved along the axis if that makes more components zero. The frame of a body on a
+    prismatic joint is that of its parent when the joint is at 0.
     """
-    one, nothing = np.eye(3, dtype=int) + 0 * mechanism.gravity, 0 * mechanism.gravity
-    # The new frame of each body, as its pose (Q, o) in the old one.
-    frames: dict[int, tuple[Array, Array]] = {ROOT: (one, nothing)}
+    identity, zero = np.eye(3, dtype=int) + 0 * mechanism.gravity, 0 * mechanism.gravity
+    # Pose (Q, o) of the new frame of each body in its old one.
+    frames: dict[int, tuple[Array, Array]] = {ROOT: (identity, zero)}
     bodies = []
     for index, body in enumerate(mechanism.bodies):
         Q_parent, o_parent = frames[body.parent]
-        # The joint as the parent's new frame sees it.
+        # Pose of the joint in the parent's new frame.
         R, p = Q_parent.T @ body.R, Q_parent.T @ (body.p - o_parent)
         if body.revolute:
-            onwards = [np.sum(child.p * body.axis) for child in mechanism.bodies if child.parent == index]
-            Q, o = _axes(R, body.axis), _slide(R, p, body.axis, onwards)
+            child_offsets = [
+                np.sum(child.p * body.axis) for child in mechanism.bodies if child.parent == index
+            ]
+            Q, o = _rotation_to_axis(R, body.axis), _origin_shift(R, p, body.axis, child_offsets)
         else:
             Q, o = R.T, -R.T @ p
         frames[index] = Q, o
-        moved = replace(body, R=R @ Q, p=p + R @ o, axis=Z + nothing, inertia=_in_frame(body.inertia, Q, o))
-        bodies.append(moved if body.revolute else replace(moved, R=one, p=nothing, axis=R @ body.axis))
-    named = tuple(
+        inertia = _inertia_in_frame(body.inertia, Q, o)
+        moved = replace(body, R=R @ Q, p=p + R @ o, axis=Z_AXIS + zero, inertia=inertia)
+        bodies.append(moved if body.revolute else replace(moved, R=identity, p=zero, axis=R @ body.axis))
+    named_frames = tuple(
         replace(frame, R=Q.T @ frame.R, p=Q.T @ (frame.p - o))
         for frame in mechanism.frames
         for Q, o in (frames[frame.body],)
     )
-    return replace(mechanism, bodies=tuple(bodies), frames=named)
+    return replace(mechanism, bodies=tuple(bodies), frames=named_frames)
 
 
-def regrouped(mechanism: Mechanism) -> Mechanism:
-    """What may belong to the parent moved there, body after body from the tips to the root.
+def regroup_inertias(mechanism: Mechanism) -> Mechanism:
+    """Return the mechanism with redundant inertial parameters moved to the parents, from tips to root.
 
-    Wants an `aligned` mechanism. The inertias that remain are those of no real body.
+    The mechanism must come from `align_frames`. The remaining inertias need not be physically consistent.
     """
     inertias = {ROOT: mechanism.root, **{k: body.inertia for k, body in enumerate(mechanism.bodies)}}
     for index in reversed(range(len(mechanism.bodies))):
         body = mechanism.bodies[index]
-        inertias[index], moved = _parted(inertias[index], body)
-        inertias[body.parent] = inertias[body.parent] + moved.seen_from(body.R, body.p)
+        inertias[index], redundant = _split_inertia(inertias[index], body)
+        inertias[body.parent] = inertias[body.parent] + redundant.transform(body.R, body.p)
     bodies = tuple(replace(body, inertia=inertias[k]) for k, body in enumerate(mechanism.bodies))
     return replace(mechanism, root=inertias[ROOT], bodies=bodies)
 
 
-def _parted(inertia: RigidInertia, body: Body) -> tuple[RigidInertia, RigidInertia]:
-    """What stays with a body, and what goes to its parent."""
-    mass, h, tensor = inertia.mass, inertia.first_moment, inertia.second_moment
+def _split_inertia(inertia: RigidInertia, body: Body) -> tuple[RigidInertia, RigidInertia]:
+    """Split an inertia into the part that stays with the body and the part that moves to its parent."""
+    mass, h, tensor = inertia.mass, inertia.first_moment, inertia.rotational_inertia
     if not body.revolute:
         return RigidInertia(mass, h, 0 * tensor), RigidInertia(0 * mass, 0 * h, tensor)
-    x, y, line = (inertia.spread[k, k] for k in range(3))
-    # With these moments the spread of what stays is x, y and, exactly, 0.
+    xx, yy, zz = (inertia.second_moment_matrix[k, k] for k in range(3))
+    # With this tensor the second-moment matrix of the remaining part has the diagonal xx, yy and exactly 0.
     (_, xy, xz), (_, _, yz), _ = tensor
-    stays = np.array([[y, xy, xz], [xy, x, yz], [xz, yz, x + y]])
+    remaining = np.array([[yy, xy, xz], [xy, xx, yz], [xz, yz, xx + yy]])
     across, along = np.array([1, 1, 0]), np.array([0, 0, 1])
     return (
-        RigidInertia(0 * mass, h * across, stays),
-        RigidInertia(mass, h * along, np.diag(across) * line),
+        RigidInertia(0 * mass, h * across, remaining),
+        RigidInertia(mass, h * along, np.diag(across) * zz),
     )
 
 
-def _in_frame(inertia: RigidInertia, Q: Array, o: Array) -> RigidInertia:
-    """An inertia about the origin of the frame with the pose (Q, o), in its axes."""
-    return inertia.seen_from(Q.T, -Q.T @ o)
+def _inertia_in_frame(inertia: RigidInertia, Q: Array, o: Array) -> RigidInertia:
+    """Return an inertia about the origin of the frame that has the pose (Q, o), in its axes."""
+    return inertia.transform(Q.T, -Q.T @ o)
 
 
-def _axes(R: Array, axis: Array) -> Array:
-    """Q (3, 3), a rotation with z along `axis`: of coordinate axes if that is one, else such that R Q,
-    the joint in its parent, has a zero."""
+def _rotation_to_axis(R: Array, axis: Array) -> Array:
+    """Return a rotation Q (3, 3) that maps z to `axis`.
+
+    If `axis` is a coordinate axis, Q permutes axes; else it is chosen so that R Q has a zero entry.
+    """
     k = int(np.argmax(np.abs(axis)))
     if np.count_nonzero(axis) == 1:
         x = np.eye(3, dtype=int)[(k + 1) % 3]
     else:
-        x = cross(R.T @ Z, axis)
+        x = cross(R.T @ Z_AXIS, axis)
         if np.sum(x * x) < 1e-16:
-            # The joint is parallel to z of the parent already: any x will do.
+            # The joint axis is parallel to z of the parent: any x perpendicular to it gives the zero.
             x = cross(np.eye(3, dtype=int)[(k + 1) % 3] + 0 * axis, axis)
         x = x / sqrt(np.sum(x * x))
     return np.stack([x + 0 * axis, cross(axis, x + 0 * axis), axis], axis=-1)
 
 
-def _slide(R: Array, p: Array, axis: Array, onwards: Sequence[Any]) -> Array:
-    """Where on the axis (through the old origin) the new one is.
+def _origin_shift(R: Array, p: Array, axis: Array, child_offsets: Sequence[Any]) -> Array:
+    """Return the displacement o (3,) of the origin along the joint axis.
 
-    There a component of p + R o vanishes, but others may come into being: `onwards` are the ways along
-    the axis to the joints that the body carries. If that does not save a number the origin stays.
-    Three axes through one point would otherwise be pulled apart, with bodies without mass between
-    them, and forward dynamics would lose digits.
+    With it a component of p + R o vanishes, but the offsets along the axis to the child joints,
+    `child_offsets` [m], may become non-zero. Unless the number of non-zero components falls, the origin
+    stays: moving it regardless would separate three axes that meet in one point, with massless bodies
+    between them, and forward dynamics would lose digits.
     """
-    along = R @ axis
-    k = int(np.argmax(np.abs(along)))
-    way = -p[k] / along[k]
-    before = (abs(p[k]) > NOTHING) + sum(abs(length) > NOTHING for length in onwards)
-    after = sum(abs(length - way) > NOTHING for length in onwards)
-    return np.asarray(axis * (way if after < before else 0 * way))
+    direction = R @ axis
+    k = int(np.argmax(np.abs(direction)))
+    shift = -p[k] / direction[k]
+    before = (abs(p[k]) > ZERO_LENGTH) + sum(abs(length) > ZERO_LENGTH for length in child_offsets)
+    after = sum(abs(length - shift) > ZERO_LENGTH for length in child_offsets)
+    return np.asarray(axis * (shift if after < before else 0 * shift))

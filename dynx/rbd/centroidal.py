@@ -1,4 +1,4 @@
-"""The body as a whole: centre of mass, its Jacobian, momentum and energies (world axes).
+"""Centre of mass, its Jacobian, centroidal momentum and energies of the whole robot, in world axes.
 
 Orin, Goswami and Lee, Centroidal dynamics of a humanoid robot, 2013.
 """
@@ -15,7 +15,7 @@ from dynx.spatial.so3 import cross, rotate
 
 
 def center_of_mass(mechanism: Mechanism, poses: Poses) -> Array:
-    """(..., 3) [m]; the root's origin if nothing has mass."""
+    """Return the centre of mass (..., 3) [m], or the origin of the root if no body has mass."""
     mass, moment = subtree_moments(mechanism, poses)
     if not mechanism.has_mass:
         return np.asarray(poses[ROOT][1] + 0 * moment[0])
@@ -23,7 +23,7 @@ def center_of_mass(mechanism: Mechanism, poses: Poses) -> Array:
 
 
 def center_of_mass_jacobian(mechanism: Mechanism, poses: Poses) -> Array:
-    """(..., 3, nv), column by column from what each joint carries."""
+    """Return the Jacobian (..., 3, nv) of the centre of mass; each column follows from a joint's subtree."""
     mass, moment = subtree_moments(mechanism, poses)
     total = mass[0] if mechanism.has_mass else mass[0] + 1
     columns = []
@@ -34,8 +34,8 @@ def center_of_mass_jacobian(mechanism: Mechanism, poses: Poses) -> Array:
         columns += [cross(R[..., :, k], arm) for k in range(3)]
     for index, body in enumerate(mechanism.bodies):
         z, m = joint_axis(mechanism, poses, index), mass[index + 1]
-        moved = cross(z, moment[index + 1] - poses[index][1] * m) if body.revolute else z * m
-        columns.append(moved / total)
+        momentum = cross(z, moment[index + 1] - poses[index][1] * m) if body.revolute else z * m
+        columns.append(momentum / total)
     if not columns:
         return np.zeros((*moment[0].shape[:-1], 3, 0))
     shape = np.broadcast_shapes(*(column.shape for column in columns))
@@ -43,7 +43,7 @@ def center_of_mass_jacobian(mechanism: Mechanism, poses: Poses) -> Array:
 
 
 def centroidal_momentum(mechanism: Mechanism, poses: Poses, v: Array) -> Array:
-    """Linear, then angular momentum about the centre of mass (..., 6)."""
+    """Return linear momentum [kg m/s], then angular momentum about the centre of mass [kg m^2/s] (..., 6)."""
     center = center_of_mass(mechanism, poses)
     total, spin = 0 * center, 0 * center
     for p, momentum, about_origin, _, _ in _body_momenta(mechanism, poses, v):
@@ -53,7 +53,7 @@ def centroidal_momentum(mechanism: Mechanism, poses: Poses, v: Array) -> Array:
 
 
 def kinetic_energy(mechanism: Mechanism, poses: Poses, v: Array) -> Array:
-    """Sum of the bodies' kinetic energies (...,) [J]."""
+    """Return the sum of the bodies' kinetic energies (...,) [J]."""
     energy = 0 * np.sum(v, axis=-1)
     for _, momentum, spin, linear, angular in _body_momenta(mechanism, poses, v):
         energy = energy + np.sum(momentum * linear, axis=-1) + np.sum(spin * angular, axis=-1)
@@ -61,13 +61,13 @@ def kinetic_energy(mechanism: Mechanism, poses: Poses, v: Array) -> Array:
 
 
 def potential_energy(mechanism: Mechanism, poses: Poses) -> Array:
-    """-g . (mass times centre of mass) (...,) [J]."""
+    """Return the potential energy -g . (mass times centre of mass) (...,) [J]."""
     _, moment = subtree_moments(mechanism, poses)
     return np.asarray(-np.sum(mechanism.gravity * moment[0], axis=-1))
 
 
 def subtree_moments(mechanism: Mechanism, poses: Poses) -> tuple[list[Array], list[Array]]:
-    """Mass and first moment in the world of what each body carries, itself included, root first."""
+    """Return mass [kg] and first moment about the world origin [kg m] of each body's subtree, root first."""
     inertias = _inertias(mechanism)
     mass = [inertia.mass for inertia in inertias]
     moment = [
@@ -88,12 +88,12 @@ def _inertias(mechanism: Mechanism) -> list[RigidInertia]:
 def _body_momenta(
     mechanism: Mechanism, poses: Poses, v: Array
 ) -> list[tuple[Array, Array, Array, Array, Array]]:
-    """Per body: origin, linear momentum, angular momentum about the origin, and its twist."""
+    """Return per body: origin, linear momentum, angular momentum about the origin, and the two velocities."""
     twists = body_twists(mechanism, poses, v)
-    found = []
+    momenta = []
     for index, inertia in enumerate(_inertias(mechanism)):
         R, p = poses.R[index], poses.p[index]
         linear, angular = twists.linear[index], twists.angular[index]
-        in_world = inertia.seen_from(R, 0 * p)
-        found.append((p, *in_world.momentum(linear, angular), linear, angular))
-    return found
+        in_world = inertia.transform(R, 0 * p)
+        momenta.append((p, *in_world.momentum(linear, angular), linear, angular))
+    return momenta

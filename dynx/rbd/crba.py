@@ -12,27 +12,27 @@ from dynx.spatial.so3 import skew
 
 
 def mass_matrix(mechanism: Mechanism, q: Array) -> Array:
-    """M (..., nv, nv) in tree coordinates."""
+    """Return the joint-space inertia M (..., nv, nv) in tree coordinates at q (..., nq)."""
     bodies = mechanism.bodies
     placements = [Placement.of(body, joint_value(mechanism, q, k)) for k, body in enumerate(bodies)]
     composite = {ROOT: mechanism.root, **{k: body.inertia for k, body in enumerate(bodies)}}
     for index in reversed(range(len(bodies))):
         parent = bodies[index].parent
-        composite[parent] = composite[parent] + placements[index].inertia_of_parent(composite[index])
+        composite[parent] = composite[parent] + placements[index].inertia_to_parent(composite[index])
 
     base = 6 if mechanism.floating else 0
     zero = 0 * np.sum(q, axis=-1)
     M = [[zero] * mechanism.nv for _ in range(mechanism.nv)]
     for index, body in enumerate(bodies):
-        still = 0 * body.axis
-        twist = (still, body.axis) if body.revolute else (body.axis, still)
+        no_motion = 0 * body.axis
+        twist = (no_motion, body.axis) if body.revolute else (body.axis, no_motion)
         force, moment = composite[index].momentum(*twist)
         row = index
         while row != ROOT:
             owner = bodies[row]
             along = np.sum(owner.axis * (moment if owner.revolute else force), axis=-1)
             M[base + row][base + index] = M[base + index][base + row] = along + zero
-            force, moment = placements[row].wrench_of_parent(force, moment)
+            force, moment = placements[row].wrench_to_parent(force, moment)
             row = owner.parent
         if mechanism.floating:
             for k in range(3):
@@ -45,7 +45,7 @@ def mass_matrix(mechanism: Mechanism, q: Array) -> Array:
             for j in range(3):
                 M[i][j] = (root.mass if i == j else 0) + zero
                 M[3 + i][j] = M[j][3 + i] = coupling[..., i, j] + zero
-                M[3 + i][3 + j] = root.second_moment[..., i, j] + zero
+                M[3 + i][3 + j] = root.rotational_inertia[..., i, j] + zero
     if not M:
         return np.zeros((*q.shape[:-1], 0, 0))
     return np.stack([np.stack(row, axis=-1) for row in M], axis=-2)

@@ -26,48 +26,52 @@ REFERENCES: dict[str, Reference] = {
 
 
 def frame_jacobian(mechanism: Mechanism, poses: Poses, frame: int, reference: Reference) -> Array:
-    """J (..., 6, nv) of frame number `frame`."""
+    """Return J (..., 6, nv) of frame number `frame`, linear rows first, expressed as `reference` says."""
     R, p = frame_pose(mechanism, poses, frame)
-    linear, angular = _aligned(mechanism, poses, mechanism.frames[frame].body, p)
-    return _referred(linear, angular, R, p, reference)
+    linear, angular = _world_columns(mechanism, poses, mechanism.frames[frame].body, p)
+    return _express(linear, angular, R, p, reference)
 
 
 def frame_jacobian_derivative(
     mechanism: Mechanism, poses: Poses, v: Array, frame: int, reference: Reference
 ) -> Array:
-    """dJ/dt (..., 6, nv) of frame number `frame` at the tree velocity `v` (..., nv)."""
+    """Return dJ/dt (..., 6, nv) of frame number `frame` at the tree velocity `v` (..., nv)."""
     R, p = frame_pose(mechanism, poses, frame)
     body = mechanism.frames[frame].body
     twists = body_twists(mechanism, poses, v)
-    turning = twists[body][1]
-    velocity = twists[body][0] + cross(turning, p - poses[body][1])
+    omega = twists[body][1]
+    velocity = twists[body][0] + cross(omega, p - poses[body][1])
 
-    linear, angular = _aligned(mechanism, poses, body, p)
+    linear, angular = _world_columns(mechanism, poses, body, p)
     d_linear, d_angular = [0 * column for column in linear], [0 * column for column in angular]
     for column, z, o, owner in _moving_columns(mechanism, poses, body):
-        o_velocity, o_turning = twists[owner]
-        dz = cross(o_turning, z)
-        if _turns(mechanism, column, owner):
+        o_velocity, o_omega = twists[owner]
+        dz = cross(o_omega, z)
+        if _is_rotation(mechanism, column, owner):
             d_linear[column] = cross(dz, p - o) + cross(z, velocity - o_velocity)
             d_angular[column] = dz + 0 * d_linear[column]
         else:
             d_linear[column] = dz + 0 * d_linear[column]
 
     if reference == "world":
-        J, dJ = _stacked(linear, angular, p), _stacked(d_linear, d_angular, p)
+        J, dJ = _stack_columns(linear, angular, p), _stack_columns(d_linear, d_angular, p)
         moved = skew(velocity) @ J[..., 3:, :] + skew(p) @ dJ[..., 3:, :]
         return np.concatenate([dJ[..., :3, :] + moved, dJ[..., 3:, :]], axis=-2)
     if reference == "local":
         # d(R' x)/dt = R' (dx/dt - omega x x)
-        d_linear = [d - cross(turning, x) for d, x in zip(d_linear, linear, strict=True)]
-        d_angular = [d - cross(turning, x) for d, x in zip(d_angular, angular, strict=True)]
-    return _referred(d_linear, d_angular, R, p, reference)
+        d_linear = [d - cross(omega, x) for d, x in zip(d_linear, linear, strict=True)]
+        d_angular = [d - cross(omega, x) for d, x in zip(d_angular, angular, strict=True)]
+    return _express(d_linear, d_angular, R, p, reference)
 
 
 def shift_jacobian(
     J: Array, dJ: Array | None, v: Array | None, R: Array, point: Array, reference: Reference
 ) -> Array:
-    """J, or dJ/dt where it is given, moved to `point` (3,) given in the axes of the frame at (R, p)."""
+    """Return J, or dJ/dt if `dJ` is given, at a point fixed in the frame instead of at its origin.
+
+    `point` (3,) [m] is in the axes of the frame, whose rotation to the world is R; v (..., nv) is needed
+    for dJ/dt in the reference ``local_world_aligned``.
+    """
     if reference == "world":
         return J if dJ is None else dJ
     lever = point if reference == "local" else rotate(R, point)
@@ -76,13 +80,13 @@ def shift_jacobian(
         return np.concatenate([J[..., :3, :] - arm @ J[..., 3:, :], J[..., 3:, :]], axis=-2)
     moved = dJ[..., :3, :] - arm @ dJ[..., 3:, :]
     if reference == LOCAL_WORLD_ALIGNED:
-        turning = (J[..., 3:, :] @ v[..., None])[..., 0]
-        moved = moved - skew(cross(turning, lever)) @ J[..., 3:, :]
+        omega = (J[..., 3:, :] @ v[..., None])[..., 0]
+        moved = moved - skew(cross(omega, lever)) @ J[..., 3:, :]
     return np.concatenate([moved, dJ[..., 3:, :]], axis=-2)
 
 
 def _moving_columns(mechanism: Mechanism, poses: Poses, body: int) -> list[tuple[int, Array, Array, int]]:
-    """(column, axis z, origin o, owning body) of every coordinate that moves `body`."""
+    """List (column, axis z, origin o, body that the joint moves) of every coordinate that moves `body`."""
     base = 6 if mechanism.floating else 0
     columns = [(base + k, joint_axis(mechanism, poses, k), poses[k][1], k) for k in ancestry(mechanism, body)]
     if mechanism.floating:
@@ -91,24 +95,28 @@ def _moving_columns(mechanism: Mechanism, poses: Poses, body: int) -> list[tuple
     return columns
 
 
-def _turns(mechanism: Mechanism, column: int, owner: int) -> bool:
+def _is_rotation(mechanism: Mechanism, column: int, owner: int) -> bool:
+    """Return whether the coordinate is a rotation, not a translation."""
     return column >= 3 if owner == ROOT else mechanism.bodies[owner].revolute
 
 
-def _aligned(mechanism: Mechanism, poses: Poses, body: int, p: Array) -> tuple[list[Array], list[Array]]:
-    """Columns (linear, angular), in world axes, of the point p fixed to `body`."""
+def _world_columns(
+    mechanism: Mechanism, poses: Poses, body: int, p: Array
+) -> tuple[list[Array], list[Array]]:
+    """Return the columns (linear, angular), in world axes, of the point p fixed to `body`."""
     zero = 0 * p
     linear, angular = [zero] * mechanism.nv, [zero] * mechanism.nv
     for column, z, o, owner in _moving_columns(mechanism, poses, body):
-        if _turns(mechanism, column, owner):
+        if _is_rotation(mechanism, column, owner):
             linear[column], angular[column] = cross(z, p - o), z + zero
         else:
             linear[column] = z + zero
     return linear, angular
 
 
-def _referred(linear: list[Array], angular: list[Array], R: Array, p: Array, reference: Reference) -> Array:
-    J = _stacked(linear, angular, p)
+def _express(linear: list[Array], angular: list[Array], R: Array, p: Array, reference: Reference) -> Array:
+    """Stack columns in world axes at p into a matrix (..., 6, nv) in the given reference."""
+    J = _stack_columns(linear, angular, p)
     if reference == "local":
         R_T = np.swapaxes(R, -1, -2)
         return np.concatenate([R_T @ J[..., :3, :], R_T @ J[..., 3:, :]], axis=-2)
@@ -117,7 +125,7 @@ def _referred(linear: list[Array], angular: list[Array], R: Array, p: Array, ref
     return J
 
 
-def _stacked(linear: list[Array], angular: list[Array], p: Array) -> Array:
+def _stack_columns(linear: list[Array], angular: list[Array], p: Array) -> Array:
     if not linear:
         return np.zeros((*p.shape[:-1], 6, 0))
     columns = [np.concatenate(pair, axis=-1) for pair in zip(linear, angular, strict=True)]

@@ -1,4 +1,4 @@
-"""Where the bodies are and how they move, in world axes (Featherstone 2008, sections 4.4 and 5.3)."""
+"""Poses and twists of the bodies, in world axes (Featherstone 2008, sections 4.4 and 5.3)."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dynx.model.mechanism import ROOT, Mechanism, joint_motion
-from dynx.spatial.scalar import Array, along
+from dynx.spatial.scalar import Array, append_axis
 from dynx.spatial.se3 import homogeneous
 from dynx.spatial.so3 import cross, rotate, rotation_from_quat
 
@@ -24,8 +24,11 @@ class Poses:
 
 
 @dataclass(frozen=True)
-class Twists:
-    """Velocity in the world of each body: of its origin (linear) and of turning (angular)."""
+class BodyVectors:
+    """A linear and an angular vector of each body, in world axes, root body first.
+
+    Velocities of the origins and angular velocities, or accelerations of both.
+    """
 
     linear: tuple[Array, ...]
     angular: tuple[Array, ...]
@@ -35,12 +38,12 @@ class Twists:
 
 
 def joint_value(mechanism: Mechanism, x: Array, body: int) -> Array:
-    """The entry of a tree configuration or velocity (..., n) that belongs to the body's joint."""
+    """Return the entry (...,) for the body's joint of a tree configuration or velocity (..., n)."""
     return np.asarray(x[..., x.shape[-1] - len(mechanism.bodies) + body])
 
 
 def body_poses(mechanism: Mechanism, q: Array) -> Poses:
-    """Poses of all bodies at the tree configuration `q` (..., nq)."""
+    """Return the poses of all bodies at the tree configuration `q` (..., nq)."""
     if mechanism.floating:
         R, p = [rotation_from_quat(q[..., 3:7])], [q[..., :3]]
     else:
@@ -55,20 +58,20 @@ def body_poses(mechanism: Mechanism, q: Array) -> Poses:
 
 
 def poses_from_frames(mechanism: Mechanism, placements: Array) -> Poses:
-    """Poses of all bodies, read off the placements (..., n_frames, 4, 4) of all frames."""
+    """Return the poses of all bodies, taken from the placements (..., n_frames, 4, 4) of all frames."""
     own = [placements[..., index, :, :] for index in mechanism.body_frames]
     return Poses(tuple(T[..., :3, :3] for T in own), tuple(T[..., :3, 3] for T in own))
 
 
 def frame_pose(mechanism: Mechanism, poses: Poses, frame: int) -> tuple[Array, Array]:
-    """Pose (R, p) in the world of frame number `frame`."""
+    """Return the pose (R, p) of frame number `frame` in the world."""
     fixed = mechanism.frames[frame]
     R, p = poses[fixed.body]
     return R @ fixed.R, p + rotate(R, fixed.p)
 
 
 def frame_placements(mechanism: Mechanism, q: Array) -> Array:
-    """T_world_frame of every frame (..., n_frames, 4, 4)."""
+    """Return T_world_frame of every frame (..., n_frames, 4, 4)."""
     poses = body_poses(mechanism, q)
     shape = (*q.shape[:-1], 4, 4)
     all_frames = (homogeneous(*frame_pose(mechanism, poses, k)) for k in range(len(mechanism.frames)))
@@ -76,29 +79,29 @@ def frame_placements(mechanism: Mechanism, q: Array) -> Array:
 
 
 def joint_axis(mechanism: Mechanism, poses: Poses, body: int) -> Array:
-    """The joint's unit axis in the world (..., 3)."""
+    """Return the unit axis (..., 3) of the body's joint in world axes."""
     return rotate(poses[body][0], mechanism.bodies[body].axis)
 
 
-def body_twists(mechanism: Mechanism, poses: Poses, v: Array) -> Twists:
-    """Velocities of all bodies in the world at the tree velocity `v` (..., nv)."""
+def body_twists(mechanism: Mechanism, poses: Poses, v: Array) -> BodyVectors:
+    """Return the velocities of all bodies in world axes at the tree velocity `v` (..., nv)."""
     R_root, p_root = poses[ROOT]
     if mechanism.floating:
         linear, angular = [rotate(R_root, v[..., :3])], [rotate(R_root, v[..., 3:6])]
     else:
         linear, angular = [0 * p_root], [0 * p_root]
     for index, body in enumerate(mechanism.bodies):
-        speed = joint_axis(mechanism, poses, index) * along(joint_value(mechanism, v, index))
-        turning = angular[body.parent + 1]
-        reach = poses[index][1] - poses[body.parent][1]
-        carried = linear[body.parent + 1] + cross(turning, reach)
-        linear.append(carried if body.revolute else carried + speed)
-        angular.append(turning + speed if body.revolute else turning)
-    return Twists(tuple(linear), tuple(angular))
+        speed = joint_axis(mechanism, poses, index) * append_axis(joint_value(mechanism, v, index))
+        omega = angular[body.parent + 1]
+        lever = poses[index][1] - poses[body.parent][1]
+        velocity = linear[body.parent + 1] + cross(omega, lever)
+        linear.append(velocity if body.revolute else velocity + speed)
+        angular.append(omega + speed if body.revolute else omega)
+    return BodyVectors(tuple(linear), tuple(angular))
 
 
 def ancestry(mechanism: Mechanism, body: int) -> list[int]:
-    """The moving bodies from `body` down to the root, `body` first."""
+    """List the moving bodies on the path from `body` to the root, `body` first and the root left out."""
     path = []
     while body != ROOT:
         path.append(body)

@@ -1,4 +1,4 @@
-"""Solving A x = b for a symmetric positive definite A of any scalar, branching on no value."""
+"""Solve A x = b for a symmetric positive definite A of any scalar type, without branching on values."""
 
 from __future__ import annotations
 
@@ -9,23 +9,26 @@ from dynx.spatial.scalar import Array
 Factors = tuple[list[list[Array]], list[Array]]
 
 
-def solve_positive(A: Array, b: Array) -> Array:
-    """x (..., n) with A x = b by A = L D L' (Golub and Van Loan, algorithm 4.1.2).
+def solve_positive_definite(A: Array, b: Array) -> Array:
+    """Return x (..., n) with A x = b, for A (..., n, n), by A = L D L' (Golub and Van Loan, algorithm 4.1.2).
 
-    Square roots are not needed, so any field of numbers will do; a singular A divides by zero.
+    The factorisation needs no square roots. A singular A causes a division by zero.
     """
-    return substituted(*factorised(A), b)
+    return solve_ldl(*ldl_factors(A), b)
 
 
 def solve_columns(A: Array, B: Array) -> Array:
-    """X (n, m) with A X = B: for floats by LAPACK, for any other scalar as `solve_positive`."""
+    """Return X (n, m) with A X = B: floats by LAPACK, any other scalar by `solve_positive_definite`."""
     if A.dtype != object:
         return np.asarray(np.linalg.solve(A, B))
-    return np.asarray(solve_positive(A, B.T).T)
+    return np.asarray(solve_positive_definite(A, B.T).T)
 
 
-def factorised(A: Array) -> Factors:
-    """L, whose row i holds the i entries left of the diagonal, and D, with A = L D L' and 1 on it."""
+def ldl_factors(A: Array) -> Factors:
+    """Return L and D with A = L D L'.
+
+    L has a unit diagonal; its row i holds the i entries left of the diagonal.
+    """
     n = A.shape[-1]
     L: list[list[Array]] = [[] for _ in range(n)]
     D: list[Array] = []
@@ -44,8 +47,8 @@ def factorised(A: Array) -> Factors:
     return L, D
 
 
-def substituted(L: list[list[Array]], D: list[Array], b: Array) -> Array:
-    """x (..., n) with L D L' x = b."""
+def solve_ldl(L: list[list[Array]], D: list[Array], b: Array) -> Array:
+    """Return x (..., n) with L D L' x = b, by forward and back substitution."""
     if not D:
         return b
     n = len(D)

@@ -208,7 +208,7 @@ class Symbol:
         """The larger one; `other` if either is NaN."""
         return self._with("max", other)
 
-    def bounded(self, most: Any) -> Symbol:
+    def clamp(self, most: Any) -> Symbol:
         """This cut to -`most` and `most`; NaN stays NaN."""
         return self._from("max", -most)._from("min", most)
 

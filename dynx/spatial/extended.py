@@ -1,6 +1,6 @@
-"""Extended precision: NumPy's long double, in which inertias are lumped and turned before they are rounded.
+"""Extended precision (NumPy's long double), in which inertias are merged and rotated before rounding.
 
-It has 64 bits or more of mantissa where the platform has such a type, and those of float64 elsewhere.
+Its mantissa has 64 bits or more where the platform has such a type, and the 53 of float64 elsewhere.
 """
 
 from __future__ import annotations
@@ -10,19 +10,19 @@ import numpy as np
 from dynx.spatial.scalar import Array
 
 FLOAT64_EPS = float(np.finfo(np.float64).eps)
-"""Distance from 1.0 to the next double, 2.2e-16: what extended precision is there to stay below."""
+"""Machine epsilon of float64, 2.2e-16: the distance from 1.0 to the next double."""
 
 
 def longdouble(numbers: object) -> Array:
-    """The numbers as an array of long doubles."""
+    """Convert nested numbers to an array of long doubles."""
     return np.asarray(numbers, dtype=np.longdouble)
 
 
-def eigen(symmetric: Array) -> tuple[Array, Array]:
-    """Eigenvalues (3,) and eigenvectors (3, 3), as columns, of a symmetric matrix, by Jacobi's method.
+def jacobi_eigen(symmetric: Array) -> tuple[Array, Array]:
+    """Return the eigenvalues (3,) and eigenvectors (3, 3), as columns, of a symmetric matrix.
 
-    Works in the precision of `symmetric`, which LAPACK does not (Golub and Van Loan, Matrix
-    Computations, section 8.5).
+    Jacobi's method (Golub and Van Loan, Matrix Computations, section 8.5), in the precision of
+    `symmetric`; LAPACK works in float64 only.
     """
     A = np.array(symmetric)
     V = np.eye(3, dtype=A.dtype)
@@ -37,10 +37,10 @@ def eigen(symmetric: Array) -> tuple[Array, Array]:
             tangent = (1 if ratio >= 0 else -1) / (abs(ratio) + np.hypot(ratio, 1))
             cosine = 1 / np.hypot(tangent, 1)
             sine = tangent * cosine
-            turn = np.eye(3, dtype=A.dtype)
-            turn[i, i] = turn[j, j] = cosine
-            turn[i, j], turn[j, i] = sine, -sine
-            A = turn.T @ A @ turn
+            rotation = np.eye(3, dtype=A.dtype)
+            rotation[i, i] = rotation[j, j] = cosine
+            rotation[i, j], rotation[j, i] = sine, -sine
+            A = rotation.T @ A @ rotation
             A[i, j] = A[j, i] = 0
-            V = V @ turn
+            V = V @ rotation
     return np.diagonal(A).copy(), V

@@ -1,8 +1,8 @@
-"""Elementary functions over arrays of any scalar: float64, 50-digit numbers, traced symbols.
+"""Elementary functions over arrays of any scalar type: float64, 50-digit numbers, traced symbols.
 
-The algorithms of `dynx.rbd` are written once and evaluated on several kinds of number. NumPy's
-operators already dispatch on the elements of an object array; its ``sin`` does so only where the
-element has a method of that name. The functions here close that gap.
+The algorithms of `dynx.rbd` are written once and evaluated on several scalar types. NumPy's operators
+dispatch on the elements of an object array, but ``np.sin`` does so only if the element has a method of that
+name, which 50-digit numbers lack. The functions here work on all of them.
 """
 
 from __future__ import annotations
@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[Any]
-"""An array of scalars: float64, or object for every other kind of number."""
+"""An array of scalars: dtype float64, or object for every other scalar type."""
 
 Floats = NDArray[np.float64]
+"""An array of float64."""
 
 
 def sin(x: Array) -> Array:
@@ -49,46 +50,47 @@ def arctan(x: Array) -> Array:
 
 
 def sign(x: Array) -> Array:
-    """-1, 0 or 1 of each element."""
+    """Sign of each element: -1, 0 or 1."""
     return _elementwise("sign", x)
 
 
-def clipped(x: Array, limit: Array) -> Array:
-    """Each element cut to -limit and limit (the same number of them, or one); infinite is no limit."""
+def clamp(x: Array, limit: Array) -> Array:
+    """Clamp each element of x (..., n) to [-limit, limit]; `limit`, (n,) or a scalar, may be infinite."""
     x = np.asarray(x)
     if x.dtype != object:
         return np.asarray(np.minimum(np.maximum(x, -limit), limit))
 
-    def one(element: Any, most: Any) -> Any:
-        if np.isinf(most):
+    def clamp_one(element: Any, bound: Any) -> Any:
+        if np.isinf(bound):
             return element
-        if hasattr(element, "bounded"):
-            return element.bounded(most)
-        return min(max(element, -most), most)
+        if hasattr(element, "clamp"):
+            return element.clamp(bound)
+        return min(max(element, -bound), bound)
 
-    return np.asarray(np.frompyfunc(one, 2, 1)(x, limit), dtype=object)
+    return np.asarray(np.frompyfunc(clamp_one, 2, 1)(x, limit), dtype=object)
 
 
-def along(x: Any) -> Array:
-    """x[..., None]: a scalar per sample, ready to multiply a vector per sample.
+def append_axis(x: Any) -> Array:
+    """Return x[..., None]: one scalar per sample, ready to multiply one vector per sample.
 
-    Arithmetic on 0-d object arrays gives bare scalars, which cannot be indexed.
+    Arithmetic on 0-d object arrays returns bare scalars, which cannot be indexed; hence `np.asarray`.
     """
     return np.asarray(np.asarray(x)[..., None])
 
 
 def _elementwise(function: str, x: Array) -> Array:
+    """Apply NumPy's function of this name to floats, the element's method or mpmath's function to others."""
     x = np.asarray(x)
     if x.dtype != object:
         return np.asarray(getattr(np, function)(x))
 
-    def one(element: Any) -> Any:
+    def evaluate_one(element: Any) -> Any:
         method = getattr(element, function, None)
-        # To mpmath's numbers `exp` is their exponent.
+        # `exp` of an mpmath number is an attribute, its exponent.
         if callable(method):
             return method()
-        import mpmath
+        import mpmath  # only the referee needs it; importing dynx must not load it
 
         return getattr(mpmath, {"arctan": "atan"}.get(function, function))(element)
 
-    return np.asarray(np.frompyfunc(one, 1, 1)(x), dtype=object)
+    return np.asarray(np.frompyfunc(evaluate_one, 1, 1)(x), dtype=object)

@@ -1,6 +1,6 @@
 """Rigid transforms: ``T_AB`` maps coordinates in B to coordinates in A and is the pose of B in A.
 
-Homogeneous matrices (..., 4, 4) on the outside; inside `dynx.rbd`, pairs (R, p).
+Public interfaces use homogeneous matrices (..., 4, 4); `dynx.rbd` uses pairs (R, p).
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dynx.spatial.so3 import quat_exp, quat_from_rotation, quat_log, rotate, ske
 
 
 def homogeneous(R: Array, p: Array) -> Array:
-    """The matrix [[R, p], [0, 1]] from R (..., 3, 3) and p (..., 3)."""
+    """Return the matrix [[R, p], [0, 1]] (..., 4, 4) from R (..., 3, 3) and p (..., 3)."""
     shape = np.broadcast_shapes(R.shape[:-2], p.shape[:-1])
     R = np.broadcast_to(R, (*shape, 3, 3))
     p = np.broadcast_to(p, (*shape, 3))
@@ -22,16 +22,16 @@ def homogeneous(R: Array, p: Array) -> Array:
 
 
 def inverse(T: Array) -> Array:
-    """The inverse of a rigid transform, by transposition."""
+    """Return the inverse of a rigid transform T (..., 4, 4), by transposing its rotation."""
     R_T = np.swapaxes(T[..., :3, :3], -1, -2)
     return homogeneous(R_T, -rotate(R_T, T[..., :3, 3]))
 
 
 def se3_exp(linear: Floats, angular: Floats) -> tuple[Floats, Floats]:
-    """Displacement reached by a constant body twist for one unit of time.
+    """Return the displacement reached by a constant body twist in unit time.
 
-    Returns (position (..., 3), quat_xyzw (..., 4)) in the starting frame (Murray, Li and Sastry,
-    A Mathematical Introduction to Robotic Manipulation, eq. 2.36).
+    `linear` [m] and `angular` [rad] are (..., 3). Returns (position (..., 3), quat_xyzw (..., 4)) in the
+    initial frame (Murray, Li and Sastry, A Mathematical Introduction to Robotic Manipulation, eq. 2.36).
     """
     theta2 = np.sum(angular * angular, axis=-1)[..., None, None]
     theta = np.sqrt(theta2)
@@ -46,7 +46,7 @@ def se3_exp(linear: Floats, angular: Floats) -> tuple[Floats, Floats]:
 
 
 def se3_log(position: Floats, quat_xyzw: Floats) -> tuple[Floats, Floats]:
-    """The body twist (linear, angular) that `se3_exp` maps to this displacement."""
+    """Return the body twist (linear (..., 3), angular (..., 3)) that `se3_exp` maps to this displacement."""
     angular = quat_log(quat_xyzw)
     theta2 = np.sum(angular * angular, axis=-1)[..., None, None]
     theta = np.sqrt(theta2)
@@ -60,9 +60,9 @@ def se3_log(position: Floats, quat_xyzw: Floats) -> tuple[Floats, Floats]:
 
 
 def pose_error(T_world_target: Array, T_world_frame: Array) -> tuple[Array, Array]:
-    """What is left to go from `frame` to `target`, of floats or of symbols.
+    """Return position error [m] and rotation vector [rad], each (..., 3), from `frame` to `target`.
 
-    Returns (position error [m] (..., 3), rotation vector [rad] (..., 3)), both in world axes.
+    Both are in world axes. The poses are (..., 4, 4), of floats or of traced symbols.
     """
     position = T_world_target[..., :3, 3] - T_world_frame[..., :3, 3]
     R = T_world_target[..., :3, :3] @ np.swapaxes(T_world_frame[..., :3, :3], -1, -2)

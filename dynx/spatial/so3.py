@@ -1,8 +1,8 @@
 """Rotations: matrices, roll-pitch-yaw, axis and angle, unit quaternions ordered (x, y, z, w).
 
-Every function takes leading batch axes. Those that must serve `dynx.rbd` (`cross`, `skew`,
-`rotation_about`, `rotation_from_rpy`, `rotation_from_quat`) branch on no value and work on any
-scalar; the others are for float64.
+Every function takes leading batch axes. Those used by `dynx.rbd` (`cross`, `skew`, `rotation_about`,
+`rotation_from_rpy`, `rotation_from_quat`) branch on no value and work on any scalar type; the others are for
+float64.
 """
 
 from __future__ import annotations
@@ -11,37 +11,37 @@ import numpy as np
 
 from dynx.spatial.scalar import Array, Floats, cos, sin
 
-# For each component of a cross product, which come next.
-NEXT, AFTER_NEXT = np.array([1, 2, 0]), np.array([2, 0, 1])
+# The two axes that follow each axis in cyclic order.
+NEXT_AXIS, SECOND_NEXT_AXIS = np.array([1, 2, 0]), np.array([2, 0, 1])
 
 
 def cross(a: Array, b: Array) -> Array:
-    """a x b, for arrays (..., 3)."""
-    # Two products of whole vectors take a third of the time of three components put together.
-    a1, a2 = a.take(NEXT, axis=-1), a.take(AFTER_NEXT, axis=-1)
-    b1, b2 = b.take(NEXT, axis=-1), b.take(AFTER_NEXT, axis=-1)
+    """Return a x b, for arrays (..., 3)."""
+    # Two products of whole vectors take a third of the time of three stacked components.
+    a1, a2 = a.take(NEXT_AXIS, axis=-1), a.take(SECOND_NEXT_AXIS, axis=-1)
+    b1, b2 = b.take(NEXT_AXIS, axis=-1), b.take(SECOND_NEXT_AXIS, axis=-1)
     return np.asarray(a1 * b2 - a2 * b1)
 
 
 def skew(a: Array) -> Array:
-    """The matrix [a] with [a] b = a x b, (..., 3) to (..., 3, 3)."""
+    """Return the matrix [a] (..., 3, 3) with [a] b = a x b, for a (..., 3)."""
     x, y, z = a[..., 0:1], a[..., 1:2], a[..., 2:3]
     zero = x * 0
-    return _matrix([[zero, -z, y], [z, zero, -x], [-y, x, zero]])
+    return _stack_matrix([[zero, -z, y], [z, zero, -x], [-y, x, zero]])
 
 
 def rotate(R: Array, a: Array) -> Array:
-    """R a, for R (..., 3, 3) and a (..., 3)."""
+    """Return R a, for R (..., 3, 3) and a (..., 3)."""
     return np.asarray((R @ a[..., None])[..., 0])
 
 
 def rotate_back(R: Array, a: Array) -> Array:
-    """R^T a, for R (..., 3, 3) and a (..., 3)."""
+    """Return R^T a, for R (..., 3, 3) and a (..., 3)."""
     return np.asarray((np.swapaxes(R, -1, -2) @ a[..., None])[..., 0])
 
 
 def rotation_about(axis: Array, angle: Array) -> Array:
-    """Rotation by `angle` [rad] about the unit vector `axis` (Rodrigues)."""
+    """Return the rotation matrix (..., 3, 3) by `angle` [rad] about the unit vector `axis` (Rodrigues)."""
     angle = np.asarray(angle)
     c, s = cos(angle)[..., None, None], sin(angle)[..., None, None]
     along = axis[..., :, None] * axis[..., None, :]
@@ -50,7 +50,7 @@ def rotation_about(axis: Array, angle: Array) -> Array:
 
 
 def rotation_from_rpy(rpy: Array) -> Array:
-    """URDF's roll, pitch, yaw [rad] (..., 3): R = Rz(yaw) Ry(pitch) Rx(roll)."""
+    """Return R = Rz(yaw) Ry(pitch) Rx(roll) (..., 3, 3) of URDF's roll, pitch, yaw [rad] (..., 3)."""
     c, s = cos(rpy), sin(rpy)
     cr, cp, cy = c[..., 0:1], c[..., 1:2], c[..., 2:3]
     sr, sp, sy = s[..., 0:1], s[..., 1:2], s[..., 2:3]
@@ -59,14 +59,14 @@ def rotation_from_rpy(rpy: Array) -> Array:
         [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
         [-sp, cp * sr, cp * cr],
     ]
-    return _matrix(rows)
+    return _stack_matrix(rows)
 
 
 def rpy_from_rotation(R: Array) -> Array:
-    """The roll, pitch, yaw [rad] of R (..., 3, 3); at pitch = +-90 degrees, yaw is put to 0.
+    """Return roll, pitch, yaw [rad] (..., 3) of R (..., 3, 3); yaw is 0 at pitch = +-90 degrees.
 
-    Roll is taken from Rz(-yaw) R, so that it makes up for a yaw that is ill-determined near
-    pitch = +-90 degrees: the three always give R back to rounding, in long double too.
+    Roll is computed from Rz(-yaw) R, so that it compensates for a yaw that is ill-determined near
+    pitch = +-90 degrees: the three angles reproduce R to rounding, also in long double.
     """
     locked = np.hypot(R[..., 0, 0], R[..., 1, 0]) < 4.0 * np.finfo(float).eps
     yaw = np.where(locked, 0.0, np.arctan2(R[..., 1, 0], R[..., 0, 0]))
@@ -77,32 +77,32 @@ def rpy_from_rotation(R: Array) -> Array:
 
 
 def rotation_from_quat(quat_xyzw: Array) -> Array:
-    """Rotation matrix of a unit quaternion (..., 4); the norm is not checked."""
+    """Return the rotation matrix (..., 3, 3) of a unit quaternion (..., 4); the norm is not checked."""
     x, y, z, w = (quat_xyzw[..., i : i + 1] for i in range(4))
     rows = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
         [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
         [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
     ]
-    return _matrix(rows)
+    return _stack_matrix(rows)
 
 
 def quat_from_rotation(R: Floats) -> Floats:
-    """Unit quaternion (x, y, z, w), w >= 0, of a rotation matrix (..., 3, 3).
+    """Return the unit quaternion (x, y, z, w), w >= 0, of a rotation matrix (..., 3, 3).
 
-    The products of each component with all four are sums of entries of R. Those of the largest are
-    taken, divided by their length (Shepperd 1978; Markley and Crassidis 2014, section 2.9.3).
+    The products of one component with all four are sums of entries of R. Those of the largest component,
+    normalised, are the quaternion (Shepperd 1978; Markley and Crassidis 2014, section 2.9.3).
     """
     R = np.asarray(R, dtype=float)
     m = [[R[..., i, j] for j in range(3)] for i in range(3)]
     trace = m[0][0] + m[1][1] + m[2][2]
-    skewed = [m[2][1] - m[1][2], m[0][2] - m[2][0], m[1][0] - m[0][1]]
+    differences = [m[2][1] - m[1][2], m[0][2] - m[2][0], m[1][0] - m[0][1]]
     rows = []
     for i in range(3):
         row = [m[i][j] + m[j][i] for j in range(3)]
         row[i] = 1.0 + 2.0 * m[i][i] - trace
-        rows.append(np.stack([*row, skewed[i]], axis=-1))
-    rows.append(np.stack([*skewed, 1.0 + trace], axis=-1))
+        rows.append(np.stack([*row, differences[i]], axis=-1))
+    rows.append(np.stack([*differences, 1.0 + trace], axis=-1))
     products = np.stack(rows, axis=-2)
     largest = np.argmax(np.diagonal(products, axis1=-2, axis2=-1), axis=-1)
     quat = np.take_along_axis(products, largest[..., None, None], axis=-2)[..., 0, :]
@@ -111,7 +111,7 @@ def quat_from_rotation(R: Floats) -> Floats:
 
 
 def quat_product(a_xyzw: Floats, b_xyzw: Floats) -> Floats:
-    """Hamilton product a b, so that R(a b) = R(a) R(b)."""
+    """Return the Hamilton product a b (..., 4), so that R(a b) = R(a) R(b)."""
     av, aw = a_xyzw[..., :3], a_xyzw[..., 3:]
     bv, bw = b_xyzw[..., :3], b_xyzw[..., 3:]
     vector = aw * bv + bw * av + cross(av, bv)
@@ -120,27 +120,27 @@ def quat_product(a_xyzw: Floats, b_xyzw: Floats) -> Floats:
 
 
 def quat_exp(rotation_vector: Floats) -> Floats:
-    """Unit quaternion (x, y, z, w) of a rotation vector [rad] (..., 3)."""
+    """Return the unit quaternion (x, y, z, w) of a rotation vector [rad] (..., 3)."""
     half = 0.5 * np.linalg.norm(rotation_vector, axis=-1, keepdims=True)
     vector = 0.5 * rotation_vector * np.sinc(half / np.pi)
     return np.concatenate([vector, np.cos(half)], axis=-1)
 
 
 def quat_log(quat_xyzw: Floats) -> Floats:
-    """Rotation vector [rad] (..., 3), of length at most pi, of a unit quaternion."""
+    """Return the rotation vector [rad] (..., 3), of norm at most pi, of a unit quaternion."""
     vector, w = quat_xyzw[..., :3], quat_xyzw[..., 3:]
     sign = np.where(w < 0, -1.0, 1.0)
     length = np.linalg.norm(vector, axis=-1, keepdims=True)
     angle = 2.0 * np.arctan2(length, sign * w)
-    # Near the identity 2 atan2(n, w) / n tends to 2 / w; n = 0 must not divide.
+    # Near the identity 2 atan2(n, w) / n tends to 2 / w; division by n = 0 is avoided.
     scale = np.where(
         length > 1e-12, angle / np.where(length > 0, length, 1.0), 2.0 / np.abs(np.where(w == 0, 1.0, w))
     )
     return np.asarray(sign * scale * vector)
 
 
-def _matrix(rows: list[list[Array]]) -> Array:
-    """The matrix (..., m, n) of entries (..., 1); stacking rows of stacked entries takes thrice as long."""
+def _stack_matrix(rows: list[list[Array]]) -> Array:
+    """Return the matrix (..., m, n) of entries (..., 1); stacking twice would take three times as long."""
     entries = [entry for row in rows for entry in row]
     shape = (*entries[0].shape[:-1], len(rows), len(rows[0]))
     return np.concatenate(entries, axis=-1).reshape(shape)

@@ -14,7 +14,7 @@ from dynx.control.gains import feedback_gains
 from dynx.control.saturation import checked_limit
 from dynx.errors import ArgumentError, GainError, LimitError, UnknownNameError
 from dynx.model.loading import load
-from dynx.spatial.scalar import clipped
+from dynx.spatial.scalar import clamp
 
 ARM = load("ur5")
 reals = st.floats(1e-3, 1e3)
@@ -73,7 +73,7 @@ def test_other_arguments_of_laws() -> None:
 
 @given(st.lists(st.floats(-1e6, 1e6), min_size=6, max_size=6), st.lists(reals, min_size=6, max_size=6))
 def test_clipping_keeps_what_is_inside_and_the_sign_of_the_rest(tau: list[float], limit: list[float]) -> None:
-    cut = clipped(np.array(tau), np.array(limit))
+    cut = clamp(np.array(tau), np.array(limit))
     assert np.all(np.abs(cut) <= limit)
     inside = np.abs(tau) <= limit
     np.testing.assert_array_equal(cut[inside], np.array(tau)[inside])

@@ -73,8 +73,8 @@ CHECKS_FAULTS = (
     Fault(
         "dx107_inertia_merged_in_the_wrong_frame",
         "dynx.rules.inertia.merging",
-        right="seen_from(*group.pose(name, into))",
-        wrong="seen_from(*group.pose(into, name))",
+        right="transform(*group.pose(name, into))",
+        wrong="transform(*group.pose(into, name))",
         test_file="tests/rules/test_dx1_remedies.py",
         test="test_a_root_without_inertial_gets_that_of_the_body_welded_to_it",
     ),

@@ -68,7 +68,7 @@ DESCRIPTION_FAULTS = (
     Fault(
         "merged_link_not_moved_to_its_place",
         "dynx.model.mechanism",
-        right="lumped[body] = lumped[body] + own.seen_from(R, p)",
+        right="lumped[body] = lumped[body] + own.transform(R, p)",
         wrong="lumped[body] = lumped[body] + own",
         test_file="tests/contract/test_bodies.py",
         test="test_centre_of_mass_and_gravity_are_those_of_the_links[reference-fixed]",

@@ -60,7 +60,7 @@ def fused(model: Model) -> LoadedModel:
         mass = float(inertia.mass)
         center = inertia.first_moment / mass if mass else np.zeros(3)
         arm = skew(center)
-        tensor = inertia.second_moment + mass * (arm @ arm)
+        tensor = inertia.rotational_inertia + mass * (arm @ arm)
         lumps[first] = LoadedInertial(mass, np.asarray(center), np.asarray(tensor), tuple(others))
     return replace(held(model), links=lumps)
 

@@ -50,5 +50,5 @@ def total_inertia(model: Model, q: Floats) -> RigidInertia:
         inertial = model.inertial(name)
         own = inertial.origin.matrix
         about = inertia_about_origin(np.array(inertial.mass), own[:3, 3], own[:3, :3], inertial.tensor)
-        total = total + about.seen_from(T[:3, :3], T[:3, 3])
+        total = total + about.transform(T[:3, :3], T[:3, 3])
     return total

@@ -49,11 +49,11 @@ def test_frames_and_total_inertia_are_those_of_the_links(data: st.DataObject) ->
 
     total = RigidInertia(np.zeros(()), np.zeros(3), np.zeros((3, 3)))
     for body, inertia in [(ROOT, mechanism.root), *enumerate(b.inertia for b in mechanism.bodies)]:
-        total = total + inertia.seen_from(*poses[body])
+        total = total + inertia.transform(*poses[body])
     expected = total_inertia(model, q)
     weight, reach = max(1.0, model.total_mass), size * len(model.links)
     assert_same_to_rounding(total.mass, model.total_mass, 4 * len(model.links), size=weight)
-    for field in ("mass", "first_moment", "second_moment"):
+    for field in ("mass", "first_moment", "rotational_inertia"):
         got, wanted = getattr(total, field), getattr(expected, field)
         assert_same_to_rounding(got, wanted, 128 * len(model.links), size=weight * reach**2)
 
@@ -109,7 +109,7 @@ def test_the_same_text_lumps_fifty_digit_numbers(model: Model) -> None:
         assert_same_to_rounding(np.array(ours.R, dtype=float), theirs.R, 64 * len(model.links))
         assert_same_to_rounding(np.array(ours.p, dtype=float), theirs.p, 64 * len(model.links), size=reach)
     for ours_inertia, theirs_inertia, size in pairs:
-        for field in ("mass", "first_moment", "second_moment"):
+        for field in ("mass", "first_moment", "rotational_inertia"):
             got = np.array(getattr(ours_inertia, field), dtype=float)
             wanted = getattr(theirs_inertia, field)
             assert_same_to_rounding(got, wanted, 128 * len(model.links), size=size)

@@ -1,4 +1,4 @@
-"""The inertial regressor: what it says of parameters is what the robot does with them."""
+"""The inertial regressor against inverse dynamics with changed inertial parameters."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from dynx.rbd import rnea
 from dynx.rbd.kinematics import body_poses
 from dynx.rbd.regressor import (
     PARAMETERS,
-    inertia_of,
+    inertia_from_parameters,
     inertial_parameters,
     inertial_regressor,
     link_inertia,
-    parameters_of,
+    parameters_from_inertia,
 )
 from dynx.reference.backend import ReferenceBackend
 from dynx.spatial.scalar import Array
 from dynx.testing.strategies import models, samples
 from tests.backends.robots import BASES, assert_close, chain, mixed_robot, motion
 from tests.closeness import Closeness, samples_at
-from tests.rbd.exact import CLOSE, distance, exact_mechanism, exactly, fifty_digits, tree_q
+from tests.rbd.exact import IDENTITY_TOLERANCE, distance, exact_mechanism, exactly, fifty_digits, tree_q
 
 MODELS = [mixed_robot(base, mimic=mimic) for base in BASES for mimic in (False, True)]
 each_model = pytest.mark.parametrize("model", MODELS, ids=["fixed", "mimic", "floating", "floating-mimic"])
@@ -42,12 +42,12 @@ def test_torque_is_regressor_times_parameters_in_50_digits(case: tuple[Model, tu
     with fifty_digits():
         mechanism = exact_mechanism(model)
         S = np.eye(mechanism.nv) if mechanism.coupling is None else mechanism.coupling.matrix()
-        tree, speed, change = tree_q(model, q), exactly(S) @ exactly(v), exactly(S) @ exactly(a)
-        poses = body_poses(mechanism, tree)
-        Y = inertial_regressor(mechanism, poses, speed, change, range(len(model.links)))
+        q, v, a = tree_q(model, q), exactly(S) @ exactly(v), exactly(S) @ exactly(a)
+        poses = body_poses(mechanism, q)
+        Y = inertial_regressor(mechanism, poses, v, a, range(len(model.links)))
         assert Y.shape == (mechanism.nv, 10 * len(model.links))
-        tau = rnea.inverse_dynamics(mechanism, tree, speed, change)
-        assert distance(Y @ inertial_parameters(model, exactly), tau) < CLOSE
+        tau = rnea.inverse_dynamics(mechanism, q, v, a)
+        assert distance(Y @ inertial_parameters(model, exactly), tau) < IDENTITY_TOLERANCE
 
 
 @given(models(max_links=5, base="either").flatmap(lambda m: samples(m).map(lambda s: (m, s))))
@@ -55,7 +55,7 @@ def test_native_and_derived_regressors_agree(case: tuple[Model, tuple[Array, ...
     model, (q, v, a) = case
     close = Closeness(samples_at(model, q, v, a))
     reference = ReferenceBackend(model).inertial_regressor(q, v, a)
-    # Pinocchio cannot hold every inertia, but the regressor does not ask for inertias.
+    # Pinocchio cannot represent every inertia, but its regressor uses no inertia.
     bare = replace(model, links=tuple(replace(link, inertial=None) for link in model.links))
     engine = PinocchioBackend(bare)
     close.check("inertial_regressor", engine.inertial_regressor(q, v, a), reference)
@@ -79,7 +79,7 @@ def test_a_column_is_the_torque_of_one_parameter(model: Model, link: str) -> Non
     start = 10 * link_number(model, link)
     Y = ReferenceBackend(model).inertial_regressor(q, v, a)
     before = ReferenceBackend(model).inverse_dynamics(q, v, a)
-    # The mass of a body at the frame's origin, then a tensor there: both linear in what is changed.
+    # A point mass at the origin of the link frame, then an inertia tensor: the torque is linear in both.
     changes = {
         0: Inertial(2.0),
         4: Inertial(ixx=2.0),
@@ -97,16 +97,16 @@ def test_a_column_is_the_torque_of_one_parameter(model: Model, link: str) -> Non
 
 
 @pytest.mark.parametrize("axis", range(3))
-def test_a_first_moment_is_mass_moved_without_mass(axis: int) -> None:
+def test_column_of_a_first_moment(axis: int) -> None:
     model = MODELS[2]
     q, v, a = motion(model)
     Y = ReferenceBackend(model).inertial_regressor(q, v, a)
     own = link_inertia(model, "link6")
-    parameters = parameters_of(own)
+    parameters = parameters_from_inertia(own)
     parameters[1 + axis] += 0.5
     mechanism = model.mechanism
     frame = mechanism.frames[link_number(model, "link6")]
-    change = inertia_of(parameters - parameters_of(own)).seen_from(frame.R, frame.p)
+    change = inertia_from_parameters(parameters - parameters_from_inertia(own)).transform(frame.R, frame.p)
     bodies = list(mechanism.bodies)
     bodies[frame.body] = replace(bodies[frame.body], inertia=bodies[frame.body].inertia + change)
     after = rnea.inverse_dynamics(replace(mechanism, bodies=tuple(bodies)), q, v, a)
@@ -115,7 +115,7 @@ def test_a_first_moment_is_mass_moved_without_mass(axis: int) -> None:
     assert_close((after - before) / 0.5, column, float(np.max(np.abs(before))))
 
 
-def test_what_is_welded_to_the_world_has_zero_columns() -> None:
+def test_links_fixed_to_the_world_have_zero_columns() -> None:
     model = mixed_robot()
     Y = ReferenceBackend(model).inertial_regressor(*motion(model))
     np.testing.assert_array_equal(Y[:, :10], 0.0)
@@ -126,7 +126,7 @@ def test_what_is_welded_to_the_world_has_zero_columns() -> None:
 
 
 @pytest.mark.parametrize("joints", [0, 1])
-def test_the_smallest_robots(joints: int) -> None:
+def test_robots_with_no_joint_and_with_one(joints: int) -> None:
     model = chain(joints)
     for engine in (ReferenceBackend(model), PinocchioBackend(model)):
         for size in ((), (4,), (0,)):
@@ -145,15 +145,15 @@ def test_parameters_of_a_link() -> None:
     own = parameters[link_number(model, "link6")]
     assert own[0] == inertial.mass
     np.testing.assert_allclose(own[1:4], inertial.mass * np.array(inertial.origin.xyz), rtol=1e-15)
-    inertia = inertia_of(own)
-    np.testing.assert_array_equal(parameters_of(inertia), own)
-    np.testing.assert_array_equal(inertia.second_moment, inertia.second_moment.T)
+    inertia = inertia_from_parameters(own)
+    np.testing.assert_array_equal(parameters_from_inertia(inertia), own)
+    np.testing.assert_array_equal(inertia.rotational_inertia, inertia.rotational_inertia.T)
 
 
 def with_body(model: Model, link: str, added: Inertial) -> Model:
-    """The model with a body at the origin of a link's frame welded to that link."""
-    weld = Joint("added_weld", "fixed", link, "added")
+    """Return the model with a body rigidly connected to `link`, its inertial given in the link frame."""
+    joint = Joint("added_joint", "fixed", link, "added")
     changed = Model.build(
-        "changed", [*model.links, Link("added", added)], [*model.joints, weld], gravity=model.gravity
+        "changed", [*model.links, Link("added", added)], [*model.joints, joint], gravity=model.gravity
     )
     return changed.with_base(model.base)

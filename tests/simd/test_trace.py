@@ -19,7 +19,7 @@ from dynx.simd.program import Port, Program
 from dynx.simd.simplify import FAST, STRICT
 from dynx.simd.target import host
 from dynx.simd.trace import trace
-from dynx.spatial.scalar import Array, clipped, cos, sin, sqrt
+from dynx.spatial.scalar import Array, clamp, cos, sin, sqrt
 
 
 def test_a_function_of_arrays() -> None:
@@ -181,10 +181,10 @@ def test_tracing_ends_with_a_check_of_what_it_made(monkeypatch: pytest.MonkeyPat
 @pytest.mark.parametrize("fast", [True, False])
 def test_cutting_keeps_what_is_no_number(fast: bool) -> None:
     limit = np.array([1.0, 1.0, 1.0, np.inf, 2.0])
-    program = trace(lambda x: clipped(x, limit), {"x": (5,)}, simplify=FAST if fast else STRICT)
+    program = trace(lambda x: clamp(x, limit), {"x": (5,)}, simplify=FAST if fast else STRICT)
     x = np.array([[np.nan, np.inf, -3.0, np.nan, 0.5]])
     found = np.empty((1, 5))
     kernel = Kernel(program, settings=Settings(host().lanes, fast=fast))
     kernel([x], [found])
-    np.testing.assert_array_equal(found, clipped(x, limit))
+    np.testing.assert_array_equal(found, clamp(x, limit))
     np.testing.assert_array_equal(found, [[np.nan, 1.0, -1.0, np.nan, 0.5]])

@@ -20,8 +20,8 @@ from tests.spatial.test_so3 import lengths
 Floats = NDArray[np.float64]
 Triple = tuple[float, float, float]
 
-# Around the length at which closed forms hand over to series.
-turns = st.one_of(lengths, st.floats(0.009, 0.011))
+# Angles [rad], among them those around the switch between closed forms and series.
+angles = st.one_of(lengths, st.floats(0.009, 0.011))
 
 
 @given(poses())
@@ -30,9 +30,9 @@ def test_inverse_is_the_matrix_inverse(T_AB: Floats) -> None:
     np.testing.assert_array_equal(inverse(inverse(T_AB))[:3, :3], T_AB[:3, :3])
 
 
-@given(vectors(), unit_vectors(), turns)
-def test_exp_is_the_exponential_of_the_twist(linear: Triple, axis: Triple, turn: float) -> None:
-    v, w = np.array(linear), np.array(axis) * turn
+@given(vectors(), unit_vectors(), angles)
+def test_exp_is_the_exponential_of_the_twist(linear: Triple, axis: Triple, angle: float) -> None:
+    v, w = np.array(linear), np.array(axis) * angle
     position, quat = se3_exp(v, w)
     with mpmath.workdps(40):
         twist = mpmath.zeros(4)
@@ -45,12 +45,12 @@ def test_exp_is_the_exponential_of_the_twist(linear: Triple, axis: Triple, turn:
     assert_same_to_rounding(homogeneous(rotation_from_quat(quat), position), expected, 64, size=2.0)
 
 
-@given(vectors(), unit_vectors(), turns.filter(lambda turn: turn < math.pi - 1e-9))
-def test_log_undoes_exp(linear: Triple, axis: Triple, turn: float) -> None:
-    v, w = np.array(linear), np.array(axis) * turn
+@given(vectors(), unit_vectors(), angles.filter(lambda angle: angle < math.pi - 1e-9))
+def test_log_undoes_exp(linear: Triple, axis: Triple, angle: float) -> None:
+    v, w = np.array(linear), np.array(axis) * angle
     linear_back, angular_back = se3_log(*se3_exp(v, w))
     assert_same_to_rounding(angular_back, w, 16, size=4.0)
-    # V^-1 is of size theta / (2 sin(theta / 2)) <= pi / 2, and V of size 1.
+    # The norm of V^-1 is theta / (2 sin(theta / 2)) <= pi / 2, that of V at most 1.
     assert_same_to_rounding(linear_back, v, 128, size=4.0)
 
 
@@ -66,12 +66,12 @@ def test_exp_undoes_log(T_AB: Floats, sign: float) -> None:
 def test_pose_error_leads_to_the_target(T_world_target: Floats, T_world_frame: Floats) -> None:
     position, rotation = pose_error(T_world_target, T_world_frame)
     np.testing.assert_array_equal(position, T_world_target[:3, 3] - T_world_frame[:3, 3])
-    turned = Rotation.from_rotvec(rotation).as_matrix() @ T_world_frame[:3, :3]
-    assert_same_to_rounding(turned, T_world_target[:3, :3], 128)
+    reached = Rotation.from_rotvec(rotation).as_matrix() @ T_world_frame[:3, :3]
+    assert_same_to_rounding(reached, T_world_target[:3, :3], 128)
 
 
 @given(poses())
-def test_no_pose_error_to_itself(T_AB: Floats) -> None:
+def test_pose_error_to_itself_is_zero(T_AB: Floats) -> None:
     position, rotation = pose_error(T_AB, T_AB)
     np.testing.assert_array_equal(position, np.zeros(3))
     assert_same_to_rounding(rotation, np.zeros(3), 16)

@@ -31,10 +31,10 @@ from tests.spatial.rounding import assert_same_to_rounding
 
 Floats = NDArray[np.float64]
 
-# Pitch at and next to the attitude at which roll and yaw turn about the same axis.
+# Pitch at and near gimbal lock, where roll and yaw rotate about the same axis.
 STEPS = (0.0, 1e-17, 1e-16, 1e-15, 1e-12, 1e-10, 9e-10, 1.1e-9, 1e-8, 1e-6, 1e-4, 1e-2)
 near_lock = st.builds(
-    lambda side, step, way: side * (math.pi / 2 + way * step),
+    lambda side, step, direction: side * (math.pi / 2 + direction * step),
     st.sampled_from((1, -1)),
     st.sampled_from(STEPS),
     st.sampled_from((1, -1)),
@@ -42,7 +42,7 @@ near_lock = st.builds(
 angle = st.floats(-math.pi, math.pi)
 rpys = st.tuples(angle, st.one_of(angle, near_lock), angle).map(np.array)
 
-# A rotation vector of any length up to half a turn, the smallest floats among them.
+# Norms of a rotation vector up to pi [rad], the smallest floats among them.
 lengths = st.one_of(
     st.sampled_from((0.0, 5e-324, 1e-200, 1e-30, 1e-12, 1e-8, 1e-4, 1e-2, 1.0, 3.0)),
     st.sampled_from(STEPS).map(lambda step: math.pi - step),
@@ -56,13 +56,13 @@ def test_rpy_is_scipys_extrinsic_xyz(rpy: Floats) -> None:
 
 
 @given(rpys)
-def test_rpy_of_a_rotation_gives_the_rotation_back(rpy: Floats) -> None:
+def test_rpy_reproduces_the_rotation(rpy: Floats) -> None:
     R = rotation_from_rpy(rpy)
     assert_same_to_rounding(rotation_from_rpy(rpy_from_rotation(R)), R, 24)
 
 
 @given(quaternions())
-def test_rpy_of_any_attitude_gives_it_back(quat: Floats) -> None:
+def test_rpy_reproduces_any_orientation(quat: Floats) -> None:
     R = rotation_from_quat(quat)
     assert_same_to_rounding(rotation_from_rpy(rpy_from_rotation(R)), R, 24)
 
@@ -77,10 +77,11 @@ def test_yaw_is_zero_where_it_is_undetermined(side: int) -> None:
 
 
 @given(unit_vectors(), st.floats(-20.0, 20.0))
-def test_rotation_about_an_axis_is_scipys(axis: tuple[float, float, float], turn: float) -> None:
-    expected = Rotation.from_rotvec(np.array(axis) * turn).as_matrix()
-    # SciPy takes the turn from the length of a vector, so the turn itself is rounded.
-    assert_same_to_rounding(rotation_about(np.array(axis), np.array(turn)), expected, 16 + 4 * int(abs(turn)))
+def test_rotation_about_an_axis_is_scipys(axis: tuple[float, float, float], angle: float) -> None:
+    expected = Rotation.from_rotvec(np.array(axis) * angle).as_matrix()
+    # SciPy computes the angle as the norm of a vector, which rounds it.
+    operations = 16 + 4 * int(abs(angle))
+    assert_same_to_rounding(rotation_about(np.array(axis), np.array(angle)), expected, operations)
 
 
 @given(quaternions())
@@ -89,10 +90,10 @@ def test_rotation_of_a_quaternion_is_scipys(quat: Floats) -> None:
 
 
 @given(quaternions())
-def test_quaternion_of_a_rotation_has_its_attitude_and_positive_w(quat: Floats) -> None:
+def test_quaternion_of_a_rotation_has_its_orientation_and_positive_w(quat: Floats) -> None:
     found = quat_from_rotation(rotation_from_quat(quat))
     assert found[3] >= 0.0
-    # The sign is free; at a half turn w may round to either side of zero.
+    # q and -q are the same rotation; at an angle of pi, w may round to either side of zero.
     distance = min(np.max(np.abs(found - quat)), np.max(np.abs(found + quat)))
     assert_same_to_rounding(distance, 0.0, 32)
 
@@ -103,8 +104,8 @@ def test_product_of_quaternions_is_that_of_rotations(
 ) -> None:
     product = rotation_from_quat(quat_product(a, b))
     assert_same_to_rounding(product, rotation_from_quat(a) @ rotation_from_quat(b), 48)
-    one_by_one = rotate(rotation_from_quat(a), rotate(rotation_from_quat(b), np.array(x)))
-    assert_same_to_rounding(rotate(product, np.array(x)), one_by_one, 64, size=2.0)
+    in_two_steps = rotate(rotation_from_quat(a), rotate(rotation_from_quat(b), np.array(x)))
+    assert_same_to_rounding(rotate(product, np.array(x)), in_two_steps, 64, size=2.0)
 
 
 @given(unit_vectors(), lengths)
@@ -112,19 +113,19 @@ def test_log_undoes_exp(axis: tuple[float, float, float], length: float) -> None
     vector = np.array(axis) * length
     quat = quat_exp(vector)
     assert_same_to_rounding(np.linalg.norm(quat), 1.0, 8)
-    # Relative to its own length: small rotations keep all their digits.
+    # The error is relative to the norm: small rotations keep all their digits.
     smallest = float(np.finfo(float).tiny)
-    turn = quat_log(quat)
+    found = quat_log(quat)
     if length < math.pi - 1e-9:
-        assert_same_to_rounding(turn, vector, 16, size=max(length, smallest))
+        assert_same_to_rounding(found, vector, 16, size=max(length, smallest))
     else:
-        # A hair past half a turn the other way round is the shorter one.
-        nearer = min(np.max(np.abs(turn - vector)), np.max(np.abs(turn + vector)))
-        assert_same_to_rounding(nearer, 0.0, 16, size=2.0 * math.pi)
+        # Rounded to slightly more than pi, the rotation is logged about the opposite axis.
+        error = min(np.max(np.abs(found - vector)), np.max(np.abs(found + vector)))
+        assert_same_to_rounding(error, 0.0, 16, size=2.0 * math.pi)
 
 
 @given(quaternions())
-def test_exp_undoes_log_and_takes_the_shorter_way(quat: Floats) -> None:
+def test_exp_undoes_log_and_the_angle_is_at_most_pi(quat: Floats) -> None:
     vector = quat_log(quat)
     assert float(np.linalg.norm(vector)) <= math.pi * (1.0 + 4.0 * np.finfo(float).eps)
     back = quat_exp(vector)
@@ -163,8 +164,8 @@ def test_leading_axes_are_batches() -> None:
     assert R.shape == (2, 3, 3, 3)
     for function, argument in ((quat_from_rotation, R), (rpy_from_rotation, R), (quat_log, quat)):
         stacked = function(argument)
-        one_by_one = [[function(argument[i, j]) for j in range(3)] for i in range(2)]
-        np.testing.assert_array_equal(stacked, np.array(one_by_one))
+        singly = [[function(argument[i, j]) for j in range(3)] for i in range(2)]
+        np.testing.assert_array_equal(stacked, np.array(singly))
 
 
 def test_rotations_work_on_fifty_digit_numbers() -> None:

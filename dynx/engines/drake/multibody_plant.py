@@ -109,9 +109,9 @@ def build_plant(mechanism: Mechanism) -> BuiltPlant:
 def _parts(inertia: RigidInertia) -> list[Any]:
     """The inertia as one of Drake's; as several where it has too little mass to be divided by it."""
     mass = float(inertia.mass)
-    if not (inertia.first_moment.any() or inertia.second_moment.any()):
+    if not (inertia.first_moment.any() or inertia.rotational_inertia.any()):
         return [_inertia(mass, inertia)]
-    largest = float(max(np.max(np.abs(inertia.first_moment)), np.max(np.abs(inertia.second_moment))))
+    largest = float(max(np.max(np.abs(inertia.first_moment)), np.max(np.abs(inertia.rotational_inertia))))
     if mass and largest < LARGEST * abs(mass):
         return [_inertia(mass, inertia)]
     nothing = RigidInertia(inertia.mass, np.zeros(3), np.zeros((3, 3)))
@@ -122,7 +122,7 @@ def _parts(inertia: RigidInertia) -> list[Any]:
 def _inertia(mass: float, moments: RigidInertia) -> Any:
     """Drake's inertia of this mass, with the first and second moment of `moments`."""
     divisor = mass or 1.0
-    G = moments.second_moment / divisor
+    G = moments.rotational_inertia / divisor
     unit = UnitInertia(G[0, 0], G[1, 1], G[2, 2], G[0, 1], G[0, 2], G[1, 2])
     return SpatialInertia(mass, moments.first_moment / divisor, unit, skip_validity_check=True)
 

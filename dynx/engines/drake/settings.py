@@ -63,7 +63,7 @@ def set_in_context(context: Any, bodies: Mapping[str, Any], model: Model, calls:
         R, p = pose_arrays(link.inertial.origin, float64)
         stated = inertia_about_origin(float64(link.inertial.mass), p, R, float64(link.inertial.tensor))
         mass = float(stated.mass) or FEATHER
-        G = np.asarray(stated.second_moment / mass)
+        G = np.asarray(stated.rotational_inertia / mass)
         unit = UnitInertia(G[0, 0], G[1, 1], G[2, 2], G[0, 1], G[0, 2], G[1, 2])
         inertia = SpatialInertia(mass, p, unit, skip_validity_check=True)
         bodies[link.name].SetSpatialInertiaInBodyFrame(context, inertia)

@@ -20,7 +20,7 @@ from dynx.engines.mujoco.library import MAX_DEPTH, mujoco
 from dynx.errors import EngineError, EngineLimitError
 from dynx.model import Model
 from dynx.model.elements import Inertial, Pose
-from dynx.spatial.extended import eigen, longdouble
+from dynx.spatial.extended import jacobi_eigen, longdouble
 from dynx.spatial.scalar import Array, Floats
 from dynx.spatial.so3 import quat_from_rotation, rotation_from_rpy
 
@@ -125,7 +125,7 @@ def _write_inertias(model: Model, compiled: Any, tree: tuple[int, ...]) -> Float
 def _principal(inertial: Inertial) -> tuple[Floats, Array]:
     """Principal moments (3,), and their axes as the columns of a rotation (3, 3), in the link frame."""
     tensor = inertial.tensor
-    moments, axes = eigen(longdouble(tensor))
+    moments, axes = jacobi_eigen(longdouble(tensor))
     return np.asarray(moments, dtype=np.float64), _rotation(inertial.origin) @ axes
 
 

@@ -29,7 +29,7 @@ from dynx.errors import DynxError, EngineError, EngineLimitError, shown
 from dynx.model import Model
 from dynx.model.elements import Inertial, Joint, Pose
 from dynx.rbd.jacobians import Reference
-from dynx.rbd.regressor import inertia_of, parameters_of
+from dynx.rbd.regressor import inertia_from_parameters, parameters_from_inertia
 from dynx.spatial.scalar import Floats
 
 MAX_NV = 200
@@ -323,7 +323,9 @@ def _lumping(engine: Any, links: Sequence[int]) -> tuple[list[int], Floats]:
     for link in links:
         frame = engine.frames[link]
         R, p = np.array(frame.placement.rotation), np.array(frame.placement.translation)
-        moved = [parameters_of(inertia_of(unit).seen_from(R, p)) for unit in np.eye(10)]
+        moved = [
+            parameters_from_inertia(inertia_from_parameters(unit).transform(R, p)) for unit in np.eye(10)
+        ]
         matrix = np.stack(moved, axis=-1)[theirs]
         joints.append(max(int(frame.parentJoint) - 1, 0))
         matrices.append(0.0 * matrix if frame.parentJoint == WORLD else matrix)

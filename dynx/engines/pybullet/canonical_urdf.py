@@ -63,7 +63,7 @@ def bullet_tree(mechanism: Mechanism, ballast: tuple[Ballast, ...], times: int) 
         sizes.append(float(np.max(root.moments)))
     bodies = list(zip(mechanism.bodies, ballast[1:], strict=True))
     inertias = [load.added(body.inertia, times) for body, load in bodies]
-    sizes += [float(np.max(np.abs(inertia.second_moment))) for inertia in inertias]
+    sizes += [float(np.max(np.abs(inertia.rotational_inertia))) for inertia in inertias]
     unit = 2.0 ** max(0, int(np.frexp(max(sizes))[1]))
     links = []
     for body, lumped in zip(mechanism.bodies, inertias, strict=True):

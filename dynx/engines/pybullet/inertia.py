@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dynx.model.mechanism import Mechanism
-from dynx.spatial.extended import FLOAT64_EPS, eigen, longdouble
+from dynx.spatial.extended import FLOAT64_EPS, jacobi_eigen, longdouble
 from dynx.spatial.inertia import RigidInertia
 from dynx.spatial.scalar import Array, Floats
 from dynx.spatial.so3 import skew
@@ -52,7 +52,7 @@ class Ballast:
         return RigidInertia(
             np.asarray(inertia.mass + times * longdouble(self.mass)),
             inertia.first_moment,
-            inertia.second_moment + times * longdouble(self.rotational) * longdouble(np.eye(3)),
+            inertia.rotational_inertia + times * longdouble(self.rotational) * longdouble(np.eye(3)),
         )
 
 
@@ -63,16 +63,16 @@ def principal_inertia(inertia: RigidInertia, *, about_center: bool = False) -> P
     has the body's frame at the centre of mass (the root's), not at the joint.
     """
     mass = float(inertia.mass)
-    second = longdouble(inertia.second_moment)
+    second = longdouble(inertia.rotational_inertia)
     center = longdouble(np.zeros(3))
     if mass != 0.0:
         center = longdouble(inertia.first_moment) / longdouble(inertia.mass)
         arm = skew(center)
         second = second + longdouble(inertia.mass) * (arm @ arm)
-    values, axes = eigen(second)
+    values, axes = jacobi_eigen(second)
     # A point mass has no moments, but lumping leaves it last digits of either sign. Negative ones
     # below the rounding of float64 in the moments about the origin stand for zero.
-    noise = 4 * FLOAT64_EPS * _size(inertia.second_moment)
+    noise = 4 * FLOAT64_EPS * _size(inertia.rotational_inertia)
     values = np.where((values < 0) & (values >= -noise), 0, values)
     moments = np.asarray(values, dtype=np.float64)
     lever = np.zeros(3) if about_center else np.asarray(axes.T @ center, dtype=np.float64)
@@ -119,7 +119,7 @@ def _ballast(inertia: RigidInertia, unit: float, *, root: bool) -> Ballast:
     body = principal_inertia(needed.added(inertia, 1), about_center=root)
     if not body.accepted:
         negative = max(0.0, -float(np.min(body.moments)))
-        size = float(_size(inertia.second_moment))
+        size = float(_size(inertia.rotational_inertia))
         needed = Ballast(needed.mass, 2.0 * negative + 64 * FLOAT64_EPS * size)
     return needed
 

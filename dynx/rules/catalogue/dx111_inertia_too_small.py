@@ -133,7 +133,7 @@ def _thin(group: RigidGroup, inertials: Mapping[str, Inertial | None]) -> str | 
     for count, name in enumerate(n for n in group.links if (i := inertials[n]) is not None and i.mass > 0.0):
         inertial = inertials[name]
         assert inertial is not None
-        part = CentralInertia.of(inertial).seen_from(*group.poses[name])
+        part = CentralInertia.of(inertial).transform(*group.poses[name])
         total = part if total is None else total + part
         if count > 0 and total.moments()[0] < SMALLEST_MOMENT and clear_fault(inertial) is None:
             return "with what is welded to it the link is a row of points, without inertia about one axis"

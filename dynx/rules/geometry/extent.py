@@ -40,7 +40,7 @@ class Extent:
         """Whether there is no shape at all."""
         return len(self.points) == 0
 
-    def seen_from(self, T: Floats) -> Extent:
+    def transform(self, T: Floats) -> Extent:
         """The same region in frame A, where T (4, 4) is the pose of this frame in A."""
         return Extent(self.points @ T[:3, :3].T + T[:3, 3], self.radii)
 

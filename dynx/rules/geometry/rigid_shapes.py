@@ -32,7 +32,7 @@ def welded_extents(case: Case) -> Iterator[tuple[Link, Extent]]:
             known[group.head] = _group_extent(case, group)
         extent = known[group.head]
         if extent is not None and not extent.empty:
-            yield link, extent.seen_from(inverse(_pose(group, link.name)))
+            yield link, extent.transform(inverse(_pose(group, link.name)))
 
 
 def _group_extent(case: Case, group: RigidGroup) -> Extent | None:
@@ -42,7 +42,7 @@ def _group_extent(case: Case, group: RigidGroup) -> Extent | None:
         extent = link_extent(case.links[name], case.source.source)
         if extent is None:
             return None
-        parts.append(extent.seen_from(_pose(group, name)))
+        parts.append(extent.transform(_pose(group, name)))
     return Extent.union(parts)
 
 

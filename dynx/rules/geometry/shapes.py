@@ -48,7 +48,7 @@ def _shape_extent(shape: SourceElement, source: str) -> Extent | None:
         return Extent.of_points([])
     try:
         extent = _in_own_frame(geometry.children[0], source)
-        return None if extent is None else extent.seen_from(origin_of(shape).matrix)
+        return None if extent is None else extent.transform(origin_of(shape).matrix)
     except DescriptionError:
         return None
 

@@ -12,7 +12,7 @@ from itertools import permutations
 import numpy as np
 
 from dynx.model.elements import Inertial, Pose, Vector
-from dynx.spatial.extended import eigen, longdouble
+from dynx.spatial.extended import jacobi_eigen, longdouble
 from dynx.spatial.scalar import Array
 from dynx.spatial.so3 import rotation_from_rpy, rpy_from_rotation
 
@@ -32,7 +32,7 @@ class CentralInertia:
         tensor = longdouble(inertial.tensor)
         return cls(longdouble(inertial.mass), longdouble(inertial.origin.xyz), R @ tensor @ R.T)
 
-    def seen_from(self, R: Array, p: Array) -> CentralInertia:
+    def transform(self, R: Array, p: Array) -> CentralInertia:
         """The same body in frame A, where (R, p) is the pose of this frame in A."""
         return CentralInertia(self.mass, R @ self.center + p, R @ self.tensor @ R.T)
 
@@ -53,14 +53,14 @@ class CentralInertia:
 
     def moments(self) -> Array:
         """The principal moments (3,), smallest first."""
-        return np.sort(eigen(self.tensor)[0])
+        return np.sort(jacobi_eigen(self.tensor)[0])
 
     def principal(self, near: Vector = (0.0, 0.0, 0.0)) -> tuple[Array, Array]:
         """Principal moments (3,) and axes (3, 3), the columns of a rotation, in the axes of the frame.
 
         Of the ways to order and to point the axes the one nearest to the attitude `near` (rpy) is taken.
         """
-        values, axes = eigen(self.tensor)
+        values, axes = jacobi_eigen(self.tensor)
         order, R = _nearest_axes(axes, rotation_from_rpy(longdouble(near)))
         return values[order], R
 

@@ -43,6 +43,6 @@ def _lumped(case: Case, group: RigidGroup, links: Iterable[str], into: str) -> C
     for name in sorted(links, key=lambda name: name != into):
         inertial = case.inertials[name]
         if inertial is not None:
-            part = CentralInertia.of(inertial).seen_from(*group.pose(name, into))
+            part = CentralInertia.of(inertial).transform(*group.pose(name, into))
             total = part if total is None else total + part
     return CentralInertia.of(Inertial()) if total is None else total

@@ -28,7 +28,7 @@ from dynx.simd.cache import cached_kernel, recipe_of
 from dynx.simd.kernel import Kernel
 from dynx.simd.trace import trace
 from dynx.spatial.branchless import difference, integrate
-from dynx.spatial.scalar import Array, Floats, clipped, sign
+from dynx.spatial.scalar import Array, Floats, clamp, sign
 from dynx.trajectory.base import Setpoint
 
 REMEMBERED = 32
@@ -168,7 +168,7 @@ class StepOf:
         outcome = {} if state is None else {"state": state}
         if self.limit is None:
             return {"tau": tau, **outcome}
-        tau = clipped(tau, self.limit)
+        tau = clamp(tau, self.limit)
         bounded = np.isfinite(self.limit)
         cut = np.array(given["cut"])
         # Symbols also where a law gives plain numbers.

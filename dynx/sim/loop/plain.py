@@ -23,7 +23,7 @@ from dynx.sim.loop.sensors import Sensors
 from dynx.sim.loop.stops import Stops
 from dynx.sim.plants.plant import Plant
 from dynx.sim.record.record import Record
-from dynx.spatial.scalar import Floats, clipped
+from dynx.spatial.scalar import Floats, clamp
 from dynx.trajectory.base import Setpoint
 
 FLOAT64 = np.dtype(np.float64)
@@ -94,7 +94,7 @@ class Loop:
                     if not isfinite(sum(tau.tolist())):
                         raise self._control_failed(k, record, f"its torque is not finite: {shown(tau)}")
                     if limit is not None:
-                        tau = clipped(tau, limit)
+                        tau = clamp(tau, limit)
             try:
                 if command is None:
                     q, v, a = step(t, tau)

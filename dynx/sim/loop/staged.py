@@ -24,7 +24,7 @@ from dynx.sim.plants.plant import DynxPlant
 from dynx.sim.record.record import Record
 from dynx.simd.kernel import Kernel
 from dynx.simd.strides import Walk, Walked, walk
-from dynx.spatial.scalar import Array, Floats, clipped
+from dynx.spatial.scalar import Array, Floats, clamp
 from dynx.trajectory.base import Setpoint
 
 WORTH = 256
@@ -126,7 +126,7 @@ class GluedLoop:
             # The sum that the plain loop looks at: a torque beyond all numbers is none, though it is cut.
             unsound = 0.0 * sum(tau.tolist(), 0.0)
             if loop.limit is not None:
-                tau = clipped(tau, loop.limit)
+                tau = clamp(tau, loop.limit)
 
         forward = self._plant.dynamics.in_this_thread("forward_dynamics")
 

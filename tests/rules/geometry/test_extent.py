@@ -56,7 +56,7 @@ def test_the_reach_is_reached(
 
 @given(extents, poses(1.0))
 def test_distances_do_not_depend_on_the_frame(extent: Extent, T: Floats) -> None:
-    moved = extent.seen_from(T)
+    moved = extent.transform(T)
     axis = np.array([0.0, 0.6, 0.8])
     here = extent.reach_from_axis(np.zeros(3), axis)
     there = moved.reach_from_axis(T[:3, 3], T[:3, :3] @ axis)

@@ -30,13 +30,13 @@ def size_of(*tensors: Array) -> float:
 @given(bodies, bodies, poses())
 def test_two_bodies_make_one(first: Inertial, second: Inertial, T: Floats) -> None:
     R, p = longdouble(T[:3, :3]), longdouble(T[:3, 3])
-    lump = CentralInertia.of(first) + CentralInertia.of(second).seen_from(R, p)
-    parts = about_origin(first), about_origin(second).seen_from(R, p)
+    lump = CentralInertia.of(first) + CentralInertia.of(second).transform(R, p)
+    parts = about_origin(first), about_origin(second).transform(R, p)
     together = parts[0] + parts[1]
     # A product of three rotations of float64 entries; R is one to rounding only.
-    bound = 64 * EPS * max(size_of(parts[0].second_moment, parts[1].second_moment), 1e-300)
+    bound = 64 * EPS * max(size_of(parts[0].rotational_inertia, parts[1].rotational_inertia), 1e-300)
     assert float(lump.mass) == float(together.mass)
-    np.testing.assert_allclose(lump.about_origin(), together.second_moment, rtol=0, atol=bound)
+    np.testing.assert_allclose(lump.about_origin(), together.rotational_inertia, rtol=0, atol=bound)
     if lump.mass > 0:
         np.testing.assert_allclose(lump.mass * lump.center, together.first_moment, rtol=0, atol=64 * EPS * 10)
 
