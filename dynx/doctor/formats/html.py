@@ -1,91 +1,94 @@
-"""A page for people: one HTML file that needs no other, without scripts, for screen and paper."""
+"""A page for people: one HTML file that needs no other, without scripts, for screen and paper.
+
+The templates beside this module hold the markup. Everything they print is escaped, and control characters are
+made visible: names in a robot description may hold anything.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from importlib.resources import files
-from string import Template
+from collections.abc import Callable, Sequence
+from functools import cache
+from typing import TYPE_CHECKING, Any
 
 from dynx._version import __version__
 from dynx.doctor.formats import wording
 from dynx.doctor.formats.baseline import Baseline
 from dynx.doctor.formats.causes import causes, status
-from dynx.doctor.formats.html_causes import rule_pages
-from dynx.doctor.formats.html_elements import cell, code, escape, name, pre, table
-from dynx.doctor.formats.html_heat import heat_cell, heat_style, legend
-from dynx.doctor.formats.html_robot import robot_section, robot_summary
+from dynx.doctor.formats.heat import ALL_STEPS, engine_map, joint_map, pair_map, step_of
+from dynx.doctor.formats.model_tables import model_tables
+from dynx.doctor.formats.text_changes import changes, excerpt
 from dynx.doctor.formats.vote import largest_error
 from dynx.doctor.report import DoctorReport
 
-_SHOWN_RULES = 6
-"""Rules in the row of one robot among many."""
+if TYPE_CHECKING:
+    from jinja2 import Environment
+
+LIMITS = {"SHOWN_RULES": 6, "OPEN_PLACES": 2, "SHOWN_PLACES": 40, "OPEN_VALUES": 25, "OPEN_LINES": 80}
+"""Rules in the row of one robot among many; places of a cause that are open, and shown at all; values that
+engines hold and changed lines up to which a table is open."""
+
+LOWEST_BAR = -16
+"""Power of ten at which the bar of an error starts: the last digit of a double; it is full at 100 %."""
 
 
 def html_page(
     reports: Sequence[DoctorReport], *, command: str | None = None, baseline: Baseline | None = None
 ) -> str:
     """The page, in ASCII. `command` is what the page says to run for the same result."""
-    called = wording.titles([report.robot for report in reports])
-    if len(reports) == 1:
-        title = f"{escape(called[0])}, {escape(reports[0].base)} base"
-        header = f"<h1>{title}</h1>"
-        body = robot_section(reports[0], baseline)
-    else:
-        title = "Do engines load these robots alike?"
-        header = f"<h1>{title}</h1><p>{escape(_counted(reports))}</p>"
-        body = (
-            _summary(reports, called)
-            + "\n"
-            + "\n".join(
-                robot_summary(report, called[number], f"r{number}", baseline)
-                for number, report in enumerate(reports)
-            )
-        )
-    pages = rule_pages(cause for report in reports for cause in causes(report))
-    if pages:
-        body += f"\n<h3>The rules</h3>\n{pages}"
-    page = Template(_template("page.html")).substitute(
-        version=escape(__version__),
-        title=f"{title} - dynx doctor",
-        style=_template("page.css") + heat_style(),
-        header=header,
-        body=body,
-        footer=_footer(reports, command),
+    entries = {cause.rule: cause.entry for report in reports for cause in causes(report) if cause.entry}
+    page = template_environment().get_template("page.html.j2")
+    text = page.render(
+        reports=reports,
+        titles=wording.titles([report.robot for report in reports]),
+        counts=_counts(reports),
+        rules=[entries[rule] for rule in sorted(entries)],
+        baseline=baseline,
+        command=command,
+        version=__version__,
+        footer=_footer(reports),
     )
-    return page.encode("ascii", "xmlcharrefreplace").decode("ascii")
+    return text.encode("ascii", "xmlcharrefreplace").decode("ascii")
 
 
-def _summary(reports: Sequence[DoctorReport], called: Sequence[str]) -> str:
-    """A row for each robot, which leads to it."""
-    rows = []
-    for number, report in enumerate(reports):
-        word = status(report)
-        found = [cause for cause in causes(report) if cause.worst is not None]
-        rules = " ".join(code(cause.rule) for cause in found[:_SHOWN_RULES])
-        rules += f" and {len(found) - _SHOWN_RULES} more" if len(found) > _SHOWN_RULES else ""
-        measured = report.error is None
-        refusing = [each.engine for each in report.engines if each.refused is not None]
-        rows.append(
-            (
-                f'<a href="#r{number}">{escape(called[number])}</a>',
-                [
-                    cell(escape(report.base)),
-                    cell(f'<span class="tag {word}">{word}</span>'),
-                    heat_cell(largest_error(report) if measured else None, report.tolerance),
-                    heat_cell(report.residual if measured else None, report.tolerance),
-                    cell(", ".join(map(name, refusing))),
-                    cell(rules),
-                ],
-            )
-        )
-    tolerance = max((report.tolerance for report in reports), default=0.0)
-    return legend(tolerance) + table(
-        ["robot", "base", "verdict", ">as loaded", ">mended", "refused by", "causes"], rows, "heat-some"
+@cache
+def template_environment() -> Environment:
+    """The templates, with the functions that they use. This is the only place of dynx that uses Jinja2."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=PackageLoader("dynx.doctor.formats"),
+        autoescape=True,
+        finalize=_printable,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
     )
+    words = (wording.name, wording.relative, wording.size, wording.quantity, wording.effect, wording.part)
+    environment.filters.update({each.__name__: each for each in words})
+    environment.filters["capitalized"] = lambda text: text[:1].upper() + text[1:]
+    views: tuple[Callable[..., Any], ...] = (causes, status, step_of, bar_position, largest_error)
+    views += (engine_map, pair_map, joint_map, model_tables, changes, excerpt)
+    environment.globals.update({each.__name__: each for each in views}, steps=ALL_STEPS, **LIMITS)
+    return environment
 
 
-def _counted(reports: Sequence[DoctorReport]) -> str:
+def _printable(value: Any) -> Any:
+    """Show the control characters of a text, but line breaks and tabs; markup of templates stays."""
+    if not isinstance(value, str) or hasattr(value, "__html__"):
+        return value
+    return "".join(c if c.isprintable() or c in "\n\t" else repr(c)[1:-1] for c in value)
+
+
+def bar_position(error: float) -> float:
+    """Where on the bar an error is [%]; an error that is not finite fills it."""
+    if not math.isfinite(error):
+        return 100.0
+    power = math.log10(max(error, 10.0**LOWEST_BAR))
+    return 100.0 * (1.0 - min(power, 0.0) / LOWEST_BAR)
+
+
+def _counts(reports: Sequence[DoctorReport]) -> str:
     words = [status(report) for report in reports]
     parts = [f"{words.count('alike')} alike", f"{words.count('explained')} differ, with every cause proved"]
     parts += [f"{words.count('unexplained')} differ without a full explanation"]
@@ -95,19 +98,11 @@ def _counted(reports: Sequence[DoctorReport]) -> str:
     return f"{what}: " + ", ".join(part for part in parts if not part.startswith("0 ")) + "."
 
 
-def _footer(reports: Sequence[DoctorReport], command: str | None) -> str:
+def _footer(reports: Sequence[DoctorReport]) -> str:
     found = {each.engine: each.version for report in reports for each in report.engines}
-    engines = ", ".join(f"{name(engine)} {name(version)}" for engine, version in found.items())
-    measured = [report for report in reports if report.error is None]
+    engines = [f"{wording.name(engine)} {wording.name(version)}" for engine, version in found.items()]
     settings = ""
-    if measured:
-        one = measured[0]
+    for one in [report for report in reports if report.error is None][:1]:
         settings = f" {one.samples} random states, seed {one.seed}, tolerance {one.tolerance:g}."
-    again = "" if command is None else f"<h3>How to reproduce</h3>{pre(command)}"
     seconds = math.fsum(report.seconds for report in reports)
-    versions = ", ".join(filter(None, [f"dynx {escape(__version__)}", engines]))
-    return f"{again}<p>{versions}.{settings} {seconds:.1f} s.</p>"
-
-
-def _template(file: str) -> str:
-    return files("dynx.doctor.formats").joinpath(file).read_text(encoding="utf-8")
+    return f"{', '.join([f'dynx {__version__}', *engines])}.{settings} {seconds:.1f} s."

@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dynx.doctor.formats import html_page, read_baseline
-from dynx.doctor.formats.html_changes import excerpt, lines_of
-from dynx.doctor.formats.html_elements import escape, name
-from dynx.doctor.formats.html_heat import NONE, SAME, STEPS, Step, heat_style, step_of
+from dynx.doctor.formats.heat import ALL_STEPS, SAME, Step, step_of
+from dynx.doctor.formats.html import template_environment
+from dynx.doctor.formats.text_changes import excerpt, lines_of
 from dynx.doctor.report import DoctorReport
 from dynx.rules.registry import all_rules
 from tests.doctor.formats.reports import HOSTILE, TEXT, alike, differing, hostile, refused
@@ -106,12 +106,14 @@ def test_a_cause_leads_to_the_page_of_its_rule() -> None:
     assert ("id", anchor) in page.attributes
 
 
-@given(st.text())
-def test_nothing_escapes_from_text(text: str) -> None:
-    for written in (escape(text), name(text)):
-        assert "<" not in written
-        assert '"' not in written
-        assert all(c.isprintable() or c in "\n\t" for c in written)
+@given(st.text(), st.sampled_from(["text", "text | name", "code(text)", "lines(text)", "listed([text])"]))
+def test_nothing_escapes_from_text(text: str, printed: str) -> None:
+    macros = '{% from "elements.html.j2" import code, lines, listed %}'
+    template = template_environment().from_string(f"{macros}{{{{ {printed} }}}}")
+    written, safe = (template.render(text=each) for each in (text, "x" * (text != "")))
+    for mark in "<\">'":
+        assert written.count(mark) == safe.count(mark)
+    assert all(c.isprintable() or c in "\n\t" for c in written)
 
 
 @given(st.text(st.characters(exclude_characters="\r"), max_size=20))
@@ -128,11 +130,11 @@ def test_a_very_long_name_is_cut() -> None:
 
 def test_the_marked_line_is_the_one_that_is_meant() -> None:
     for number, line in enumerate(TEXT.splitlines(), start=1):
-        marked = Page(excerpt(differing(), number))
-        here = re.search(r'<span class="here">.*?</span>(.*?)</span>', excerpt(differing(), number))
-        assert here is not None
-        assert here.group(1) == escape(line)
-        assert str(number) in marked.text
+        assert (number, line) in excerpt(TEXT, number)
+        finding = replace(differing().findings[0], line=number)
+        page = html_page([replace(differing(), findings=(finding,))])
+        here = re.findall(r'<span class="here">(<span class="line">.*?</span>.*?)</span>', page)
+        assert [Page(each).text for each in here] == [f"{number}{line}"]
 
 
 @given(st.lists(st.sampled_from(["a", "\u2028", "\x0b", "\n", "\r\n", "\r"])))
@@ -153,17 +155,16 @@ def luminance(colour: str) -> float:
     return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
 
 
-@pytest.mark.parametrize("step", [SAME, *STEPS, NONE], ids=lambda step: step.label)
+@pytest.mark.parametrize("step", ALL_STEPS, ids=lambda step: step.label)
 def test_numbers_can_be_read_on_every_colour(step: Step) -> None:
     for pair in (step.light, step.dark):
-        assert all(colour in heat_style() for colour in pair)
+        assert all(colour in html_page([]) for colour in pair)
         darker, lighter = sorted(map(luminance, pair))
         assert (lighter + 0.05) / (darker + 0.05) >= 4.5  # what WCAG 2.1 AA asks of text
 
 
 @given(st.floats(min_value=0.0), st.floats(min_value=0.0))
 def test_a_larger_error_is_on_no_lower_step(one: float, other: float) -> None:
-    order = [SAME, *STEPS, NONE]
     small, large = sorted((one, other))
-    assert order.index(step_of(small, 1e-12)) <= order.index(step_of(large, 1e-12))
+    assert ALL_STEPS.index(step_of(small, 1e-12)) <= ALL_STEPS.index(step_of(large, 1e-12))
     assert (step_of(one, 1e-12) is SAME) == (one <= 1e-12)
