@@ -1,33 +1,26 @@
-"""Which backends exist, and how a name becomes one.
+"""Backends by name: those of dynx, of the running program, and of installed packages (`dynx.registry`).
 
-Three sources, the first that knows the name decides: the backends of dynx itself (a table here, so
-they are found in a source tree that was never installed), those a program registered, and entry
-points in the group ``dynx.backends`` of installed packages. A name therefore never changes its
-meaning: `register` refuses one that is taken, and an entry point with a taken name is passed over.
-
-Engines are imported when a backend of theirs is asked for, never in order to list names.
+A package offers its backend by an entry point in the group ``dynx.backends``. Engines are imported when a
+backend of theirs is first used, never to list names.
 """
 
 from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
-from importlib import import_module
-from importlib.metadata import EntryPoint, entry_points
 from typing import TYPE_CHECKING, Any
 
-from dynx.errors import ArgumentError, BackendError, DynxError, UnknownBackendError, nearest, shown
+from dynx.errors import ArgumentError, BackendError, UnknownBackendError, shown
 from dynx.model import Model
+from dynx.registry import ClassRegistry
 
 if TYPE_CHECKING:
     from dynx.backends.base import Backend
 
-    Loader = Callable[[], type[Backend]]
-
 GROUP = "dynx.backends"
 """The entry-point group: ``name = "package.module:BackendClass"``."""
 
-_BUILT_IN = {
+BUILT_IN = {
     "reference": "dynx.reference.backend:ReferenceBackend",
     "pinocchio": "dynx.engines.pinocchio.backend:PinocchioBackend",
     "pybullet": "dynx.engines.pybullet.backend:PyBulletBackend",
@@ -35,14 +28,23 @@ _BUILT_IN = {
     "drake": "dynx.engines.drake.backend:DrakeBackend",
     "compiled": "dynx.compiled.backend:CompiledBackend",
 }
-_registered: dict[str, Loader] = {}
+
+
+def _base() -> type[Backend]:
+    from dynx.backends.base import Backend
+
+    return Backend
+
+
+_backends = ClassRegistry("backend", GROUP, BUILT_IN, _base, error=BackendError, unknown=UnknownBackendError)
 
 
 def refuse_other_than_model(model: object) -> None:
     """Raise ArgumentError for anything but a `Model`, such as a robot's name."""
     if not isinstance(model, Model):
+        example = shown(model) if isinstance(model, str) else "..."
         raise ArgumentError(
-            f"model is of type {type(model).__name__}; wanted a Model, such as dynx.load({_example(model)})"
+            f"model is of type {type(model).__name__}; wanted a Model, such as dynx.load({example})"
         )
 
 
@@ -65,26 +67,12 @@ def backend(name: str, model: Model, **options: Any) -> Backend:
 
 def backend_class(name: str) -> type[Backend]:
     """The class behind a name; this imports its engine."""
-    if not isinstance(name, str):
-        raise ArgumentError(f"a backend's name is of type {type(name).__name__}; wanted a str")
-    if name in _BUILT_IN:
-        module, _, attribute = _BUILT_IN[name].partition(":")
-        return _checked(name, lambda: getattr(import_module(module), attribute), "dynx itself")
-    if name in _registered:
-        return _checked(name, _registered[name], "this program")
-    found = [point for point in _entry_points() if point.name == name]
-    if not found:
-        raise UnknownBackendError(f"no backend {shown(name)}{nearest(name, backend_names())}")
-    if len({point.value for point in found}) > 1:
-        listed = " and ".join(_described(point) for point in found)
-        raise BackendError(f"the backend {shown(name)} is provided more than once: {listed}")
-    return _checked(name, found[0].load, _described(found[0]))
+    return _backends.find(name)
 
 
 def backend_names() -> tuple[str, ...]:
     """Every name that `backend` knows, dynx's own first; whether their engines work is not tried."""
-    names = [*_BUILT_IN, *_registered, *sorted(point.name for point in _entry_points())]
-    return tuple(dict.fromkeys(names))
+    return _backends.names()
 
 
 def installed_backends() -> tuple[str, ...]:
@@ -92,52 +80,18 @@ def installed_backends() -> tuple[str, ...]:
     return tuple(name for name in backend_names() if _works(name))
 
 
-def register(name: str, loader: Loader) -> None:
-    """Let `backend` find a class of your own: `loader()` returns it, when it is first asked for.
+def register(name: str, loader: Callable[[], type[Backend]]) -> None:
+    """Add a backend class of the running program; `loader()` returns it when it is first used.
 
     Raises ArgumentError for a name that is taken; a backend is never replaced. A package offers its
     backend by an entry point in the group ``dynx.backends`` instead.
     """
-    if not isinstance(name, str) or not name:
-        raise ArgumentError(f"a backend's name is {shown(name)}; wanted a str that is not empty")
-    if not callable(loader):
-        raise ArgumentError(f"the loader of {shown(name)} is of type {type(loader).__name__}, not callable")
-    if name in backend_names():
-        raise ArgumentError(f"the name {shown(name)} is taken; a backend is never replaced")
-    _registered[name] = loader
+    _backends.register(name, loader)
 
 
 def unregister(name: str) -> None:
-    """Take back what `register` did; UnknownBackendError for a name that no program registered."""
-    if name not in _registered:
-        raise UnknownBackendError(f"no backend {shown(name)} was registered{nearest(name, _registered)}")
-    del _registered[name]
-
-
-def _checked(name: str, loader: Callable[[], Any], provider: str) -> type[Backend]:
-    from dynx.backends.base import Backend
-
-    try:
-        kind = loader()
-    except DynxError:
-        raise
-    except Exception as error:
-        raise BackendError(
-            f"the backend {shown(name)}, provided by {provider}, cannot be loaded: "
-            f"{type(error).__name__}: {error}"
-        ) from error
-    if not (isinstance(kind, type) and issubclass(kind, Backend)):
-        raise BackendError(
-            f"the backend {shown(name)}, provided by {provider}, is {shown(kind)}, "
-            "which is no subclass of dynx.Backend"
-        )
-    if inspect.isabstract(kind):
-        missing = ", ".join(sorted(kind.__abstractmethods__))
-        raise BackendError(
-            f"the backend {shown(name)}, provided by {provider}, does not say how to answer: "
-            f"{kind.__name__} lacks {missing}"
-        )
-    return kind
+    """Remove what `register` added; UnknownBackendError for a name that no program registered."""
+    _backends.unregister(name)
 
 
 def _works(name: str) -> bool:
@@ -146,16 +100,3 @@ def _works(name: str) -> bool:
     except BackendError:
         return False
     return True
-
-
-def _entry_points() -> list[EntryPoint]:
-    return [point for point in entry_points(group=GROUP) if point.name not in _BUILT_IN]
-
-
-def _described(point: EntryPoint) -> str:
-    distribution = "" if point.dist is None else f" of {point.dist.name}"
-    return f"the entry point {point.value}{distribution}"
-
-
-def _example(model: object) -> str:
-    return shown(model) if isinstance(model, str) else "..."

@@ -24,9 +24,9 @@ from dynx.sim.loop.references import SetpointOf, checked_reference, setpoints_of
 from dynx.sim.loop.sensors import Noise, Sensors
 from dynx.sim.loop.staged import glued
 from dynx.sim.loop.stops import Stops
-from dynx.sim.plants.loads import Loads, Push
+from dynx.sim.plants.disturbances import Disturbances, Push
 from dynx.sim.plants.model_error import MassScale, Payload, plant_model
-from dynx.sim.plants.plant import INTEGRATORS, DynxPlant, Plant
+from dynx.sim.plants.registry import default_integrator, make_plant
 from dynx.sim.record.record import Record
 from dynx.sim.record.rollout import Rollout
 from dynx.spatial.scalar import Floats
@@ -125,13 +125,13 @@ def simulate(
     if controller is not None:
         check_controller(model, controller, clock)
     setpoint_of = checked_reference(model, reference, within_limits=check_reference)
-    loads = Loads(moved, damping, friction, friction_slip, armature, pushes, dt)
+    disturbances = Disturbances(moved, damping, friction, friction_slip, armature, pushes, dt)
     limit = _effort_limits(model, controller, effort_limits)
     sensors = Sensors(model, clock, noise)
     record = Record.begin(*_start(moved, setpoint_of, q0, v0), clock.n_steps)
     settings: dict[str, Any] = {
         "plant": plant,
-        "integrator": integrator or ("engine" if plant == "pybullet" else "semi_implicit"),
+        "integrator": integrator or default_integrator(plant),
         "controller": "none" if controller is None else controller.name,
         "law": {} if controller is None else controller_numbers(controller),
         "dt": clock.dt,
@@ -141,12 +141,12 @@ def simulate(
         "effort_limits": None if limit is None else limit.tolist(),
         "position_limits": position_limits,
         "joints": {
-            "damping": loads.friction.damping.tolist(),
-            "friction": loads.friction.friction.tolist(),
-            "slip": loads.friction.slip,
+            "damping": disturbances.friction.damping.tolist(),
+            "friction": disturbances.friction.friction.tolist(),
+            "slip": disturbances.friction.slip,
         },
         "noise": None if noise is None else repr(noise),
-        "pushes": [repr(push) for push in loads.pushes],
+        "pushes": [repr(push) for push in disturbances.pushes],
     }
     if resume is not None:
         _take_over(record, resume, len(resume) if step is None else step, moved, settings)
@@ -155,7 +155,15 @@ def simulate(
         raise ArgumentError("step is that of a rollout to resume, which is not given")
     options = {"method": method, "rtol": rtol, "atol": atol}
     setpoints = setpoints_of(setpoint_of, clock, controller)
-    made = _plant(moved, plant, settings["integrator"], loads, clock.dt, substeps, options)
+    made = make_plant(
+        plant,
+        moved,
+        disturbances,
+        clock.dt,
+        integrator=settings["integrator"],
+        substeps=substeps,
+        options=options,
+    )
 
     def so_far() -> Rollout:
         n = record.steps
@@ -170,13 +178,13 @@ def simulate(
             tau,
             at_limit,
             None if setpoint_of is None else setpoint_of(times),
-            loads.rotors,
+            disturbances.armature,
             settings,
         )
 
     try:
         made.refuse(controller)
-        stops = Stops(moved, _mass_matrix(moved, loads)) if position_limits else None
+        stops = Stops(moved, _mass_matrix(moved, disturbances)) if position_limits else None
         told = None if progress is None else partial(_tell, progress, clock.n_steps)
         loop = Loop(made, controller, setpoints, clock, sensors, limit, stops, told)
         # A state that runs away is seen by the loop, which says more than NumPy's warning.
@@ -260,25 +268,7 @@ def _refuse_other_reference(
         raise ArgumentError("the rollout to resume followed another reference")
 
 
-def _plant(
-    model: Model, name: str, integrator: str, loads: Loads, dt: float, substeps: int, options: dict[str, Any]
-) -> Plant:
-    if not isinstance(substeps, int) or isinstance(substeps, bool) or substeps < 1:
-        raise ArgumentError(f"substeps is {shown(substeps)}; wanted 1 or more")
-    if integrator not in INTEGRATORS:
-        raise ArgumentError(f"integrator is {shown(integrator)}; wanted one of {', '.join(INTEGRATORS)}")
-    if integrator == "engine":
-        if name != "pybullet":
-            raise ArgumentError(f"the engine {shown(name)} has no stepper here; PyBullet has one")
-        # Only this plant needs PyBullet.
-        from dynx.engines.pybullet.plant import BulletPlant
-
-        return BulletPlant(model, loads, dt, substeps=substeps)
-    engine = backend(name, model, validate=False)
-    return DynxPlant(engine, loads, dt, integrator=integrator, substeps=substeps, **options)
-
-
-def _mass_matrix(model: Model, loads: Loads) -> Callable[[Floats], Floats]:
+def _mass_matrix(model: Model, disturbances: Disturbances) -> Callable[[Floats], Floats]:
     """M of the plant for the stops, by the same text whatever the plant."""
     bodies = backend("reference", model, validate=False)
-    return lambda q: bodies.mass_matrix(q) + loads.rotors
+    return lambda q: bodies.mass_matrix(q) + disturbances.armature

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 import dynx.backends.registry as registry
+import dynx.registry as shared_registry
 from dynx.backends import (
     Backend,
     backend,
@@ -35,7 +36,7 @@ class Mine(ReferenceBackend):
 
 def _offer(monkeypatch: pytest.MonkeyPatch, **values: str) -> None:
     points = EntryPoints(EntryPoint(name, value, registry.GROUP) for name, value in values.items())
-    monkeypatch.setattr(registry, "entry_points", lambda *, group: points.select(group=group))
+    monkeypatch.setattr(shared_registry, "entry_points", lambda *, group: points.select(group=group))
 
 
 @pytest.fixture
@@ -64,7 +65,7 @@ def test_the_metadata_of_dynx_says_what_its_table_says() -> None:
     project = (Path(__file__).resolve().parents[2] / "pyproject.toml").read_text(encoding="utf-8")
     table = project.partition(f'[project.entry-points."{registry.GROUP}"]\n')[2].partition("\n\n")[0]
     offered = dict(line.replace('"', "").split(" = ") for line in table.splitlines())
-    assert offered == registry._BUILT_IN
+    assert offered == registry.BUILT_IN
 
 
 def test_a_backend_is_made_by_name_with_options() -> None:
@@ -230,7 +231,7 @@ def test_two_packages_with_one_name_are_both_named(monkeypatch: pytest.MonkeyPat
     points = EntryPoints(
         EntryPoint("theirs", value, registry.GROUP) for value in ("one.package:A", "other.package:B")
     )
-    monkeypatch.setattr(registry, "entry_points", lambda *, group: points)
+    monkeypatch.setattr(shared_registry, "entry_points", lambda *, group: points)
     with pytest.raises(BackendError, match=r"more than once.*one\.package:A.*and.*other\.package:B"):
         backend_class("theirs")
     assert backend_names() == (*BUILT_IN, "theirs")

@@ -1,7 +1,7 @@
 """PyBullet's own stepper as a plant: its articulated-body algorithm and its scheme, and nothing else of it.
 
 `dynx.engines.pybullet.stepping` says what is switched off and why. Friction, pushes and armature are those
-of `dynx.sim.plants.loads`, given as torque, so that they mean what they mean in every plant.
+of `dynx.sim.plants.disturbances`, given as torque, so that they mean what they mean in every plant.
 """
 
 from __future__ import annotations
@@ -21,9 +21,8 @@ from dynx.engines.pybullet.stepping import BaseState, SteppingClient
 from dynx.errors import EngineLimitError, UnsupportedFeatureError
 from dynx.model import Model
 from dynx.model.mechanism import build_mechanism
-from dynx.sim.plants.integrators import State
-from dynx.sim.plants.loads import Acceleration, Loads
-from dynx.sim.plants.plant import Plant
+from dynx.sim.plants.disturbances import Disturbances, DisturbedAcceleration
+from dynx.sim.plants.plant import Plant, StepResult
 from dynx.spatial.extended import longdouble
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import cross, quat_from_rotation, quat_product, rotate_back, rotation_from_quat
@@ -36,11 +35,11 @@ class BulletPlant(Plant):
     Bullet's mass matrix and bias, and the stepper is given the torque that brings exactly that about.
     """
 
-    takes_motors: ClassVar[bool] = True
+    motor_commands: ClassVar[tuple[type, ...]] = (MotorCommand,)
 
-    def __init__(self, model: Model, loads: Loads, dt: float, *, substeps: int = 1) -> None:
+    def __init__(self, model: Model, disturbances: Disturbances, dt: float, *, substeps: int = 1) -> None:
         """Raises EngineLimitError for a robot with an inertia that Bullet's stepper does not take."""
-        super().__init__(model, dt, substeps)
+        super().__init__(model, disturbances, dt, substeps=substeps)
         mechanism = build_mechanism(model, longdouble)
         ballast = ballast_for(mechanism)
         if any(load.mass or load.rotational for load in ballast):
@@ -49,19 +48,17 @@ class BulletPlant(Plant):
                 "doctor); the plant of another engine does"
             )
         tree = bullet_tree(mechanism, ballast, 0)
-        self._loads = loads
         self._unit = tree.unit
         self._floating = model.floating
         self._base_nq, self._base_nv = (7, 6) if model.floating else (0, 0)
         self._coupling = model.mechanism.coupling
         self._S = np.eye(0) if self._coupling is None else self._coupling.matrix()
         self._owners = np.flatnonzero([joint.mimic is None for joint in model.joints if joint.moves])
-        self._solves = self._coupling is not None or loads.has_rotors
+        self._solves = self._coupling is not None or disturbances.has_armature
         # The root's inertial frame in the base frame.
         self._center: Floats = np.asarray(tree.root.center, dtype=np.float64)
         self._axes: Floats = quat_from_rotation(np.asarray(tree.root.axes, dtype=np.float64))
         self._axes_back: Floats = self._axes * np.array([-1.0, -1.0, -1.0, 1.0])
-        self._h = dt / substeps
         self._client = SteppingClient(bullet(), tree, model.name, gravity=list(model.gravity), dt=self._h)
 
     @cached_property
@@ -76,38 +73,38 @@ class BulletPlant(Plant):
         return PyBulletBackend(replace(self.model, joints=joints), validate=False)
 
     @cached_property
-    def _accelerate(self) -> Acceleration:
-        return Acceleration(self._engine, self._loads)
+    def _accelerate(self) -> DisturbedAcceleration:
+        return DisturbedAcceleration(self._engine, self.disturbances)
 
     def reset(self, q: Floats, v: Floats) -> None:
         """Make this the state."""
         self._q, self._v = q, v
         self._place()
 
-    def step(self, t: float, tau: Floats) -> State:
-        """One step, or as many sub-steps."""
+    def step(self, t: float, tau: Floats) -> StepResult:
+        """Take one step, or as many sub-steps."""
         first = self._substep(t, tau)
         for k in range(1, self.substeps):
             self._substep(t + k * self._h, tau)
-        return self._q, self._v, first
+        return StepResult(self._q, self._v, first, tau)
 
-    def step_motors(self, t: float, command: MotorCommand) -> tuple[Floats, Floats, Floats, Floats]:
-        """The same with Bullet's motors; last the torque (nv,) that they gave in the first sub-step.
+    def step_motors(self, t: float, command: MotorCommand) -> StepResult:
+        """Take one step with Bullet's motors.
 
-        That is what the motion took, by inverse dynamics, less what the loads gave: Bullet's own report
-        leaves out PD_CONTROL.
+        Their torque (nv,) in the first sub-step is that of inverse dynamics less that of the
+        disturbances: Bullet's own report leaves out PD_CONTROL.
         """
         command = self._in_units(command)
         q, v = self._q, self._v
-        first, loads = self._motor_substep(t, command)
-        tau = self._engine.inverse_dynamics(q, v, first) - loads
+        first, disturbance = self._motor_substep(t, command)
+        tau = self._engine.inverse_dynamics(q, v, first) - disturbance
         for k in range(1, self.substeps):
             self._motor_substep(t + k * self._h, command)
-        return self._q, self._v, first, tau
+        return StepResult(self._q, self._v, first, tau)
 
     def refuse(self, controller: object) -> None:
         """Bullet's motors know no rotors: refuse the two together."""
-        if isinstance(controller, EngineMotor) and self._loads.has_rotors:
+        if isinstance(controller, EngineMotor) and self.disturbances.has_armature:
             raise UnsupportedFeatureError(
                 f"{controller.name} is a motor inside PyBullet, which knows no armature; use a law of torque"
             )
@@ -124,19 +121,19 @@ class BulletPlant(Plant):
     def _substep(self, t: float, tau: Floats) -> Floats:
         if self._solves:
             tau = self._tree_torque(self._q, self._v, self._accelerate(self._q, self._v, tau, t))
-        elif self._loads.present:
-            tau = tau + self._loads.torque(self._engine, t, self._q, self._v)
+        elif self.disturbances.has_torque:
+            tau = tau + self.disturbances.torque(self._engine, t, self._q, self._v)
         self._client.apply((tau[self._base_nv :] / self._unit).tolist())
         return self._advance(tau)
 
     def _motor_substep(self, t: float, command: MotorCommand) -> tuple[Floats, Floats]:
-        """The acceleration, and the torque of the loads (nv,)."""
+        """The acceleration, and the torque of the disturbances (nv,)."""
         self._client.command(command)
-        loads: Floats = np.zeros(self.model.nv)
-        if self._loads.present:
-            loads = self._loads.torque(self._engine, t, self._q, self._v)
-            self._client.add((loads[self._base_nv :] / self._unit).tolist())
-        return self._advance(loads), loads
+        disturbance: Floats = np.zeros(self.model.nv)
+        if self.disturbances.has_torque:
+            disturbance = self.disturbances.torque(self._engine, t, self._q, self._v)
+            self._client.add((disturbance[self._base_nv :] / self._unit).tolist())
+        return self._advance(disturbance), disturbance
 
     def _tree_torque(self, q: Floats, v: Floats, a: Floats) -> Floats:
         """The torque of every joint of the tree, mimic joints too, that gives the acceleration `a`."""

@@ -29,7 +29,7 @@ from dynx.sim.loop.clock import Clock
 from dynx.sim.loop.controller_checks import check_controller
 from dynx.sim.loop.references import checked_reference
 from dynx.sim.loop.sensors import Noise
-from dynx.sim.plants.loads import Push
+from dynx.sim.plants.disturbances import Push
 from dynx.sim.plants.model_error import MassScale, Payload, plant_model
 from dynx.simd.threads import checked_threads
 from dynx.spatial.scalar import Floats

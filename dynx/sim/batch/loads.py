@@ -1,6 +1,6 @@
 """What acts on the joints of many rollouts besides the motors: friction, rotors and pushes, on symbols.
 
-They mean what they mean to one rollout (`dynx.sim.plants.loads`). Coefficients of the joints may differ
+They mean what they mean to one rollout (`dynx.sim.plants.disturbances`). Coefficients of joints may differ
 from rollout to rollout; those are inputs of the kernel, all others are constants in it.
 """
 
@@ -20,7 +20,7 @@ from dynx.errors import ArgumentError, GainError
 from dynx.model import Mechanism, Model
 from dynx.model.configuration import real_array
 from dynx.sim.loop.clock import WHOLE, Clock
-from dynx.sim.plants.loads import Push
+from dynx.sim.plants.disturbances import Push
 from dynx.spatial.scalar import Array, Floats
 
 WRENCH = 6

@@ -97,9 +97,9 @@ class Loop:
                         tau = clamp(tau, limit)
             try:
                 if command is None:
-                    q, v, a = step(t, tau)
+                    q, v, a, _, _ = step(t, tau)
                 else:
-                    q, v, a, tau = plant.step_motors(t, command)
+                    q, v, a, tau, _ = plant.step_motors(t, command)
                 if stops is not None:
                     stopped = stops(q, v)
                     if stopped is not None:

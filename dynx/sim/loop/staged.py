@@ -20,7 +20,7 @@ from dynx.errors import TraceError
 from dynx.sim.loop.controller_checks import is_row
 from dynx.sim.loop.plain import RUNAWAY, Loop
 from dynx.sim.loop.stages import Ask, Glue, Questions, asking_law, refuse_foreign_law
-from dynx.sim.plants.plant import DynxPlant
+from dynx.sim.plants.integrated import IntegratedPlant
 from dynx.sim.record.record import Record
 from dynx.simd.kernel import Kernel
 from dynx.simd.strides import Walk, Walked, walk
@@ -53,7 +53,7 @@ def glued(loop: Loop, record: Record) -> GluedLoop | None:
     plant, left = loop.plant, len(record) - record.steps
     if left < WORTH or isinstance(loop.controller, EngineMotor):
         return None
-    if not isinstance(plant, DynxPlant) or not plant.is_array_code or plant.substeps > MOST_SUBSTEPS:
+    if not isinstance(plant, IntegratedPlant) or not plant.is_array_code or plant.substeps > MOST_SUBSTEPS:
         return None
     if left < WORTH * plant.evaluations:
         return None
@@ -71,7 +71,7 @@ def glued(loop: Loop, record: Record) -> GluedLoop | None:
 class GluedLoop:
     """A step in stages, once with the law asked and once with its torque held from before."""
 
-    def __init__(self, loop: Loop, plant: DynxPlant) -> None:
+    def __init__(self, loop: Loop, plant: IntegratedPlant) -> None:
         """Raises TraceError, and whatever a law raises, for a law that cannot be traced."""
         self._loop, self._plant = loop, plant
         nq, nv = plant.model.nq, plant.model.nv

@@ -17,7 +17,7 @@ from dynx.cli.sim.command import sim as command
 from dynx.sim import Rollout, simulate
 from dynx.sim.named_controllers import CONTROLLERS
 from dynx.sim.plants.integrators import METHODS
-from dynx.sim.plants.plant import INTEGRATORS
+from dynx.sim.plants.registry import INTEGRATORS
 from tests.cli.sim.command import SHORT, document, sim
 
 needs_bullet = pytest.mark.skipif("pybullet" not in installed_backends(), reason="PyBullet is not installed")

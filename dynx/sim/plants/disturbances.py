@@ -1,7 +1,7 @@
-"""What acts on the joints besides the motors: friction, pushes from outside, and the rotors' inertia.
+"""Joint friction, external wrenches and armature of a plant.
 
-One text for every plant: as a function of time and state it gives a torque that is added to that of the
-motors, so a push or a damper means the same to every engine and every integrator.
+One text for every plant: friction and wrenches become, as a function of time and state, a torque that is
+added to that of the motors, so a push or a damper means the same to every engine and every integrator.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class Push:
     reference: str = LOCAL_WORLD_ALIGNED
 
     def checked(self, model: Model) -> Push:
-        """The same with its wrench as an array, or an error that says why not."""
+        """A copy with its wrench as an array. Raises ArgumentError for an invalid push on `model`."""
         model.frame_index(self.frame)
         wrench = checked_array("wrench", self.wrench, 6)
         if wrench.ndim != 1 or self.reference not in REFERENCES:
@@ -57,29 +57,30 @@ class Push:
         return Push(self.frame, wrench, float(self.start), float(self.duration), self.reference)
 
 
-class Loads:
-    """Friction, pushes and armature of a plant, from what `dynx.simulate` is asked."""
+class Disturbances:
+    """All that acts on the joints of a plant besides its motors, from the arguments of `dynx.simulate`."""
 
     def __init__(
         self,
         model: Model,
-        damping: Coefficients,
-        friction: Coefficients,
-        slip: float,
-        armature: Coefficients,
-        pushes: Sequence[Push],
-        dt: float,
+        damping: Coefficients = False,
+        friction: Coefficients = False,
+        slip: float = 0.0,
+        armature: Coefficients = False,
+        pushes: Sequence[Push] = (),
+        dt: float = 0.0,
     ) -> None:
+        """Raises GainError and ArgumentError for coefficients and pushes that `model` cannot have."""
         self.friction = JointFriction(model, damping, friction, slip)
         self.pushes = tuple(push.checked(model) for push in pushes)
-        self.rotors = _rotors(model, armature)
-        """Inertia of the rotors (nv, nv), added to the mass matrix."""
-        self.has_rotors = bool(self.rotors.any())
+        self.armature = _armature_matrix(model, armature)
+        """Armature (nv, nv), added to the mass matrix."""
+        self.has_armature = bool(self.armature.any())
         self._early = WHOLE * dt
 
     @property
-    def present(self) -> bool:
-        """Whether any torque is added at all."""
+    def has_torque(self) -> bool:
+        """Whether friction or pushes add any torque."""
         return self.friction.present or bool(self.pushes)
 
     def torque(self, engine: Backend, t: float, q: Floats, v: Floats) -> Floats:
@@ -92,31 +93,31 @@ class Loads:
         return tau
 
 
-class Acceleration:
-    """The acceleration of a plant under a torque: one backend's forward dynamics, with the loads."""
+class DisturbedAcceleration:
+    """The acceleration of a plant under a torque: one backend's forward dynamics, with the disturbances."""
 
-    def __init__(self, engine: Backend, loads: Loads) -> None:
+    def __init__(self, engine: Backend, disturbances: Disturbances) -> None:
         self.dynamics = SingleSample(engine)
         self._engine = engine
-        self._loads = loads
+        self._disturbances = disturbances
 
     @property
-    def is_plain(self) -> bool:
+    def is_undisturbed(self) -> bool:
         """Whether it is the backend's forward dynamics and nothing else."""
-        return not (self._loads.present or self._loads.has_rotors)
+        return not (self._disturbances.has_torque or self._disturbances.has_armature)
 
     def __call__(self, q: Floats, v: Floats, tau: Floats, t: float) -> Floats:
         """a (nv,) at state q, v under `tau`, in a step that began at `t`."""
-        if self._loads.present:
-            tau = tau + self._loads.torque(self._engine, t, q, v)
-        if not self._loads.has_rotors:
+        if self._disturbances.has_torque:
+            tau = tau + self._disturbances.torque(self._engine, t, q, v)
+        if not self._disturbances.has_armature:
             a: Floats = self.dynamics.forward_dynamics(q, v, tau)
             return a
-        M = self.dynamics.mass_matrix(q) + self._loads.rotors
+        M = self.dynamics.mass_matrix(q) + self._disturbances.armature
         return solve_mass_matrix(M, tau - self.dynamics.bias_torque(q, v))
 
 
-def _rotors(model: Model, armature: Coefficients) -> Floats:
+def _armature_matrix(model: Model, armature: Coefficients) -> Floats:
     if isinstance(armature, bool):
         return JointDynamicsTerms(model).rotors if armature else np.zeros((model.nv, model.nv))
     base = 6 if model.floating else 0

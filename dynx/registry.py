@@ -1,0 +1,119 @@
+"""Classes by name, from dynx itself, from the running program and from entry points of installed packages.
+
+Three sources; the first that has a name decides: a table of dynx's own classes, so that they are found in a
+source tree that was never installed; those that a program registered; and the entry points of one group. A
+name therefore never changes its meaning: `ClassRegistry.register` refuses a name that is taken, and an entry
+point with the name of one of dynx's own is ignored.
+
+A class is imported when it is first looked up, never to list names.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping
+from importlib import import_module
+from importlib.metadata import EntryPoint, entry_points
+from typing import Any, Generic, TypeVar
+
+from dynx.errors import ArgumentError, DynxError, nearest, shown
+
+Kind = TypeVar("Kind")
+
+
+class ClassRegistry(Generic[Kind]):
+    """The subclasses of one base class, by name."""
+
+    def __init__(
+        self,
+        word: str,
+        group: str,
+        built_in: Mapping[str, str],
+        base: Callable[[], type[Kind]],
+        *,
+        error: type[DynxError],
+        unknown: type[DynxError],
+    ) -> None:
+        """`word` stands for such a class in messages; entries are ``"package.module:Class"``.
+
+        `base` returns the base class; `error` is raised for a class that cannot be used, `unknown` for a
+        name that nobody provides.
+        """
+        self.group = group
+        """Entry-point group: ``name = "package.module:Class"``."""
+        self.built_in = built_in
+        """Entries of dynx itself."""
+        self._word = word
+        self._base = base
+        self._error = error
+        self._unknown = unknown
+        self._registered: dict[str, Callable[[], type[Kind]]] = {}
+
+    def find(self, name: str) -> type[Kind]:
+        """The class of that name; this imports it."""
+        if not isinstance(name, str):
+            raise ArgumentError(f"a {self._word}'s name is of type {type(name).__name__}; wanted a str")
+        if name in self.built_in:
+            module, _, attribute = self.built_in[name].partition(":")
+            return self._checked(name, lambda: getattr(import_module(module), attribute), "dynx itself")
+        if name in self._registered:
+            return self._checked(name, self._registered[name], "this program")
+        found = [point for point in self._entry_points() if point.name == name]
+        if not found:
+            raise self._unknown(f"no {self._word} {shown(name)}{nearest(name, self.names())}")
+        if len({point.value for point in found}) > 1:
+            listed = " and ".join(_described(point) for point in found)
+            raise self._error(f"the {self._word} {shown(name)} is provided more than once: {listed}")
+        return self._checked(name, found[0].load, _described(found[0]))
+
+    def names(self) -> tuple[str, ...]:
+        """All names, dynx's own first; whether the classes can be imported is not tried."""
+        points = sorted(point.name for point in self._entry_points())
+        return tuple(dict.fromkeys([*self.built_in, *self._registered, *points]))
+
+    def register(self, name: str, loader: Callable[[], type[Kind]]) -> None:
+        """Add a class of the running program; `loader()` returns it when it is first looked up.
+
+        Raises ArgumentError for a name that is taken: a class is never replaced.
+        """
+        if not isinstance(name, str) or not name:
+            raise ArgumentError(f"a {self._word}'s name is {shown(name)}; wanted a str that is not empty")
+        if not callable(loader):
+            raise ArgumentError(
+                f"the loader of {shown(name)} is of type {type(loader).__name__}, not callable"
+            )
+        if name in self.names():
+            raise ArgumentError(f"the name {shown(name)} is taken; a {self._word} is never replaced")
+        self._registered[name] = loader
+
+    def unregister(self, name: str) -> None:
+        """Remove a class that `register` added; raises `unknown` for any other name."""
+        if name not in self._registered:
+            raise self._unknown(
+                f"no {self._word} {shown(name)} was registered{nearest(name, self._registered)}"
+            )
+        del self._registered[name]
+
+    def _checked(self, name: str, loader: Callable[[], Any], provider: str) -> type[Kind]:
+        base = self._base()
+        subject = f"the {self._word} {shown(name)}, provided by {provider},"
+        try:
+            kind = loader()
+        except DynxError:
+            raise
+        except Exception as error:
+            raise self._error(f"{subject} cannot be loaded: {type(error).__name__}: {error}") from error
+        if not (isinstance(kind, type) and issubclass(kind, base)):
+            raise self._error(f"{subject} is {shown(kind)}, which is no subclass of dynx.{base.__name__}")
+        if inspect.isabstract(kind):
+            missing = ", ".join(sorted(getattr(kind, "__abstractmethods__", ())))
+            raise self._error(f"{subject} is incomplete: {kind.__name__} lacks {missing}")
+        return kind
+
+    def _entry_points(self) -> list[EntryPoint]:
+        return [point for point in entry_points(group=self.group) if point.name not in self.built_in]
+
+
+def _described(point: EntryPoint) -> str:
+    distribution = "" if point.dist is None else f" of {point.dist.name}"
+    return f"the entry point {point.value}{distribution}"

@@ -1,0 +1,105 @@
+"""A plant over any backend: its forward dynamics, integrated by dynx."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+from dynx.backends import Backend
+from dynx.backends.solvability import singular_coordinates
+from dynx.errors import ArgumentError, shown
+from dynx.model import Model
+from dynx.sim.plants.disturbances import Disturbances, DisturbedAcceleration
+from dynx.sim.plants.integrators import Accelerate, Adaptive, RungeKutta4, SemiImplicitEuler, State
+from dynx.sim.plants.plant import Plant, StepResult
+from dynx.spatial.scalar import Array, Floats
+
+SCHEMES = ("semi_implicit", "rk4", "adaptive")
+"""Names of the integration schemes."""
+
+
+@lru_cache(maxsize=64)
+def _is_singular(model: Model) -> bool:
+    """Whether some joint moves no inertia; cached, because the check takes as long as some hundred steps."""
+    return bool(singular_coordinates(model))
+
+
+class IntegratedPlant(Plant):
+    """Forward dynamics of a backend under an integrator of dynx."""
+
+    def __init__(
+        self,
+        engine: Backend,
+        disturbances: Disturbances,
+        dt: float,
+        *,
+        integrator: str = "semi_implicit",
+        substeps: int = 1,
+        method: str = "DOP853",
+        rtol: float = 1e-10,
+        atol: float = 1e-12,
+    ) -> None:
+        """Raises ArgumentError for an integrator that does not exist."""
+        super().__init__(engine.model, disturbances, dt, substeps=substeps)
+        self._engine = engine
+        self._accelerate = DisturbedAcceleration(engine, disturbances)
+        if integrator == "semi_implicit":
+            self._scheme: SemiImplicitEuler | RungeKutta4 | Adaptive = SemiImplicitEuler(
+                engine.model, self._h
+            )
+        elif integrator == "rk4":
+            self._scheme = RungeKutta4(engine.model, self._h)
+        elif integrator == "adaptive":
+            self._scheme = Adaptive(engine.model, self._h, method=method, rtol=rtol, atol=atol)
+        else:
+            raise ArgumentError(
+                f"integrator is {shown(integrator)}; a plant of dynx has {', '.join(SCHEMES)}"
+            )
+        self.dynamics = self._accelerate.dynamics
+        """The engine's dynamics without disturbances."""
+        self._forward = self.dynamics.forward_dynamics
+        self._undisturbed = self._accelerate.is_undisturbed
+        self._singular = not disturbances.has_armature and _is_singular(engine.model)
+
+    def reset(self, q: Floats, v: Floats) -> None:
+        """Make this the state. Raises SingularMassMatrixError where it has no acceleration."""
+        if self._singular:
+            self._engine.forward_dynamics(q, v, 0.0 * v)
+        self._q, self._v = q, v
+
+    def step(self, t: float, tau: Floats) -> StepResult:
+        """Take one step, or as many sub-steps."""
+        q, v, a = self._advance(t, tau)
+        for k in range(1, self.substeps):
+            q, v, _ = self._advance(t + k * self._h, tau)
+        return StepResult(q, v, a, tau)
+
+    @property
+    def is_array_code(self) -> bool:
+        """Whether a step is `advanced` over the engine's forward dynamics, for arrays of any scalar."""
+        # Floats and symbols take the flow of a floating base in other roundings.
+        schemes = SemiImplicitEuler if self.model.floating else SemiImplicitEuler | RungeKutta4
+        return self._undisturbed and isinstance(self._scheme, schemes)
+
+    @property
+    def evaluations(self) -> int:
+        """Evaluations of the acceleration in one step, where it `is_array_code`."""
+        return self.substeps * (4 if isinstance(self._scheme, RungeKutta4) else 1)
+
+    def advanced(self, accelerate: Accelerate, q: Array, v: Array, tau: Array) -> State:
+        """One step from q, v, with `accelerate(q, v, tau)` in the place of the engine."""
+        q, v, first = self._scheme(accelerate, q, v, tau)
+        for _ in range(1, self.substeps):
+            q, v, _ = self._scheme(accelerate, q, v, tau)
+        return q, v, first
+
+    def _advance(self, t: float, tau: Floats) -> State:
+        if self._undisturbed:
+            state = self._scheme(self._forward, self._q, self._v, tau)
+        else:
+            state = self._scheme(self._accelerate, self._q, self._v, tau, t)
+        self._q, self._v, _ = state
+        return state
+
+    def close(self) -> None:
+        """Close the backend."""
+        self._engine.close()

@@ -1,0 +1,100 @@
+"""Plants by name: engines with a stepper of their own, and every backend under an integrator of dynx.
+
+Steppers are registered as backends are (`dynx.registry`): by a table here, by `register`, or by entry
+points in the group ``dynx.plants`` of installed packages. Such a class is made as
+``Class(model, disturbances, dt, substeps=n)``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from dynx.backends import backend
+from dynx.backends.registry import BUILT_IN as BACKENDS
+from dynx.errors import ArgumentError, BackendError, UnknownBackendError, shown
+from dynx.model import Model
+from dynx.registry import ClassRegistry
+from dynx.sim.plants.disturbances import Disturbances
+from dynx.sim.plants.integrated import SCHEMES, IntegratedPlant
+from dynx.sim.plants.plant import Plant
+
+GROUP = "dynx.plants"
+"""The entry-point group: ``name = "package.module:PlantClass"``."""
+
+BUILT_IN = {"pybullet": "dynx.engines.pybullet.plant:BulletPlant"}
+"""Plants of dynx itself with a stepper of their own."""
+
+ENGINE = "engine"
+"""Name of the integrator that stands for the engine's own stepper."""
+
+INTEGRATORS = (*SCHEMES, ENGINE)
+"""Names that `dynx.simulate` takes as `integrator`."""
+
+_steppers = ClassRegistry(
+    "plant", GROUP, BUILT_IN, lambda: Plant, error=BackendError, unknown=UnknownBackendError
+)
+
+
+def plant_names() -> tuple[str, ...]:
+    """Names of all plants with a stepper of their own, dynx's own first."""
+    return _steppers.names()
+
+
+def plant_class(name: str) -> type[Plant]:
+    """The class of the plant of that name that has a stepper of its own; this imports its engine."""
+    return _steppers.find(name)
+
+
+def register(name: str, loader: Callable[[], type[Plant]]) -> None:
+    """Add a plant class of the running program; `loader()` returns it when it is first used.
+
+    Raises ArgumentError for a name that is taken by another plant or by a backend of dynx.
+    """
+    if name in BACKENDS:
+        raise ArgumentError(f"the name {shown(name)} is taken by a backend; a plant is never replaced")
+    _steppers.register(name, loader)
+
+
+def unregister(name: str) -> None:
+    """Remove what `register` added; UnknownBackendError for a name that no program registered."""
+    _steppers.unregister(name)
+
+
+def default_integrator(name: str) -> str:
+    """``engine`` for a plant with a stepper of its own, otherwise ``semi_implicit``."""
+    # Entry points are read only for names that dynx does not have: that takes some milliseconds.
+    has_stepper = name in BUILT_IN if name in BACKENDS else name in _steppers.names()
+    return ENGINE if has_stepper else "semi_implicit"
+
+
+def make_plant(
+    name: str,
+    model: Model,
+    disturbances: Disturbances,
+    dt: float,
+    *,
+    integrator: str,
+    substeps: int,
+    options: Mapping[str, Any],
+) -> Plant:
+    """The plant `name` under `integrator`; `options` are those of the adaptive integrator.
+
+    Raises ArgumentError for an integrator that the plant does not have, UnknownBackendError for a name
+    nobody provides, NotInstalledError where its engine is missing.
+    """
+    if not isinstance(substeps, int) or isinstance(substeps, bool) or substeps < 1:
+        raise ArgumentError(f"substeps is {shown(substeps)}; wanted 1 or more")
+    if integrator not in INTEGRATORS:
+        raise ArgumentError(f"integrator is {shown(integrator)}; wanted one of {', '.join(INTEGRATORS)}")
+    if integrator == ENGINE:
+        try:
+            kind = plant_class(name)
+        except UnknownBackendError:
+            known = ", ".join(plant_names())
+            raise ArgumentError(
+                f"the engine {shown(name)} has no stepper here; those that have one: {known}"
+            ) from None
+        return kind(model, disturbances, dt, substeps=substeps)
+    engine = backend(name, model, validate=False)
+    return IntegratedPlant(engine, disturbances, dt, integrator=integrator, substeps=substeps, **options)

@@ -1,0 +1,99 @@
+"""A plant of somebody else's runs under its name like those of dynx."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from importlib.metadata import EntryPoint, EntryPoints
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import dynx.registry as shared_registry
+from dynx.control import PositionMotor
+from dynx.errors import ArgumentError, BackendError, UnknownBackendError, UnsupportedFeatureError
+from dynx.model import Model
+from dynx.model.loading import load
+from dynx.sim import Plant, StepResult, register_plant, simulate
+from dynx.sim.plants import registry
+from dynx.sim.plants.disturbances import Disturbances
+from dynx.spatial.scalar import Floats
+
+PENDULUM = load("pendulum")
+
+
+class Drifting(Plant):
+    """Moves at a constant velocity, whatever the torque."""
+
+    def __init__(self, model: Model, disturbances: Disturbances, dt: float, *, substeps: int = 1) -> None:
+        super().__init__(model, disturbances, dt, substeps=substeps)
+        self.closed = False
+
+    def reset(self, q: Floats, v: Floats) -> None:
+        self._q, self._v = q, v
+
+    def step(self, t: float, tau: Floats) -> StepResult:
+        self._q = self._q + self._dt * self._v
+        return StepResult(self._q, self._v, 0.0 * self._v, tau)
+
+    def close(self) -> None:
+        self.closed = True
+
+
+@pytest.fixture
+def drifting() -> Iterator[str]:
+    register_plant("drifting", lambda: Drifting)
+    yield "drifting"
+    registry.unregister("drifting")
+
+
+def _assert_drifts(plant: str) -> None:
+    found = simulate(PENDULUM, v0=[2.0], plant=plant, duration=0.1, dt=1e-2)
+    assert np.allclose(found.q[:, 0], 2.0 * found.t)
+    assert found.settings["integrator"] == "engine"
+
+
+def test_a_registered_plant_is_simulated_by_its_name(drifting: str) -> None:
+    assert drifting in registry.plant_names()
+    _assert_drifts(drifting)
+
+
+def test_an_entry_point_adds_a_plant(monkeypatch: pytest.MonkeyPatch) -> None:
+    points = EntryPoints([EntryPoint("theirs", f"{__name__}:Drifting", registry.GROUP)])
+    monkeypatch.setattr(shared_registry, "entry_points", lambda *, group: points.select(group=group))
+    assert registry.plant_names() == ("pybullet", "theirs")
+    _assert_drifts("theirs")
+
+
+def test_the_metadata_of_dynx_has_the_entries_of_its_table() -> None:
+    project = (Path(__file__).resolve().parents[3] / "pyproject.toml").read_text(encoding="utf-8")
+    table = project.partition(f'[project.entry-points."{registry.GROUP}"]\n')[2].partition("\n\n")[0]
+    offered = dict(line.replace('"', "").split(" = ") for line in table.splitlines())
+    assert offered == registry.BUILT_IN
+
+
+@pytest.mark.parametrize("taken", ["pybullet", "pinocchio", "drifting"])
+def test_a_plant_is_never_replaced(drifting: str, taken: str) -> None:
+    with pytest.raises(ArgumentError, match=f"'{taken}' is taken"):
+        register_plant(taken, lambda: Drifting)
+
+
+def test_only_a_plant_that_takes_a_motor_command_gets_it(drifting: str) -> None:
+    with pytest.raises(UnsupportedFeatureError, match="own stepper"):
+        simulate(PENDULUM, PositionMotor(PENDULUM), [0.1], plant=drifting, duration=0.1)
+
+
+def test_a_class_that_is_no_plant_is_refused() -> None:
+    register_plant("odd", lambda: dict)  # type: ignore[arg-type, return-value]
+    try:
+        with pytest.raises(BackendError, match=r"the plant 'odd'.*no subclass of dynx\.Plant"):
+            simulate(PENDULUM, plant="odd", duration=0.1)
+    finally:
+        registry.unregister("odd")
+
+
+def test_a_name_that_nobody_provides_is_an_error() -> None:
+    with pytest.raises(UnknownBackendError, match="pinochio"):
+        simulate(PENDULUM, plant="pinochio", duration=0.1)
+    with pytest.raises(ArgumentError, match="no stepper here; those that have one: pybullet"):
+        simulate(PENDULUM, plant="pinocchio", integrator="engine", duration=0.1)
