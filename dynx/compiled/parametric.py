@@ -31,7 +31,6 @@ from dynx.model.configuration import checked_array
 from dynx.rbd import crba, rnea
 from dynx.simd.kernel import Kernel
 from dynx.simd.program import Program
-from dynx.simd.sign import sign_of
 from dynx.simd.threads import checked_threads
 from dynx.simd.trace import trace
 from dynx.spatial.inertia import RigidInertia
@@ -221,7 +220,7 @@ def _joint_torque(mechanism: Mechanism, joints: Array | None, v: Array, a: Array
 
 def _sign(x: Any) -> Any:
     # A mimic joint with multiplier 0 has a constant for its speed.
-    return np.sign(x) if isinstance(x, (int, float)) else sign_of(x)
+    return np.sign(x) if isinstance(x, (int, float)) else x.sign()
 
 
 def _rebuild(selection: Selection, threads: int | None) -> ParametricDynamics:

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from dynx.errors import NotInstalledError
-from dynx.files.writing import atomic_file
+from dynx.files.figures import new_figure, save_figure
 from dynx.sim.tutorial import BULLET, Row, Tutorial
 
 STYLES = ("-", "--", "-.", ":")
@@ -26,11 +24,7 @@ def plot_rows(rows: Sequence[Row], tutorial: Tutorial, path: str | os.PathLike[s
     Shown is the largest error of all joints at each time. Raises NotInstalledError without matplotlib
     (``pip install 'dynx[plot]'``), ArgumentError where the file cannot be written.
     """
-    try:
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise NotInstalledError("a plot needs matplotlib: pip install 'dynx[plot]'") from error
-    figure = Figure(figsize=(7.0, 2.0 + 3.2 * len(tutorial.plants)), layout="constrained")
+    figure = new_figure(7.0, 2.0 + 3.2 * len(tutorial.plants))
     panels = figure.subplots(len(tutorial.plants), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
     for axis, plant in zip(panels, tutorial.plants, strict=True):
         for k, row in enumerate(rows):
@@ -55,6 +49,5 @@ def plot_rows(rows: Sequence[Row], tutorial: Tutorial, path: str | os.PathLike[s
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=8)
     if path is not None:
-        with atomic_file(path) as file:
-            figure.savefig(file, format=Path(path).suffix[1:].lower(), dpi=200)
+        save_figure(figure, path)
     return figure

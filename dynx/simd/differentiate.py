@@ -23,9 +23,8 @@ from heapq import heapify, heappop, heappush
 from typing import Literal
 
 from dynx.errors import CompileError, nearest, shown
-from dynx.simd.expr import Graph, Node, Simplify
+from dynx.simd.expr import Graph, Node, Simplify, sign
 from dynx.simd.program import Port, Program, finished
-from dynx.simd.sign import sign
 from dynx.simd.simplify import FAST
 
 Order = Literal["forward", "reverse", "markowitz"]

@@ -123,6 +123,23 @@ class Graph:
         return found
 
 
+_SIGN_FACTOR = 2.0**537
+"""Twice this factor lifts the smallest subnormal, 2^-1074, to 1."""
+
+
+def sign(graph: Graph, x: int) -> int:
+    """The sign of node `x`, made of the operations that there are: -1, 0 or 1 for every double; NaN for NaN.
+
+    x is scaled and clamped to [-1, 1] twice: clamping once between the two factors because one factor
+    alone would not reach 1, and both together overflow. `min` and `max` return a NaN if it is their second
+    argument. The derivative of this expression near 0 is meaningless.
+    """
+    for _ in range(2):
+        lifted = graph.apply("mul", graph.constant(_SIGN_FACTOR), x)
+        x = graph.apply("max", graph.constant(-1.0), graph.apply("min", graph.constant(1.0), lifted))
+    return x
+
+
 class Symbol:
     """A number that is not known yet: node `index` of `graph`. Arithmetic on it makes nodes.
 
@@ -194,11 +211,8 @@ class Symbol:
         return self._alone("arctan")
 
     def sign(self) -> Symbol:
-        """-1, 0 or 1."""
-        # It is made of other operations, on top of this module.
-        from dynx.simd.sign import sign_of
-
-        return sign_of(self)
+        """-1, 0 or 1; see `sign`."""
+        return Symbol(self.graph, sign(self.graph, self.index))
 
     def minimum(self, other: Any) -> Symbol:
         """The smaller one; `other` if either is NaN."""

@@ -13,11 +13,10 @@ from hypothesis import strategies as st
 
 from dynx.errors import CompileError
 from dynx.simd.differentiate import Order, differentiate
-from dynx.simd.expr import Graph, Op
+from dynx.simd.expr import Graph, Op, sign
 from dynx.simd.inlining import inlined
 from dynx.simd.interp import interpret
 from dynx.simd.program import Port, Program, finished
-from dynx.simd.sign import sign
 from dynx.simd.trace import trace
 from dynx.spatial.scalar import Array, Floats, arctan, cos, exp, sin, sqrt, tanh
 from tests.simd.programs import RANDOM, SPECIAL, doubles

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from dynx.cli.shell.output_file import check_writable
 from dynx.errors import ArgumentError, NotInstalledError, shown
+from dynx.files.figures import picture_format
 
 if TYPE_CHECKING:
     from dynx.sim import Rollout
@@ -66,11 +67,4 @@ def check_record(path: str) -> None:
 
 def check_picture(path: str) -> None:
     """Raise NotInstalledError without matplotlib, ArgumentError for a name with no format of its."""
-    try:
-        from matplotlib.backend_bases import FigureCanvasBase
-    except ImportError as error:
-        raise NotInstalledError("--plot needs matplotlib: pip install 'dynx[plot]'") from error
-    formats = FigureCanvasBase.get_supported_filetypes()
-    if os.path.splitext(path)[1][1:].lower() not in formats:
-        listed = ", ".join(f".{name}" for name in sorted(formats))
-        raise ArgumentError(f"--plot {shown(path, 300)} ends with no format; wanted one of {listed}")
+    picture_format(path)

@@ -17,7 +17,7 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 
 from dynx.model.xml.source import SourceElement
 from dynx.rules import Case, Detection, Rule, found_at
-from dynx.rules.inertia.edits import MOMENTS
+from dynx.rules.text.numeric_attributes import MOMENTS
 
 _ELEMENTS = {
     "robot": ("link", "joint", "material", "transmission"),

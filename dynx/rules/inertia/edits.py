@@ -6,8 +6,7 @@ from dynx.model.elements import Inertial
 from dynx.model.xml.source import Edit, SourceElement, XmlSource
 from dynx.rules.case import Case
 from dynx.rules.text.number_text import decimal
-
-MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+from dynx.rules.text.numeric_attributes import MOMENTS
 
 ZERO_TENSOR = "<inertia {}/>".format(" ".join(f'{name}="0"' for name in MOMENTS))
 

@@ -6,7 +6,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from dynx.model.xml.source import SourceElement, XmlSource
-from dynx.rules.inertia.edits import MOMENTS
+
+MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+"""The attributes of ``<inertia>``: moments and products of inertia."""
 
 _ORIGIN = {"xyz": 3, "rpy": 3}
 _IN_INERTIAL = {

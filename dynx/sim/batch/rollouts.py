@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from dynx.errors import ArgumentError, NotInstalledError, shown
+from dynx.errors import ArgumentError, shown
+from dynx.files.figures import new_figure, save_figure
 from dynx.spatial.scalar import Floats
 
 SCHEMA = "dynx.rollouts/1"
@@ -83,11 +84,7 @@ class BatchRollouts:
 
         Raises NotInstalledError without matplotlib (``pip install 'dynx[plot]'``).
         """
-        try:
-            from matplotlib.figure import Figure
-        except ImportError as error:
-            raise NotInstalledError("a plot needs matplotlib: pip install 'dynx[plot]'") from error
-        figure = Figure(figsize=(7.0, 6.0), layout="constrained")
+        figure = new_figure(7.0, 6.0)
         upper, lower = figure.subplots(2, 1)
         worst = np.sort(self.worst[np.isfinite(self.worst)])
         upper.step(
@@ -109,7 +106,7 @@ class BatchRollouts:
             f"{int(self.done.sum())} of {len(self)} rollouts" + (f", {lost} diverged" if lost else "")
         )
         if path is not None:
-            figure.savefig(path, dpi=200)
+            save_figure(figure, path)
         return figure
 
     def __repr__(self) -> str:

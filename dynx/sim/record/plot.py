@@ -9,13 +9,11 @@ from __future__ import annotations
 
 import os
 from itertools import pairwise
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from dynx.errors import ArgumentError, NotInstalledError, shown
-from dynx.files.writing import atomic_file
+from dynx.files.figures import new_figure, save_figure
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
 
@@ -46,22 +44,14 @@ class Column(NamedTuple):
 
 def plot(rollout: Rollout, path: str | os.PathLike[str] | None) -> Any:
     """See `Rollout.plot`. The figure belongs to no window and no global state of matplotlib."""
-    try:
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise NotInstalledError("a plot needs matplotlib: pip install 'dynx[plot]'") from error
     columns = _columns(rollout.model)
-    figure = Figure(figsize=(7.0 if len(columns) == 1 else 3.8 * len(columns), 8.0), layout="constrained")
+    figure = new_figure(7.0 if len(columns) == 1 else 3.8 * len(columns), 8.0)
     panels = figure.subplots(3, len(columns), sharex=True, squeeze=False)
     for column, axes in zip(columns, panels.T, strict=True):
         _draw(rollout, column, axes)
     figure.suptitle(_plain(_title(rollout)), fontsize=11)
     if path is not None:
-        kind = Path(path).suffix[1:].lower()
-        if kind not in figure.canvas.get_supported_filetypes():
-            raise ArgumentError(f"a plot is saved as .png, .pdf or .svg, not as {shown(Path(path).name)}")
-        with atomic_file(path) as file:
-            figure.savefig(file, format=kind, dpi=200)
+        save_figure(figure, path)
     return figure
 
 

@@ -86,7 +86,7 @@ def test_what_cannot_be_written_in_the_end_loses_nothing_else(
 
 def test_a_plot_without_matplotlib_names_the_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "matplotlib", None)
-    monkeypatch.setitem(sys.modules, "matplotlib.backend_bases", None)
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
     for arguments in (["ur5", *SHORT], ["--tutorial"]):
         result = sim(*arguments, "--plot", str(tmp_path / "out.png"))
         assert result.exit_code == 2

@@ -1,0 +1,44 @@
+"""Figures by matplotlib, of no window and no global state. No other module imports matplotlib."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+from dynx.errors import ArgumentError, NotInstalledError, shown
+from dynx.files.writing import atomic_file
+
+RESOLUTION = 200
+"""Pixels per inch of a saved picture."""
+
+
+def new_figure(width: float, height: float) -> Any:
+    """A `matplotlib.figure.Figure` of that size [in]. Raises NotInstalledError without matplotlib."""
+    try:
+        from matplotlib.figure import Figure
+    except ImportError as error:
+        raise NotInstalledError("a plot needs matplotlib: pip install 'dynx[plot]'") from error
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def picture_format(path: str | os.PathLike[str]) -> str:
+    """The format that the name of a picture ends with, such as ``png``.
+
+    Raises ArgumentError for a format that matplotlib does not write, NotInstalledError without matplotlib.
+    """
+    formats = new_figure(1.0, 1.0).canvas.get_supported_filetypes()
+    suffix = Path(path).suffix[1:].lower()
+    if suffix not in formats:
+        raise ArgumentError(f"a plot is saved as .png, .pdf or .svg, not as {shown(Path(path).name)}")
+    return suffix
+
+
+def save_figure(figure: Any, path: str | os.PathLike[str]) -> None:
+    """Write a figure to a file, in the format that its name ends with: all of it, or nothing.
+
+    Raises ArgumentError for a format that matplotlib does not write or a file that cannot be written.
+    """
+    kind = picture_format(path)
+    with atomic_file(path) as file:
+        figure.savefig(file, format=kind, dpi=RESOLUTION)
