@@ -1,35 +1,28 @@
-"""The interface every backend keeps: checked arguments, batches, mimic joints, joint dynamics.
+"""The interface of every backend, written out: one method for each quantity of the table.
 
-`Backend` turns what a user asks (model coordinates, names, any leading axes) into what an engine
-answers (`EngineHooks`: tree coordinates, frame numbers, one sample). The four calls that control
-loops make thousands of times a second (forward kinematics of one frame, Jacobian, inverse dynamics,
-mass matrix) go to the engine in a straight line when there is one sample and no mimic joint.
+The four calls that control loops make thousands of times a second (forward kinematics of one frame,
+Jacobian, inverse dynamics, mass matrix) go to the engine's hook in a straight line when there is one
+sample and no mimic joint. All others go through `QuantityCalls`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dynx.backends.arguments import Arguments
-from dynx.backends.evaluation import Evaluation, common_batch
-from dynx.backends.hooks import EngineHooks, apply_matrix, solve_mass_matrix
-from dynx.backends.joint_dynamics import JointDynamicsTerms
-from dynx.backends.lifecycle import Lifecycle
-from dynx.backends.solvability import Solvability
+from dynx.backends.evaluation import common_batch
+from dynx.backends.hooks import apply_matrix, solve_mass_matrix
+from dynx.backends.quantity_calls import Forces, QuantityCalls
 from dynx.ik import IKResult, inverse_kinematics
-from dynx.model import Model
-from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED, Reference, shift_jacobian
+from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED, shift_jacobian
 from dynx.spatial.scalar import Floats
 
-Forces = Mapping[str, ArrayLike]
 
-
-class Backend(Lifecycle, EngineHooks):
-    """An engine wrapped: the same questions, conventions and answers whichever engine is behind.
+class Backend(QuantityCalls):
+    """A robot in one engine: the same methods, conventions and results whichever engine computes them.
 
     Arrays are float64 and take leading batch axes, which broadcast: q (..., nq), v, a, tau
     (..., nv). One sample in, one sample out. SI units. Poses are T_world_frame (..., 4, 4).
@@ -41,12 +34,16 @@ class Backend(Lifecycle, EngineHooks):
 
     `point` (3,) [m], in the frame's axes, moves the origin of the first two.
 
-    `joint_dynamics=True` adds what the description says of the joints, alike in every backend:
-    ``armature * a + damping * v + friction * sign(v)`` to the torque, armature to the diagonal of
-    the mass matrix. The default is the rigid bodies alone.
+    `joint_dynamics=True` adds the armature, viscous damping and Coulomb friction of the joints, which every
+    backend computes alike: ``armature * a + damping * v + friction * sign(v)`` to the torque, armature to
+    the diagonal of the mass matrix. The default is the rigid bodies alone.
 
     `external_forces` maps frame names to wrenches (..., 6), force [N] then moment [N m], that act
     on the robot, expressed at and in `force_reference` as a Jacobian is.
+
+    Torques are generalised forces: [N m] of a joint that turns, [N] of one that slides, and the force and
+    the moment at the base frame's origin, in its axes, for a floating base. `dynx.backends.quantities` is
+    the table of all quantities.
 
     A batch is a Python loop over the engine's calls unless the class is `vectorized`; in the backend
     ``reference`` NumPy evaluates it whole. The backend ``compiled`` gives the same numbers for batches, to
@@ -54,22 +51,17 @@ class Backend(Lifecycle, EngineHooks):
     65536 --threads 1``; docs/bench.md says which backend suits which work).
 
     Raises errors of `dynx.errors` only. With ``validate=False`` the arguments must be float64
-    arrays of the right shape and are not looked at; a wrong one then gives an undefined answer.
+    arrays of the right shape and are not checked; a wrong one then gives an undefined result.
     """
-
-    def __init__(self, model: Model, *, validate: bool = True) -> None:
-        super().__init__(model, Arguments(model), validate=validate)
-        self._mechanism = model.mechanism
-        self._evaluation = Evaluation(self._mechanism, vectorized=self.vectorized)
-        self._straight = self._mechanism.coupling is None
-        self._joint_terms = JointDynamicsTerms(model)
-        self._solvability = Solvability(model)
-        self._frame_index = {name: index for index, name in enumerate(model.frame_names)}
 
     # -- kinematics ---------------------------------------------------------------------------
 
     def forward_kinematics(self, q: ArrayLike, frame: str | Sequence[str] | None = None) -> Floats:
-        """T_world_frame (..., 4, 4); for several frames, or None for all, (..., n, 4, 4)."""
+        """T_world_frame (..., 4, 4) [1, m]; for several frames, or None for all, (..., n, 4, 4).
+
+        Featherstone 2008, section 4.4. Elsewhere: Pinocchio `framesForwardKinematics`, Drake
+        `CalcPoseInWorld`, MuJoCo `mj_kinematics`, PyBullet `getLinkState`.
+        """
         known: Any = self._arguments.q(q) if self._validate else q
         if isinstance(frame, str):
             index = self._index(frame)
@@ -90,15 +82,17 @@ class Backend(Lifecycle, EngineHooks):
         reference: str = LOCAL_WORLD_ALIGNED,
         point: ArrayLike | None = None,
     ) -> Floats:
-        """J (..., 6, nv) with J v the velocity of `frame`, linear [m/s] then angular [rad/s]."""
+        """Geometric Jacobian J (..., 6, nv) [m/rad, 1]: J v is the velocity of `frame`, linear rows first.
+
+        Siciliano et al., eq. 3.30. Elsewhere: Pinocchio `computeFrameJacobian`, Drake
+        `CalcJacobianSpatialVelocity`, MuJoCo `mj_jac`, PyBullet `calculateJacobian`.
+        """
         known: Any = self._arguments.q(q) if self._validate else q
         axes: Any = self._arguments.reference(reference) if self._validate else reference
         index = self._index(frame)
         if self._straight and point is None and known.ndim == 1:
             return self._jacobian(known, index, axes)
-        J = self._evaluation(
-            self._jacobian, (6, -1), known, args=(index, axes), reduce=self._evaluation.reduce_rows
-        )
+        J = self._evaluate("jacobian", known, details=(index, axes))
         return J if point is None else self._at_point(J, None, known, None, frame, axes, point)
 
     def jacobian_derivative(
@@ -110,17 +104,13 @@ class Backend(Lifecycle, EngineHooks):
         reference: str = LOCAL_WORLD_ALIGNED,
         point: ArrayLike | None = None,
     ) -> Floats:
-        """dJ/dt (..., 6, nv) along the motion `v`."""
+        """dJ/dt (..., 6, nv) [m/(rad s), 1/s] along the motion `v`.
+
+        Siciliano et al., eq. 3.30, differentiated in time. Elsewhere: Pinocchio
+        `getFrameJacobianTimeVariation`, MuJoCo `mj_jacDot`.
+        """
         q, v, axes = self._checked_q(q), self._checked_v(v), self._checked_reference(reference)
-        index = self._index(frame)
-        dJ = self._evaluation(
-            self._jacobian_derivative,
-            (6, -1),
-            q,
-            v,
-            args=(index, axes),
-            reduce=self._evaluation.reduce_rows,
-        )
+        dJ = self._evaluate("jacobian_derivative", q, v, details=(self._index(frame), axes))
         if point is None:
             return dJ
         J = self.jacobian(q, frame, reference=reference)
@@ -135,13 +125,16 @@ class Backend(Lifecycle, EngineHooks):
         reference: str = LOCAL_WORLD_ALIGNED,
         point: ArrayLike | None = None,
     ) -> Floats:
-        """J v (..., 6): linear [m/s] then angular [rad/s] velocity of the frame."""
+        """J v (..., 6) [m/s, rad/s]: linear, then angular velocity of the frame.
+
+        Featherstone 2008, section 2.8. Elsewhere: Pinocchio `getFrameVelocity`, Drake
+        `CalcSpatialVelocityInWorld`, MuJoCo `mj_objectVelocity`.
+        """
         q, v, axes = self._checked_q(q), self._checked_v(v), self._checked_reference(reference)
         if point is not None:
             common_batch(q, v)
             return apply_matrix(self.jacobian(q, frame, reference=reference, point=point), v)
-        index = self._index(frame)
-        return self._evaluation(self._frame_velocity, (6,), q, v, args=(index, axes))
+        return self._evaluate("frame_velocity", q, v, details=(self._index(frame), axes))
 
     def frame_acceleration(
         self,
@@ -153,10 +146,12 @@ class Backend(Lifecycle, EngineHooks):
         reference: str = LOCAL_WORLD_ALIGNED,
         point: ArrayLike | None = None,
     ) -> Floats:
-        """J a + dJ/dt v (..., 6), the time derivative of `frame_velocity` in the same reference.
+        """J a + dJ/dt v (..., 6) [m/s^2, rad/s^2], the time derivative of `frame_velocity`.
 
         In ``local_world_aligned`` that is the classical acceleration of the frame's origin; in
-        ``local`` and ``world`` the spatial acceleration. Gravity has no part in it.
+        ``local`` and ``world`` the spatial acceleration (Featherstone 2008, section 2.11). Gravity has no
+        part in it. Elsewhere: Pinocchio `getFrameClassicalAcceleration`, Drake
+        `CalcSpatialAccelerationInWorld`, MuJoCo `mj_objectAcceleration` (which adds gravity).
         """
         q, v, axes = self._checked_q(q), self._checked_v(v), self._checked_reference(reference)
         a = self._checked_v(a, "a")
@@ -165,8 +160,7 @@ class Backend(Lifecycle, EngineHooks):
             J = self.jacobian(q, frame, reference=reference, point=point)
             dJ = self.jacobian_derivative(q, v, frame, reference=reference, point=point)
             return apply_matrix(J, a) + apply_matrix(dJ, v)
-        index = self._index(frame)
-        return self._evaluation(self._frame_acceleration, (6,), q, v, a, args=(index, axes))
+        return self._evaluate("frame_acceleration", q, v, a, details=(self._index(frame), axes))
 
     def inverse_kinematics(
         self, target: ArrayLike, frame: str, q0: ArrayLike | None = None, **options: Any
@@ -186,20 +180,22 @@ class Backend(Lifecycle, EngineHooks):
         force_reference: str = LOCAL_WORLD_ALIGNED,
         joint_dynamics: bool = False,
     ) -> Floats:
-        """The torque tau (..., nv) that gives acceleration `a`: M a + bias - J' external forces."""
+        """The torque tau (..., nv) [N m] that gives acceleration `a`: M a + bias - J' external forces.
+
+        Luh, Walker and Paul 1980. Elsewhere: Pinocchio `rnea`, Drake `CalcInverseDynamics`, MuJoCo
+        `mj_inverse`, PyBullet `calculateInverseDynamics`.
+        """
         known: Any = self._arguments.q(q) if self._validate else q
-        speed: Any = self._arguments.v(v) if self._validate else v
-        wanted: Any = self._arguments.v(a, "a") if self._validate else a
-        if self._straight and known.ndim == 1 and speed.ndim == 1 and wanted.ndim == 1:
-            tau = self._inverse_dynamics(known, speed, wanted)
+        velocity: Any = self._arguments.v(v) if self._validate else v
+        acceleration: Any = self._arguments.v(a, "a") if self._validate else a
+        if self._straight and known.ndim == 1 and velocity.ndim == 1 and acceleration.ndim == 1:
+            tau = self._inverse_dynamics(known, velocity, acceleration)
         else:
-            tau = self._evaluation(
-                self._inverse_dynamics, (-1,), known, speed, wanted, reduce=self._evaluation.reduce_rows
-            )
+            tau = self._evaluate("inverse_dynamics", known, velocity, acceleration)
         if external_forces is not None:
             tau = tau - self._force_torque(known, tau, external_forces, force_reference)
         if joint_dynamics:
-            tau = tau + self._joint_terms.losses(speed) + self._joint_terms.rotor_torque(wanted)
+            tau = tau + self._joint_terms.losses(velocity) + self._joint_terms.rotor_torque(acceleration)
         return tau
 
     def forward_dynamics(
@@ -212,9 +208,12 @@ class Backend(Lifecycle, EngineHooks):
         force_reference: str = LOCAL_WORLD_ALIGNED,
         joint_dynamics: bool = False,
     ) -> Floats:
-        """The acceleration a (..., nv) that `tau` and the external forces give.
+        """The acceleration a (..., nv) [rad/s^2] that `tau` and the external forces give.
 
         Raises SingularMassMatrixError, which names the joints, where a joint moves no inertia.
+
+        Featherstone 2008, section 7.3. Elsewhere: Pinocchio `aba`, Drake
+        `get_generalized_acceleration_output_port`, MuJoCo `mj_forward`.
         """
         q, v = self._checked_q(q), self._checked_v(v)
         tau = self._checked_v(tau, "tau")
@@ -225,19 +224,23 @@ class Backend(Lifecycle, EngineHooks):
         if joint_dynamics:
             tau = tau - self._joint_terms.losses(v)
         if self._straight and not (joint_dynamics and self._joint_terms.has_rotors):
-            a = self._evaluation(self._forward_dynamics, (-1,), q, v, tau)
+            a = self._evaluate("forward_dynamics", q, v, tau)
         else:
             M = self.mass_matrix(q, joint_dynamics=joint_dynamics)
             a = solve_mass_matrix(M, tau - self.bias_torque(q, v))
         return self._arguments.finite_acceleration(a)
 
     def mass_matrix(self, q: ArrayLike, *, joint_dynamics: bool = False) -> Floats:
-        """M (..., nv, nv), symmetric."""
+        """Joint-space inertia matrix M (..., nv, nv) [kg m^2], symmetric.
+
+        Featherstone 2008, section 6.2. Elsewhere: Pinocchio `crba`, Drake `CalcMassMatrix`, MuJoCo
+        `mj_fullM`, PyBullet `calculateMassMatrix`.
+        """
         known: Any = self._arguments.q(q) if self._validate else q
         if self._straight and known.ndim == 1:
             M = self._mass_matrix(known)
         else:
-            M = self._evaluation(self._mass_matrix, (-1, -1), known, reduce=self._evaluation.reduce_both)
+            M = self._evaluate("mass_matrix", known)
         return M + self._joint_terms.rotors if joint_dynamics else M
 
     def bias_torque(
@@ -249,88 +252,93 @@ class Backend(Lifecycle, EngineHooks):
         force_reference: str = LOCAL_WORLD_ALIGNED,
         joint_dynamics: bool = False,
     ) -> Floats:
-        """C v + g (..., nv): `inverse_dynamics` at zero acceleration."""
+        """C v + g (..., nv) [N m]: `inverse_dynamics` at zero acceleration.
+
+        Siciliano et al., section 7.1.3. Elsewhere: Pinocchio `nonLinearEffects`, MuJoCo `qfrc_bias`,
+        Drake `CalcBiasTerm` less `CalcGravityGeneralizedForces`.
+        """
         q, v = self._checked_q(q), self._checked_v(v)
-        tau = self._evaluation(self._bias_torque, (-1,), q, v, reduce=self._evaluation.reduce_rows)
+        tau = self._evaluate("bias_torque", q, v)
         if external_forces is not None:
             tau = tau - self._force_torque(q, tau, external_forces, force_reference)
         return tau + self._joint_terms.losses(v) if joint_dynamics else tau
 
     def gravity_torque(self, q: ArrayLike) -> Floats:
-        """g (..., nv): `inverse_dynamics` at rest, the gradient of the potential energy."""
-        q = self._checked_q(q)
-        return self._evaluation(self._gravity_torque, (-1,), q, reduce=self._evaluation.reduce_rows)
+        """g (..., nv) [N m]: `inverse_dynamics` at rest, the gradient of the potential energy.
+
+        Siciliano et al., section 7.1.3. Elsewhere: Pinocchio `computeGeneralizedGravity`, Drake
+        `CalcGravityGeneralizedForces` (with the opposite sign).
+        """
+        return self._evaluate("gravity_torque", self._checked_q(q))
 
     def coriolis_matrix(self, q: ArrayLike, v: ArrayLike) -> Floats:
-        """C (..., nv, nv) with C v + g = bias and dM/dt - 2 C skew-symmetric (`dynx.rbd.coriolis`)."""
-        q, v = self._checked_q(q), self._checked_v(v)
-        return self._evaluation(self._coriolis_matrix, (-1, -1), q, v, reduce=self._evaluation.reduce_both)
+        """C (..., nv, nv) [N m s/rad] with C v + g = bias and dM/dt - 2 C skew-symmetric.
+
+        Echeandia and Wensing 2021, eq. 24 (`dynx.rbd.coriolis`). Elsewhere: Pinocchio
+        `computeCoriolisMatrix`.
+        """
+        return self._evaluate("coriolis_matrix", self._checked_q(q), self._checked_v(v))
 
     def inertial_regressor(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> Floats:
-        """Y (..., nv, 10 n_links): inverse dynamics is Y pi, with pi the links' inertial parameters.
+        """Y (..., nv, 10 n_links) [m/s^2, m^2/s^2, 1/s^2]: inverse dynamics is Y pi.
 
-        The ten of each link of `model.links`, in order and about the origin of the link's frame in its
-        axes: m [kg], m cx, m cy, m cz [kg m], Ixx, Ixy, Ixz, Iyy, Iyz, Izz [kg m^2]
-        (`dynx.inertial_parameters` gives the model's own). Links that no coordinate moves have zeros.
+        pi holds the ten inertial parameters of each link of `model.links`, in order and about the origin of
+        the link's frame in its axes: m [kg], m cx, m cy, m cz [kg m], Ixx, Ixy, Ixz, Iyy, Iyz, Izz
+        [kg m^2] (`dynx.inertial_parameters` gives the model's own). Links that no coordinate moves have
+        zeros. Atkeson, An and Hollerbach 1986. Elsewhere: Pinocchio `computeJointTorqueRegressor`, which
+        orders the tensor otherwise.
         """
         q, v, a = self._checked_q(q), self._checked_v(v), self._checked_v(a, "a")
-        tail = (-1, 10 * len(self.model.links))
-        return self._evaluation(
-            self._inertial_regressor, tail, q, v, a, reduce=self._evaluation.reduce_leading
-        )
+        return self._evaluate("inertial_regressor", q, v, a)
 
     # -- the whole body -----------------------------------------------------------------------
 
     def center_of_mass(self, q: ArrayLike) -> Floats:
         """Centre of mass in the world (..., 3) [m]; the base frame's origin if nothing has mass.
 
-        Links that are bolted to the world count, as they do for the potential energy (Pinocchio's own
-        `centerOfMass` leaves them out).
+        Links fixed to the world count, as they do for the potential energy. Orin, Goswami and Lee 2013.
+        Elsewhere: Pinocchio `centerOfMass` (which leaves those links out), Drake
+        `CalcCenterOfMassPositionInWorld`, MuJoCo `subtree_com`.
         """
-        q = self._checked_q(q)
-        return self._evaluation(self._center_of_mass, (3,), q)
+        return self._evaluate("center_of_mass", self._checked_q(q))
 
     def center_of_mass_jacobian(self, q: ArrayLike) -> Floats:
-        """J (..., 3, nv) with J v the velocity of the centre of mass, world axes."""
-        q = self._checked_q(q)
-        return self._evaluation(
-            self._center_of_mass_jacobian, (3, -1), q, reduce=self._evaluation.reduce_rows
-        )
+        """J (..., 3, nv) [m/rad] with J v the velocity of the centre of mass, world axes.
+
+        Orin, Goswami and Lee 2013. Elsewhere: Pinocchio `jacobianCenterOfMass`, Drake
+        `CalcJacobianCenterOfMassTranslationalVelocity`, MuJoCo `mj_jacSubtreeCom`.
+        """
+        return self._evaluate("center_of_mass_jacobian", self._checked_q(q))
 
     def centroidal_momentum(self, q: ArrayLike, v: ArrayLike) -> Floats:
-        """Linear [kg m/s] then angular [kg m^2/s] momentum about the centre of mass (..., 6)."""
-        q, v = self._checked_q(q), self._checked_v(v)
-        return self._evaluation(self._centroidal_momentum, (6,), q, v)
+        """Linear, then angular momentum about the centre of mass (..., 6) [kg m/s, kg m^2/s], world axes.
+
+        Orin, Goswami and Lee 2013. Elsewhere: Pinocchio `computeCentroidalMomentum`, Drake
+        `CalcSpatialMomentumInWorldAboutPoint`, MuJoCo `subtree_angmom`.
+        """
+        return self._evaluate("centroidal_momentum", self._checked_q(q), self._checked_v(v))
 
     def kinetic_energy(self, q: ArrayLike, v: ArrayLike, *, joint_dynamics: bool = False) -> Floats:
-        """v' M v / 2 (...,) [J]."""
+        """v' M v / 2 (...,) [J].
+
+        Siciliano et al., section 7.1.1. Elsewhere: Pinocchio `computeKineticEnergy`, Drake
+        `CalcKineticEnergy`, MuJoCo `mj_energyVel`.
+        """
         q, v = self._checked_q(q), self._checked_v(v)
-        energy = self._evaluation(self._kinetic_energy, (), q, v)
+        energy = self._evaluate("kinetic_energy", q, v)
         if joint_dynamics:
             energy = energy + 0.5 * np.sum(v * self._joint_terms.rotor_torque(v), axis=-1)
         return energy
 
     def potential_energy(self, q: ArrayLike) -> Floats:
-        """Energy in the field of gravity (...,) [J], zero with the mass at the world's origin."""
-        q = self._checked_q(q)
-        return self._evaluation(self._potential_energy, (), q)
+        """Energy in the field of gravity (...,) [J], zero with the mass at the world's origin.
 
-    # -- from questions to hooks --------------------------------------------------------------
+        Siciliano et al., section 7.1.2. Elsewhere: Pinocchio `computePotentialEnergy`, Drake
+        `CalcPotentialEnergy`, MuJoCo `mj_energyPos`.
+        """
+        return self._evaluate("potential_energy", self._checked_q(q))
 
-    def _index(self, frame: str) -> int:
-        try:
-            return self._frame_index[frame]
-        except (KeyError, TypeError):
-            return self.model.frame_index(frame)
-
-    def _checked_q(self, q: Any) -> Floats:
-        return self._arguments.q(q) if self._validate else q
-
-    def _checked_v(self, v: Any, name: str = "v") -> Floats:
-        return self._arguments.v(v, name) if self._validate else v
-
-    def _checked_reference(self, reference: Any) -> Reference:
-        return self._arguments.reference(reference) if self._validate else reference
+    # -- terms that every engine shares -------------------------------------------------------
 
     def _force_torque(self, q: Any, tau: Any, forces: Forces, reference: str) -> Floats:
         """J' w summed over the frames that a wrench acts on, to be added to or taken from `tau`."""

@@ -1,8 +1,8 @@
-"""An engine asked for two things only: what the base derives from them, beside the engine's own.
+"""Every quantity derived from an engine's frame placements and inverse dynamics.
 
-A backend implements the placements of all frames and inverse dynamics; every other quantity has a
-derivation in `EngineHooks`. `DerivedBackend` shows any backend through those two, so that an
-engine's native answers can be compared with the answers derived from that same engine.
+A backend implements those two; every other quantity has a derivation (`dynx.backends.hooks`).
+`DerivedBackend` uses the two of any backend, so that the native results of an engine can be compared
+with results derived from the same engine.
 """
 
 from __future__ import annotations
@@ -10,30 +10,9 @@ from __future__ import annotations
 from typing import Any, ClassVar
 
 from dynx.backends.base import Backend
-from dynx.backends.hooks import EngineHooks
+from dynx.backends.quantities import QUANTITIES
 from dynx.errors import ClosedError
 from dynx.spatial.scalar import Floats
-
-HOOK_OF_QUANTITY = {
-    "forward_kinematics": "_frame_placements",
-    "jacobian": "_jacobian",
-    "jacobian_derivative": "_jacobian_derivative",
-    "frame_velocity": "_frame_velocity",
-    "frame_acceleration": "_frame_acceleration",
-    "inverse_dynamics": "_inverse_dynamics",
-    "forward_dynamics": "_forward_dynamics",
-    "mass_matrix": "_mass_matrix",
-    "bias_torque": "_bias_torque",
-    "gravity_torque": "_gravity_torque",
-    "coriolis_matrix": "_coriolis_matrix",
-    "inertial_regressor": "_inertial_regressor",
-    "center_of_mass": "_center_of_mass",
-    "center_of_mass_jacobian": "_center_of_mass_jacobian",
-    "centroidal_momentum": "_centroidal_momentum",
-    "kinetic_energy": "_kinetic_energy",
-    "potential_energy": "_potential_energy",
-}
-"""The hook that answers each quantity of `Backend`."""
 
 
 class DerivedBackend(Backend):
@@ -72,16 +51,9 @@ class DerivedBackend(Backend):
 
 
 def native_quantities(backend: Backend | type[Backend]) -> frozenset[str]:
-    """The quantities that a backend's engine computes itself, named as the methods of `Backend`.
-
-    A hook counts as native where the class overrides its derivation.
-    """
+    """Names of the quantities that a backend's engine computes itself, rather than by a derivation."""
     kind = backend if isinstance(backend, type) else type(backend)
-    return frozenset(
-        quantity
-        for quantity, hook in HOOK_OF_QUANTITY.items()
-        if getattr(kind, hook) is not getattr(EngineHooks, hook)
-    )
+    return frozenset(name for name, quantity in QUANTITIES.items() if kind._is_native(quantity))
 
 
 def _rebuild_view(inner: Backend, options: dict[str, Any]) -> DerivedBackend:

@@ -1,4 +1,4 @@
-"""From a call with any leading axes to the engine's one sample at a time, through the mimic joints.
+"""Evaluation of an engine's hook at samples with any leading axes, reduced by mimic joints.
 
 A mimic joint is a linear map v_tree = S v (`dynx.model.mechanism.Coupling`). By virtual work torques
 go back by S', Jacobians and matrices by S, so every engine gives the reduced dynamics although it
@@ -21,10 +21,9 @@ Reduction = Callable[[Floats], Floats]
 
 
 class Evaluation:
-    """Calls hooks of an engine on behalf of one model."""
+    """Evaluates hooks of an engine for one model, batch by batch."""
 
     def __init__(self, mechanism: Mechanism, *, vectorized: bool) -> None:
-        self._nv = mechanism.nv
         self._vectorized = vectorized
         self._coupling = mechanism.coupling
         self._S: Floats = np.eye(0) if self._coupling is None else self._coupling.matrix()
@@ -41,8 +40,7 @@ class Evaluation:
         """`hook(q, *velocities, *args)` for every sample of the broadcast batch.
 
         q (..., nq) and velocities (..., nv) are in model coordinates, the hook's in tree
-        coordinates. `tail` is the shape of one answer in tree coordinates, -1 standing for nv;
-        `reduce` brings it back.
+        coordinates. `tail` is the shape of one result in tree coordinates; `reduce` converts it.
         """
         batch = common_batch(q, *velocities)
         if self._coupling is not None:
@@ -52,39 +50,39 @@ class Evaluation:
             x if x.shape[:-1] == batch else np.broadcast_to(x, (*batch, x.shape[-1]))
             for x in (q, *velocities)
         ]
-        shape = (*batch, *(self._nv if n == -1 else n for n in tail))
+        shape = (*batch, *tail)
         if self._vectorized or not batch:
-            answer = np.asarray(hook(*samples, *args))
-            if answer.shape != shape:
-                # What no coordinate moves may come back without the batch.
-                answer = np.array(np.broadcast_to(answer, shape))
+            result = np.asarray(hook(*samples, *args))
+            if result.shape != shape:
+                # A result that no coordinate moves may lack the batch axes.
+                result = np.array(np.broadcast_to(result, shape))
         else:
-            answer = self._one_by_one(hook, shape, samples, args)
+            result = self._one_by_one(hook, shape, samples, args)
         if self._coupling is not None and reduce is not None:
-            return reduce(answer)
-        return answer
+            return reduce(result)
+        return result
 
-    def reduce_rows(self, answer: Floats) -> Floats:
-        """A torque (..., nv) or the columns of a Jacobian (..., 6, nv), in model coordinates."""
-        return np.asarray(answer @ self._S)
+    def reduce_columns(self, result: Floats) -> Floats:
+        """A S for a torque (..., nv) or a Jacobian (..., 6, nv)."""
+        return np.asarray(result @ self._S)
 
-    def reduce_leading(self, answer: Floats) -> Floats:
-        """S' A for a matrix (..., nv, n), in model coordinates."""
-        return np.asarray(self._S.T @ answer)
+    def reduce_rows(self, result: Floats) -> Floats:
+        """S' A for a matrix (..., nv, n)."""
+        return np.asarray(self._S.T @ result)
 
-    def reduce_both(self, answer: Floats) -> Floats:
+    def reduce_both(self, result: Floats) -> Floats:
         """S' A S for a matrix (..., nv, nv)."""
-        return np.asarray(self._S.T @ answer @ self._S)
+        return np.asarray(self._S.T @ result @ self._S)
 
     def _one_by_one(
         self, hook: Callable[..., Any], shape: tuple[int, ...], samples: list[Floats], args: tuple[Any, ...]
     ) -> Floats:
         batch = samples[0].shape[:-1]
         flat = [np.ascontiguousarray(x).reshape(prod(batch), x.shape[-1]) for x in samples]
-        answer = np.empty((prod(batch), *shape[len(batch) :]))
+        result = np.empty((prod(batch), *shape[len(batch) :]))
         for k, sample in enumerate(zip(*flat, strict=True)):
-            answer[k] = hook(*sample, *args)
-        return answer.reshape(shape)
+            result[k] = hook(*sample, *args)
+        return result.reshape(shape)
 
 
 def common_batch(q: Floats, *others: Floats) -> tuple[int, ...]:

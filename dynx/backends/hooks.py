@@ -1,31 +1,34 @@
-"""What an engine answers, and how everything it does not offer follows from what it does.
+"""The hooks of an engine, and the derivation of every quantity that the engine does not compute itself.
 
-A backend implements two hooks, the placements of all frames and inverse dynamics; every other hook
-has a derivation here from those two. It overrides those its engine computes natively. Hooks work
-in tree coordinates (every moving joint, mimic joints included; see `dynx.model.mechanism`) and
-receive float64 arrays that were checked: one sample, unless `vectorized` is set, in which case any
-leading batch axes. Those arrays may be written over once the hook has returned; what it returns the caller
-may keep and change.
+A backend implements two hooks, the placements of all frames and inverse dynamics; every other quantity
+is derived from those two: by a method here or, for a quantity without one, by its algorithm at the poses
+of the bodies, which are read off the placements. A hook that a backend defines under the name of
+`Quantity.hook` replaces the derivation.
+
+Hooks work in tree coordinates (every moving joint, mimic joints included; see `dynx.model.mechanism`) and
+receive float64 arrays that were checked: one sample or, if `vectorized` is set, any leading batch axes.
+The caller may overwrite those arrays once the hook has returned, and may keep and change the result.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dynx.backends.quantities import QUANTITIES, Quantity
 from dynx.errors import SingularMassMatrixError
 from dynx.model import Mechanism, Model
-from dynx.rbd import centroidal, coriolis, jacobians, kinematics, regressor
+from dynx.rbd import jacobians, kinematics
 from dynx.rbd.jacobians import Reference
 from dynx.spatial.scalar import Floats
 
 
 class EngineHooks(ABC):
-    """The questions dynx asks of an engine, in tree coordinates."""
+    """The calls of an engine, in tree coordinates."""
 
     vectorized: ClassVar[bool] = False
     """Whether the hooks take leading batch axes."""
@@ -33,14 +36,29 @@ class EngineHooks(ABC):
     model: Model
     _mechanism: Mechanism
 
-    def _in_this_thread(self, question: str) -> Callable[..., Floats] | None:
-        """What answers a hook (named without its underscore) by the shortest way, if there is one.
+    def _in_this_thread(self, quantity: str) -> Callable[..., Floats] | None:
+        """Unchecked callable for `quantity` bound to the calling thread, or None if the engine has none.
 
-        For loops of one thread in which microseconds count. What the engine raises comes as it is.
+        For loops of one thread in which microseconds count. Exceptions of the engine are not translated.
         """
         return None
 
-    # -- what every engine must answer --------------------------------------------------------
+    @classmethod
+    def _is_native(cls, quantity: Quantity) -> bool:
+        """Whether the engine computes the quantity itself, rather than by a derivation of dynx."""
+        derivation = getattr(EngineHooks, quantity.hook, None)
+        return getattr(cls, quantity.hook, None) is not derivation
+
+    def _derive(self, quantity: Quantity | str, q: Floats, *rest: Any) -> Floats:
+        """The algorithm of a quantity, at the engine's own poses of the bodies if it takes poses.
+
+        `rest` is what the algorithm takes after q: the other arguments and the details.
+        """
+        known = QUANTITIES[quantity] if isinstance(quantity, str) else quantity
+        first = self._body_poses(q) if known.takes_poses else q
+        return np.asarray(known.algorithm(self._mechanism, first, *rest))
+
+    # -- what every engine must compute -------------------------------------------------------
 
     @abstractmethod
     def _frame_placements(self, q: Floats) -> Floats:
@@ -102,39 +120,12 @@ class EngineHooks(ABC):
         """The acceleration a (..., nv) with M a + bias = tau."""
         return solve_mass_matrix(self._mass_matrix(q), tau - self._bias_torque(q, v))
 
-    def _coriolis_matrix(self, q: Floats, v: Floats) -> Floats:
-        """The C (..., nv, nv) of `dynx.rbd.coriolis`, for which dM/dt - 2 C is skew-symmetric."""
-        return coriolis.coriolis_matrix(self._mechanism, self._body_poses(q), v)
-
-    def _inertial_regressor(self, q: Floats, v: Floats, a: Floats) -> Floats:
-        """Y (..., nv, 10 n_links) of `dynx.rbd.regressor`, the links those of the model in order."""
-        links, poses = range(len(self.model.links)), self._body_poses(q)
-        return regressor.inertial_regressor(self._mechanism, poses, v, a, links)
-
-    # -- the whole body -----------------------------------------------------------------------
-
-    def _center_of_mass(self, q: Floats) -> Floats:
-        """Centre of mass in the world (..., 3)."""
-        return centroidal.center_of_mass(self._mechanism, self._body_poses(q))
-
-    def _center_of_mass_jacobian(self, q: Floats) -> Floats:
-        """Jacobian of the centre of mass (..., 3, nv), world axes."""
-        return centroidal.center_of_mass_jacobian(self._mechanism, self._body_poses(q))
-
-    def _centroidal_momentum(self, q: Floats, v: Floats) -> Floats:
-        """Linear then angular momentum about the centre of mass, world axes (..., 6)."""
-        return centroidal.centroidal_momentum(self._mechanism, self._body_poses(q), v)
-
     def _kinetic_energy(self, q: Floats, v: Floats) -> Floats:
         """v' M v / 2, (...,)."""
         return np.asarray(0.5 * np.sum(v * apply_matrix(self._mass_matrix(q), v), axis=-1))
 
-    def _potential_energy(self, q: Floats) -> Floats:
-        """Of the centre of mass in the field of gravity, zero at the world's origin (...,)."""
-        return centroidal.potential_energy(self._mechanism, self._body_poses(q))
-
     def _body_poses(self, q: Floats) -> kinematics.Poses:
-        """Pose of the root and of each moving body, read off the engine's own frame placements."""
+        """Poses of the root and of each moving body, read off the engine's own frame placements."""
         return kinematics.poses_from_frames(self._mechanism, self._frame_placements(q))
 
 

@@ -17,22 +17,23 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx._version import __version__
-from dynx.backends.base import Backend, Forces
-from dynx.backends.evaluation import Evaluation, Reduction
+from dynx.backends.base import Backend
+from dynx.backends.quantities import QUANTITIES, Quantity
+from dynx.backends.quantity_calls import Forces
 from dynx.compiled.arguments import BatchArguments
 from dynx.compiled.call import KernelCall, NumericCall, into
 from dynx.compiled.frames import chain_of, place_of
 from dynx.compiled.kernels import (
     ON_CHAINS,
-    QUANTITIES,
     chain_kernel,
     compiles,
     is_physical,
+    kernel_quantity,
     quantity_kernel,
     tidied,
 )
-from dynx.model import Mechanism, Model
-from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED, Reference
+from dynx.model import Model
+from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED
 from dynx.simd.image import COMPILING
 from dynx.simd.kernel import Kernel
 from dynx.simd.target import compiler_version, host
@@ -40,8 +41,6 @@ from dynx.simd.threads import checked_threads
 from dynx.spatial.scalar import Floats
 
 Call = Callable[..., Floats]
-
-_QUANTITY_OF_HOOK = {f"_{quantity}": quantity for quantity in QUANTITIES}
 
 
 class CompiledBackend(Backend):
@@ -67,13 +66,7 @@ class CompiledBackend(Backend):
         self._threads = checked_threads(threads)
         self._arguments = BatchArguments(model)
         self._tidy = tidied(self._mechanism)
-        self._evaluation = _Compiled(self._mechanism, self._call_of_hook)
         self._all_frames = tuple(range(len(self._frame_index)))
-        # What hooks without arguments of their own ask for.
-        self._implied: dict[str, tuple[Any, ...]] = {
-            "frame_placements": self._all_frames,
-            "inertial_regressor": (len(model.links),),
-        }
         self._eliminates = self._straight or is_physical(self._mechanism)
         self._calls: dict[object, Call] = {}
         self._chains: dict[object, Kernel] = {}
@@ -202,6 +195,10 @@ class CompiledBackend(Backend):
 
     # -- kernels ------------------------------------------------------------------------------
 
+    def _evaluate(self, name: str, q: Floats, *rates: Floats, details: tuple[Any, ...] = ()) -> Floats:
+        """By a kernel in model coordinates, into which mimic joints are compiled."""
+        return self._call_for(name, details or QUANTITIES[name].implied_details(self.model))(q, *rates)
+
     def _named(self, quantity: str) -> Call:
         """A quantity without details, kept under its name."""
         self._arguments.refuse_closed()
@@ -230,9 +227,9 @@ class CompiledBackend(Backend):
         return call
 
     def _made(self, quantity: str, details: tuple[Any, ...], tree: bool) -> Call:
-        checks = tuple(self._check(argument, tree) for argument in QUANTITIES[quantity].arguments)
-        divides = QUANTITIES[quantity].divides and not tree
-        refuse = self._arguments.finite_acceleration if divides else None
+        described = kernel_quantity(quantity)
+        checks = tuple(self._check(argument, tree) for argument in described.arguments)
+        refuse = self._arguments.finite_acceleration if described.solves and not tree else None
         if not compiles(self._tidy, quantity):
             return NumericCall(self._tidy, quantity, details, checks, tree=tree, refuse=refuse).answer
         options: dict[str, Any] = {
@@ -259,87 +256,31 @@ class CompiledBackend(Backend):
 
     # -- hooks, in tree coordinates -----------------------------------------------------------
 
-    def _hook(self, quantity: str, *arguments: Floats, details: tuple[Any, ...] = ()) -> Floats:
-        details = details or self._implied.get(quantity, ())
+    def _in_tree(self, quantity: str, *arguments: Floats, details: tuple[Any, ...] = ()) -> Floats:
         return self._call_for(quantity, details, tree=True)(*arguments)
 
-    def _call_of_hook(self, hook: str, details: tuple[Any, ...]) -> Call:
-        """The call in model coordinates that answers the question of a hook in tree coordinates."""
-        quantity = _QUANTITY_OF_HOOK[hook]
-        return self._call_for(quantity, details or self._implied.get(quantity, ()))
+    @classmethod
+    def _is_native(cls, quantity: Quantity) -> bool:
+        """Every quantity has a kernel."""
+        return True
 
     def _frame_placement(self, q: Floats, frame: int) -> Floats:
-        return self._hook("frame_placement", q, details=(frame,))
+        return self._in_tree("frame_placement", q, details=(frame,))
 
     def _frame_placements(self, q: Floats) -> Floats:
-        return self._hook("frame_placements", q)
-
-    def _jacobian(self, q: Floats, frame: int, reference: Reference) -> Floats:
-        return self._hook("jacobian", q, details=(frame, reference))
-
-    def _jacobian_derivative(self, q: Floats, v: Floats, frame: int, reference: Reference) -> Floats:
-        return self._hook("jacobian_derivative", q, v, details=(frame, reference))
-
-    def _frame_velocity(self, q: Floats, v: Floats, frame: int, reference: Reference) -> Floats:
-        return self._hook("frame_velocity", q, v, details=(frame, reference))
-
-    def _frame_acceleration(
-        self, q: Floats, v: Floats, a: Floats, frame: int, reference: Reference
-    ) -> Floats:
-        return self._hook("frame_acceleration", q, v, a, details=(frame, reference))
+        return self._in_tree("frame_placements", q, details=self._all_frames)
 
     def _inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
-        return self._hook("inverse_dynamics", q, v, a)
+        return self._in_tree("inverse_dynamics", q, v, a)
 
     def _forward_dynamics(self, q: Floats, v: Floats, tau: Floats) -> Floats:
-        return self._hook("forward_dynamics", q, v, tau)
+        return self._in_tree("forward_dynamics", q, v, tau)
 
     def _mass_matrix(self, q: Floats) -> Floats:
-        return self._hook("mass_matrix", q)
+        return self._in_tree("mass_matrix", q)
 
     def _bias_torque(self, q: Floats, v: Floats) -> Floats:
-        return self._hook("bias_torque", q, v)
+        return self._in_tree("bias_torque", q, v)
 
     def _gravity_torque(self, q: Floats) -> Floats:
-        return self._hook("gravity_torque", q)
-
-    def _coriolis_matrix(self, q: Floats, v: Floats) -> Floats:
-        return self._hook("coriolis_matrix", q, v)
-
-    def _inertial_regressor(self, q: Floats, v: Floats, a: Floats) -> Floats:
-        return self._hook("inertial_regressor", q, v, a)
-
-    def _center_of_mass(self, q: Floats) -> Floats:
-        return self._hook("center_of_mass", q)
-
-    def _center_of_mass_jacobian(self, q: Floats) -> Floats:
-        return self._hook("center_of_mass_jacobian", q)
-
-    def _centroidal_momentum(self, q: Floats, v: Floats) -> Floats:
-        return self._hook("centroidal_momentum", q, v)
-
-    def _kinetic_energy(self, q: Floats, v: Floats) -> Floats:
-        return self._hook("kinetic_energy", q, v)
-
-    def _potential_energy(self, q: Floats) -> Floats:
-        return self._hook("potential_energy", q)
-
-
-class _Compiled(Evaluation):
-    """Asks the kernel of a hook's quantity in model coordinates: mimic joints are compiled into it."""
-
-    def __init__(self, mechanism: Mechanism, call_of_hook: Callable[[str, tuple[Any, ...]], Call]) -> None:
-        super().__init__(mechanism, vectorized=True)
-        self._call_of_hook = call_of_hook
-
-    def __call__(
-        self,
-        hook: Callable[..., Any],
-        tail: tuple[int, ...],
-        q: Floats,
-        *velocities: Floats,
-        args: tuple[Any, ...] = (),
-        reduce: Reduction | None = None,
-    ) -> Floats:
-        """As `Evaluation` does, which would bring arguments and answer to the tree and back."""
-        return self._call_of_hook(hook.__name__, args)(q, *velocities)
+        return self._in_tree("gravity_torque", q)

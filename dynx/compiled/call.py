@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from dynx.backends.evaluation import common_batch
-from dynx.compiled.kernels import SOUND, evaluated, rank
+from dynx.compiled.kernels import MAX_DEFECT, evaluated, kernel_quantity
 from dynx.errors import ArgumentError, DTypeError, ShapeError
 from dynx.model import Mechanism
 from dynx.simd.kernel import Kernel, Workspace
@@ -106,7 +106,7 @@ class KernelCall:
         except _ODD:
             return self._rows_answered(room, tuple(x for x in (q, v, a) if x is not _ABSENT), out)
         room.run()
-        if room.numbers[self._defect] < SOUND or self._trusting:
+        if room.numbers[self._defect] < MAX_DEFECT or self._trusting:
             if out is None:
                 out = room.results[0].copy()
             else:
@@ -129,7 +129,7 @@ class KernelCall:
         if few:
             room.run_rows(n)
             # Not negative, so that the sum is below the bound only if each is, and none is NaN.
-            if sum(room.output_rows[1][:n, 0].tolist()) < SOUND or self._trusting:
+            if sum(room.output_rows[1][:n, 0].tolist()) < MAX_DEFECT or self._trusting:
                 if out is None:
                     out = room.output_rows[0][:n].copy()
                 else:
@@ -157,7 +157,7 @@ class KernelCall:
             # The arguments may be needed once more.
             answer = np.empty(shape)
         defect = self._evaluate(arrays, batch, answer)
-        if not self._trusting and not defect.max(initial=0.0) < SOUND:
+        if not self._trusting and not defect.max(initial=0.0) < MAX_DEFECT:
             if self._validate:
                 checked = [check(array) for array, check in zip(arrays, self._checks, strict=True)]
                 if any(new is not old for new, old in zip(checked, arrays, strict=True)):
@@ -210,7 +210,7 @@ class NumericCall:
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             found = evaluated(self._mechanism, self._quantity, self._details, *spread, tree=self._tree)
         # What no coordinate moves comes without the batch.
-        own = rank(self._quantity)
+        own = len(kernel_quantity(self._quantity).shape)
         shape = (*batch, *found.shape[found.ndim - own :])
         whole = found.shape == shape and found.flags.c_contiguous and found.flags.writeable
         answer = found if whole else np.array(np.broadcast_to(found, shape))

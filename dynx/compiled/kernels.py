@@ -1,22 +1,22 @@
-"""What the compiled backend compiles: for each quantity, the function of `dynx.rbd` that is traced.
+"""Kernels of quantities: the algorithms of `dynx.rbd`, traced for one robot and compiled.
 
-A kernel has the arguments of its quantity as inputs and two outputs: the answer, and a ``defect``
-that is below `SOUND` exactly if the arguments are finite, not too large, and of unit length where
-they are a quaternion, and the answer is finite where it might not be. So arguments are checked while
-they are in the processor's registers anyway.
+A kernel has the arguments of its quantity as inputs and two outputs: the result, and a ``defect`` that is
+below `MAX_DEFECT` exactly if the arguments are finite, not too large, and of unit length where they are a
+quaternion, and the result is finite where it might not be. So arguments are checked while they are in the
+processor's registers anyway.
 
 Mimic joints are traced with the rest: a kernel works in the coordinates of the model, unless those of
 the tree are asked for.
 
 Placements of frames have the frames folded in as constants, for most programs ask for one. Other
-quantities of frames have kernels that many frames share (`dynx.compiled.frames`). Which
-kernel answers depends on the question alone, so no answer depends on what was asked before.
+quantities of frames have kernels that many frames share (`dynx.compiled.frames`). The kernel follows from
+the call alone, so no result depends on earlier calls.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from functools import cache, partial
 from hashlib import sha256
 from pathlib import Path
@@ -24,21 +24,22 @@ from typing import Any
 
 import numpy as np
 
+import dynx.backends.quantities
 import dynx.model.configuration
 import dynx.model.mechanism
 import dynx.rbd
 import dynx.spatial
 from dynx._version import __version__
+from dynx.backends.quantities import QUANTITIES, Growth, Quantity
 from dynx.compiled import frames as compiled_frames
 from dynx.compiled.frames import Chain, on_chain
 from dynx.model import Mechanism
 from dynx.model.configuration import TOO_LARGE, UNIT
 from dynx.model.mechanism import Coupling
-from dynx.rbd import aba, centroidal, coriolis, crba, jacobians, kinematics, regressor, rnea
+from dynx.rbd import coriolis, crba, rnea
 from dynx.rbd.aba import inertia_matrix
 from dynx.rbd.base_parameters import align_frames, regroup_inertias
-from dynx.rbd.jacobians import Reference
-from dynx.rbd.kinematics import body_poses
+from dynx.rbd.kinematics import Poses, ancestry, frame_placement
 from dynx.rbd.linear import solve_positive_definite
 from dynx.simd.cache import cached_kernel, source_hash
 from dynx.simd.emit import Settings
@@ -47,152 +48,62 @@ from dynx.simd.program import Program
 from dynx.simd.target import host
 from dynx.simd.trace import trace
 from dynx.spatial.scalar import Array, Floats
-from dynx.spatial.se3 import homogeneous
 
-SOUND = TOO_LARGE**2
-"""Bound on the defect of a sample whose arguments can be answered."""
+MAX_DEFECT = TOO_LARGE**2
+"""Bound on the defect of a sample with valid arguments."""
 
-LARGEST = 1e300
-"""Bound on the answers of quantities that divide; no acceleration of a robot is larger."""
+MAX_RESULT = 1e300
+"""Bound on the accelerations of quantities that solve; those of robots are smaller."""
 
-LONGEST = 1000
-"""Bound on the size of a quantity's code, as its `size` measures it: some 20 seconds of compiling."""
+MAX_CODE_SIZE = 1000
+"""Bound on the size of a quantity's code (`_code_size`): some 20 seconds of compiling. NumPy evaluates
+what is larger."""
 
-SHORT = 600
+SEGMENT_OF_CUBIC_CODE = 600
 """Length of the segments (`dynx.simd.emit`) of code of cubic size: two thirds of the time to
 compile, and as fast to within an eighth."""
 
-Answer = Callable[..., Array]
+ON_CHAINS = frozenset({"jacobian", "jacobian_derivative", "frame_velocity", "frame_acceleration"})
+"""Quantities whose kernels serve many frames."""
+
+Computation = Callable[..., Array]
 
 
-def _linear(mechanism: Mechanism) -> int:
-    """Code that grows with the number of joints."""
-    return 4 * mechanism.nv
-
-
-def _pairwise(mechanism: Mechanism) -> int:
-    """Code that grows with the number of pairs of joints of which one carries the other."""
-    return sum(len(kinematics.ancestry(mechanism, body)) for body in range(len(mechanism.bodies)))
-
-
-def _cubic(mechanism: Mechanism) -> int:
-    """Code that multiplies a matrix for every body."""
-    return len(mechanism.bodies) * mechanism.nv**2
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """A function of `dynx.rbd`: of the mechanism, the named arguments, and details such as a frame.
-
-    `columns` and `rows` say which axes of the answer belong to velocities, which mimic joints reduce.
-    `rank` is the answer's number of axes; `size` measures the code; beyond `LONGEST` NumPy evaluates.
-    With `divides`, the answer is not finite in some states, and the defect says so as well.
-    """
-
-    arguments: tuple[str, ...]
-    function: Answer
-    rank: int
-    columns: bool = False
-    rows: bool = False
-    size: Callable[[Mechanism], int] = _linear
-    divides: bool = False
-
-
-def _placement(mechanism: Mechanism, q: Array, frame: int) -> Array:
-    return homogeneous(*kinematics.frame_pose(mechanism, body_poses(mechanism, q), frame))
-
-
-def _placements(mechanism: Mechanism, q: Array, *frames: int) -> Array:
-    poses = body_poses(mechanism, q)
-    shape = (*q.shape[:-1], 4, 4)
-    found = [homogeneous(*kinematics.frame_pose(mechanism, poses, frame)) for frame in frames]
+def _all_placements(mechanism: Mechanism, poses: Poses, *frames: int) -> Array:
+    """T_world_frame (..., n, 4, 4) of n frames."""
+    found = [frame_placement(mechanism, poses, frame) for frame in frames]
+    shape = np.broadcast_shapes(*(T.shape for T in found))
     return np.stack([np.broadcast_to(T, shape) for T in found], axis=-3) if found else np.zeros((0, 4, 4))
 
 
-def _jacobian(mechanism: Mechanism, q: Array, frame: int, reference: Reference) -> Array:
-    return jacobians.frame_jacobian(mechanism, body_poses(mechanism, q), frame, reference)
-
-
-def _jacobian_derivative(mechanism: Mechanism, q: Array, v: Array, frame: int, reference: Reference) -> Array:
-    return jacobians.frame_jacobian_derivative(mechanism, body_poses(mechanism, q), v, frame, reference)
-
-
-def _frame_velocity(mechanism: Mechanism, q: Array, v: Array, frame: int, reference: Reference) -> Array:
-    return _applied(_jacobian(mechanism, q, frame, reference), v)
-
-
-def _frame_acceleration(
-    mechanism: Mechanism, q: Array, v: Array, a: Array, frame: int, reference: Reference
-) -> Array:
-    moved = _applied(_jacobian(mechanism, q, frame, reference), a)
-    return moved + _applied(_jacobian_derivative(mechanism, q, v, frame, reference), v)
-
-
-def _inverse_dynamics(mechanism: Mechanism, q: Array, v: Array, a: Array) -> Array:
-    return rnea.inverse_dynamics(regroup_inertias(mechanism), q, v, a)
-
-
-def _bias_torque(mechanism: Mechanism, q: Array, v: Array) -> Array:
-    return _inverse_dynamics(mechanism, q, v, np.zeros(v.shape))
-
-
-def _gravity_torque(mechanism: Mechanism, q: Array) -> Array:
-    rest = np.zeros((*q.shape[:-1], mechanism.nv))
-    return _inverse_dynamics(mechanism, q, rest, rest)
-
-
-def _inertial_regressor(mechanism: Mechanism, q: Array, v: Array, a: Array, links: int) -> Array:
-    # The frames of the links come first.
-    return regressor.inertial_regressor(mechanism, body_poses(mechanism, q), v, a, range(links))
-
-
-def _of_poses(function: Answer) -> Answer:
-    return lambda mechanism, q, *rest: function(mechanism, body_poses(mechanism, q), *rest)
-
-
-def _applied(A: Array, x: Array) -> Array:
-    return np.asarray((A @ x[..., None])[..., 0])
-
-
-QUANTITIES: dict[str, Quantity] = {
-    "frame_placement": Quantity(("q",), _placement, 2),
-    "frame_placements": Quantity(("q",), _placements, 3),
-    "jacobian": Quantity(("q",), _jacobian, 2, columns=True),
-    "jacobian_derivative": Quantity(("q", "v"), _jacobian_derivative, 2, columns=True),
-    "frame_velocity": Quantity(("q", "v"), _frame_velocity, 1),
-    "frame_acceleration": Quantity(("q", "v", "a"), _frame_acceleration, 1),
-    "inverse_dynamics": Quantity(("q", "v", "a"), _inverse_dynamics, 1, columns=True),
-    "forward_dynamics": Quantity(("q", "v", "tau"), aba.forward_dynamics, 1, divides=True),
-    "mass_matrix": Quantity(("q",), crba.mass_matrix, 2, columns=True, rows=True, size=_pairwise),
-    "bias_torque": Quantity(("q", "v"), _bias_torque, 1, columns=True),
-    "gravity_torque": Quantity(("q",), _gravity_torque, 1, columns=True),
-    "coriolis_matrix": Quantity(
-        ("q", "v"), coriolis.coriolis_matrix_at, 2, columns=True, rows=True, size=_pairwise
-    ),
-    "inertial_regressor": Quantity(("q", "v", "a"), _inertial_regressor, 2, rows=True, size=_cubic),
-    "center_of_mass": Quantity(("q",), _of_poses(centroidal.center_of_mass), 1),
-    "center_of_mass_jacobian": Quantity(
-        ("q",), _of_poses(centroidal.center_of_mass_jacobian), 2, columns=True
-    ),
-    "centroidal_momentum": Quantity(("q", "v"), _of_poses(centroidal.centroidal_momentum), 1),
-    "kinetic_energy": Quantity(("q", "v"), _of_poses(centroidal.kinetic_energy), 0),
-    "potential_energy": Quantity(("q",), _of_poses(centroidal.potential_energy), 0),
+_PLACEMENT = QUANTITIES["forward_kinematics"]
+_PLACEMENTS = {
+    "frame_placement": _PLACEMENT,
+    "frame_placements": replace(_PLACEMENT, algorithm=_all_placements, shape=("n_frames", 4, 4)),
 }
-"""Every quantity, by the name of the hook that answers it."""
+"""Forward kinematics of one frame and of several, by the names of their hooks."""
+
+_WITH_BASE_PARAMETERS = frozenset({"inverse_dynamics", "bias_torque", "gravity_torque"})
+"""Quantities that are computed from the base parameters of the inertias, in fewer operations."""
+
+
+def kernel_quantity(name: str) -> Quantity:
+    """The table's entry for a quantity, by the name of the hook that computes it without its underscore."""
+    return _PLACEMENTS.get(name) or QUANTITIES[name]
+
+
+def _code_size(mechanism: Mechanism, growth: Growth) -> int:
+    """Size of the code of an algorithm, in units that `MAX_CODE_SIZE` has too."""
+    if growth == "cubic":
+        return len(mechanism.bodies) * mechanism.nv**2
+    if growth == "pairs":
+        return sum(len(ancestry(mechanism, body)) for body in range(len(mechanism.bodies)))
+    return 4 * mechanism.nv
 
 
 def compiles(mechanism: Mechanism, name: str) -> bool:
     """Whether a quantity of this mechanism is compiled, rather than evaluated by NumPy."""
-    return QUANTITIES[name].size(mechanism) <= LONGEST
-
-
-def rank(name: str) -> int:
-    """Number of axes of one sample's answer."""
-    return QUANTITIES[name].rank
-
-
-ON_CHAINS = frozenset({"jacobian", "jacobian_derivative", "frame_velocity", "frame_acceleration"})
-"""Quantities whose kernels serve many frames."""
+    return _code_size(mechanism, kernel_quantity(name).growth) <= MAX_CODE_SIZE
 
 
 def evaluated(
@@ -202,32 +113,36 @@ def evaluated(
 
     They are in the coordinates of the model or, with `tree`, of the mechanism itself.
     """
-    quantity = QUANTITIES[name]
-
-    def of_tree(q: Array, *rates: Array) -> Array:
-        return np.asarray(quantity.function(mechanism, q, *rates, *details))
-
+    quantity = kernel_quantity(name)
     coupling = None if tree else mechanism.coupling
-    if name == "forward_dynamics" and coupling is not None:
+    if quantity.solves and coupling is not None:
         # The inertia that the drivers feel is not that of a tree.
         S, (v, tau) = coupling.matrix(), rates
         q = coupling.expand_q(q)
         M = S.T @ crba.mass_matrix(mechanism, q) @ S
-        return np.asarray(solve_positive_definite(M, tau - _bias_torque(mechanism, q, v @ S.T) @ S))
-    return _coupled(coupling, quantity, of_tree, q, *rates)
+        bias = rnea.bias_torque(regroup_inertias(mechanism), q, v @ S.T)
+        return np.asarray(solve_positive_definite(M, tau - bias @ S))
+
+    def in_tree(q: Array, *rates: Array) -> Array:
+        if name == "coriolis_matrix":
+            return coriolis.coriolis_matrix_at(mechanism, q, *rates)
+        numbers = regroup_inertias(mechanism) if name in _WITH_BASE_PARAMETERS else mechanism
+        return quantity.evaluate(numbers, q, *rates, *details)
+
+    return _reduced(coupling, quantity, in_tree, q, *rates)
 
 
-def _coupled(
-    coupling: Coupling | None, quantity: Quantity, of_tree: Answer, q: Array, *rates: Array
+def _reduced(
+    coupling: Coupling | None, quantity: Quantity, in_tree: Computation, q: Array, *rates: Array
 ) -> Array:
-    """`of_tree`, a quantity in the coordinates of the tree, in those that mimic joints leave."""
+    """`in_tree`, a quantity in tree coordinates, evaluated in those of the model."""
     if coupling is None:
-        return of_tree(q, *rates)
+        return in_tree(q, *rates)
     S = coupling.matrix()
-    answer = of_tree(coupling.expand_q(q), *(rate @ S.T for rate in rates))
-    if quantity.columns:
-        answer = answer @ S
-    return np.asarray(S.T @ answer if quantity.rows else answer)
+    result = in_tree(coupling.expand_q(q), *(rate @ S.T for rate in rates))
+    if quantity.reduces_columns:
+        result = result @ S
+    return np.asarray(S.T @ result if quantity.reduces_rows else result)
 
 
 def quantity_kernel(
@@ -240,7 +155,8 @@ def quantity_kernel(
 
     recipe = _recipe(mechanism, name, details, tree)
     lanes = host().lanes
-    settings = Settings(lanes, segment=SHORT) if QUANTITIES[name].size is _cubic else Settings(lanes)
+    cubic = kernel_quantity(name).growth == "cubic"
+    settings = Settings(lanes, segment=SEGMENT_OF_CUBIC_CODE) if cubic else Settings(lanes)
     return cached_kernel(recipe, lambda: _program(mechanism, name, answer, tree=tree), settings=settings)
 
 
@@ -250,8 +166,8 @@ def chain_kernel(mechanism: Mechanism, name: str, chain: Chain, *, tree: bool = 
 
     def answer(q: Array, *rates_and_place: Array) -> Array:
         *rates, place = rates_and_place
-        of_tree = partial(on_chain, mechanism, name, chain, place)
-        return _coupled(coupling, QUANTITIES[name], of_tree, q, *rates)
+        in_tree = partial(on_chain, mechanism, name, chain, place)
+        return _reduced(coupling, kernel_quantity(name), in_tree, q, *rates)
 
     recipe = _recipe(mechanism, name, chain, tree)
     return cached_kernel(
@@ -264,19 +180,20 @@ def _recipe(mechanism: Mechanism, name: str, details: object, tree: bool) -> byt
 
 
 def _program(
-    mechanism: Mechanism, name: str, answer: Answer, *, tree: bool, **more: tuple[int, ...]
+    mechanism: Mechanism, name: str, answer: Computation, *, tree: bool, **more: tuple[int, ...]
 ) -> Program:
     """The program of `answer`, of the quantity's arguments and inputs `more` that need no checking."""
+    quantity = kernel_quantity(name)
     coupled = mechanism.coupling if not tree else None
     base_q, base_v = (7, 6) if mechanism.floating else (0, 0)
     joints = len(mechanism.bodies) if coupled is None else coupled.n_joints
-    checked = QUANTITIES[name].arguments
+    checked: tuple[str, ...] = quantity.arguments
 
     def answer_and_defect(**inputs: Array) -> dict[str, Array]:
         found = answer(*inputs.values())
         defect = _defect(mechanism, *(inputs[argument] for argument in checked))
-        if QUANTITIES[name].divides:
-            defect = defect + np.sum(abs(found)) * (SOUND / LARGEST)
+        if quantity.solves:
+            defect = defect + np.sum(abs(found)) * (MAX_DEFECT / MAX_RESULT)
         return {"answer": found, "defect": defect}
 
     shapes = {argument: (base_q + joints if argument == "q" else base_v + joints,) for argument in checked}
@@ -284,12 +201,12 @@ def _program(
 
 
 def _defect(mechanism: Mechanism, q: Array, *rates: Array) -> Array:
-    """Sum of the squares of all arguments; far above `SOUND` if a quaternion is not of unit length."""
+    """Sum of the squares of all arguments; far above `MAX_DEFECT` if a quaternion is not of unit length."""
     numbers = np.concatenate([q, *rates])
     total = _sum_by_pairs([x * x for x in numbers])
     if mechanism.floating:
         off = abs(sum(x * x for x in q[3:7]) - 1.0)
-        total = total + (off - UNIT).maximum(0.0) * (SOUND * 1e100)
+        total = total + (off - UNIT).maximum(0.0) * (MAX_DEFECT * 1e100)
     return np.array([total], dtype=object)
 
 
@@ -342,7 +259,7 @@ def _algorithms() -> str:
     """Hash of the text of all that a traced function runs through."""
     folders = [Path(str(package.__file__)).parent for package in (dynx.rbd, dynx.spatial)]
     modules = [dynx.model.configuration.__file__, dynx.model.mechanism.__file__]
-    modules += [compiled_frames.__file__, __file__]
+    modules += [dynx.backends.quantities.__file__, compiled_frames.__file__, __file__]
     return f"{__version__} {np.__version__} {source_hash(*folders, *map(Path, modules))}"
 
 

@@ -64,6 +64,19 @@ def frame_jacobian_derivative(
     return _express(d_linear, d_angular, R, p, reference)
 
 
+def frame_velocity(mechanism: Mechanism, poses: Poses, v: Array, frame: int, reference: Reference) -> Array:
+    """J v (..., 6) of frame number `frame`."""
+    return _applied(frame_jacobian(mechanism, poses, frame, reference), v)
+
+
+def frame_acceleration(
+    mechanism: Mechanism, poses: Poses, v: Array, a: Array, frame: int, reference: Reference
+) -> Array:
+    """J a + dJ/dt v (..., 6) of frame number `frame`."""
+    dJ = frame_jacobian_derivative(mechanism, poses, v, frame, reference)
+    return _applied(frame_jacobian(mechanism, poses, frame, reference), a) + _applied(dJ, v)
+
+
 def shift_jacobian(
     J: Array, dJ: Array | None, v: Array | None, R: Array, point: Array, reference: Reference
 ) -> Array:
@@ -131,3 +144,7 @@ def _stack_columns(linear: list[Array], angular: list[Array], p: Array) -> Array
     columns = [np.concatenate(pair, axis=-1) for pair in zip(linear, angular, strict=True)]
     shape = np.broadcast_shapes(*(column.shape for column in columns))
     return np.stack([np.broadcast_to(column, shape) for column in columns], axis=-1)
+
+
+def _applied(A: Array, x: Array) -> Array:
+    return np.asarray((A @ x[..., None])[..., 0])

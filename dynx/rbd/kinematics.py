@@ -70,11 +70,16 @@ def frame_pose(mechanism: Mechanism, poses: Poses, frame: int) -> tuple[Array, A
     return R @ fixed.R, p + rotate(R, fixed.p)
 
 
+def frame_placement(mechanism: Mechanism, poses: Poses, frame: int) -> Array:
+    """T_world_frame (..., 4, 4) of frame number `frame`."""
+    return homogeneous(*frame_pose(mechanism, poses, frame))
+
+
 def frame_placements(mechanism: Mechanism, q: Array) -> Array:
     """Return T_world_frame of every frame (..., n_frames, 4, 4)."""
     poses = body_poses(mechanism, q)
     shape = (*q.shape[:-1], 4, 4)
-    all_frames = (homogeneous(*frame_pose(mechanism, poses, k)) for k in range(len(mechanism.frames)))
+    all_frames = (frame_placement(mechanism, poses, k) for k in range(len(mechanism.frames)))
     return np.stack([np.broadcast_to(T, shape) for T in all_frames], axis=-3)
 
 

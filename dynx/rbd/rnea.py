@@ -97,6 +97,17 @@ def inverse_dynamics(mechanism: Mechanism, q: Array, v: Array, a: Array) -> Arra
     return np.stack(joints, axis=-1) if joints else np.zeros(v.shape)
 
 
+def bias_torque(mechanism: Mechanism, q: Array, v: Array) -> Array:
+    """C v + g (..., nv): inverse dynamics at zero acceleration."""
+    return inverse_dynamics(mechanism, q, v, np.zeros(v.shape))
+
+
+def gravity_torque(mechanism: Mechanism, q: Array) -> Array:
+    """g (..., nv): inverse dynamics at rest."""
+    rest = np.zeros((*q.shape[:-1], mechanism.nv))
+    return inverse_dynamics(mechanism, q, rest, rest)
+
+
 def root_motion(mechanism: Mechanism, q: Array, v: Array, a: Array) -> Motion:
     """Return the motion of the root body; gravity g enters as the proper acceleration -g.
 

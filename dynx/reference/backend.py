@@ -1,6 +1,6 @@
 """The backend `reference`: the algorithms of `dynx.rbd` on float64, whole batches at a time.
 
-Written to be read and to be right; a call costs milliseconds, a batch of a thousand some ten times that.
+Written for clarity and accuracy; a call costs milliseconds, a batch of a thousand some ten times that.
 It holds no engine and no state, so it is safe to use from any number of threads.
 """
 
@@ -14,7 +14,6 @@ from dynx._version import __version__
 from dynx.backends.base import Backend
 from dynx.rbd import aba, centroidal, crba, kinematics, rnea
 from dynx.spatial.scalar import Floats
-from dynx.spatial.se3 import homogeneous
 
 
 class ReferenceBackend(Backend):
@@ -37,8 +36,8 @@ class ReferenceBackend(Backend):
         return kinematics.frame_placements(self._mechanism, q)
 
     def _frame_placement(self, q: Floats, frame: int) -> Floats:
-        R, p = kinematics.frame_pose(self._mechanism, self._body_poses(q), frame)
-        return np.array(np.broadcast_to(homogeneous(R, p), (*q.shape[:-1], 4, 4)))
+        T = kinematics.frame_placement(self._mechanism, self._body_poses(q), frame)
+        return np.array(np.broadcast_to(T, (*q.shape[:-1], 4, 4)))
 
     def _body_poses(self, q: Floats) -> kinematics.Poses:
         return kinematics.body_poses(self._mechanism, q)
@@ -47,7 +46,7 @@ class ReferenceBackend(Backend):
         return rnea.inverse_dynamics(self._mechanism, q, v, a)
 
     def _forward_dynamics(self, q: Floats, v: Floats, tau: Floats) -> Floats:
-        # A configuration without an answer divides by zero; the base sees it in the result.
+        # A singular mass matrix divides by zero; the base checks the result.
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             return aba.forward_dynamics(self._mechanism, q, v, tau)
 

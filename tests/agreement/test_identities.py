@@ -47,22 +47,22 @@ class Negative(Broken):
 
 class StaleRates(Broken):
     def _coriolis_matrix(self, q: Floats, v: Floats) -> Floats:
-        return np.array(np.swapaxes(super()._coriolis_matrix(q, v), -1, -2))
+        return np.array(np.swapaxes(self._derive("coriolis_matrix", q, v), -1, -2))
 
 
 class SlantedGravity(Broken):
     def _potential_energy(self, q: Floats) -> Floats:
-        return super()._potential_energy(q) * (1.0 + 1e-9)
+        return self._derive("potential_energy", q) * (1.0 + 1e-9)
 
 
 class WrongCenter(Broken):
     def _center_of_mass(self, q: Floats) -> Floats:
-        return super()._center_of_mass(q) * (1.0 + 1e-9)
+        return self._derive("center_of_mass", q) * (1.0 + 1e-9)
 
 
 class WrongMomentum(Broken):
     def _centroidal_momentum(self, q: Floats, v: Floats) -> Floats:
-        return super()._centroidal_momentum(q, v) * (1.0 + 1e-9)
+        return self._derive("centroidal_momentum", q, v) * (1.0 + 1e-9)
 
 
 class TiltedWorld(Broken):

@@ -1,14 +1,12 @@
 from __future__ import annotations
 
-import inspect
 import pickle
 
 import numpy as np
 import pytest
 
 from dynx.backends import Backend, DerivedBackend, native_quantities
-from dynx.backends.derived import HOOK_OF_QUANTITY
-from dynx.backends.hooks import EngineHooks
+from dynx.backends.quantities import QUANTITIES
 from dynx.engines.pinocchio.backend import PinocchioBackend
 from dynx.errors import ClosedError
 from dynx.reference.backend import ReferenceBackend
@@ -16,19 +14,6 @@ from dynx.spatial.scalar import Floats
 from tests.backends.robots import all_quantities, assert_close, assert_same, chain, mixed_robot, motion
 
 MINIMUM = {"forward_kinematics", "inverse_dynamics"}
-
-
-def test_every_quantity_has_a_hook_and_every_hook_a_quantity() -> None:
-    hooks = {
-        name
-        for name, member in vars(EngineHooks).items()
-        if inspect.isfunction(member) and "engine's own" not in (member.__doc__ or "")
-    }
-    # The placement of one frame serves forward kinematics too, and poses of bodies are no quantity,
-    # nor is a shorter way to one.
-    assert hooks - {"_frame_placement", "_body_poses", "_in_this_thread"} == set(HOOK_OF_QUANTITY.values())
-    for quantity in HOOK_OF_QUANTITY:
-        assert callable(getattr(Backend, quantity))
 
 
 def test_a_view_computes_nothing_natively_but_the_two() -> None:
@@ -42,7 +27,10 @@ def test_the_engine_is_asked_for_nothing_else(monkeypatch: pytest.MonkeyPatch) -
     def never(*_: object) -> Floats:
         raise AssertionError("a native hook was used")
 
-    for hook in set(HOOK_OF_QUANTITY.values()) - {"_frame_placements", "_inverse_dynamics"}:
+    for hook in {quantity.hook for quantity in QUANTITIES.values()} - {
+        "_frame_placements",
+        "_inverse_dynamics",
+    }:
         monkeypatch.setattr(PinocchioBackend, hook, never)
     monkeypatch.setattr(PinocchioBackend, "_frame_placement", never)
     model = mixed_robot("floating", mimic=True)

@@ -12,11 +12,12 @@ import pytest
 
 import dynx
 from dynx.backends import backend
-from dynx.backends.derived import HOOK_OF_QUANTITY, native_quantities
+from dynx.backends.derived import native_quantities
+from dynx.backends.quantities import QUANTITIES
 from dynx.compiled import kernels
 from dynx.compiled.backend import CompiledBackend
 from dynx.compiled.call import FEW, KernelCall, NumericCall
-from dynx.compiled.kernels import QUANTITIES, is_physical
+from dynx.compiled.kernels import is_physical
 from dynx.errors import ArgumentError, ClosedError
 from dynx.model import Inertial, Link, Mechanism, Model
 from dynx.simd.kernel import Kernel
@@ -98,7 +99,7 @@ def test_closing_while_others_ask() -> None:
 
 
 def test_every_quantity_is_native() -> None:
-    assert native_quantities(CompiledBackend) >= set(QUANTITIES) - {"frame_placement", "frame_placements"}
+    assert native_quantities(CompiledBackend) == set(QUANTITIES)
 
 
 def owner(method: Any) -> object:
@@ -145,14 +146,14 @@ def test_an_unphysical_robot_with_mimic_joints_is_solved_with_pivots() -> None:
     Closeness(samples_at(bad, q, v, found)).check("inverse_dynamics", engine.inverse_dynamics(q, v, found), a)
 
 
-@pytest.mark.parametrize("quantity", sorted({*QUANTITIES} & {*HOOK_OF_QUANTITY}))
+@pytest.mark.parametrize("quantity", QUANTITIES)
 @pytest.mark.parametrize("robot", ["fixed", "floating mimic"])
 def test_what_is_not_compiled_is_evaluated(
     quantity: str, robot: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     model = ROBOTS[robot]
     kernels, reference = made(model), backend("reference", model)
-    monkeypatch.setattr(kernels, "LONGEST", 0)
+    monkeypatch.setattr(kernels, "MAX_CODE_SIZE", -1)
     numbers = made(model)
     q, v, a = state(model, (3,))
     arguments: dict[str, Any] = {"q": q, "v": v, "a": a, "tau": a}

@@ -10,10 +10,11 @@ from hypothesis import given, note
 from hypothesis import strategies as st
 
 from dynx.backends import backend
+from dynx.backends.quantities import QUANTITIES
 from dynx.compiled.backend import CompiledBackend
 from dynx.compiled.call import FEW
 from dynx.compiled.frames import chain_of, on_chain, place_of
-from dynx.compiled.kernels import ON_CHAINS, QUANTITIES, evaluated
+from dynx.compiled.kernels import ON_CHAINS, evaluated
 from dynx.model.mechanism import ROOT
 from dynx.rbd.jacobians import REFERENCES
 from dynx.rbd.kinematics import ancestry
@@ -58,7 +59,7 @@ def test_any_frame_of_any_robot(
     place = place_of(mechanism, chain, frame, reference)
     got = on_chain(mechanism, quantity, chain, place, q, *rates).astype(float)
     wanted = evaluated(mechanism, quantity, (frame, reference), q, *rates, tree=True)
-    if QUANTITIES[quantity].columns:
+    if QUANTITIES[quantity].reduces_columns:
         got, wanted = got @ S, wanted @ S
     Closeness(samples_at(model, drawn.q, drawn.v, drawn.a)).check(quantity, got, wanted)
 

@@ -203,7 +203,7 @@ class DrakeBackend(Backend):
     @_mapped
     def _center_of_mass(self, q: Floats) -> Floats:
         if not self._weighs:
-            return super()._center_of_mass(q)
+            return self._derive("center_of_mass", q)
         context, _ = self._placed(q)
         center: Floats = self._plant.CalcCenterOfMassPositionInWorld(context)
         return center
@@ -211,7 +211,7 @@ class DrakeBackend(Backend):
     @_mapped
     def _center_of_mass_jacobian(self, q: Floats) -> Floats:
         if not self._weighs:
-            return super()._center_of_mass_jacobian(q)
+            return self._derive("center_of_mass_jacobian", q)
         context, R = self._placed(q)
         J = self._plant.CalcJacobianCenterOfMassTranslationalVelocity(context, _V, self._world, self._world)
         return self._coordinates.forces_back(R, J)
@@ -219,7 +219,7 @@ class DrakeBackend(Backend):
     @_mapped
     def _centroidal_momentum(self, q: Floats, v: Floats) -> Floats:
         if not self._weighs:
-            return super()._centroidal_momentum(q, v)
+            return self._derive("centroidal_momentum", q, v)
         context, _ = self._moving(q, v)
         center = self._plant.CalcCenterOfMassPositionInWorld(context)
         momentum = self._plant.CalcSpatialMomentumInWorldAboutPoint(context, center)

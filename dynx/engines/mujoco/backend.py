@@ -183,7 +183,7 @@ class MujocoBackend(Backend):
     @_mapped
     def _center_of_mass(self, q: Floats) -> Floats:
         if not self._masses_add:
-            return super()._center_of_mass(q)
+            return self._derive("center_of_mass", q)
         work = self._placed(q)
         mujoco.mj_comPos(self._engine, work.data)
         return np.array(work.data.subtree_com[ROOT])
@@ -191,7 +191,7 @@ class MujocoBackend(Backend):
     @_mapped
     def _center_of_mass_jacobian(self, q: Floats) -> Floats:
         if not self._masses_add:
-            return super()._center_of_mass_jacobian(q)
+            return self._derive("center_of_mass_jacobian", q)
         work = self._placed(q)
         mujoco.mj_comPos(self._engine, work.data)
         J = np.zeros((3, self._nv))
@@ -203,7 +203,7 @@ class MujocoBackend(Backend):
     @_mapped
     def _centroidal_momentum(self, q: Floats, v: Floats) -> Floats:
         if not self._masses_add:
-            return super()._centroidal_momentum(q, v)
+            return self._derive("centroidal_momentum", q, v)
         data = self._moving(q, v).data
         mujoco.mj_subtreeVel(self._engine, data)
         linear = self._total_mass * data.subtree_linvel[ROOT]

@@ -172,10 +172,10 @@ class PinocchioBackend(Backend):
 
     # -- dynamics -----------------------------------------------------------------------------
 
-    def _in_this_thread(self, question: str) -> Callable[..., Floats] | None:
+    def _in_this_thread(self, quantity: str) -> Callable[..., Floats] | None:
         """The binding's function itself, with the `Data` of the calling thread."""
-        function = _FUNCTIONS.get(question)
-        hook = f"_{question}"
+        function = _FUNCTIONS.get(quantity)
+        hook = f"_{quantity}"
         if function is None or getattr(type(self), hook) is not getattr(PinocchioBackend, hook):
             return None
         return partial(function, self._engine, self._workspace.data)
@@ -225,21 +225,21 @@ class PinocchioBackend(Backend):
     @_mapped
     def _center_of_mass(self, q: Floats) -> Floats:
         if not (self._moving_mass and self._total_mass):
-            return super()._center_of_mass(q)
+            return self._derive("center_of_mass", q)
         moving: Floats = pin.centerOfMass(self._engine, self._workspace.data, q, False)
         return (self._moving_mass * moving + self._rest_moment) / self._total_mass
 
     @_mapped
     def _center_of_mass_jacobian(self, q: Floats) -> Floats:
         if not (self._moving_mass and self._total_mass):
-            return super()._center_of_mass_jacobian(q)
+            return self._derive("center_of_mass_jacobian", q)
         moving: Floats = pin.jacobianCenterOfMass(self._engine, self._workspace.data, q, False)
         return (self._moving_mass / self._total_mass) * moving.reshape(3, self._nv)
 
     @_mapped
     def _centroidal_momentum(self, q: Floats, v: Floats) -> Floats:
         if not (self._moving_mass and self._total_mass):
-            return super()._centroidal_momentum(q, v)
+            return self._derive("centroidal_momentum", q, v)
         data = self._workspace.data
         momentum: Floats = pin.computeCentroidalMomentum(self._engine, data, q, v).vector
         if self._rest_mass:

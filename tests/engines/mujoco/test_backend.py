@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from dynx.backends import DerivedBackend, native_quantities
-from dynx.backends.derived import HOOK_OF_QUANTITY
+from dynx.backends.quantities import QUANTITIES
 from dynx.errors import ClosedError, EngineError, EngineLimitError, SingularMassMatrixError
 from dynx.model import Inertial, Joint, Link, Model, Pose
 from dynx.model.loading import load
@@ -53,7 +53,7 @@ def test_what_the_engine_computes() -> None:
         "kinetic_energy",
         "inertial_regressor",
     }
-    assert native_quantities(MujocoBackend) == set(HOOK_OF_QUANTITY) - derived
+    assert native_quantities(MujocoBackend) == set(QUANTITIES) - derived
 
 
 @pytest.mark.parametrize("mimic", [False, True])

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from dynx.agreement.tolerances import BAR
 from dynx.backends import DerivedBackend, backend, backend_class, installed_backends, native_quantities
-from dynx.backends.derived import HOOK_OF_QUANTITY
+from dynx.backends.quantities import QUANTITIES
 from dynx.engines.pinocchio.backend import MAX_NV, PinocchioBackend, engine_model
 from dynx.errors import ClosedError, EngineError, EngineLimitError, NotInstalledError
 from dynx.model import Joint, Link, Model
@@ -43,7 +43,7 @@ BASES = ("fixed", "floating")
 
 
 def test_every_quantity_is_computed_by_the_engine() -> None:
-    assert native_quantities(PinocchioBackend) == set(HOOK_OF_QUANTITY)
+    assert native_quantities(PinocchioBackend) == set(QUANTITIES)
 
 
 @pytest.mark.parametrize("mimic", [False, True])

@@ -1,0 +1,376 @@
+"""The table of quantities: everything that dynx computes of a robot, each described once.
+
+The evaluation of calls (`dynx.backends.base`), the derivations (`dynx.backends.hooks`), the compiled
+kernels, the benchmark, the 50-digit referee, the comparison of `dynx agree` and the tests of the contract
+read this table. A test holds the methods of `Backend`, which are written out for their users, to it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+
+from dynx.model import Mechanism, Model
+from dynx.rbd import aba, centroidal, coriolis, crba, jacobians, kinematics, regressor, rnea
+from dynx.spatial.scalar import Array
+
+Algorithm = Callable[..., Array]
+
+Argument = Literal["q", "v", "a", "tau"]
+"""q (..., nq) is a configuration; v, a and tau (..., nv) a velocity, an acceleration and a torque."""
+
+Growth = Literal["joints", "pairs", "cubic"]
+"""Operations of an algorithm grow with the number of joints, with the number of pairs of joints of which
+one carries the other, or with the number of bodies times nv squared."""
+
+Extent = int | Literal["nv", "10 n_links", "n_frames"]
+"""Length of an axis of a result: a number, nv, ten for every link of the model, or one for every frame."""
+
+
+def no_details(model: Model) -> tuple[Any, ...]:
+    """No further arguments."""
+    return ()
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A quantity of a robot: a method of `Backend`, its result, and the algorithm that computes it.
+
+    Mimic joints reduce a result by virtual work: with v_tree = S v, an axis of length "nv" that comes
+    last is multiplied by S from the right, one before the last by S' from the left.
+    """
+
+    name: str
+    """Name of the method of `Backend`."""
+
+    arguments: tuple[Argument, ...]
+    """The arrays the method takes, in order."""
+
+    shape: tuple[Extent, ...]
+    """Shape of one sample's result."""
+
+    unit: str
+    """Unit of the entries; where joints slide, m stands for rad."""
+
+    algorithm: Algorithm
+    """Function of `dynx.rbd`: of the mechanism, the arguments in tree coordinates, and the details."""
+
+    natural_magnitude: str
+    """What errors are divided by: a name in `dynx.agreement.natural_magnitudes`."""
+
+    source: str
+    """Where the equation is found."""
+
+    other_names: Mapping[str, str] = field(default_factory=dict)
+    """Names of the quantity in other libraries."""
+
+    options: tuple[str, ...] = ()
+    """Keyword options of the method."""
+
+    of_frame: bool = False
+    """Whether the quantity belongs to a frame; the details are then its number and, if it is among the
+    options, the reference."""
+
+    takes_poses: bool = True
+    """Whether the algorithm takes the poses of the bodies (`dynx.rbd.kinematics.Poses`) in place of q."""
+
+    solves: bool = False
+    """Whether the result solves an equation of motion with the mass matrix: in some states there is none,
+    and errors are backward errors. Mimic joints reduce the equation instead of the result."""
+
+    growth: Growth = "joints"
+    """How the number of operations grows with the robot."""
+
+    refereed: bool = True
+    """Whether `dynx agree` compares it with 50 digits."""
+
+    implied_details: Callable[[Model], tuple[Any, ...]] = no_details
+    """Details that follow from the model."""
+
+    @property
+    def hook(self) -> str:
+        """Name of the hook of `EngineHooks` by which an engine computes the quantity natively."""
+        return "_frame_placements" if self.name == "forward_kinematics" else f"_{self.name}"
+
+    @property
+    def reduces_columns(self) -> bool:
+        """Whether mimic joints multiply a result by S from the right."""
+        return self.shape[-1:] == ("nv",) and not self.solves
+
+    @property
+    def reduces_rows(self) -> bool:
+        """Whether mimic joints multiply a result by S' from the left."""
+        return len(self.shape) > 1 and self.shape[-2] == "nv"
+
+    def shape_of(self, model: Model, nv: int | None = None) -> tuple[int, ...]:
+        """Shape of one sample's result; in tree coordinates for the `nv` of the tree."""
+        extents = {
+            "nv": model.nv if nv is None else nv,
+            "10 n_links": 10 * len(model.links),
+            "n_frames": len(model.frame_names),
+        }
+        return tuple(n if isinstance(n, int) else extents[n] for n in self.shape)
+
+    def evaluate(self, mechanism: Mechanism, q: Array, *rest: Any) -> Array:
+        """The algorithm at the tree configuration q (..., nq), with the other arguments and details."""
+        first = kinematics.body_poses(mechanism, q) if self.takes_poses else q
+        return np.asarray(self.algorithm(mechanism, first, *rest))
+
+
+_AT_POINT = ("reference", "point")
+_FORCES = ("external_forces", "force_reference", "joint_dynamics")
+
+_TABLE = (
+    Quantity(
+        "forward_kinematics",
+        ("q",),
+        (4, 4),
+        "1, m",
+        kinematics.frame_placement,
+        "pose",
+        "Featherstone 2008, section 4.4",
+        {
+            "Pinocchio": "framesForwardKinematics",
+            "Drake": "CalcPoseInWorld",
+            "MuJoCo": "mj_kinematics",
+            "PyBullet": "getLinkState",
+        },
+        of_frame=True,
+    ),
+    Quantity(
+        "jacobian",
+        ("q",),
+        (6, "nv"),
+        "m/rad, 1",
+        jacobians.frame_jacobian,
+        "jacobian",
+        "Siciliano et al., eq. 3.30",
+        {
+            "Pinocchio": "computeFrameJacobian",
+            "Drake": "CalcJacobianSpatialVelocity",
+            "MuJoCo": "mj_jac",
+            "PyBullet": "calculateJacobian",
+        },
+        options=_AT_POINT,
+        of_frame=True,
+    ),
+    Quantity(
+        "jacobian_derivative",
+        ("q", "v"),
+        (6, "nv"),
+        "m/(rad s), 1/s",
+        jacobians.frame_jacobian_derivative,
+        "jacobian rate",
+        "Siciliano et al., eq. 3.30, differentiated in time",
+        {"Pinocchio": "getFrameJacobianTimeVariation", "MuJoCo": "mj_jacDot"},
+        refereed=False,
+        options=_AT_POINT,
+        of_frame=True,
+    ),
+    Quantity(
+        "frame_velocity",
+        ("q", "v"),
+        (6,),
+        "m/s, rad/s",
+        jacobians.frame_velocity,
+        "velocity",
+        "Featherstone 2008, section 2.8",
+        {
+            "Pinocchio": "getFrameVelocity",
+            "Drake": "CalcSpatialVelocityInWorld",
+            "MuJoCo": "mj_objectVelocity",
+        },
+        refereed=False,
+        options=_AT_POINT,
+        of_frame=True,
+    ),
+    Quantity(
+        "frame_acceleration",
+        ("q", "v", "a"),
+        (6,),
+        "m/s^2, rad/s^2",
+        jacobians.frame_acceleration,
+        "acceleration",
+        "Featherstone 2008, section 2.11",
+        {
+            "Pinocchio": "getFrameClassicalAcceleration",
+            "Drake": "CalcSpatialAccelerationInWorld",
+            "MuJoCo": "mj_objectAcceleration",
+        },
+        refereed=False,
+        options=_AT_POINT,
+        of_frame=True,
+    ),
+    Quantity(
+        "inverse_dynamics",
+        ("q", "v", "a"),
+        ("nv",),
+        "N m",
+        rnea.inverse_dynamics,
+        "torque",
+        "Luh, Walker and Paul 1980",
+        {
+            "Pinocchio": "rnea",
+            "Drake": "CalcInverseDynamics",
+            "MuJoCo": "mj_inverse",
+            "PyBullet": "calculateInverseDynamics",
+        },
+        options=_FORCES,
+        takes_poses=False,
+    ),
+    Quantity(
+        "forward_dynamics",
+        ("q", "v", "tau"),
+        ("nv",),
+        "rad/s^2",
+        aba.forward_dynamics,
+        "solution",
+        "Featherstone 2008, section 7.3",
+        {
+            "Pinocchio": "aba",
+            "Drake": "get_generalized_acceleration_output_port",
+            "MuJoCo": "mj_forward",
+        },
+        options=_FORCES,
+        takes_poses=False,
+        solves=True,
+    ),
+    Quantity(
+        "mass_matrix",
+        ("q",),
+        ("nv", "nv"),
+        "kg m^2",
+        crba.mass_matrix,
+        "inertia",
+        "Featherstone 2008, section 6.2",
+        {
+            "Pinocchio": "crba",
+            "Drake": "CalcMassMatrix",
+            "MuJoCo": "mj_fullM",
+            "PyBullet": "calculateMassMatrix",
+        },
+        options=("joint_dynamics",),
+        takes_poses=False,
+        growth="pairs",
+    ),
+    Quantity(
+        "bias_torque",
+        ("q", "v"),
+        ("nv",),
+        "N m",
+        rnea.bias_torque,
+        "bias torque",
+        "Siciliano et al., section 7.1.3",
+        {"Pinocchio": "nonLinearEffects", "Drake": "CalcBiasTerm", "MuJoCo": "qfrc_bias"},
+        options=_FORCES,
+        takes_poses=False,
+    ),
+    Quantity(
+        "gravity_torque",
+        ("q",),
+        ("nv",),
+        "N m",
+        rnea.gravity_torque,
+        "gravity torque",
+        "Siciliano et al., section 7.1.3",
+        {"Pinocchio": "computeGeneralizedGravity", "Drake": "CalcGravityGeneralizedForces"},
+        takes_poses=False,
+    ),
+    Quantity(
+        "coriolis_matrix",
+        ("q", "v"),
+        ("nv", "nv"),
+        "N m s/rad",
+        coriolis.coriolis_matrix,
+        "coriolis",
+        "Echeandia and Wensing 2021, eq. 24",
+        {"Pinocchio": "computeCoriolisMatrix"},
+        growth="pairs",
+        refereed=False,
+    ),
+    Quantity(
+        "inertial_regressor",
+        ("q", "v", "a"),
+        ("nv", "10 n_links"),
+        "m/s^2, m^2/s^2, 1/s^2",
+        regressor.inertial_regressor,
+        "regressor",
+        "Atkeson, An and Hollerbach 1986",
+        {"Pinocchio": "computeJointTorqueRegressor"},
+        growth="cubic",
+        refereed=False,
+        # The frames of the links come first.
+        implied_details=lambda model: (range(len(model.links)),),
+    ),
+    Quantity(
+        "center_of_mass",
+        ("q",),
+        (3,),
+        "m",
+        centroidal.center_of_mass,
+        "length",
+        "Orin, Goswami and Lee 2013",
+        {
+            "Pinocchio": "centerOfMass",
+            "Drake": "CalcCenterOfMassPositionInWorld",
+            "MuJoCo": "subtree_com",
+        },
+    ),
+    Quantity(
+        "center_of_mass_jacobian",
+        ("q",),
+        (3, "nv"),
+        "m/rad",
+        centroidal.center_of_mass_jacobian,
+        "linear jacobian",
+        "Orin, Goswami and Lee 2013",
+        {
+            "Pinocchio": "jacobianCenterOfMass",
+            "Drake": "CalcJacobianCenterOfMassTranslationalVelocity",
+            "MuJoCo": "mj_jacSubtreeCom",
+        },
+        refereed=False,
+    ),
+    Quantity(
+        "centroidal_momentum",
+        ("q", "v"),
+        (6,),
+        "kg m/s, kg m^2/s",
+        centroidal.centroidal_momentum,
+        "momentum",
+        "Orin, Goswami and Lee 2013",
+        {
+            "Pinocchio": "computeCentroidalMomentum",
+            "Drake": "CalcSpatialMomentumInWorldAboutPoint",
+            "MuJoCo": "subtree_angmom",
+        },
+        refereed=False,
+    ),
+    Quantity(
+        "kinetic_energy",
+        ("q", "v"),
+        (),
+        "J",
+        centroidal.kinetic_energy,
+        "kinetic energy",
+        "Siciliano et al., section 7.1.1",
+        {"Pinocchio": "computeKineticEnergy", "Drake": "CalcKineticEnergy", "MuJoCo": "mj_energyVel"},
+        options=("joint_dynamics",),
+    ),
+    Quantity(
+        "potential_energy",
+        ("q",),
+        (),
+        "J",
+        centroidal.potential_energy,
+        "potential energy",
+        "Siciliano et al., section 7.1.2",
+        {"Pinocchio": "computePotentialEnergy", "Drake": "CalcPotentialEnergy", "MuJoCo": "mj_energyPos"},
+    ),
+)
+
+QUANTITIES: dict[str, Quantity] = {quantity.name: quantity for quantity in _TABLE}
+"""Every quantity by its name."""
