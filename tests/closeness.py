@@ -9,15 +9,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.agreement import tolerances
+from dynx.agreement.compared_quantities import compared_quantities
 from dynx.agreement.comparison import judge
 from dynx.agreement.magnitudes import Magnitudes
-from dynx.agreement.quantities import QUANTITIES
 from dynx.agreement.sampling import Kind, Samples, deal
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
 
 ANYWHERE: Kind = "anywhere"
-BY_NAME = {quantity.name: quantity for quantity in QUANTITIES}
+BY_NAME = {quantity.name: quantity for quantity in compared_quantities()}
 
 
 def samples_at(

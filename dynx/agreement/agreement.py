@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 
 from dynx.agreement.answers import DERIVED, EXACT, Answers
+from dynx.agreement.compared_quantities import compared_quantities
 from dynx.agreement.comparison import Comparison, compare
 from dynx.agreement.identities import IdentityCheck, check_identities
 from dynx.agreement.magnitudes import Magnitudes
-from dynx.agreement.quantities import QUANTITIES
 from dynx.agreement.referee import Referee
 from dynx.agreement.report import AgreementReport, refused_report
 from dynx.agreement.sampling import Samples, draw_samples
@@ -109,7 +109,7 @@ def _compared(
     rows: list[Comparison] = []
     for first, second in combinations(all_answers, 2):
         progress(f"{first.name}~{second.name}")
-        rows += [compare(quantity, first, second, sizes) for quantity in QUANTITIES]
+        rows += [compare(quantity, first, second, sizes) for quantity in compared_quantities()]
         rows.append(compare_forward_dynamics(first, second, sizes))
         if model.nv:
             rows.append(compare_inverse_kinematics(first, second, sizes))
@@ -151,7 +151,11 @@ def _refereed(samples: Samples, names: list[str], engines: list[Backend]) -> lis
     rows = []
     for name, engine in zip(names, engines, strict=True):
         answers = Answers(name, engine, samples)
-        rows += [compare(quantity, answers, exact, sizes) for quantity in QUANTITIES if quantity.refereed]
+        rows += [
+            compare(quantity, answers, exact, sizes)
+            for quantity in compared_quantities()
+            if quantity.refereed
+        ]
         rows.append(compare_forward_dynamics(answers, exact, sizes, both=False))
     return rows
 
@@ -161,7 +165,11 @@ def _self_compared(sizes: Magnitudes, name: str, engine: Backend) -> list[Compar
     native = native_quantities(engine)
     own = Answers(name, engine, sizes.samples)
     derived = Answers(DERIVED, DerivedBackend(engine), sizes.samples)
-    rows = [compare(quantity, own, derived, sizes) for quantity in QUANTITIES if quantity.native in native]
+    rows = [
+        compare(quantity, own, derived, sizes)
+        for quantity in compared_quantities()
+        if quantity.native in native
+    ]
     if "forward_dynamics" in native:
         rows.append(compare_forward_dynamics(own, derived, sizes, both=False))
     return rows

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from dynx.agreement.answers import DERIVED, Answers, Refusal
+from dynx.agreement.compared_quantities import ComparedQuantity
 from dynx.agreement.magnitudes import Magnitudes
-from dynx.agreement.quantities import Layout, Quantity, questions_of
+from dynx.agreement.natural_magnitudes import Layout, questions_of
 from dynx.agreement.sampling import Samples
 from dynx.spatial.scalar import Array, Floats
 
@@ -74,7 +75,7 @@ def judge(error: Array, scale: Floats) -> Verdict:
     return Verdict(float(np.max(size)), float(relative[worst]), tuple(int(k) for k in worst))
 
 
-def compare(quantity: Quantity, first: Answers, second: Answers, sizes: Magnitudes) -> Comparison:
+def compare(quantity: ComparedQuantity, first: Answers, second: Answers, sizes: Magnitudes) -> Comparison:
     """The two answers to a quantity whose error is their difference."""
     samples = first.samples
     tolerance = quantity.tolerance(sizes)

@@ -17,7 +17,7 @@ from dynx.agreement.answers import Answers
 from dynx.agreement.comparison import WorstSample, judge, state
 from dynx.agreement.differentiation import time_derivative
 from dynx.agreement.magnitudes import Magnitudes
-from dynx.agreement.quantities import coriolis_scale, largest, mass_scale
+from dynx.agreement.natural_magnitudes import coriolis_scale, largest, mass_scale
 from dynx.agreement.sampling import Samples
 from dynx.agreement.solutions import compare_forward_dynamics
 from dynx.agreement.symmetry import turned

@@ -1,8 +1,8 @@
 """The referee: the algorithms of `dynx.rbd` evaluated with 50 digits.
 
-It answers some of the questions that a backend answers, with arrays of mpmath numbers, starting from
-the decimal values of the description (as read into doubles). Its own rounding errors are 34 digits
-below those of any engine, so the distance of an engine from it is the engine's error.
+It has the methods of a backend and returns arrays of mpmath numbers, starting from the decimal values of
+the description (as read into doubles). Its own rounding errors are 34 digits below those of any engine, so
+the distance of an engine from it is the engine's error.
 
 The precision is raised inside each call only; mpmath keeps it per process, so the referee is for
 one thread.
@@ -11,15 +11,18 @@ one thread.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
+from typing import Any
 
 import mpmath
 import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.agreement.answers import EXACT
+from dynx.backends.quantities import QUANTITIES, Quantity
 from dynx.model import Model
 from dynx.model.mechanism import Mechanism, build_mechanism
-from dynx.rbd import centroidal, crba, jacobians, kinematics, rnea
+from dynx.rbd import jacobians, kinematics
 from dynx.rbd.kinematics import Poses
 from dynx.spatial.scalar import Array
 
@@ -32,7 +35,7 @@ def exactly(numbers: object) -> Array:
 
 
 class Referee:
-    """Answers in 50 digits for one model, with the methods and shapes of `Backend`.
+    """Quantities of one model in 50 digits, with the methods and shapes of `Backend`.
 
     Arguments are doubles with any leading axes, taken as exact; an argument that already holds
     mpmath numbers is used as it stands.
@@ -50,52 +53,39 @@ class Referee:
 
     def forward_kinematics(self, q: ArrayLike) -> Array:
         """T_world_frame of every frame (..., n_frames, 4, 4)."""
-        return self._asked(kinematics.frame_placements, 3, q)
+        return self._evaluate(kinematics.frame_placements, 3, q)
 
-    def jacobian(self, q: ArrayLike, frame: str, *, reference: str = "local_world_aligned") -> Array:
-        """J (..., 6, nv)."""
-        index, axes = self.model.frame_index(frame), jacobians.REFERENCES[reference]
+    def __getattr__(self, name: str) -> Callable[..., Array]:
+        """The method of `Backend` of that name, for every quantity of the table that solves no equation."""
+        if name not in QUANTITIES or QUANTITIES[name].solves:
+            raise AttributeError(f"the referee does not compute {name}")
+        return partial(self._quantity, QUANTITIES[name])
 
-        def of_poses(mechanism: Mechanism, poses: Poses) -> Array:
-            return jacobians.frame_jacobian(mechanism, poses, index, axes)
-
-        return self._reduced_columns(self._asked(self._of_poses(of_poses), 2, q))
-
-    def inverse_dynamics(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> Array:
-        """tau (..., nv)."""
-        return self._reduced_columns(self._asked(rnea.inverse_dynamics, 1, q, v, a))
-
-    def bias_torque(self, q: ArrayLike, v: ArrayLike) -> Array:
-        """C v + g (..., nv)."""
-        return self.inverse_dynamics(q, v, np.zeros_like(np.asarray(v)))
-
-    def gravity_torque(self, q: ArrayLike) -> Array:
-        """g (..., nv)."""
-        q = np.asarray(q)
-        rest = np.zeros((*q.shape[:-1], self.model.nv))
-        return self.inverse_dynamics(q, rest, rest)
-
-    def mass_matrix(self, q: ArrayLike) -> Array:
-        """M (..., nv, nv)."""
-        M = self._asked(crba.mass_matrix, 2, q)
-        return M if self._S is None else self._multiply(exactly(self._S.T), self._reduced_columns(M))
-
-    def center_of_mass(self, q: ArrayLike) -> Array:
-        """(..., 3)"""
-        return self._asked(self._of_poses(centroidal.center_of_mass), 1, q)
-
-    def potential_energy(self, q: ArrayLike) -> Array:
-        """(...,)"""
-        return self._asked(self._of_poses(centroidal.potential_energy), 0, q)
-
-    def kinetic_energy(self, q: ArrayLike, v: ArrayLike) -> Array:
-        """(...,)"""
-        return self._asked(self._of_poses(centroidal.kinetic_energy), 0, q, v)
-
-    def _asked(
-        self, algorithm: Callable[..., Array], rank: int, q: ArrayLike, *velocities: ArrayLike
+    def _quantity(
+        self, quantity: Quantity, *arguments: Any, reference: str = jacobians.LOCAL_WORLD_ALIGNED
     ) -> Array:
-        """`algorithm` in tree coordinates, for every sample; `rank` axes of its answer are no batch."""
+        """The algorithm of a quantity at its arguments and, where it is one of a frame, that frame."""
+        state, frame = arguments[: len(quantity.arguments)], arguments[len(quantity.arguments) :]
+        details = quantity.implied_details(self.model)
+        if quantity.of_frame:
+            details = (self.model.frame_index(*frame), jacobians.REFERENCES[reference])
+        algorithm = self._from_poses(quantity.algorithm) if quantity.takes_poses else quantity.algorithm
+        result = self._evaluate(algorithm, len(quantity.shape), *state, details=details)
+        if self._S is None:
+            return result
+        if quantity.reduces_columns:
+            result = self._multiply(result, exactly(self._S))
+        return self._multiply(exactly(self._S.T), result) if quantity.reduces_rows else result
+
+    def _evaluate(
+        self,
+        algorithm: Callable[..., Array],
+        rank: int,
+        q: ArrayLike,
+        *velocities: ArrayLike,
+        details: tuple[Any, ...] = (),
+    ) -> Array:
+        """`algorithm` in tree coordinates, for every sample; `rank` axes of its result are no batch."""
         with mpmath.mp.workdps(DIGITS):
             q, rates = exactly(q), [exactly(v) for v in velocities]
             coupling = self._mechanism.coupling
@@ -105,25 +95,22 @@ class Referee:
                 joints = driven * exactly(coupling.scale) + exactly(coupling.offset)
                 q = np.concatenate([q[..., :base], joints], axis=-1)
                 rates = [v @ exactly(self._S.T) for v in rates]
-            answer = np.asarray(algorithm(self._mechanism, q, *rates))
-            # What no coordinate moves comes without batch axes.
+            result = np.asarray(algorithm(self._mechanism, q, *rates, *details))
+            # A result that no coordinate moves lacks the batch axes.
             batch = np.broadcast_shapes(q.shape[:-1], *(v.shape[:-1] for v in rates))
-            return np.array(np.broadcast_to(answer, (*batch, *answer.shape[answer.ndim - rank :])))
-
-    def _reduced_columns(self, answer: Array) -> Array:
-        return answer if self._S is None else self._multiply(answer, exactly(self._S))
+            return np.array(np.broadcast_to(result, (*batch, *result.shape[result.ndim - rank :])))
 
     def _multiply(self, A: Array, B: Array) -> Array:
         with mpmath.mp.workdps(DIGITS):
             return np.asarray(A @ B)
 
-    def _of_poses(self, algorithm: Callable[..., Array]) -> Callable[..., Array]:
-        """`algorithm` of body poses, which are kept: a robot has many frames at one configuration."""
+    def _from_poses(self, algorithm: Callable[..., Array]) -> Callable[..., Array]:
+        """`algorithm` at the poses of the bodies, which are kept: a robot has many frames."""
 
-        def evaluate(mechanism: Mechanism, q: Array, *v: Array) -> Array:
+        def evaluate(mechanism: Mechanism, q: Array, *rest: Any) -> Array:
             key = tuple(np.ravel(q).tolist()), q.shape
             if key not in self._poses:
                 self._poses[key] = kinematics.body_poses(mechanism, q)
-            return algorithm(mechanism, self._poses[key], *v)
+            return algorithm(mechanism, self._poses[key], *rest)
 
         return evaluate

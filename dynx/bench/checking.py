@@ -14,7 +14,7 @@ import numpy as np
 from dynx.agreement import tolerances
 from dynx.agreement.comparison import judge
 from dynx.agreement.magnitudes import Magnitudes
-from dynx.agreement.quantities import largest, mass_scale, pose_scale
+from dynx.agreement.natural_magnitudes import largest, mass_scale, pose_scale
 from dynx.agreement.sampling import Kind, Samples
 from dynx.bench.cases import Batch
 from dynx.reference.backend import ReferenceBackend

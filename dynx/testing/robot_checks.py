@@ -11,14 +11,14 @@ from collections.abc import Sequence
 import pytest
 
 from dynx.agreement import AgreementReport, Comparison, IdentityCheck, WorstSample, agree, refused_report
+from dynx.agreement.compared_quantities import compared_quantities
 from dynx.agreement.identities import IDENTITIES
-from dynx.agreement.quantities import QUANTITIES
 from dynx.errors import DynxError
 from dynx.model.loading import load
 from dynx.model.model import Base
 
 CHECKS: tuple[str, ...] = (
-    *(quantity.name for quantity in QUANTITIES),
+    *(quantity.name for quantity in compared_quantities()),
     "forward_dynamics",
     "inverse_kinematics",
     *(identity.name for identity in IDENTITIES),

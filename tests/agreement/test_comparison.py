@@ -4,16 +4,16 @@ import mpmath
 import numpy as np
 
 from dynx.agreement.answers import Answers
+from dynx.agreement.compared_quantities import compared_quantities
 from dynx.agreement.comparison import compare, judge
 from dynx.agreement.magnitudes import Magnitudes
-from dynx.agreement.quantities import QUANTITIES
 from dynx.agreement.sampling import draw_samples
 from dynx.errors import EngineError
 from dynx.reference.backend import ReferenceBackend
 from dynx.spatial.scalar import Floats
 from tests.agreement.robots import Broken, arm
 
-MASS = next(quantity for quantity in QUANTITIES if quantity.name == "mass_matrix")
+MASS = next(quantity for quantity in compared_quantities() if quantity.name == "mass_matrix")
 
 
 def test_the_largest_relative_error_and_its_place() -> None:

@@ -5,8 +5,8 @@ from hypothesis import given
 
 import dynx
 from dynx.agreement import tolerances
+from dynx.agreement.compared_quantities import compared_quantities
 from dynx.agreement.magnitudes import Magnitudes
-from dynx.agreement.quantities import QUANTITIES
 from dynx.agreement.sampling import draw_samples
 from dynx.model import Model
 from dynx.reference.backend import ReferenceBackend
@@ -36,7 +36,7 @@ def test_natural_sizes_bound_the_quantities(model: Model) -> None:
     sizes = Magnitudes(samples)
     slack = 1.0 + tolerances.rounding(sizes.depth)
     with ReferenceBackend(model) as backend:
-        for quantity in QUANTITIES:
+        for quantity in compared_quantities():
             if quantity.name in BOUNDS:
                 value = np.abs(np.asarray(quantity.evaluate(backend, samples), dtype=float))
                 scale = np.asarray(quantity.scale(sizes))

@@ -153,12 +153,12 @@ def test_what_is_not_compiled_is_evaluated(
 ) -> None:
     model = ROBOTS[robot]
     kernels, reference = made(model), backend("reference", model)
-    monkeypatch.setattr(kernels, "MAX_CODE_SIZE", -1)
+    monkeypatch.setattr("dynx.compiled.kernels.MAX_CODE_SIZE", -1)
     numbers = made(model)
     q, v, a = state(model, (3,))
     arguments: dict[str, Any] = {"q": q, "v": v, "a": a, "tau": a}
     values = [arguments[name] for name in QUANTITIES[quantity].arguments]
-    frame = [TIP] if quantity.startswith(("jacobian", "frame")) else []
+    frame = [TIP] if QUANTITIES[quantity].of_frame else []
     answers = [getattr(each, quantity)(*values, *frame) for each in (numbers, reference)]
     np.testing.assert_array_equal(answers[0].shape, answers[1].shape)
     close = Closeness(samples_at(model, q, v, a, a))

@@ -13,9 +13,9 @@ from hypothesis import given, note, settings
 from hypothesis import strategies as st
 
 from dynx.agreement.answers import Answers
+from dynx.agreement.compared_quantities import compared_quantities
 from dynx.agreement.comparison import Comparison, compare
 from dynx.agreement.magnitudes import Magnitudes
-from dynx.agreement.quantities import QUANTITIES
 from dynx.agreement.sampling import Samples, draw_samples
 from dynx.agreement.solutions import compare_forward_dynamics
 from dynx.backends import Backend, backend, installed_backends
@@ -56,7 +56,7 @@ def assert_agree(engines: list[Backend], states: Samples) -> None:
     sizes = Magnitudes(states)
     answers = [Answers(engine.name, engine, states) for engine in engines]
     for pair in combinations(answers, 2):
-        for quantity in QUANTITIES:
+        for quantity in compared_quantities():
             assert_agreement(compare(quantity, *pair, sizes))
         assert_agreement(compare_forward_dynamics(*pair, sizes))
 
@@ -133,7 +133,7 @@ def test_derived_answers_are_the_native_ones(base: Base, data: st.DataObject) ->
         for engine in engines:
             native = Answers(engine.name, engine, states)
             derived = Answers("derived", DerivedBackend(engine), states)
-            for quantity in QUANTITIES:
+            for quantity in compared_quantities():
                 if quantity.native in native_quantities(engine):
                     assert_agreement(compare(quantity, native, derived, sizes))
 
