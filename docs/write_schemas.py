@@ -13,6 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from dynx.agreement.report import AgreementDocument
+from dynx.bench.document import BenchDocument
+from dynx.cli.sim.document_types import SimDocument, TutorialDocument
 from dynx.doctor.formats.baseline import BaselineDocument
 from dynx.doctor.report import DoctorDocument
 from dynx.files.documents import json_schema
@@ -25,7 +27,10 @@ def schemas() -> dict[str, dict[str, Any]]:
     return {
         "agree": json_schema(AgreementDocument, "dynx agree --json"),
         "baseline": json_schema(BaselineDocument, "dynx doctor --write-baseline", omits_defaults=True),
+        "bench": json_schema(BenchDocument, "dynx bench --json"),
         "doctor": json_schema(DoctorDocument, "dynx doctor --json"),
+        "sim": json_schema(SimDocument, "dynx sim --json"),
+        "tutorial": json_schema(TutorialDocument, "dynx sim --tutorial --json"),
     }
 
 

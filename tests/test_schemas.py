@@ -9,10 +9,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from click.testing import CliRunner
 from jsonschema import Draft202012Validator
 
 from dynx import agree, diagnose, load
 from dynx.agreement import refused_report, results_document
+from dynx.cli.shell.main import cli
 from dynx.doctor import results_document as doctor_document
 from dynx.doctor.formats.baseline import baseline_document
 from dynx.errors import DescriptionError
@@ -70,6 +72,27 @@ def test_documents_of_the_doctor_keep_their_schema() -> None:
 
 def test_baselines_keep_their_schema() -> None:
     assert errors("baseline", baseline_document([differing(), hostile()], "")) == []
+
+
+COMMANDS = [
+    ("bench", ["bench", "double_pendulum", "--quick", "--batch", "8", "--threads", "1"], 0),
+    ("sim", ["sim", "ur5", "--duration", "0.01", "--payload", "tool0:3", "--noise-q", "1e-4"], 0),
+    ("sim", ["sim", "ur5", "--to", "elbow_joint=0.1", "--controller", "operational-space"], 0),
+    (
+        "sim",
+        ["sim", "double_pendulum", "--base", "floating", "--duration", "0.01", "--controller", "none"],
+        0,
+    ),
+    ("sim", ["sim", "ur5", "--duration", "1", "--controller", "pd", "--kp", "1e9", "--kd", "1e6"], 1),
+    ("tutorial", ["sim", "--tutorial", "--duration", "1.2", "--dt", "0.004"], 0),
+]
+
+
+@pytest.mark.parametrize(("name", "arguments", "code"), COMMANDS, ids=lambda value: str(value)[:60])
+def test_documents_of_commands_keep_their_schema(name: str, arguments: list[str], code: int) -> None:
+    result = CliRunner().invoke(cli, [*arguments, "--json"])
+    assert result.exit_code == code, result.output
+    assert errors(name, json.loads(result.stdout)) == []
 
 
 def test_a_key_too_few_or_too_many_is_an_error_wherever_it_is() -> None:

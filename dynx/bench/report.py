@@ -3,11 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 from dynx._version import __version__
 from dynx.bench.cases import Work
 from dynx.bench.cost import Cost
+from dynx.bench.document import (
+    BenchCase,
+    BenchDocument,
+    BenchPeak,
+    BenchResult,
+    BenchRoofline,
+    BenchWay,
+)
 from dynx.bench.measurement import Measurement
 from dynx.bench.roofline import Peak, roofline
 from dynx.bench.session import Session
@@ -15,7 +22,7 @@ from dynx.bench.session import Session
 SCHEMA = 1
 
 
-def document(session: Session, found: Sequence[Sequence[Measurement]], processor: str) -> dict[str, Any]:
+def document(session: Session, found: Sequence[Sequence[Measurement]], processor: str) -> BenchDocument:
     """What a session found: one entry of `found` for each work that was measured, in order."""
     plan = session.plan
     measured = {group[0].work for group in found if group}
@@ -42,7 +49,7 @@ def document(session: Session, found: Sequence[Sequence[Measurement]], processor
 
 def result(
     group: Sequence[Measurement], costs: Sequence[Cost | None], peaks: Mapping[int, Peak]
-) -> dict[str, Any]:
+) -> BenchResult:
     """One work and all its ways. A ratio says how many times faster the way is than a peer."""
     peers = {each.way: each.times.median for each in group if each.role == "peer" and each.times is not None}
     return {
@@ -64,10 +71,10 @@ def is_wrong(measurement: Measurement) -> bool:
 
 def _way(
     measurement: Measurement, cost: Cost | None, peers: Mapping[str, float], peaks: Mapping[int, Peak]
-) -> dict[str, Any]:
+) -> BenchWay:
     times = measurement.times
     peak = peaks.get(measurement.threads)
-    entry: dict[str, Any] = {
+    entry: BenchWay = {
         "way": measurement.way,
         "role": measurement.role,
         "version": measurement.version,
@@ -92,7 +99,7 @@ def _way(
     return entry
 
 
-def _roofline(cost: Cost, seconds: float, peak: Peak) -> dict[str, Any]:
+def _roofline(cost: Cost, seconds: float, peak: Peak) -> BenchRoofline:
     found = roofline(cost, seconds, peak)
     return {
         "bytes": cost.bytes,
@@ -104,7 +111,7 @@ def _roofline(cost: Cost, seconds: float, peak: Peak) -> dict[str, Any]:
     }
 
 
-def _peak(peak: Peak) -> dict[str, Any]:
+def _peak(peak: Peak) -> BenchPeak:
     return {
         "threads": peak.threads,
         "copy_bandwidth": peak.copy_bandwidth,
@@ -112,5 +119,5 @@ def _peak(peak: Peak) -> dict[str, Any]:
     }
 
 
-def _work(work: Work) -> dict[str, Any]:
+def _work(work: Work) -> BenchCase:
     return {"quantity": work.quantity, "batch": work.batch, "threads": work.threads}

@@ -51,6 +51,7 @@ def test_times_are_nanoseconds_of_one_sample() -> None:
 
 def test_the_roofline_is_that_of_the_threads_of_the_way() -> None:
     with_cost = result(GROUP[:1], [COST], {1: PEAK})["ways"][0]["roofline"]
+    assert with_cost is not None
     # 19.2 ns for the bytes and 20 ns for the operations, of 40.
     assert with_cost["memory_share"] == pytest.approx(0.48)
     assert with_cost["arithmetic_share"] == pytest.approx(0.5)

@@ -16,6 +16,7 @@ from rich.console import Console
 
 import dynx
 from dynx.bench.cases import ARGUMENTS, Work
+from dynx.bench.document import BenchWay
 from dynx.bench.implementations import Way
 from dynx.bench.report import document
 from dynx.bench.roofline import Peak
@@ -156,7 +157,7 @@ def test_a_machine_that_was_busy_is_said(load: float | None, said: bool) -> None
     assert ("load 3.1 before the run" in out.getvalue()) == said
 
 
-def way(name: str, ns: float | None) -> dict[str, Any]:
+def way(name: str, ns: float | None) -> BenchWay:
     """The entry of a way."""
     quartiles = None if ns is None else [ns, ns]
     return {

@@ -1,0 +1,76 @@
+"""The JSON document of ``dynx bench``: its keys and types, from which its schema is generated."""
+
+from __future__ import annotations
+
+from typing import Literal, TypedDict
+
+
+class BenchCase(TypedDict):
+    """A quantity, the samples in one call, and the threads of what has threads."""
+
+    quantity: str
+    batch: int
+    threads: int
+
+
+class BenchPeak(TypedDict):
+    """Measured limits of the machine on so many threads: copying [B/s], multiply-adds [1/s]."""
+
+    threads: int
+    copy_bandwidth: float
+    multiply_adds: float
+
+
+class BenchRoofline(TypedDict):
+    """Bytes and operations of one sample, and the shares of both peaks that its time comes to."""
+
+    bytes: int
+    operations: int
+    multiply_adds: int
+    memory_share: float
+    arithmetic_share: float
+    binds: Literal["memory", "arithmetic"]
+
+
+class BenchWay(TypedDict):
+    """One implementation: its error, the median and quartiles of the time of one sample [ns], and how many
+    times faster it is than each peer; times are null where `problem` says why it was not timed."""
+
+    way: str
+    role: str
+    version: str
+    threads: int
+    samples: int
+    error: float | None
+    tolerance: float | None
+    problem: str | None
+    ns: float | None
+    ns_quartiles: list[float] | None
+    ratios: dict[str, float]
+    roofline: BenchRoofline | None
+
+
+class BenchResult(BenchCase):
+    """One case with all its implementations."""
+
+    ways: list[BenchWay]
+
+
+class BenchDocument(TypedDict):
+    """The document; `load` is how busy the machine was, `not_done` what an interrupted run left out."""
+
+    schema: int
+    dynx: str
+    robot: str
+    source: str | None
+    base: str
+    nq: int
+    nv: int
+    frame: str
+    repetitions: int
+    seed: int
+    processor: str
+    load: float | None
+    peaks: list[BenchPeak]
+    results: list[BenchResult]
+    not_done: list[BenchCase]
