@@ -1,7 +1,7 @@
-"""A pytest plugin that plants one fault into the source of dynx as it is imported.
+"""A pytest plugin that imports one module of dynx from other source than that on the disk.
 
-``pytest -p tests.faults.plant`` with DYNX_FAULT naming an entry of the catalogue. The file on disk is
-not touched: the module's source is changed on its way into the interpreter.
+``pytest -p tests.faults.plant`` with DYNX_PLANT naming a JSON file ``{"module": ..., "source": ...}``.
+It is a plugin, because pytest puts its own finder first as it starts, and that one reads the disk.
 """
 
 from __future__ import annotations
@@ -9,53 +9,50 @@ from __future__ import annotations
 import importlib.abc
 import importlib.machinery
 import importlib.util
+import json
 import os
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 from types import CodeType, ModuleType
 
-from tests.faults.catalogue import FAULTS
-from tests.faults.fault import Fault
 
+class ChangedLoader(importlib.machinery.SourceFileLoader):
+    """Loader that compiles the given source instead of the file's."""
 
-class FaultyLoader(importlib.machinery.SourceFileLoader):
-    """Loads a module with one piece of its text replaced."""
-
-    def __init__(self, fullname: str, path: str, fault: Fault) -> None:
+    def __init__(self, fullname: str, path: str, source: str) -> None:
         super().__init__(fullname, path)
-        self.fault = fault
+        self.source = source
 
     def get_code(self, fullname: str) -> CodeType:
-        with open(self.path, encoding="utf-8") as file:
-            source = file.read()
-        return compile(self.fault.planted(source), self.path, "exec", dont_inherit=True)
+        return compile(self.source, self.path, "exec", dont_inherit=True)
 
 
-class FaultyFinder(importlib.abc.MetaPathFinder):
-    """Finds the one module that the fault changes, before the ordinary finders do."""
+class ChangedFinder(importlib.abc.MetaPathFinder):
+    """Finder of the one module that is changed, searched before the ordinary finders."""
 
-    def __init__(self, fault: Fault) -> None:
-        self.fault = fault
+    def __init__(self, module: str, source: str) -> None:
+        self.module = module
+        self.source = source
 
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
     ) -> importlib.machinery.ModuleSpec | None:
-        if fullname != self.fault.module:
+        if fullname != self.module:
             return None
         found = importlib.machinery.PathFinder.find_spec(fullname, path)
         if found is None or found.origin is None:
-            raise ImportError(f"no module {fullname} to plant a fault in")
-        loader = FaultyLoader(fullname, found.origin, self.fault)
+            raise ImportError(f"no module {fullname} to change")
+        loader = ChangedLoader(fullname, found.origin, self.source)
         return importlib.util.spec_from_file_location(fullname, found.origin, loader=loader)
 
 
-def plant(name: str) -> None:
-    """Put the fault of that name before everything that imports dynx."""
-    fault = next(fault for fault in FAULTS if fault.name == name)
-    if fault.module in sys.modules:
-        raise RuntimeError(f"{fault.module} is imported already; the fault would not be seen")
-    sys.meta_path.insert(0, FaultyFinder(fault))
+def plant(module: str, source: str) -> None:
+    """Change the module for every later import; raise RuntimeError if it is imported already."""
+    if module in sys.modules:
+        raise RuntimeError(f"{module} is imported already; the change would have no effect")
+    sys.meta_path.insert(0, ChangedFinder(module, source))
 
 
-if os.environ.get("DYNX_FAULT"):
-    plant(os.environ["DYNX_FAULT"])
+if os.environ.get("DYNX_PLANT"):
+    plant(**json.loads(Path(os.environ["DYNX_PLANT"]).read_text(encoding="utf-8")))

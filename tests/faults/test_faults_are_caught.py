@@ -14,7 +14,7 @@ import pytest
 
 from tests.faults.catalogue import FAULTS, FAULTS_BY_AREA
 from tests.faults.fault import Fault
-from tests.faults.warm import ROOT, Runner
+from tests.faults.warm import ROOT, Change, Runner
 
 
 @pytest.fixture(scope="module")
@@ -28,10 +28,15 @@ def skip_without_engine(fault: Fault) -> None:
         pytest.skip(f"needs {fault.engine}, which is not installed")
 
 
+def planted(fault: Fault) -> Change:
+    source = (ROOT / f"{fault.module.replace('.', '/')}.py").read_text(encoding="utf-8")
+    return Change(fault.module, fault.planted(source))
+
+
 @pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name)
 def test_a_fault_fits_the_source_and_its_test_exists(fault: Fault) -> None:
-    source = (ROOT / f"{fault.module.replace('.', '/')}.py").read_text(encoding="utf-8")
-    compile(fault.planted(source), fault.module, "exec")
+    change = planted(fault)
+    compile(change.source, change.module, "exec")
     tests = ast.parse((ROOT / fault.test_file).read_text(encoding="utf-8"))
     defined = {node.name for node in ast.walk(tests) if isinstance(node, ast.FunctionDef | ast.ClassDef)}
     assert set(fault.test.partition("[")[0].split("::")) <= defined
@@ -45,7 +50,7 @@ def test_names_of_faults_are_distinct() -> None:
 @pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name)
 def test_a_fault_is_caught(runner: Runner, fault: Fault) -> None:
     skip_without_engine(fault)
-    code, output = runner.run([fault.caught_by], fault.name)
+    code, output = runner.run([fault.caught_by], planted(fault))
     # 1: tests ran and one failed. 0 would be a fault that no test notices, 2 and above a broken run.
     assert code == 1, f"{fault.caught_by} did not fail:\n{output[-3000:]}"
     assert " failed" in output, f"{fault.caught_by} did not get to its assertions:\n{output[-3000:]}"
@@ -58,5 +63,5 @@ def test_without_a_fault_the_same_tests_pass(runner: Runner, area: str) -> None:
         for fault in FAULTS_BY_AREA[area]
         if fault.engine is None or importlib.util.find_spec(fault.engine) is not None
     ]
-    code, output = runner.run(sorted({fault.caught_by for fault in faults}), "")
+    code, output = runner.run(sorted({fault.caught_by for fault in faults}))
     assert code == 0, output[-5000:]

@@ -1,13 +1,14 @@
-"""Runs tests with a fault planted, each run in a process of its own, forked from a warm one.
+"""Runs of pytest with one module of dynx changed, each in a process forked from one that is warm.
 
-``python -m tests.faults.warm`` imports what dynx and its tests need from elsewhere, but nothing of
-dynx, and then answers requests: a line of JSON ``[fault, test, ...]`` on stdin, a line of JSON
-``[exit code, output]`` on stdout. The imports take most of the time of a short test, so this is
-several times as fast as a new interpreter for each fault. Where there is no fork, `Runner` starts one.
+``python -m tests.faults.warm`` imports what dynx and its tests need from elsewhere, but nothing of dynx, and
+then serves requests: a line of JSON on stdin (see `Runner.run`), a line of JSON ``[exit code, output]`` on
+stdout. The imports take most of the time of a short test, so this is several times as fast as a new
+interpreter for each change. Where there is no fork, `Runner` starts one.
 """
 
 from __future__ import annotations
 
+import contextlib
 import gc
 import json
 import os
@@ -15,51 +16,48 @@ import signal
 import subprocess
 import sys
 import tempfile
+from dataclasses import asdict, dataclass
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from types import TracebackType
+from typing import Any
 
 ROOT = Path(__file__).resolve().parents[2]
 TIMEOUT = 300
 """Longest run of the tests of one request [s]."""
+TIMED_OUT = -14
+"""Exit code of a run that took longer than it may: the negative number of its signal."""
 
-IMPORTED_BEFORE = (
+PRELOADED = (
     *("pytest", "numpy", "scipy.spatial.transform", "scipy.linalg.lapack", "mpmath"),
     *("hypothesis", "hypothesis.strategies", "hypothesis.extra.numpy"),
     *("pinocchio", "mujoco", "pydrake.multibody.parsing"),
 )
 OPTIONS = (
     *("-x", "-q", "-p", "tests.faults.plant", "-p", "no:xdist", "-p", "no:benchmark"),
-    # What was imported before cannot have its assertions rewritten; none of it has any.
+    # Modules imported before cannot have their assertions rewritten; none of them has any.
     *("-W", "ignore::pytest.PytestAssertRewriteWarning"),
 )
 
 
-def environment(fault: str) -> dict[str, str]:
-    """What is set in the process that runs tests with the fault of that name; "" plants none.
+@dataclass(frozen=True)
+class Change:
+    """Source to import in place of that of a module."""
 
-    With a fault kernels are compiled anew: those in the cache are from the source on the disk.
-    """
-    cache = "0" if fault else os.environ.get("DYNX_CACHE", "")
-    return {"DYNX_FAULT": fault, "HYPOTHESIS_PROFILE": "faults", "DYNX_CACHE": cache}
+    module: str
+    source: str
 
 
 class Runner:
-    """Runs tests with faults planted; use it in a with block."""
+    """Context that runs tests with modules changed."""
 
     def __init__(self) -> None:
-        self._warm: subprocess.Popen[str] | None = None
+        self._server: subprocess.Popen[str] | None = None
 
     def __enter__(self) -> Runner:
         if hasattr(os, "fork"):
-            self._warm = subprocess.Popen(
-                [sys.executable, "-m", "tests.faults.warm"],
-                cwd=ROOT,
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                text=True,
-            )
+            self._server = self._start()
         return self
 
     def __exit__(
@@ -68,78 +66,113 @@ class Runner:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        if self._warm is not None:
-            self._warm.communicate()
+        if self._server is not None:
+            self._server.communicate()
 
-    def run(self, tests: list[str], fault: str) -> tuple[int, str]:
-        """The exit code of pytest (1: tests ran and one failed) and what it said."""
-        if self._warm is None:
-            done = subprocess.run(
-                [sys.executable, "-m", "pytest", *OPTIONS, *tests],
-                cwd=ROOT,
-                env={**os.environ, **environment(fault)},
-                capture_output=True,
-                text=True,
-                timeout=TIMEOUT,
-                check=False,
-            )
-            return done.returncode, done.stdout + done.stderr
-        assert self._warm.stdin is not None
-        assert self._warm.stdout is not None
-        self._warm.stdin.write(json.dumps([fault, *tests]) + "\n")
-        self._warm.stdin.flush()
-        code, output = json.loads(self._warm.stdout.readline())
+    def run(self, tests: list[str], change: Change | None = None, timeout: int = TIMEOUT) -> tuple[int, str]:
+        """Run tests up to the first failure, for at most `timeout` [s].
+
+        Return the exit code of pytest (1: a test failed; `TIMED_OUT`) and its output.
+        """
+        change_given = None if change is None else asdict(change)
+        line = json.dumps({"tests": tests, "timeout": timeout, "change": change_given}) + "\n"
+        if self._server is None:
+            return json.loads(self._start().communicate(line)[0])  # type: ignore[no-any-return]
+        assert self._server.stdin is not None
+        assert self._server.stdout is not None
+        self._server.stdin.write(line)
+        self._server.stdin.flush()
+        reply = self._server.stdout.readline()
+        if not reply:
+            raise EOFError("the warm process has ended")
+        code, output = json.loads(reply)
         return code, output
+
+    def interrupt(self) -> None:
+        """End the run in progress in another thread, which then raises EOFError."""
+        if self._server is not None:
+            self._server.send_signal(signal.SIGINT)
+
+    @staticmethod
+    def _start() -> subprocess.Popen[str]:
+        return subprocess.Popen(
+            [sys.executable, "-m", "tests.faults.warm"],
+            cwd=ROOT,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
 
 
 def serve() -> None:
-    """Answer requests until stdin ends."""
-    for name in IMPORTED_BEFORE:
+    """Serve requests until stdin ends; without fork a single one."""
+    for name in PRELOADED:
         if find_spec(name.partition(".")[0]) is not None:
             import_module(name)
     assert not any(name == "dynx" or name.startswith("dynx.") for name in sys.modules)
-    # pytest collects garbage at its end; what is imported by now never is any, and is not to be looked at.
+    # pytest collects garbage at its end; modules imported by now are never any, so the collector skips them.
     gc.freeze()
-    with tempfile.TemporaryDirectory() as compiled:
+    replies = os.fdopen(os.dup(1), "w")
+    with tempfile.TemporaryDirectory() as folder:
         if sys.dont_write_bytecode:
-            # What one run compiles, and pytest rewrites, the next ones read: half the time of most. A
-            # planted fault is never among it (`tests.faults.plant`).
-            sys.pycache_prefix, sys.dont_write_bytecode = compiled, False
+            # Bytecode that one run writes, the next ones read: half the time of most. A changed module is
+            # never among it (`tests.faults.plant`).
+            sys.pycache_prefix, sys.dont_write_bytecode = folder, False
         for line in sys.stdin:
-            fault, *tests = json.loads(line)
-            code, said = in_a_child(tests, fault)
-            print(json.dumps([code, said]), flush=True)
+            asked = json.loads(line)
+            if asked["change"] is not None:
+                asked["change"] = write_change(Path(folder, "change.json"), asked["change"])
+            with tempfile.TemporaryFile() as output:
+                run = run_in_child if hasattr(os, "fork") else run_here
+                code = run(asked, output.fileno())
+                output.seek(0)
+                print(json.dumps([code, output.read().decode(errors="replace")]), file=replies, flush=True)
 
 
-def in_a_child(tests: list[str], fault: str) -> tuple[int, str]:
-    """The exit code of a forked process that runs the tests, and what it wrote."""
-    with tempfile.TemporaryFile() as output:
-        child = os.fork()
-        if child == 0:
-            run_here(tests, fault, output.fileno())
-        _, status = os.waitpid(child, 0)
-        output.seek(0)
-        return os.waitstatus_to_exitcode(status), output.read().decode(errors="replace")
+def write_change(path: Path, change: dict[str, str]) -> str:
+    path.write_text(json.dumps(change), encoding="utf-8")
+    return str(path)
 
 
-def run_here(tests: list[str], fault: str, output: int) -> None:
-    """Run the tests in this process, writing to the file descriptor `output`, and end the process."""
-    code = 3
-    # A fault may be one that never ends; the alarm ends the process, which is then no test failure.
-    signal.alarm(TIMEOUT)
+def run_in_child(asked: dict[str, Any], output: int) -> int:
+    """Run the tests in a forked process that writes to the file descriptor `output`; return its exit code."""
+    child = os.fork()
+    if child == 0:
+        code = 3
+        try:
+            os.setpgid(0, 0)
+            code = run_here(asked, output)
+        finally:
+            os._exit(code)
     try:
-        nothing = os.open(os.devnull, os.O_RDONLY)
-        os.dup2(nothing, 0)
-        os.dup2(output, 1)
-        os.dup2(output, 2)
-        os.environ.update(environment(fault))
-        import pytest
-
-        code = int(pytest.main([*OPTIONS, *tests]))
+        _, status = os.waitpid(child, 0)
     finally:
-        sys.stdout.flush()
-        sys.stderr.flush()
-        os._exit(code)
+        # The child, where this process is interrupted, and processes that its tests started and left.
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            os.killpg(child, signal.SIGKILL)
+    return os.waitstatus_to_exitcode(status)
+
+
+def run_here(asked: dict[str, Any], output: int) -> int:
+    """Run the tests in this process, writing to the file descriptor `output`; return pytest's exit code."""
+    if hasattr(signal, "alarm"):
+        # A change may be one that never ends; the alarm ends the process, which is then no failed test.
+        signal.alarm(asked["timeout"])
+    nothing = os.open(os.devnull, os.O_RDONLY)
+    os.dup2(nothing, 0)
+    os.dup2(output, 1)
+    os.dup2(output, 2)
+    os.environ["HYPOTHESIS_PROFILE"] = "faults"
+    if asked["change"] is not None:
+        os.environ["DYNX_PLANT"] = asked["change"]
+        # Kernels are compiled anew: those in the cache are from the source on the disk.
+        os.environ["DYNX_CACHE"] = "0"
+    import pytest
+
+    code = int(pytest.main([*OPTIONS, *asked["tests"]]))
+    sys.stdout.flush()
+    sys.stderr.flush()
+    return code
 
 
 if __name__ == "__main__":

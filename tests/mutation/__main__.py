@@ -1,0 +1,125 @@
+"""Mutation testing of dynx by the operators of mutmut::
+
+    python -m tests.mutation --record            which tests execute which lines (once, some ten minutes)
+    python -m tests.mutation --seed 0 --count 300
+
+Makes a random sample of mutants, runs for each the tests that execute the changed line (fastest first, up
+to the first failure), and prints the score and the survivors. What is done is kept in the folder of
+``--results``: the same command goes on where Ctrl-C ended it, ``--retry`` tries the survivors again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from contextlib import ExitStack
+from dataclasses import asdict
+from pathlib import Path
+from queue import SimpleQueue
+
+from tests.faults.warm import ROOT, Runner
+from tests.mutation.coverage_map import CoverageMap, record
+from tests.mutation.population import Mutant, sample
+from tests.mutation.report import EQUIVALENT, summary
+from tests.mutation.trial import CAUGHT, Outcome, attempt
+
+ROOMS = ("rbd", "spatial", "model", "backends", "ik", "control", "sim", "agreement")
+TESTS = tuple(f"tests/{room}" for room in (*ROOMS, "contract", "oracles"))
+
+
+def main() -> None:
+    arguments = parser().parse_args()
+    arguments.results.mkdir(parents=True, exist_ok=True)
+    folders = [f"dynx/{room}" for room in arguments.rooms]
+    map_file = arguments.results / "coverage.json"
+    coverage = CoverageMap.load(map_file)
+    if arguments.record is not None:
+        tests = arguments.record or list(TESTS)
+        os.environ.setdefault("HYPOTHESIS_PROFILE", "faults")
+        coverage.replace(record(ROOT, [f"dynx/{room}" for room in ROOMS], tests, arguments.results), tests)
+        coverage.save(map_file)
+        return
+    if not coverage.durations:
+        raise SystemExit("no coverage is recorded yet: python -m tests.mutation --record")
+    mutants, total = sample(ROOT, folders, arguments.seed, arguments.count)
+    kept = arguments.results / "outcomes.json"
+    outcomes = load(kept)
+    waiting = [
+        mutant
+        for mutant in mutants
+        if mutant.key not in outcomes or (arguments.retry and outcomes[mutant.key].status != CAUGHT)
+    ]
+    try:
+        for outcome in attempts(waiting, coverage, arguments.jobs):
+            if outcome.key in outcomes:
+                outcome.first_status = outcomes[outcome.key].first_status
+            outcomes[outcome.key] = outcome
+            save(outcomes, kept)
+            print(f"{outcome.status:9} {outcome.path}:{outcome.line} {outcome.after[:70]}", flush=True)
+    except KeyboardInterrupt:
+        print("interrupted; the same command goes on from here")
+    done = [outcomes[mutant.key] for mutant in mutants if mutant.key in outcomes]
+    print(summary(done, total, json.loads(EQUIVALENT.read_text(encoding="utf-8"))))
+
+
+def parser() -> argparse.ArgumentParser:
+    assert __doc__ is not None
+    made = argparse.ArgumentParser(
+        "python -m tests.mutation",
+        description=__doc__.replace("::\n", ":\n"),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    made.add_argument("--seed", type=int, default=0, help="seed of the sample")
+    made.add_argument("--count", type=int, default=300, help="number of mutants in the sample")
+    made.add_argument("--rooms", nargs="+", default=ROOMS, metavar="ROOM", help="packages of dynx to change")
+    made.add_argument("--jobs", type=int, default=2, help="mutants to try at a time")
+    made.add_argument("--record", nargs="*", metavar="TESTS", help="record what these tests execute, and end")
+    made.add_argument("--retry", action="store_true", help="try mutants again that were not caught")
+    made.add_argument("--results", type=Path, default=ROOT / ".mutation", help="folder of what is kept")
+    return made
+
+
+def attempts(mutants: list[Mutant], coverage: CoverageMap, jobs: int) -> Iterator[Outcome]:
+    """Yield the outcomes as they come, of `jobs` mutants at a time."""
+    with ExitStack() as stack:
+        idle: SimpleQueue[Runner] = SimpleQueue()
+        runners = [stack.enter_context(Runner()) for _ in range(jobs)]
+        for runner in runners:
+            idle.put(runner)
+
+        def attempt_with_idle_runner(mutant: Mutant) -> Outcome:
+            runner = idle.get()
+            try:
+                return attempt(mutant, coverage, runner)
+            finally:
+                idle.put(runner)
+
+        pool = stack.enter_context(ThreadPoolExecutor(jobs))
+        futures = [pool.submit(attempt_with_idle_runner, mutant) for mutant in mutants]
+        try:
+            for future in as_completed(futures):
+                yield future.result()
+        except (KeyboardInterrupt, GeneratorExit):
+            pool.shutdown(wait=False, cancel_futures=True)
+            for runner in runners:
+                runner.interrupt()
+            raise
+
+
+def load(path: Path) -> dict[str, Outcome]:
+    if not path.exists():
+        return {}
+    return {each["key"]: Outcome(**each) for each in json.loads(path.read_text(encoding="utf-8"))}
+
+
+def save(outcomes: dict[str, Outcome], path: Path) -> None:
+    partial = path.with_suffix(".part")
+    partial.write_text(json.dumps([asdict(each) for each in outcomes.values()], indent=1), encoding="utf-8")
+    partial.replace(path)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,110 @@
+"""Which tests execute a line of dynx, and how long each takes.
+
+Recorded by coverage.py, whose dynamic contexts name the test that runs. Recording again replaces what is
+known of the tests that ran, and keeps the rest.
+"""
+
+from __future__ import annotations
+
+import json
+from collections import defaultdict
+from collections.abc import Generator, Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import coverage
+import pytest
+
+
+@dataclass
+class CoverageMap:
+    """Passed tests by the lines that they execute."""
+
+    durations: dict[str, float] = field(default_factory=dict)
+    """Test -> time that it took, with its fixtures [s]."""
+    lines: dict[str, dict[int, set[str]]] = field(default_factory=dict)
+    """Path of a source file -> line -> tests."""
+
+    def tests(self, path: str, first: int, last: int) -> set[str]:
+        """Return the tests that execute one of these lines, or for lines of imports any line of the file."""
+        lines = self.lines.get(path, {})
+        found = {test for line in range(first, last + 1) for test in lines.get(line, ())}
+        return found or {test for tests in lines.values() for test in tests}
+
+    @classmethod
+    def load(cls, path: Path) -> CoverageMap:
+        """Read a map; empty if there is no such file."""
+        if not path.exists():
+            return cls()
+        document = json.loads(path.read_text(encoding="utf-8"))
+        names = list(document["durations"])
+        lines = {
+            file: {int(line): {names[number] for number in numbers} for line, numbers in found.items()}
+            for file, found in document["lines"].items()
+        }
+        return cls(document["durations"], lines)
+
+    def save(self, path: Path) -> None:
+        numbers = {name: number for number, name in enumerate(self.durations)}
+        lines = {
+            file: {line: sorted(numbers[test] for test in tests) for line, tests in found.items()}
+            for file, found in self.lines.items()
+        }
+        path.write_text(json.dumps({"durations": self.durations, "lines": lines}), encoding="utf-8")
+
+    def replace(self, other: CoverageMap, folders: Iterable[str]) -> None:
+        """Take over what `other` recorded with the tests in these folders; drop what was known of them."""
+        stale = {name for name in self.durations if name.startswith(tuple(folders))}
+        for name in stale:
+            del self.durations[name]
+        self.durations |= other.durations
+        for file in {*self.lines, *other.lines}:
+            if file not in other.lines:
+                continue
+            merged: defaultdict[int, set[str]] = defaultdict(set)
+            for known in (self.lines.get(file, {}), other.lines[file]):
+                for line, tests in known.items():
+                    merged[line] |= {test for test in tests if test in self.durations}
+            self.lines[file] = dict(merged)
+
+
+class ContextSwitcher:
+    """A pytest plugin that tells coverage.py which test runs, and keeps the durations of passed tests."""
+
+    def __init__(self, recorder: coverage.Coverage) -> None:
+        self.recorder = recorder
+        self.durations: dict[str, float] = defaultdict(float)
+        self.not_passed: set[str] = set()
+
+    @pytest.hookimpl(hookwrapper=True)
+    def pytest_runtest_protocol(self, item: pytest.Item) -> Generator[None, None, None]:
+        self.recorder.switch_context(item.nodeid)
+        yield
+        self.recorder.switch_context("")
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        self.durations[report.nodeid] += report.duration
+        if not report.passed:
+            self.not_passed.add(report.nodeid)
+
+
+def record(root: Path, folders: list[str], tests: list[str], scratch: Path) -> CoverageMap:
+    """Run tests in this process, which must not have imported dynx, and return what they execute."""
+    recorder = coverage.Coverage(
+        data_file=str(scratch / "coverage"), include=[f"{root / folder}/*" for folder in folders]
+    )
+    switcher = ContextSwitcher(recorder)
+    recorder.erase()
+    recorder.start()
+    pytest.main(["-q", "-p", "no:xdist", "-p", "no:benchmark", "--no-header", *tests], plugins=[switcher])
+    recorder.stop()
+    data = recorder.get_data()
+    passed = {name: time for name, time in switcher.durations.items() if name not in switcher.not_passed}
+    found: dict[str, dict[int, set[str]]] = {}
+    for file in data.measured_files():
+        path = Path(file).relative_to(root).as_posix()
+        found[path] = {
+            line: {context for context in contexts if context in passed}
+            for line, contexts in data.contexts_by_lineno(file).items()
+        }
+    return CoverageMap(passed, found)

@@ -1,0 +1,87 @@
+"""The driver of mutation runs: its population, its sample, and the order of the tests."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("mutmut", reason="mutation runs need the extra 'mutation'")
+
+from tests.mutation.coverage_map import CoverageMap
+from tests.mutation.population import places, sample
+from tests.mutation.trial import BROKEN, CAUGHT, SURVIVED, ordered, verdict
+
+SOURCE = '''"""Docstring."""
+from typing import TYPE_CHECKING, Any, cast
+
+if TYPE_CHECKING:
+    LIMIT = 1
+
+__all__ = ["f"]
+Pair = dict[str, "int"]
+
+def f(x: "int") -> "int":
+    """Docstring."""
+    assert x > 0
+    if x == 1:
+        raise ValueError("not" + " one")
+    return cast("int", x) + 2
+'''
+
+
+@pytest.fixture
+def root(tmp_path: Path) -> Path:
+    (tmp_path / "dynx").mkdir()
+    (tmp_path / "dynx" / "f.py").write_text(SOURCE, encoding="utf-8")
+    (tmp_path / "dynx" / "g.py").write_text("def g(x):\n    return [x * 3, x * 3]\n", encoding="utf-8")
+    return tmp_path
+
+
+def test_the_population_is_what_decides_behaviour(root: Path) -> None:
+    found = {(place.function, place.text, place.line) for place in places(root, "dynx/f.py")}
+    assert found == {("f", "== 1", 13), ("f", "1", 13), ("f", 'cast("int", x) + 2', 15), ("f", "2", 15)}
+
+
+def test_a_sample_is_one_mutant_of_each_of_its_places(root: Path) -> None:
+    mutants, total = sample(root, ["dynx"], 0, 100)
+    assert len(mutants) == total == 4 + 4
+    for mutant in mutants:
+        original = (root / mutant.path).read_text(encoding="utf-8")
+        assert mutant.source != original
+        assert mutant.source.count("\n") == original.count("\n")
+        compile(mutant.source, mutant.path, "exec")
+
+
+def test_an_edit_of_one_file_leaves_the_sample_of_the_others(root: Path) -> None:
+    before = {mutant.key for mutant in sample(root, ["dynx"], 1, 100)[0] if mutant.path == "dynx/g.py"}
+    (root / "dynx" / "f.py").write_text("y = 1 + 2\n" + SOURCE, encoding="utf-8")
+    after = {mutant.key for mutant in sample(root, ["dynx"], 1, 100)[0] if mutant.path == "dynx/g.py"}
+    assert before == after
+    other = {mutant.key for mutant in sample(root, ["dynx"], 2, 4)[0]}
+    assert other != {mutant.key for mutant in sample(root, ["dynx"], 1, 4)[0]}
+
+
+def test_each_test_comes_once_before_any_with_other_parameters() -> None:
+    durations = {"t::slow": 9.0, "t::f[a]": 1.0, "t::f[b]": 2.0, "tests/rbd/t::own": 30.0}
+    assert ordered(set(durations), durations, "rbd") == ["t::f[a]", "tests/rbd/t::own", "t::slow", "t::f[b]"]
+
+
+def test_a_verdict_names_the_test_that_failed() -> None:
+    assert verdict(0, "") == (SURVIVED, "")
+    assert verdict(1, "FAILED t.py::a[1] - AssertionError\n") == (CAUGHT, "t.py::a[1]")
+    assert verdict(2, "ERROR t.py - ImportError\n") == (CAUGHT, "t.py")
+    assert verdict(-14, "") == (CAUGHT, "time limit")
+    assert verdict(-11, "") == (CAUGHT, "signal 11")
+    assert verdict(5, "no tests ran")[0] == BROKEN
+
+
+def test_a_map_is_what_was_saved_and_replaced_by_folder(tmp_path: Path) -> None:
+    kept = CoverageMap({"a/t": 1.0, "b/t": 2.0}, {"x.py": {1: {"a/t"}, 2: {"a/t", "b/t"}}})
+    kept.save(tmp_path / "map.json")
+    loaded = CoverageMap.load(tmp_path / "map.json")
+    assert loaded == kept
+    loaded.replace(CoverageMap({"a/u": 3.0}, {"x.py": {2: {"a/u"}}}), ["a/"])
+    assert loaded.durations == {"b/t": 2.0, "a/u": 3.0}
+    assert loaded.tests("x.py", 2, 2) == {"b/t", "a/u"}
+    assert loaded.tests("x.py", 7, 7) == {"b/t", "a/u"}

@@ -1,0 +1,111 @@
+"""One mutant and the tests that may catch it."""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+from dataclasses import dataclass
+
+from tests.faults.warm import TIMED_OUT, Change, Runner
+from tests.mutation.coverage_map import CoverageMap
+from tests.mutation.population import Mutant
+
+STAGES = ((30, 15.0), (400, 120.0))
+"""Tests to run, at most, and the time that they take without a mutant [s]; the next stage if none fails."""
+START = 20
+"""Time that the import of dynx and the collection of tests may take [s]."""
+SLOWER = 6
+"""Factor by which tests may become slower (kernels are compiled anew, and others use the machine)."""
+
+CAUGHT = "caught"
+SURVIVED = "survived"
+UNTESTED = "no test"
+BROKEN = "broken run"
+
+
+@dataclass
+class Outcome:
+    """Verdict of the tests on a mutant."""
+
+    key: str
+    path: str
+    function: str
+    line: int
+    operator: str
+    before: str
+    after: str
+    status: str
+    first_status: str
+    """Status when it was tried first."""
+    tests: int
+    """Number of tests that were run, or could have been, until one failed."""
+    caught_by: str = ""
+
+
+def ordered(tests: set[str], durations: dict[str, float], room: str) -> list[str]:
+    """Return tests in the order to run them: each function once, fastest first, then with other parameters.
+
+    Tests of the room of the mutant (``tests/rbd`` of ``dynx/rbd``) count as four times as fast.
+    """
+
+    def cost(test: str) -> float:
+        return durations[test] * (0.25 if test.startswith(f"tests/{room}/") else 1.0)
+
+    by_function: dict[str, list[str]] = defaultdict(list)
+    for test in sorted(tests, key=lambda test: (cost(test), test)):
+        by_function[test.partition("[")[0]].append(test)
+    turns = [(turn, cost(test), test) for same in by_function.values() for turn, test in enumerate(same)]
+    return [test for _, _, test in sorted(turns)]
+
+
+def attempt(mutant: Mutant, coverage: CoverageMap, runner: Runner) -> Outcome:
+    """Run the tests that execute the mutant until one fails."""
+    covering = coverage.tests(mutant.path, mutant.line, mutant.last_line)
+    waiting = ordered(covering, coverage.durations, mutant.path.split("/")[1])
+    outcome = Outcome(
+        mutant.key,
+        mutant.path,
+        mutant.function,
+        mutant.line,
+        mutant.operator,
+        mutant.before,
+        mutant.after,
+        UNTESTED,
+        UNTESTED,
+        0,
+    )
+    for most, time in STAGES:
+        chosen, spent = 0, 0.0
+        while chosen < min(most, len(waiting)) and spent + coverage.durations[waiting[chosen]] <= time:
+            spent += coverage.durations[waiting[chosen]]
+            chosen += 1
+        # A test that takes longer than the whole stage is run alone rather than never.
+        chosen = max(chosen, min(1, len(waiting)))
+        if chosen == 0:
+            break
+        tests, waiting = waiting[:chosen], waiting[chosen:]
+        timeout = int(START + SLOWER * spent)
+        code, output = runner.run(tests, Change(mutant.module, mutant.source), timeout)
+        outcome.tests += len(tests)
+        outcome.status, outcome.caught_by = verdict(code, output)
+        if outcome.status != SURVIVED:
+            break
+    outcome.first_status = outcome.status
+    return outcome
+
+
+def verdict(code: int, output: str) -> tuple[str, str]:
+    """Return the status that an exit code of pytest means, and the test that failed."""
+    if code == 0:
+        return SURVIVED, ""
+    if code == TIMED_OUT:
+        return CAUGHT, "time limit"
+    if code < 0:
+        return CAUGHT, f"signal {-code}"
+    failed = re.search(r"^(?:FAILED|ERROR) (\S+)", output, re.MULTILINE)
+    # 2: a module of tests could not be imported.
+    if code in (1, 2) and failed:
+        return CAUGHT, failed[1]
+    if code == 4 and "conftest" in output:
+        return CAUGHT, "conftest"
+    return BROKEN, output[-600:]
