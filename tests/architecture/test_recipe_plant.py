@@ -1,0 +1,92 @@
+"""The recipe for a plant: one module and an entry point, in a package of somebody else."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import dynx
+from dynx.errors import ArgumentError, UnsupportedFeatureError
+from dynx.sim.plants.registry import plant_names
+
+MODULE = '''"""Explicit Euler: q' = q (+) h v, v' = v + h a(q, v)."""
+
+import dynx
+from dynx.sim.plants.plant import Plant, StepResult
+
+
+class ExplicitEuler(Plant):
+    def __init__(self, model, disturbances, dt, *, substeps=1):
+        super().__init__(model, disturbances, dt, substeps=substeps)
+        self._engine = dynx.backend("reference", model)
+
+    def reset(self, q, v):
+        self._q, self._v = q, v
+
+    def step(self, t, tau):
+        first = None
+        for _ in range(self.substeps):
+            a = self._engine.forward_dynamics(self._q, self._v, tau)
+            first = a if first is None else first
+            self._q = self.model.integrate(self._q, self._h * self._v)
+            self._v = self._v + self._h * a
+        return StepResult(self._q, self._v, first, tau)
+
+    def close(self):
+        self._engine.close()
+'''
+NAME = "explicit_euler"
+
+
+@pytest.fixture
+def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """The folder in which the package is installed: a module, and metadata with the entry point."""
+    (tmp_path / "acme_plant.py").write_text(MODULE)
+    metadata = tmp_path / "acme_plant-1.0.dist-info"
+    metadata.mkdir()
+    (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: acme-plant\nVersion: 1.0\n")
+    (metadata / "entry_points.txt").write_text(f"[dynx.plants]\n{NAME} = acme_plant:ExplicitEuler\n")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    yield tmp_path
+    sys.modules.pop("acme_plant", None)
+
+
+@pytest.mark.usefixtures("package")
+def test_simulate_finds_it_by_name() -> None:
+    assert NAME in plant_names()
+    arm = dynx.load("double_pendulum")
+    q0, h, n = np.array([1.0, -0.5]), 1e-3, 20
+    rollout = dynx.simulate(arm, None, plant=NAME, q0=q0, dt=h, duration=n * h)
+    engine, q, v = dynx.backend("reference", arm), q0, np.zeros(arm.nv)
+    for k in range(n):
+        a = engine.forward_dynamics(q, v, np.zeros(arm.nv))
+        q, v = arm.integrate(q, h * v), v + h * a
+        assert np.array_equal(rollout.q[k + 1], q)
+        assert np.array_equal(rollout.v[k + 1], v)
+        assert np.array_equal(rollout.a[k], a)
+
+
+@pytest.mark.usefixtures("package")
+def test_substeps_are_those_of_the_plant() -> None:
+    arm = dynx.load("double_pendulum")
+    fine = dynx.simulate(arm, None, plant=NAME, q0=[1.0, -0.5], dt=1e-3, duration=0.02)
+    coarse = dynx.simulate(arm, None, plant=NAME, q0=[1.0, -0.5], dt=2e-3, substeps=2, duration=0.02)
+    assert np.allclose(coarse.q, fine.q[::2], rtol=0.0, atol=1e-12 * np.abs(fine.q).max())
+
+
+@pytest.mark.usefixtures("package")
+def test_a_motor_of_another_engine_is_refused() -> None:
+    arm = dynx.load("double_pendulum")
+    motor = dynx.control.VelocityMotor(arm)
+    with pytest.raises(UnsupportedFeatureError, match="PyBullet"):
+        dynx.simulate(arm, motor, arm.neutral(), plant=NAME, duration=0.01)
+
+
+def test_a_name_that_nobody_provides_is_refused() -> None:
+    arm = dynx.load("double_pendulum")
+    with pytest.raises(ArgumentError, match="pybullet"):
+        dynx.simulate(arm, None, plant=NAME, integrator="engine", duration=0.01)
