@@ -19,11 +19,26 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from dynx.errors import traceback_wanted
+from dynx.errors import DynxError, EngineError, traceback_wanted
 
 FailureKind = Literal["crash", "timeout", "defect"]
 
 _START = "import sys; sys.path[:] = sys.argv[1:]; from dynx.workers import serve; serve()"
+
+
+class EngineCrash(EngineError):
+    """An engine ended the process it ran in."""
+
+
+class EngineTimeout(EngineError):
+    """An engine took longer than the time limit of its task."""
+
+
+class InternalError(DynxError):
+    """A defect of dynx: code in a worker process raised an exception that is no `DynxError`."""
+
+
+_ERRORS = {"crash": EngineCrash, "timeout": EngineTimeout, "defect": InternalError}
 
 
 @dataclass(frozen=True)
@@ -32,6 +47,11 @@ class Failure:
 
     kind: FailureKind
     message: str
+
+    @property
+    def error(self) -> DynxError:
+        """The failure as an exception."""
+        return _ERRORS[self.kind](self.message)
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ An error that has no size (a refusal, a NaN, a wrong shape) is null, and `note` 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -186,8 +186,11 @@ def refused_report(
     )
 
 
-def results_document(reports: Iterable[AgreementReport]) -> dict[str, Any]:
-    """The JSON document of many reports; see the head of this file."""
+def results_document(reports: Iterable[AgreementReport], not_done: Sequence[str] = ()) -> dict[str, Any]:
+    """The JSON document of many reports, described at the head of this file.
+
+    `not_done` names the robots of an interrupted run that have no report.
+    """
     results = [report.to_dict() for report in reports]
     refused = sum(result["error"] is not None for result in results)
     agreeing = sum(result["agree"] for result in results)
@@ -200,7 +203,7 @@ def results_document(reports: Iterable[AgreementReport]) -> dict[str, Any]:
             "agree": agreeing,
             "differ": len(results) - agreeing - refused,
             "refused": refused,
-            "not_done": 0,
+            "not_done": len(not_done),
         },
-        "not_done": [],
+        "not_done": list(not_done),
     }

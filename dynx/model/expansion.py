@@ -1,4 +1,4 @@
-"""From the ROBOT arguments to the robots they mean: names, files, directories and ``all``."""
+"""Expansion of ROBOT arguments (names, files, directories and ``all``) into single robots."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from dynx.errors import DynxError, ModelError, RobotNotFoundError, shown
+from dynx.model.library import EXAMPLE_ROBOT_DATA, find, robots
 
 ALL = "all"
 """The argument that means every robot of example-robot-data; ``./all`` is a file of that name."""
@@ -14,9 +15,10 @@ ALL = "all"
 
 @dataclass(frozen=True)
 class RobotInput:
-    """One robot to work on: what `dynx.load` takes, or why there is none.
+    """One robot: the argument for `dynx.load`, or the error where there is none.
 
-    `folder` is the directory argument below which it was found, None where it was named itself.
+    `folder` is the directory argument below which the file was found, None where the robot itself was
+    the argument.
     """
 
     robot: str
@@ -25,11 +27,11 @@ class RobotInput:
 
 
 def expand(arguments: Sequence[str]) -> list[RobotInput]:
-    """The robots that the arguments mean, in order; nothing is opened yet.
+    """List the robots that the arguments stand for, in order, without opening a file.
 
-    A directory means every .urdf below it, sorted by path; as in `dynx.load`, a name of the library
-    wins over a directory of that name. A directory that has none, or cannot be read, is an input
-    with a refusal, so that the others are still done.
+    A directory stands for every .urdf below it, sorted by path; as in `dynx.load`, a name of the
+    library takes precedence over a directory of that name. A directory without one, or that cannot be
+    read, becomes an input with a refusal, so that the others are still processed.
     """
     found: list[RobotInput] = []
     for argument in arguments:
@@ -42,9 +44,12 @@ def expand(arguments: Sequence[str]) -> list[RobotInput]:
     return found
 
 
-def _library() -> list[RobotInput]:
-    from dynx.model.library import EXAMPLE_ROBOT_DATA, robots
+def refusals(inputs: Sequence[RobotInput]) -> dict[int, DynxError]:
+    """Return the errors of the inputs that are no robots, by their position."""
+    return {index: each.refusal for index, each in enumerate(inputs) if each.refusal is not None}
 
+
+def _library() -> list[RobotInput]:
     found = [RobotInput(entry.name) for entry in robots() if entry.source == EXAMPLE_ROBOT_DATA]
     return found or [
         RobotInput(
@@ -80,9 +85,7 @@ def _is_directory(argument: str) -> bool:
 
 
 def is_library_name(argument: str) -> bool:
-    """Whether `dynx.load` would look this up in the library, and find it."""
-    from dynx.model.library import find
-
+    """Whether `dynx.load` would find the argument in the library."""
     if os.sep in argument or "/" in argument:
         return False
     try:

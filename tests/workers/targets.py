@@ -7,9 +7,10 @@ import signal
 import time
 from typing import Any
 
-from dynx.cli.agree.task import AgreementTask, Entry, measure
-from dynx.cli.doctor.task import DoctorTask
+from dynx.agreement import AgreementReport
+from dynx.agreement.task import AgreementTask, measure
 from dynx.doctor.report import DoctorReport
+from dynx.doctor.task import DoctorTask
 from tests.doctor.formats.reports import differing
 
 
@@ -28,7 +29,7 @@ def act(task: Any) -> Any:
     return task, os.getpid()
 
 
-def crash_on_panda(task: AgreementTask) -> Entry:
+def crash_on_panda(task: AgreementTask) -> AgreementReport:
     """Measure, but end the process at the robot `panda` as an engine would."""
     if task.robot == "panda":
         os.kill(os.getpid(), signal.SIGSEGV)

@@ -6,8 +6,9 @@ import time
 
 import pytest
 
+from dynx.agreement import results_document
+from dynx.agreement.task import AgreementTask
 from dynx.cli.agree.run import agreement_run
-from dynx.cli.agree.task import AgreementTask, document
 from dynx.workers import Failure, Workers
 from tests.workers.targets import act, crash_on_panda
 
@@ -59,7 +60,7 @@ def test_an_engine_crash_is_an_entry_of_the_document() -> None:
     tasks = [AgreementTask(name, "fixed", (), ("reference",), 1, 0) for name in ("ur5", "panda", "z1")]
     run = agreement_run(tasks, crash_on_panda)
     run.measure(1, 120.0, show_progress=False)
-    made = document(run.results, run.not_done)
+    made = results_document(run.results, run.not_done)
     assert made["summary"] == {"robots": 3, "agree": 2, "differ": 0, "refused": 1, "not_done": 0}
     assert [entry["robot"] for entry in made["results"]] == ["ur5", "panda", "z1"]
     assert made["results"][1]["error"]["type"] == "EngineCrash"

@@ -1,21 +1,111 @@
-"""Measuring the agreement of many robots in worker processes."""
+"""Run of ``dynx agree``: each robot is compared in a worker process, then come files and tables."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
-from dynx.cli.agree.task import AgreementTask, Entry, counts, failed, measure
-from dynx.cli.shell.run import Run
+import click
+
+from dynx.agreement.report import AgreementReport, results_document
+from dynx.agreement.task import AgreementTask, measure, refused
+from dynx.backends.registry import backend_class
+from dynx.cli.agree.tables import label, show_many, show_one, show_summary, verdict
+from dynx.cli.doctor.as_loaded import compare
+from dynx.cli.shell.exits import ANSWER_IS_NO, BAD_INPUT, DONE, complain
+from dynx.cli.shell.output_file import check_writable, require_apart
+from dynx.cli.shell.run import Run, carry_out
+from dynx.cli.shell.terminal import console, echo_json
+from dynx.errors import DynxError
+from dynx.files.documents import json_text
+from dynx.files.writing import write_text
+from dynx.model.expansion import expand, refusals
+from dynx.model.model import Base
+
+AgreementRun = Run[AgreementTask, AgreementReport]
+
+
+def agree(
+    robots: tuple[str, ...],
+    backends: tuple[str, ...] | None,
+    as_loaded: bool,
+    base: Base,
+    lock: tuple[tuple[str, float], ...],
+    samples: int | None,
+    seed: int,
+    jobs: int | None,
+    timeout: float,
+    json_path: str | None,
+    quiet: bool,
+) -> int:
+    """Compare the engines on each robot; return the exit code."""
+    if as_loaded:
+        if lock:
+            raise click.UsageError("--lock changes the robot, and --as-loaded compares files as they are")
+        return compare(
+            robots,
+            base,
+            backends,
+            samples,
+            seed,
+            jobs=jobs,
+            timeout=timeout,
+            json_path=json_path,
+            quiet=quiet,
+        )
+    if json_path is not None and json_path != "-":
+        check_writable(json_path)
+    for name in backends or ():  # once, rather than as a refusal of every robot
+        backend_class(name)
+    inputs = expand(robots)
+    if json_path is not None:
+        require_apart([json_path], (each.robot for each in inputs), "a robot that is read")
+    tasks = [AgreementTask(each.robot, base, lock, backends, samples, seed) for each in inputs]
+    run = agreement_run(tasks, refusals=refusals(inputs))
+    return carry_out(run, jobs, timeout, quiet, lambda: _report(run, json_path, quiet))
 
 
 def agreement_run(
-    tasks: Sequence[AgreementTask], target: Callable[[AgreementTask], Entry] = measure
-) -> Run[AgreementTask, Entry]:
-    """The run of ``dynx agree``."""
-    return Run(tasks, target, failed, _progress)
+    tasks: Sequence[AgreementTask],
+    target: Callable[[AgreementTask], AgreementReport] = measure,
+    refusals: dict[int, DynxError] | None = None,
+) -> AgreementRun:
+    """Prepare the run of ``dynx agree``."""
+    return Run(tasks, target, refused, _problem, "comparing", refusals)
 
 
-def _progress(entries: Sequence[Entry]) -> str:
-    count = counts(entries)
-    said = ", ".join(f"{count[word]} {word}" for word in ("differ", "refused") if count[word])
-    return said or "comparing"
+def _problem(report: AgreementReport) -> str | None:
+    if report.error is not None:
+        return "refused"
+    return None if report.agree else "differ"
+
+
+def _report(run: AgreementRun, json_path: str | None, quiet: bool) -> int:
+    """Write the document, the tables and the errors; return the exit code."""
+    document = results_document(run.results, run.not_done)
+    entries: list[dict[str, Any]] = document["results"]
+    # The document comes first: a pipe that closes while the table is written must not lose it.
+    if json_path == "-":
+        echo_json(document)
+    elif json_path is not None:
+        write_text(json_path, json_text(document) + "\n")
+    if not quiet:
+        out = console(err=json_path == "-")
+        if len(run.tasks) == 1:
+            for entry in entries:
+                show_one(out, entry)
+        else:
+            show_many(out, entries)
+            show_summary(out, document["summary"], run.seconds)
+    for entry in entries:
+        if verdict(entry) == "refused":
+            complain(_refusal(entry))
+    if document["summary"]["refused"]:
+        return BAD_INPUT
+    return ANSWER_IS_NO if document["summary"]["differ"] else DONE
+
+
+def _refusal(entry: dict[str, Any]) -> str:
+    """The reason why a robot was refused, after its name where the message does not contain that."""
+    message: str = entry["error"]["message"]
+    return message if entry["robot"] in message else f"{label(entry)}: {message}"

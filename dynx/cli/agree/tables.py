@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from dynx.cli.agree.task import Entry, counts, label, verdict
-from dynx.cli.shell.exits import one_line
+from rich.console import Console
+from rich.text import Text
+
+from dynx.cli.shell.exits import one_line, short_line
 from dynx.cli.shell.tables import Table
 from dynx.cli.shell.terminal import counted
 
-if TYPE_CHECKING:
-    from rich.console import Console
-    from rich.text import Text
+Entry = dict[str, Any]
+"""An entry of ``results`` in the document that `dynx.agreement.report` describes."""
 
 Check = dict[str, Any]
 """An entry of ``quantities`` or ``identities``."""
@@ -79,7 +80,7 @@ def show_many(out: Console, entries: Sequence[Entry]) -> None:
             "" if refused else str(entry["nv"]),
             *cells,
             _verdict_text(entry),
-            "" if entry["seconds"] is None else f"{entry['seconds']:.1f}",
+            f"{entry['seconds']:.1f}",
         )
     out.print(
         "largest relative error over all quantities but inverse kinematics",
@@ -91,13 +92,24 @@ def show_many(out: Console, entries: Sequence[Entry]) -> None:
         _show_differences(out, entry, _SHOWN_DIFFERENCES)
 
 
-def show_summary(out: Console, entries: Sequence[Entry], seconds: float, left: int) -> None:
-    """The last line: how many agree, differ, were refused, and were not done."""
-    count = counts(entries)
-    parts = [f"{count[word]} {word}" for word in ("agree", "differ", "refused")]
-    if left:
-        parts.append(f"{left} not done")
-    out.print(f"{counted(count['robots'], 'robot')}: {', '.join(parts)}; {seconds:.1f} s")
+def show_summary(out: Console, summary: dict[str, int], seconds: float) -> None:
+    """Print the last line: the counts of the document's ``summary``, and the time."""
+    parts = [f"{summary[word]} {word}" for word in ("agree", "differ", "refused")]
+    if summary["not_done"]:
+        parts.append(f"{summary['not_done']} not done")
+    out.print(f"{counted(summary['robots'], 'robot')}: {', '.join(parts)}; {seconds:.1f} s")
+
+
+def label(entry: Entry) -> str:
+    """The robot of an entry as one short line."""
+    return short_line(entry["robot"])
+
+
+def verdict(entry: Entry) -> str:
+    """``agree``, ``differ`` or ``refused``."""
+    if entry["error"] is not None:
+        return "refused"
+    return "agree" if entry["agree"] else "differ"
 
 
 def _pivot(checks: Sequence[Check], row_key: str, column_key: str, error_key: str) -> Table:
@@ -139,8 +151,6 @@ def _severity(check: Check, error_key: str) -> float:
 
 
 def _cell(check: Check | None, error_key: str) -> Text:
-    from rich.text import Text
-
     if check is None:
         return Text("")
     mark = "*" if check["note"] else ""
@@ -148,8 +158,6 @@ def _cell(check: Check | None, error_key: str) -> Text:
 
 
 def _worst(checks: Sequence[Check]) -> Text:
-    from rich.text import Text
-
     if not checks:
         return Text("")
     agree = all(check["agree"] for check in checks)
@@ -186,14 +194,10 @@ def _digits(error: float | None) -> str:
 
 
 def _agreement(agree: bool) -> Text:
-    from rich.text import Text
-
     return Text("agree", "green") if agree else Text("DIFFER", "bold red")
 
 
 def _verdict_text(entry: Entry) -> Text:
-    from rich.text import Text
-
     if verdict(entry) == "refused":
         return Text(f"refused ({entry['error']['type']})", "yellow")
     return _agreement(entry["agree"])
@@ -230,8 +234,6 @@ def _difference(check: Check, what: str, who: str, error: float | None) -> str:
 
 def _conclusion(entry: Entry) -> Text:
     """Who agrees, and how well: the digits are those of what is solved neither by iteration nor by steps."""
-    from rich.text import Text
-
     engines: list[str] = entry["backends"]
     agree: bool = entry["agree"]
     if len(engines) == 1:

@@ -1,22 +1,62 @@
-"""The works of ``dynx bench`` one after the other, with progress, and the end of it also after Ctrl-C."""
+"""Run of ``dynx bench``: one benchmark case after the other, with progress, tables and exit code."""
 
 from __future__ import annotations
 
 from itertools import count
 
+from dynx.backends.registry import backend_class
+from dynx.bench.cases import ARGUMENTS
 from dynx.bench.machine import described
 from dynx.bench.measurement import Measurement
 from dynx.bench.report import document, wrong
-from dynx.bench.session import Session
+from dynx.bench.session import BATCHES, QUICK_REPETITIONS, REPETITIONS, WORTH_THREADS, Plan, Session, works
 from dynx.cli.bench.tables import show
 from dynx.cli.shell.exits import ANSWER_IS_NO, DONE, complain
+from dynx.cli.shell.inputs import chosen_frame
 from dynx.cli.shell.interruption import interruptible
 from dynx.cli.shell.progress import progress_bar
+from dynx.cli.shell.run import processors
 from dynx.cli.shell.terminal import console, counted, echo_json
+from dynx.model.loading import load
+from dynx.model.model import Base
+
+
+def bench(
+    robot: str,
+    quantities: tuple[str, ...],
+    batches: tuple[int, ...],
+    threads: tuple[int, ...],
+    backends: tuple[str, ...] | None,
+    frame: str | None,
+    base: Base,
+    lock: tuple[tuple[str, float], ...],
+    seed: int,
+    quick: bool,
+    as_json: bool,
+) -> int:
+    """Time the backends on the robot; return the exit code."""
+    for name in backends or ():
+        backend_class(name)
+    model = load(robot, base=base, lock=dict(lock))
+    plan = Plan(
+        model,
+        chosen_frame(model, frame),
+        works(
+            quantities or tuple(ARGUMENTS),
+            batches or BATCHES,
+            threads or (1, processors()),
+            1 if threads else WORTH_THREADS,
+        ),
+        backends,
+        QUICK_REPETITIONS if quick else REPETITIONS,
+        seed,
+    )
+    with Session(plan) as session:
+        return run_bench(session, as_json=as_json)
 
 
 def run_bench(session: Session, *, as_json: bool) -> int:
-    """Measure everything and show it, also where Ctrl-C ended it early; the exit code."""
+    """Measure every case and show the results, also after Ctrl-C; return the exit code."""
     found: list[list[Measurement]] = []
     works = session.plan.works
     with interruptible() as interruption:

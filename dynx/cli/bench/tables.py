@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+from rich.console import Console
+from rich.text import Text
 
 from dynx.cli.shell.exits import one_line
 from dynx.cli.shell.tables import Table
 from dynx.cli.shell.terminal import counted
 
-if TYPE_CHECKING:
-    from rich.console import Console
-    from rich.text import Text
-
 Entry = Mapping[str, Any]
-
 
 _QUIET = 0.5
 """Programs that wanted to run before this one; with more, the machine was not quiet."""
@@ -96,8 +94,6 @@ def _limits(roofline: Entry | None) -> Sequence[str]:
 
 def _problem(problem: str, ways: Sequence[Entry]) -> Text:
     """What kept some ways from being timed."""
-    from rich.text import Text
-
     wrong = any(way["error"] is not None for way in ways) and all(way["ns"] is None for way in ways)
     names = ", ".join(way["way"] for way in ways)
     return Text(f"{names}: {one_line(problem)}", "bold red" if wrong else "yellow")

@@ -1,31 +1,29 @@
-"""``dynx agree --as-loaded``: what engines make of a file themselves, with no search for causes."""
+"""Run of ``dynx agree --as-loaded``: files as each engine loads them, without a search for causes."""
 
 from __future__ import annotations
 
 import math
 import shlex
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
-from dynx.cli.doctor.conclusion import refusal
+from rich.console import Console
+from rich.text import Text
+
+from dynx.cli.doctor.conclusion import DoctorRun, refusal
 from dynx.cli.doctor.outputs import Outputs
+from dynx.cli.doctor.run import doctor_run
 from dynx.cli.doctor.tables import error_text, show_engines, show_errors
-from dynx.cli.doctor.task import DoctorTask, check_engines, doctor_run, missing_engines, refused
 from dynx.cli.doctor.text import heading, sentence
 from dynx.cli.shell.exits import ANSWER_IS_NO, BAD_INPUT, DONE, complain, one_line, short_line
-from dynx.cli.shell.run import Run, carry_out
+from dynx.cli.shell.run import carry_out
 from dynx.cli.shell.tables import Table
 from dynx.cli.shell.terminal import console, counted
 from dynx.doctor.formats import wording
 from dynx.doctor.formats.vote import Vote, largest_error, vote, worst
-from dynx.model.expansion import expand
-
-if TYPE_CHECKING:
-    from rich.console import Console
-    from rich.text import Text
-
-    from dynx.doctor.report import DoctorReport
-    from dynx.model.model import Base
+from dynx.doctor.report import DoctorReport
+from dynx.doctor.task import DoctorTask, check_engines, missing_engines
+from dynx.model.expansion import expand, refusals
+from dynx.model.model import Base
 
 
 def compare(
@@ -40,22 +38,18 @@ def compare(
     json_path: str | None,
     quiet: bool,
 ) -> int:
-    """Compare, write and show; the exit code, which is that of ``dynx agree``."""
+    """Compare the engines on each robot; return the exit code of ``dynx agree``."""
     outputs = Outputs(json=json_path)
     outputs.check()
     check_engines(engines)
     inputs = expand(robots)
     outputs.keep_apart((each.robot for each in inputs), (), None)
-    run = doctor_run([DoctorTask(each.robot, base, engines, samples, seed, causes=False) for each in inputs])
-    for index, each in enumerate(inputs):
-        if each.refusal is not None:
-            run.record(index, refused(run.tasks[index], each.refusal))
+    tasks = [DoctorTask(each.robot, base, engines, samples, seed, causes=False) for each in inputs]
+    run = doctor_run(tasks, refusals=refusals(inputs))
     return carry_out(run, jobs, timeout, quiet, lambda: _conclude(run, outputs, engines, quiet))
 
 
-def _conclude(
-    run: Run[DoctorTask, DoctorReport], outputs: Outputs, engines: tuple[str, ...] | None, quiet: bool
-) -> int:
+def _conclude(run: DoctorRun, outputs: Outputs, engines: tuple[str, ...] | None, quiet: bool) -> int:
     reports = run.results
     outputs.write(reports, run.not_done)
     if not quiet:

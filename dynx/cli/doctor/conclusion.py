@@ -1,41 +1,40 @@
-"""What `dynx doctor` does when the robots are done: files, tables, errors, exit code."""
+"""Conclusion of `dynx doctor` when the robots are examined: files, tables, errors, exit code."""
 
 from __future__ import annotations
 
 import shlex
 import sys
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+
+from rich.console import Console
 
 from dynx.cli.doctor.mending import write_mended
 from dynx.cli.doctor.outputs import Outputs, save_counterexamples
 from dynx.cli.doctor.tables import show_many, show_one, show_summary
-from dynx.cli.doctor.task import DoctorTask, missing_engines
 from dynx.cli.shell.exits import ANSWER_IS_NO, BAD_INPUT, DONE, complain, one_line, short_line
 from dynx.cli.shell.run import Run
 from dynx.cli.shell.terminal import console, counted
 from dynx.doctor.formats.baseline import Baseline
+from dynx.doctor.report import DoctorReport
+from dynx.doctor.task import DoctorTask, missing_engines
 from dynx.errors import DynxError
 
-if TYPE_CHECKING:
-    from rich.console import Console
-
-    from dynx.doctor.report import DoctorReport
+DoctorRun = Run[DoctorTask, DoctorReport]
 
 _SHOWN_DIFFERENCES = 6
 """Differences listed for each robot against a baseline."""
 
 
 class Conclusion:
-    """Everything that becomes of the reports of a run.
+    """The reports of a run, and where their files go.
 
-    `targets` are the files that mended descriptions go to, one per input (so one per task where any is
-    not None), `folder` is for counterexamples, `engines` what the user asked for.
+    `targets` has the file for the mended description of each input (which is one per task where any is
+    not None), `folder` is for counterexamples, `engines` are those that the user chose.
     """
 
     def __init__(
         self,
-        run: Run[DoctorTask, DoctorReport],
+        run: DoctorRun,
         outputs: Outputs,
         baseline: Baseline | None,
         targets: Sequence[str | None],
@@ -53,7 +52,7 @@ class Conclusion:
         self._problems: list[str] = []
 
     def reach(self, *, quiet: bool) -> int:
-        """Write and show everything; the exit code."""
+        """Write and show everything; return the exit code."""
         reports = self._run.results
         # First the files: a pipe that closes while the table is written must not lose them.
         self._outputs.write(reports, self._run.not_done, self._baseline, command())
@@ -69,13 +68,13 @@ class Conclusion:
         return ANSWER_IS_NO if any(self._fails(report) for report in reports) else DONE
 
     def _fails(self, report: DoctorReport) -> bool:
-        """Whether a report says that engines differ in what is not known; just written is known."""
+        """Whether engines differ in a way that no baseline, read or just written, contains."""
         if self._baseline is not None:
             return not report.alike and bool(self._baseline.compare(report).new)
         return not report.alike and self._outputs.baseline is None
 
     def _mend(self) -> Mapping[int, str]:
-        """Write the mended descriptions; where they went, by the number of the result."""
+        """Write the mended descriptions; return their files by the number of the result."""
         written: dict[int, str] = {}
         done = {task: number for number, task in enumerate(self._run.done)}
         for index, path in enumerate(self._targets):
@@ -111,7 +110,7 @@ class Conclusion:
                     out.print(f"counterexample: {one_line(file)}")
             if mended:
                 same = sum(reports[number].mended is None for number in mended)
-                copies = f", {same} of them as it was read" if same else ""
+                copies = f", {same} of them unchanged" if same else ""
                 out.print(f"{counted(len(mended), 'file')} written{copies}", style="bold green")
         if self._engines is None:
             for line in missing_engines(reports):
@@ -137,12 +136,12 @@ class Conclusion:
 
 
 def refusal(report: DoctorReport) -> str:
-    """Why a robot could not be examined; most messages name its file already."""
+    """The reason why a robot was refused, after its name where the message does not contain that."""
     assert report.error is not None
     message = report.error.message
     return message if report.robot in message else f"{short_line(report.robot)}: {message}"
 
 
 def command() -> str:
-    """The command line in force, to be run again."""
+    """The command line of this process, for running it again."""
     return shlex.join(["dynx", *map(one_line, sys.argv[1:])])

@@ -5,15 +5,14 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from pathlib import PurePath
-from typing import TYPE_CHECKING
 
 from dynx.cli.shell.output_file import check_writable, make_folder, require_apart
+from dynx.doctor.report import DoctorReport
 from dynx.errors import ArgumentError, shown
+from dynx.files.reading import read_file
 from dynx.files.writing import write_bytes
 from dynx.model.expansion import RobotInput, is_library_name
-
-if TYPE_CHECKING:
-    from dynx.doctor.report import DoctorReport
+from dynx.model.xml.source import XmlSource
 
 
 def planned_targets(
@@ -87,8 +86,6 @@ def write_mended(path: str, report: DoctorReport, *, over_input: bool) -> bool:
     any case. The encoding, the byte-order mark and the line ends are those that were read. A file that
     was changed since it was read is not written over.
     """
-    from dynx.model.xml.source import XmlSource
-
     text = report.mended
     if text is None and not over_input:
         text = report.text
@@ -104,9 +101,6 @@ def write_mended(path: str, report: DoctorReport, *, over_input: bool) -> bool:
 
 
 def _require_unchanged(path: str, report: DoctorReport) -> None:
-    from dynx.files.reading import read_file
-    from dynx.model.xml.source import XmlSource
-
     if XmlSource(read_file(path), path).text != report.text:
         raise ArgumentError(f"{shown(path, 300)} was changed while it was examined, and is left as it is")
 

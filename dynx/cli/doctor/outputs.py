@@ -6,17 +6,15 @@ import os
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from dynx.cli.shell.output_file import check_writable, make_folder, require_apart
 from dynx.cli.shell.terminal import echo_json
+from dynx.doctor.formats import baseline_document, html_page, junit_xml, sarif_document
+from dynx.doctor.formats.baseline import Baseline
+from dynx.doctor.report import Counterexample, DoctorReport, Unexplained, results_document
 from dynx.errors import ArgumentError, shown
 from dynx.files.documents import json_text
 from dynx.files.writing import write_text
-
-if TYPE_CHECKING:
-    from dynx.doctor.formats.baseline import Baseline
-    from dynx.doctor.report import Counterexample, DoctorReport, Unexplained
 
 STDOUT = "-"
 
@@ -70,14 +68,12 @@ class Outputs:
         command: str | None = None,
     ) -> None:
         """Write all that was asked for; `command` is what a page says to run again."""
-        from dynx.doctor import formats
-
         if self.json is not None:
             self._json(reports, not_done)
         texts: dict[str | None, Callable[[], str]] = {
-            self.html: lambda: formats.html_page(reports, command=command, baseline=baseline),
-            self.junit: lambda: formats.junit_xml(reports, baseline),
-            self.sarif: lambda: json_text(formats.sarif_document(reports, baseline)) + "\n",
+            self.html: lambda: html_page(reports, command=command, baseline=baseline),
+            self.junit: lambda: junit_xml(reports, baseline),
+            self.sarif: lambda: json_text(sarif_document(reports, baseline)) + "\n",
             self.baseline: lambda: self._known(reports),
         }
         for path, text in texts.items():
@@ -85,8 +81,6 @@ class Outputs:
                 write_text(path, text())
 
     def _json(self, reports: Sequence[DoctorReport], not_done: Sequence[str]) -> None:
-        from dynx.doctor.report import results_document
-
         document = results_document(reports, not_done)
         if self.json == STDOUT:
             echo_json(document)
@@ -94,8 +88,6 @@ class Outputs:
             write_text(self.json, json_text(document) + "\n")
 
     def _known(self, reports: Sequence[DoctorReport]) -> str:
-        from dynx.doctor.formats import baseline_document
-
         return json_text(baseline_document(reports, os.path.dirname(self.baseline or ""))) + "\n"
 
 

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, get_args
+from collections.abc import Mapping, Sequence
+from typing import get_args
+
+from rich.console import Console
+from rich.text import Text
 
 from dynx.cli.doctor.text import STYLES, block, heading, sentence
 from dynx.cli.shell.exits import one_line, short_line
@@ -13,14 +16,7 @@ from dynx.cli.shell.terminal import counted
 from dynx.doctor.formats import wording
 from dynx.doctor.formats.causes import ROUNDING, Cause, Status, causes, severity, status
 from dynx.doctor.formats.vote import largest_error
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from rich.console import Console
-    from rich.text import Text
-
-    from dynx.doctor.report import DoctorReport, EngineResult, Finding
+from dynx.doctor.report import DoctorReport, EngineResult, Finding
 
 _SHOWN_PLACES = 4
 """Places of one rule on a terminal; ``--json`` and ``--html`` have all."""
@@ -164,8 +160,6 @@ def _place(finding: Finding) -> str:
 
 def _cause_line(cause: Cause) -> Text:
     """Rule, how large, where it counts; loud only where it is more than rounding."""
-    from rich.text import Text
-
     worst = cause.worst
     line = Text(f"  {wording.name(cause.rule)} {wording.name(cause.name)}", STYLES[cause.severity])
     if worst is not None:
@@ -235,8 +229,6 @@ def _show_next(out: Console, report: DoctorReport, mended: str | None) -> None:
 
 def _change(engine: EngineResult, key: str, tolerance: float, mended: bool) -> Text:
     """One number where nothing had to change, else two."""
-    from rich.text import Text
-
     before, after = engine.before.get(key), engine.after.get(key)
     if before is None:
         first = Text("refused" if engine.refused is not None else "-", "red")
@@ -249,16 +241,12 @@ def _change(engine: EngineResult, key: str, tolerance: float, mended: bool) -> T
 
 def error_text(error: float, tolerance: float) -> Text:
     """An error, loud as it is large."""
-    from rich.text import Text
-
     if error <= tolerance:
         return Text(wording.relative(error), "green")
     return Text(wording.relative(error), STYLES["warning" if error <= ROUNDING else "error"])
 
 
 def _largest(report: DoctorReport) -> Text:
-    from rich.text import Text
-
     if report.error is not None:
         return Text("")
     if any(each.refused is not None for each in report.engines):
@@ -267,8 +255,6 @@ def _largest(report: DoctorReport) -> Text:
 
 
 def _rules(report: DoctorReport) -> Text:
-    from rich.text import Text
-
     found = [cause for cause in causes(report) if cause.worst is not None]
     parts = [Text(wording.name(cause.rule), STYLES[cause.severity]) for cause in found[:_SHOWN_RULES]]
     if len(found) > _SHOWN_RULES:
@@ -277,8 +263,6 @@ def _rules(report: DoctorReport) -> Text:
 
 
 def _verdict_text(report: DoctorReport) -> Text:
-    from rich.text import Text
-
     word = status(report)
     if word == "refused":  # why is said on standard error
         return Text("refused", "yellow")

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import textwrap
-from typing import TYPE_CHECKING
+
+from rich.console import Console
 
 from dynx.cli.shell.exits import one_line
-
-if TYPE_CHECKING:
-    from rich.console import Console
 
 STYLES = {"error": "bold red", "warning": "yellow", "note": "dim"}
 """How loud each severity is."""

@@ -1,40 +1,23 @@
-"""``dynx info``: what a robot description says, as dynx reads it."""
+"""Body of ``dynx info``: a robot description as dynx reads it."""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-import click
+from rich.text import Text
+from rich.tree import Tree
 
-from dynx.cli.shell.options import json_flag, model_options
-
-if TYPE_CHECKING:
-    from rich.tree import Tree
-
-    from dynx.cli.shell.tables import Table
-    from dynx.model import Joint, Model
-    from dynx.model.model import Base
+from dynx.cli.shell.exits import one_line
+from dynx.cli.shell.tables import Table
+from dynx.cli.shell.terminal import PIPE_WIDTH, console, counted, echo_json, number
+from dynx.model import Joint, Model
+from dynx.model.loading import load
+from dynx.model.model import Base
 
 
-@click.command(short_help="Show the tree, joints, masses and frames of a robot.")
-@click.argument("robot")
-@model_options
-@json_flag
 def info(robot: str, base: Base, lock: tuple[tuple[str, float], ...], as_json: bool) -> None:
-    """Show what dynx reads in a robot description: tree, joints, masses, frames, notes.
-
-    A note is something that was ignored or read as meant, and that could matter.
-
-    \b
-    Examples:
-      dynx info ur5
-      dynx info path/to/robot.urdf --base floating
-      dynx info panda --lock panda_finger_joint1=0.02 --json
-    """
-    from dynx.cli.shell.terminal import echo_json
-    from dynx.model.loading import load
-
+    """Print the model as a tree and a table, or as a document."""
     model = load(robot, base=base, lock=dict(lock))
     if as_json:
         echo_json(document(model))
@@ -43,7 +26,7 @@ def info(robot: str, base: Base, lock: tuple[tuple[str, float], ...], as_json: b
 
 
 def document(model: Model) -> dict[str, Any]:
-    """The model as ``dynx info --json`` writes it; limits that are not there are null."""
+    """Make the JSON document of a model; infinite limits become null."""
     return {
         "schema": 1,
         "name": model.name,
@@ -94,9 +77,6 @@ def _joint_entry(joint: Joint) -> dict[str, Any]:
 
 
 def _show(model: Model) -> None:
-    from dynx.cli.shell.exits import one_line
-    from dynx.cli.shell.terminal import PIPE_WIDTH, console, counted
-
     out = console()
     out.print(f"{one_line(model.name)}  ({one_line(model.source)})", style="bold")
     out.print(
@@ -106,7 +86,7 @@ def _show(model: Model) -> None:
     )
     out.print()
     wide = console()
-    wide.width = PIPE_WIDTH  # rich cuts the lines of a tree at the width, names and all
+    wide.width = PIPE_WIDTH  # rich would truncate the lines of a tree
     wide.print(_tree(model))
     if any(joint.moves for joint in model.joints):
         out.print()
@@ -120,12 +100,6 @@ def _show(model: Model) -> None:
 
 
 def _tree(model: Model) -> Tree:
-    from rich.text import Text
-    from rich.tree import Tree
-
-    from dynx.cli.shell.exits import one_line
-    from dynx.cli.shell.terminal import number
-
     def label(link: str, joint: Joint | None) -> Text:
         inertial = model.link(link).inertial
         text = Text(one_line(link))
@@ -135,7 +109,7 @@ def _tree(model: Model) -> Tree:
             text.append(f"  <- {one_line(joint.name)} ({kind})", style="cyan" if joint.moves else "dim")
         return text
 
-    # Joints come in depth-first order, so the parent's branch is there before its children.
+    # Joints are in depth-first order, so the parent's branch exists before its children.
     branches = {model.root: Tree(label(model.root, None))}
     for joint in model.joints:
         branches[joint.child] = branches[joint.parent].add(label(joint.child, joint))
@@ -143,9 +117,6 @@ def _tree(model: Model) -> Tree:
 
 
 def _joint_table(model: Model) -> Table:
-    from dynx.cli.shell.exits import one_line
-    from dynx.cli.shell.tables import Table
-
     right = ("q", "lower", "upper", "velocity", "effort")
     table = Table("q", "joint", "type", "axis", *right[1:], "follows", right=right, keys=2)
     index = {name: k + (7 if model.floating else 0) for k, name in enumerate(model.joint_names)}
@@ -166,9 +137,6 @@ def _joint_table(model: Model) -> Table:
 
 
 def _rule(joint: Joint) -> str:
-    from dynx.cli.shell.exits import one_line
-    from dynx.cli.shell.terminal import number
-
     if joint.mimic is None:
         return ""
     offset = "" if joint.mimic.offset == 0.0 else f" {joint.mimic.offset:+.6g}"

@@ -1,4 +1,4 @@
-"""The entry point `dynx`: the group of commands, and the one place where errors become exit codes."""
+"""Entry point `dynx`: the table of commands, and the one place where errors become exit codes."""
 
 from __future__ import annotations
 
@@ -11,34 +11,51 @@ from typing import Any, NoReturn
 import click
 
 from dynx._version import __version__
-from dynx.cli.agree.command import agree
-from dynx.cli.bench.command import bench
-from dynx.cli.doctor.command import doctor
-from dynx.cli.queries.backends import backends
-from dynx.cli.queries.evaluate import fd, fk, id_, jacobian, mass
-from dynx.cli.queries.explain import explain
-from dynx.cli.queries.ik import ik
-from dynx.cli.queries.info import info
-from dynx.cli.queries.robots import robots
 from dynx.cli.shell.exits import DONE, closed_pipe_raised, report_failure
-from dynx.cli.sim.command import sim
+from dynx.cli.shell.lazy import LazyCommand, LazyGroup
 from dynx.errors import TRACEBACK_VARIABLE
 
+COMMANDS = {
+    "agree": LazyCommand("dynx.cli.agree.command:agree", "Compare the results of all engines on robots."),
+    "doctor": LazyCommand(
+        "dynx.cli.doctor.command:doctor", "Find, prove and mend what makes engines differ on a file."
+    ),
+    "sim": LazyCommand("dynx.cli.sim.command:sim", "Simulate a robot under a controller."),
+    "bench": LazyCommand("dynx.cli.bench.command:bench", "Time the engines on a robot and this machine."),
+    "explain": LazyCommand(
+        "dynx.cli.queries.commands:explain", "Explain a rule of the doctor, such as DX101."
+    ),
+    "info": LazyCommand(
+        "dynx.cli.queries.commands:info", "Show the links, joints, masses and frames of a robot."
+    ),
+    "robots": LazyCommand("dynx.cli.queries.commands:robots", "List the robots that have a name."),
+    "backends": LazyCommand("dynx.cli.queries.commands:backends", "List the backends and their versions."),
+    "fk": LazyCommand("dynx.cli.queries.commands:fk", "Forward kinematics: the pose of a frame."),
+    "jacobian": LazyCommand("dynx.cli.queries.commands:jacobian", "The Jacobian of a frame."),
+    "id": LazyCommand(
+        "dynx.cli.queries.commands:id_", "Inverse dynamics: the torque that gives an acceleration."
+    ),
+    "fd": LazyCommand(
+        "dynx.cli.queries.commands:fd", "Forward dynamics: the acceleration that a torque gives."
+    ),
+    "mass": LazyCommand("dynx.cli.queries.commands:mass", "The mass matrix."),
+    "ik": LazyCommand(
+        "dynx.cli.queries.commands:ik", "Inverse kinematics: a configuration that reaches a target."
+    ),
+}
+"""The commands of dynx in the order of the list, each with its line there."""
 
-class CommandLine(click.Group):
-    """The group of commands; whatever is raised below leaves as one line and an exit code."""
 
-    def list_commands(self, ctx: click.Context) -> list[str]:
-        """Commands in the order in which they were added, the main one first."""
-        return list(self.commands)
+class CommandLine(LazyGroup):
+    """The group of commands: every error below it leaves as one line and an exit code."""
 
     def make_context(self, *args: Any, **extra: Any) -> click.Context:
-        """Read the options of the group; ``--help`` writes here already."""
+        """Read the options of the group; ``--help`` and ``--version`` already write here."""
         with closed_pipe_raised():
             return super().make_context(*args, **extra)
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run the command that is asked for."""
+        """Run the command."""
         with closed_pipe_raised():
             return super().invoke(ctx)
 
@@ -61,7 +78,7 @@ class CommandLine(click.Group):
 
 
 def _tolerate_unencodable() -> None:
-    """A character that the terminal cannot show is escaped rather than raised."""
+    """Escape characters that the terminal cannot show instead of raising an error."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
@@ -74,24 +91,24 @@ def _show_traceback(ctx: click.Context, option: click.Parameter, wanted: bool) -
 
 @click.group(
     cls=CommandLine,
+    table=COMMANDS,
     invoke_without_command=True,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
     epilog="""
     \b
     Examples:
-      dynx agree ur5               do the installed engines agree on the UR5?
-      dynx agree all --json a.json every robot of example-robot-data
-      dynx doctor my.urdf          why do engines differ on my file, and how is it mended?
-      dynx sim --tutorial          how closely does each mode of control follow a motion?
-      dynx bench panda             how fast are they on this machine?
-      dynx explain DX101           what a cause means, and what each engine does
-      dynx info panda              joints, limits, masses, frames
-      dynx id ur5 --q 0,-1,1,0,0,0 torque that holds the arm there
+      dynx agree ur5               compare the engines on the UR5
+      dynx agree all --json a.json compare them on every robot of example-robot-data
+      dynx doctor my.urdf          find out why engines differ on a file
+      dynx sim --tutorial          compare the tracking errors of all controllers
+      dynx bench panda             time the engines on this machine
+      dynx explain DX101           read about a rule of the doctor
+      dynx info panda              list joints, limits, masses and frames
+      dynx id ur5 --q 0,-1,1,0,0,0 torque that holds the arm still
 
     \b
-    Exit codes: 0 done (all agree), 1 the answer is no (some differ, target not reached,
-    simulation diverged), 2 some input cannot be used, 70 a defect of dynx,
-    74 the output cannot be written.
+    Exit codes: 0 success; 1 negative result (engines differ, target not reached,
+    simulation diverged); 2 unusable input; 70 defect of dynx; 74 output not writable.
     """,
 )
 @click.version_option(__version__, prog_name="dynx", message="%(prog)s %(version)s")
@@ -101,20 +118,16 @@ def _show_traceback(ctx: click.Context, option: click.Parameter, wanted: bool) -
     is_eager=True,
     expose_value=False,
     callback=_show_traceback,
-    help=f"Show where an error was raised (also: {TRACEBACK_VARIABLE}=1).",
+    help=f"Print the Python traceback of an error (also with {TRACEBACK_VARIABLE}=1).",
 )
 @click.pass_context
 def cli(ctx: click.Context) -> None:
-    """One interface over several rigid-body engines, proven to give one answer.
+    """One interface over several rigid-body dynamics engines, and tests that they agree.
 
-    ROBOT is always a path to a URDF file or a name of the library (see `dynx robots`).
+    ROBOT is the path of a URDF or xacro file, or a name from `dynx robots`.
     """
     if ctx.invoked_subcommand is None:
         click.echo(ctx.get_help())
-
-
-for _command in (agree, doctor, sim, bench, explain, info, robots, backends, fk, jacobian, id_, fd, mass, ik):
-    cli.add_command(_command)
 
 
 def main() -> None:

@@ -1,20 +1,21 @@
-"""Options that several commands share, and how lists of numbers are read."""
+"""Options that several commands share, the types of their values, and a command that groups its options."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeVar
 
 import click
 
+from dynx.cli.shell.lazy import imported
 from dynx.errors import nearest, shown
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 
 def number_list(text: str) -> list[float] | dict[str, float]:
-    """Numbers separated by commas or white space, or ``joint=value`` pairs as a dictionary."""
+    """Read numbers separated by commas or white space, or ``joint=value`` pairs as a dictionary."""
     words = text.replace(",", " ").split()
     if not any("=" in word for word in words):
         return [finite_number(word) for word in words]
@@ -28,7 +29,7 @@ def number_list(text: str) -> list[float] | dict[str, float]:
 
 
 def plain_numbers(text: str) -> list[float]:
-    """Numbers separated by commas or white space, at least one."""
+    """Read at least one number, separated by commas or white space."""
     numbers = [finite_number(word) for word in text.replace(",", " ").split()]
     if not numbers:
         raise click.BadParameter("wanted a number, or several separated by commas")
@@ -36,21 +37,25 @@ def plain_numbers(text: str) -> list[float]:
 
 
 def name_list(text: str) -> tuple[str, ...]:
-    """Names separated by commas, each once, in order."""
+    """Read names separated by commas, each once, in order."""
     names = tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
     if not names:
         raise click.BadParameter("wanted names separated by commas")
     return names
 
 
-def one_of(names: Iterable[str]) -> Callable[[str], str]:
-    """A type for one of some names; of a wrong one the message says which is nearest, or all of them."""
-    known = tuple(names)
+def one_of(*names: str, source: str | None = None) -> Callable[[str], str]:
+    """Return the type of an option that takes one of `names`, or of those in `source`.
+
+    `source` is ``module:attribute``, imported when the option is read. The message about a wrong name
+    offers the nearest, or lists all of them.
+    """
 
     def name(word: str) -> str:
+        known = (*names, *(() if source is None else imported(source)))
         if word not in known:
             close = nearest(word, known)
-            # Where none is near, a set that is closed is said whole, however long it is.
+            # `nearest` shortens a long list; here all names are listed.
             clause = close if close.endswith("?") else f"; known: {', '.join(known)}"
             raise click.BadParameter(f"there is no {shown(word)}{clause}")
         return word
@@ -59,23 +64,23 @@ def one_of(names: Iterable[str]) -> Callable[[str], str]:
 
 
 def choice_pair(word: str) -> tuple[str, str]:
-    """``rule=choice``, such as DX103=keep."""
+    """Read ``rule=choice``, such as DX103=keep."""
     rule, _, choice = (part.strip() for part in word.partition("="))
     if not rule or not choice:
-        raise click.BadParameter(f"{shown(word)} is no rule=choice, such as DX103=keep")
+        raise click.BadParameter(f"{shown(word)} is not of the form rule=choice, such as DX103=keep")
     return rule, choice
 
 
 def _pair(word: str) -> tuple[str, float]:
-    """One ``joint=value``; the name may hold any sign but a comma or white space."""
+    """Read one ``joint=value``; the name may hold any character but a comma or white space."""
     name, equals, text = word.rpartition("=")
     if not equals or not name:
-        raise click.BadParameter(f"{shown(word)} is no joint=value, such as finger=0.02")
+        raise click.BadParameter(f"{shown(word)} is not of the form joint=value, such as finger=0.02")
     return name, finite_number(text)
 
 
 def finite_number(word: str) -> float:
-    """One number, as Python writes it, that is neither NaN nor infinite."""
+    """Read one finite number in the notation of Python."""
     try:
         number = float(word)
     except ValueError:
@@ -88,69 +93,106 @@ def finite_number(word: str) -> float:
 
 
 def model_options(command: F) -> F:
-    """``--base`` and ``--lock``, as parameters `base` and `lock` (pairs)."""
-    command = click.option(
-        "--lock",
-        type=_pair,
-        metavar="JOINT=VALUE",
-        multiple=True,
-        help="Fix a joint at a value [rad or m]; it leaves q. May be given several times.",
-    )(command)
-    return click.option(
-        "--base",
-        type=click.Choice(["fixed", "floating"]),
-        default="fixed",
-        show_default=True,
-        help="Whether the root link is bolted to the world or free.",
+    """Add ``--base`` and ``--lock``, as parameters `base` and `lock` (pairs)."""
+    return stacked(
+        click.option(
+            "--base",
+            type=click.Choice(["fixed", "floating"]),
+            default="fixed",
+            show_default=True,
+            help="Whether the root link is fixed to the world or free to move.",
+        ),
+        click.option(
+            "--lock",
+            type=_pair,
+            metavar="JOINT=VALUE",
+            multiple=True,
+            help="Joint to fix at a value [rad or m], which removes it from q; may be given several times.",
+        ),
     )(command)
 
 
 def run_options(command: F) -> F:
-    """``--jobs``, ``--timeout`` and ``--quiet``: of commands that do many robots in processes."""
-    command = click.option(
-        "--quiet", is_flag=True, help="No table and no progress: errors, files and exit code only."
-    )(command)
-    command = click.option(
-        "--timeout",
-        type=click.FloatRange(min=0.0),
-        default=600.0,
-        show_default=True,
-        help="Seconds after which a robot is given up; 0 for never.",
-    )(command)
-    return click.option(
-        "--jobs",
-        type=click.IntRange(min=1),
-        help="Robots at a time, each in a process of its own (default: one per processor).",
+    """Add ``--jobs``, ``--timeout`` and ``--quiet``, for commands that process robots in worker processes."""
+    return stacked(
+        click.option(
+            "--jobs",
+            type=click.IntRange(min=1),
+            help="Number of robots at a time, each in its own process (default: one per processor).",
+        ),
+        click.option(
+            "--timeout",
+            type=click.FloatRange(min=0.0),
+            default=600.0,
+            show_default=True,
+            help="Time limit for each robot [s]; 0 for none.",
+        ),
+        click.option(
+            "--quiet", is_flag=True, help="No tables and no progress: only errors, files and the exit code."
+        ),
     )(command)
 
 
-def json_flag(command: F) -> F:
-    """``--json`` without a value, as parameter `as_json`."""
-    return click.option(
-        "--json", "as_json", is_flag=True, help="Write JSON to standard output instead of a table."
-    )(command)
+json_flag = click.option(
+    "--json", "as_json", is_flag=True, help="JSON on standard output instead of a table."
+)
 
 
 def robot_options(command: F) -> F:
-    """ROBOT, ``--backend``, ``--base``, ``--lock`` and ``--json``."""
-    command = json_flag(command)
-    command = model_options(command)
-    command = click.option(
-        "--backend",
-        "backend_name",
-        metavar="NAME",
-        help="The engine to ask (default: pinocchio if installed, else reference).",
+    """Add ROBOT, ``--backend``, ``--base``, ``--lock`` and ``--json``."""
+    return stacked(
+        click.argument("robot"),
+        click.option(
+            "--backend",
+            "backend_name",
+            metavar="NAME",
+            help="Backend that computes (default: pinocchio if installed, else reference).",
+        ),
+        model_options,
+        json_flag,
     )(command)
-    return click.argument("robot")(command)
 
 
-def sample_option(name: str, what: str) -> Callable[[F], F]:
-    """An option such as ``--q`` that takes the numbers of one sample."""
+def sample_option(name: str, quantity: str) -> Callable[[F], F]:
+    """Return an option such as ``--q``, whose value is the vector of one sample."""
     return click.option(
-        f"--{name}", type=number_list, metavar="NUMBERS", help=f"{what}: 0,1.5,... or joint=value,..."
+        f"--{name}", type=number_list, metavar="NUMBERS", help=f"{quantity}: 0,1.5,... or joint=value,..."
     )
 
 
 frame_option = click.option(
-    "--frame", metavar="NAME", help="The frame (default: the end of the longest chain of moving joints)."
+    "--frame",
+    metavar="NAME",
+    help="Name of the frame (default: the end of the longest chain of moving joints).",
 )
+
+
+class GroupedCommand(click.Command):
+    """A command whose help lists its options under the headings of `groups`."""
+
+    def __init__(self, *args: Any, groups: Mapping[str, Sequence[str]], **extra: Any) -> None:
+        super().__init__(*args, **extra)
+        self.groups = groups
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the options, group by group."""
+        options = [param for param in self.get_params(ctx) if isinstance(param, click.Option)]
+        records = {param.name: param.get_help_record(ctx) for param in options}
+        grouped = {name for names in self.groups.values() for name in names}
+        rest = [name for name in records if name is not None and name not in grouped]
+        for title, names in [*self.groups.items(), ("Other options", rest)]:
+            rows = [record for record in map(records.get, names) if record is not None]
+            if rows:
+                with formatter.section(title):
+                    formatter.write_dl(rows)
+
+
+def stacked(*options: Callable[[F], F]) -> Callable[[F], F]:
+    """Combine several options into one decorator."""
+
+    def decorate(command: F) -> F:
+        for option in reversed(options):
+            command = option(command)
+        return command
+
+    return decorate

@@ -1,22 +1,23 @@
-"""The robots of one command in worker processes, with progress on a terminal."""
+"""A run over many robots in worker processes, with progress on a terminal."""
 
 from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Sequence
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Generic, Protocol, TypeVar
 
 from dynx.cli.shell.exits import complain
 from dynx.cli.shell.interruption import interruptible
 from dynx.cli.shell.progress import progress_bar
 from dynx.cli.shell.terminal import counted
-from dynx.errors import DynxError, EngineError
-from dynx.workers import Failure, Workers
+from dynx.errors import DynxError
+from dynx.workers import Workers
 
 
 class RobotTask(Protocol):
-    """What is to be done with one robot."""
+    """The work on one robot."""
 
     @property
     def robot(self) -> str:
@@ -27,55 +28,43 @@ Task = TypeVar("Task", bound=RobotTask)
 Result = TypeVar("Result")
 
 
-class EngineCrash(EngineError):
-    """An engine ended the process it ran in."""
-
-
-class EngineTimeout(EngineError):
-    """An engine took longer than it was given."""
-
-
-class InternalError(DynxError):
-    """dynx raised what it should not have raised."""
-
-
-_OF_KIND = {"crash": EngineCrash, "timeout": EngineTimeout, "defect": InternalError}
-
-
-def error_of(failure: Failure) -> DynxError:
-    """The error that says why a worker process gave no answer."""
-    return _OF_KIND[failure.kind](failure.message)
-
-
 class Run(Generic[Task, Result]):
-    """The robots of one command, and the results that are there so far.
+    """The tasks of one command, one robot each, and the results that exist so far.
 
-    ``target(task)`` is done in a worker process; ``failed(task, failure)`` is the result of a task of
-    which that process died, and ``progress(results)`` the words beside the bar.
+    ``target(task)`` runs in a worker process. ``refused(task, error)`` makes the result of a task whose
+    process ended without one, and of the tasks numbered in `refusals`, which never start.
+    The progress bar counts the results by ``problem(result)``, a word such as ``differ`` or None; without
+    any its text is `activity`.
     """
 
     def __init__(
         self,
         tasks: Sequence[Task],
         target: Callable[[Task], Result],
-        failed: Callable[[Task, Failure], Result],
-        progress: Callable[[Sequence[Result]], str],
+        refused: Callable[[Task, DynxError], Result],
+        problem: Callable[[Result], str | None],
+        activity: str,
+        refusals: Mapping[int, DynxError] | None = None,
     ) -> None:
         self.tasks = list(tasks)
         self.seconds = 0.0
         self._target = target
-        self._failed = failed
-        self._words = progress
+        self._refused = refused
+        self._problem = problem
+        self._activity = activity
+        self._problems: Counter[str] = Counter()
         self._results: dict[int, Result] = {}
+        for index, error in (refusals or {}).items():
+            self.record(index, refused(self.tasks[index], error))
 
     @property
     def results(self) -> list[Result]:
-        """The results that are there, in the order of the robots."""
-        return [self._results[index] for index in sorted(self._results)]
+        """The results so far, in the order of the tasks."""
+        return [self._results[index] for index in self.done]
 
     @property
     def done(self) -> list[int]:
-        """The numbers of the tasks that have a result: `results` are theirs, in this order."""
+        """The numbers of the tasks that `results` belong to, in this order."""
         return sorted(self._results)
 
     @property
@@ -84,36 +73,42 @@ class Run(Generic[Task, Result]):
         return [task.robot for index, task in enumerate(self.tasks) if index not in self._results]
 
     def record(self, index: int, result: Result) -> None:
-        """Take the result of task number `index`."""
+        """Keep the result of task number `index`."""
         self._results[index] = result
+        problem = self._problem(result)
+        if problem is not None:
+            self._problems[problem] += 1
 
     def measure(self, jobs: int, timeout: float | None, *, show_progress: bool) -> None:
-        """Do the tasks that have no result yet, `jobs` at a time.
+        """Run the tasks that have no result yet, `jobs` at a time, each for at most `timeout` seconds.
 
-        KeyboardInterrupt leaves with the results that are there by then.
+        KeyboardInterrupt leaves the results that exist by then.
         """
         started = time.perf_counter()
         pending = [index for index in range(len(self.tasks)) if index not in self._results]
-        bar = progress_bar(len(self.tasks), len(self._results), self._words([]), wanted=show_progress)
+        bar = progress_bar(len(self.tasks), len(self._results), self._status(), wanted=show_progress)
         try:
             with Workers(self._target, jobs, timeout) as workers, bar as advance:
                 for outcome in workers.run([self.tasks[index] for index in pending]):
                     index = pending[outcome.index]
                     result: Any = outcome.value
                     if outcome.failure is not None:
-                        result = self._failed(self.tasks[index], outcome.failure)
+                        result = self._refused(self.tasks[index], outcome.failure.error)
                     self.record(index, result)
-                    advance(len(self._results), self._words(self.results))
+                    advance(len(self._results), self._status())
         finally:
             self.seconds = time.perf_counter() - started
+
+    def _status(self) -> str:
+        return ", ".join(f"{count} {word}" for word, count in self._problems.items()) or self._activity
 
 
 def carry_out(
     run: Run[Any, Any], jobs: int | None, timeout: float, quiet: bool, conclude: Callable[[], int]
 ) -> int:
-    """Do a run and ``conclude()`` it, also where Ctrl-C ended it early; the exit code.
+    """Carry out a run and ``conclude()`` it, also after Ctrl-C; return the exit code.
 
-    `jobs` None means one per processor, `timeout` 0 none.
+    `jobs` None means one per processor; `timeout` 0 means no time limit.
     """
     with interruptible() as interruption:
         try:
@@ -126,7 +121,7 @@ def carry_out(
 
 
 def processors() -> int:
-    """How many processors this process may use."""
+    """Return the number of processors that this process may use."""
     try:
         return len(os.sched_getaffinity(0))
     except AttributeError:  # not on this system

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterable, Iterator, Sequence
-from typing import TYPE_CHECKING, Union
 
-if TYPE_CHECKING:
-    from rich.console import Console, ConsoleOptions
-    from rich.text import Text
+from rich.console import Console, ConsoleOptions
+from rich.text import Text
 
-Cell = Union["str", "Text"]
+Cell = str | Text
 
 _GAP, _NARROW_GAP = 3, 2
 """Blanks between two columns, the second in a table that would not fit; one stands before the first."""
@@ -38,8 +36,6 @@ class Table:
 
     def add_row(self, *cells: Cell) -> None:
         """Add a row of cells; columns for which there is none stay empty."""
-        from rich.text import Text
-
         filled = [*cells, *[""] * (len(self._columns) - len(cells))]
         self._rows.append([Text(cell) if isinstance(cell, str) else cell for cell in filled])
 
@@ -48,8 +44,6 @@ class Table:
 
     def lines(self, width: int, rule: str = "─") -> Iterator[Text]:
         """The table as lines without trailing blanks, at most `width` wide where the cells allow it."""
-        from rich.text import Text
-
         heads = [[Text(line, "bold") for line in column.split("\n")] for column in self._columns]
         body = [[[cell] for cell in row] for row in self._rows]
         widths = _widths([heads, *body])
@@ -90,8 +84,6 @@ class Table:
         self, cells: Sequence[Sequence[Text]], block: Sequence[int], widths: Sequence[int], gap: int
     ) -> Iterator[Text]:
         """The lines of one row: cells of fewer lines than the longest are blank below."""
-        from rich.text import Text
-
         for k in range(max(len(cells[column]) for column in block)):
             line = Text()
             for number, column in enumerate(block):
@@ -118,8 +110,6 @@ def listing(heading: str, items: Iterable[str], width: int) -> str:
 
 def _broken(cell: Text, limit: int) -> list[Text]:
     """A key in lines of at most `limit`, broken between words only."""
-    from rich.text import Text
-
     lines = textwrap.wrap(
         cell.plain, max(limit, 1), break_long_words=False, break_on_hyphens=False, subsequent_indent="  "
     )

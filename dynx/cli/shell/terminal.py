@@ -5,14 +5,12 @@ from __future__ import annotations
 import errno
 import os
 import sys
-from typing import TYPE_CHECKING, TextIO
+from typing import TextIO
 
 import click
+from rich.console import Console
 
 from dynx.files.documents import json_text
-
-if TYPE_CHECKING:
-    from rich.console import Console
 
 PIPE_WIDTH = 10_000
 """Columns where nobody watches: a table in a file or a pipe is never divided."""
@@ -25,8 +23,6 @@ def console(*, err: bool = False) -> Console:
     Names of robots may hold anything, so neither markup nor emoji codes are read. NO_COLOR, TERM
     and COLUMNS are honoured.
     """
-    from rich.console import Console
-
     stream = sys.stderr if err else _standard_output()
     width = None if stream.isatty() or "COLUMNS" in os.environ else PIPE_WIDTH
     return Console(file=stream, width=width, soft_wrap=True, markup=False, emoji=False, highlight=False)

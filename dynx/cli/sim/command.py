@@ -1,62 +1,60 @@
-"""``dynx sim``: a robot in motion under a controller, and what came of it."""
+"""Declaration of ``dynx sim``."""
 
 from __future__ import annotations
 
-from typing import Any
-
 import click
 
-from dynx.cli.shell.option_groups import GroupedCommand
-from dynx.cli.shell.options import json_flag, model_options
+from dynx.cli.shell.lazy import runs
+from dynx.cli.shell.options import GroupedCommand, json_flag, model_options
 from dynx.cli.sim import options as sim_options
 
 
-@click.command(
-    cls=GroupedCommand,
-    groups=sim_options.GROUPS,
-    short_help="Simulate a robot under a controller; all modes of control.",
-)
+@click.command(cls=GroupedCommand, groups=sim_options.GROUPS)
 @click.argument("robot", required=False)
 @model_options
 @sim_options.robot
 @sim_options.motion
 @sim_options.controller
 @sim_options.plant
-@sim_options.loads
-@sim_options.unknowns
+@sim_options.disturbances
+@sim_options.model_errors
 @sim_options.results
 @json_flag
-@click.pass_context
-def sim(ctx: click.Context, /, robot: str | None, tutorial: bool, **given: Any) -> int:
-    """Simulate a robot under a controller: the law computes on one engine, the robot moves on another.
+@runs("dynx.cli.sim.run:sim")
+def sim() -> None:
+    """Simulate a robot under a controller, which can compute on one engine while the robot moves on another.
 
-    The motion goes from --from to --to, or a frame goes on a straight line to --to-pose; without either
-    the robot is to stay where it is. Times are in s, angles in rad, lengths in m; NUMBERS is one number
-    for all joints, or one for each, separated by commas. Laws (--controller):
+    The reference motion goes from --from to --to, or moves a frame on a straight line to --to-pose;
+    without either the controller holds the initial configuration. Units are s, rad, m, kg and N; NUMBERS
+    is one number for all joints, or one for each joint, separated by commas. Controllers (--controller),
+    where * marks the reference and ID is inverse dynamics:
 
     \b
       computed-torque           ID(q, v, a* + kd (v* - v) + kp (q* - q))
-      discrete-computed-torque  the torque whose step ends on the next setpoint
-      pd, gravity-pd, pid       kp (q* - q) + kd (v* - v); with the weight; with
-                                an integral that does not wind up
+      discrete-computed-torque  torque that reaches the next reference sample in
+                                one step
+      pd, gravity-pd, pid       kp (q* - q) + kd (v* - v); plus gravity
+                                compensation; plus an integral with anti-windup
       velocity                  kd (v* - v)
-      feed-forward[-pd]         ID(q*, v*, a*), alone or with pd
-      operational-space         computed torque of a frame; --posture-kp for the rest
-      impedance                 spring --kp and damper --kd of a frame
+      feed-forward[-pd]         ID(q*, v*, a*); plus pd
+      operational-space         computed torque of a frame; --posture-kp acts on the
+                                remaining degrees of freedom
+      impedance                 spring --kp and damper --kd between a frame and
+                                its reference
       position-motor, velocity-motor, pd-motor
-                                PyBullet's own; with --plant pybullet
-      none                      no motors
+                                motors of PyBullet; with --plant pybullet
+      none                      no torque
 
-    Torque tables and laws of your own are for Python: dynx.simulate.
+    Torque tables and your own controllers need Python: dynx.simulate.
 
-    There are no contacts: nothing stands on the ground, and links do not collide.
+    Contacts are not simulated: there is no ground, and links do not collide.
 
-    Shown for each joint are the largest and the root mean square error, the largest speed, and the largest
-    torque beside its limit.
+    The table shows for each joint the maximum and the root mean square tracking error, the maximum speed,
+    and the maximum torque beside its limit.
 
-    Exit code 0 when the simulation reached its end; 1 when it did not: it diverged, or the law gave no
-    torque that can be applied, and then what was computed is shown and written all the same; 2 when some
-    input cannot be used. Ctrl-C ends it with what is computed so far, and 130; --resume goes on.
+    Exit code 0 when the simulation reached its end; 1 when it diverged or the controller returned an
+    invalid torque, and then the results so far are shown and written; 2 when some input cannot be used.
+    Ctrl-C ends it with the results so far and exit code 130; --resume continues it.
 
     \b
     Examples:
@@ -67,31 +65,3 @@ def sim(ctx: click.Context, /, robot: str | None, tutorial: bool, **given: Any) 
       dynx sim pendulum --q0 1.5 --controller none --integrator rk4 --duration 10 --save swing.npz
       dynx sim --tutorial
     """
-    from dynx.cli.sim.outputs import Outputs
-
-    outputs = Outputs(given.pop("save"), given.pop("plot"))
-    as_json: bool = given.pop("as_json")
-    if tutorial:
-        from dynx.cli.sim.tutorial_run import run_tutorial
-
-        _refuse_beside_tutorial(ctx)
-        outputs.check()
-        return run_tutorial(robot, given, outputs.plot, as_json=as_json)
-    if robot is None:
-        raise click.UsageError("ROBOT is missing; only --tutorial has one of its own", ctx)
-    from dynx.cli.sim.request import prepare
-    from dynx.cli.sim.run import run_sim
-
-    outputs.check()
-    return run_sim(prepare({"robot": robot, **given}), outputs, as_json=as_json)
-
-
-def _refuse_beside_tutorial(ctx: click.Context) -> None:
-    """Raise for an option that all modes of control have no use for: none is passed over in silence."""
-    for param in ctx.command.params:
-        source = ctx.get_parameter_source(param.name or "")
-        given = source is not None and source is not click.core.ParameterSource.DEFAULT
-        if given and param.name not in sim_options.OF_TUTORIAL:
-            raise click.UsageError(
-                f"{param.opts[0]} is of one simulation, and --tutorial does all modes", ctx
-            )

@@ -4,21 +4,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from dynx import trajectory
-from dynx.cli.shell.configuration_input import chosen_frame, configuration
-from dynx.cli.shell.target_input import target_pose
+from dynx.cli.shell.inputs import Numbers, chosen_frame, configuration, target_pose
+from dynx.cli.shell.terminal import counted
 from dynx.cli.sim.options import PROFILES
-from dynx.errors import ArgumentError
+from dynx.errors import ArgumentError, LimitError, LimitViolation, shown
 from dynx.model import Model
 from dynx.sim.loop.clock import positive
 from dynx.sim.named_controllers import CONTROLLERS
 from dynx.spatial.scalar import Floats
 from dynx.trajectory import Trajectory
-
-if TYPE_CHECKING:
-    from dynx.cli.shell.configuration_input import Numbers
 
 DURATION = 2.0
 """Of a motion whose time is free [s]."""
@@ -160,3 +157,22 @@ def _refuse_contradictions(asked: MotionInput) -> None:
 def _given(limit: Limit | None) -> Limit:
     assert limit is not None
     return limit
+
+
+def limit_message(error: LimitError, robot: str, *, ignorable: bool) -> str:
+    """Name each violated limit, and the options that help; `ignorable` where --ignore-limits is one."""
+    if not error.violations:  # not a limit of joints
+        return str(error)
+    listed = "; ".join(map(_violation, error.violations))
+    too_fast = any(each.quantity == "velocity" for each in error.violations)
+    hints = ["a longer --duration lowers velocities"] * too_fast
+    hints += ["--ignore-limits simulates it nevertheless"] * ignorable
+    hint = f" ({'; '.join(hints)})" if hints else ""
+    return f"the motion violates {counted(len(error.violations), 'limit')} of {robot}: {listed}{hint}"
+
+
+def _violation(broken: LimitViolation) -> str:
+    return (
+        f"{broken.quantity} of {shown(broken.joint)} is {broken.value:.6g} at {broken.time:.6g} s, "
+        f"limit {broken.limit:.6g}"
+    )

@@ -5,14 +5,12 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 from importlib.util import find_spec
-from typing import TYPE_CHECKING
 
 from dynx.cli.shell.output_file import check_writable
 from dynx.errors import ArgumentError, NotInstalledError, shown
 from dynx.files.figures import picture_format
-
-if TYPE_CHECKING:
-    from dynx.sim import Rollout
+from dynx.sim import Rollout
+from dynx.sim.record.formats import WRITERS
 
 
 @dataclass(frozen=True)
@@ -39,7 +37,7 @@ class Outputs:
             if self.files.count(path) > 1:
                 raise ArgumentError(f"{shown(path, 300)} would be written twice")
         if self.plot is not None:
-            check_picture(self.plot)
+            picture_format(self.plot)
 
     def write(self, rollout: Rollout) -> None:
         """Write all of them. Raises ArgumentError where the system does not let it."""
@@ -54,8 +52,6 @@ def check_record(path: str) -> None:
 
     NotInstalledError where the format needs a package that is missing.
     """
-    from dynx.sim.record.formats import WRITERS
-
     suffix = os.path.splitext(path)[1].lower()
     if suffix not in WRITERS:
         raise ArgumentError(
@@ -63,8 +59,3 @@ def check_record(path: str) -> None:
         )
     if suffix == ".mcap" and find_spec("mcap") is None:
         raise NotInstalledError("--save with .mcap needs mcap: pip install 'dynx[mcap]'")
-
-
-def check_picture(path: str) -> None:
-    """Raise NotInstalledError without matplotlib, ArgumentError for a name with no format of its."""
-    picture_format(path)

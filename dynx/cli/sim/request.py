@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from dynx.backends.registry import backend_class
-from dynx.cli.shell.configuration_input import configuration, velocity
+from dynx.cli.shell.inputs import configuration, velocity
 from dynx.cli.sim.motion import Motion, MotionInput, planned
 from dynx.cli.sim.values import Coefficients, PayloadInput, PushInput
 from dynx.control import EngineMotor, FrictionCompensation, ModelBased
@@ -18,13 +18,11 @@ from dynx.control.saturation import checked_limit
 from dynx.errors import ArgumentError, UnsupportedFeatureError
 from dynx.model import Model
 from dynx.model.loading import load
+from dynx.model.model import Base
 from dynx.sim import Noise, Payload, Push, Rollout
 from dynx.sim.loop.clock import Clock
 from dynx.sim.named_controllers import ControllerRequest, Gains, named_controller
 from dynx.simd.machine import LARGEST_SHARE, memory
-
-if TYPE_CHECKING:
-    from dynx.model.model import Base
 
 GAINS = ("kp", "kd", "ki", "natural_frequency", "damping_ratio", "posture_kp", "posture_kd")
 PASSED_ON = ("plant", "integrator", "dt", "substeps", "control_dt", "delay", "position_limits")

@@ -1,24 +1,52 @@
-"""One simulation with progress, and the end of it also where it diverged or Ctrl-C came."""
+"""Run of ``dynx sim``: one simulation with progress, then its files, tables and exit code."""
 
 from __future__ import annotations
 
 import time
+from typing import Any
+
+import click
 
 from dynx.cli.shell.exits import ANSWER_IS_NO, BAD_INPUT, DONE, INTERRUPTED, complain
 from dynx.cli.shell.interruption import interruptible
 from dynx.cli.shell.progress import progress_bar
 from dynx.cli.shell.terminal import console, echo_json
 from dynx.cli.sim.document import document
-from dynx.cli.sim.limits import limits_said
+from dynx.cli.sim.motion import limit_message
+from dynx.cli.sim.options import TUTORIAL_OPTIONS
 from dynx.cli.sim.outputs import Outputs
-from dynx.cli.sim.request import Prepared
+from dynx.cli.sim.request import Prepared, prepare
 from dynx.cli.sim.tables import show
+from dynx.cli.sim.tutorial_run import run_tutorial
 from dynx.errors import ArgumentError, DynxError, LimitError, SimulationError
 from dynx.sim import Rollout, RolloutInterrupted, simulate
 
 
+def sim(robot: str | None, tutorial: bool, as_json: bool, **given: Any) -> int:
+    """Simulate the robot, or all controllers of the tutorial; return the exit code."""
+    context = click.get_current_context()
+    outputs = Outputs(given.pop("save"), given.pop("plot"))
+    if tutorial:
+        _refuse_beside_tutorial(context)
+        outputs.check()
+        return run_tutorial(robot, given, outputs.plot, as_json=as_json)
+    if robot is None:
+        raise click.UsageError("ROBOT is missing; only --tutorial has a default", context)
+    outputs.check()
+    return run_sim(prepare({"robot": robot, **given}), outputs, as_json=as_json)
+
+
+def _refuse_beside_tutorial(context: click.Context) -> None:
+    """Raise UsageError for an option that has no effect with ``--tutorial``."""
+    for param in context.command.params:
+        source = context.get_parameter_source(param.name or "")
+        given = source is not None and source is not click.core.ParameterSource.DEFAULT
+        if given and param.name not in TUTORIAL_OPTIONS:
+            raise click.UsageError(f"{param.opts[0]} has no effect with --tutorial", context)
+
+
 def run_sim(prepared: Prepared, outputs: Outputs, *, as_json: bool) -> int:
-    """Simulate, write what there is and show it; the exit code."""
+    """Simulate, write the files and show the results, also of a part; return the exit code."""
     ended: SimulationError | RolloutInterrupted | None = None
     started = time.perf_counter()
     with interruptible() as interruption:
@@ -30,7 +58,7 @@ def run_sim(prepared: Prepared, outputs: Outputs, *, as_json: bool) -> int:
             complain("interrupted before the first step")
             return interruption.code or INTERRUPTED
         except LimitError as error:
-            raise ArgumentError(limits_said(error, prepared.model.name, ignorable=True)) from error
+            raise ArgumentError(limit_message(error, prepared.model.name, ignorable=True)) from error
         seconds = time.perf_counter() - started
         interruption.finishing = True
         unwritten = _write(outputs, rollout)
@@ -40,7 +68,7 @@ def run_sim(prepared: Prepared, outputs: Outputs, *, as_json: bool) -> int:
         else:
             show(console(), made)
         if ended is not None:
-            complain(f"{ended}{_kept(outputs, unwritten, goes_on=isinstance(ended, RolloutInterrupted))}")
+            complain(f"{ended}{_saved(outputs, unwritten, resumable=isinstance(ended, RolloutInterrupted))}")
         if unwritten is not None:
             complain(str(unwritten))
     if interruption.code is not None:
@@ -64,7 +92,7 @@ def _simulated(prepared: Prepared) -> Rollout:
 
 
 def _write(outputs: Outputs, rollout: Rollout) -> DynxError | None:
-    """Write the files; why not, where they cannot be. What is shown must not be lost by that."""
+    """Write the files; return the error where that fails, so that the tables are still shown."""
     try:
         outputs.write(rollout)
     except DynxError as error:
@@ -72,10 +100,10 @@ def _write(outputs: Outputs, rollout: Rollout) -> DynxError | None:
     return None
 
 
-def _kept(outputs: Outputs, unwritten: DynxError | None, *, goes_on: bool) -> str:
-    """Where to find what was computed until then, and how to go on where that makes sense."""
+def _saved(outputs: Outputs, unwritten: DynxError | None, *, resumable: bool) -> str:
+    """Name the files with the results so far, and the option that continues from them."""
     if not outputs.save or unwritten is not None:
         return ""
     complete = [path for path in outputs.save if path.lower().endswith(".npz")]
-    hint = f"; the same command with --resume {complete[0]} goes on" if goes_on and complete else ""
-    return f"; what was computed is in {' and '.join(outputs.save)}{hint}"
+    hint = f"; the same command with --resume {complete[0]} continues" if resumable and complete else ""
+    return f"; the results so far are in {' and '.join(outputs.save)}{hint}"

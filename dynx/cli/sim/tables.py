@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from dynx.cli.shell.configuration_input import default_said
+from rich.console import Console
+
 from dynx.cli.shell.exits import one_line
+from dynx.cli.shell.inputs import default_frame_note
 from dynx.cli.shell.tables import Table
 from dynx.cli.shell.terminal import counted, number
 from dynx.cli.sim.numbers import column_text, error_text, share_text
 from dynx.cli.sim.perturbed import perturbed, spread
-
-if TYPE_CHECKING:
-    from rich.console import Console
 
 Entry = dict[str, Any]
 
@@ -61,7 +60,7 @@ def _show_header(out: Console, made: Entry) -> None:
         f"gravity {' '.join(number(g) for g in made['gravity'])} m/s^2"
     )
     if made["frame"] is not None and not made["frame_given"]:
-        out.print(default_said(made["frame"]))
+        out.print(default_frame_note(made["frame"]))
     gains = [f"{name} {spread(gain)}" for name, gain in made["gains"].items() if gain]
     if gains:
         out.print(", ".join(gains))

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from dynx._version import __version__
-from dynx.cli.shell.configuration_input import configuration
 from dynx.cli.shell.exits import ANSWER_IS_NO, BAD_INPUT, DONE, complain, one_line
+from dynx.cli.shell.inputs import configuration
 from dynx.cli.shell.interruption import interruptible
 from dynx.cli.shell.progress import progress_bar
 from dynx.cli.shell.terminal import console, counted, echo_json
-from dynx.cli.sim.limits import limits_said
+from dynx.cli.sim.motion import limit_message
 from dynx.cli.sim.tutorial_tables import show
 from dynx.errors import ArgumentError, DynxError, LimitError
 from dynx.model.loading import load
@@ -127,4 +127,4 @@ def _experiments(robot: str | None, given: dict[str, Any]) -> Tutorial:
             model, start=start, to=to, duration=duration, dt=given["dt"], backend=given["backend"]
         )
     except LimitError as error:
-        raise ArgumentError(limits_said(error, model.name, ignorable=False)) from error
+        raise ArgumentError(limit_message(error, model.name, ignorable=False)) from error

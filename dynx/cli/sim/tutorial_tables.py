@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+from rich.console import Console
 
 from dynx.cli.shell.exits import one_line
 from dynx.cli.shell.tables import Table
 from dynx.cli.shell.terminal import counted, number
 from dynx.cli.sim.numbers import error_text
-
-if TYPE_CHECKING:
-    from rich.console import Console
 
 Entry = dict[str, Any]
 

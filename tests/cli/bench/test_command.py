@@ -21,7 +21,6 @@ from dynx.bench.implementations import Way
 from dynx.bench.report import document
 from dynx.bench.roofline import Peak
 from dynx.bench.session import BATCHES, QUICK_REPETITIONS, REPETITIONS
-from dynx.cli.bench.command import QUANTITIES
 from dynx.cli.bench.run import run_bench
 from dynx.cli.bench.tables import show
 from dynx.cli.shell.main import cli
@@ -44,11 +43,16 @@ def bench(*arguments: str) -> Result:
 
 
 def test_the_options_are_those_of_the_library() -> None:
-    assert tuple(ARGUMENTS) == QUANTITIES
     text = " ".join(bench("--help").output.split())
     one, few, many = BATCHES
     assert f"(default: {one}, {few} and {many})" in text
     assert f"{QUICK_REPETITIONS} repetitions instead of {REPETITIONS}" in text
+
+
+def test_a_wrong_quantity_lists_those_of_the_library() -> None:
+    result = bench("double_pendulum", "--quantity", "curvature")
+    assert result.exit_code == 2
+    assert f"known: {', '.join(ARGUMENTS)} " in result.stderr
 
 
 def test_a_table_for_each_work() -> None:

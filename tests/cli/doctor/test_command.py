@@ -213,7 +213,7 @@ def test_a_file_that_changed_meanwhile_is_left_as_it_is(arm: Path) -> None:
 
 def test_the_help_states_the_defaults_of_the_library() -> None:
     text = " ".join(CliRunner().invoke(cli, ["doctor", "--help"]).stdout.split())
-    assert f"Random states per robot (default: {DEFAULT_SAMPLES})" in text
+    assert f"Number of random states per robot (default: {DEFAULT_SAMPLES})" in text
     assert f"[default: {BAR:g};" in text
 
 

@@ -18,13 +18,14 @@ from dynx.cli.doctor.as_loaded import vote_lines
 from dynx.cli.doctor.conclusion import Conclusion
 from dynx.cli.doctor.mending import planned_targets, write_mended
 from dynx.cli.doctor.outputs import Outputs, save_counterexamples
+from dynx.cli.doctor.run import doctor_run
 from dynx.cli.doctor.tables import show_many, show_one
-from dynx.cli.doctor.task import DoctorTask, doctor_run, examine, missing_engines
 from dynx.cli.shell.run import carry_out
 from dynx.doctor.formats import read_baseline
 from dynx.doctor.formats.baseline import Baseline
 from dynx.doctor.formats.vote import vote
 from dynx.doctor.report import DoctorReport, EngineResult, PairError
+from dynx.doctor.task import DoctorTask, examine, missing_engines
 from dynx.errors import ArgumentError, NotInstalledError
 from dynx.model.expansion import RobotInput
 from dynx.model.loading import load
@@ -169,7 +170,7 @@ def test_a_missing_engine_is_a_line_that_says_what_to_install(
     def absent(name: str) -> None:
         raise NotInstalledError(f"the engine {name!r} needs a package: pip install 'dynx[{name}]'")
 
-    monkeypatch.setattr("dynx.loaded.registry.loader_class", absent)
+    monkeypatch.setattr("dynx.doctor.task.loader_class", absent)
     assert [line.split("'")[1] for line in missing_engines([differing(), alike()])] == ["drake"]
     assert missing_engines([refused()]) == []
     concluded([differing()], tmp_path, engines=None)

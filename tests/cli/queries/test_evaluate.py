@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dynx.backends import backend
-from dynx.cli.shell.configuration_input import default_frame
+from dynx.cli.shell.inputs import default_frame
 from dynx.cli.shell.main import cli
 from dynx.cli.shell.options import number_list
 from dynx.cli.shell.terminal import counted

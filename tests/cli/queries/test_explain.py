@@ -9,7 +9,6 @@ import pytest
 from click.testing import CliRunner
 from rich.console import Console
 
-from dynx.cli.shell import terminal
 from dynx.cli.shell.main import cli
 from dynx.rules import Rule, all_rules, find_rule
 
@@ -72,7 +71,7 @@ def test_a_terminal_gets_the_same_words_laid_out(
     def terminal_console(*, err: bool = False) -> Console:
         return Console(file=sys.stdout, force_terminal=True, width=width, color_system=None, soft_wrap=True)
 
-    monkeypatch.setattr(terminal, "console", terminal_console)
+    monkeypatch.setattr("dynx.cli.queries.explain.console", terminal_console)
     with pytest.raises(SystemExit) as ended:
         cli.main(["explain", "DX514"])
     assert ended.value.code == 0

@@ -12,14 +12,15 @@ from click.testing import CliRunner
 
 from dynx._version import __version__
 from dynx.agreement.agreement import DEFAULT_SAMPLES
-from dynx.cli.shell.main import CommandLine, cli
+from dynx.cli.shell.main import COMMANDS, CommandLine, cli
+from dynx.doctor.diagnosis import DEFAULT_SAMPLES as DEFAULT_STATES
 
 
 def test_version() -> None:
     assert CliRunner().invoke(cli, ["--version"]).output == f"dynx {__version__}\n"
 
 
-@pytest.mark.parametrize("name", [None, *cli.commands])
+@pytest.mark.parametrize("name", [None, *COMMANDS])
 def test_help_of_every_command_has_examples(name: str | None) -> None:
     result = CliRunner().invoke(cli, ["--help"] if name is None else [name, "--help"])
     assert result.exit_code == 0
@@ -33,7 +34,8 @@ def test_no_argument_gives_help() -> None:
 
 
 def test_the_default_of_samples_is_that_of_agree() -> None:
-    assert f"(default: {DEFAULT_SAMPLES})" in CliRunner().invoke(cli, ["agree", "--help"]).output
+    text = " ".join(CliRunner().invoke(cli, ["agree", "--help"]).output.split())
+    assert f"(default: {DEFAULT_SAMPLES}; with --as-loaded {DEFAULT_STATES})" in text
 
 
 def test_starting_imports_nothing_slow() -> None:

@@ -54,7 +54,7 @@ def test_a_simulation_that_diverges_keeps_its_record(tmp_path: Path) -> None:
     assert result.exit_code == 1
     assert result.stderr.count("\n") == 1
     assert "diverged in step 2, at 0.002 s" in result.stderr
-    assert f"what was computed is in {target}" in result.stderr
+    assert f"the results so far are in {target}" in result.stderr
     assert "--resume" not in result.stderr
     assert "2 steps of 0.001 s" in result.stdout
     assert len(Rollout.load(target)) == 2
@@ -112,7 +112,7 @@ def test_an_interrupted_run_keeps_what_is_done(number: int, code: int, tmp_path:
     assert "Traceback" not in err
     assert err.count("\n") == 1
     assert "interrupted after " in err
-    assert f"the same command with --resume {target} goes on" in err
+    assert f"the same command with --resume {target} continues" in err
     assert "largest error" in out
     assert 0 < len(Rollout.load(target)) < 200_000
 

@@ -38,10 +38,10 @@ def document(*arguments: str, code: int = 0) -> dict[str, Any]:
 
 
 def test_what_takes_part_is_an_option_of_the_command() -> None:
-    assert {str(param.name) for param in command.params} >= sim_options.OF_TUTORIAL
+    assert {str(param.name) for param in command.params} >= sim_options.TUTORIAL_OPTIONS
     help_text = {param.name: param for param in command.params}["tutorial"].to_info_dict()["help"]
     for param in command.params:
-        if param.name in sim_options.OF_TUTORIAL - {"tutorial", "robot"}:
+        if param.name in sim_options.TUTORIAL_OPTIONS - {"tutorial", "robot"}:
             assert param.opts[0] in help_text
 
 
@@ -145,11 +145,11 @@ def test_a_plot_that_cannot_be_written_loses_no_table(
 @pytest.mark.parametrize(
     ("arguments", "clue"),
     [
-        (["--controller", "pd"], "--controller is of one simulation"),
-        (["--base", "floating"], "--base is of one simulation"),
-        (["--kp", "1"], "--kp is of one simulation"),
-        (["--plant", "pinocchio"], "--plant is of one simulation"),
-        (["--save", "x.npz"], "--save is of one simulation"),
+        (["--controller", "pd"], "--controller has no effect with --tutorial"),
+        (["--base", "floating"], "--base has no effect with --tutorial"),
+        (["--kp", "1"], "--kp has no effect with --tutorial"),
+        (["--plant", "pinocchio"], "--plant has no effect with --tutorial"),
+        (["--save", "x.npz"], "--save has no effect with --tutorial"),
         (["panda"], "6 coordinates and panda has 8"),
         (["nosuch"], "no robot 'nosuch'"),
         (["--to", "0,0,0"], "--to has 3 numbers"),

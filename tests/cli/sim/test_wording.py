@@ -10,10 +10,10 @@ import pytest
 
 import dynx
 from dynx import control
-from dynx.cli.sim import options as sim_options
 from dynx.cli.sim.numbers import column_text, share_text
 from dynx.cli.sim.overshoot import overshoot
 from dynx.sim import simulate
+from dynx.sim.named_controllers import CONTROLLERS
 from tests.cli.sim.command import SHORT, document, sim
 
 ELBOW = ["ur5", "--to", "elbow_joint=1"]
@@ -99,15 +99,15 @@ def test_limits_that_are_broken_are_told_apart() -> None:
     result = sim("ur5", *motion)
     assert result.exit_code == 2
     assert result.stderr == (
-        "dynx: error: the motion breaks 2 limits of ur5: "
-        "velocity of 'elbow_joint' is 60 at 0.05 s, beyond 3.15; "
-        "velocity of 'wrist_1_joint' is 60 at 0.05 s, beyond 3.2 "
-        "(a longer --duration is slower; --ignore-limits follows it all the same)\n"
+        "dynx: error: the motion violates 2 limits of ur5: "
+        "velocity of 'elbow_joint' is 60 at 0.05 s, limit 3.15; "
+        "velocity of 'wrist_1_joint' is 60 at 0.05 s, limit 3.2 "
+        "(a longer --duration lowers velocities; --ignore-limits simulates it nevertheless)\n"
     )
     tutorial = sim("--tutorial", "--duration", "0.2").stderr
     assert "; velocity of " in tutorial
     assert "--ignore-limits" not in tutorial
-    assert tutorial.endswith("(a longer --duration is slower)\n")
+    assert tutorial.endswith("(a longer --duration lowers velocities)\n")
 
 
 def test_the_document_has_objects_for_what_was_asked() -> None:
@@ -284,11 +284,11 @@ def test_the_error_of_the_frame_itself() -> None:
 def test_a_controller_that_is_none_of_them_lists_all() -> None:
     result = sim(*ELBOW, "--controller", "lqr")
     assert result.exit_code == 2
-    assert f"there is no 'lqr'; known: {', '.join(sim_options.CONTROLLERS)} " in result.stderr
+    assert f"there is no 'lqr'; known: {', '.join(['none', *CONTROLLERS])} " in result.stderr
 
 
 def test_the_help_says_what_is_not_simulated() -> None:
-    assert "nothing stands on the ground, and links do not collide" in sim("--help").stdout
+    assert "there is no ground, and links do not collide" in " ".join(sim("--help").stdout.split())
 
 
 def test_a_plot_says_in_which_axes_a_base_is() -> None:

@@ -1,33 +1,34 @@
-"""From the words of a command to a model, a backend, a frame and the numbers of one sample."""
+"""Command-line input as objects: a backend, a frame, a configuration, a velocity, a target pose."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
+import numpy as np
+
+from dynx.backends.base import Backend
+from dynx.backends.registry import backend
 from dynx.cli.shell.exits import one_line
-
-if TYPE_CHECKING:
-    from dynx.backends import Backend
-    from dynx.model import Model
-    from dynx.model.model import Base
-    from dynx.spatial.scalar import Floats
+from dynx.errors import ArgumentError, NotInstalledError, UnknownNameError, nearest, shown
+from dynx.model import Model
+from dynx.model.configuration import checked_array, checked_q
+from dynx.model.loading import load
+from dynx.model.model import Base
+from dynx.spatial.scalar import Floats
+from dynx.spatial.se3 import homogeneous
+from dynx.spatial.so3 import rotation_from_quat, rotation_from_rpy
 
 Numbers = Sequence[float] | Mapping[str, float] | None
-"""What an option such as ``--q`` gave: a list, values by joint, or nothing."""
+"""Value of an option such as ``--q``: a list, values by joint, or None where it was not given."""
 
 _LISTED_NAMES = 8
-"""Coordinates named in the message about a wrong count."""
+"""Number of coordinates listed in the message about a wrong count."""
 
 
 def open_backend(
     robot: str, base: Base, lock: tuple[tuple[str, float], ...], backend_name: str | None
 ) -> Backend:
-    """The backend of a robot by its name; None means Pinocchio if it is installed, else `reference`."""
-    from dynx.backends.registry import backend
-    from dynx.errors import NotInstalledError
-    from dynx.model.loading import load
-
+    """Open the backend of a robot by its name; None is Pinocchio if it is installed, else `reference`."""
     model = load(robot, base=base, lock=dict(lock))
     if backend_name is not None:
         return backend(backend_name, model)
@@ -38,41 +39,57 @@ def open_backend(
 
 
 def configuration(model: Model, given: Numbers, option: str = "--q", default: Floats | None = None) -> Floats:
-    """q: as given, or `default` (neutral if None) with the joints that are given by name put in."""
-    from dynx.model.configuration import checked_q
-
+    """Return q (nq,): `given`, where joints without a value keep `default` (None: the neutral one)."""
     base = ["x", "y", "z", "qx", "qy", "qz", "qw"] if model.floating else []
     start = model.neutral() if default is None else default.copy()
     return checked_q(model, _filled(model, given, start, base, option), option)
 
 
 def velocity(model: Model, given: Numbers, option: str) -> Floats:
-    """v, a or tau: as given to `option`, or zero with the joints that are given by name put in."""
-    import numpy as np
-
-    from dynx.model.configuration import checked_array
-
+    """Return v, a or tau (nv,): `given`, where joints without a value are zero."""
     filled = _filled(model, given, np.zeros(model.nv), _base_velocity(model), option)
     return checked_array(option, filled, model.nv)
 
 
 def velocity_names(model: Model) -> list[str]:
-    """What each entry of v, a and tau belongs to."""
+    """Name the coordinate of each entry of v, a and tau."""
     return [*_base_velocity(model), *model.joint_names]
 
 
+def target_pose(given: Numbers, option: str) -> Floats:
+    """Return a position (3,) or a pose (4, 4) from the numbers of `option`."""
+    if not isinstance(given, list):
+        raise ArgumentError(f"{option} takes numbers without names")
+    numbers = np.array(given)
+    if len(numbers) == 3:
+        return numbers
+    if len(numbers) == 6:
+        return homogeneous(rotation_from_rpy(numbers[3:]), numbers[:3])
+    if len(numbers) == 7:
+        norm = float(np.linalg.norm(numbers[3:]))
+        if abs(norm - 1.0) > 1e-3:
+            raise ArgumentError(f"{option}: the quaternion has norm {norm:.6g}; wanted 1")
+        return homogeneous(rotation_from_quat(numbers[3:] / norm), numbers[:3])
+    if len(numbers) == 16:
+        return numbers.reshape(4, 4)
+    raise ArgumentError(
+        f"{option}: wanted 3 numbers (position), 6 (with roll, pitch, yaw), "
+        f"7 (with a quaternion qx,qy,qz,qw) or 16 (a matrix); got {len(numbers)}"
+    )
+
+
 def chosen_frame(model: Model, given: str | None) -> str:
-    """The frame that ``--frame`` gave, or else the default one."""
+    """Return the frame that ``--frame`` gave, or the default."""
     return default_frame(model) if given is None else given
 
 
-def default_said(frame: str) -> str:
-    """The line that says which frame was taken when none was given."""
+def default_frame_note(frame: str) -> str:
+    """Make the line that names the frame used without ``--frame``."""
     return f"frame {one_line(frame)} ends the longest chain of moving joints; --frame chooses another"
 
 
 def default_frame(model: Model) -> str:
-    """The end of the longest chain of moving joints; of several, the last in `frame_names`."""
+    """Return the end of the longest chain of moving joints; of several, the last in `frame_names`."""
     moving, joints = {model.root: 0}, {model.root: 0}
     for joint in model.joints:
         moving[joint.child] = moving[joint.parent] + joint.moves
@@ -86,11 +103,7 @@ def _base_velocity(model: Model) -> list[str]:
 
 
 def _filled(model: Model, given: Numbers, default: Floats, base: Sequence[str], option: str) -> Floats:
-    """What `option` gave, in an array like `default`, whose first entries are those of the `base`."""
-    import numpy as np
-
-    from dynx.errors import ArgumentError
-
+    """Fill an array like `default`, whose first entries are those of the `base`, from the option."""
     if given is None:
         return default
     if isinstance(given, Mapping):
@@ -107,9 +120,7 @@ def _filled(model: Model, given: Numbers, default: Floats, base: Sequence[str], 
 
 
 def _joint_number(model: Model, name: str, option: str) -> int:
-    """Position in `joint_names`, or an error that says why there is none."""
-    from dynx.errors import UnknownNameError, nearest, shown
-
+    """Return the position in `joint_names`, or raise an error with the reason why there is none."""
     if name in model.joint_names:
         return model.joint_names.index(name)
     if all(joint.name != name for joint in model.joints):

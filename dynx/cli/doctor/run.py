@@ -1,0 +1,73 @@
+"""Run of ``dynx doctor``: the examination of each robot in a worker process, then its conclusion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Literal
+
+from dynx.cli.doctor.conclusion import Conclusion, DoctorRun
+from dynx.cli.doctor.mending import planned_targets
+from dynx.cli.doctor.outputs import Outputs
+from dynx.cli.shell.run import Run, carry_out
+from dynx.doctor.formats.baseline import load_baseline
+from dynx.doctor.report import DoctorReport
+from dynx.doctor.task import DoctorTask, check_engines, examine, refused
+from dynx.errors import DynxError
+from dynx.model.expansion import expand, refusals
+from dynx.model.model import Base
+from dynx.rules.choices import checked_choices
+
+
+def doctor(
+    robots: tuple[str, ...],
+    base: Literal["fixed", "floating", "both"],
+    engines: tuple[str, ...] | None,
+    samples: int | None,
+    seed: int,
+    tolerance: float,
+    choose: tuple[tuple[str, str], ...],
+    fix: str | None,
+    in_place: bool,
+    json_path: str | None,
+    html: str | None,
+    junit: str | None,
+    sarif: str | None,
+    baseline_path: str | None,
+    write_baseline: str | None,
+    counterexamples: str,
+    jobs: int | None,
+    timeout: float,
+    quiet: bool,
+) -> int:
+    """Examine each robot; return the exit code."""
+    outputs = Outputs(json_path, html, junit, sarif, write_baseline)
+    outputs.check()
+    choices = tuple(checked_choices(choose).items())
+    check_engines(engines)
+    baseline = None if baseline_path is None else load_baseline(baseline_path)
+    inputs = expand(robots)
+    bases: tuple[Base, ...] = ("fixed", "floating") if base == "both" else (base,)
+    targets = planned_targets(inputs, fix, in_place=in_place, bases=len(bases))
+    outputs.keep_apart((each.robot for each in inputs), () if in_place else targets, baseline_path)
+    examined = [(each, one) for each in inputs for one in bases]
+    run = doctor_run(
+        [DoctorTask(each.robot, one, engines, samples, seed, tolerance, choices) for each, one in examined],
+        refusals=refusals([each for each, _ in examined]),
+    )
+    conclusion = Conclusion(run, outputs, baseline, targets, in_place, counterexamples, engines)
+    return carry_out(run, jobs, timeout, quiet, lambda: conclusion.reach(quiet=quiet))
+
+
+def doctor_run(
+    tasks: Sequence[DoctorTask],
+    target: Callable[[DoctorTask], DoctorReport] = examine,
+    refusals: dict[int, DynxError] | None = None,
+) -> DoctorRun:
+    """Prepare the run of ``dynx doctor`` or of ``dynx agree --as-loaded``."""
+    return Run(tasks, target, refused, _problem, "examining", refusals)
+
+
+def _problem(report: DoctorReport) -> str | None:
+    if report.error is not None:
+        return "refused"
+    return None if report.alike else "differ"
