@@ -10,11 +10,11 @@ import pytest
 
 from dynx.spatial.scalar import Floats
 from tests.contract.conftest import Make
-from tests.contract.questions import QUESTIONS, Question, State, random_state
+from tests.contract.engine_calls import ENGINE_CALLS, EngineCall, State, random_state
 from tests.contract.robots import branched
 
 FLOATING = branched().with_base("floating")
-each_question = pytest.mark.parametrize("question", QUESTIONS, ids=str)
+each_call = pytest.mark.parametrize("engine_call", ENGINE_CALLS, ids=str)
 
 
 def every_other(x: Floats) -> Floats:
@@ -52,61 +52,63 @@ SPELLINGS: tuple[Callable[[Floats], Any], ...] = (
 
 
 @pytest.mark.parametrize("spelling", SPELLINGS, ids=lambda spelling: spelling.__name__)
-@each_question
+@each_call
 def test_any_array_of_the_same_numbers(
-    make: Make, question: Question, spelling: Callable[[Floats], Any]
+    make: Make, engine_call: EngineCall, spelling: Callable[[Floats], Any]
 ) -> None:
     engine = make(FLOATING)
     for size in ((), (3,)):
         state = random_state(FLOATING, 11, size)
-        answer = question.ask(engine, state.map(spelling))
-        question.check(engine, state, answer, question.ask(engine, state))
+        answer = engine_call.evaluate(engine, state.map(spelling))
+        engine_call.check(engine, state, answer, engine_call.evaluate(engine, state))
 
 
 @pytest.mark.parametrize("dtype", ["float32", "float16", "int64", "int8", "uint8"])
-@each_question
-def test_other_real_numbers_are_taken_at_their_value(make: Make, question: Question, dtype: str) -> None:
+@each_call
+def test_other_real_numbers_are_taken_at_their_value(make: Make, engine_call: EngineCall, dtype: str) -> None:
     engine = make(FLOATING)
     narrow = random_state(FLOATING, 12).map(lambda x: np.rint(np.abs(x)).astype(dtype))
     narrow.q[3:7] = np.array([0, 0, 1, 0], dtype=dtype)
-    answer = question.ask(engine, narrow)
-    np.testing.assert_array_equal(answer, question.ask(engine, narrow.map(np.float64)))
+    answer = engine_call.evaluate(engine, narrow)
+    np.testing.assert_array_equal(answer, engine_call.evaluate(engine, narrow.map(np.float64)))
     assert np.asarray(answer).dtype == np.float64
 
 
-@each_question
-def test_arguments_stay_as_they_were(make: Make, question: Question) -> None:
+@each_call
+def test_arguments_stay_as_they_were(make: Make, engine_call: EngineCall) -> None:
     engine = make(FLOATING)
     for size in ((), (2,)):
         state = random_state(FLOATING, 13, size)
         before = state.map(np.copy)
-        question.ask(engine, state)
+        engine_call.evaluate(engine, state)
         for name in ("q", "v", "a", "tau"):
             np.testing.assert_array_equal(getattr(state, name), getattr(before, name))
 
 
-@each_question
-def test_answers_belong_to_the_caller(make: Make, question: Question) -> None:
+@each_call
+def test_answers_belong_to_the_caller(make: Make, engine_call: EngineCall) -> None:
     engine = make(FLOATING)
     for size in ((), (2,)):
         state = random_state(FLOATING, 14, size)
-        first = np.asarray(question.ask(engine, state))
+        first = np.asarray(engine_call.evaluate(engine, state))
         kept = first.copy()
-        others = [np.asarray(question.ask(engine, state)) for _ in range(2)]
+        others = [np.asarray(engine_call.evaluate(engine, state)) for _ in range(2)]
         for argument in (state.q, state.v, state.a, state.tau):
             assert not np.shares_memory(first, argument)
         assert not any(np.shares_memory(first, other) for other in others)
         if size or first.ndim:
             assert first.flags.writeable
             first[...] = np.nan
-        np.testing.assert_array_equal(question.ask(engine, state), kept)
-        question.ask(engine, random_state(FLOATING, 15, size))
+        np.testing.assert_array_equal(engine_call.evaluate(engine, state), kept)
+        engine_call.evaluate(engine, random_state(FLOATING, 15, size))
         np.testing.assert_array_equal(others[0], kept)
 
 
-@each_question
-def test_without_validation_the_answers_are_the_same(make: Make, question: Question) -> None:
+@each_call
+def test_without_validation_the_answers_are_the_same(make: Make, engine_call: EngineCall) -> None:
     checked, trusting = make(FLOATING), make(FLOATING, validate=False)
     for size in ((), (2,)):
         state: State = random_state(FLOATING, 16, size)
-        np.testing.assert_array_equal(question.ask(trusting, state), question.ask(checked, state))
+        np.testing.assert_array_equal(
+            engine_call.evaluate(trusting, state), engine_call.evaluate(checked, state)
+        )

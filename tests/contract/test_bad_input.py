@@ -26,13 +26,13 @@ from dynx.errors import (
 from dynx.model.configuration import TOO_LARGE
 from dynx.model.loading import load
 from tests.contract.conftest import Make
-from tests.contract.questions import QUESTIONS, Question, State, random_state
+from tests.contract.engine_calls import ENGINE_CALLS, EngineCall, State, random_state
 from tests.contract.robots import branched
 
 FIXED = branched()
 FLOATING = FIXED.with_base("floating")
 GOOD = random_state(FLOATING, 61)
-each_question = pytest.mark.parametrize("question", QUESTIONS, ids=str)
+each_call = pytest.mark.parametrize("engine_call", ENGINE_CALLS, ids=str)
 
 BAD_ARRAYS: dict[str, tuple[Callable[[np.ndarray], Any], type[DynxError], str]] = {
     "too short": (lambda x: x[:-1], ShapeError, r"shape \(1?\d,\); wanted \(\.\.\., 1[01]\)"),
@@ -60,19 +60,19 @@ BAD_ARRAYS: dict[str, tuple[Callable[[np.ndarray], Any], type[DynxError], str]] 
 
 
 @pytest.mark.parametrize("kind", BAD_ARRAYS)
-@each_question
-def test_an_array_that_cannot_be_used(make: Make, question: Question, kind: str) -> None:
+@each_call
+def test_an_array_that_cannot_be_used(make: Make, engine_call: EngineCall, kind: str) -> None:
     engine = make(FLOATING)
     spoil, error, says = BAD_ARRAYS[kind]
-    for argument in question.arguments:
+    for argument in engine_call.arguments:
         fields = {**vars(GOOD), argument: spoil(getattr(GOOD, argument))}
         with pytest.raises(error, match=says) as caught:
-            question.ask(engine, State(**fields))
+            engine_call.evaluate(engine, State(**fields))
         assert argument in str(caught.value)
 
 
-@each_question
-def test_the_largest_numbers_that_are_taken_overflow_nothing(make: Make, question: Question) -> None:
+@each_call
+def test_the_largest_numbers_that_are_taken_overflow_nothing(make: Make, engine_call: EngineCall) -> None:
     """A quaternion stays one; everything else is as large as the bound allows."""
     engine = make(FLOATING)
     large = 0.99 * TOO_LARGE
@@ -80,30 +80,30 @@ def test_the_largest_numbers_that_are_taken_overflow_nothing(make: Make, questio
     q[:3], q[7:] = large, large
     v = np.full(FLOATING.nv, large)
     try:
-        answer = question.ask(engine, State(q, v, -v, v))
+        answer = engine_call.evaluate(engine, State(q, v, -v, v))
     except SingularMassMatrixError:
         # A body as far away as that leaves the joints' own inertia below its rounding error.
-        assert str(question) == "forward_dynamics"
+        assert str(engine_call) == "forward_dynamics"
     else:
         assert np.isfinite(answer).all()
 
 
-@pytest.mark.parametrize("question", [q for q in QUESTIONS if len(q.arguments) > 1], ids=str)
-def test_batches_that_do_not_broadcast(make: Make, question: Question) -> None:
+@pytest.mark.parametrize("engine_call", [q for q in ENGINE_CALLS if len(q.arguments) > 1], ids=str)
+def test_batches_that_do_not_broadcast(make: Make, engine_call: EngineCall) -> None:
     engine = make(FLOATING)
     state = replace(random_state(FLOATING, 62, (2,)), q=random_state(FLOATING, 62, (3,)).q)
     with pytest.raises(ShapeError, match=r"\(3, 11\).*\(2, 10\)"):
-        question.ask(engine, state)
+        engine_call.evaluate(engine, state)
 
 
-@each_question
-def test_a_quaternion_that_is_no_attitude(make: Make, question: Question) -> None:
+@each_call
+def test_a_quaternion_that_is_no_attitude(make: Make, engine_call: EngineCall) -> None:
     engine = make(FLOATING)
     for quat in ([0.0, 0.0, 0.0, 0.0], [1.0, 1.0, 1.0, 1.0], [0.0, 0.0, 0.0, 1.01]):
         q = GOOD.q.copy()
         q[3:7] = quat
         with pytest.raises(ArgumentError, match="quaternion"):
-            question.ask(engine, State(q, GOOD.v, GOOD.a, GOOD.tau))
+            engine_call.evaluate(engine, State(q, GOOD.v, GOOD.a, GOOD.tau))
 
 
 def test_a_length_of_the_other_base(make: Make) -> None:
@@ -222,11 +222,11 @@ ARRAYS = hnp.arrays(
 @given(st.data())
 def test_whatever_is_passed_only_dynx_errors_come_back(make: Make, data: st.DataObject) -> None:
     engine = make(FLOATING)
-    question = data.draw(st.sampled_from(QUESTIONS))
-    wrong = data.draw(st.sampled_from(question.arguments))
+    engine_call = data.draw(st.sampled_from(ENGINE_CALLS))
+    wrong = data.draw(st.sampled_from(engine_call.arguments))
     state = State(**{**vars(GOOD), wrong: data.draw(JUNK | ARRAYS)})
     try:
-        answer = question.ask(engine, state)
+        answer = engine_call.evaluate(engine, state)
     except DynxError:
         return
     assert np.isfinite(answer).all()

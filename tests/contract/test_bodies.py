@@ -15,7 +15,7 @@ from dynx.model import Model
 from dynx.spatial.scalar import Floats
 from tests.closeness import Closeness, samples_at
 from tests.contract.conftest import Make
-from tests.contract.questions import random_state
+from tests.contract.engine_calls import random_state
 from tests.contract.robots import branched, mimicking
 
 MODELS = {

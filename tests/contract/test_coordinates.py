@@ -15,7 +15,7 @@ from dynx.spatial.scalar import Floats
 from dynx.testing.strategies import Sample, samples
 from tests.closeness import Closeness, samples_at
 from tests.contract.conftest import Make
-from tests.contract.questions import QUESTIONS, Question, State, random_state
+from tests.contract.engine_calls import ENGINE_CALLS, EngineCall, State, random_state
 from tests.contract.robots import JOINT_ORDER, LINK_ORDER, LINKS, branched, followed_elbow, mimicking
 from tests.examples import one_robot
 
@@ -26,12 +26,12 @@ BELOW = {
     "b_elbow": {"beta"},
 }
 each_base = pytest.mark.parametrize("base", ["fixed", "floating"])
-each_question = pytest.mark.parametrize("question", QUESTIONS, ids=str)
+each_call = pytest.mark.parametrize("engine_call", ENGINE_CALLS, ids=str)
 
 
-def is_projected(question: Question) -> bool:
+def is_projected(engine_call: EngineCall) -> bool:
     """Whether the answer of a robot with a mimic joint is a projection of that of the free robot."""
-    return not question.options.get("joint_dynamics") and question.method != "forward_dynamics"
+    return not engine_call.options.get("joint_dynamics") and engine_call.method != "forward_dynamics"
 
 
 def test_order_is_depth_first_in_the_order_of_the_document() -> None:
@@ -92,9 +92,9 @@ def test_a_continuous_joint_is_one_unbounded_angle(make: Make) -> None:
     state = random_state(model, 21, (3,))
     turned = state.q.copy()
     turned[:, wheel] += 2 * np.pi
-    for question in QUESTIONS:
-        answer = question.ask(engine, State(turned, state.v, state.a, state.tau))
-        question.check(engine, state, answer, question.ask(engine, state))
+    for engine_call in ENGINE_CALLS:
+        answer = engine_call.evaluate(engine, State(turned, state.v, state.a, state.tau))
+        engine_call.check(engine, state, answer, engine_call.evaluate(engine, state))
 
 
 @each_base
@@ -153,13 +153,13 @@ class TestFloatingBase:
         close = Closeness(samples_at(self.model, q))
         close.check("forward_kinematics", make(self.model).forward_kinematics(q, "trunk"), np.eye(4))
 
-    @each_question
-    def test_both_quaternions_of_an_attitude_are_one(self, make: Make, question: Question) -> None:
+    @each_call
+    def test_both_quaternions_of_an_attitude_are_one(self, make: Make, engine_call: EngineCall) -> None:
         engine, state = make(self.model), random_state(self.model, 22, (3,))
         other = state.q.copy()
         other[:, 3:7] *= -1.0
-        answer = question.ask(engine, State(other, state.v, state.a, state.tau))
-        question.check(engine, state, answer, question.ask(engine, state))
+        answer = engine_call.evaluate(engine, State(other, state.v, state.a, state.tau))
+        engine_call.check(engine, state, answer, engine_call.evaluate(engine, state))
 
     def test_a_base_that_is_held_is_a_fixed_base(self, make: Make) -> None:
         """Without motion of the base, the joints see the torques that they see on a fixed base."""
@@ -226,8 +226,8 @@ class TestMimicJoints:
         with pytest.raises(UnknownNameError, match="m_wheel"):
             model.coordinate_index("b_elbow")
 
-    @pytest.mark.parametrize("question", [q for q in QUESTIONS if is_projected(q)], ids=str)
-    def test_reduced_answers(self, make: Make, question: Question) -> None:
+    @pytest.mark.parametrize("engine_call", [q for q in ENGINE_CALLS if is_projected(q)], ids=str)
+    def test_reduced_answers(self, make: Make, engine_call: EngineCall) -> None:
         model = mimicking()
         state = random_state(model, 25, (4,))
         free = State(
@@ -235,13 +235,13 @@ class TestMimicJoints:
         )
         # What is asked about a frame is about the one that the mimic joint moves.
         assert model.frame_names[-1] == self.free.frame_names[-1] == "beta"
-        answer = question.ask(make(self.free), free)
-        wide, narrow = question.tail(self.free), question.tail(model)
+        answer = engine_call.evaluate(make(self.free), free)
+        wide, narrow = engine_call.tail(self.free), engine_call.tail(model)
         if wide[-1:] != narrow[-1:]:
             answer = answer @ self.S
         if wide[:-1] != narrow[:-1]:
             answer = self.S.T @ answer
-        question.check(make(model), state, question.ask(make(model), state), answer)
+        engine_call.check(make(model), state, engine_call.evaluate(make(model), state), answer)
 
     def test_forward_dynamics_gives_what_inverse_dynamics_took(self, make: Make) -> None:
         model = mimicking()

@@ -12,7 +12,7 @@ from dynx.model import Inertial, JointDynamics, Model, Pose
 from dynx.rbd.jacobians import REFERENCES
 from tests.closeness import Closeness, samples_at
 from tests.contract.conftest import Make
-from tests.contract.questions import random_state
+from tests.contract.engine_calls import random_state
 from tests.contract.robots import branched, hinge, mimicking
 
 MODELS = {

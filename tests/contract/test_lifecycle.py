@@ -17,7 +17,7 @@ from dynx.errors import ClosedError
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
 from tests.contract.conftest import Make
-from tests.contract.questions import QUESTIONS, State, random_state
+from tests.contract.engine_calls import ENGINE_CALLS, State, random_state
 from tests.contract.robots import branched, mimicking
 
 FIXED = branched()
@@ -28,11 +28,11 @@ MODELS: tuple[Model, ...] = (FIXED, OTHER, FLOATING, mimicking())
 SIZES = ((), (2,))
 
 Call = tuple[int, int, int, int]
-"""Numbers of the model, the question, the state, and the size."""
+"""Numbers of the model, the engine call, the state, and the size."""
 
 CALLS = st.tuples(
     st.integers(0, len(MODELS) - 1),
-    st.integers(0, len(QUESTIONS) - 1),
+    st.integers(0, len(ENGINE_CALLS) - 1),
     st.integers(0, 2),
     st.integers(0, len(SIZES) - 1),
 )
@@ -44,7 +44,7 @@ def state_of(call: Call) -> State:
 
 
 def answer(engine: Backend, call: Call) -> Floats:
-    return np.array(QUESTIONS[call[1]].ask(engine, state_of(call)))
+    return np.array(ENGINE_CALLS[call[1]].evaluate(engine, state_of(call)))
 
 
 @pytest.fixture(scope="module")
@@ -73,21 +73,21 @@ def test_no_order_of_calls_changes_an_answer(
 def test_a_failed_call_leaves_nothing_behind(make: Make) -> None:
     engine = make(FLOATING)
     state = random_state(FLOATING, 80)
-    for question in QUESTIONS:
-        before = question.ask(engine, state)
+    for engine_call in ENGINE_CALLS:
+        before = engine_call.evaluate(engine, state)
         for spoiled in (state.q[:-1], np.full(FLOATING.nq, np.nan)):
             with pytest.raises(ValueError, match="q"):
-                question.ask(engine, State(spoiled, state.v, state.a, state.tau))
-        np.testing.assert_array_equal(question.ask(engine, state), before)
+                engine_call.evaluate(engine, State(spoiled, state.v, state.a, state.tau))
+        np.testing.assert_array_equal(engine_call.evaluate(engine, state), before)
 
 
 def test_several_threads_at_once(make: Make) -> None:
     """Each thread asks everything, of two robots, in an order of its own."""
     engines = [make(model) for model in MODELS]
     calls = [
-        (model, question, state, size)
+        (model, engine_call, state, size)
         for model in range(len(MODELS))
-        for question in range(len(QUESTIONS))
+        for engine_call in range(len(ENGINE_CALLS))
         for state in range(2)
         for size in range(len(SIZES))
     ]
@@ -112,8 +112,10 @@ def test_pickling_by_recipe(make: Make, model: Model) -> None:
     with pickle.loads(pickle.dumps(engine)) as copy:
         assert type(copy) is type(engine)
         assert copy.model == model
-        for question in QUESTIONS:
-            np.testing.assert_array_equal(question.ask(copy, state), question.ask(engine, state))
+        for engine_call in ENGINE_CALLS:
+            np.testing.assert_array_equal(
+                engine_call.evaluate(copy, state), engine_call.evaluate(engine, state)
+            )
 
 
 def test_pickling_keeps_the_options(make: Make) -> None:
@@ -125,24 +127,24 @@ def test_a_closed_backend_refuses(backend_name: str, validate: bool) -> None:
     engine = backend(backend_name, FLOATING, validate=validate)
     for size in SIZES:
         state = random_state(FLOATING, 82, size)
-        for question in QUESTIONS:
-            question.ask(engine, state)
+        for engine_call in ENGINE_CALLS:
+            engine_call.evaluate(engine, state)
     engine.close()
     engine.close()
     for size in SIZES:
         state = random_state(FLOATING, 82, size)
-        for question in QUESTIONS:
+        for engine_call in ENGINE_CALLS:
             with pytest.raises(ClosedError, match=FLOATING.name):
-                question.ask(engine, state)
+                engine_call.evaluate(engine, state)
 
 
 def test_closing_one_leaves_the_others_open(backend_name: str) -> None:
     first, second = (backend(backend_name, FIXED) for _ in range(2))
     state = random_state(FIXED, 83)
-    wanted = [question.ask(second, state) for question in QUESTIONS]
+    wanted = [engine_call.evaluate(second, state) for engine_call in ENGINE_CALLS]
     first.close()
-    for question, want in zip(QUESTIONS, wanted, strict=True):
-        np.testing.assert_array_equal(question.ask(second, state), want)
+    for engine_call, want in zip(ENGINE_CALLS, wanted, strict=True):
+        np.testing.assert_array_equal(engine_call.evaluate(second, state), want)
     second.close()
 
 

@@ -9,7 +9,7 @@ from dynx.errors import SingularMassMatrixError
 from dynx.model import Inertial, Joint, Link, Model, Pose
 from tests.closeness import Closeness, samples_at
 from tests.contract.conftest import Make
-from tests.contract.questions import QUESTIONS, Question, random_state
+from tests.contract.engine_calls import ENGINE_CALLS, EngineCall, random_state
 from tests.contract.robots import JOINTS, LINKS, body, branched, hinge
 
 MASSLESS = {"no inertial": None, "zero inertial": Inertial()}
@@ -17,10 +17,10 @@ each_massless = pytest.mark.parametrize("inertial", MASSLESS.values(), ids=MASSL
 
 
 @each_massless
-@pytest.mark.parametrize("question", QUESTIONS, ids=str)
+@pytest.mark.parametrize("engine_call", ENGINE_CALLS, ids=str)
 @pytest.mark.parametrize("base", ["fixed", "floating"])
 def test_a_link_without_inertial_has_no_mass(
-    make: Make, base: str, question: Question, inertial: Inertial | None
+    make: Make, base: str, engine_call: EngineCall, inertial: Inertial | None
 ) -> None:
     """Massless links welded on change no answer."""
     extra_links = [Link("flag", inertial), Link("pole", inertial)]
@@ -34,15 +34,15 @@ def test_a_link_without_inertial_has_no_mass(
     )
     assert plain.frame_names[-1] == decked.frame_names[-1]
     state = random_state(plain, 51, (3,))
-    answer = question.ask(make(decked), state)
-    if question.method == "inertial_regressor":
+    answer = engine_call.evaluate(make(decked), state)
+    if engine_call.method == "inertial_regressor":
         # It has columns for the links that were added, too.
         shared = [decked.links.index(link) for link in plain.links]
         by_link = answer.reshape(*answer.shape[:-1], len(decked.links), 10)
         answer = by_link[..., shared, :].reshape(*answer.shape[:-1], -1)
-        question.check(make(plain), state, answer, question.ask(make(plain), state))
+        engine_call.check(make(plain), state, answer, engine_call.evaluate(make(plain), state))
         return
-    question.check(make(decked), state, answer, question.ask(make(plain), state))
+    engine_call.check(make(decked), state, answer, engine_call.evaluate(make(plain), state))
 
 
 @each_massless

@@ -14,7 +14,7 @@ from dynx.spatial.scalar import Floats
 from dynx.testing.strategies import Sample, samples
 from tests.closeness import Closeness, samples_at
 from tests.contract.conftest import Make
-from tests.contract.questions import random_state
+from tests.contract.engine_calls import random_state
 from tests.contract.robots import branched, mimicking
 from tests.examples import one_robot
 

@@ -7,7 +7,7 @@ import pytest
 
 from dynx.model import Link, Model
 from tests.contract.conftest import Make
-from tests.contract.questions import QUESTIONS, Question, State, random_state
+from tests.contract.engine_calls import ENGINE_CALLS, EngineCall, State, random_state
 from tests.contract.robots import body, branched, mimicking
 
 MODELS = {
@@ -19,47 +19,50 @@ MODELS = {
 SIZES = ((), (1,), (3,), (2, 3), (0,), (2, 0))
 
 each_model = pytest.mark.parametrize("model", MODELS.values(), ids=MODELS.keys())
-each_question = pytest.mark.parametrize("question", QUESTIONS, ids=str)
+each_call = pytest.mark.parametrize("engine_call", ENGINE_CALLS, ids=str)
 
 
 @each_model
-@each_question
-def test_shape_and_type_for_every_size_of_batch(make: Make, model: Model, question: Question) -> None:
+@each_call
+def test_shape_and_type_for_every_size_of_batch(make: Make, model: Model, engine_call: EngineCall) -> None:
     engine = make(model)
     for size in SIZES:
-        answer = question.ask(engine, random_state(model, 1, size))
+        answer = engine_call.evaluate(engine, random_state(model, 1, size))
         assert type(answer) is np.ndarray or size == (), f"{type(answer)} for {size}"
-        assert np.shape(answer) == (*size, *question.tail(model))
+        assert np.shape(answer) == (*size, *engine_call.tail(model))
         assert np.asarray(answer).dtype == np.float64
         assert np.isfinite(answer).all()
 
 
 @each_model
-@each_question
-def test_a_batch_is_its_samples(make: Make, model: Model, question: Question) -> None:
+@each_call
+def test_a_batch_is_its_samples(make: Make, model: Model, engine_call: EngineCall) -> None:
     engine = make(model)
     state = random_state(model, 2, (3,))
-    together = question.ask(engine, state)
+    together = engine_call.evaluate(engine, state)
     one_by_one = [
-        question.ask(engine, State(*row)) for row in zip(state.q, state.v, state.a, state.tau, strict=True)
+        engine_call.evaluate(engine, State(*row))
+        for row in zip(state.q, state.v, state.a, state.tau, strict=True)
     ]
-    question.check(engine, state, together, np.stack(one_by_one))
+    engine_call.check(engine, state, together, np.stack(one_by_one))
 
 
 @pytest.mark.parametrize("base", ["fixed", "floating"])
-@each_question
-def test_leading_axes_broadcast(make: Make, base: str, question: Question) -> None:
+@each_call
+def test_leading_axes_broadcast(make: Make, base: str, engine_call: EngineCall) -> None:
     model = MODELS[base]
     engine = make(model)
     whole = random_state(model, 3, (2, 3))
     apart = State(whole.q[:, :1], whole.v[0], whole.a[0, 0], whole.tau[0, 0])
-    answer = question.ask(engine, apart)
+    answer = engine_call.evaluate(engine, apart)
     shapes = {"q": (2, 1), "v": (3,), "a": (), "tau": ()}
-    batch = np.broadcast_shapes(*(shapes[argument] for argument in question.arguments))
-    assert answer.shape == (*batch, *question.tail(model))
+    batch = np.broadcast_shapes(*(shapes[argument] for argument in engine_call.arguments))
+    assert answer.shape == (*batch, *engine_call.tail(model))
     spread = apart.map(lambda x: np.broadcast_to(x, (2, 3, x.shape[-1])).reshape(6, -1))
-    answers = np.broadcast_to(answer, (2, 3, *question.tail(model)))
-    question.check(engine, spread, answers.reshape(6, *question.tail(model)), question.ask(engine, spread))
+    answers = np.broadcast_to(answer, (2, 3, *engine_call.tail(model)))
+    engine_call.check(
+        engine, spread, answers.reshape(6, *engine_call.tail(model)), engine_call.evaluate(engine, spread)
+    )
 
 
 @each_model
@@ -83,7 +86,7 @@ def test_one_frame_is_that_of_all_frames(make: Make, model: Model) -> None:
     every = engine.forward_kinematics(state.q)
     for index, name in enumerate(model.frame_names):
         one = engine.forward_kinematics(state.q, name)
-        QUESTIONS[0].check(engine, state, one, every[:, index])
+        ENGINE_CALLS[0].check(engine, state, one, every[:, index])
 
 
 def test_a_batch_of_wrenches(make: Make) -> None:

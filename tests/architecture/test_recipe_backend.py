@@ -1,0 +1,89 @@
+"""The recipe "add a backend" of docs/architecture.md, carried out by a package of its own: one module."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from textwrap import dedent
+
+import pytest
+
+from dynx.agreement import agree
+from dynx.backends import backend_class, backend_names, installed_backends, native_quantities, register
+from dynx.backends.registry import unregister
+from tests.backends.robots import mixed_robot
+
+MODULE = '''
+"""An engine that loses a sign."""
+
+from dynx.backends import Backend
+from dynx.rbd import kinematics, rnea
+
+
+class ThirdPartyBackend(Backend):
+    name = "third_party"
+    vectorized = True
+
+    def _frame_placements(self, q):
+        return kinematics.frame_placements(self._mechanism, q)
+
+    def _inverse_dynamics(self, q, v, a):
+        return rnea.inverse_dynamics(self._mechanism, q, v, a)
+
+
+class DefectiveBackend(ThirdPartyBackend):
+    name = "defective"
+
+    def _gravity_torque(self, q):
+        return -super()._gravity_torque(q)
+'''
+ENTRY_POINTS = """
+[dynx.backends]
+third_party = third_party_engine:ThirdPartyBackend
+defective = third_party_engine:DefectiveBackend
+"""
+
+
+@pytest.fixture
+def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A folder on the path with the module and what an installer writes beside it."""
+    info = tmp_path / "third_party_engine-1.0.dist-info"
+    info.mkdir()
+    (tmp_path / "third_party_engine.py").write_text(dedent(MODULE), encoding="utf-8")
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: third-party-engine\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(ENTRY_POINTS, encoding="utf-8")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    yield tmp_path
+    sys.modules.pop("third_party_engine", None)
+
+
+@pytest.mark.usefixtures("installed")
+@pytest.mark.parametrize("mimic", [False, True])
+def test_an_installed_backend_is_found_and_compared(mimic: bool) -> None:
+    assert {"third_party", "defective"} <= set(backend_names())
+    assert "third_party" in installed_backends()
+    assert native_quantities(backend_class("third_party")) == {"forward_kinematics", "inverse_dynamics"}
+    report = agree(mixed_robot("floating", mimic=mimic), ["reference", "third_party"], samples=3)
+    assert report.agree
+    assert {row.pair for row in report.quantities} >= {"reference~third_party", "third_party~referee"}
+
+
+@pytest.mark.usefixtures("installed")
+def test_its_defect_is_found() -> None:
+    report = agree(mixed_robot(), ["reference", "pinocchio", "defective"], samples=3)
+    assert not report.agree
+    assert {suspect.backend for suspect in report.suspects} == {"defective"}
+
+
+def test_a_program_registers_one_without_a_package(installed: Path) -> None:
+    kind = backend_class("third_party")
+    register("of_this_program", lambda: kind)
+    try:
+        assert agree(mixed_robot(), ["reference", "of_this_program"], samples=2).agree
+    finally:
+        unregister("of_this_program")
+
+
+def test_it_takes_one_module(installed: Path) -> None:
+    assert [path.name for path in installed.glob("*.py")] == ["third_party_engine.py"]

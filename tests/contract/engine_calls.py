@@ -1,0 +1,107 @@
+"""Every engine_call that can be put to a backend, with the shape that its answer must have."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from dynx.agreement.compared_quantities import compared_quantities
+from dynx.backends import Backend
+from dynx.backends.quantities import QUANTITIES, Quantity
+from dynx.model import Model
+from dynx.rbd.jacobians import REFERENCES
+from dynx.spatial.scalar import Floats
+from tests.closeness import Closeness, samples_at
+
+
+@dataclass(frozen=True)
+class State:
+    """q (..., nq), v, a, tau (..., nv); each may have leading axes of its own."""
+
+    q: Any
+    v: Any
+    a: Any
+    tau: Any
+
+    def map(self, change: Callable[[Any], Any]) -> State:
+        """The state with `change` made to each of the four."""
+        return State(change(self.q), change(self.v), change(self.a), change(self.tau))
+
+
+@dataclass(frozen=True)
+class EngineCall:
+    """A quantity of the table, with options of its method."""
+
+    quantity: Quantity
+    options: dict[str, Any] = field(default_factory=dict)
+
+    def __str__(self) -> str:
+        return "-".join([self.method, *map(str, self.options.values())])
+
+    @property
+    def method(self) -> str:
+        """Name of the method of `Backend`."""
+        return self.quantity.name
+
+    @property
+    def arguments(self) -> tuple[str, ...]:
+        """The arrays of a state that the method takes."""
+        return self.quantity.arguments
+
+    def tail(self, model: Model) -> tuple[int, ...]:
+        """The last axes of the result."""
+        return self.quantity.shape_of(model)
+
+    def evaluate(self, engine: Backend, state: State) -> Floats:
+        """The result at a state; for a quantity of a frame, that of the model's last one."""
+        values = [getattr(state, argument) for argument in self.arguments]
+        options = dict(self.options)
+        if self.quantity.of_frame:
+            options["frame"] = engine.model.frame_names[-1]
+        if options.pop("with_force", False):
+            force = np.array([1.0, -2.0, 0.5, 0.1, 0.2, -0.3])
+            options["external_forces"] = {engine.model.frame_names[-1]: force}
+        result: Floats = getattr(engine, self.method)(*values, **options)
+        return result
+
+    def check(self, engine: Backend, state: State, got: Floats, wanted: Floats) -> None:
+        """Assert that two results at `state`, of one leading axis or none, agree."""
+        close = Closeness(samples_at(engine.model, state.q, state.v, state.a, state.tau))
+        if self.quantity.solves:
+            for a in (got, wanted):
+                close.check_solves(a, engine.inverse_dynamics(state.q, state.v, a), state.tau)
+        elif self.options.get("with_force"):
+            close.check(f"{self.method}_external_forces", np.tile(got, 3), np.tile(wanted, 3))
+        elif self.options.get("joint_dynamics"):
+            close.check(f"{self.method}_joint_dynamics", got, wanted)
+        else:
+            close.check(self.method, got, wanted)
+
+
+def engine_calls() -> tuple[EngineCall, ...]:
+    """Every quantity of the table in every reference, and its variants that `dynx agree` compares too."""
+    compared = {line.name for line in compared_quantities()}
+    calls: list[EngineCall] = []
+    for quantity in QUANTITIES.values():
+        if "reference" in quantity.options:
+            calls += [EngineCall(quantity, {"reference": reference}) for reference in REFERENCES]
+            continue
+        calls.append(EngineCall(quantity))
+        if f"{quantity.name}_external_forces" in compared:
+            calls.append(EngineCall(quantity, {"with_force": True}))
+        if f"{quantity.name}_joint_dynamics" in compared:
+            calls.append(EngineCall(quantity, {"joint_dynamics": True}))
+    return tuple(calls)
+
+
+ENGINE_CALLS = engine_calls()
+
+
+def random_state(model: Model, seed: int, size: tuple[int, ...] = ()) -> State:
+    """A state from a seed; the same for every backend."""
+    rng = np.random.default_rng(seed)
+    v, a, tau = (rng.uniform(-2.0, 2.0, (*size, model.nv)) for _ in range(3))
+    return State(model.random(rng, size), v, a, tau)
