@@ -1,4 +1,4 @@
-"""Controllers: one law per file, each a function of what is measured, what is wanted, and its state."""
+"""Controllers, one per file: frozen dataclasses with a torque of measurement, setpoint and state."""
 
 from dynx.control.base import Controller, Measurement, ModelBased
 from dynx.control.computed_torque import ComputedTorque

@@ -1,17 +1,22 @@
-"""What a controller is: a function of what is measured, of what is wanted, and of its own state.
+"""Controllers: functions of a measurement, a setpoint and the controller's state.
 
-Everything that a law remembers is handed to it and handed back: the same arguments give the same torque,
-whoever asked before. So a rollout can be resumed at any step, replayed, and dealt to several processes.
+The state is an argument of `torque` and part of its result: equal arguments give equal torques, whatever was
+evaluated before. So a rollout can be resumed at any step, replayed, and shared out among processes.
 """
 
 from __future__ import annotations
 
 import copy
 from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 from typing import Any, Generic, NamedTuple, TypeVar
 
+import numpy as np
+
 from dynx.backends import Backend, backend
-from dynx.control.single_sample import SingleSample
+from dynx.control.content import attributes_of, content_of, fields_of
+from dynx.control.dynamics import Dynamics, EngineDynamics
 from dynx.errors import ArgumentError, UnsupportedFeatureError, shown
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
@@ -22,79 +27,207 @@ Self = TypeVar("Self", bound="Controller[Any]")
 
 
 class Measurement(NamedTuple):
-    """What sensors say at time `t` [s]: configuration `q` (nq,) and velocity `v` (nv,)."""
+    """Configuration `q` (nq,) and velocity `v` (nv,) as measured at time `t` [s]."""
 
     t: float
     q: Floats
     v: Floats
 
 
-class Controller(ABC, Generic[ControllerState]):
-    """A control law of one robot; `ControllerState` is the type of what it remembers (None for most).
+def gain(unit: str) -> Any:
+    """Dataclass field for a gain: an array of numbers in `unit`, which a batch may vary."""
+    return field(metadata={"unit": unit, "gain": True})
 
-    A law of your own is a subclass with `torque`, and `start` where it remembers something. A controller
-    is never changed after it is made. Several threads may share one if they may share its backend.
+
+def parameter(unit: str, *, argument: str | None = None) -> Any:
+    """Dataclass field for a number or an array of numbers in `unit` that is no gain.
+
+    `argument` is its name in the constructor, where that is another.
+    """
+    return field(metadata={"unit": unit, "argument": argument})
+
+
+class Controller(ABC, Generic[ControllerState]):
+    """A controller of one robot; `ControllerState` is the type of its state (None for most).
+
+    A controller of your own is a subclass with `torque`, and `initial_state` where it has a state: best a
+    frozen dataclass, which compares, prints and is serialised by its fields. A controller whose torque it
+    changes is its `inner`, and what it evaluates of its model its `dynamics`. It must not change itself.
+    Several threads may share one if they may share its backend.
     """
 
     lead: int = 0
-    """How many control steps ahead of the measurement the setpoint is that the law is given."""
+    """Control steps from the measurement to the setpoint that the controller is given."""
 
     needs_setpoint: bool = True
-    """Whether the law looks at its setpoint; one that does not runs without a reference."""
+    """Whether the controller reads its setpoint; one that does not runs without a reference."""
 
     control_dt: float | None = None
-    """The control step that the law was made for [s], where it matters to it."""
+    """The control step that the controller was made for [s], where it matters."""
 
     model: Model
-    """The robot as the law knows it; that of the plant may be another."""
+    """The robot as the controller knows it; that of the plant may be another."""
+
+    is_pure: bool = False
+    """Whether `torque` and `initial_state` are array code that depends on fields and arguments alone."""
+
+    def __init_subclass__(cls, *, pure: bool = False, **options: Any) -> None:
+        """`pure` promises `is_pure` for this class, not for its subclasses: those may do anything."""
+        super().__init_subclass__(**options)
+        cls.is_pure = pure
+        # The methods below hold for dataclasses too, which generate others unless a class has its own.
+        for name in ("__eq__", "__hash__", "__repr__"):
+            setattr(cls, name, getattr(cls, name))
 
     def initial_state(self) -> Any:
-        """What is remembered before the first step; None for a controller without a state of its own."""
+        """The state before the first step; None for a controller without one."""
         return None
 
     @abstractmethod
     def torque(
         self, measurement: Measurement, setpoint: Setpoint, state: ControllerState
     ) -> tuple[Floats, ControllerState]:
-        """The torque tau (nv,) to apply until the next control step, and what to remember until then.
+        """The torque tau (nv,) to apply until the next control step, and the state then.
 
-        The arrays handed in are not to be written to; those handed back must be new or never change.
+        The arrays given must not be written to; those returned must be new or never change.
         """
 
     def on(self: Self, engine: str | Backend) -> Self:
-        """The same law with its model evaluated by another backend; itself where it evaluates none."""
-        return self
+        """The controller with its model evaluated by another backend; itself where it evaluates none."""
+        inner = getattr(self, "inner", None)
+        return substitute(self, inner=inner.on(engine)) if isinstance(inner, Controller) else self
 
     @property
     def name(self) -> str:
-        """What a record calls the law."""
+        """The controller's name in a record."""
         return type(self).__name__
 
+    def content_key(self) -> tuple[Any, ...]:
+        """Key that is equal for equal controllers.
 
+        Raises TypeError for attributes that cannot be compared.
+        """
+        ignored = {name for name, each in fields_of(self).items() if not each.compare}
+        kept = ((name, value) for name, value in attributes_of(self).items() if name not in ignored)
+        return tuple((name, content_of(value)) for name, value in kept)
+
+    def _wrap(self, inner: Controller[ControllerState]) -> None:
+        """Take robot and timing from an inner controller."""
+        self._set(inner=inner, model=inner.model, lead=inner.lead, control_dt=inner.control_dt)
+        self._set(needs_setpoint=inner.needs_setpoint)
+
+    def _set(self, **values: Any) -> None:
+        """Set attributes in the constructor of a frozen dataclass."""
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
+
+    def __eq__(self, other: object) -> bool:
+        if self is other or not isinstance(other, Controller) or type(self) is not type(other):
+            return self is other
+        try:
+            return self.content_key() == other.content_key()
+        except TypeError:
+            return False
+
+    def __hash__(self) -> int:
+        return hash((type(self), getattr(self, "model", None)))
+
+    def __repr__(self) -> str:
+        known = fields_of(self)
+        robot = getattr(getattr(self, "model", None), "name", "no model")
+        parts = [f"{type(self).__name__} of {robot}"]
+        for name, value in attributes_of(self).items():
+            if name in known and known[name].repr and not isinstance(value, Model):
+                unit = known[name].metadata.get("unit", "")
+                parts.append(f"{name} {_in_words(value)} {unit}".rstrip())
+        return f"<{', '.join(parts)}>"
+
+
+@dataclass(frozen=True)
 class ModelBased(Controller[ControllerState]):
-    """A law that evaluates the dynamics of its model, by the backend it is given.
+    """A controller that evaluates the dynamics of its model by a backend.
 
-    It commands every coordinate, so that a floating base, which no motor moves, is refused.
+    It commands every coordinate, so a floating base, which no motor moves, is refused.
     """
 
+    model: Model
+    backend: str | Backend = field(compare=False)
+    dynamics: Dynamics = field(init=False, repr=False)
+
     def __init__(self, model: Model, backend: str | Backend = "pinocchio") -> None:
-        """`backend` is a name, or a backend of this very model.
+        """`backend` is a name, or a backend of an equal model.
 
         Raises UnsupportedFeatureError for a floating base, ArgumentError for a backend of another robot.
         """
-        self.model = model
         if model.floating:
             raise UnsupportedFeatureError(
                 f"{type(self).__name__} commands every coordinate, but {model.name} has a floating base, "
-                "which has no motor; joint-space laws (PD, PID, Velocity) leave the base alone"
+                "which has no motor; joint-space controllers (PD, PID, Velocity) leave the base alone"
             )
-        self._dynamics = SingleSample(engine_of(model, backend))
+        self._set(model=model, backend=backend, dynamics=EngineDynamics(engine_of(model, backend)))
 
     def on(self: Self, engine: str | Backend) -> Self:
-        """The same law with its model evaluated by another backend."""
-        twin = copy.copy(self)
-        twin.__dict__["_dynamics"] = SingleSample(engine_of(self.model, engine))
-        return twin
+        """The controller with its model evaluated by another backend."""
+        return substitute(self, backend=engine, dynamics=EngineDynamics(engine_of(self.model, engine)))
+
+
+@dataclass(frozen=True)
+class Wrapper(Controller[ControllerState]):
+    """A controller that changes the torque of another."""
+
+    inner: Controller[ControllerState]
+
+    def __init__(self, inner: Controller[ControllerState]) -> None:
+        self._wrap(inner)
+
+    def initial_state(self) -> Any:
+        """That of the inner controller."""
+        return self.inner.initial_state()
+
+
+def chain_of(controller: Controller[Any]) -> Iterator[Controller[Any]]:
+    """A controller and those inside it, from the outermost to the innermost."""
+    yield controller
+    inner = getattr(controller, "inner", None)
+    if isinstance(inner, Controller):
+        yield from chain_of(inner)
+
+
+def gains_of(controller: Controller[Any]) -> dict[str, Floats]:
+    """The gains that a controller declares; the public arrays of one that declares no fields."""
+    known = fields_of(controller)
+    arrays = {name: x for name, x in attributes_of(controller).items() if isinstance(x, np.ndarray)}
+    return {
+        name: x
+        for name, x in arrays.items()
+        if (known[name].metadata.get("gain") if name in known else not name.startswith("_"))
+    }
+
+
+def substitute(controller: Self, **attributes: Any) -> Self:
+    """A copy of a controller with other attributes, which are not checked."""
+    twin = copy.copy(controller)
+    for name, value in attributes.items():
+        object.__setattr__(twin, name, value)
+    return twin
+
+
+def rebind(
+    controller: Self,
+    dynamics: Callable[[Dynamics], Dynamics],
+    gains: Callable[[Controller[Any]], Mapping[str, Any]],
+) -> Self:
+    """A copy of a controller, and of those inside it, over other dynamics and with other gains.
+
+    Neither is checked: they may be symbols of a trace.
+    """
+    changes = dict(gains(controller))
+    inner, evaluated = getattr(controller, "inner", None), getattr(controller, "dynamics", None)
+    if isinstance(inner, Controller):
+        changes["inner"] = rebind(inner, dynamics, gains)
+    if isinstance(evaluated, Dynamics):
+        changes["dynamics"] = dynamics(evaluated)
+    return substitute(controller, **changes)
 
 
 def engine_of(model: Model, engine: str | Backend) -> Backend:
@@ -104,3 +237,13 @@ def engine_of(model: Model, engine: str | Backend) -> Backend:
     if engine.model != model:
         raise ArgumentError(f"the backend is one of {shown(engine.model)}; wanted one of {shown(model)}")
     return engine
+
+
+def _in_words(value: Any) -> str:
+    if isinstance(value, Backend):
+        return value.name
+    if isinstance(value, np.ndarray):
+        if value.size and (value == value.flat[0]).all():
+            return f"{value.flat[0]:g}"
+        return str(value.shape) if value.ndim > 1 else f"[{', '.join(f'{x:g}' for x in value)}]"
+    return f"{value:g}" if isinstance(value, float) else str(value)

@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from numpy.typing import ArrayLike
 
 from dynx.backends import Backend
-from dynx.control.base import Measurement, ModelBased
+from dynx.control.base import Measurement, ModelBased, gain
 from dynx.control.gains import feedback_gains
 from dynx.model import Model
 from dynx.spatial.scalar import Array, Floats
 from dynx.trajectory.base import Setpoint
 
 
-class ComputedTorque(ModelBased[None]):
+@dataclass(frozen=True)
+class ComputedTorque(ModelBased[None], pure=True):
     """tau = ID(q, v, a* + kd (v* - v) + kp (q* - q)).
 
-    With the right model the error of each coordinate obeys e'' + kd e' + kp e = 0 and knows nothing of
-    the others (Spong, Hutchinson and Vidyasagar, Robot Modeling and Control, section 8.3). In steps of
-    dt the error does not vanish: about dt a* kd / (2 kp) remains, which `DiscreteComputedTorque` removes.
+    With the right model the error of each coordinate obeys e'' + kd e' + kp e = 0, independent of the others
+    (Spong, Hutchinson and Vidyasagar, Robot Modeling and Control, section 8.3). In steps of dt the error does
+    not vanish: about dt a* kd / (2 kp) remains, which `DiscreteComputedTorque` removes.
     """
+
+    kp: Floats = gain("1/s^2")
+    kd: Floats = gain("1/s")
 
     def __init__(
         self,
@@ -35,13 +41,14 @@ class ComputedTorque(ModelBased[None]):
         One number, or one for each coordinate. Raises GainError.
         """
         super().__init__(model, backend)
-        self.kp, self.kd = feedback_gains(model.nv, kp, kd, natural_frequency, damping_ratio)
+        kp, kd = feedback_gains(model.nv, kp, kd, natural_frequency, damping_ratio)
+        self._set(kp=kp, kd=kd)
 
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
         """The torque (nv,)."""
         _, q, v = measurement
         a = commanded_acceleration(q, v, *setpoint, self.kp, self.kd)
-        return self._dynamics.inverse_dynamics(q, v, a), None
+        return self.dynamics.inverse_dynamics(q, v, a), None
 
 
 def commanded_acceleration(

@@ -1,18 +1,19 @@
-"""Computed torque for a plant that moves in steps: its own step is inverted, so that no error is left."""
+"""Computed torque for a plant that moves in steps: the inverse of its integration step."""
 
 from __future__ import annotations
 
-import numpy as np
+from dataclasses import dataclass
 
 from dynx.backends import Backend
-from dynx.control.base import Measurement, ModelBased
-from dynx.errors import ArgumentError, shown
+from dynx.control.base import Measurement, ModelBased, parameter
+from dynx.control.gains import positive_seconds
 from dynx.model import Model
 from dynx.spatial.scalar import Array, Floats
 from dynx.trajectory.base import Setpoint
 
 
-class DiscreteComputedTorque(ModelBased[None]):
+@dataclass(frozen=True)
+class DiscreteComputedTorque(ModelBased[None], pure=True):
     """The torque with which one step of semi-implicit Euler ends at the next setpoint, exactly.
 
     The step v' = v + dt a, q' = q + dt v', which Bullet takes and dynx by default, is solved for a:
@@ -24,23 +25,23 @@ class DiscreteComputedTorque(ModelBased[None]):
     `FrictionCompensation`. Another plant (RK4, sub-steps) leaves an error of the order of dt.
     """
 
+    control_dt: float = parameter("s")
+
     lead = 1
 
     def __init__(self, model: Model, *, control_dt: float, backend: str | Backend = "pinocchio") -> None:
         """`control_dt` [s] is the plant's step. Raises ArgumentError if it is not positive."""
         super().__init__(model, backend)
-        if not isinstance(control_dt, int | float) or not 0.0 < control_dt < np.inf:
-            raise ArgumentError(f"control_dt is {shown(control_dt)}; wanted a positive number of seconds")
-        self.control_dt = float(control_dt)
-        self._dt: Floats = np.full(model.nv, control_dt)
+        self._set(control_dt=positive_seconds("control_dt", control_dt))
 
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
         """The torque (nv,); the setpoint is that of the end of the step."""
         _, q, v = measurement
-        a = one_step_acceleration(q, v, setpoint.q, self._dt)
-        return self._dynamics.inverse_dynamics(q, v, a), None
+        a = one_step_acceleration(q, v, setpoint.q, self.control_dt)
+        return self.dynamics.inverse_dynamics(q, v, a), None
 
 
-def one_step_acceleration(q: Array, v: Array, q_next: Array, dt: Array) -> Array:
+def one_step_acceleration(q: Array, v: Array, q_next: Array, dt: Array | float) -> Array:
     """The a with q + dt (v + dt a) = q_next, for arrays of any scalar."""
-    return ((q_next - q) / dt - v) / dt
+    a: Array = ((q_next - q) / dt - v) / dt
+    return a

@@ -1,31 +1,33 @@
-"""The motors that PyBullet has of its own, as controllers that only its plant understands.
+"""The motors inside PyBullet, as controllers for its plant alone.
 
-They are constraints of its solver and not laws of torque: how hard a motor pulls follows from the step
-itself. So they give a `MotorCommand`, and their `torque` refuses.
+They are constraints of its solver, which finds their torque within the step. So they return a `MotorCommand`,
+and their `torque` raises.
 """
 
 from __future__ import annotations
 
 from abc import abstractmethod
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dynx.control.base import Controller, Measurement
+from dynx.control.base import Controller, Measurement, gain, parameter
 from dynx.control.gains import checked_gain
+from dynx.control.joint_space import JointSpace
 from dynx.control.saturation import checked_limit
 from dynx.errors import UnsupportedFeatureError
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint
 
-AMPLE = 1e30
-"""What stands for no limit [N m or N]: Bullet multiplies it by the time step, and infinity makes NaN."""
+UNLIMITED_FORCE = 1e30
+"""Force of a motor without a limit [N m or N]; an infinite one becomes NaN in Bullet."""
 
 
 class MotorCommand(NamedTuple):
-    """What `setJointMotorControlArray` is told: one number per joint each, None for the engine's default."""
+    """Arguments of `setJointMotorControlArray`: one number per joint each, None for the engine's default."""
 
     mode: str
     positions: list[float] | None = None
@@ -35,19 +37,17 @@ class MotorCommand(NamedTuple):
     velocity_gains: list[float] | None = None
 
 
-class EngineMotor(Controller[None]):
-    """A motor mode of PyBullet; ``plant="pybullet"`` takes it, no other plant can."""
+@dataclass(frozen=True)
+class EngineMotor(JointSpace[None]):
+    """A motor mode of PyBullet, for ``plant="pybullet"`` alone."""
 
     def __init__(self, model: Model) -> None:
         if model.mechanism.coupling is not None:
             raise UnsupportedFeatureError(
-                f"PyBullet's motors know nothing of the mimic joints of {model.name}; lock them, or use a law"
+                f"PyBullet's motors do not support the mimic joints of {model.name}; lock them, or use a "
+                "controller that computes torques"
             )
-        self.model = model
-        base = 6 if model.floating else 0
-        self._n_joints = model.nv - base
-        self._q_joints = slice(base + 1 if base else 0, None)
-        self._v_joints = slice(base, None)
+        super().__init__(model)
 
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
         """Raises UnsupportedFeatureError: the engine's solver finds the torque, within its step."""
@@ -57,27 +57,34 @@ class EngineMotor(Controller[None]):
 
     @abstractmethod
     def command(self, measurement: Measurement, setpoint: Setpoint) -> MotorCommand:
-        """What the motors of all joints are told."""
+        """The command to the motors of all joints."""
 
-    def _per_joint(self, name: str, number: ArrayLike) -> list[float]:
-        gains: list[float] = checked_gain(name, number, self._n_joints, per="one for each joint").tolist()
-        return gains
+    def _per_joint(self, name: str, number: ArrayLike) -> Floats:
+        return checked_gain(name, number, self.n_joints, per="one for each joint")
 
-    def _forces(self, force: ArrayLike | None) -> list[float] | None:
-        """The most the motors may pull, the engine's default (which is ample) where none is given."""
-        if force is None:
-            return None
-        limits = checked_limit(self.model, force)[self._v_joints]
-        full: list[float] = np.minimum(limits, AMPLE).tolist()
-        return full
+    def _limits(self, force: ArrayLike | None) -> Floats | None:
+        return None if force is None else checked_limit(self.model, force)[self.v_joints]
 
 
+def _forces(limits: Floats | None) -> list[float] | None:
+    """Limits of the motors as the engine takes them, None for its own default."""
+    if limits is None:
+        return None
+    finite: list[float] = np.minimum(limits, UNLIMITED_FORCE).tolist()
+    return finite
+
+
+@dataclass(frozen=True)
 class PositionMotor(EngineMotor):
     """POSITION_CONTROL: each step ends at v = kd v* + kp (q* - q) / dt, if the force suffices.
 
     `position_gain` and `velocity_gain` are fractions of an error that one step removes, with the engine's
     defaults 0.1 and 1.
     """
+
+    position_gain: Floats = gain("")
+    velocity_gain: Floats = gain("")
+    force: Floats | None = parameter("N m or N")
 
     def __init__(
         self,
@@ -89,72 +96,83 @@ class PositionMotor(EngineMotor):
     ) -> None:
         """`force` [N m or N] is the most a motor gives; the engine's default if None."""
         super().__init__(model)
-        self._position_gain = self._per_joint("position_gain", position_gain)
-        self._velocity_gain = self._per_joint("velocity_gain", velocity_gain)
-        self._force = self._forces(force)
+        self._set(
+            position_gain=self._per_joint("position_gain", position_gain),
+            velocity_gain=self._per_joint("velocity_gain", velocity_gain),
+            force=self._limits(force),
+        )
 
     def command(self, measurement: Measurement, setpoint: Setpoint) -> MotorCommand:
         """Position and velocity of the setpoint."""
         return MotorCommand(
             "POSITION_CONTROL",
-            positions=setpoint.q[self._q_joints].tolist(),
-            velocities=setpoint.v[self._v_joints].tolist(),
-            forces=self._force,
-            position_gains=self._position_gain,
-            velocity_gains=self._velocity_gain,
+            positions=setpoint.q[self.q_joints].tolist(),
+            velocities=setpoint.v[self.v_joints].tolist(),
+            forces=_forces(self.force),
+            position_gains=self.position_gain.tolist(),
+            velocity_gains=self.velocity_gain.tolist(),
         )
 
 
+@dataclass(frozen=True)
 class VelocityMotor(EngineMotor):
-    """VELOCITY_CONTROL: each step ends at the wanted velocity, if the force suffices."""
+    """VELOCITY_CONTROL: each step ends at the velocity of the setpoint, if the force suffices."""
+
+    force: Floats | None = parameter("N m or N")
 
     def __init__(self, model: Model, *, force: ArrayLike | None = None) -> None:
         """`force` [N m or N] is the most a motor gives; the engine's default if None."""
         super().__init__(model)
-        self._force = self._forces(force)
+        self._set(force=self._limits(force))
 
     def command(self, measurement: Measurement, setpoint: Setpoint) -> MotorCommand:
         """Velocity of the setpoint."""
-        velocities = setpoint.v[self._v_joints].tolist()
-        return MotorCommand("VELOCITY_CONTROL", velocities=velocities, forces=self._force)
+        velocities = setpoint.v[self.v_joints].tolist()
+        return MotorCommand("VELOCITY_CONTROL", velocities=velocities, forces=_forces(self.force))
 
 
+@dataclass(frozen=True)
 class PDMotor(EngineMotor):
     """PD_CONTROL: tau = kp (q* - q) + kd (v* - v), computed inside the engine."""
+
+    kp: Floats = gain("N m/rad or N/m")
+    kd: Floats = gain("N m s/rad or N s/m")
+    force: Floats | None = parameter("N m or N")
 
     def __init__(self, model: Model, *, kp: ArrayLike, kd: ArrayLike, force: ArrayLike | None = None) -> None:
         """`kp` [N m/rad] and `kd` [N m s/rad], one number or one for each joint; `force` the most."""
         super().__init__(model)
-        self._kp = self._per_joint("kp", kp)
-        self._kd = self._per_joint("kd", kd)
-        self._force = self._forces(force)
+        kp, kd = self._per_joint("kp", kp), self._per_joint("kd", kd)
+        self._set(kp=kp, kd=kd, force=self._limits(force))
 
     def command(self, measurement: Measurement, setpoint: Setpoint) -> MotorCommand:
         """Position and velocity of the setpoint, and the gains."""
         return MotorCommand(
             "PD_CONTROL",
-            positions=setpoint.q[self._q_joints].tolist(),
-            velocities=setpoint.v[self._v_joints].tolist(),
-            forces=self._force,
-            position_gains=self._kp,
-            velocity_gains=self._kd,
+            positions=setpoint.q[self.q_joints].tolist(),
+            velocities=setpoint.v[self.v_joints].tolist(),
+            forces=_forces(self.force),
+            position_gains=self.kp.tolist(),
+            velocity_gains=self.kd.tolist(),
         )
 
 
+@dataclass(frozen=True)
 class TorqueMotor(EngineMotor):
-    """TORQUE_CONTROL: the torque of another law, given to the engine's motors as it stands.
+    """TORQUE_CONTROL: the torque of another controller, given to the engine's motors unchanged.
 
-    It is what the plant does with any law; the class is there so that all four modes have a name.
+    The plant does so with any controller; with this class all four modes have a name.
     """
 
+    model: Model = field(init=False)
+    inner: Controller[None] = field()
+
     def __init__(self, inner: Controller[None]) -> None:
-        """`inner` is a controller without a state of its own."""
+        """`inner` is a controller without a state."""
         super().__init__(inner.model)
-        self.inner = inner
-        self.lead, self.control_dt = inner.lead, inner.control_dt
-        self.needs_setpoint = inner.needs_setpoint
+        self._wrap(inner)
 
     def command(self, measurement: Measurement, setpoint: Setpoint) -> MotorCommand:
-        """The inner law's joint torques."""
+        """The joint torques of the inner controller."""
         tau, _ = self.inner.torque(measurement, setpoint, None)
-        return MotorCommand("TORQUE_CONTROL", forces=tau[self._v_joints].tolist())
+        return MotorCommand("TORQUE_CONTROL", forces=tau[self.v_joints].tolist())

@@ -1,11 +1,13 @@
-"""Torque that the wanted motion takes, whatever the robot does: tau = ID(q*, v*, a*)."""
+"""Feed-forward torque of the reference: tau = ID(q*, v*, a*)."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 from numpy.typing import ArrayLike
 
 from dynx.backends import Backend
-from dynx.control.base import Measurement, ModelBased
+from dynx.control.base import Measurement, ModelBased, gain
 from dynx.control.gains import checked_gain
 from dynx.control.pd import pd_torque
 from dynx.model import Model
@@ -13,11 +15,15 @@ from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint
 
 
-class FeedForward(ModelBased[None]):
-    """Inverse dynamics of the setpoint; with gains, a PD law corrects what is left.
+@dataclass(frozen=True)
+class FeedForward(ModelBased[None], pure=True):
+    """Inverse dynamics of the setpoint, and with gains PD control of the remaining error.
 
-    Without gains nothing looks at the robot: an error, once there, grows as gravity pleases.
+    Without gains there is no feedback: errors are not corrected, and gravity makes them grow.
     """
+
+    kp: Floats = gain("N m/rad or N/m")
+    kd: Floats = gain("N m s/rad or N s/m")
 
     def __init__(
         self,
@@ -29,10 +35,9 @@ class FeedForward(ModelBased[None]):
     ) -> None:
         """Gains as those of `PD`; none by default."""
         super().__init__(model, backend)
-        self.kp = checked_gain("kp", kp, model.nv)
-        self.kd = checked_gain("kd", kd, model.nv)
+        self._set(kp=checked_gain("kp", kp, model.nv), kd=checked_gain("kd", kd, model.nv))
 
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
         """The torque (nv,)."""
-        tau = self._dynamics.inverse_dynamics(*setpoint)
+        tau = self.dynamics.inverse_dynamics(*setpoint)
         return tau + pd_torque(measurement.q, measurement.v, setpoint.q, setpoint.v, self.kp, self.kd), None

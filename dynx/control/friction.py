@@ -1,6 +1,9 @@
-"""What joints lose: viscous damping and dry friction, one law for plants and for their compensation."""
+"""Joint friction: viscous damping and dry friction, for plants and for their compensation."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,23 +14,32 @@ from dynx.model import Model
 from dynx.spatial.scalar import Array, Floats, sign, tanh
 
 SLIP = 1e-2
-"""Speed [rad/s or m/s] at which dry friction has 76 % of its size, by default."""
+"""Default speed [rad/s or m/s] at which dry friction has 76 % of its magnitude."""
 
-LEAST_SLIP = 1e-9
-"""Least slip speed but 0: below it the division would overflow before it made a difference."""
+MIN_SLIP = 1e-9
+"""Smallest slip speed above 0 [rad/s or m/s]; the division overflows for smaller ones."""
 
 Coefficients = bool | ArrayLike
 """True for those of the description, False for none, one number, or one for each joint with a coordinate."""
 
 
+@dataclass(frozen=True, eq=False)
 class JointFriction:
     """The torque that damping and dry friction take: d v + f tanh(v / slip), of each joint.
 
     With `slip` 0 it is d v + f sign(v), what ``joint_dynamics=True`` means in every backend. Such a jump
-    makes a stepper of any kind rattle around rest: within one step the friction throws the joint back
-    further than it went. Over the speed `slip` it does not, as long as dt f / (M slip) stays below 2.
+    makes any integrator oscillate around rest: within one step the friction moves the joint back
+    further than it came. With a slope over the speed `slip` it does not, as long as
+    dt f / (M slip) stays below 2.
     A mimic joint's coefficients act on its driver through its multiplier.
     """
+
+    model: Model
+    damping: Floats
+    friction: Floats
+    slip: float
+    to_tree: Floats | None
+    """From the model's coordinates to those of the tree's joints, in which coefficients then are."""
 
     def __init__(
         self, model: Model, damping: Coefficients = True, friction: Coefficients = True, slip: float = SLIP
@@ -36,34 +48,46 @@ class JointFriction:
 
         Raises GainError for coefficients, ArgumentError for a slip speed, that cannot be used.
         """
-        if not isinstance(slip, int | float) or not (slip == 0.0 or LEAST_SLIP <= slip < np.inf):
-            raise ArgumentError(f"slip is {shown(slip)}; wanted a speed: 0, or {LEAST_SLIP:g} or more")
-        self.slip = float(slip)
+        if not isinstance(slip, int | float) or not (slip == 0.0 or MIN_SLIP <= slip < np.inf):
+            raise ArgumentError(f"slip is {shown(slip)}; wanted a speed: 0, or {MIN_SLIP:g} or more")
         moving = [joint.dynamics for joint in model.joints if joint.moves]
         of_model = damping is True, friction is True
         coupling = model.mechanism.coupling
         # The description's are those of the tree's joints, given ones those of the coordinates.
         through = coupling is not None and any(of_model)
-        self._S = coupling.matrix() if coupling is not None and through else None
         base = [0.0] * (6 if model.floating else 0)
         own_damping = np.array(base + [joint.damping for joint in moving])
         own_friction = np.array(base + [joint.friction for joint in moving])
-        self.damping = self._coefficients("damping", damping, own_damping, model, through)
-        self.friction = self._coefficients("friction", friction, own_friction, model, through)
-        self._dry = bool(self.friction.any())
-        self.present = bool(self.damping.any()) or self._dry
+        values = {
+            "model": model,
+            "damping": self._coefficients("damping", damping, own_damping, model, through),
+            "friction": self._coefficients("friction", friction, own_friction, model, through),
+            "slip": float(slip),
+            "to_tree": coupling.matrix() if coupling is not None and through else None,
+        }
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
+
+    @cached_property
+    def present(self) -> bool:
+        """Whether any coefficient is not zero."""
+        return bool(self.damping.any()) or self._dry
+
+    @cached_property
+    def _dry(self) -> bool:
+        return bool(self.friction.any())
 
     def __call__(self, v: Array) -> Array:
-        """The torque (..., nv) that is lost at velocity `v` (..., nv), arrays of any scalar."""
+        """The torque (..., nv) of friction at velocity `v` (..., nv), arrays of any scalar."""
         return self.lost(v, self.damping, self.friction)
 
     def lost(self, v: Array, damping: Array, friction: Array) -> Array:
-        """The same with other coefficients, in the places of this one's."""
-        speed = v if self._S is None else v @ self._S.T
+        """The torque (..., nv) that other coefficients, of the shape of this one's, take."""
+        speed = v if self.to_tree is None else v @ self.to_tree.T
         lost = damping * speed
         if self._dry:
             lost = lost + friction * (tanh(speed / self.slip) if self.slip else sign(speed))
-        return np.asarray(lost if self._S is None else lost @ self._S)
+        return np.asarray(lost if self.to_tree is None else lost @ self.to_tree)
 
     @staticmethod
     def _coefficients(name: str, given: Coefficients, own: Floats, model: Model, through: bool) -> Floats:

@@ -1,25 +1,34 @@
-"""Friction given back: another law's torque, plus what the joints lose."""
+"""Compensation of joint friction: the torque of another controller plus that of friction."""
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import dataclass, field
 
-from dynx.backends import Backend
-from dynx.control.base import Controller, ControllerState, Measurement
+from dynx.control.base import Controller, ControllerState, Measurement, Wrapper, parameter
 from dynx.control.friction import SLIP, Coefficients, JointFriction
+from dynx.control.gains import checked_gain
 from dynx.errors import ArgumentError, shown
+from dynx.model import Model
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint
 
 SPEEDS = ("measured", "setpoint")
 
 
-class FrictionCompensation(Controller[ControllerState]):
-    """tau = inner law + d v + f tanh(v / slip), with v measured or wanted.
+@dataclass(frozen=True)
+class FrictionCompensation(Wrapper[ControllerState], pure=True):
+    """tau = inner torque + d v + f tanh(v / slip), with v measured or of the setpoint.
 
-    From the measured speed a plant's own friction cancels exactly, if the coefficients are its own; with
-    noise, or with friction overrated, that can drive the joint by itself. The wanted speed cannot.
+    With the measured speed the friction of a plant cancels exactly, if the coefficients are those of the
+    plant; with noise, or with friction overestimated, the joint may become unstable. With the speed of the
+    setpoint it cannot.
     """
+
+    damping: bool | Floats = parameter("N m s/rad or N s/m")
+    friction: bool | Floats = parameter("N m or N")
+    slip: float = parameter("rad/s or m/s")
+    speed: str = parameter("")
+    losses: JointFriction = field(init=False, repr=False)
 
     def __init__(
         self,
@@ -33,31 +42,28 @@ class FrictionCompensation(Controller[ControllerState]):
         """Coefficients as those of `JointFriction`: by default what the model's description says."""
         if speed not in SPEEDS:
             raise ArgumentError(f"speed is {shown(speed)}; wanted one of {', '.join(SPEEDS)}")
-        self.inner = inner
-        self.model = inner.model
-        self.lead, self.control_dt = inner.lead, inner.control_dt
-        self.needs_setpoint = inner.needs_setpoint
-        self.losses = JointFriction(inner.model, damping, friction, slip)
-        self._measured = speed == "measured"
-        self._recipe = {"damping": damping, "friction": friction, "slip": slip, "speed": speed}
-
-    def initial_state(self) -> Any:
-        """As the inner law starts."""
-        return self.inner.initial_state()
+        super().__init__(inner)
+        self._set(
+            damping=_coefficients(inner.model, "damping", damping),
+            friction=_coefficients(inner.model, "friction", friction),
+            slip=float(slip),
+            speed=speed,
+            losses=JointFriction(inner.model, damping, friction, slip),
+        )
 
     def torque(
         self, measurement: Measurement, setpoint: Setpoint, state: ControllerState
     ) -> tuple[Floats, ControllerState]:
-        """The inner law's torque (nv,) and what is lost."""
+        """The torque (nv,) of the inner controller plus that of friction."""
         tau, state = self.inner.torque(measurement, setpoint, state)
-        return tau + self.losses(measurement.v if self._measured else setpoint.v), state
-
-    def on(self, engine: str | Backend) -> FrictionCompensation[ControllerState]:
-        """The same with the inner law on another backend."""
-        options: Any = self._recipe
-        return FrictionCompensation(self.inner.on(engine), **options)
+        return tau + self.losses(measurement.v if self.speed == "measured" else setpoint.v), state
 
     @property
     def name(self) -> str:
-        """That of the law, and that friction is compensated."""
+        """Name of the inner controller, and that friction is compensated."""
         return f"{self.inner.name}, friction compensated"
+
+
+def _coefficients(model: Model, name: str, given: Coefficients) -> bool | Floats:
+    """True or False as given, numbers as an array with one for each joint."""
+    return given if isinstance(given, bool) else checked_gain(name, given, len(model.joint_names))

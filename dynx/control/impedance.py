@@ -1,11 +1,13 @@
-"""Impedance control: the frame is tied to its reference by a spring and a damper, and may be pushed away."""
+"""Impedance control: a spring and a damper between a frame and its reference."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 from numpy.typing import ArrayLike
 
 from dynx.backends import Backend
-from dynx.control.base import Measurement
+from dynx.control.base import Measurement, gain
 from dynx.control.gains import checked_gain
 from dynx.control.task_space import TaskSpace
 from dynx.model import Model
@@ -13,12 +15,17 @@ from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint
 
 
-class Impedance(TaskSpace[None]):
+@dataclass(frozen=True)
+class Impedance(TaskSpace[None], pure=True):
     """tau = J' (K e + D e') + g(q) - B v, without shaping the inertia.
 
-    Passive with a reference at rest: whatever it touches, it cannot gain energy (Hogan 1985; Siciliano et
+    Passive with a reference at rest: it gives no energy to its environment (Hogan 1985; Siciliano et
     al., Robotics, section 9.2). A steady force F displaces the frame by F / K.
     """
+
+    stiffness: Floats = gain("N/m, N m/rad")
+    damping: Floats = gain("N s/m, N m s/rad")
+    joint_damping: Floats = gain("N m s/rad or N s/m")
 
     def __init__(
         self,
@@ -32,17 +39,20 @@ class Impedance(TaskSpace[None]):
     ) -> None:
         """`stiffness` K [N/m, N m/rad] and `damping` D [N s/m, N m s/rad] along the world's axes.
 
-        (6,), linear then angular, or one number; `joint_damping` B (nv,) calms what the frame does not
-        see. Raises GainError, UnknownNameError for the frame.
+        (6,), linear then angular, or one number; `joint_damping` B (nv,) damps the motion that leaves the
+        frame at rest. Raises GainError, UnknownNameError for the frame.
         """
         super().__init__(model, frame, backend)
-        self.stiffness = checked_gain("stiffness", stiffness, 6, per="linear then angular")
-        self.damping = checked_gain("damping", damping, 6, per="linear then angular")
-        self.joint_damping = checked_gain("joint_damping", joint_damping, model.nv)
+        per = "linear then angular"
+        self._set(
+            stiffness=checked_gain("stiffness", stiffness, 6, per=per),
+            damping=checked_gain("damping", damping, 6, per=per),
+            joint_damping=checked_gain("joint_damping", joint_damping, model.nv),
+        )
 
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
         """The torque (nv,)."""
         error = self._error(measurement, setpoint)
         wrench = self.stiffness * error.pose + self.damping * error.twist
-        weight = self._dynamics.gravity_torque(measurement.q)
+        weight = self.dynamics.gravity_torque(measurement.q)
         return weight + error.jacobian.T @ wrench - self.joint_damping * measurement.v, None

@@ -1,27 +1,38 @@
-"""The part of a robot that has motors: its joints, without the six freedoms of a floating base."""
+"""Controllers of the joints of a robot, without the six degrees of freedom of a floating base."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from dynx.control.base import Controller, ControllerState
 from dynx.model import Model
-from dynx.spatial.scalar import Floats
 
 
+@dataclass(frozen=True)
 class JointSpace(Controller[ControllerState]):
-    """A law that looks at joints alone; on a floating base it commands no force."""
+    """A controller that reads and moves joints alone; it commands no force on a floating base."""
 
-    def __init__(self, model: Model) -> None:
-        self.model = model
-        base = 6 if model.floating else 0
-        self._n_joints = model.nv - base
-        self._q_joints = slice(base + 1 if base else 0, None)
-        self._v_joints = slice(base, None)
-        self._no_force: Floats = np.zeros(base)
+    model: Model
 
-    def _of_all(self, joint_torque: Any) -> Floats:
+    @property
+    def n_joints(self) -> int:
+        """Number of joints with a coordinate."""
+        return len(self.model.joint_names)
+
+    @cached_property
+    def q_joints(self) -> slice:
+        """Entries of the joints in a configuration."""
+        return slice(7 if self.model.floating else 0, None)
+
+    @cached_property
+    def v_joints(self) -> slice:
+        """Entries of the joints in a velocity."""
+        return slice(6 if self.model.floating else 0, None)
+
+    def all_torques(self, joint_torque: Any) -> Any:
         """The torque (nv,) whose joint part is `joint_torque` (n,)."""
-        return np.concatenate([self._no_force, joint_torque]) if self._no_force.size else joint_torque
+        return np.concatenate([np.zeros(6), joint_torque]) if self.model.floating else joint_torque

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.backends import Backend
-from dynx.control.base import Measurement
+from dynx.control.base import Measurement, gain, parameter
 from dynx.control.computed_torque import commanded_acceleration
 from dynx.control.gains import checked_gain, feedback_gains
 from dynx.control.task_space import TaskSpace
@@ -16,14 +18,21 @@ from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint
 
 
-class OperationalSpace(TaskSpace[None]):
+@dataclass(frozen=True)
+class OperationalSpace(TaskSpace[None], pure=True):
     """Computed torque in the space of a frame (Khatib 1987; Siciliano et al., Robotics, section 8.6.2).
 
-    The frame's error e obeys e'' + kd e' + kp e = 0. Joint accelerations that leave the frame alone draw
+    The frame's error e obeys e'' + kd e' + kp e = 0. Joint accelerations that leave the frame alone move
     the posture to the setpoint, by the projector of the dynamically consistent inverse
     J# = M^-1 J' (J M^-1 J' + damping^2)^-1. `damping` keeps the torque finite near singular postures, at
     the price of an error there.
     """
+
+    kp: Floats = gain("1/s^2")
+    kd: Floats = gain("1/s")
+    posture_kp: Floats = gain("1/s^2")
+    posture_kd: Floats = gain("1/s")
+    damping: float = parameter("")
 
     def __init__(
         self,
@@ -44,20 +53,28 @@ class OperationalSpace(TaskSpace[None]):
         Units as those of `ComputedTorque`. Raises GainError, UnknownNameError for the frame.
         """
         super().__init__(model, frame, backend)
-        self.kp, self.kd = feedback_gains(6, kp, kd, natural_frequency, damping_ratio)
-        self.posture_kp = checked_gain("posture_kp", posture_kp, model.nv)
-        self.posture_kd = checked_gain("posture_kd", posture_kd, model.nv)
-        self._ridge = float(checked_gain("damping", damping, 1, per="")[0]) ** 2 * np.eye(6)
+        kp, kd = feedback_gains(6, kp, kd, natural_frequency, damping_ratio)
+        self._set(
+            kp=kp,
+            kd=kd,
+            posture_kp=checked_gain("posture_kp", posture_kp, model.nv),
+            posture_kd=checked_gain("posture_kd", posture_kd, model.nv),
+            damping=float(checked_gain("damping", damping, 1, per="")[0]),
+        )
 
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
         """The torque (nv,)."""
         _, q, v = measurement
-        engine, frame = self._engine, self.frame
+        dynamics, frame = self.dynamics, self.frame
         error = self._error(measurement, setpoint)
-        wanted = engine.frame_acceleration(*setpoint, frame) + self.kd * error.twist + self.kp * error.pose
-        left = wanted - engine.jacobian_derivative(q, v, frame) @ v
+        wanted = dynamics.frame_acceleration(*setpoint, frame) + self.kd * error.twist + self.kp * error.pose
+        left = wanted - dynamics.jacobian_derivative(q, v, frame) @ v
         posture = commanded_acceleration(q, v, *setpoint, self.posture_kp, self.posture_kd)
         J = error.jacobian
-        inverse = solve_columns(engine.mass_matrix(q), J.T)
-        a = posture + inverse @ solve_columns(J @ inverse + self._ridge, (left - J @ posture)[:, None])[:, 0]
-        return self._dynamics.inverse_dynamics(q, v, a), None
+        inverse = solve_columns(dynamics.mass_matrix(q), J.T)
+        a = (
+            posture
+            + inverse
+            @ solve_columns(J @ inverse + self.damping**2 * np.eye(6), (left - J @ posture)[:, None])[:, 0]
+        )
+        return dynamics.inverse_dynamics(q, v, a), None

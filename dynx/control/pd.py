@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from numpy.typing import ArrayLike
 
-from dynx.control.base import Measurement
+from dynx.control.base import Measurement, gain
 from dynx.control.gains import checked_gain
 from dynx.control.joint_space import JointSpace
 from dynx.model import Model
@@ -12,21 +14,25 @@ from dynx.spatial.scalar import Array, Floats
 from dynx.trajectory.base import Setpoint
 
 
-class PD(JointSpace[None]):
+@dataclass(frozen=True)
+class PD(JointSpace[None], pure=True):
     """A spring and a damper from each joint to its setpoint; it needs no model of the masses.
 
     Under gravity an arm hangs by g / kp below its setpoint.
     """
 
+    kp: Floats = gain("N m/rad or N/m")
+    kd: Floats = gain("N m s/rad or N s/m")
+
     def __init__(self, model: Model, *, kp: ArrayLike, kd: ArrayLike) -> None:
         """`kp` [N m/rad or N/m] and `kd` [N m s/rad or N s/m]: one number, or one for each joint."""
         super().__init__(model)
-        self.kp = checked_gain("kp", kp, self._n_joints, per="one for each joint")
-        self.kd = checked_gain("kd", kd, self._n_joints, per="one for each joint")
+        n, per = self.n_joints, "one for each joint"
+        self._set(kp=checked_gain("kp", kp, n, per=per), kd=checked_gain("kd", kd, n, per=per))
 
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
         """The torque (nv,)."""
-        joints, rates = self._q_joints, self._v_joints
+        joints, rates = self.q_joints, self.v_joints
         tau = pd_torque(
             measurement.q[joints],
             measurement.v[rates],
@@ -35,7 +41,7 @@ class PD(JointSpace[None]):
             self.kp,
             self.kd,
         )
-        return self._of_all(tau), None
+        return self.all_torques(tau), None
 
 
 def pd_torque(q: Array, v: Array, q_wanted: Array, v_wanted: Array, kp: Array, kd: Array) -> Array:

@@ -1,14 +1,13 @@
-"""Motors have limits: torque cut to the model's effort limits, or to others."""
+"""Saturation of a controller's torque at effort limits."""
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dynx.backends import Backend
-from dynx.control.base import Controller, ControllerState, Measurement
+from dynx.control.base import Controller, ControllerState, Measurement, Wrapper, parameter
 from dynx.errors import GainError, LimitError, shown
 from dynx.model import Model
 from dynx.model.configuration import real_array
@@ -16,41 +15,33 @@ from dynx.spatial.scalar import Floats, clamp
 from dynx.trajectory.base import Setpoint
 
 
-class Saturated(Controller[ControllerState]):
-    """Another law, its torques cut to what the motors can give.
+@dataclass(frozen=True)
+class Saturated(Wrapper[ControllerState], pure=True):
+    """Another controller's torque, saturated at the limits of the motors.
 
-    `dynx.simulate(..., effort_limits=True)` cuts them in the plant instead, and records where.
+    `dynx.simulate(..., effort_limits=True)` saturates in the plant instead, and records where.
     """
+
+    limit: Floats = parameter("N m or N")
 
     def __init__(self, inner: Controller[ControllerState], *, limit: ArrayLike | None = None) -> None:
         """`limit` [N m or N]: one number or one for each joint, by default the effort limits of the model.
 
-        Raises LimitError for a limit of 0, with which nothing could be done.
+        Raises LimitError for a limit of 0, which would allow no torque.
         """
-        self.inner = inner
-        self.model = inner.model
-        self.lead, self.control_dt = inner.lead, inner.control_dt
-        self.needs_setpoint = inner.needs_setpoint
-        self.limit = checked_limit(inner.model, limit)
-
-    def initial_state(self) -> Any:
-        """As the inner law starts."""
-        return self.inner.initial_state()
+        super().__init__(inner)
+        self._set(limit=checked_limit(inner.model, limit))
 
     def torque(
         self, measurement: Measurement, setpoint: Setpoint, state: ControllerState
     ) -> tuple[Floats, ControllerState]:
-        """The inner law's torque (nv,), within the limits."""
+        """The torque (nv,) of the inner controller, within the limits."""
         tau, state = self.inner.torque(measurement, setpoint, state)
         return clamp(tau, self.limit), state
 
-    def on(self, engine: str | Backend) -> Saturated[ControllerState]:
-        """The same with the inner law on another backend."""
-        return Saturated(self.inner.on(engine), limit=self.limit)
-
     @property
     def name(self) -> str:
-        """That of the law, and that it is cut."""
+        """Name of the inner controller, and that its torque is saturated."""
         return f"{self.inner.name}, saturated"
 
 
@@ -64,6 +55,8 @@ def checked_limit(model: Model, limit: ArrayLike | None) -> Floats:
     efforts: Floats = model.effort_limit
     if limit is not None:
         given, n = real_array("limit", limit), model.nv - base
+        if base and given.shape == (model.nv,) and (given[:base] == np.inf).all():
+            given = given[base:]
         if given.shape not in ((), (n,)) or not (given >= 0.0).all():
             raise GainError(f"limit is {shown(limit)}; wanted one number, or {n}, 0 or more")
         efforts = np.concatenate([np.full(base, np.inf), np.broadcast_to(given, (n,))])

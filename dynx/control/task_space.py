@@ -1,7 +1,8 @@
-"""A frame of the robot and where it is wanted: what the laws in the space of a task share."""
+"""The error of a frame of the robot, on which the task-space controllers act."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -15,33 +16,35 @@ from dynx.trajectory.base import Setpoint
 
 
 class TaskError(NamedTuple):
-    """What is left to the wanted motion of a frame: linear, then angular, along the world's axes."""
+    """Setpoint of a frame minus its measured motion: linear, then angular, along the world's axes."""
 
     pose: Floats
     """(6,): metres, then a rotation vector [rad]."""
     twist: Floats
     """(6,): metres and radians per second."""
     jacobian: Floats
-    """J (6, nv) of the frame where it is."""
+    """J (6, nv) of the frame at the measured configuration."""
 
 
+@dataclass(frozen=True)
 class TaskSpace(ModelBased[ControllerState]):
-    """A law about one frame. The setpoint is in joint space as for every law: what it wants of the frame is
-    the pose, the velocity and the acceleration that the frame has there."""
+    """A controller of one frame.
+
+    The setpoint is in joint space as for every controller; that of the frame is the pose, velocity and
+    acceleration that the frame has there.
+    """
+
+    frame: str
 
     def __init__(self, model: Model, frame: str, backend: str | Backend) -> None:
         super().__init__(model, backend)
         model.frame_index(frame)
-        self.frame = frame
-
-    @property
-    def _engine(self) -> Backend:
-        return self._dynamics.backend
+        self._set(frame=frame)
 
     def _error(self, measurement: Measurement, setpoint: Setpoint) -> TaskError:
-        engine, frame = self._engine, self.frame
-        J = engine.jacobian(measurement.q, frame)
-        wanted = engine.forward_kinematics(setpoint.q, frame)
-        linear, angular = pose_error(wanted, engine.forward_kinematics(measurement.q, frame))
-        wanted_twist = engine.jacobian(setpoint.q, frame) @ setpoint.v
+        dynamics, frame = self.dynamics, self.frame
+        J = dynamics.jacobian(measurement.q, frame)
+        wanted = dynamics.forward_kinematics(setpoint.q, frame)
+        linear, angular = pose_error(wanted, dynamics.forward_kinematics(measurement.q, frame))
+        wanted_twist = dynamics.jacobian(setpoint.q, frame) @ setpoint.v
         return TaskError(np.concatenate([linear, angular]), wanted_twist - J @ measurement.v, J)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from numpy.typing import ArrayLike
 
-from dynx.control.base import Measurement
+from dynx.control.base import Measurement, gain
 from dynx.control.gains import checked_gain
 from dynx.control.joint_space import JointSpace
 from dynx.model import Model
@@ -12,15 +14,18 @@ from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint
 
 
-class Velocity(JointSpace[None]):
-    """A damper from each joint to its wanted speed; what positions do is left to chance."""
+@dataclass(frozen=True)
+class Velocity(JointSpace[None], pure=True):
+    """A damper from each joint to its velocity setpoint; positions are not controlled."""
+
+    kd: Floats = gain("N m s/rad or N s/m")
 
     def __init__(self, model: Model, *, kd: ArrayLike) -> None:
         """`kd` [N m s/rad or N s/m]: one number, or one for each joint."""
         super().__init__(model)
-        self.kd = checked_gain("kd", kd, self._n_joints, per="one for each joint")
+        self._set(kd=checked_gain("kd", kd, self.n_joints, per="one for each joint"))
 
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
         """The torque (nv,)."""
-        rates = self._v_joints
-        return self._of_all(self.kd * (setpoint.v[rates] - measurement.v[rates])), None
+        rates = self.v_joints
+        return self.all_torques(self.kd * (setpoint.v[rates] - measurement.v[rates])), None

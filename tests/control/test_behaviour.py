@@ -20,7 +20,7 @@ from dynx.control import (
     Measurement,
     OperationalSpace,
 )
-from dynx.control.friction import LEAST_SLIP
+from dynx.control.friction import MIN_SLIP
 from dynx.control.saturation import checked_limit
 from dynx.model.loading import load
 from dynx.sim import Push, simulate
@@ -128,7 +128,7 @@ def test_impedance_gives_no_energy_away() -> None:
     assert stored[-1] < 0.7 * stored[0]
 
 
-@given(st.integers(0, 2**32 - 1), st.one_of(st.just(0.0), st.floats(LEAST_SLIP, 0.1)))
+@given(st.integers(0, 2**32 - 1), st.one_of(st.just(0.0), st.floats(MIN_SLIP, 0.1)))
 def test_friction_takes_energy_at_every_speed(seed: int, slip: float) -> None:
     robot = mixed_robot(mimic=True)
     losses = JointFriction(robot, slip=slip)

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from dynx.backends.solvability import Solvability
 from dynx.compiled.parametric import ParametricDynamics
-from dynx.control.base import Controller
+from dynx.control.base import Controller, gains_of
 from dynx.control.friction import SLIP, Coefficients
 from dynx.control.gains import checked_gain
 from dynx.control.saturation import checked_limit
@@ -154,7 +154,7 @@ def simulate_batch(
         fixed["parameters"] = rows.of("parameters", given, len(plant.parameters.names))
     law = innermost(controller)
     for name, values in (gains or {}).items():
-        fixed[f"gain_{name}"] = rows.of(name, _columns(values), getattr(law, name).size, spread=True)
+        fixed[f"gain_{name}"] = rows.of(name, _columns(values), gains_of(law)[name].size, spread=True)
     n = rows.count
     refuse_ambiguous(loads, n, {"damping": damping, "friction": friction, "armature": armature})
     start = {name: rows.spread(array) for name, array in start.items()}

@@ -8,7 +8,7 @@ such as sines and cosines, is computed once.
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -16,12 +16,12 @@ import numpy as np
 from dynx.compiled.kernels import evaluated, tidied
 from dynx.compiled.mass_factors import factors_of, solved
 from dynx.compiled.parametric import ParametricDynamics
-from dynx.control.base import Controller, Measurement
+from dynx.control.base import Controller, Measurement, chain_of, gains_of
+from dynx.control.content import content_of
 from dynx.errors import ArgumentError, DynxError, TraceError, UnsupportedFeatureError, shown
 from dynx.model import Mechanism, Model
-from dynx.sim.batch.fingerprint import content_of
 from dynx.sim.batch.loads import BatchLoads
-from dynx.sim.batch.traced_controller import innermost, traced_law
+from dynx.sim.batch.traced_controller import innermost, traced_controller
 from dynx.sim.loop.controller_checks import Unchanged, is_row
 from dynx.sim.plants.floating_step import floating_step
 from dynx.simd.cache import cached_kernel, recipe_of
@@ -56,11 +56,12 @@ class StepOf:
 
     def __post_init__(self) -> None:
         law = innermost(self.controller)
+        known = gains_of(law)
         for name in self.gains:
-            if not isinstance(vars(law).get(name), np.ndarray):
-                arrays = [key for key, value in vars(law).items() if isinstance(value, np.ndarray)]
-                known = ", ".join(key for key in arrays if not key.startswith("_"))
-                raise ArgumentError(f"{law.name} has no gain {shown(name)}; it has {known or 'none'}")
+            if name not in known:
+                raise ArgumentError(
+                    f"{law.name} has no gain {shown(name)}; it has {', '.join(known) or 'none'}"
+                )
         state = self.controller.initial_state()
         if state is not None and not is_row(state):
             what = f"array {state.shape}" if isinstance(state, np.ndarray) else type(state).__name__
@@ -75,9 +76,7 @@ class StepOf:
         Raises UnsupportedFeatureError for a law that branches on what it measures.
         """
         try:
-            # A plant is never changed, and is held on to here, so that it can be told by what it is.
-            own = content_of({name: value for name, value in vars(self).items() if name != "plant"})
-            key = own, self.plant, controlled, pushed
+            key = self._content(), controlled, pushed
         except TypeError:
             return self._traced(controlled=controlled, pushed=pushed)
         kernel = _made.get(key)
@@ -87,9 +86,18 @@ class StepOf:
                 _made.pop(old, None)
         return kernel
 
+    def _content(self) -> Hashable:
+        """Key of all that decides the step. Raises TypeError for a controller that is not declared pure."""
+        if not all(each.is_pure for each in chain_of(self.controller)):
+            raise TypeError(f"{self.controller.name} is not declared pure")
+        # A plant is never changed, and the key holds on to it, so its identity is enough.
+        others = (each.name for each in fields(self) if each.name not in ("controller", "plant"))
+        own = content_of([getattr(self, name) for name in others])
+        return own, content_of(traced_controller(self.controller, {})), self.plant
+
     def _traced(self, *, controlled: bool, pushed: bool) -> Kernel:
         mechanism = tidied(self.model.mechanism)
-        law = traced_law(self.controller, {})
+        law = traced_controller(self.controller, {})
 
         def step(**given: Array) -> dict[str, Array]:
             if controlled:
@@ -132,7 +140,7 @@ class StepOf:
             if self.noisy:
                 sizes |= {"noise_q": nv, "noise_v": nv}
             law = innermost(self.controller)
-            sizes |= {f"gain_{name}": getattr(law, name).size for name in self.gains}
+            sizes |= {f"gain_{name}": gains_of(law)[name].size for name in self.gains}
             if self.limit is not None:
                 sizes["held_for"] = 1
         state = self.controller.initial_state()
@@ -152,7 +160,7 @@ class StepOf:
             off = given["noise_q"]
             q, v = integrate(q, off) if self.model.floating else q + off, v + given["noise_v"]
         setpoint = Setpoint(given["q_wanted"], given["v_wanted"], given["a_wanted"])
-        own = traced_law(law, {name: given[f"gain_{name}"] for name in self.gains})
+        own = traced_controller(law, {name: given[f"gain_{name}"] for name in self.gains})
         watch = Unchanged(own)
         tau, state = own.torque(Measurement(given["t"][0], q, v), setpoint, given.get("state"))
         if watch.changed:

@@ -1,85 +1,56 @@
-"""A control law on symbols: what it asks of its backend is answered by `dynx.rbd`, traced with the rest."""
+"""A controller on symbols: `dynx.rbd`, traced with the plant, evaluates its dynamics."""
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Mapping
 from typing import Any
 
 from dynx.compiled.kernels import evaluated, tidied
-from dynx.control.base import Controller
+from dynx.control.base import Controller, chain_of, rebind
+from dynx.control.dynamics import Dynamics, Evaluation
 from dynx.model import Model
-from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED, Reference
+from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED
 from dynx.spatial.scalar import Array
 
+FRAME_FUNCTIONS = {"forward_kinematics": "frame_placement"}
+"""Names of `dynx.compiled.kernels` for quantities of a frame, where they are others."""
 
-class TracedDynamics:
-    """What `dynx.control` asks of a backend, answered on symbols, for one sample."""
+
+class ArrayDynamics(Dynamics):
+    """Dynamics evaluated by the array code of `dynx.rbd`, for symbols as for numbers."""
 
     def __init__(self, model: Model) -> None:
-        self._model = model
         self._mechanism = tidied(model.mechanism)
+        super().__init__(model)
 
-    @property
-    def backend(self) -> TracedDynamics:
-        """What questions about frames are asked of: the same."""
-        return self
+    def evaluation(self, quantity: str) -> Evaluation:
+        """Function of `dynx.rbd` for the quantity."""
+        mechanism, model = self._mechanism, self.model
 
-    def inverse_dynamics(self, q: Array, v: Array, a: Array) -> Array:
-        """tau (nv,)."""
-        return evaluated(self._mechanism, "inverse_dynamics", (), q, v, a)
+        def evaluate(*arguments: Any, reference: str = LOCAL_WORLD_ALIGNED) -> Array:
+            if not isinstance(arguments[-1], str):
+                return evaluated(mechanism, quantity, (), *arguments)
+            *arrays, frame = arguments
+            details = (model.frame_index(frame), *(() if quantity == "forward_kinematics" else (reference,)))
+            return evaluated(mechanism, FRAME_FUNCTIONS.get(quantity, quantity), details, *arrays)
 
-    def forward_dynamics(self, q: Array, v: Array, tau: Array) -> Array:
-        """a (nv,)."""
-        return evaluated(self._mechanism, "forward_dynamics", (), q, v, tau)
+        return evaluate
 
-    def bias_torque(self, q: Array, v: Array) -> Array:
-        """C v + g (nv,)."""
-        return evaluated(self._mechanism, "bias_torque", (), q, v)
-
-    def gravity_torque(self, q: Array) -> Array:
-        """g (nv,)."""
-        return evaluated(self._mechanism, "gravity_torque", (), q)
-
-    def mass_matrix(self, q: Array) -> Array:
-        """M (nv, nv)."""
-        return evaluated(self._mechanism, "mass_matrix", (), q)
-
-    def forward_kinematics(self, q: Array, frame: str) -> Array:
-        """T_world_frame (4, 4)."""
-        return evaluated(self._mechanism, "frame_placement", (self._model.frame_index(frame),), q)
-
-    def jacobian(self, q: Array, frame: str, *, reference: Reference = LOCAL_WORLD_ALIGNED) -> Array:
-        """J (6, nv) of a frame."""
-        return self._of_frame("jacobian", frame, reference, q)
-
-    def jacobian_derivative(
-        self, q: Array, v: Array, frame: str, *, reference: Reference = LOCAL_WORLD_ALIGNED
-    ) -> Array:
-        """dJ/dt (6, nv) of a frame."""
-        return self._of_frame("jacobian_derivative", frame, reference, q, v)
-
-    def frame_acceleration(
-        self, q: Array, v: Array, a: Array, frame: str, *, reference: Reference = LOCAL_WORLD_ALIGNED
-    ) -> Array:
-        """J a + dJ/dt v (6,) of a frame."""
-        return self._of_frame("frame_acceleration", frame, reference, q, v, a)
-
-    def _of_frame(self, question: str, frame: str, reference: Reference, q: Array, *rates: Array) -> Array:
-        return evaluated(self._mechanism, question, (self._model.frame_index(frame), reference), q, *rates)
+    def content_key(self) -> tuple[Any, ...]:
+        """Key that is equal for equal models."""
+        return (self.model,)
 
 
-def traced_law(controller: Controller[Any], gains: Mapping[str, Array]) -> Controller[Any]:
-    """The same law with symbols for a backend, and other gains in the innermost one."""
-    twin = copy.copy(controller)
-    inner = vars(twin).get("inner")
-    vars(twin).update({"inner": traced_law(inner, gains)} if inner is not None else gains)
-    if "_dynamics" in vars(twin) and not isinstance(vars(twin)["_dynamics"], TracedDynamics):
-        vars(twin)["_dynamics"] = TracedDynamics(twin.model)
-    return twin
+def traced_controller(controller: Controller[Any], gains: Mapping[str, Array]) -> Controller[Any]:
+    """The controller over array code in the place of an engine, with other gains in the innermost one."""
+    last = innermost(controller)
+    return rebind(
+        controller,
+        lambda dynamics: dynamics if isinstance(dynamics, ArrayDynamics) else ArrayDynamics(dynamics.model),
+        lambda each: gains if each is last else {},
+    )
 
 
 def innermost(controller: Controller[Any]) -> Controller[Any]:
-    """The law itself, without what is wrapped around it."""
-    inner = vars(controller).get("inner")
-    return controller if inner is None else innermost(inner)
+    """The controller without those that are wrapped around it."""
+    return list(chain_of(controller))[-1]

@@ -106,7 +106,7 @@ class Loop:
                         q, v = stopped
                         plant.reset(q, v)
             except Exception as error:
-                # Also what an engine raises: its hooks are called bare (`dynx.control.single_sample`).
+                # Also what an engine raises: its hooks are called bare (`dynx.control.dynamics`).
                 raise self._diverged(k, record, f"{type(error).__name__}: {error}") from error
             if not hypot(*v.tolist()) < RUNAWAY:
                 raise self._diverged(k, record, "the velocity is no number or beyond all bounds")

@@ -19,7 +19,7 @@ from dynx.control.engine_motors import EngineMotor
 from dynx.errors import TraceError
 from dynx.sim.loop.controller_checks import is_row
 from dynx.sim.loop.plain import RUNAWAY, Loop
-from dynx.sim.loop.stages import Ask, Glue, Questions, asking_law, refuse_foreign_law
+from dynx.sim.loop.stages import Ask, Glue, Questions, refuse_impure, traced_controller
 from dynx.sim.plants.integrated import IntegratedPlant
 from dynx.sim.record.record import Record
 from dynx.simd.kernel import Kernel
@@ -78,7 +78,7 @@ class GluedLoop:
         sizes = dict.fromkeys(("v", "held", "seen_v", *SETPOINT, *NOISE), nv) | {"t": 1}
         sizes |= dict.fromkeys(("q", "seen_q", "q_wanted"), nq)
         if loop.controller is not None:
-            refuse_foreign_law(loop.controller)
+            refuse_impure(loop.controller)
         if any(array.dtype != np.float64 for array in loop.setpoints):
             raise TraceError("the reference is not in float64")
         self._start = None if loop.controller is None else loop.controller.initial_state()
@@ -118,7 +118,7 @@ class GluedLoop:
             if loop.sensors.noise is not None:
                 q, v = q + given["noise_q"], v + given["noise_v"]
             measurement = Measurement(given["t"][0], q, v)
-            law = asking_law(loop.controller, questions)
+            law = traced_controller(loop.controller, questions)
             tau, state = law.torque(measurement, Setpoint(*(given[name] for name in SETPOINT)), state)
             questions.refuse_rounded_otherwise()
             if tau.shape != given["v"].shape:
@@ -128,7 +128,7 @@ class GluedLoop:
             if loop.limit is not None:
                 tau = clamp(tau, loop.limit)
 
-        forward = self._plant.dynamics.in_this_thread("forward_dynamics")
+        forward = self._plant.dynamics.bound_to_thread("forward_dynamics")
 
         def accelerate(q: Array, v: Array, tau: Array) -> Array:
             return questions.ask(forward, v.shape, q, v, tau, guarded=True)

@@ -9,15 +9,15 @@ for bit: which of the two ran cannot be told from the record.
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from dynx.control.base import Controller
-from dynx.control.single_sample import SingleSample
+from dynx.control.base import Controller, chain_of, gains_of, rebind
+from dynx.control.dynamics import QUANTITIES, Dynamics, EngineDynamics, Evaluation
 from dynx.errors import TraceError
 from dynx.simd.cache import cached_kernel, recipe_of
 from dynx.simd.emit import Settings
@@ -163,52 +163,46 @@ class Questions:
         return _without_idle_inputs(finished(self._graph, self._ports, outputs, results))
 
 
-class AskedDynamics:
-    """What a law asks of its backend (`SingleSample`), as questions."""
+class TracedEngineCalls(Dynamics):
+    """Dynamics of a controller in a trace, where each evaluation becomes an engine call."""
 
-    def __init__(self, questions: Questions, dynamics: SingleSample) -> None:
-        nv = dynamics.backend.model.nv
-        shapes = {"mass_matrix": (nv, nv)}
-        for name in ("inverse_dynamics", "forward_dynamics", "bias_torque", "gravity_torque", "mass_matrix"):
-            vars(self)[name] = _asking(questions, dynamics.in_this_thread(name), shapes.get(name, (nv,)))
+    def __init__(self, questions: Questions, dynamics: Dynamics) -> None:
+        if not isinstance(dynamics, EngineDynamics):
+            raise TraceError(f"{type(dynamics).__name__} is not evaluated by an engine")
+        self._questions, self._engine = questions, dynamics
+        super().__init__(dynamics.model)
 
-    def __getattr__(self, name: str) -> Any:
-        raise TraceError(f"{name} is not asked for in a stage")
+    def evaluation(self, quantity: str) -> Evaluation:
+        """Callable that records an engine call and returns symbols for its result."""
+        nv = self.model.nv
+        shape = (nv, nv) if quantity == "mass_matrix" else (nv,)
+
+        def record(*arguments: Array) -> Array:
+            if quantity not in QUANTITIES:
+                raise TraceError(f"{quantity} of a frame is no engine call of a compiled stage")
+            return self._questions.ask(self._engine.bound_to_thread(quantity), shape, *arguments)
+
+        return record
 
 
-def refuse_foreign_law(controller: Controller[Any]) -> None:
-    """Raise TraceError for a law that is not one of `dynx.control`, or holds such a one.
+def refuse_impure(controller: Controller[Any]) -> None:
+    """Raise TraceError for a controller that may do anything besides returning its torque.
 
-    What somebody else's does besides answering, such as counting its calls, would be done once and
-    never again.
+    Whatever else it did, such as counting its calls, would be done once in the trace and never again.
     """
-    kind, own = type(controller), vars(controller)
-    methods = (kind, kind.torque, kind.initial_state)
-    if {"torque", "initial_state"} & own.keys() or not all(
-        str(method.__module__).startswith("dynx.control.") for method in methods
-    ):
-        raise TraceError(f"{controller.name} is not a law of dynx")
-    if "inner" in own:
-        refuse_foreign_law(own["inner"])
+    for each in chain_of(controller):
+        if not each.is_pure:
+            raise TraceError(f"{each.name} is not declared pure")
 
 
-def asking_law(controller: Controller[Any], questions: Questions) -> Controller[Any]:
-    """The same law with `questions` in the place of its backend, and symbols for its gains."""
-    twin = copy.copy(controller)
-    own = vars(twin)
-    for name, value in own.items():
-        # Whether there is a limit is asked where it is applied.
-        if type(value) is np.ndarray and value.dtype == np.float64 and value.ndim == 1 and name != "limit":
-            own[name] = questions.number(value)
-    if "inner" in own:
-        own["inner"] = asking_law(own["inner"], questions)
-    if isinstance(own.get("_dynamics"), SingleSample):
-        own["_dynamics"] = AskedDynamics(questions, own["_dynamics"])
-    return twin
+def traced_controller(controller: Controller[Any], questions: Questions) -> Controller[Any]:
+    """The controller with engine calls for its dynamics, and symbols for its gains."""
 
+    def symbols(each: Controller[Any]) -> dict[str, Array]:
+        gains = gains_of(each).items()
+        return {name: questions.number(gain) for name, gain in gains if gain.ndim == 1}
 
-def _asking(questions: Questions, question: Ask, shape: Shape) -> Callable[..., Array]:
-    return lambda *arguments: questions.ask(question, shape, *arguments)
+    return rebind(controller, partial(TracedEngineCalls, questions), symbols)
 
 
 def _without_idle_inputs(program: Program) -> Program:

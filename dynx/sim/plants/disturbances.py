@@ -15,9 +15,9 @@ from numpy.typing import ArrayLike
 from dynx.backends import Backend
 from dynx.backends.hooks import solve_mass_matrix
 from dynx.backends.joint_dynamics import JointDynamicsTerms
+from dynx.control.dynamics import EngineDynamics
 from dynx.control.friction import Coefficients, JointFriction
 from dynx.control.gains import checked_gain
-from dynx.control.single_sample import SingleSample
 from dynx.errors import ArgumentError, shown
 from dynx.model import Model
 from dynx.model.configuration import checked_array
@@ -97,7 +97,7 @@ class DisturbedAcceleration:
     """The acceleration of a plant under a torque: one backend's forward dynamics, with the disturbances."""
 
     def __init__(self, engine: Backend, disturbances: Disturbances) -> None:
-        self.dynamics = SingleSample(engine)
+        self.dynamics = EngineDynamics(engine)
         self._engine = engine
         self._disturbances = disturbances
 

@@ -136,7 +136,7 @@ def test_a_law_without_a_model_is_told_so() -> None:
             return np.zeros(6), None
 
     for ask in (simulate, simulate_batch):
-        with pytest.raises(ArgumentError, match=r"Nowhere has no model; a law sets self\.model"):
+        with pytest.raises(ArgumentError, match=r"Nowhere has no model; a controller sets self\.model"):
             ask(ARM, Nowhere(), REST, duration=0.01)
 
 

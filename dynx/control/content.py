@@ -1,0 +1,52 @@
+"""Content of an object to the last bit, as a key to compare and look up by."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping
+from dataclasses import Field, fields, is_dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from dynx.model import Model
+
+
+def content_of(thing: Any) -> Hashable:
+    """Key that is equal for two objects if and only if their contents are.
+
+    Raises TypeError for an object whose content is not known to be all that it is.
+    """
+    kind = type(thing)
+    if thing is None or kind in (bool, int, str, Model):
+        return kind, thing
+    if kind is float:
+        return kind, thing.hex()
+    if isinstance(thing, np.ndarray) and thing.dtype != object:
+        return kind, thing.dtype.str, thing.shape, thing.tobytes()
+    if isinstance(thing, tuple | list):
+        return kind, tuple(content_of(entry) for entry in thing)
+    if isinstance(thing, Mapping):
+        return kind, tuple((content_of(key), content_of(value)) for key, value in thing.items())
+    if hasattr(kind, "content_key"):
+        return kind, thing.content_key()
+    if is_dataclass(kind):
+        return kind, tuple(content_of(getattr(thing, each.name)) for each in fields(thing) if each.compare)
+    raise TypeError(f"the content of a {kind.__name__} is not known")
+
+
+def fields_of(thing: Any) -> dict[str, Field[Any]]:
+    """Dataclass fields by name; those of its base classes for an object of another class."""
+    return {each.name: each for each in fields(thing)} if is_dataclass(thing) else {}
+
+
+def attributes_of(thing: Any) -> dict[str, Any]:
+    """The fields of a dataclass; of any other object the attributes that a copy of it would get."""
+    kind = type(thing)
+    if "__dataclass_fields__" in kind.__dict__:
+        return {each.name: getattr(thing, each.name) for each in fields(thing)}
+    state = thing.__reduce_ex__(2)[2:3]
+    parts = state[0] if state and isinstance(state[0], tuple) else state
+    found = {name: value for part in parts if isinstance(part, Mapping) for name, value in part.items()}
+    derived = {name for name in found if isinstance(getattr(kind, name, None), cached_property)}
+    return {name: value for name, value in found.items() if name not in derived}

@@ -1,0 +1,98 @@
+"""Dynamics of one robot at one sample: what a controller or a plant evaluates in each step.
+
+Nothing is checked: arrays are of the right shape and type, in the coordinates of the model. `Backend`'s
+own methods check their arguments, broadcast batch axes and expand mimic joints, which would take half of the
+time in a loop of ten microseconds a step.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from dynx.backends import Backend
+from dynx.model import Model
+
+Evaluation = Callable[..., Any]
+"""Arrays in, one array out; the quantities of a frame take its name after the arrays."""
+
+QUANTITIES = ("inverse_dynamics", "forward_dynamics", "bias_torque", "gravity_torque", "mass_matrix")
+FRAME_QUANTITIES = ("forward_kinematics", "jacobian", "jacobian_derivative", "frame_acceleration")
+
+
+class Dynamics(ABC):
+    """Quantities of a robot as callables, for arrays of floats or of symbols."""
+
+    inverse_dynamics: Evaluation
+    """tau (nv,) of q (nq,), v (nv,), a (nv,)."""
+    forward_dynamics: Evaluation
+    """a (nv,) of q, v, tau; not finite where the mass matrix is singular."""
+    bias_torque: Evaluation
+    """C v + g (nv,) of q, v."""
+    gravity_torque: Evaluation
+    """g (nv,) of q."""
+    mass_matrix: Evaluation
+    """M (nv, nv) of q."""
+    forward_kinematics: Evaluation
+    """T_world_frame (4, 4) of q, frame."""
+    jacobian: Evaluation
+    """J (6, nv) of q, frame."""
+    jacobian_derivative: Evaluation
+    """dJ/dt (6, nv) of q, v, frame."""
+    frame_acceleration: Evaluation
+    """J a + dJ/dt v (6,) of q, v, a, frame."""
+
+    def __init__(self, model: Model) -> None:
+        self.model = model
+        for quantity in QUANTITIES + FRAME_QUANTITIES:
+            setattr(self, quantity, self.evaluation(quantity))
+
+    @abstractmethod
+    def evaluation(self, quantity: str) -> Evaluation:
+        """Callable for a quantity of that name."""
+
+
+class EngineDynamics(Dynamics):
+    """Dynamics evaluated by a backend."""
+
+    def __init__(self, backend: Backend) -> None:
+        self.backend = backend
+        super().__init__(backend.model)
+
+    def evaluation(self, quantity: str) -> Evaluation:
+        """The engine's hook itself where it takes the model's coordinates, the backend's method otherwise."""
+        backend = self.backend
+        method: Evaluation = getattr(backend, quantity)
+        if quantity in FRAME_QUANTITIES or not self._calls_hook(quantity):
+            return method
+        hook: Evaluation = getattr(backend, f"_{quantity}")
+        # The loop maps the engine's exceptions for a whole step, so the wrapper that maps them is left out.
+        bare = getattr(hook, "__wrapped__", None)
+        return hook if bare is None else partial(bare, backend)
+
+    def bound_to_thread(self, quantity: str) -> Evaluation:
+        """Callable for the calling thread alone, quicker where the engine has one."""
+        quick = self.backend._in_this_thread(quantity) if self._calls_hook(quantity) else None
+        usual: Evaluation = getattr(self, quantity)
+        return quick or usual
+
+    def content_key(self) -> tuple[Any, ...]:
+        """Key that is equal for equal models in engines of one kind."""
+        return type(self.backend), self.backend.name, self.model
+
+    def _calls_hook(self, quantity: str) -> bool:
+        """Whether the backend's method only passes its arguments to the hook of its engine."""
+        backend, hook = self.backend, f"_{quantity}"
+        unchanged = _function(backend, quantity) is getattr(Backend, quantity)
+        own_hook = _function(backend, hook) is getattr(type(backend), hook)
+        return unchanged and own_hook and backend.model.mechanism.coupling is None
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return EngineDynamics, (self.backend,)
+
+
+def _function(backend: Backend, name: str) -> object:
+    """The function behind a method; None if it was replaced on the object itself."""
+    return getattr(getattr(backend, name), "__func__", None)
