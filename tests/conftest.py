@@ -1,6 +1,9 @@
-"""Hypothesis profiles: ``ci`` (100 examples of each property, the default), ``dev`` (20, for a quick
-look), ``faults`` (25, not shrunk: `tests.faults` asks only whether a test fails) and ``long`` (1000, for
-a night); ``pytest --hypothesis-profile dev`` or ``HYPOTHESIS_PROFILE=dev`` chooses.
+"""Hypothesis profiles, and one cache of compiled kernels for the whole run.
+
+The profiles are ``ci`` (100 examples of each property, the default), ``dev`` (20, for a quick look),
+``faults`` (25, not shrunk: `tests.faults` and `tests.mutation` need only whether a test fails), ``coverage``
+(5: `tests.mutation` records which lines a test executes) and ``long`` (1000, for a night).
+``pytest --hypothesis-profile dev`` or ``HYPOTHESIS_PROFILE=dev`` chooses.
 
 Examples are drawn from a fixed seed, so a failure in CI is a failure everywhere; no deadline, since
 the time of one example says more about the machine than about dynx.
@@ -30,6 +33,7 @@ settings.register_profile(
     max_examples=25,
     phases=[Phase.explicit, Phase.generate],
 )
+settings.register_profile("coverage", parent=settings.get_profile("faults"), max_examples=5)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
 
 LONGEST = (
@@ -37,14 +41,14 @@ LONGEST = (
     "tests/properties/",
     "tests/doctor/test_raw_engines.py",
 )
-"""Where single tests take up to a minute."""
+"""Beginnings of the names of tests that take up to a minute each."""
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """One cache of compiled kernels for the whole run, parallel workers included, that goes with it.
+    """Make one cache of compiled kernels for this run and its parallel workers, and remove it afterwards.
 
-    A kernel is compiled once and no test depends on what an earlier run left behind; a folder named in
-    DYNX_CACHE_DIR is kept.
+    Each kernel is compiled once, and no test depends on files of an earlier run. If DYNX_CACHE_DIR names a
+    folder, that one is used and kept.
     """
     if "DYNX_CACHE_DIR" not in os.environ:
         folder = tempfile.TemporaryDirectory(prefix="dynx-tests-")
@@ -53,5 +57,5 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """What takes longest comes first, so that parallel workers end together."""
+    """Put the longest tests first, so that parallel workers end together."""
     items.sort(key=lambda item: not item.nodeid.startswith(LONGEST))

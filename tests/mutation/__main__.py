@@ -37,9 +37,9 @@ def main() -> None:
     map_file = arguments.results / "coverage.json"
     coverage = CoverageMap.load(map_file)
     if arguments.record is not None:
+        os.environ.setdefault("HYPOTHESIS_PROFILE", "coverage")
         tests = arguments.record or list(TESTS)
-        os.environ.setdefault("HYPOTHESIS_PROFILE", "faults")
-        coverage.replace(record(ROOT, [f"dynx/{room}" for room in ROOMS], tests, arguments.results), tests)
+        coverage.replace(record(ROOT, [f"dynx/{room}" for room in ROOMS], tests, arguments.results))
         coverage.save(map_file)
         return
     if not coverage.durations:
@@ -76,9 +76,14 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("--count", type=int, default=300, help="number of mutants in the sample")
     made.add_argument("--rooms", nargs="+", default=ROOMS, metavar="ROOM", help="packages of dynx to change")
     made.add_argument("--jobs", type=int, default=2, help="mutants to try at a time")
-    made.add_argument("--record", nargs="*", metavar="TESTS", help="record what these tests execute, and end")
     made.add_argument("--retry", action="store_true", help="try mutants again that were not caught")
     made.add_argument("--results", type=Path, default=ROOT / ".mutation", help="folder of what is kept")
+    made.add_argument(
+        "--record",
+        nargs=argparse.REMAINDER,
+        metavar="PYTEST-ARGUMENT",
+        help="record what tests execute (these arguments of pytest, or else all tests of the packages), and end",
+    )
     return made
 
 

@@ -1,14 +1,14 @@
 """Which tests execute a line of dynx, and how long each takes.
 
 Recorded by coverage.py, whose dynamic contexts name the test that runs. Recording again replaces what is
-known of the tests that ran, and keeps the rest.
+known of the files of tests that ran, and keeps the rest.
 """
 
 from __future__ import annotations
 
 import json
 from collections import defaultdict
-from collections.abc import Generator, Iterable
+from collections.abc import Generator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -52,19 +52,16 @@ class CoverageMap:
         }
         path.write_text(json.dumps({"durations": self.durations, "lines": lines}), encoding="utf-8")
 
-    def replace(self, other: CoverageMap, folders: Iterable[str]) -> None:
-        """Take over what `other` recorded with the tests in these folders; drop what was known of them."""
-        stale = {name for name in self.durations if name.startswith(tuple(folders))}
-        for name in stale:
-            del self.durations[name]
-        self.durations |= other.durations
+    def replace(self, other: CoverageMap) -> None:
+        """Take over what `other` recorded, and forget what was known of the files of its tests."""
+        files = {name.partition("::")[0] for name in other.durations}
+        kept = {name: time for name, time in self.durations.items() if name.partition("::")[0] not in files}
+        self.durations = kept | other.durations
         for file in {*self.lines, *other.lines}:
-            if file not in other.lines:
-                continue
             merged: defaultdict[int, set[str]] = defaultdict(set)
-            for known in (self.lines.get(file, {}), other.lines[file]):
-                for line, tests in known.items():
-                    merged[line] |= {test for test in tests if test in self.durations}
+            for tests_by_line, names in ((self.lines, kept), (other.lines, other.durations)):
+                for line, tests in tests_by_line.get(file, {}).items():
+                    merged[line] |= {test for test in tests if test in names}
             self.lines[file] = dict(merged)
 
 

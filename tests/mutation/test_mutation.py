@@ -77,11 +77,13 @@ def test_a_verdict_names_the_test_that_failed() -> None:
 
 
 def test_a_map_is_what_was_saved_and_replaced_by_folder(tmp_path: Path) -> None:
-    kept = CoverageMap({"a/t": 1.0, "b/t": 2.0}, {"x.py": {1: {"a/t"}, 2: {"a/t", "b/t"}}})
+    kept = CoverageMap(
+        {"a.py::t": 1.0, "b.py::t": 2.0}, {"x.py": {1: {"a.py::t"}, 2: {"a.py::t", "b.py::t"}}}
+    )
     kept.save(tmp_path / "map.json")
     loaded = CoverageMap.load(tmp_path / "map.json")
     assert loaded == kept
-    loaded.replace(CoverageMap({"a/u": 3.0}, {"x.py": {2: {"a/u"}}}), ["a/"])
-    assert loaded.durations == {"b/t": 2.0, "a/u": 3.0}
-    assert loaded.tests("x.py", 2, 2) == {"b/t", "a/u"}
-    assert loaded.tests("x.py", 7, 7) == {"b/t", "a/u"}
+    loaded.replace(CoverageMap({"a.py::u": 3.0}, {"x.py": {2: {"a.py::u"}}}))
+    assert loaded.durations == {"b.py::t": 2.0, "a.py::u": 3.0}
+    assert loaded.tests("x.py", 2, 2) == {"b.py::t", "a.py::u"}
+    assert loaded.tests("x.py", 7, 7) == {"b.py::t", "a.py::u"}
