@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import os
 import tempfile
+from zlib import crc32
 
 import pytest
 from hypothesis import HealthCheck, Phase, settings
@@ -56,6 +57,15 @@ def pytest_configure(config: pytest.Config) -> None:
         config.add_cleanup(folder.cleanup)
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Put the longest tests first, so that parallel workers end together."""
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--one-in", type=int, default=1, metavar="N", help="run a random Nth of all tests")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Keep the sample of ``--one-in``; put the longest tests first, so that parallel workers end together."""
+    one_in = config.getoption("--one-in")
+    left_out = [item for item in items if crc32(item.nodeid.encode()) % one_in]
+    if left_out:
+        config.hook.pytest_deselected(items=left_out)
+        items[:] = [item for item in items if crc32(item.nodeid.encode()) % one_in == 0]
     items.sort(key=lambda item: not item.nodeid.startswith(LONGEST))

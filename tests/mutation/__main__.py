@@ -82,7 +82,7 @@ def parser() -> argparse.ArgumentParser:
         "--record",
         nargs=argparse.REMAINDER,
         metavar="PYTEST-ARGUMENT",
-        help="record what tests execute (these arguments of pytest, or else all tests of the packages), and end",
+        help="record what tests execute (all of the packages, or those of these arguments), and end",
     )
     return made
 
