@@ -1,11 +1,11 @@
-"""How many examples a property of one robot takes: a quarter of those of a property of all robots."""
+"""Number of examples of a property of one robot: a quarter of those of a property of all robots."""
 
 from __future__ import annotations
 
 from hypothesis import settings
 
 ENOUGH = 25
-"""Examples by which `tests.faults` has every planted fault found."""
+"""Number of examples with which `tests.faults` catches every planted fault."""
 
 PROFILE = settings().max_examples
 

@@ -15,8 +15,8 @@ from dynx.errors import ArgumentError, NotFiniteError, ShapeError, SingularMassM
 from dynx.model import Inertial, Joint, Link, Model, Pose
 from dynx.model.configuration import TOO_LARGE
 from tests.backends.robots import chain
-from tests.closeness import Closeness, samples_at
 from tests.compiled.robots import ROBOTS, made, state
+from tests.error_bounds import ErrorBounds, samples_at
 
 
 @pytest.fixture(scope="module", params=ROBOTS)
@@ -54,7 +54,7 @@ def test_quaternions_are_scaled_or_refused(robot: str) -> None:
         off = q.copy()
         off[..., 3:7] *= 1.0 + 1e-8
         rows = [x.reshape(-1, x.shape[-1]) for x in (q, v, a)]
-        close = Closeness(samples_at(engine.model, rows[0], rows[1], rows[2]))
+        close = ErrorBounds(samples_at(engine.model, rows[0], rows[1], rows[2]))
         close.check(
             "inverse_dynamics",
             engine.inverse_dynamics(off, v, a).reshape(-1, engine.model.nv),

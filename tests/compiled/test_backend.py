@@ -22,8 +22,8 @@ from dynx.errors import ArgumentError, ClosedError
 from dynx.model import Inertial, Link, Mechanism, Model
 from dynx.simd.kernel import Kernel
 from tests.backends.robots import chain
-from tests.closeness import Closeness, samples_at
 from tests.compiled.robots import ROBOTS, TIP, made, state
+from tests.error_bounds import ErrorBounds, samples_at
 
 
 def test_it_is_found_by_name_and_says_what_it_is() -> None:
@@ -126,7 +126,7 @@ def test_hooks_answer_in_tree_coordinates() -> None:
     q, v, a = state(engine.model, (3,))
     S = coupling.matrix()
     tree = engine._inverse_dynamics(coupling.expand_q(q), v @ S.T, a @ S.T)
-    Closeness(samples_at(engine.model, q, v, a)).check(
+    ErrorBounds(samples_at(engine.model, q, v, a)).check(
         "inverse_dynamics", tree @ S, engine.inverse_dynamics(q, v, a)
     )
 
@@ -143,7 +143,9 @@ def test_an_unphysical_robot_with_mimic_joints_is_solved_with_pivots() -> None:
     q, v, a = state(bad, (3,))
     found = engine.forward_dynamics(q, v, a)
     assert not any(key[0] == "forward_dynamics" for key in engine._calls if isinstance(key, tuple))
-    Closeness(samples_at(bad, q, v, found)).check("inverse_dynamics", engine.inverse_dynamics(q, v, found), a)
+    ErrorBounds(samples_at(bad, q, v, found)).check(
+        "inverse_dynamics", engine.inverse_dynamics(q, v, found), a
+    )
 
 
 @pytest.mark.parametrize("quantity", QUANTITIES)
@@ -161,10 +163,10 @@ def test_what_is_not_compiled_is_evaluated(
     frame = [TIP] if QUANTITIES[quantity].of_frame else []
     answers = [getattr(each, quantity)(*values, *frame) for each in (numbers, reference)]
     np.testing.assert_array_equal(answers[0].shape, answers[1].shape)
-    close = Closeness(samples_at(model, q, v, a, a))
+    close = ErrorBounds(samples_at(model, q, v, a, a))
     if quantity == "forward_dynamics":
         quantity, answers = "inverse_dynamics", [reference.inverse_dynamics(q, v, answers[0]), a]
-        close = Closeness(samples_at(model, q, v, numbers.forward_dynamics(q, v, a)))
+        close = ErrorBounds(samples_at(model, q, v, numbers.forward_dynamics(q, v, a)))
     close.check(quantity, answers[0], answers[1])
     assert numbers._calls
     assert all(isinstance(owner(answer), NumericCall) for answer in numbers._calls.values())

@@ -37,7 +37,7 @@ from dynx.simd.expr import Node
 from dynx.spatial.scalar import Floats
 from dynx.testing.strategies import models, samples
 from tests.backends.robots import BASES, assert_close, chain, mixed_robot, motion
-from tests.closeness import samples_at
+from tests.error_bounds import samples_at
 from tests.rbd.exact import exact_mechanism, exactly, fifty_digits, rate, tree_q
 
 MODELS = [mixed_robot(base, mimic=mimic) for base in BASES for mimic in (False, True)]

@@ -21,8 +21,8 @@ from dynx.rbd.kinematics import ancestry
 from dynx.spatial.scalar import Floats
 from dynx.testing.strategies import models, samples
 from tests.backends.robots import chain as a_chain
-from tests.closeness import Closeness, samples_at
 from tests.compiled.robots import ROBOTS, TIP, made, state
+from tests.error_bounds import ErrorBounds, samples_at
 
 each_quantity = pytest.mark.parametrize("quantity", sorted(ON_CHAINS))
 
@@ -61,7 +61,7 @@ def test_any_frame_of_any_robot(
     wanted = evaluated(mechanism, quantity, (frame, reference), q, *rates, tree=True)
     if QUANTITIES[quantity].reduces_columns:
         got, wanted = got @ S, wanted @ S
-    Closeness(samples_at(model, drawn.q, drawn.v, drawn.a)).check(quantity, got, wanted)
+    ErrorBounds(samples_at(model, drawn.q, drawn.v, drawn.a)).check(quantity, got, wanted)
 
 
 @each_quantity
@@ -72,7 +72,7 @@ def test_kernels_answer_for_every_frame(
     model = engine.model
     numeric = backend("reference", model)
     given = state(model, size)
-    close = Closeness(samples_at(model, *given))
+    close = ErrorBounds(samples_at(model, *given))
     for frame in model.frame_names:
         for reference in REFERENCES:
             got, wanted = (asked(each, quantity, frame, reference, *given) for each in (engine, numeric))

@@ -14,7 +14,7 @@ from dynx.backends.quantities import QUANTITIES, Quantity
 from dynx.model import Model
 from dynx.rbd.jacobians import REFERENCES
 from dynx.spatial.scalar import Floats
-from tests.closeness import Closeness, samples_at
+from tests.error_bounds import ErrorBounds, samples_at
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class EngineCall:
 
     def check(self, engine: Backend, state: State, got: Floats, wanted: Floats) -> None:
         """Assert that two results at `state`, of one leading axis or none, agree."""
-        close = Closeness(samples_at(engine.model, state.q, state.v, state.a, state.tau))
+        close = ErrorBounds(samples_at(engine.model, state.q, state.v, state.a, state.tau))
         if self.quantity.solves:
             for a in (got, wanted):
                 close.check_solves(a, engine.inverse_dynamics(state.q, state.v, a), state.tau)

@@ -13,10 +13,10 @@ from scipy.spatial.transform import Rotation
 from dynx.backends import Backend
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
-from tests.closeness import Closeness, samples_at
 from tests.contract.conftest import Make
 from tests.contract.engine_calls import random_state
 from tests.contract.robots import branched, mimicking
+from tests.error_bounds import ErrorBounds, samples_at
 
 MODELS = {
     "fixed": branched(),
@@ -46,7 +46,7 @@ def test_mass_matrix_is_the_sum_over_the_links(make: Make, model: Model) -> None
     engine = make(model)
     for seed in range(3):
         state = random_state(model, 90 + seed)
-        close = Closeness(samples_at(model, state.q, state.v))
+        close = ErrorBounds(samples_at(model, state.q, state.v))
         M = np.zeros((model.nv, model.nv))
         for mass, _, J, tensor in center_jacobians(model, engine, state.q):
             M += mass * J[:3].T @ J[:3] + J[3:].T @ tensor @ J[3:]
@@ -60,7 +60,7 @@ def test_centre_of_mass_and_gravity_are_those_of_the_links(make: Make, model: Mo
     engine = make(model)
     for seed in range(3):
         q = random_state(model, 95 + seed).q
-        close = Closeness(samples_at(model, q))
+        close = ErrorBounds(samples_at(model, q))
         gravity, moment, torque = np.array(model.gravity), np.zeros(3), np.zeros(model.nv)
         for mass, center, J, _ in center_jacobians(model, engine, q):
             moment += mass * center

@@ -13,10 +13,10 @@ from dynx.model import Model, Pose
 from dynx.model.loading import load
 from dynx.spatial.scalar import Floats
 from dynx.testing.strategies import Sample, samples
-from tests.closeness import Closeness, samples_at
 from tests.contract.conftest import Make
 from tests.contract.engine_calls import ENGINE_CALLS, EngineCall, State, random_state
 from tests.contract.robots import JOINT_ORDER, LINK_ORDER, LINKS, branched, followed_elbow, mimicking
+from tests.error_bounds import ErrorBounds, samples_at
 from tests.examples import one_robot
 
 BELOW = {
@@ -49,7 +49,7 @@ def test_a_coordinate_moves_what_is_below_its_joint_along_its_axis(make: Make, b
     engine = make(model)
     for seed in range(3):
         q = random_state(model, seed).q
-        close = Closeness(samples_at(model, q))
+        close = ErrorBounds(samples_at(model, q))
         for name in JOINT_ORDER:
             joint, step = model.joint(name), 0.7
             moved = q.copy()
@@ -80,7 +80,7 @@ def test_at_zero_frames_are_where_the_description_puts_them(make: Make, base: st
         origin[:3, 3] = joint.origin.xyz
         wanted[joint.child] = wanted[joint.parent] @ origin
     q = model.neutral()
-    close = Closeness(samples_at(model, q))
+    close = ErrorBounds(samples_at(model, q))
     for frame, pose in wanted.items():
         close.check("forward_kinematics", engine.forward_kinematics(q, frame), pose)
 
@@ -107,7 +107,7 @@ def test_velocity_is_the_rate_of_the_pose(make: Make, base: str) -> None:
     @given(samples(model))
     def holds(state: Sample) -> None:
         q, v, _ = state
-        close = Closeness(samples_at(model, q, v))
+        close = ErrorBounds(samples_at(model, q, v))
         frequency = close.sizes.frequency
 
         def poses(t: Floats) -> Floats:
@@ -136,21 +136,21 @@ class TestFloatingBase:
             wanted = np.eye(4)
             wanted[:3, :3] = Rotation.from_quat(q[3:7]).as_matrix()
             wanted[:3, 3] = q[:3]
-            close = Closeness(samples_at(self.model, q))
+            close = ErrorBounds(samples_at(self.model, q))
             close.check("forward_kinematics", engine.forward_kinematics(q, "trunk"), wanted)
 
     def test_velocity_of_the_base_is_in_the_base_frame(self, make: Make) -> None:
         engine = make(self.model)
         for seed in range(5):
             q, v = (getattr(random_state(self.model, seed), name) for name in "qv")
-            close = Closeness(samples_at(self.model, q, v))
+            close = ErrorBounds(samples_at(self.model, q, v))
             close.check("frame_velocity", engine.frame_velocity(q, v, "trunk", reference="local"), v[:6])
             wanted = np.eye(6, self.model.nv)
             close.check("jacobian", engine.jacobian(q, "trunk", reference="local"), wanted)
 
     def test_neutral_is_at_the_worlds_frame(self, make: Make) -> None:
         q = self.model.neutral()
-        close = Closeness(samples_at(self.model, q))
+        close = ErrorBounds(samples_at(self.model, q))
         close.check("forward_kinematics", make(self.model).forward_kinematics(q, "trunk"), np.eye(4))
 
     @each_call
@@ -168,7 +168,7 @@ class TestFloatingBase:
         q = np.concatenate([np.tile([0.0, 0, 0, 0, 0, 0, 1], (4, 1)), state.q], axis=1)
         v, a = (np.concatenate([np.zeros((4, 6)), x], axis=1) for x in (state.v, state.a))
         tau = make(self.model).inverse_dynamics(q, v, a)[:, 6:]
-        close = Closeness(samples_at(fixed, state.q, state.v, state.a))
+        close = ErrorBounds(samples_at(fixed, state.q, state.v, state.a))
         close.check("inverse_dynamics", make(fixed).inverse_dynamics(state.q, state.v, state.a), tau)
 
 
@@ -191,7 +191,7 @@ class TestLockedJoints:
         state = random_state(self.locked, 24, (4,))
         q = np.insert(state.q, 2, self.value, axis=1)
         v, a = (np.insert(x, 2, 0.0, axis=1) for x in (state.v, state.a))
-        close = Closeness(samples_at(self.locked, state.q, state.v, state.a))
+        close = ErrorBounds(samples_at(self.locked, state.q, state.v, state.a))
         for frame in self.whole.frame_names:
             pose = whole.forward_kinematics(q, frame)
             close.check("forward_kinematics", locked.forward_kinematics(state.q, frame), pose)
@@ -205,7 +205,7 @@ class TestLockedJoints:
     def test_a_locked_hinge_stays_where_its_angle_put_it(self, make: Make) -> None:
         locked = load(self.whole, lock={"z_shoulder": 0.7, "b_elbow": -0.4})
         state = random_state(locked, 29)
-        close = Closeness(samples_at(locked, state.q))
+        close = ErrorBounds(samples_at(locked, state.q))
         q = np.array([0.7, state.q[0], state.q[1], -0.4])
         whole, held = make(self.whole), make(locked)
         for frame in self.whole.frame_names:
@@ -247,14 +247,14 @@ class TestMimicJoints:
         model = mimicking()
         engine, state = make(model), random_state(model, 26, (4,))
         a = engine.forward_dynamics(state.q, state.v, state.tau)
-        close = Closeness(samples_at(model, state.q, state.v, tau=state.tau))
+        close = ErrorBounds(samples_at(model, state.q, state.v, tau=state.tau))
         close.check_solves(a, engine.inverse_dynamics(state.q, state.v, a), state.tau)
 
     def test_a_joint_that_follows_with_ratio_zero_stands_still(self, make: Make) -> None:
         model = Model.build("still", LINKS, followed_elbow(0.0, 0.3))
         held = load(branched().with_gravity(model.gravity), lock={"b_elbow": 0.3})
         state = random_state(model, 27, (3,))
-        close = Closeness(samples_at(model, state.q, state.v, state.a))
+        close = ErrorBounds(samples_at(model, state.q, state.v, state.a))
         tau = make(held).inverse_dynamics(state.q, state.v, state.a)
         close.check("inverse_dynamics", make(model).inverse_dynamics(state.q, state.v, state.a), tau)
 
@@ -268,7 +268,7 @@ def test_frames_can_be_added(make: Make) -> None:
     offset[:3, :3] = Rotation.from_euler("xyz", placement.rpy).as_matrix()
     offset[:3, 3] = placement.xyz
     wanted = engine.forward_kinematics(q, "tool") @ offset
-    close = Closeness(samples_at(model, q))
+    close = ErrorBounds(samples_at(model, q))
     close.check("forward_kinematics", engine.forward_kinematics(q, "grip"), wanted)
 
 
@@ -276,7 +276,7 @@ def test_frames_can_be_added(make: Make) -> None:
 def test_a_quaternion_almost_of_unit_length_means_the_attitude(make: Make, off: float) -> None:
     model = branched().with_base("floating")
     engine, state = make(model), random_state(model, 7, (3,))
-    close = Closeness(samples_at(model, state.q, state.v))
+    close = ErrorBounds(samples_at(model, state.q, state.v))
     stretched = state.q.copy()
     stretched[:, 3:7] *= 1.0 + off
     given = stretched.copy()

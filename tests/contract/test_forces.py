@@ -10,10 +10,10 @@ import pytest
 
 from dynx.model import Inertial, JointDynamics, Model, Pose
 from dynx.rbd.jacobians import REFERENCES
-from tests.closeness import Closeness, samples_at
 from tests.contract.conftest import Make
 from tests.contract.engine_calls import random_state
 from tests.contract.robots import branched, hinge, mimicking
+from tests.error_bounds import ErrorBounds, samples_at
 
 MODELS = {
     "fixed": branched(),
@@ -31,7 +31,7 @@ class TestGravity:
         """A point mass on a hinge about y, held out along x, pulls by m g d."""
         model = hinge(Inertial(2.0, Pose((0.5, 0.0, 0.0))))
         assert model.gravity == (0.0, 0.0, -9.81)
-        close = Closeness(samples_at(model, [0.0]))
+        close = ErrorBounds(samples_at(model, [0.0]))
         close.check("gravity_torque", make(model).gravity_torque([0.0]), np.array([-2.0 * 9.81 * 0.5]))
 
     @each_model
@@ -40,7 +40,7 @@ class TestGravity:
         state = random_state(model, 41, (3,))
         pull = [make(model.with_gravity(9.0 * axis)).gravity_torque(state.q) for axis in np.eye(3)]
         mixed = model.with_gravity((9.0 * 0.2, 9.0 * -0.5, 9.0 * 0.7))
-        close = Closeness(samples_at(mixed, state.q))
+        close = ErrorBounds(samples_at(mixed, state.q))
         wanted = 0.2 * pull[0] - 0.5 * pull[1] + 0.7 * pull[2]
         close.check("gravity_torque", make(mixed).gravity_torque(state.q), wanted)
         nothing = make(model.with_gravity((0.0, 0.0, 0.0)))
@@ -50,7 +50,7 @@ class TestGravity:
     @each_model
     def test_is_inverse_dynamics_at_rest(self, make: Make, model: Model) -> None:
         engine, state = make(model), random_state(model, 42, (3,))
-        close = Closeness(samples_at(model, state.q, state.v))
+        close = ErrorBounds(samples_at(model, state.q, state.v))
         rest = 0 * state.v
         wanted = engine.inverse_dynamics(state.q, rest, rest)
         close.check("gravity_torque", engine.gravity_torque(state.q), wanted)
@@ -61,7 +61,7 @@ class TestGravity:
     def test_does_not_change_kinematics_or_inertia(self, make: Make, model: Model) -> None:
         engine, other = make(model), make(model.with_gravity((5.0, 3.0, 1.0)))
         state = random_state(model, 43, (3,))
-        close = Closeness(samples_at(model, state.q, state.v))
+        close = ErrorBounds(samples_at(model, state.q, state.v))
         poses = zip(
             engine.forward_kinematics(state.q).swapaxes(0, 1),
             other.forward_kinematics(state.q).swapaxes(0, 1),
@@ -90,7 +90,7 @@ class TestExternalForces:
             "local": [*(T[:3, :3].T @ up), 0, 0, 0],
             "world": [*up, *np.cross(T[:3, 3], up)],
         }
-        close = Closeness(samples_at(model, q, wrench=wrenches["world"], frame="center"))
+        close = ErrorBounds(samples_at(model, q, wrench=wrenches["world"], frame="center"))
         rest = np.zeros(1)
         for reference, wrench in wrenches.items():
             forces = {"center": wrench}
@@ -112,7 +112,7 @@ class TestExternalForces:
             engine.jacobian(q, frame, reference=reference).T @ each for frame, each in forces.items()
         )
         keywords: dict[str, Any] = {"external_forces": forces, "force_reference": reference}
-        close = Closeness(samples_at(model, q, v, a, state.tau, wrench=wrench, frame="tool"))
+        close = ErrorBounds(samples_at(model, q, v, a, state.tau, wrench=wrench, frame="tool"))
 
         def check(got: np.ndarray, free: np.ndarray) -> None:
             wanted = free - pushed
@@ -153,7 +153,7 @@ class TestJointDynamics:
             M_extra[k, k] += ratio**2 * own.armature
         assert np.any(lost)
         assert np.any(extra)
-        close = Closeness(samples_at(model, q, v, a, state.tau))
+        close = ErrorBounds(samples_at(model, q, v, a, state.tau))
         tau = engine.inverse_dynamics(q, v, a)
         with_them = engine.inverse_dynamics(q, v, a, joint_dynamics=True)
         close.check("inverse_dynamics_joint_dynamics", with_them, tau + lost + extra)

@@ -7,10 +7,10 @@ import pytest
 
 from dynx.errors import SingularMassMatrixError
 from dynx.model import Inertial, Joint, Link, Model, Pose
-from tests.closeness import Closeness, samples_at
 from tests.contract.conftest import Make
 from tests.contract.engine_calls import ENGINE_CALLS, EngineCall, random_state
 from tests.contract.robots import JOINTS, LINKS, body, branched, hinge
+from tests.error_bounds import ErrorBounds, samples_at
 
 MASSLESS = {"no inertial": None, "zero inertial": Inertial()}
 each_massless = pytest.mark.parametrize("inertial", MASSLESS.values(), ids=MASSLESS.keys())
@@ -67,7 +67,7 @@ def test_a_massless_link_between_two_bodies(make: Make) -> None:
     model = Model.build("wrist", links, joints)
     engine, state = make(model), random_state(model, 52, (4,))
     a = engine.forward_dynamics(state.q, state.v, state.tau)
-    close = Closeness(samples_at(model, state.q, state.v, tau=state.tau))
+    close = ErrorBounds(samples_at(model, state.q, state.v, tau=state.tau))
     close.check_solves(a, engine.inverse_dynamics(state.q, state.v, a), state.tau)
 
 
@@ -78,10 +78,10 @@ def test_a_massless_root_floats(make: Make) -> None:
     model = Model.build("hull", links, [weld], base="floating")
     engine, state = make(model), random_state(model, 53)
     a = engine.forward_dynamics(state.q, state.v, state.tau)
-    close = Closeness(samples_at(model, state.q, state.v, tau=state.tau))
+    close = ErrorBounds(samples_at(model, state.q, state.v, tau=state.tau))
     close.check_solves(a, engine.inverse_dynamics(state.q, state.v, a), state.tau)
     fall = engine.forward_dynamics(model.neutral(), np.zeros(6), np.zeros(6))
-    close = Closeness(samples_at(model, model.neutral()))
+    close = ErrorBounds(samples_at(model, model.neutral()))
     close.check_solves(fall, np.zeros(6), np.zeros(6))
     weight = engine.mass_matrix(model.neutral()) @ np.array([0, 0, -9.81, 0, 0, 0])
     close.check("gravity_torque", engine.gravity_torque(model.neutral()), -weight)
@@ -110,7 +110,7 @@ def test_an_inertia_that_no_body_can_have_is_used_as_it_stands(
     distance2 = float(center @ center - (center @ unit) ** 2)
     wanted = moments[axis] + 2.0 * distance2
     engine = make(model)
-    close = Closeness(samples_at(model, [0.6], [0.5], [1.5]))
+    close = ErrorBounds(samples_at(model, [0.6], [0.5], [1.5]))
     close.check("mass_matrix", engine.mass_matrix([0.6]), np.array([[wanted]]))
     tau = engine.inverse_dynamics([0.6], [0.5], [1.5])
     close.check("inverse_dynamics", tau, np.array([1.5 * wanted]))
@@ -132,7 +132,7 @@ def test_impossible_products_of_inertia(make: Make) -> None:
     engine, state = make(model), random_state(model, 54)
     wanted = np.zeros((6, 6))
     wanted[:3, :3], wanted[3:, 3:] = 1.5 * np.eye(3), tensor
-    close = Closeness(samples_at(model, state.q, state.v, state.a))
+    close = ErrorBounds(samples_at(model, state.q, state.v, state.a))
     close.check("mass_matrix", engine.mass_matrix(state.q), wanted)
     v, a = state.v, state.a
     force = 1.5 * (a[:3] + np.cross(v[3:], v[:3]))

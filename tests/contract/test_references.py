@@ -12,10 +12,10 @@ from dynx.model import Model, Pose
 from dynx.rbd.jacobians import REFERENCES
 from dynx.spatial.scalar import Floats
 from dynx.testing.strategies import Sample, samples
-from tests.closeness import Closeness, samples_at
 from tests.contract.conftest import Make
 from tests.contract.engine_calls import random_state
 from tests.contract.robots import branched, mimicking
+from tests.error_bounds import ErrorBounds, samples_at
 from tests.examples import one_robot
 
 MODELS = {
@@ -70,7 +70,7 @@ def test_default_is_the_geometric_jacobian(make: Make, model: Model) -> None:
     engine = make(model)
     for seed in range(3):
         q = random_state(model, seed).q
-        close = Closeness(samples_at(model, q))
+        close = ErrorBounds(samples_at(model, q))
         for frame in model.frame_names:
             J = engine.jacobian(q, frame)
             close.check("jacobian", J, columns_from_poses(model, engine, q, frame))
@@ -83,7 +83,7 @@ def test_local_and_world_follow_from_the_default(make: Make, model: Model) -> No
     engine = make(model)
     for seed in range(3):
         q = random_state(model, seed).q
-        close = Closeness(samples_at(model, q))
+        close = ErrorBounds(samples_at(model, q))
         for frame in model.frame_names:
             J, T = engine.jacobian(q, frame), engine.forward_kinematics(q, frame)
             R, p = T[:3, :3], T[:3, 3]
@@ -103,7 +103,7 @@ def test_derivative_of_the_jacobian(make: Make, model: Model, reference: str) ->
     @given(samples(model))
     def holds(state: Sample) -> None:
         q, v, _ = state
-        close = Closeness(samples_at(model, q, v))
+        close = ErrorBounds(samples_at(model, q, v))
 
         def jacobians(t: Floats) -> Floats:
             return engine.jacobian(model.integrate(q, v * t[..., None]), FRAME, reference=reference)
@@ -121,7 +121,7 @@ def test_velocity_and_acceleration_follow_from_the_jacobian(make: Make, model: M
     for seed in range(3):
         state = random_state(model, seed)
         q, v, a = state.q, state.v, state.a
-        close = Closeness(samples_at(model, q, v, a))
+        close = ErrorBounds(samples_at(model, q, v, a))
         J = engine.jacobian(q, FRAME, reference=reference)
         dJ = engine.jacobian_derivative(q, v, FRAME, reference=reference)
         close.check("frame_velocity", engine.frame_velocity(q, v, FRAME, reference=reference), J @ v)
@@ -139,7 +139,7 @@ def test_a_point_is_a_frame_at_that_point(make: Make, model: Model, reference: s
     for size in ((), (3,)):
         state = random_state(model, 31, size)
         q, v, a = state.q, state.v, state.a
-        close = Closeness(samples_at(marked, q, v, a))
+        close = ErrorBounds(samples_at(marked, q, v, a))
         J = plain.jacobian(q, FRAME, reference=reference, point=POINT)
         close.check("jacobian", J, helped.jacobian(q, "marked", reference=reference))
         dJ = plain.jacobian_derivative(q, v, FRAME, reference=reference, point=POINT)

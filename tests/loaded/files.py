@@ -19,7 +19,7 @@ from dynx.testing.strategies import models
 from dynx.testing.strategies.geometry import Strategy
 from dynx.testing.strategies.models import BaseChoice
 from tests.backends.robots import assert_close, motion
-from tests.closeness import Closeness, samples_at
+from tests.error_bounds import ErrorBounds, samples_at
 
 TILTED = (0.3, -0.7, -9.81)
 """Gravity in which an error of a frame shows."""
@@ -68,7 +68,7 @@ def assert_alike(robot: LoadedRobot, model: Model, seed: int = 0, *, solve: bool
     """Every answer of the engine is that of the reference, at a random state."""
     reference = ReferenceBackend(model)
     q, v, a = motion(model, seed)
-    near = Closeness(samples_at(model, q, v, a))
+    near = ErrorBounds(samples_at(model, q, v, a))
     n = len(model.links)
     assert_close(robot.link_poses(q), reference.forward_kinematics(q)[:n], what="poses")
     for link in model.links:
@@ -78,7 +78,7 @@ def assert_alike(robot: LoadedRobot, model: Model, seed: int = 0, *, solve: bool
     if solve:
         tau = reference.inverse_dynamics(q, v, a)
         found = robot.forward_dynamics(q, v, tau)
-        Closeness(samples_at(model, q, v, a, tau)).check_solves(
+        ErrorBounds(samples_at(model, q, v, a, tau)).check_solves(
             found, reference.inverse_dynamics(q, v, found), tau
         )
 

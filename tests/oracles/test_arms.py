@@ -9,7 +9,7 @@ from hypothesis import given
 from dynx.backends import backend, installed_backends
 from dynx.model.loading import load
 from dynx.testing.strategies import configurations
-from tests.closeness import Closeness, samples_at
+from tests.error_bounds import ErrorBounds, samples_at
 from tests.examples import one_robot
 from tests.oracles.closed_form import MODELS
 
@@ -30,7 +30,7 @@ def test_wrist_centre_of_the_six_axis_arm(name: str) -> None:
             wrist = engine.forward_kinematics(q, "wrist")
             wanted = wrist.copy()
             wanted[:3, 3] = out * np.cos(q[0]), out * np.sin(q[0]), up
-            close = Closeness(samples_at(model, q))
+            close = ErrorBounds(samples_at(model, q))
             close.check("forward_kinematics", wrist, wanted)
             flange = engine.forward_kinematics(q, "flange")
             wanted = flange.copy()
@@ -56,6 +56,6 @@ def test_distance_of_the_seven_axis_arms_wrist(name: str) -> None:
             # Both squares in the place of a position: their size is that of the robot, about 1.
             got, wanted = wrist.copy(), wrist.copy()
             got[:3, 3], wanted[:3, 3] = [arm @ arm, 0.0, 0.0], [distance2, 0.0, 0.0]
-            Closeness(samples_at(model, q)).check("forward_kinematics", got, wanted)
+            ErrorBounds(samples_at(model, q)).check("forward_kinematics", got, wanted)
 
         follows_from_the_elbow()

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from dynx.backends import Backend, backend, installed_backends
 from dynx.model.loading import load
 from dynx.testing.strategies import samples
-from tests.closeness import Closeness, samples_at
+from tests.error_bounds import ErrorBounds, samples_at
 from tests.examples import one_robot
 from tests.oracles.cart_pole import CartPole
 from tests.oracles.closed_form import MODELS, ClosedForm
@@ -53,7 +53,7 @@ def test_backend_matches_closed_form(form: ClosedForm, name: str) -> None:
 
 
 def check_kinematics(form: ClosedForm, engine: Backend, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> None:
-    close = Closeness(samples_at(engine.model, q, v, a))
+    close = ErrorBounds(samples_at(engine.model, q, v, a))
     J, dJ = form.jacobian(q), form.jacobian_derivative(q, v)
     close.check("forward_kinematics", engine.forward_kinematics(q, form.tip), form.placement(q))
     close.check("jacobian", engine.jacobian(q, form.tip), J)
@@ -65,7 +65,7 @@ def check_kinematics(form: ClosedForm, engine: Backend, q: np.ndarray, v: np.nda
 
 def check_dynamics(form: ClosedForm, engine: Backend, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> None:
     wanted = form.inverse_dynamics(q, v, a)
-    close = Closeness(samples_at(engine.model, q, v, a, tau=wanted))
+    close = ErrorBounds(samples_at(engine.model, q, v, a, tau=wanted))
     products, gravity = form.velocity_torque(q, v), form.gravity_torque(q)
     close.check("inverse_dynamics", engine.inverse_dynamics(q, v, a), wanted)
     close.check("mass_matrix", engine.mass_matrix(q), form.mass_matrix(q))
@@ -91,7 +91,7 @@ def test_momentum_of_a_free_body(name: str) -> None:
         @given(samples(engine.model))
         def matches(state: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
             q, v, _ = state
-            close = Closeness(samples_at(engine.model, q, v))
+            close = ErrorBounds(samples_at(engine.model, q, v))
             close.check("centroidal_momentum", engine.centroidal_momentum(q, v), form.momentum(q, v))
             center = q[:3] + form.rotation(q) @ form.c
             close.check("center_of_mass", engine.center_of_mass(q), center)

@@ -23,7 +23,7 @@ from dynx.backends.derived import DerivedBackend, native_quantities
 from dynx.model import Model
 from dynx.model.loading import load
 from dynx.testing.strategies import models, samples, wrenches
-from tests.closeness import samples_at
+from tests.error_bounds import samples_at
 
 REAL = ("ur5", "panda", "solo12", "hyq", "xarm7", "z1", "six_axis_arm", "seven_axis_arm", "scara")
 REAL_COMPILED = [(robot, ("fixed", "floating")[k % 2]) for k, robot in enumerate(REAL)]

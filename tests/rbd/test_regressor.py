@@ -25,7 +25,7 @@ from dynx.reference.backend import ReferenceBackend
 from dynx.spatial.scalar import Array
 from dynx.testing.strategies import models, samples
 from tests.backends.robots import BASES, assert_close, chain, mixed_robot, motion
-from tests.closeness import Closeness, samples_at
+from tests.error_bounds import ErrorBounds, samples_at
 from tests.rbd.exact import IDENTITY_TOLERANCE, distance, exact_mechanism, exactly, fifty_digits, tree_q
 
 MODELS = [mixed_robot(base, mimic=mimic) for base in BASES for mimic in (False, True)]
@@ -53,7 +53,7 @@ def test_torque_is_regressor_times_parameters_in_50_digits(case: tuple[Model, tu
 @given(models(max_links=5, base="either").flatmap(lambda m: samples(m).map(lambda s: (m, s))))
 def test_native_and_derived_regressors_agree(case: tuple[Model, tuple[Array, ...]]) -> None:
     model, (q, v, a) = case
-    close = Closeness(samples_at(model, q, v, a))
+    close = ErrorBounds(samples_at(model, q, v, a))
     reference = ReferenceBackend(model).inertial_regressor(q, v, a)
     # Pinocchio cannot represent every inertia, but its regressor uses no inertia.
     bare = replace(model, links=tuple(replace(link, inertial=None) for link in model.links))

@@ -20,7 +20,7 @@ from dynx.reference.backend import ReferenceBackend
 from dynx.spatial.scalar import Floats
 from tests.backends.independence import check_answers_belong_to_the_caller
 from tests.backends.robots import all_quantities, assert_close, assert_same, chain, mixed_robot, motion
-from tests.closeness import Closeness, samples_at
+from tests.error_bounds import ErrorBounds, samples_at
 
 pytest.importorskip("pydrake")
 from dynx.engines.drake.backend import DrakeBackend
@@ -91,7 +91,7 @@ def indefinite() -> Model:
 def test_forward_dynamics_is_found_whatever_the_inertia(model: Model) -> None:
     q, v, tau = motion(model)
     a = DrakeBackend(model).forward_dynamics(q, v, tau)
-    near = Closeness(samples_at(model, q, v, a, tau))
+    near = ErrorBounds(samples_at(model, q, v, a, tau))
     near.check_solves(a, ReferenceBackend(model).inverse_dynamics(q, v, a), tau)
 
 

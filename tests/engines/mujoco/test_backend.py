@@ -34,7 +34,7 @@ from tests.backends.robots import (
     motion,
     pair,
 )
-from tests.closeness import Closeness, samples_at
+from tests.error_bounds import ErrorBounds, samples_at
 
 pytest.importorskip("mujoco")
 import mujoco
@@ -103,7 +103,7 @@ STRANGE = {
 def test_inertias_are_used_as_they_stand(kind: str, base: Base, prismatic: bool) -> None:
     for model in (pair(BOX, STRANGE[kind], base, prismatic), pair(STRANGE[kind], BOX, base, prismatic)):
         q, v, a = motion(model, size=(2,))
-        reference, near = ReferenceBackend(model), Closeness(samples_at(model, q, v, a))
+        reference, near = ReferenceBackend(model), ErrorBounds(samples_at(model, q, v, a))
         with MujocoBackend(model) as engine:
             tau = reference.inverse_dynamics(q, v, a)
             near.check("inverse_dynamics", engine.inverse_dynamics(q, v, a), tau)
@@ -121,7 +121,7 @@ def test_forward_dynamics_of_strange_inertias(kind: str, base: Base) -> None:
     q, v, tau = motion(model, size=(2,))
     with MujocoBackend(model) as engine:
         a = engine.forward_dynamics(q, v, tau)
-    near = Closeness(samples_at(model, q, v, tau=tau))
+    near = ErrorBounds(samples_at(model, q, v, tau=tau))
     near.check_solves(a, ReferenceBackend(model).inverse_dynamics(q, v, a), tau)
 
 
@@ -174,7 +174,7 @@ def test_light_fingers_keep_their_digits() -> None:
     ]
     model = Model.build("hand", [Link("root", BOX), Link("arm", BOX), Link("finger", finger)], joints)
     q = motion(model, size=(20,))[0]
-    near, wanted = Closeness(samples_at(model, q)), ReferenceBackend(model).mass_matrix(q)
+    near, wanted = ErrorBounds(samples_at(model, q)), ReferenceBackend(model).mass_matrix(q)
     with MujocoBackend(model) as engine:
         near.check("mass_matrix", engine.mass_matrix(q), wanted)
         own = np.array([_own_mass_matrix(engine, each) for each in q])

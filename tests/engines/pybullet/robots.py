@@ -6,7 +6,7 @@ from dynx.engines.pybullet.backend import PyBulletBackend
 from dynx.model import Model
 from dynx.reference.backend import ReferenceBackend
 from tests.backends.robots import assert_close, motion
-from tests.closeness import Closeness, samples_at
+from tests.error_bounds import ErrorBounds, samples_at
 
 
 def assert_agrees(model: Model, seed: int = 0, samples: int = 2) -> None:
@@ -14,7 +14,7 @@ def assert_agrees(model: Model, seed: int = 0, samples: int = 2) -> None:
     q, v, a = motion(model, seed, (samples,))
     with PyBulletBackend(model) as engine:
         reference = ReferenceBackend(model)
-        near = Closeness(samples_at(model, q, v, a))
+        near = ErrorBounds(samples_at(model, q, v, a))
         tau = reference.inverse_dynamics(q, v, a)
         near.check("inverse_dynamics", engine.inverse_dynamics(q, v, a), tau)
         near.check("mass_matrix", engine.mass_matrix(q), reference.mass_matrix(q))
@@ -32,7 +32,7 @@ def assert_solves(model: Model, seed: int = 0, faster: float = 1.0) -> None:
     v, tau = faster * v, faster * tau
     with PyBulletBackend(model) as engine:
         a = engine.forward_dynamics(q, v, tau)
-    near = Closeness(samples_at(model, q, v, tau=tau))
+    near = ErrorBounds(samples_at(model, q, v, tau=tau))
     near.check_solves(a, ReferenceBackend(model).inverse_dynamics(q, v, a), tau)
 
 

@@ -19,8 +19,8 @@ from dynx.reference.backend import ReferenceBackend
 from dynx.spatial.so3 import quat_from_rotation, rotation_from_rpy
 from dynx.testing.strategies import models
 from tests.backends.robots import BASES, BOX, all_quantities, assert_close, chain, mixed_robot, motion, pair
-from tests.closeness import Closeness, samples_at
 from tests.engines.pybullet.robots import assert_agrees, assert_solves
+from tests.error_bounds import ErrorBounds, samples_at
 
 pytest.importorskip("pybullet")
 
@@ -80,7 +80,7 @@ def test_attitudes_about_several_axes_and_at_the_poles(pitch: float) -> None:
     with PyBulletBackend(model) as engine:
         expected = ReferenceBackend(model).inverse_dynamics(q, v, a)
         assert_close(engine.inverse_dynamics(q, v, a), expected)
-    near = Closeness(samples_at(model, q, v, tau=a))
+    near = ErrorBounds(samples_at(model, q, v, tau=a))
     with PyBulletBackend(model) as engine:
         found = engine.forward_dynamics(q, v, a)
     near.check_solves(found, ReferenceBackend(model).inverse_dynamics(q, v, found), a)
@@ -114,7 +114,7 @@ def test_as_many_joints_as_bullet_answers_for(base: Base) -> None:
     with PyBulletBackend(model) as engine:
         assert_close(engine.forward_kinematics(q), reference.forward_kinematics(q), size=MAX_JOINTS)
         tau = engine.inverse_dynamics(q, v, a)
-        near = Closeness(samples_at(model, q, v, a, tau))
+        near = ErrorBounds(samples_at(model, q, v, a, tau))
         near.check("inverse_dynamics", tau, reference.inverse_dynamics(q, v, a))
         near.check("mass_matrix", engine.mass_matrix(q), reference.mass_matrix(q))
         found = engine.forward_dynamics(q, v, tau)

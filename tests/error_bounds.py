@@ -1,4 +1,4 @@
-"""Closeness as `dynx.agreement` judges it: error over natural size, against the derived tolerance.
+"""ErrorBounds as `dynx.agreement` judges it: error over natural size, against the derived tolerance.
 
 No test has a tolerance of its own; this is how they use those of `dynx.agreement.tolerances`.
 """
@@ -30,9 +30,9 @@ def samples_at(
     frame: str | None = None,
     references: int = 3,
 ) -> Samples:
-    """The samples of given states: q (n, nq) or (nq,), the others alike, zero where not given.
+    """Return samples at given states: q (n, nq) or (nq,), the others likewise, zero where not given.
 
-    Every frame is asked for at every sample, in every reference or, in turns, in fewer.
+    Every frame is compared at every sample, in every reference, or in fewer, which take turns.
     """
     q = np.atleast_2d(np.asarray(q, dtype=float))
     n = len(q)
@@ -56,15 +56,15 @@ def samples_at(
     )
 
 
-class Closeness:
-    """Judges answers at the given samples; one sample (nq,) or several (n, nq)."""
+class ErrorBounds:
+    """Bounds of the errors of results at the given samples: one sample (nq,) or several (n, nq)."""
 
     def __init__(self, samples: Samples) -> None:
         self.samples = samples
         self.sizes = Magnitudes(samples)
 
     def check(self, quantity: str, got: ArrayLike, wanted: ArrayLike) -> None:
-        """Assert that two answers to `quantity` (for frames: about one frame) are the same."""
+        """Assert that two results of `quantity` (for frames: of one frame) are equal within its tolerance."""
         got, wanted = np.asarray(got), np.asarray(wanted)
         assert got.shape == wanted.shape, f"{quantity}: shape {got.shape}, wanted {wanted.shape}"
         asked = BY_NAME[quantity]
@@ -72,7 +72,7 @@ class Closeness:
         self._assert_small(quantity, got - wanted, self._scale(quantity), tolerance, got, wanted)
 
     def check_rate(self, quantity: str, got: ArrayLike, wanted: ArrayLike) -> None:
-        """The same where one of the two is a numerical derivative of that quantity along the motion."""
+        """Assert that a rate of `quantity` equals its numerical derivative along the motion."""
         got, wanted = np.asarray(got), np.asarray(wanted)
         scale = self._scale(quantity)
         rate = scale * self.sizes.frequency.reshape(-1, *([1] * (scale.ndim - 1)))
@@ -80,14 +80,14 @@ class Closeness:
         self._assert_small(f"rate of {quantity}", got - wanted, rate, tolerance, got, wanted)
 
     def check_solves(self, a: ArrayLike, tau_of_a: ArrayLike, tau: ArrayLike) -> None:
-        """Assert that forward dynamics' `a` takes the torque that was asked for (backward error)."""
+        """Assert that the acceleration `a` takes the torque `tau` that caused it (backward error)."""
         a, tau_of_a, tau = np.atleast_2d(a), np.atleast_2d(tau_of_a), np.atleast_2d(tau)
         scale = self.sizes.solved_torque(a)[:, None]
         tolerance = tolerances.solving()
         self._assert_small("forward_dynamics", tau_of_a - tau, scale, tolerance, tau_of_a, tau)
 
     def _scale(self, quantity: str) -> Floats:
-        """The natural size at each sample, for one frame."""
+        """Return the magnitude of the quantity at each sample, for one frame."""
         asked = BY_NAME[quantity]
         scale = np.asarray(asked.scale(self.sizes))
         if asked.layout == "frames":
@@ -107,6 +107,6 @@ class Closeness:
             error = error[None]
         verdict = judge(error, scale)
         assert verdict.relative <= tolerance, (
-            f"{what} is off by {verdict.relative:.3g} of its size, more than {tolerance:.3g}, at "
+            f"{what}: relative error {verdict.relative:.3g} exceeds {tolerance:.3g} at "
             f"{verdict.position}\ngot    {got}\nwanted {wanted}"
         )
