@@ -28,7 +28,7 @@ FRAMES = {"ur5": "tool0", "panda": "panda_hand", "talos_reduced": "gripper_left_
 """The robots that are timed, and the frame of each."""
 
 COMPILED = "compiled"
-COMPILING: tuple[type[CompilingPeer], ...] = (AdamJax, Frax, CasadiMap, CasadiCode)
+COMPILE_LOCK: tuple[type[CompilingPeer], ...] = (AdamJax, Frax, CasadiMap, CasadiCode)
 """Peers that take batches, once they have compiled."""
 
 WAYS: dict[str, tuple[str, ...]] = {
@@ -37,11 +37,11 @@ WAYS: dict[str, tuple[str, ...]] = {
     LOOP: tuple(ARGUMENTS),
     MujocoInverse.name: ("inverse_dynamics",),
     MujocoRollout.name: ("forward_dynamics",),
-    **{peer.name: tuple(ARGUMENTS) for peer in COMPILING},
+    **{peer.name: tuple(ARGUMENTS) for peer in COMPILE_LOCK},
 }
 """Each way, and the quantities that it does."""
 
-TAKE_SECONDS = frozenset({MujocoRollout.name, *(peer.name for peer in COMPILING)})
+TAKE_SECONDS = frozenset({MujocoRollout.name, *(peer.name for peer in COMPILE_LOCK)})
 """Peers for large batches: getting ready takes seconds to minutes, handing over arrays much of a call."""
 HAVE_THREADS = frozenset({COMPILED, BATCH, *TAKE_SECONDS})
 ONLY_BATCHES = frozenset({BATCH, *TAKE_SECONDS})
@@ -73,7 +73,7 @@ def make_way(model: Model, name: str, threads: int) -> Way:
         MujocoInverse.name: lambda: MujocoInverse(model),
         MujocoRollout.name: lambda: MujocoRollout(model, threads),
     }
-    for peer in COMPILING:
+    for peer in COMPILE_LOCK:
         makers[peer.name] = partial(peer, model, threads)
     return makers[name]() if name in makers else backend_way(model, name, threads)
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
 from dynx.model import Model
-from dynx.simd.machine import LARGEST_SHARE, memory
+from dynx.simd.machine import MAX_MEMORY_SHARE, memory_size
 from dynx.spatial.scalar import Floats
 
 ARGUMENTS: dict[str, tuple[str, ...]] = {
@@ -108,8 +108,8 @@ def require_memory(model: Model, work: Work) -> None:
     state = np.dtype(np.float64).itemsize * (model.nq + 3 * model.nv)
     answer = np.dtype(np.float64).itemsize * prod(answer_shape(model, work.quantity))
     needed = work.batch * (state + 2 * answer)
-    if needed > LARGEST_SHARE * memory():
+    if needed > MAX_MEMORY_SHARE * memory_size():
         raise ArgumentError(
             f"{work.quantity} at a batch of {work.batch} needs {needed / 1e9:.3g} GB; this machine has "
-            f"{memory() / 1e9:.3g} GB, of which a batch may take {LARGEST_SHARE:.0%}"
+            f"{memory_size() / 1e9:.3g} GB, of which a batch may take {MAX_MEMORY_SHARE:.0%}"
         )

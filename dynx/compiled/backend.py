@@ -34,7 +34,7 @@ from dynx.compiled.kernels import (
 )
 from dynx.model import Model
 from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED
-from dynx.simd.image import COMPILING
+from dynx.simd.image import COMPILE_LOCK
 from dynx.simd.kernel import Kernel
 from dynx.simd.target import compiler_version, host
 from dynx.simd.threads import checked_threads
@@ -80,7 +80,7 @@ class CompiledBackend(Backend):
 
     def _release(self) -> None:
         # Calls that other threads are in keep their kernel until they end.
-        with COMPILING:
+        with COMPILE_LOCK:
             self._asked, self._calls, self._chains = {}, {}, {}
 
     # -- with `out` ---------------------------------------------------------------------------
@@ -207,7 +207,7 @@ class CompiledBackend(Backend):
     def _kept(self, key: object, quantity: str, details: tuple[Any, ...] = ()) -> Call:
         """How a quantity is answered, to be found under `key` the next time."""
         call = self._call_for(quantity, details)
-        with COMPILING:
+        with COMPILE_LOCK:
             self._arguments.refuse_closed()
             self._asked[key] = call
         return call
@@ -219,7 +219,7 @@ class CompiledBackend(Backend):
         call = self._calls.get(key)
         if call is None:
             # The lock that a fork waits for: a child must not find it taken.
-            with COMPILING:
+            with COMPILE_LOCK:
                 self._arguments.refuse_closed()
                 call = self._calls.get(key)
                 if call is None:

@@ -80,8 +80,8 @@ class KernelCall:
         largest = max(port.size for port in (*kernel.inputs, *kernel.outputs))
         self._few = min(FEW, max(1, FEW_NUMBERS // largest))
         room = self._room()
-        self._first, self._second, self._third = (*room.places, slice(0), slice(0))[:3]
-        self._defect = room.found_places[1].start
+        self._first, self._second, self._third = (*room.input_slices, slice(0), slice(0))[:3]
+        self._defect = room.output_slices[1].start
         # Taken and given back, rather than one for each thread: also safe where a signal handler or a
         # destructor calls in the middle of a call.
         self._rooms = [room]
@@ -106,7 +106,7 @@ class KernelCall:
         except _ODD:
             return self._rows_answered(room, tuple(x for x in (q, v, a) if x is not _ABSENT), out)
         room.run()
-        if room.numbers[self._defect] < MAX_DEFECT or self._trusting:
+        if room.output_values[self._defect] < MAX_DEFECT or self._trusting:
             if out is None:
                 out = room.results[0].copy()
             else:

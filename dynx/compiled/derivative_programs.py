@@ -12,7 +12,7 @@ from dynx.rbd.base_parameters import regroup_inertias
 from dynx.rbd.crba import mass_matrix
 from dynx.rbd.linear import solve_positive_definite
 from dynx.simd.differentiate import differentiate
-from dynx.simd.inlining import inlined
+from dynx.simd.inlining import inline
 from dynx.simd.program import Program
 from dynx.simd.trace import trace
 from dynx.spatial.branchless import displace
@@ -92,7 +92,7 @@ def pose_derivative(mechanism: Mechanism, frame: int) -> Program:
 
     program = differentiate(trace(pose, {"q": shapes["q"], "d": shapes["v"]}), [("T", "d")], order="forward")
     still = np.zeros(shapes["v"])
-    return trace(lambda q: {"dT_dq": inlined(program, {"q": q, "d": still})["dT_dd"]}, {"q": shapes["q"]})
+    return trace(lambda q: {"dT_dq": inline(program, {"q": q, "d": still})["dT_dd"]}, {"q": shapes["q"]})
 
 
 def _torque(mechanism: Mechanism, q: Array, v: Array, a: Array) -> Array:
@@ -116,7 +116,7 @@ def _differentiated_torque(mechanism: Mechanism) -> Program:
 
 def _torque_derivatives(program: Program, q: Array, v: Array, a: Array) -> dict[str, Array]:
     """The outputs of `_differentiated_torque` at d = 0; M is computed once on either side."""
-    found = inlined(program, {"q": q, "d": np.zeros(len(v)), "v": v, "a": a})
+    found = inline(program, {"q": q, "d": np.zeros(len(v)), "v": v, "a": a})
     M = np.array(found["dtau_da"])
     for i, j in zip(*np.triu_indices(len(M), 1), strict=True):
         M[i, j] = M[j, i]

@@ -41,7 +41,7 @@ from dynx.rbd.aba import inertia_matrix
 from dynx.rbd.base_parameters import align_frames, regroup_inertias
 from dynx.rbd.kinematics import Poses, ancestry, frame_placement
 from dynx.rbd.linear import solve_positive_definite
-from dynx.simd.cache import cached_kernel, source_hash
+from dynx.simd.cache import load_kernel, source_hash
 from dynx.simd.emit import Settings
 from dynx.simd.kernel import Kernel
 from dynx.simd.program import Program
@@ -157,7 +157,7 @@ def quantity_kernel(
     lanes = host().lanes
     cubic = kernel_quantity(name).growth == "cubic"
     settings = Settings(lanes, segment=SEGMENT_OF_CUBIC_CODE) if cubic else Settings(lanes)
-    return cached_kernel(recipe, lambda: _program(mechanism, name, answer, tree=tree), settings=settings)
+    return load_kernel(recipe, lambda: _program(mechanism, name, answer, tree=tree), settings=settings)
 
 
 def chain_kernel(mechanism: Mechanism, name: str, chain: Chain, *, tree: bool = False) -> Kernel:
@@ -170,7 +170,7 @@ def chain_kernel(mechanism: Mechanism, name: str, chain: Chain, *, tree: bool = 
         return _reduced(coupling, kernel_quantity(name), in_tree, q, *rates)
 
     recipe = _recipe(mechanism, name, chain, tree)
-    return cached_kernel(
+    return load_kernel(
         recipe, lambda: _program(mechanism, name, answer, tree=tree, place=(chain.place_size,))
     )
 

@@ -16,7 +16,7 @@ import dynx.spatial
 from dynx._version import __version__
 from dynx.backends.evaluation import common_batch
 from dynx.model import Mechanism, Model
-from dynx.simd.cache import cached_kernel, source_hash
+from dynx.simd.cache import load_kernel, source_hash
 from dynx.simd.emit import Settings
 from dynx.simd.kernel import Kernel
 from dynx.simd.program import Program
@@ -35,7 +35,7 @@ def robot_kernel(model: Model, question: object, program: Callable[[], Program])
     lanes = host().lanes
     large = model.mechanism.nv > LARGE
     settings = Settings(lanes, segment=1200) if large else Settings(lanes)
-    return cached_kernel(recipe, program, settings=settings)
+    return load_kernel(recipe, program, settings=settings)
 
 
 def evaluated(kernel: Kernel, arrays: Sequence[Floats], threads: int) -> list[Floats]:

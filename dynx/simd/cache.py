@@ -1,14 +1,13 @@
-"""Machine code kept between processes.
+"""Cache of compiled kernels on disk, shared between processes.
 
-The folder is that of the environment variable ``DYNX_CACHE_DIR``, or else the user's cache folder of
-dynx; ``DYNX_CACHE=0`` switches the cache off, and so, without a word, does a folder that cannot be
-written. Code found there is run, so a folder that somebody else owns or may write to is not used.
+The folder is given by the environment variable ``DYNX_CACHE_DIR``, by default the user's cache folder of
+dynx. ``DYNX_CACHE=0`` switches the cache off; a folder that cannot be written is silently not used. Cached
+code is executed, so a folder that another user owns or may write to is not used either.
 
-An image is found by a key: the hash of its *recipe* and of all that turns the recipe into machine
-code. A recipe is any text that decides what the program is; `recipe_of` gives that of a program at
-hand, and a caller who knows a shorter one saves the time of tracing. Each file carries a checksum and
-is written under another name first, so that what is cut short, altered or being written by another
-process is never used: it is compiled again and replaced.
+The key of an image is the hash of its *recipe* and of everything that turns the recipe into machine code. A
+recipe is any text that determines the program. `program_recipe` derives one from a program; a caller who
+knows a shorter one saves the time of tracing. Each file carries a checksum and is written under a temporary
+name first, so that a truncated, altered or unfinished file is never used but compiled again and replaced.
 """
 
 from __future__ import annotations
@@ -27,33 +26,33 @@ import platformdirs
 from dynx.errors import ArgumentError, CompileError
 from dynx.files.writing import write_bytes
 from dynx.simd.emit import Settings
-from dynx.simd.image import Image, compiled
+from dynx.simd.image import Image, compile_image
 from dynx.simd.kernel import Kernel
 from dynx.simd.program import Port, Program
 from dynx.simd.target import Target, compiler_version, host
 
-LARGEST = 512 * 2**20
-"""Bytes the cache may hold; beyond, what was not used for longest is removed."""
+MAX_CACHE_BYTES = 512 * 2**20
+"""Largest size of the cache [bytes]; beyond it the least recently used files are removed."""
 
-OFF = frozenset({"0", "no", "off", "false"})
-"""What ``DYNX_CACHE`` is set to where nothing shall be kept."""
+OFF_WORDS = frozenset({"0", "no", "off", "false"})
+"""Values of ``DYNX_CACHE`` that switch the cache off."""
 
 _SUFFIX = ".kernel"
 _MAGIC = b"dynx kernel 1\n"
 _DIGEST = 32
 
 
-def cached_kernel(
+def load_kernel(
     recipe: bytes,
     program: Callable[[], Program],
     *,
     target: Target | None = None,
     settings: Settings | None = None,
 ) -> Kernel:
-    """The kernel of `recipe`: from the cache, or of `program()`, which the cache then remembers."""
+    """Load the kernel of `recipe` from the cache, or compile `program()` and store it there."""
     target = host() if target is None else target
     settings = Settings(target.lanes) if settings is None else settings
-    folder = _folder()
+    folder = _cache_folder()
     if folder is None:
         return Kernel(program(), target=target, settings=settings)
     path = folder / (_key(recipe, target, settings) + _SUFFIX)
@@ -61,13 +60,13 @@ def cached_kernel(
     if found is not None:
         with contextlib.suppress(CompileError):
             return Kernel(found)
-    image = compiled(program(), target, settings)
+    image = compile_image(program(), target, settings)
     _write(path, image)
     return Kernel(image)
 
 
-def recipe_of(program: Program) -> bytes:
-    """A recipe for a program: its nodes and ports, every constant to the last bit."""
+def program_recipe(program: Program) -> bytes:
+    """Return the recipe of a program: its nodes and ports, with every constant in hexadecimal."""
     nodes = [(node.op, node.args, node.slot, float(node.value).hex()) for node in program.nodes]
     return repr((nodes, program.inputs, program.outputs, program.results)).encode()
 
@@ -83,12 +82,12 @@ def _key(recipe: bytes, target: Target, settings: Settings) -> str:
 
 @cache
 def _emitter_version() -> str:
-    """A hash of the compiler's own text."""
+    """Return a hash of the source text of `dynx.simd`."""
     return source_hash(Path(__file__).parent)
 
 
 def source_hash(*sources: Path) -> str:
-    """A hash of the Python text of files and of folders (without those inside)."""
+    """Return a hash of Python files and of the Python files directly inside folders."""
     digest = sha256()
     for source in sources:
         names = sorted(os.listdir(source)) if source.is_dir() else [""]
@@ -104,9 +103,9 @@ def source_hash(*sources: Path) -> str:
 # -- files -------------------------------------------------------------------------------------------
 
 
-def _folder() -> Path | None:
-    """Where kernels are kept, made if need be; None where the cache is off."""
-    if os.environ.get("DYNX_CACHE", "").strip().lower() in OFF:
+def _cache_folder() -> Path | None:
+    """Return the cache folder, created if necessary, or None if the cache is off or unusable."""
+    if os.environ.get("DYNX_CACHE", "").strip().lower() in OFF_WORDS:
         return None
     given = os.environ.get("DYNX_CACHE_DIR")
     folder = (Path(given) if given else platformdirs.user_cache_path("dynx")) / "kernels"
@@ -123,7 +122,7 @@ def _folder() -> Path | None:
 
 
 def _read(path: Path, target: Target) -> Image | None:
-    """The image in a file, if it is there and whole."""
+    """Read the image in a file; None if the file is absent or its checksum is wrong."""
     try:
         content = path.read_bytes()
         os.utime(path)
@@ -142,7 +141,7 @@ def _read(path: Path, target: Target) -> Image | None:
 
 
 def _write(path: Path, image: Image) -> None:
-    """Keep an image: all of it or nothing. Not being able to is no error."""
+    """Write an image atomically; failure to write is ignored."""
     ports = {
         side: [(port.name, port.shape) for port in found]
         for side, found in (("inputs", image.inputs), ("outputs", image.outputs))
@@ -152,21 +151,21 @@ def _write(path: Path, image: Image) -> None:
     # Only the user may read or write it, whatever the umask: it holds code that is run.
     with contextlib.suppress(ArgumentError, OSError):
         write_bytes(path, _MAGIC + sha256(body).digest() + body, mode=0o600)
-        _make_room(path.parent)
+        _evict(path.parent)
 
 
-def _make_room(folder: Path) -> None:
-    """Remove what was not used for longest until the folder holds at most `LARGEST` bytes."""
+def _evict(folder: Path) -> None:
+    """Remove the least recently used files until the folder holds at most `MAX_CACHE_BYTES`."""
     found = []
     with os.scandir(folder) as entries:
         for entry in entries:
-            # Another process may remove a file between listing and looking.
+            # Another process may remove a file between listing it and reading its state.
             with contextlib.suppress(FileNotFoundError):
                 state = entry.stat()
                 found.append((state.st_mtime, state.st_size, entry.path))
     total = sum(size for _, size, _ in found)
     for _, size, name in sorted(found):
-        if total <= LARGEST:
+        if total <= MAX_CACHE_BYTES:
             return
         with contextlib.suppress(OSError):
             os.unlink(name)

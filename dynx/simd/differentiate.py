@@ -1,18 +1,18 @@
-"""Exact partial derivatives of a program, as a program.
+"""Exact partial derivatives of a program, as another program.
 
-Every operation has a local derivative by each of its arguments. They label the edges of the graph, and
-the derivative of an output by an input is the sum, over all paths between the two, of the products of
-the labels (Griewank and Walther, Evaluating Derivatives, 2008, chapter 9). Nodes between them are
-eliminated one after the other: what leads into a node is joined to what leads out of it. The order in
-which that is done changes the cost, not the result. From the inputs on it is forward mode, from the
-outputs back it is reverse mode (the gradient of a scalar at the cost of a few evaluations), and the
-rule of Markowitz takes the node with the fewest ways through it next. Edges exist only where something
-depends on something, so a derivative that is zero for all inputs is never computed; it is a constant.
+Every operation has a local derivative with respect to each of its arguments. These label the edges of the
+graph, and the derivative of an output by an input is the sum, over all paths between the two, of the products
+of the labels (Griewank and Walther, Evaluating Derivatives, 2008, chapter 9). The nodes in between are
+eliminated one after the other: each edge into a node is combined with each edge out of it. The elimination
+order changes the cost, not the result. From the inputs onwards it is forward mode; from the outputs backwards
+it is reverse mode (the gradient of a scalar for the cost of a few evaluations); Markowitz's rule eliminates
+next the node with the fewest paths through it. Only actual dependencies have edges, so a derivative that is
+identically zero is never computed; it is a constant.
 
 Where a derivative does not exist:
 
 - ``abs`` at 0, and ``min`` and ``max`` of equal arguments: the mean of the derivatives on both sides
-- ``sqrt`` at 0, ``div`` by 0: what IEEE 754 makes of the formula, an infinity or NaN
+- ``sqrt`` at 0, ``div`` by 0: the IEEE 754 result of the formula, an infinity or NaN
 - where an argument of ``abs``, ``min`` or ``max`` is NaN: NaN
 """
 
@@ -23,8 +23,8 @@ from heapq import heapify, heappop, heappush
 from typing import Literal
 
 from dynx.errors import CompileError, nearest, shown
-from dynx.simd.expr import Graph, Node, Simplify, sign
-from dynx.simd.program import Port, Program, finished
+from dynx.simd.expr import Graph, Node, Simplify
+from dynx.simd.program import Port, Program, extract_program
 from dynx.simd.simplify import FAST
 
 Order = Literal["forward", "reverse", "markowitz"]
@@ -38,24 +38,25 @@ def differentiate(
     order: Order = "markowitz",
     simplify: Simplify | None = FAST,
 ) -> Program:
-    """The program of the derivatives of outputs by inputs, for each of `pairs` (output, input) in turn.
+    """Return the program that computes the derivative of an output by an input, for each of `pairs`.
 
-    The derivative of ``y`` by ``x`` is an output ``dy_dx`` of the shape of y followed by that of x.
-    The outputs named in `values` come first, as they were. The inputs are those of `program`.
+    A pair is (output, input). The derivative of ``y`` by ``x`` is an output ``dy_dx`` of the shape of y
+    followed by that of x. The outputs named in `values` come first, unchanged. The inputs are those of
+    `program`. `order` is the order in which the nodes are eliminated.
 
     Raises CompileError for an output or input that the program does not have.
     """
     graph = Graph(simplify)
-    nodes = _copied(graph, program)
-    slots, results = _entries(program.inputs), _entries(program.outputs)
-    sources = {slot for _, name in pairs for slot in _named(slots, name, "input")}
-    sinks = {nodes[program.results[place]] for name, _ in pairs for place in _named(results, name, "output")}
+    nodes = _copy_nodes(graph, program)
+    slots, results = _scalar_ranges(program.inputs), _scalar_ranges(program.outputs)
+    sources = {slot for _, name in pairs for slot in _lookup(slots, name, "input")}
+    sinks = {nodes[program.results[place]] for name, _ in pairs for place in _lookup(results, name, "output")}
     jacobian = _Elimination(graph, {graph.input(slot) for slot in sorted(sources)}, sinks).run(order)
 
     zero = graph.constant(0.0)
     ports, found = [], []
     for name in values:
-        places = _named(results, name, "output")
+        places = _lookup(results, name, "output")
         ports.append(Port(name, _port(program.outputs, name).shape))
         found += [nodes[program.results[place]] for place in places]
     for y, x in pairs:
@@ -64,50 +65,51 @@ def differentiate(
         for place in results[y]:
             row = jacobian[nodes[program.results[place]]]
             found += [row.get(column, zero) for column in columns]
-    return finished(graph, program.inputs, ports, found)
+    return extract_program(graph, program.inputs, ports, found)
 
 
 def local_derivatives(graph: Graph, index: int) -> tuple[int, ...]:
-    """The derivative of a node by each of its arguments, as nodes of the same graph."""
+    """Return the derivative of a node by each of its arguments, as nodes of the same graph."""
     node = graph.nodes[index]
     return _DERIVATIVES[node.op](graph, index, *node.args) if node.args else ()
 
 
 class _Elimination:
-    """The graph between `sources` and `sinks` with its local derivatives, while nodes are eliminated.
+    """Graph of local derivatives between `sources` and `sinks`, from which nodes are eliminated.
 
-    `into[x]` and `out_of[x]` hold the edges of node x, by the node at their other end. What a sink is
-    made of may be a sink, too; a sink is therefore a vertex of its own, numbered -1 - (its node).
+    `_predecessors[x]` and `_successors[x]` hold the edges of node x, by the node at their other end. A node
+    may be both a sink and an argument of another sink; each sink is therefore a separate vertex, numbered
+    -1 - (its node).
     """
 
     def __init__(self, graph: Graph, sources: set[int], sinks: set[int]) -> None:
         self._graph = graph
         self._sources, self._sinks = sources, sinks
-        self._into: dict[int, dict[int, int]] = {}
-        self._out_of: dict[int, dict[int, int]] = {}
+        self._predecessors: dict[int, dict[int, int]] = {}
+        self._successors: dict[int, dict[int, int]] = {}
         one = graph.constant(1.0)
-        active = self._between()
+        active = self._active_nodes()
         for index in sorted(active):
             if index in sinks:
-                self._join(index, -1 - index, one)
+                self._add_edge(index, -1 - index, one)
             if index in sources:
                 continue
             for arg, label in zip(graph.nodes[index].args, local_derivatives(graph, index), strict=True):
                 if arg in active:
-                    self._join(arg, index, label)
+                    self._add_edge(arg, index, label)
 
     def run(self, order: Order) -> dict[int, dict[int, int]]:
-        """For each sink the nonzero derivatives by the sources."""
-        inner = [index for index in self._out_of if index not in self._sources]
+        """Eliminate all inner nodes; return for each sink the non-zero derivatives by the sources."""
+        inner = [index for index in self._successors if index not in self._sources]
         if order == "markowitz":
             self._by_markowitz(inner)
         else:
             for index in sorted(inner, reverse=order == "reverse"):
                 self._eliminate(index)
-        return {sink: self._into.get(-1 - sink, {}) for sink in self._sinks}
+        return {sink: self._predecessors.get(-1 - sink, {}) for sink in self._sinks}
 
-    def _between(self) -> set[int]:
-        """The nodes that depend on a source and that a sink depends on."""
+    def _active_nodes(self) -> set[int]:
+        """Return the nodes that depend on a source and that a sink depends on."""
         nodes = self._graph.nodes
         needed, stack = set(), list(self._sinks)
         while stack:
@@ -115,53 +117,54 @@ class _Elimination:
             if index not in needed:
                 needed.add(index)
                 stack.extend(nodes[index].args)
-        moved: set[int] = set()
+        active: set[int] = set()
         for index in sorted(needed):
-            if index in self._sources or any(arg in moved for arg in nodes[index].args):
-                moved.add(index)
-        return moved
+            if index in self._sources or any(arg in active for arg in nodes[index].args):
+                active.add(index)
+        return active
 
-    def _join(self, start: int, end: int, label: int) -> None:
-        """One more way from start to end."""
-        before = self._into.setdefault(end, {}).get(start)
+    def _add_edge(self, start: int, end: int, label: int) -> None:
+        """Add `label` to the edge from start to end; remove the edge if the sum is the constant 0."""
+        before = self._predecessors.setdefault(end, {}).get(start)
         total = label if before is None else self._graph.apply("add", before, label)
         if self._graph.nodes[total] == _ZERO:
-            self._into[end].pop(start, None)
-            self._out_of.get(start, {}).pop(end, None)
+            self._predecessors[end].pop(start, None)
+            self._successors.get(start, {}).pop(end, None)
         else:
-            self._into[end][start] = total
-            self._out_of.setdefault(start, {})[end] = total
+            self._predecessors[end][start] = total
+            self._successors.setdefault(start, {})[end] = total
 
     def _eliminate(self, index: int) -> None:
-        before, after = self._into.pop(index, {}), self._out_of.pop(index, {})
+        before, after = self._predecessors.pop(index, {}), self._successors.pop(index, {})
         for start in before:
-            del self._out_of[start][index]
+            del self._successors[start][index]
         for end in after:
-            del self._into[end][index]
+            del self._predecessors[end][index]
         for end, last in after.items():
             for start, first in before.items():
-                self._join(start, end, self._graph.apply("mul", last, first))
+                self._add_edge(start, end, self._graph.apply("mul", last, first))
 
     def _by_markowitz(self, inner: list[int]) -> None:
-        """Always the node with the fewest products next; among equals the one that was made first."""
+        """Eliminate the node with the fewest products next; among equals the one created first."""
         waiting = set(inner)
-        queue = [(self._ways(index), index) for index in inner]
+        queue = [(self._markowitz_degree(index), index) for index in inner]
         heapify(queue)
         while queue:
-            ways, index = heappop(queue)
+            degree, index = heappop(queue)
             if index not in waiting:
                 continue
-            if ways != self._ways(index):
-                heappush(queue, (self._ways(index), index))
+            if degree != self._markowitz_degree(index):
+                heappush(queue, (self._markowitz_degree(index), index))
                 continue
             waiting.remove(index)
-            touched = [n for n in (*self._into.get(index, ()), *self._out_of.get(index, ())) if n in waiting]
+            around = (*self._predecessors.get(index, ()), *self._successors.get(index, ()))
+            neighbours = [node for node in around if node in waiting]
             self._eliminate(index)
-            for neighbour in touched:
-                heappush(queue, (self._ways(neighbour), neighbour))
+            for neighbour in neighbours:
+                heappush(queue, (self._markowitz_degree(neighbour), neighbour))
 
-    def _ways(self, index: int) -> int:
-        return len(self._into.get(index, ())) * len(self._out_of.get(index, ()))
+    def _markowitz_degree(self, index: int) -> int:
+        return len(self._predecessors.get(index, ())) * len(self._successors.get(index, ()))
 
 
 _ZERO = Node("constant", value=0.0)
@@ -169,61 +172,61 @@ _ZERO = Node("constant", value=0.0)
 Derivatives = Callable[..., tuple[int, ...]]
 
 
-def _of_product(graph: Graph, index: int, a: int, b: int) -> tuple[int, ...]:
+def _product_rule(graph: Graph, index: int, a: int, b: int) -> tuple[int, ...]:
     return b, a
 
 
-def _of_quotient(graph: Graph, index: int, a: int, b: int) -> tuple[int, ...]:
+def _quotient_rule(graph: Graph, index: int, a: int, b: int) -> tuple[int, ...]:
     inverse = graph.apply("div", graph.constant(1.0), b)
     return inverse, graph.apply("neg", graph.apply("mul", index, inverse))
 
 
-def _of_root(graph: Graph, index: int, a: int) -> tuple[int, ...]:
+def _sqrt_rule(graph: Graph, index: int, a: int) -> tuple[int, ...]:
     return (graph.apply("div", graph.constant(0.5), index),)
 
 
-def _of_tanh(graph: Graph, index: int, a: int) -> tuple[int, ...]:
-    """(1 - tanh) (1 + tanh)"""
+def _tanh_rule(graph: Graph, index: int, a: int) -> tuple[int, ...]:
+    """Return (1 - tanh) (1 + tanh)."""
     one = graph.constant(1.0)
     return (graph.apply("mul", graph.apply("sub", one, index), graph.apply("add", one, index)),)
 
 
-def _of_arctan(graph: Graph, index: int, a: int) -> tuple[int, ...]:
+def _arctan_rule(graph: Graph, index: int, a: int) -> tuple[int, ...]:
     one = graph.constant(1.0)
     return (graph.apply("div", one, graph.apply("add", one, graph.apply("mul", a, a))),)
 
 
-def _of_smaller(graph: Graph, index: int, a: int, b: int) -> tuple[int, ...]:
-    return _of_larger(graph, index, b, a)
+def _min_rule(graph: Graph, index: int, a: int, b: int) -> tuple[int, ...]:
+    return _max_rule(graph, index, b, a)
 
 
-def _of_larger(graph: Graph, index: int, a: int, b: int) -> tuple[int, ...]:
-    """(1 + sign(a - b)) / 2 and what is left to 1: a counts where it is larger."""
+def _max_rule(graph: Graph, index: int, a: int, b: int) -> tuple[int, ...]:
+    """Return (1 + sign(a - b)) / 2 and (1 - sign(a - b)) / 2."""
     half = graph.constant(0.5)
-    share = graph.apply("mul", half, sign(graph, graph.apply("sub", a, b)))
-    return graph.apply("add", half, share), graph.apply("sub", half, share)
+    half_sign = graph.apply("mul", half, graph.sign(graph.apply("sub", a, b)))
+    return graph.apply("add", half, half_sign), graph.apply("sub", half, half_sign)
 
 
 _DERIVATIVES: dict[str, Derivatives] = {
     "add": lambda graph, index, a, b: (graph.constant(1.0), graph.constant(1.0)),
     "sub": lambda graph, index, a, b: (graph.constant(1.0), graph.constant(-1.0)),
-    "mul": _of_product,
-    "div": _of_quotient,
+    "mul": _product_rule,
+    "div": _quotient_rule,
     "neg": lambda graph, index, a: (graph.constant(-1.0),),
-    "abs": lambda graph, index, a: (sign(graph, a),),
-    "sqrt": _of_root,
+    "abs": lambda graph, index, a: (graph.sign(a),),
+    "sqrt": _sqrt_rule,
     "sin": lambda graph, index, a: (graph.apply("cos", a),),
     "cos": lambda graph, index, a: (graph.apply("neg", graph.apply("sin", a)),),
     "exp": lambda graph, index, a: (index,),
-    "tanh": _of_tanh,
-    "arctan": _of_arctan,
-    "min": _of_smaller,
-    "max": _of_larger,
+    "tanh": _tanh_rule,
+    "arctan": _arctan_rule,
+    "min": _min_rule,
+    "max": _max_rule,
 }
 
 
-def _copied(graph: Graph, program: Program) -> list[int]:
-    """Where the nodes of the program are in `graph`, which makes them as they stand."""
+def _copy_nodes(graph: Graph, program: Program) -> list[int]:
+    """Copy the nodes of the program into `graph` without simplification; return their new indices."""
     place: list[int] = []
     for node in program.nodes:
         if node.op == "input":
@@ -231,12 +234,12 @@ def _copied(graph: Graph, program: Program) -> list[int]:
         elif node.op == "constant":
             place.append(graph.constant(node.value))
         else:
-            place.append(graph.literal(node.op, *(place[arg] for arg in node.args)))
+            place.append(graph.apply_unsimplified(node.op, *(place[arg] for arg in node.args)))
     return place
 
 
-def _entries(ports: Sequence[Port]) -> dict[str, range]:
-    """The numbers of every port's scalars."""
+def _scalar_ranges(ports: Sequence[Port]) -> dict[str, range]:
+    """Return the range of scalar indices of each port, by the name of the port."""
     found, first = {}, 0
     for port in ports:
         found[port.name] = range(first, first + port.size)
@@ -244,7 +247,7 @@ def _entries(ports: Sequence[Port]) -> dict[str, range]:
     return found
 
 
-def _named(entries: dict[str, range], name: str, kind: str) -> range:
+def _lookup(entries: dict[str, range], name: str, kind: str) -> range:
     if name not in entries:
         raise CompileError(f"the program has no {kind} {shown(name)}{nearest(name, entries)}")
     return entries[name]

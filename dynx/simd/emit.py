@@ -1,14 +1,12 @@
-"""From a program to LLVM IR: one function that evaluates it for a whole batch.
+"""LLVM IR for a program: one function that evaluates it for a whole batch.
 
-The function takes one pointer, to 64-bit integers: the number of samples, then for each input and
-output array its address and the distance of its rows in bytes (`arguments` below writes them). A row
-distance of 0 repeats one sample. There must be at least as many samples as lanes; the last group
-starts early enough to end with the last sample, so nothing is masked and nothing beyond the arrays is
-touched. Samples in different lanes have nothing to do with each other.
+The function takes a pointer to 64-bit integers: the number of samples, then for each input and output array
+its address and its row stride in bytes. A row stride of 0 repeats one sample. There must be at least as many
+samples as lanes; the last group starts early enough to end with the last sample, so no lane is masked and no
+memory outside the arrays is accessed. Samples in different lanes are independent.
 
-Large programs are cut into segments, each a function of its own, for the time that compilers need
-grows faster than the length of straight-line code. Values that a later segment needs are kept in
-memory between them.
+Large programs are divided into segments, each a function of its own, because compile time grows faster than
+linearly with the length of straight-line code. Values that a later segment needs are spilled to memory.
 """
 
 from __future__ import annotations
@@ -18,38 +16,38 @@ from functools import partial
 
 from dynx.simd.elementary import elementary
 from dynx.simd.expr import Op
+from dynx.simd.ir_writer import Writer
 from dynx.simd.program import Program
 from dynx.simd.rows import Rows
-from dynx.simd.schedule import ELEMENTARY, Segment, TrigGroup, places_of_kept, schedule
+from dynx.simd.schedule import ELEMENTARY, Segment, TrigGroup, schedule, spill_slots
 from dynx.simd.target import Target
-from dynx.simd.text import Writer
 from dynx.simd.trigonometry import declarations, sines_and_cosines
 from dynx.simd.verify import check_schedule
 
 ENTRY = "kernel"
 """Name of the function."""
 
+PREFETCHED_COLUMNS = range(16, 129)
+"""Row lengths of outputs whose memory is prefetched before it is written.
 
-WIDE = range(16, 129)
-"""Numbers in a row of an output whose memory is fetched before it is written.
+Writes to memory outside the caches stall. Short rows stall little, and the processor prefetches long ones.
+"""
 
-Writing to memory that is not in the caches waits for it. Narrow rows wait little, and long ones are
-fetched by the processor itself."""
+PREFETCH_GROUPS = 8
+"""Distance, in groups of samples, between prefetching a row and writing it."""
 
-AHEAD = 8
-"""So many groups before."""
-
-LINE = 64
-"""Bytes fetched at a time."""
+CACHE_LINE = 64
+"""Size of a cache line [bytes]."""
 
 
 @dataclass(frozen=True)
 class Settings:
-    """How a program becomes code.
+    """Options of code generation.
 
-    `lanes` samples are evaluated at once. `fast` lets LLVM contract a product and a sum into one
-    operation with one rounding and ignore the sign of zeros (its flags ``contract nsz``); without it
-    every operation is IEEE 754's own. NaN and infinity keep their meaning in both.
+    `lanes` samples are evaluated at once. `fast` lets LLVM contract a product and a sum into one operation
+    with one rounding and ignore the sign of zeros (its flags ``contract nsz``); otherwise every operation
+    follows IEEE 754. NaN and infinity propagate in both cases. `segment` is the largest number of
+    operations in one function.
     """
 
     lanes: int
@@ -58,17 +56,17 @@ class Settings:
 
     @property
     def flags(self) -> str:
-        """LLVM's fast-math flags of every arithmetic instruction."""
+        """LLVM's fast-math flags for every arithmetic instruction."""
         return "contract nsz " if self.fast else ""
 
 
 def emit(program: Program, target: Target, settings: Settings) -> str:
-    """The module's text."""
+    """Return the text of the LLVM module that evaluates a program."""
     segments = schedule(program, settings.lanes, settings.segment)
     check_schedule(program, segments, settings.lanes)
-    slots = places_of_kept(program, segments)
+    slots = spill_slots(program, segments)
     bodies = [
-        _Body(program, target, settings, segment, slots, number).text()
+        _SegmentBody(program, target, settings, segment, slots, number).text()
         for number, segment in enumerate(segments)
     ]
     parts = [f'target triple = "{target.triple}"']
@@ -79,7 +77,7 @@ def emit(program: Program, target: Target, settings: Settings) -> str:
 
 
 def _loop(program: Program, settings: Settings, segments: int, slots: int) -> str:
-    """The entry: samples in groups of as many as there are lanes, the last group moved back to fit."""
+    """Return the entry function: a loop over groups of `lanes` samples, of which the last may overlap."""
     lanes = settings.lanes
     lines = [
         f"define void @{ENTRY}(ptr noalias nocapture readonly %arguments) {{",
@@ -87,14 +85,14 @@ def _loop(program: Program, settings: Settings, segments: int, slots: int) -> st
         f"  %kept = alloca [{slots} x <{lanes} x double>], align 64",
         "  %n = load i64, ptr %arguments",
         f"  %last = sub i64 %n, {lanes}",
-        *_wide_arrays(program),
+        *_prefetch_pointers(program),
         "  br label %group",
         "group:",
         "  %i = phi i64 [0, %entry], [%next, %group]",
         "  %late = icmp sgt i64 %i, %last",
         "  %first = select i1 %late, i64 %last, i64 %i",
     ]
-    lines += _fetched_ahead(program, lanes)
+    lines += _prefetch(program, lanes)
     lines += [f"  call void @segment{k}(ptr %arguments, i64 %first, ptr %kept)" for k in range(segments)]
     lines += [
         f"  %next = add i64 %i, {lanes}",
@@ -107,16 +105,16 @@ def _loop(program: Program, settings: Settings, segments: int, slots: int) -> st
     return "\n".join(lines)
 
 
-def _wide(program: Program) -> list[tuple[int, int]]:
-    """The outputs that are fetched before they are written: their number among all arrays, their size."""
+def _prefetched_outputs(program: Program) -> list[tuple[int, int]]:
+    """List (array number, row length) of the outputs whose rows are prefetched."""
     ports = enumerate(program.outputs, start=len(program.inputs))
-    return [(number, port.size) for number, port in ports if port.size in WIDE]
+    return [(number, port.size) for number, port in ports if port.size in PREFETCHED_COLUMNS]
 
 
-def _wide_arrays(program: Program) -> list[str]:
-    """Their addresses and row distances."""
+def _prefetch_pointers(program: Program) -> list[str]:
+    """Return the code that loads addresses and row strides of the prefetched outputs."""
     lines = []
-    for k, _ in _wide(program):
+    for k, _ in _prefetched_outputs(program):
         lines += [
             f"  %at{k} = getelementptr inbounds i64, ptr %arguments, i64 {1 + 2 * k}",
             f"  %base{k} = load ptr, ptr %at{k}",
@@ -126,18 +124,18 @@ def _wide_arrays(program: Program) -> list[str]:
     return lines
 
 
-def _fetched_ahead(program: Program, lanes: int) -> list[str]:
-    """Their rows of a later group. Beyond the arrays that does nothing: a fetch never faults."""
+def _prefetch(program: Program, lanes: int) -> list[str]:
+    """Return the code that prefetches the rows of a later group; a prefetch beyond an array is harmless."""
     lines = []
-    for k, size in _wide(program):
+    for k, size in _prefetched_outputs(program):
         for lane in range(lanes):
             row = f"{k}_{lane}"
             lines += [
-                f"  %sample{row} = add i64 %first, {AHEAD * lanes + lane}",
+                f"  %sample{row} = add i64 %first, {PREFETCH_GROUPS * lanes + lane}",
                 f"  %offset{row} = mul i64 %sample{row}, %stride{k}",
                 f"  %row{row} = getelementptr i8, ptr %base{k}, i64 %offset{row}",
             ]
-            for start in range(0, 8 * size, LINE):
+            for start in range(0, 8 * size, CACHE_LINE):
                 place = f"%line{row}_{start}"
                 lines += [
                     f"  {place} = getelementptr i8, ptr %row{row}, i64 {start}",
@@ -150,8 +148,8 @@ _BINARY: dict[Op, str] = {"add": "fadd", "sub": "fsub", "mul": "fmul", "div": "f
 _ORDER: dict[Op, str] = {"min": "olt", "max": "ogt"}
 
 
-class _Body:
-    """One segment as a function of the arguments, the first sample of the group, and what is kept."""
+class _SegmentBody:
+    """One segment as a function of the arguments, the first sample of the group, and the spilled values."""
 
     def __init__(
         self,
@@ -178,7 +176,7 @@ class _Body:
         ]
 
     def text(self) -> str:
-        """The function."""
+        """Return the text of the function."""
         for step in self._segment.steps:
             if isinstance(step, TrigGroup):
                 self._trig(step)
@@ -189,13 +187,13 @@ class _Body:
             f"define internal void @segment{self._number}"
             "(ptr noalias nocapture readonly %arguments, i64 %first, ptr noalias nocapture %kept) {"
         )
-        heads = [line for index in sorted(self._lanes) for line in self._heads[index]]
+        heads = [line for index in sorted(self._lanes) for line in self._row_pointers[index]]
         return "\n".join([head, "entry:", *heads, *self._write.lines, "  ret void", "}"])
 
     # -- values -------------------------------------------------------------------------------------
 
     def _value(self, index: int) -> str:
-        """The name of a node's vector: computed here, loaded, kept by an earlier segment, or constant."""
+        """Return the name of a node's vector: computed here, an input, spilled earlier, or constant."""
         found = self._values.get(index)
         if found is not None:
             return found
@@ -242,7 +240,7 @@ class _Body:
 
     def _set(self, index: int, name: str) -> None:
         self._values[index] = name
-        if index in self._segment.kept:
+        if index in self._segment.spilled:
             self._write.do(f"store {self._write.vector} {name}, ptr {self._slot(index)}, align 64")
 
     def _slot(self, index: int) -> str:
@@ -253,19 +251,19 @@ class _Body:
     # -- rows ---------------------------------------------------------------------------------------
 
     def _store_results(self) -> None:
-        """The tiles of outputs that this segment completes."""
+        """Write the tiles of outputs that this segment completes."""
         for output, columns, nodes in self._segment.stores:
             rows = self._rows[len(self._program.inputs) + output]
             rows.store(columns, [self._value(node) for node in nodes])
 
     def _pointers(self, port: int) -> list[str]:
-        """The rows of one array, one pointer for each lane, computed at the head of the function."""
+        """Return the row pointers of one array, one per lane, which the head of the function computes."""
         if port not in self._lanes:
             self._lanes[port] = [f"%p{port}_{lane}" for lane in range(self._settings.lanes)]
         return self._lanes[port]
 
     @property
-    def _heads(self) -> dict[int, list[str]]:
+    def _row_pointers(self) -> dict[int, list[str]]:
         heads = {}
         for port in self._lanes:
             base, stride = 1 + 2 * port, 2 + 2 * port

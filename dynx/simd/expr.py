@@ -1,9 +1,8 @@
-"""Expressions: a graph in which every value exists once, and the numbers that build it.
+"""Expression graph with common subexpressions merged, and the symbols that build it.
 
-A `Graph` is an arena of nodes, each an operation on earlier nodes. It is hash-consed: the same
-operation on the same arguments is the same node, so common subexpressions never exist twice. A
-`Symbol` names a node and overloads arithmetic, so that array code written for numbers builds the
-graph when it is run on arrays of symbols.
+A `Graph` is a list of nodes, each an operation on earlier nodes. It is hash-consed: the same operation on the
+same arguments is the same node. A `Symbol` refers to a node and overloads arithmetic, so that array code
+written for numbers builds the graph when it is run on arrays of symbols.
 """
 
 from __future__ import annotations
@@ -51,7 +50,10 @@ ARITY: Final[dict[Op, int]] = {
     "min": 2,
     "max": 2,
 }
-"""Every operation and how many arguments it takes. `Graph` documents what each one means."""
+"""Number of arguments of every operation. `Graph` documents their semantics."""
+
+SIGN_SCALE = 2.0**537
+"""Factor whose square lifts the smallest subnormal, 2^-1074, to 1."""
 
 COMMUTATIVE: Final[frozenset[Op]] = frozenset({"add", "mul"})
 
@@ -69,20 +71,20 @@ class Node(NamedTuple):
 
 
 Simplify = Callable[["Graph", Op, tuple[int, ...]], "int | None"]
-"""The node that an operation on nodes is equal to, or None where it must be a new one."""
+"""Function that returns an existing or simpler node equal to an operation on nodes, or None."""
 
 
-def identity(value: float) -> object:
-    """What tells one constant from another: zeros of either sign are two, all NaN are one."""
+def constant_key(value: float) -> object:
+    """Return the key that identifies a constant: 0.0 and -0.0 are distinct, all NaN are one."""
     return value if value and value == value else repr(value)
 
 
 class Graph:
-    """An arena of nodes in which arguments precede what is made of them.
+    """List of nodes in which arguments precede the operations on them.
 
-    Operations are those of IEEE 754 in double precision, rounded to nearest; `min` and `max` give the
-    second argument if either is NaN (as the machine's instructions do); sin, cos and arctan are in
-    radians, and like exp and tanh within 2 units in the last place.
+    Operations are those of IEEE 754 in double precision, rounded to nearest; `min` and `max` return the
+    second argument if either is NaN (as the processor's instructions do); sin, cos and arctan are in
+    radians, and like exp and tanh accurate to 2 units in the last place.
     """
 
     def __init__(self, simplify: Simplify | None = None) -> None:
@@ -94,26 +96,38 @@ class Graph:
         return len(self.nodes)
 
     def input(self, slot: int) -> int:
-        """The value of input number `slot`."""
+        """Return the node of input number `slot`."""
         return self._node(("input", slot), Node("input", slot=slot))
 
     def constant(self, value: float) -> int:
-        """A number. Zeros of either sign are two constants; all NaN are one."""
-        return self._node(identity(value), Node("constant", value=float(value)))
+        """Return the node of a constant. 0.0 and -0.0 are distinct; all NaN are one."""
+        return self._node(constant_key(value), Node("constant", value=float(value)))
 
     def apply(self, op: Op, *args: int) -> int:
-        """The value of `op` on earlier nodes, simplified as far as the graph's rules go."""
+        """Return the node of `op` on earlier nodes, simplified by the rules of the graph."""
         if self._simplify is not None:
             found = self._simplify(self, op, args)
             if found is not None:
                 return found
-        return self.literal(op, *args)
+        return self.apply_unsimplified(op, *args)
 
-    def literal(self, op: Op, *args: int) -> int:
-        """The same without simplification."""
+    def apply_unsimplified(self, op: Op, *args: int) -> int:
+        """Return the node of `op` on earlier nodes, without simplification."""
         if op in COMMUTATIVE and args[0] > args[1]:
             args = args[::-1]
         return self._node((op, args), Node(op, args))
+
+    def sign(self, x: int) -> int:
+        """Return the sign of x, composed of other operations: -1, 0 or 1 for every double, NaN for NaN.
+
+        x is scaled up and clamped to [-1, 1] twice: a single factor would not lift the smallest subnormal to
+        1, and both factors without a clamp in between would overflow. `min` and `max` propagate NaN in
+        their second argument. The derivative of this expression is not meaningful near 0.
+        """
+        for _ in range(2):
+            scaled = self.apply("mul", self.constant(SIGN_SCALE), x)
+            x = self.apply("max", self.constant(-1.0), self.apply("min", self.constant(1.0), scaled))
+        return x
 
     def _node(self, key: object, node: Node) -> int:
         found = self._known.get(key)
@@ -123,28 +137,11 @@ class Graph:
         return found
 
 
-_SIGN_FACTOR = 2.0**537
-"""Twice this factor lifts the smallest subnormal, 2^-1074, to 1."""
-
-
-def sign(graph: Graph, x: int) -> int:
-    """The sign of node `x`, made of the operations that there are: -1, 0 or 1 for every double; NaN for NaN.
-
-    x is scaled and clamped to [-1, 1] twice: clamping once between the two factors because one factor
-    alone would not reach 1, and both together overflow. `min` and `max` return a NaN if it is their second
-    argument. The derivative of this expression near 0 is meaningless.
-    """
-    for _ in range(2):
-        lifted = graph.apply("mul", graph.constant(_SIGN_FACTOR), x)
-        x = graph.apply("max", graph.constant(-1.0), graph.apply("min", graph.constant(1.0), lifted))
-    return x
-
-
 class Symbol:
-    """A number that is not known yet: node `index` of `graph`. Arithmetic on it makes nodes.
+    """A number whose value is not known yet: node `index` of `graph`. Arithmetic on it creates nodes.
 
-    Anything that asks for its value (a comparison, ``if``, ``float``) raises TraceError with the line
-    that asked.
+    Anything that needs the value (a comparison, ``if``, ``float``) raises TraceError with the file and line
+    of the calling code.
     """
 
     __slots__ = ("graph", "index")
@@ -154,123 +151,123 @@ class Symbol:
         self.index = index
 
     def __add__(self, other: Any) -> Symbol:
-        return self._with("add", other)
+        return self._binary("add", other)
 
     def __radd__(self, other: Any) -> Symbol:
-        return self._with("add", other)
+        return self._binary("add", other)
 
     def __sub__(self, other: Any) -> Symbol:
-        return self._with("sub", other)
+        return self._binary("sub", other)
 
     def __rsub__(self, other: Any) -> Symbol:
-        return self._from("sub", other)
+        return self._binary_reflected("sub", other)
 
     def __mul__(self, other: Any) -> Symbol:
-        return self._with("mul", other)
+        return self._binary("mul", other)
 
     def __rmul__(self, other: Any) -> Symbol:
-        return self._with("mul", other)
+        return self._binary("mul", other)
 
     def __truediv__(self, other: Any) -> Symbol:
-        return self._with("div", other)
+        return self._binary("div", other)
 
     def __rtruediv__(self, other: Any) -> Symbol:
-        return self._from("div", other)
+        return self._binary_reflected("div", other)
 
     def __neg__(self) -> Symbol:
-        return self._alone("neg")
+        return self._unary("neg")
 
     def __pos__(self) -> Symbol:
         return self
 
     def __abs__(self) -> Symbol:
-        return self._alone("abs")
+        return self._unary("abs")
 
     def sqrt(self) -> Symbol:
         """Square root."""
-        return self._alone("sqrt")
+        return self._unary("sqrt")
 
     def sin(self) -> Symbol:
         """Sine [rad]."""
-        return self._alone("sin")
+        return self._unary("sin")
 
     def cos(self) -> Symbol:
         """Cosine [rad]."""
-        return self._alone("cos")
+        return self._unary("cos")
 
     def exp(self) -> Symbol:
         """Exponential."""
-        return self._alone("exp")
+        return self._unary("exp")
 
     def tanh(self) -> Symbol:
         """Hyperbolic tangent."""
-        return self._alone("tanh")
+        return self._unary("tanh")
 
     def arctan(self) -> Symbol:
         """Arctangent [rad], between -pi/2 and pi/2."""
-        return self._alone("arctan")
+        return self._unary("arctan")
 
     def sign(self) -> Symbol:
-        """-1, 0 or 1; see `sign`."""
-        return Symbol(self.graph, sign(self.graph, self.index))
+        """Sign: -1, 0 or 1."""
+        return Symbol(self.graph, self.graph.sign(self.index))
 
     def minimum(self, other: Any) -> Symbol:
-        """The smaller one; `other` if either is NaN."""
-        return self._with("min", other)
+        """Return the smaller one of the two, or `other` if either is NaN."""
+        return self._binary("min", other)
 
     def maximum(self, other: Any) -> Symbol:
-        """The larger one; `other` if either is NaN."""
-        return self._with("max", other)
+        """Return the larger one of the two, or `other` if either is NaN."""
+        return self._binary("max", other)
 
-    def clamp(self, most: Any) -> Symbol:
-        """This cut to -`most` and `most`; NaN stays NaN."""
-        return self._from("max", -most)._from("min", most)
+    def clamp(self, bound: Any) -> Symbol:
+        """Clamp to [-bound, bound]; NaN stays NaN."""
+        return self._binary_reflected("max", -bound)._binary_reflected("min", bound)
 
-    def _alone(self, op: Op) -> Symbol:
+    def _unary(self, op: Op) -> Symbol:
         return Symbol(self.graph, self.graph.apply(op, self.index))
 
-    def _with(self, op: Op, other: Any) -> Symbol:
+    def _binary(self, op: Op, other: Any) -> Symbol:
         index = _index(self.graph, other)
         return (
             NotImplemented if index is None else Symbol(self.graph, self.graph.apply(op, self.index, index))
         )
 
-    def _from(self, op: Op, other: Any) -> Symbol:
+    def _binary_reflected(self, op: Op, other: Any) -> Symbol:
         index = _index(self.graph, other)
         return (
             NotImplemented if index is None else Symbol(self.graph, self.graph.apply(op, index, self.index))
         )
 
-    # What would need the value now.
+    # Operations that need the value.
 
-    def _unknown(self, *_: object) -> NoReturn:
+    def _refuse(self, *_: object) -> NoReturn:
         raise TraceError(
-            f"{_asking_line()} asks for the value of a symbol; a traced function may not branch on one"
+            f"{_caller_location()} needs the value of a symbol; a traced function must not branch on one"
         )
 
-    __bool__ = __float__ = __int__ = __index__ = __round__ = __floor__ = _unknown
-    __eq__ = __ne__ = __lt__ = __le__ = __gt__ = __ge__ = _unknown
-    __hash__ = _unknown
+    __bool__ = __float__ = __int__ = __index__ = __round__ = __floor__ = _refuse
+    __eq__ = __ne__ = __lt__ = __le__ = __gt__ = __ge__ = _refuse
+    __hash__ = _refuse
 
 
 def _index(graph: Graph, other: Any) -> int | None:
-    """The node of an operand: a symbol of the same graph or a real number."""
+    """Return the node of an operand, a symbol of the same graph or a real number; else None."""
     if isinstance(other, Symbol):
         if other.graph is not graph:
-            raise TraceError(f"{_asking_line()} mixes symbols of two traces")
+            raise TraceError(f"{_caller_location()} mixes symbols of two traces")
         return other.index
     if isinstance(other, (float, int)):
         return graph.constant(float(other))
     return None
 
 
-def _asking_line() -> str:
-    """Where the user's code is, which may have asked through a function of NumPy."""
+def _caller_location() -> str:
+    """Return file and line of the innermost calling code outside this module and NumPy."""
     frame: Any = sys._getframe(2)
-    while frame is not None and _passed_through(frame.f_globals.get("__name__", "")):
+    while frame is not None and _is_internal(frame.f_globals.get("__name__", "")):
         frame = frame.f_back
     return "code" if frame is None else f"{frame.f_code.co_filename}:{frame.f_lineno}"
 
 
-def _passed_through(module: str) -> bool:
+def _is_internal(module: str) -> bool:
     return module in (__name__, "numpy") or module.startswith("numpy.")

@@ -1,4 +1,4 @@
-"""A finished program as a function of arrays: of symbols, to build on it in another trace, or of numbers."""
+"""Evaluation of a finished program on arrays of symbols, within another trace, or on arrays of numbers."""
 
 from __future__ import annotations
 
@@ -12,11 +12,12 @@ from dynx.simd.program import Program
 from dynx.spatial.scalar import Array, arctan, cos, exp, sin, sqrt, tanh
 
 
-def inlined(program: Program, inputs: Mapping[str, Array]) -> dict[str, Array]:
-    """The outputs of `program` by name, each of its port's shape, for one array for every input.
+def inline(program: Program, inputs: Mapping[str, Array]) -> dict[str, Array]:
+    """Return the outputs of `program` by name, given one array for every input.
 
-    The arrays hold symbols of one trace, plain numbers, or both; entries that are numbers are folded
-    into what depends on them. Arrays of mpmath's numbers are evaluated in mpmath's precision.
+    The arrays hold symbols of one trace, plain numbers, or both; operations on numbers alone are computed
+    at once. Arrays of mpmath's numbers are evaluated in mpmath's precision. Outputs have the shapes of
+    their ports.
     """
     slots = [entry for port in program.inputs for entry in np.asarray(inputs[port.name]).ravel().tolist()]
     values: list[Any] = []
@@ -26,7 +27,7 @@ def inlined(program: Program, inputs: Mapping[str, Array]) -> dict[str, Array]:
         elif node.op == "constant":
             values.append(node.value)
         else:
-            values.append(_MEANING[node.op](*(values[arg] for arg in node.args)))
+            values.append(_OPERATIONS[node.op](*(values[arg] for arg in node.args)))
     outputs, first = {}, 0
     for port in program.outputs:
         entries = np.empty(port.size, dtype=object)
@@ -37,36 +38,37 @@ def inlined(program: Program, inputs: Mapping[str, Array]) -> dict[str, Array]:
     return outputs
 
 
-def _smaller(a: Any, b: Any) -> Any:
+def _minimum(a: Any, b: Any) -> Any:
     for first in (a, b):
         if isinstance(first, Symbol):
             return _symbol(first, a).minimum(b)
     return a if a < b else b
 
 
-def _larger(a: Any, b: Any) -> Any:
+def _maximum(a: Any, b: Any) -> Any:
     for first in (a, b):
         if isinstance(first, Symbol):
             return _symbol(first, a).maximum(b)
     return a if a > b else b
 
 
-def _symbol(of_the_trace: Symbol, x: Any) -> Symbol:
+def _symbol(other: Symbol, x: Any) -> Symbol:
+    """Return x as a symbol of the graph of `other`."""
     if isinstance(x, Symbol):
         return x
-    return Symbol(of_the_trace.graph, of_the_trace.graph.constant(float(x)))
+    return Symbol(other.graph, other.graph.constant(float(x)))
 
 
 def _elementary(function: Callable[[Array], Array]) -> Callable[[Any], Any]:
-    def of_one(x: Any) -> Any:
+    def evaluate(x: Any) -> Any:
         entry = np.empty((), dtype=object)
         entry[()] = x
         return function(entry)[()]
 
-    return of_one
+    return evaluate
 
 
-_MEANING: dict[str, Callable[..., Any]] = {
+_OPERATIONS: dict[str, Callable[..., Any]] = {
     "add": lambda a, b: a + b,
     "sub": lambda a, b: a - b,
     "mul": lambda a, b: a * b,
@@ -79,6 +81,6 @@ _MEANING: dict[str, Callable[..., Any]] = {
     "exp": _elementary(exp),
     "tanh": _elementary(tanh),
     "arctan": _elementary(arctan),
-    "min": _smaller,
-    "max": _larger,
+    "min": _minimum,
+    "max": _maximum,
 }

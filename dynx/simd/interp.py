@@ -1,8 +1,8 @@
-"""What a program means: it is evaluated operation by operation with NumPy.
+"""Reference interpreter: evaluates a program operation by operation with NumPy.
 
-This is the oracle of the compiler, not a fast way to run anything. Its operations are those that
-`Graph` documents; its sine and cosine are the C library's, and like its other elementary functions, which
-are NumPy's, they can be given.
+It defines the semantics against which compiled kernels are tested, and is slow. Its operations are those that
+`Graph` documents. Sine and cosine come from the C library, the other elementary functions from NumPy; the
+caller may replace them.
 """
 
 from __future__ import annotations
@@ -21,24 +21,24 @@ from dynx.spatial.scalar import Floats
 Function = Callable[[Floats], Floats]
 
 
-def _each(function: Callable[[float], float]) -> Function:
-    """A function of the C library, one number after the other. NaN where it is not defined."""
+def _map_scalars(function: Callable[[float], float]) -> Function:
+    """Apply a function of the C library to each element; the result is NaN for an infinite argument."""
 
-    def one(x: float) -> float:
+    def evaluate(x: float) -> float:
         return function(x) if math.isfinite(x) else math.nan
 
-    return lambda x: np.array([one(entry) for entry in x.tolist()])
+    return lambda x: np.array([evaluate(entry) for entry in x.tolist()])
 
 
-sine: Final[Function] = _each(math.sin)
-cosine: Final[Function] = _each(math.cos)
+sine: Final[Function] = _map_scalars(math.sin)
+cosine: Final[Function] = _map_scalars(math.cos)
 
 
-def _chosen(first: NDArray[np.bool_], a: Floats, b: Floats) -> Floats:
+def _select(first: NDArray[np.bool_], a: Floats, b: Floats) -> Floats:
     return np.where(first, a, b)
 
 
-_MEANING: dict[Op, Callable[..., Floats]] = {
+_OPERATIONS: dict[Op, Callable[..., Floats]] = {
     "add": np.add,
     "sub": np.subtract,
     "mul": np.multiply,
@@ -51,22 +51,22 @@ _MEANING: dict[Op, Callable[..., Floats]] = {
     "exp": np.exp,
     "tanh": np.tanh,
     "arctan": np.arctan,
-    # Not NumPy's: the second one if either is NaN, and of two zeros the second.
-    "min": lambda a, b: _chosen(a < b, a, b),
-    "max": lambda a, b: _chosen(a > b, a, b),
+    # Unlike NumPy's, these return the second argument if either is NaN, or if both are zero.
+    "min": lambda a, b: _select(a < b, a, b),
+    "max": lambda a, b: _select(a > b, a, b),
 }
 
 
 def interpret(
     program: Program, inputs: Sequence[Floats], functions: Mapping[Op, Function] | None = None
 ) -> list[Floats]:
-    """The outputs (n, port size) for the inputs (n, port size), port after port.
+    """Evaluate a program: return the outputs (n, port size) for the inputs (n, port size), port by port.
 
-    `functions` take the place of elementary functions, by the name of the operation.
+    `functions` replace elementary functions, by the name of the operation.
     """
     n = len(inputs[0]) if inputs else 1
     columns = [array[:, column] for array in inputs for column in range(array.shape[1])]
-    meaning = {**_MEANING, **(functions or {})}
+    operations = {**_OPERATIONS, **(functions or {})}
     values: list[Floats] = []
     with np.errstate(all="ignore"):
         for node in program.nodes:
@@ -75,7 +75,7 @@ def interpret(
             elif node.op == "constant":
                 values.append(np.full(n, node.value))
             else:
-                values.append(meaning[node.op](*(values[arg] for arg in node.args)))
+                values.append(operations[node.op](*(values[arg] for arg in node.args)))
     outputs, first = [], 0
     for port in program.outputs:
         out = np.empty((n, port.size))

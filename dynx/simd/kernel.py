@@ -12,73 +12,75 @@ import numpy as np
 
 from dynx.errors import ArgumentError, ClosedError, CompileError, DTypeError, ShapeError
 from dynx.simd.emit import Settings
-from dynx.simd.image import Code, Image, compiled
+from dynx.simd.image import Code, Image, compile_image
 from dynx.simd.program import Port, Program
 from dynx.simd.target import Target, host
 from dynx.simd.threads import run_parts
 from dynx.spatial.scalar import Floats
 
-PART = 1.2e7
-"""Least work of a part that is worth handing to another thread, in bytes of code times groups of
-samples: about 150 microseconds. Handing parts out costs 20, waking a thread as much again."""
+MIN_PART_WORK = 1.2e7
+"""Least work of a part given to another thread, in bytes of code times groups of samples: about 150
+microseconds. Dispatching a part costs 20 microseconds, and waking a thread about as much."""
 
-LONGEST_PART = 1e10
-"""Most work of a part, in the same units: some tenths of a second."""
+MAX_PART_WORK = 1e10
+"""Most work of a part, in bytes of code times groups of samples: some tenths of a second."""
 
 PARTS_PER_THREAD = 4
-"""More parts than threads, so that a thread which the system held up does not hold up the rest."""
+"""Number of parts per thread; more than 1, so that a delayed thread does not delay the whole batch."""
 
-_NUMBER = 8
+_FLOAT64_BYTES = 8
 _FLOAT64 = np.dtype(np.float64)
 _first_byte: Any = c_char.from_buffer
 
 
 class Kernel:
-    """Evaluates a program for batches of samples.
+    """A compiled program that evaluates batches of samples.
 
-    Safe to use from several threads. Its code is freed after `close`, or when nothing refers to the
-    kernel; a call that is under way then ends as it would have. A pickle holds the machine code and
-    is refused by a machine that cannot run it.
+    Safe to use from several threads. The code is freed after `close`, or when nothing refers to the kernel
+    any more; calls in progress complete first. A pickle contains the machine code; unpickling it on a
+    different processor raises CompileError.
     """
 
     def __init__(
         self, source: Program | Image, *, target: Target | None = None, settings: Settings | None = None
     ) -> None:
-        """Compile a program (for `target`, by default this machine), or take an image as it stands."""
-        self.image = source if isinstance(source, Image) else compiled(source, target, settings)
+        """Compile a program for `target` (by default this machine), or link an existing image."""
+        self.image = source if isinstance(source, Image) else compile_image(source, target, settings)
         self._code: Code | None = Code(self.image)
 
     @property
     def inputs(self) -> tuple[Port, ...]:
-        """What it reads."""
+        """Input ports."""
         return self.image.inputs
 
     @property
     def outputs(self) -> tuple[Port, ...]:
-        """What it writes."""
+        """Output ports."""
         return self.image.outputs
 
     def __call__(self, inputs: Sequence[Floats], outputs: Sequence[Floats], *, threads: int = 1) -> None:
-        """Fill `outputs` from `inputs`, float64 arrays (n, size of the port), on at most `threads`.
+        """Fill `outputs` from `inputs`, float64 arrays (n, size of the port), with at most `threads` threads.
 
-        Rows may lie any distance apart, also 0 in an input, which repeats one sample. An array whose
-        rows are not contiguous, and an output that shares memory with another array, goes through a
-        copy. Results are the same bit for bit whatever the number of threads, and whatever the other
-        samples are. Raises errors of `dynx.errors` for arrays that do not fit, and writes nothing then.
+        Rows may have any stride, also 0 in an input, which repeats one sample. An array whose rows are not
+        contiguous is copied first; an output that shares memory with another array is computed in a copy.
+        Results are bit for bit independent of the number of threads and of the other samples. Raises
+        ArgumentError, DTypeError or ShapeError for arrays that do not fit, and writes nothing then.
         """
-        code = self._opened()
-        n = _checked(self.inputs, self.outputs, inputs, outputs)
+        code = self._open_code()
+        n = _check_arrays(self.inputs, self.outputs, inputs, outputs)
         if n == 0 or not outputs:
             return
-        sources = [array if _direct(array) else np.ascontiguousarray(array) for array in inputs]
+        sources = [array if _usable_in_place(array) else np.ascontiguousarray(array) for array in inputs]
         places = [_extent(array) for array in (*sources, *outputs)]
         targets = [
-            out if _direct(out) and _apart(places, len(sources) + k, out) else np.empty(out.shape)
+            out
+            if _usable_in_place(out) and _is_disjoint(places, len(sources) + k, out)
+            else np.empty(out.shape)
             for k, out in enumerate(outputs)
         ]
         lanes = self.image.lanes
         if 1 < n < lanes:
-            # As many samples as there are lanes, the last one repeated.
+            # Fill the lanes by repeating the last sample.
             rows = np.minimum(np.arange(lanes), n - 1)
             padded = [np.empty((lanes, out.shape[1])) for out in outputs]
             self._run(code, [array[rows] for array in sources], padded, lanes, 1)
@@ -92,22 +94,22 @@ class Kernel:
     def _run(
         self, code: Code, inputs: Sequence[Floats], outputs: Sequence[Floats], n: int, threads: int
     ) -> None:
-        """Call the code for n samples, n = 1 or at least as many as there are lanes."""
+        """Call the code for n samples, where n is 1 or at least the number of lanes."""
         arrays = (*inputs, *outputs)
         lanes = self.image.lanes
         words = [max(n, lanes)]
         for array in arrays:
-            # One sample alone is evaluated in every lane.
+            # A single sample is evaluated in every lane.
             words += [_address(array), array.strides[0] if n > 1 else 0]
         groups = n // lanes
         work = groups * len(self.image.code)
-        # Ctrl-C is heard between two parts.
-        parts = max(1, min(int(work / LONGEST_PART) + 1, groups))
+        # Ctrl-C takes effect between two parts.
+        parts = max(1, min(int(work / MAX_PART_WORK) + 1, groups))
         if threads > 1:
-            parts = max(parts, min(int(work / PART), threads * PARTS_PER_THREAD, groups))
+            parts = max(parts, min(int(work / MIN_PART_WORK), threads * PARTS_PER_THREAD, groups))
         if parts == 1:
-            alone = packed("q", words)
-            code.entry(alone.buffer_info()[0])
+            packed_words = packed("q", words)
+            code.entry(packed_words.buffer_info()[0])
             return
         arguments = np.empty((parts, len(words)), dtype=np.int64)
         arguments[:] = words
@@ -122,22 +124,22 @@ class Kernel:
 
         run_parts(call, parts, threads)
 
-    def bound(self, inputs: Sequence[Floats], outputs: Sequence[Floats]) -> Callable[[], None]:
-        """A call that fills these `outputs` from these `inputs` each time, whatever they hold by then.
+    def bind(self, inputs: Sequence[Floats], outputs: Sequence[Floats]) -> Callable[[], None]:
+        """Return a function that fills these `outputs` from the current contents of these `inputs`.
 
-        For loops of many calls: everything is checked here and nothing afterwards. Wants at least as
-        many samples as there are `lanes`, rows whose numbers lie side by side, and outputs that share
-        memory with nothing; raises ArgumentError for others, and what a plain call raises.
+        For loops with many calls: everything is checked here and nothing afterwards. There must be at least
+        as many samples as lanes, rows must be contiguous, and outputs must not share memory with any other
+        array; otherwise raises ArgumentError. Raises also the errors of a plain call.
         """
-        code, arrays = self._opened(), (*inputs, *outputs)
-        n = _checked(self.inputs, self.outputs, inputs, outputs)
+        code, arrays = self._open_code(), (*inputs, *outputs)
+        n = _check_arrays(self.inputs, self.outputs, inputs, outputs)
         if n < self.image.lanes:
-            raise ArgumentError(f"a bound call wants at least {self.image.lanes} samples, not {n}")
+            raise ArgumentError(f"a bound call needs at least {self.image.lanes} samples, not {n}")
         for array in arrays:
-            if not _direct(array):
-                raise ArgumentError("a bound call wants arrays whose rows are contiguous")
+            if not _usable_in_place(array):
+                raise ArgumentError("a bound call needs arrays with contiguous rows")
         places = [_extent(array) for array in arrays]
-        if not all(_apart(places, len(inputs) + k, out) for k, out in enumerate(outputs)):
+        if not all(_is_disjoint(places, len(inputs) + k, out) for k, out in enumerate(outputs)):
             raise ArgumentError("an output of a bound call shares memory with another array")
         words = [n]
         for array in arrays:
@@ -151,37 +153,38 @@ class Kernel:
         return call
 
     def workspace(self, samples: int = 1) -> Workspace:
-        """Room for at most so many samples, for callers that ask for few at a time."""
-        return Workspace(self._opened(), self.image, samples)
+        """Return a workspace for up to `samples` samples, for callers that evaluate few at a time."""
+        return Workspace(self._open_code(), self.image, samples)
 
     @property
-    def brief_entry(self) -> Callable[[int], None]:
-        """The code itself, called with the address of its arguments (`dynx.simd.emit`), lock held."""
-        return self._opened().brief_entry
+    def locked_entry(self) -> Callable[[int], None]:
+        """Machine code called with the address of its arguments (`dynx.simd.emit`), global lock held."""
+        return self._open_code().locked_entry
 
     def close(self) -> None:
-        """Let go of the code; further calls raise ClosedError."""
+        """Release the code; later calls raise ClosedError."""
         self._code = None
 
-    def _opened(self) -> Code:
+    def _open_code(self) -> Code:
         code = self._code
         if code is None:
             raise ClosedError("this kernel was closed")
         return code
 
     def __reduce__(self) -> tuple[object, ...]:
-        return _unpickled, (self.image,)
+        return _unpickle, (self.image,)
 
 
 class Workspace:
-    """A few samples' inputs and outputs at a fixed place, and calls bound to them.
+    """Preallocated inputs and outputs of a few samples, and calls bound to them.
 
-    For one sample, write into `inputs` at the slices `places` (one for each port), call `run()`, and
-    read `results`, an array for each output port in its own shape, or `numbers` at `found_places`.
+    For one sample, write into `inputs` at `input_slices` (one slice for each port), call `run()`, and
+    read `results`, an array for each output port in its own shape, or `output_values` at `output_slices`.
     For n samples, write into the first n of `input_rows`, call `run_rows(n)`, and read the first n of
     `output_rows`, arrays (samples, *shape).
 
-    For one thread at a time. The calls hold Python's lock: they are meant for what takes microseconds.
+    Not safe for several threads at a time. The calls hold Python's global lock: they are meant for
+    evaluations that take microseconds.
     """
 
     __slots__ = (
@@ -189,12 +192,12 @@ class Workspace:
         "_kept",
         "_lanes",
         "_run_rows",
-        "found_places",
         "input_rows",
+        "input_slices",
         "inputs",
-        "numbers",
         "output_rows",
-        "places",
+        "output_slices",
+        "output_values",
         "results",
         "run",
     )
@@ -209,38 +212,41 @@ class Workspace:
             first = 0
             for port in ports:
                 places.append(slice(first, first + port.size))
-                words += [block.ctypes.data + _NUMBER * first, _NUMBER * port.size]
+                words += [block.ctypes.data + _FLOAT64_BYTES * first, _FLOAT64_BYTES * port.size]
                 rows.append(block[first : first + samples * port.size].reshape(samples, *port.shape))
                 first += samples * port.size
-        self.inputs, self.numbers = views
+        self.inputs, self.output_values = views
         n = len(image.inputs)
-        self.places, self.found_places = tuple(places[:n]), tuple(places[n:])
+        self.input_slices, self.output_slices = tuple(places[:n]), tuple(places[n:])
         self.input_rows, self.output_rows = tuple(rows[:n]), tuple(rows[n:])
         self.results = tuple(array[0, ...] for array in self.output_rows)
         several = np.array(words, dtype=np.int64)
-        # One sample alone is evaluated in every lane.
+        # A single sample is evaluated in every lane.
         one = several.copy()
         one[2::2] = 0
         self._kept = (code, one)
         self._arguments = several.data
-        self.run: Callable[[], None] = partial(code.brief_entry, one.ctypes.data)
-        self._run_rows: Callable[[], None] = partial(code.brief_entry, several.ctypes.data)
+        self.run: Callable[[], None] = partial(code.locked_entry, one.ctypes.data)
+        self._run_rows: Callable[[], None] = partial(code.locked_entry, several.ctypes.data)
 
     def run_rows(self, n: int) -> None:
-        """Evaluate the first n samples, and what else there is up to the number of lanes."""
+        """Evaluate the first n samples, or as many as there are lanes if that is more."""
         self._arguments[0] = max(n, self._lanes)
         self._run_rows()
 
 
-def _checked(
-    inputs: Sequence[Port], outputs: Sequence[Port], given: Sequence[Floats], wanted: Sequence[Floats]
+def _check_arrays(
+    input_ports: Sequence[Port],
+    output_ports: Sequence[Port],
+    inputs: Sequence[Floats],
+    outputs: Sequence[Floats],
 ) -> int:
-    """The number of samples, if all arrays agree on one."""
-    ports, arrays = (*inputs, *outputs), (*given, *wanted)
-    if len(given) != len(inputs) or len(wanted) != len(outputs):
+    """Check number, shapes and dtypes of all arrays; return the number of samples."""
+    ports, arrays = (*input_ports, *output_ports), (*inputs, *outputs)
+    if len(inputs) != len(input_ports) or len(outputs) != len(output_ports):
         raise ArgumentError(
-            f"a kernel of {len(inputs)} inputs and {len(outputs)} outputs was given "
-            f"{len(given)} and {len(wanted)}"
+            f"a kernel of {len(input_ports)} inputs and {len(output_ports)} outputs was given "
+            f"{len(inputs)} and {len(outputs)}"
         )
     n = len(arrays[-1]) if arrays and arrays[-1].ndim else 0
     for port, array in zip(ports, arrays, strict=True):
@@ -248,44 +254,47 @@ def _checked(
             raise DTypeError(f"{port.name} has dtype {array.dtype}; wanted float64")
         if array.shape != (n, port.size):
             raise ShapeError(f"{port.name} has shape {array.shape}; wanted ({n}, {port.size})")
-    for port, array in zip(outputs, wanted, strict=True):
+    for port, array in zip(output_ports, outputs, strict=True):
         if not array.flags.writeable:
-            raise ArgumentError(f"{port.name} is read-only; wanted an array to write into")
+            raise ArgumentError(f"{port.name} is read-only; wanted a writeable array")
     return n
 
 
-def _direct(array: Floats) -> bool:
-    """Whether the code can use an array where it lies: aligned numbers, side by side within a row."""
-    return array.flags.aligned and (array.shape[1] <= 1 or array.strides[1] == _NUMBER)
+def _usable_in_place(array: Floats) -> bool:
+    """Return whether the code can use an array without copying: aligned numbers, contiguous rows."""
+    return array.flags.aligned and (array.shape[1] <= 1 or array.strides[1] == _FLOAT64_BYTES)
 
 
 def _address(array: Floats) -> int:
-    """Where the first number of an array is."""
+    """Return the address of the first number of an array."""
     try:
-        # A third of the time of the way below; for arrays without gaps that may be written to.
+        # Takes a third of the time of `array.ctypes`, but needs a contiguous, writeable array.
         return addressof(_first_byte(array))
     except (TypeError, ValueError, BufferError):
         return array.ctypes.data
 
 
 def _extent(array: Floats) -> tuple[int, int]:
-    """The addresses between which the numbers of an array (n, size) lie."""
+    """Return the first address of an array (n, size) and the first one after it."""
     first = _address(array)
     rows, columns = array.shape
-    down, across = array.strides
-    reach, wide = (rows - 1) * down, (columns - 1) * across
-    return first + min(reach, 0) + min(wide, 0), first + max(reach, 0) + max(wide, 0) + _NUMBER
+    row_stride, column_stride = array.strides
+    height, width = (rows - 1) * row_stride, (columns - 1) * column_stride
+    return first + min(height, 0) + min(width, 0), first + max(height, 0) + max(width, 0) + _FLOAT64_BYTES
 
 
-def _apart(places: Sequence[tuple[int, int]], own: int, out: Floats) -> bool:
-    """Whether no other array, nor another row of its own, shares memory with `out`, which lies at `own`."""
-    if len(out) > 1 and abs(out.strides[0]) < _NUMBER * out.shape[1]:
+def _is_disjoint(extents: Sequence[tuple[int, int]], own: int, out: Floats) -> bool:
+    """Return whether neither another array nor another row of its own shares memory with `out`.
+
+    `extents` are those of all arrays, of which number `own` is that of `out`.
+    """
+    if len(out) > 1 and abs(out.strides[0]) < _FLOAT64_BYTES * out.shape[1]:
         return False
-    first, end = places[own]
-    return all(k == own or low >= end or high <= first for k, (low, high) in enumerate(places))
+    first, end = extents[own]
+    return all(k == own or low >= end or high <= first for k, (low, high) in enumerate(extents))
 
 
-def _unpickled(image: Image) -> Kernel:
+def _unpickle(image: Image) -> Kernel:
     if image.target != host():
         raise CompileError(
             f"this kernel was compiled for {image.target.cpu} ({image.target.triple}), "

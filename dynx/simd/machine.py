@@ -1,15 +1,26 @@
-"""What the machine has besides processors."""
+"""Number of processors and size of the memory of this machine."""
 
 from __future__ import annotations
 
 import os
+from functools import cache
 
-LARGEST_SHARE = 0.5
-"""Of the machine's memory, that the arrays of one work may take."""
+MAX_MEMORY_SHARE = 0.5
+"""Largest fraction of the machine's memory that the arrays of one computation may take."""
 
 
-def memory() -> float:
-    """Bytes of memory that the machine has; infinity where the system does not say."""
+@cache
+def core_count() -> int:
+    """Return the number of processors that this process may use."""
+    if hasattr(os, "process_cpu_count"):
+        return int(os.process_cpu_count() or 1)
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def memory_size() -> float:
+    """Return the size of the machine's memory [bytes], or infinity if the system does not report it."""
     try:
         return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
     except (AttributeError, OSError, ValueError):

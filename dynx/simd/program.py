@@ -1,4 +1,4 @@
-"""A program: a finished graph with named inputs and outputs, only what the outputs need."""
+"""Program: a finished graph with named inputs and outputs, without nodes that no output needs."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from dynx.simd.expr import Graph, Node
 
 @dataclass(frozen=True)
 class Port:
-    """A named array of scalars going in or out, of the shape of one sample."""
+    """A named input or output array, with the shape of one sample."""
 
     name: str
     shape: tuple[int, ...]
@@ -24,9 +24,9 @@ class Port:
 
 @dataclass(frozen=True)
 class Program:
-    """What a kernel computes for one sample.
+    """Computation of one sample.
 
-    Inputs are numbered over all input ports in order, each in row-major order; `outputs` lists the
+    Input scalars are numbered over all input ports in order, each in row-major order; `results` lists the
     node of every output scalar in the same way.
     """
 
@@ -41,13 +41,13 @@ class Program:
         return sum(port.size for port in self.inputs)
 
 
-def finished(
+def extract_program(
     graph: Graph, inputs: Sequence[Port], outputs: Sequence[Port], results: Sequence[int]
 ) -> Program:
-    """The program that computes `results`: dead nodes left out, the rest in the order of the graph.
+    """Return the program that computes `results`: the nodes they need, in the order of the graph.
 
-    That is the order in which the traced code works, body after body, which was measured to be as fast
-    as depth first from the results on small robots, and by a sixth faster on a humanoid.
+    That is the order of the traced code, body after body. It was measured to be as fast as depth-first order
+    from the results on small robots, and faster by a sixth on a humanoid.
     """
     nodes = graph.nodes
     needed = [False] * len(nodes)
@@ -57,10 +57,10 @@ def finished(
         if needed[index]:
             for arg in nodes[index].args:
                 needed[arg] = True
-    place: dict[int, int] = {}
+    new_index: dict[int, int] = {}
     kept: list[Node] = []
     for index, (op, args, slot, value) in enumerate(nodes):
         if needed[index]:
-            place[index] = len(kept)
-            kept.append(Node(op, tuple([place[arg] for arg in args]), slot, value))
-    return Program(tuple(kept), tuple(inputs), tuple(outputs), tuple(place[result] for result in results))
+            new_index[index] = len(kept)
+            kept.append(Node(op, tuple([new_index[arg] for arg in args]), slot, value))
+    return Program(tuple(kept), tuple(inputs), tuple(outputs), tuple(new_index[result] for result in results))

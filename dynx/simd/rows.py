@@ -1,19 +1,19 @@
-"""Reading and writing the user's rows: one sample per lane, arrays in their own row-major order.
+"""LLVM IR that loads and stores rows of the user's arrays, one sample per lane.
 
-A vector holds one scalar of as many samples as there are lanes, but in memory the scalars of one
-sample lie side by side. Tiles of b by b numbers, b rows of b neighbouring columns, are therefore
-loaded as they lie and transposed in registers by shuffles; results go the other way.
+A vector holds the same scalar of several samples, one per lane, but in memory the scalars of one sample are
+contiguous. Tiles of b by b numbers, b rows of b neighbouring columns, are therefore loaded row by row and
+transposed in registers by shuffles; stores do the reverse.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from dynx.simd.text import Writer
+from dynx.simd.ir_writer import Writer
 
 
 def tile_width(columns: int, lanes: int) -> int:
-    """Columns loaded at once: the largest power of two that fits into a row, at most 4 and the lanes."""
+    """Return the number of columns loaded at once: the largest power of two <= 4, columns, lanes."""
     width = min(4, lanes)
     while width > columns:
         width //= 2
@@ -21,12 +21,12 @@ def tile_width(columns: int, lanes: int) -> int:
 
 
 def tile_start(column: int, columns: int, width: int) -> int:
-    """First column of the tile that `column` is in; the last tile of a row may overlap the one before."""
+    """Return the first column of the tile with `column`; the last tile may overlap the one before."""
     return min(column // width * width, columns - width)
 
 
 def tiles(columns: int, lanes: int) -> list[range]:
-    """The columns of every tile of a row."""
+    """Return the columns of every tile of a row."""
     if columns == 0:
         return []
     width = tile_width(columns, lanes)
@@ -46,7 +46,7 @@ class Rows:
         self._loaded: dict[int, list[str]] = {}
 
     def load(self, column: int) -> str:
-        """The vector of one column."""
+        """Return the vector of one column, loading its tile if necessary."""
         start = tile_start(column, self._columns, self._width)
         if start not in self._loaded:
             self._loaded[start] = self._load_tile(start)
@@ -60,7 +60,7 @@ class Rows:
             parts = list(columns)
             if width < write.lanes:
                 parts = [write.shuffle(c, "poison", lanes, write.lanes) for c in columns]
-            for lane, row in zip(lanes, _transposed(write, parts), strict=True):
+            for lane, row in zip(lanes, _transpose(write, parts), strict=True):
                 write.do(f"store <{width} x double> {row}, ptr {self._at(lane, tile.start)}, align 8")
 
     def _load_tile(self, start: int) -> list[str]:
@@ -71,7 +71,7 @@ class Rows:
                 write.let(f"load <{width} x double>, ptr {self._at(lane, start)}, align 8")
                 for lane in range(first, first + width)
             ]
-            groups.append(_transposed(write, rows))
+            groups.append(_transpose(write, rows))
         while len(groups) > 1:
             size = write.lanes // len(groups)
             groups = [
@@ -87,14 +87,14 @@ class Rows:
         )
 
 
-def _transposed(write: Writer, rows: Sequence[str]) -> list[str]:
-    """Columns of a square tile from its rows, or the other way round."""
+def _transpose(write: Writer, rows: Sequence[str]) -> list[str]:
+    """Transpose a square tile of 1, 2 or 4 vectors."""
     if len(rows) == 1:
         return list(rows)
     if len(rows) == 2:
         a, b = rows
         return [write.shuffle(a, b, (0, 2), 2), write.shuffle(a, b, (1, 3), 2)]
-    # Halves of two rows that are two apart, then their even and odd entries.
+    # First exchange halves between rows two apart, then even and odd entries between the results.
     a, b, c, d = rows
     low, high = (0, 1, 4, 5), (2, 3, 6, 7)
     ac, bd = write.shuffle(a, c, low, 4), write.shuffle(b, d, low, 4)

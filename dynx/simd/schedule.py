@@ -1,7 +1,7 @@
-"""In which order a program's operations are done, and where it is cut into segments.
+"""Order of a program's operations, and its division into segments.
 
-Sines and cosines of angles that are known at the same time are done together, before what needs
-them: they share one test for large angles, and the rest is one straight line.
+Sines and cosines of angles that are available at the same time are computed together, before the operations
+that need them: they share one test for large angles, and the remaining code has no branches.
 """
 
 from __future__ import annotations
@@ -15,13 +15,14 @@ from dynx.simd.rows import tiles
 
 TRIG = frozenset({"sin", "cos"})
 ELEMENTARY = frozenset({"exp", "tanh", "arctan"})
-"""Functions that are some thirty operations each."""
+"""Functions that take some thirty operations each."""
+
 LEAVES = frozenset({"input", "constant"})
-"""Operations that need no computing: they are read where they are used."""
+"""Nodes that are not computed but read where they are used."""
 
 
 class TrigGroup(NamedTuple):
-    """Angles that are known at the same time; for each the nodes of its sine and cosine, if wanted."""
+    """Angles available at the same time, and for each the nodes of its sine and cosine, or None."""
 
     angles: tuple[int, ...]
     nodes: tuple[tuple[int | None, int | None], ...]
@@ -41,64 +42,67 @@ class Store(NamedTuple):
 
 @dataclass
 class Segment:
-    """Steps in order, then stores. `kept` are the values that later segments need."""
+    """Steps in order, then stores. `spilled` are the values that later segments need."""
 
     steps: list[Step] = field(default_factory=list)
     stores: list[Store] = field(default_factory=list)
-    kept: set[int] = field(default_factory=set)
+
+    spilled: set[int] = field(default_factory=set)
 
 
 def schedule(program: Program, lanes: int, longest: int) -> list[Segment]:
-    """One segment if that has at most `longest` operations, else segments of half as many.
+    """Return one segment if that has at most `longest` operations, else segments of about half as many.
 
-    A group of angles is not cut.
+    A group of angles is never divided.
     """
     steps = list(_steps(program))
-    if sum(_size(program, step) for step in steps) > longest:
+    if sum(_operation_count(program, step) for step in steps) > longest:
         longest = max(longest // 2, 1)
-    segments, home, length = [Segment()], {}, 0
+    segments, segment_of, length = [Segment()], {}, 0
     for step in steps:
-        size = _size(program, step)
+        size = _operation_count(program, step)
         if length and length + size > longest:
             segments.append(Segment())
             length = 0
         segments[-1].steps.append(step)
         length += size
-        for node in _made(step):
-            home[node] = len(segments) - 1
+        for node in _computed_nodes(step):
+            segment_of[node] = len(segments) - 1
     for store in _stores(program, lanes):
-        segments[max((home.get(node, 0) for node in store.nodes), default=0)].stores.append(store)
+        segments[max((segment_of.get(node, 0) for node in store.nodes), default=0)].stores.append(store)
     for number, segment in enumerate(segments):
-        for node in _read(program, segment):
-            if home.get(node, number) < number:
-                segments[home[node]].kept.add(node)
+        for node in _used_values(program, segment):
+            if segment_of.get(node, number) < number:
+                segments[segment_of[node]].spilled.add(node)
     return segments
 
 
-def places_of_kept(program: Program, segments: Sequence[Segment]) -> dict[int, int]:
-    """A place in memory for every value that is kept; places are used again when none needs them."""
-    last = {value: number for number, segment in enumerate(segments) for value in _read(program, segment)}
+def spill_slots(program: Program, segments: Sequence[Segment]) -> dict[int, int]:
+    """Assign a memory slot to every spilled value, reusing the slots of values no longer needed."""
+    last = {
+        value: number for number, segment in enumerate(segments) for value in _used_values(program, segment)
+    }
     places: dict[int, int] = {}
     held: list[int] = []
     free: list[int] = []
     for number, segment in enumerate(segments):
         free += [places[value] for value in held if last[value] < number]
         held = [value for value in held if last[value] >= number]
-        for value in sorted(segment.kept):
+        for value in sorted(segment.spilled):
             places[value] = free.pop() if free else len(held)
             held.append(value)
     return places
 
 
-def _size(program: Program, step: Step) -> int:
-    """Operations of a step, about."""
+def _operation_count(program: Program, step: Step) -> int:
+    """Return the approximate number of operations of a step."""
     if isinstance(step, TrigGroup):
         return 50 * len(step.angles)
     return 30 if program.nodes[step].op in ELEMENTARY else 1
 
 
 def _steps(program: Program) -> Iterator[Step]:
-    """Group after group of angles, each preceded by what its angles need; then all the rest."""
+    """Yield each group of angles, preceded by the nodes its angles need; then all remaining nodes."""
     nodes = program.nodes
     level: list[int] = []
     for node in nodes:
@@ -119,7 +123,7 @@ def _steps(program: Program) -> Iterator[Step]:
 
 
 def _ancestors(program: Program, indices: Iterable[int], done: set[int]) -> list[int]:
-    """All of `indices` and what they are made of, but for what is done, in order."""
+    """Return `indices` and all nodes they depend on, except those in `done`, in order."""
     found: set[int] = set()
     stack = [index for index in indices if index not in done]
     while stack:
@@ -138,14 +142,14 @@ def _stores(program: Program, lanes: int) -> Iterator[Store]:
         first += port.size
 
 
-def _made(step: Step) -> list[int]:
+def _computed_nodes(step: Step) -> list[int]:
     if isinstance(step, TrigGroup):
         return [index for pair in step.nodes for index in pair if index is not None]
     return [step]
 
 
-def _read(program: Program, segment: Segment) -> Iterator[int]:
-    """Every value that a segment uses."""
+def _used_values(program: Program, segment: Segment) -> Iterator[int]:
+    """Yield every value that a segment uses."""
     for step in segment.steps:
         yield from step.angles if isinstance(step, TrigGroup) else program.nodes[step].args
     for store in segment.stores:

@@ -1,11 +1,11 @@
-"""Simplifications, each with a name and with what must hold for both sides to be equal.
+"""Simplification rules, each with a name and a precondition.
 
-`EXACT` rules hold for every double, bit for bit, signed zeros, infinities and NaN included. `FINITE`
-rules hold where all values are finite and the sign of a zero does not matter. `ROUNDED` rules hold in
-real arithmetic; in floating point the two sides differ by a few roundings.
+`EXACT` rules hold for every double, bit for bit, signed zeros, infinities and NaN included. `FINITE` rules
+hold if all values are finite and the sign of zero does not matter. `ROUNDED` rules hold in real arithmetic;
+in floating point the two sides differ by a few roundings.
 
-A rule sees one operation before it becomes a node, so a graph is simplified while it is built. It
-returns the node that the operation equals, or None.
+A rule receives an operation before it becomes a node, so the graph is simplified while it is built. It
+returns an equal node, or None if it does not apply.
 """
 
 from __future__ import annotations
@@ -26,18 +26,21 @@ Rewrite = Callable[[Graph, Op, Args], "int | None"]
 class Rule:
     """A simplification of the operations `ops`, valid under its precondition.
 
-    `among`: it applies only if one of the arguments at least is one of these operations.
+    It applies only if at least one argument is the result of one of the operations `argument_ops`.
     """
 
     name: str
     ops: tuple[Op, ...]
     precondition: Precondition
     rewrite: Rewrite
-    among: tuple[Op, ...] = tuple(ARITY)
+    argument_ops: tuple[Op, ...] = tuple(ARITY)
 
 
 def simplifier(rules: Iterable[Rule]) -> Simplify:
-    """All of `rules` as one, in their order, looked up by the operation and those of its arguments."""
+    """Combine rules into one function that applies the first rule that matches.
+
+    Candidates are looked up by the operation and the operations of its arguments.
+    """
     every = tuple(rules)
     known: dict[tuple[Op, ...], list[Rewrite]] = {}
 
@@ -47,7 +50,9 @@ def simplifier(rules: Iterable[Rule]) -> Simplify:
         rewrites = known.get(kinds)
         if rewrites is None:
             rewrites = known[kinds] = [
-                rule.rewrite for rule in every if op in rule.ops and not set(rule.among).isdisjoint(kinds[1:])
+                rule.rewrite
+                for rule in every
+                if op in rule.ops and not set(rule.argument_ops).isdisjoint(kinds[1:])
             ]
         for rewrite in rewrites:
             found = rewrite(graph, op, args)
@@ -64,7 +69,7 @@ def _value(graph: Graph, index: int) -> float | None:
 
 
 def _negated(graph: Graph, index: int) -> int | None:
-    """x where the node is -x."""
+    """Return x if the node is -x, else None."""
     node = graph.nodes[index]
     return node.args[0] if node.op == "neg" else None
 
@@ -94,7 +99,7 @@ _FOLD: dict[Op, Callable[..., float]] = {
 
 
 def _fold(graph: Graph, op: Op, args: Args) -> int | None:
-    """An operation on constants is a constant. (Elementary functions are left to the kernel's own.)"""
+    """Evaluate an operation on constants, except elementary functions, which the kernel evaluates."""
     values = []
     for arg in args:
         node = graph.nodes[arg]
@@ -104,7 +109,7 @@ def _fold(graph: Graph, op: Op, args: Args) -> int | None:
     return graph.constant(_FOLD[op](*values))
 
 
-def _one(graph: Graph, op: Op, args: Args) -> int | None:
+def _factor_one(graph: Graph, op: Op, args: Args) -> int | None:
     """x * 1, x / 1"""
     a, b = args
     if _value(graph, b) == 1.0:
@@ -137,7 +142,7 @@ def _double_negation(graph: Graph, op: Op, args: Args) -> int | None:
 
 
 def _negated_factor(graph: Graph, op: Op, args: Args) -> int | None:
-    """(-x) y, x (-y), (-x) (-y), and the same with quotients: the sign goes to the front"""
+    """(-x) y, x (-y), (-x) (-y), and likewise quotients: the sign moves to the front"""
     a, b = args
     x, y = _negated(graph, a), _negated(graph, b)
     if x is not None and y is not None:
@@ -148,7 +153,7 @@ def _negated_factor(graph: Graph, op: Op, args: Args) -> int | None:
 
 
 def _negated_multiple(graph: Graph, op: Op, args: Args) -> int | None:
-    """-(c x), -(c / x), -(x / c) with a constant c: the sign goes to the constant"""
+    """-(c x), -(c / x), -(x / c) with a constant c: the sign moves into the constant"""
     node = graph.nodes[args[0]]
     if node.op not in ("mul", "div"):
         return None
@@ -175,8 +180,8 @@ def _odd_and_even(graph: Graph, op: Op, args: Args) -> int | None:
     x = _negated(graph, args[0])
     if x is None:
         return None
-    of_size = graph.apply(op, x)
-    return graph.apply("neg", of_size) if op in ("sin", "tanh", "arctan") else of_size
+    positive = graph.apply(op, x)
+    return graph.apply("neg", positive) if op in ("sin", "tanh", "arctan") else positive
 
 
 def _power_of_two(graph: Graph, op: Op, args: Args) -> int | None:
@@ -216,7 +221,7 @@ def _same_terms(graph: Graph, op: Op, args: Args) -> int | None:
 
 
 def _negated_sum(graph: Graph, op: Op, args: Args) -> int | None:
-    """-x - y (which is +0 where x is -y; the sum's negative is -0)"""
+    """-x - y, as -(x + y), which is -0 instead of +0 if x = -y"""
     x = _negated(graph, args[0])
     return graph.apply("neg", graph.apply("add", x, args[1])) if x is not None else None
 
@@ -270,7 +275,7 @@ def _division_by_constant(graph: Graph, op: Op, args: Args) -> int | None:
 
 
 def _quotient_of_product(graph: Graph, op: Op, args: Args) -> int | None:
-    """(x y) / z, as (x / z) y, where x is the older: quotients that are used again and again"""
+    """(x y) / z, as (x / z) y, where x is the older node: the quotient x / z recurs and is then shared"""
     node = graph.nodes[args[0]]
     if node.op != "mul" or _value(graph, args[1]) is not None:
         return None
@@ -281,7 +286,7 @@ def _quotient_of_product(graph: Graph, op: Op, args: Args) -> int | None:
 
 
 def _reciprocal(graph: Graph, op: Op, args: Args) -> int | None:
-    """x / y, as x (1 / y): one division for all that is divided by y"""
+    """x / y, as x (1 / y): one division serves all quotients with the divisor y"""
     if _value(graph, args[0]) in (1.0, -1.0) or _value(graph, args[1]) is not None:
         return None
     return graph.apply("mul", args[0], graph.apply("div", graph.constant(1.0), args[1]))
@@ -289,7 +294,7 @@ def _reciprocal(graph: Graph, op: Op, args: Args) -> int | None:
 
 EXACT: tuple[Rule, ...] = (
     Rule("constants", tuple(_FOLD), "exact", _fold, ("constant",)),
-    Rule("factor-one", ("mul", "div"), "exact", _one, ("constant",)),
+    Rule("factor-one", ("mul", "div"), "exact", _factor_one, ("constant",)),
     Rule("factor-minus-one", ("mul", "div"), "exact", _minus_one, ("constant",)),
     Rule("neutral-zero", ("add", "sub"), "exact", _neutral_zero, ("constant",)),
     Rule("double-negation", ("neg",), "exact", _double_negation, ("neg",)),
@@ -317,7 +322,7 @@ ROUNDED: tuple[Rule, ...] = (
 )
 
 STRICT: Simplify = simplifier(EXACT)
-"""Bit for bit what was written."""
+"""Simplifications that preserve every result bit for bit."""
 
 FAST: Simplify = simplifier((*EXACT, *FINITE, *ROUNDED))
-"""Equal in real arithmetic: what kernels of rigid-body dynamics use."""
+"""Simplifications that preserve results in real arithmetic; used for rigid-body dynamics."""

@@ -1,4 +1,4 @@
-"""The machine that kernels are compiled for."""
+"""Processor that kernels are compiled for."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from llvmlite import binding
 
 @dataclass(frozen=True)
 class Target:
-    """A processor as LLVM knows it: triple, name, features."""
+    """Processor description of LLVM: target triple, name, features."""
 
     triple: str
     cpu: str
@@ -19,44 +19,44 @@ class Target:
 
     @property
     def fma(self) -> bool:
-        """Whether it multiplies and adds in one operation with one rounding."""
+        """Whether the processor has fused multiply-add."""
         return "+fma" in self.features.split(",") or self.triple.startswith(("aarch64", "arm64"))
 
     @property
     def lanes(self) -> int:
-        """Doubles in its widest vector register."""
+        """Number of doubles in the widest vector register."""
         features = set(self.features.split(","))
         if "+avx512f" in features:
             return 8
         return 4 if "+avx" in features else 2
 
     @property
-    def near(self) -> bool:
-        """Whether code may reach its constants by short addresses, which takes a tenth of its bytes off.
+    def short_addresses(self) -> bool:
+        """Whether code may address its constants by 32-bit offsets, which makes it a tenth smaller.
 
-        LLVM's newer linker puts all of an object into one piece of memory; the older one, which may put
-        constants gigabytes away, is left where the newer one is not known to work.
+        That needs LLVM's JITLink, which allocates an object in one block of memory. The older linker, which
+        may place constants gigabytes away, is used where JITLink is not known to work.
         """
         return self.triple.startswith("x86_64") and "windows" not in self.triple
 
     def machine(self) -> binding.TargetMachine:
-        """LLVM's code generator for it."""
+        """Return LLVM's code generator for the processor."""
         _initialise()
         target = binding.Target.from_triple(self.triple)
-        model = "small" if self.near else "jitdefault"
+        model = "small" if self.short_addresses else "jitdefault"
         return target.create_target_machine(
             cpu=self.cpu, features=self.features, opt=2, reloc="pic", codemodel=model, jit=True
         )
 
 
 def sse2() -> Target:
-    """What every x86-64 processor can do: vectors of two doubles, no fused multiply-add."""
+    """Return the baseline of x86-64: vectors of two doubles, no fused multiply-add."""
     return Target(binding.get_process_triple(), "x86-64", "")
 
 
 @cache
 def host() -> Target:
-    """The processor this runs on."""
+    """Return the processor of this machine."""
     _initialise()
     return Target(
         binding.get_process_triple(), binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()
@@ -64,7 +64,7 @@ def host() -> Target:
 
 
 def compiler_version() -> str:
-    """Of everything that decides what machine code a module becomes."""
+    """Return the versions of llvmlite and LLVM, which determine the machine code of a module."""
     return f"llvmlite {llvmlite.__version__}, LLVM {'.'.join(map(str, binding.llvm_version_info))}"
 
 

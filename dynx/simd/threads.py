@@ -1,8 +1,8 @@
-"""Work in numbered parts, done by several threads at once.
+"""Parallel execution of numbered parts of a task in a shared pool of threads.
 
-The threads are started when they are first needed and shared by all callers. The caller takes part,
-so that work is done even where no thread is free. Parts are handed out one after another as threads
-become free; which thread does a part makes no difference to its result.
+The threads start when they are first needed and are shared by all callers. The calling thread executes parts
+too, so that the task progresses even if no other thread is free. Each thread takes the next part when it has
+finished one; which thread executes a part does not affect its result.
 """
 
 from __future__ import annotations
@@ -12,44 +12,34 @@ import threading
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import suppress
-from functools import cache
 from itertools import count
 from operator import index
 from typing import SupportsIndex
 
 from dynx.errors import ArgumentError, shown
+from dynx.simd.machine import core_count
 
 _LOCK = threading.Lock()
 _pool: ThreadPoolExecutor | None = None
 
 
-@cache
-def cores() -> int:
-    """Processors that this process may run on."""
-    if hasattr(os, "process_cpu_count"):
-        return int(os.process_cpu_count() or 1)
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
-
-
 def checked_threads(threads: object) -> int:
-    """A number of threads: that given, or as many as there are cores for None; else ArgumentError."""
+    """Return `threads`, or the number of cores for None; ArgumentError unless it is a positive integer."""
     if threads is None:
-        return cores()
+        return core_count()
     if isinstance(threads, bool) or not isinstance(threads, SupportsIndex) or index(threads) < 1:
-        raise ArgumentError(f"threads is {shown(threads)}; wanted a whole number above 0, or None for all")
+        raise ArgumentError(f"threads is {shown(threads)}; wanted a positive integer, or None for all cores")
     return index(threads)
 
 
 def run_parts(task: Callable[[int], object], parts: int, threads: int) -> None:
-    """Call `task` with every number below `parts`, on at most `threads` threads, the caller's included.
+    """Call `task` with every number below `parts`, on at most `threads` threads including the caller's.
 
-    Returns when all are done; an exception of a part is raised then.
+    Returns when all parts are finished, and then raises the first exception of a part, if any.
     """
     numbers = count()
 
-    def take() -> None:
+    def run_remaining() -> None:
         for number in numbers:
             if number >= parts:
                 return
@@ -57,18 +47,18 @@ def run_parts(task: Callable[[int], object], parts: int, threads: int) -> None:
 
     helpers = min(threads, parts) - 1
     if helpers < 1:
-        take()
+        run_remaining()
         return
     futures: list[Future[None]] = []
-    # A thread that outlives the interpreter's main thread finds no others to ask.
+    # While the interpreter shuts down the pool accepts no work.
     with suppress(RuntimeError):
         pool = _threads()
         while len(futures) < helpers:
-            futures.append(pool.submit(take))
+            futures.append(pool.submit(run_remaining))
     try:
-        take()
+        run_remaining()
     finally:
-        # One that has not started by now would find nothing left to do.
+        # A helper that has not started by now would find no part left.
         started = [future for future in futures if not future.cancel()]
         wait(started)
     for future in started:
@@ -79,15 +69,15 @@ def _threads() -> ThreadPoolExecutor:
     global _pool
     with _LOCK:
         if _pool is None:
-            _pool = ThreadPoolExecutor(max(cores() - 1, 1), thread_name_prefix="dynx")
+            _pool = ThreadPoolExecutor(max(core_count() - 1, 1), thread_name_prefix="dynx")
         return _pool
 
 
-def _forget_threads() -> None:
-    """A forked child has none of its parent's threads, and perhaps a lock that one of them held."""
+def _reset_after_fork() -> None:
+    """Replace pool and lock in a forked child: it has no threads of its parent, and the lock may be held."""
     global _pool, _LOCK
     _pool, _LOCK = None, threading.Lock()
 
 
 if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_forget_threads)
+    os.register_at_fork(after_in_child=_reset_after_fork)

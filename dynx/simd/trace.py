@@ -1,8 +1,8 @@
-"""Tracing: running ordinary array code on symbols to obtain the program that it is.
+"""Tracing: calling ordinary array code on symbols to obtain its program.
 
-The function sees NumPy object arrays of `Symbol` and may do with them what it does with numbers, but
-for asking what they are: a branch on a value raises TraceError, and would mean something else for
-each of the samples that a kernel evaluates at once.
+The function receives NumPy object arrays of `Symbol` and may compute with them as with numbers. It must not
+branch on their values, which raises TraceError: a kernel evaluates several samples at once, and each could
+take another branch.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 
 from dynx.errors import TraceError
 from dynx.simd.expr import Graph, Simplify, Symbol
-from dynx.simd.program import Port, Program, finished
+from dynx.simd.program import Port, Program, extract_program
 from dynx.simd.simplify import FAST
 from dynx.simd.verify import check_program
 from dynx.spatial.scalar import Array
@@ -26,10 +26,11 @@ def trace(
     *,
     simplify: Simplify | None = FAST,
 ) -> Program:
-    """The program of `function`, called with one array of symbols for each of `inputs`, by name.
+    """Trace `function`, called with one array of symbols for each of `inputs` (shapes by argument name).
 
-    The function returns an array, or a mapping from names to arrays where there are several results;
-    a single one is named ``result``. Entries that are plain numbers become constants.
+    The function returns an array, which becomes the output ``result``, or a mapping from output names to
+    arrays. Entries that are plain numbers become constants. Raises TraceError if the function branches on a
+    symbol, mixes symbols of two traces, or returns an entry that is neither a symbol nor a number.
     """
     graph = Graph(simplify)
     ports = [Port(name, tuple(shape)) for name, shape in inputs.items()]
@@ -41,14 +42,14 @@ def trace(
             symbols[k] = Symbol(graph, graph.input(slot + k))
         slot += port.size
         arguments[port.name] = symbols.reshape(port.shape)
-    answer = function(**arguments)
-    answers = answer if isinstance(answer, Mapping) else {"result": answer}
+    returned = function(**arguments)
+    arrays = returned if isinstance(returned, Mapping) else {"result": returned}
     outputs, results = [], []
-    for name, value in answers.items():
+    for name, value in arrays.items():
         array = np.asarray(value, dtype=object)
         outputs.append(Port(name, array.shape))
         results += [_node(graph, name, entry) for entry in array.ravel().tolist()]
-    program = finished(graph, ports, outputs, results)
+    program = extract_program(graph, ports, outputs, results)
     check_program(program)
     return program
 

@@ -1,10 +1,10 @@
-"""Sine and cosine of a vector, as LLVM IR: within 2 ulp up to 1e5, the C library's beyond.
+"""LLVM IR for sine and cosine of a vector: within 2 ulp up to 1e5 rad, the C library's beyond.
 
-The size of the argument is reduced to [-pi/4, pi/4] by the nearest multiple k of pi/2, in three parts of pi/2
-(Cody and Waite, Software Manual for the Elementary Functions, 1980; with a fused multiply-add the
-first product is exact). Then two minimax polynomials in r^2, each with an error below 2^-56, are
-swapped and negated by the last two bits of k. Lanes beyond the limit, and infinities, take a branch
-that calls the C library one lane at a time; NaN goes through the polynomials and stays NaN.
+The magnitude of the argument is reduced to [-pi/4, pi/4] by the nearest multiple k of pi/2, with pi/2 split
+into three parts (Cody and Waite, Software Manual for the Elementary Functions, 1980; with a fused
+multiply-add the first product is exact). Then two minimax polynomials in r^2, each with an error below 2^-56,
+are swapped and negated according to the last two bits of k. Lanes beyond the limit, and infinities, take a
+branch that calls the C library one lane at a time; NaN propagates through the polynomials.
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from dynx.simd.text import Writer, number
+from dynx.simd.ir_writer import Writer, hex_double
 
 LIMIT = 1e5
-"""Largest |x| [rad] of the polynomial path."""
+"""Largest |x| [rad] for which the polynomials are used."""
 
 SIN = (
     -0.1666666666666663,
@@ -38,38 +38,37 @@ COS = (
 """(cos r - 1 + r^2 / 2) / r^4 on [0, pi/4], ascending in r^2."""
 
 HALF_PI = (1.5707963267948966, 6.123233995736766e-17, -1.4973849048591698e-33)
-"""pi/2 in three doubles."""
+"""pi/2 as the sum of three doubles."""
 
 HALF_PI_SHORT = (1.57079632673412561417, 6.07710050630396597660e-11, 2.02226624879595063154e-21)
 """pi/2 in parts of 33 bits, whose products with k are exact without a fused multiply-add."""
 
-TOGETHER = 6
-"""Most angles whose polynomials are evaluated side by side: what 16 registers hold with their squares."""
+ANGLES_PER_BATCH = 6
+"""Most angles whose polynomials are interleaved: as many as fit into 16 registers with their squares."""
 
-ROUND = 6755399441055744.0
-"""1.5 * 2^52: adding it rounds to an integer, which is then in the last bits."""
+ROUNDING_SHIFT = 6755399441055744.0
+"""1.5 * 2^52: adding it to a double rounds that to an integer, which the last bits then hold."""
 
 
 class SineCosine(NamedTuple):
-    """The names of the two vectors."""
+    """Names of the vectors of sines and cosines."""
 
     sin: str
     cos: str
 
 
 def sines_and_cosines(write: Writer, angles: Sequence[str], *, fma: bool) -> list[SineCosine]:
-    """Both functions of every vector in `angles`, with one branch for all of them."""
+    """Write sine and cosine of every vector in `angles`, with one branch for all of them."""
     near: list[SineCosine] = []
     far = "zeroinitializer"
-    for together in _in_parts(angles):
-        sizes = [
-            write.let(f"call {write.vector} @llvm.fabs.v{write.lanes}f64({write.vector} {x})")
-            for x in together
+    for batch in _batches(angles):
+        magnitudes = [
+            write.let(f"call {write.vector} @llvm.fabs.v{write.lanes}f64({write.vector} {x})") for x in batch
         ]
-        for size in sizes:
-            beyond = write.let(f"fcmp ogt {write.vector} {size}, {write.splat(LIMIT)}")
+        for magnitude in magnitudes:
+            beyond = write.let(f"fcmp ogt {write.vector} {magnitude}, {write.splat(LIMIT)}")
             far = write.let(f"or {write.mask} {far}, {beyond}")
-        near += _polynomials(write, together, sizes, fma)
+        near += _polynomials(write, batch, magnitudes, fma)
     bits = write.let(f"bitcast {write.mask} {far} to i{write.lanes}")
     some = write.let(f"icmp ne i{write.lanes} {bits}, 0")
     before, slow, done = (write.fresh(stem) for stem in ("near", "far", "trig"))
@@ -77,7 +76,7 @@ def sines_and_cosines(write: Writer, angles: Sequence[str], *, fma: bool) -> lis
     write.label(before)
     write.do(f"br i1 {some}, label %{slow}, label %{done}, !prof !0")
     write.label(slow)
-    called = [_called(write, x, pair) for x, pair in zip(angles, near, strict=True)]
+    called = [_call_libm(write, x, pair) for x, pair in zip(angles, near, strict=True)]
     write.do(f"br label %{done}")
     write.label(done)
     found = []
@@ -90,18 +89,20 @@ def sines_and_cosines(write: Writer, angles: Sequence[str], *, fma: bool) -> lis
     return found
 
 
-def _in_parts(angles: Sequence[str]) -> list[Sequence[str]]:
-    """Parts of about the same size, none larger than `TOGETHER`."""
+def _batches(angles: Sequence[str]) -> list[Sequence[str]]:
+    """Divide angles into batches of about equal magnitude, none larger than `ANGLES_PER_BATCH`."""
     n = len(angles)
-    parts = -(-n // TOGETHER)
+    parts = -(-n // ANGLES_PER_BATCH)
     return [angles[n * k // parts : n * (k + 1) // parts] for k in range(parts)]
 
 
-def _polynomials(write: Writer, angles: Sequence[str], sizes: Sequence[str], fma: bool) -> list[SineCosine]:
-    """Those of each size |x|; the sign of x comes back at the end, that of a zero as well.
+def _polynomials(
+    write: Writer, angles: Sequence[str], magnitudes: Sequence[str], fma: bool
+) -> list[SineCosine]:
+    """Write sine and cosine of each angle by polynomials in its magnitude; the sign is applied at the end.
 
-    Step by step for all angles: their chains of operations run side by side, and each coefficient is
-    loaded once.
+    Each step is written for all angles before the next one: their chains of operations then execute in
+    parallel, and each coefficient is loaded once.
     """
     vector, integers = write.vector, write.integers
 
@@ -112,7 +113,7 @@ def _polynomials(write: Writer, angles: Sequence[str], sizes: Sequence[str], fma
         return write.let(f"fadd {vector} {write.let(f'fmul {vector} {a}, {b}')}, {c}")
 
     def polynomials(coefficients: Sequence[float]) -> list[str]:
-        """Ascending in r^2, by Horner's rule."""
+        """Evaluate a polynomial by Horner's rule; coefficients ascend in powers of r^2."""
         found = [write.splat(coefficients[-1])] * len(squares)
         for coefficient in reversed(coefficients[:-1]):
             found = [
@@ -120,20 +121,23 @@ def _polynomials(write: Writer, angles: Sequence[str], sizes: Sequence[str], fma
             ]
         return found
 
-    turns = [multiply_add(size, write.splat(2.0 / 3.141592653589793), write.splat(ROUND)) for size in sizes]
-    counts = [write.let(f"bitcast {vector} {turn} to {integers}") for turn in turns]
-    whole = [write.let(f"fsub {vector} {turn}, {write.splat(ROUND)}") for turn in turns]
-    rests = _reduced(write, sizes, whole, fma)
-    squares = [write.let(f"fmul {vector} {r}, {r}") for r in rests]
+    shifted = [
+        multiply_add(magnitude, write.splat(2.0 / 3.141592653589793), write.splat(ROUNDING_SHIFT))
+        for magnitude in magnitudes
+    ]
+    counts = [write.let(f"bitcast {vector} {k} to {integers}") for k in shifted]
+    multiples = [write.let(f"fsub {vector} {k}, {write.splat(ROUNDING_SHIFT)}") for k in shifted]
+    remainders = _reduce(write, magnitudes, multiples, fma)
+    squares = [write.let(f"fmul {vector} {r}, {r}") for r in remainders]
     sines = polynomials(SIN)
-    cubes = [write.let(f"fmul {vector} {z}, {r}") for z, r in zip(squares, rests, strict=True)]
-    sines = [multiply_add(p, cube, r) for p, cube, r in zip(sines, cubes, rests, strict=True)]
+    cubes = [write.let(f"fmul {vector} {z}, {r}") for z, r in zip(squares, remainders, strict=True)]
+    sines = [multiply_add(p, cube, r) for p, cube, r in zip(sines, cubes, remainders, strict=True)]
     cosines = polynomials((1.0, -0.5, *COS))
-    return [_in_quadrant(write, *numbers) for numbers in zip(angles, counts, sines, cosines, strict=True)]
+    return [_apply_quadrant(write, *numbers) for numbers in zip(angles, counts, sines, cosines, strict=True)]
 
 
-def _in_quadrant(write: Writer, x: str, k: str, sin: str, cos: str) -> SineCosine:
-    """Swapped and negated by the last two bits of k; the sine has the sign of x as well."""
+def _apply_quadrant(write: Writer, x: str, k: str, sin: str, cos: str) -> SineCosine:
+    """Swap and negate sine and cosine by the last two bits of k, and give the sine the sign of x."""
     vector, integers = write.vector, write.integers
     last = write.let(f"shl {integers} {k}, {write.integer_splat(63)}")
     swap = write.let(f"icmp slt {integers} {last}, zeroinitializer")
@@ -144,54 +148,54 @@ def _in_quadrant(write: Writer, x: str, k: str, sin: str, cos: str) -> SineCosin
     half = write.let(f"shl {integers} {k}, {write.integer_splat(62)}")
     odd = write.let(f"xor {integers} {half}, {below}")
     even = write.let(f"shl {integers} {after}, {write.integer_splat(62)}")
-    return SineCosine(signed(write, s, odd), signed(write, c, even))
+    return SineCosine(flip_sign(write, s, odd), flip_sign(write, c, even))
 
 
-def signed(write: Writer, x: str, sign: str) -> str:
-    """-x where the first bit of `sign` is set."""
+def flip_sign(write: Writer, x: str, sign: str) -> str:
+    """Return -x in the lanes where the first bit of `sign` is set, x elsewhere."""
     first = write.let(f"and {write.integers} {sign}, {write.integer_splat(-(2**63))}")
     bits = write.let(f"bitcast {write.vector} {x} to {write.integers}")
     flipped = write.let(f"xor {write.integers} {bits}, {first}")
     return write.let(f"bitcast {write.integers} {flipped} to {write.vector}")
 
 
-def _reduced(write: Writer, sizes: Sequence[str], turns: Sequence[str], fma: bool) -> list[str]:
-    """x - k pi/2 of each."""
+def _reduce(write: Writer, magnitudes: Sequence[str], multiples: Sequence[str], fma: bool) -> list[str]:
+    """Return x - k pi/2 for each magnitude x and multiple k."""
     vector = write.vector
     if not fma:
-        return [_reduced_by_short_parts(write, x, k) for x, k in zip(sizes, turns, strict=True)]
-    rests = list(sizes)
+        return [_reduce_without_fma(write, x, k) for x, k in zip(magnitudes, multiples, strict=True)]
+    remainders = list(magnitudes)
     for part in HALF_PI:
         call = f"call {vector} @llvm.fma.v{write.lanes}f64"
-        rests = [
+        remainders = [
             write.let(f"{call}({vector} {k}, {vector} {write.splat(-part)}, {vector} {r})")
-            for k, r in zip(turns, rests, strict=True)
+            for k, r in zip(multiples, remainders, strict=True)
         ]
-    return rests
+    return remainders
 
 
-def _reduced_by_short_parts(write: Writer, x: str, k: str) -> str:
+def _reduce_without_fma(write: Writer, x: str, k: str) -> str:
     vector = write.vector
     first, second, third = (write.let(f"fmul {vector} {k}, {write.splat(part)}") for part in HALF_PI_SHORT)
     high = write.let(f"fsub {vector} {x}, {first}")
     r = write.let(f"fsub {vector} {high}, {second}")
-    # What that subtraction rounded away, and the third part (Dekker's sum).
+    # Add what that subtraction rounded away, and the third part (Dekker's sum).
     back = write.let(f"fsub {vector} {high}, {r}")
     lost = write.let(f"fsub {vector} {back}, {second}")
     rest = write.let(f"fsub {vector} {lost}, {third}")
     return write.let(f"fadd {vector} {r}, {rest}")
 
 
-def _called(write: Writer, x: str, near: SineCosine) -> SineCosine:
-    """Each lane beyond the limit by the C library."""
+def _call_libm(write: Writer, x: str, near: SineCosine) -> SineCosine:
+    """Replace each lane beyond the limit by the result of the C library."""
     results = []
     for function, pair in zip(("sin", "cos"), near, strict=True):
         vector = pair
         for lane in range(write.lanes):
             one = write.let(f"extractelement {write.vector} {x}, i32 {lane}")
             exact = write.let(f"call double @{function}(double {one})")
-            size = write.let(f"call double @llvm.fabs.f64(double {one})")
-            beyond = write.let(f"fcmp ogt double {size}, {number(LIMIT)}")
+            magnitude = write.let(f"call double @llvm.fabs.f64(double {one})")
+            beyond = write.let(f"fcmp ogt double {magnitude}, {hex_double(LIMIT)}")
             kept = write.let(f"extractelement {write.vector} {vector}, i32 {lane}")
             chosen = write.let(f"select i1 {beyond}, double {exact}, double {kept}")
             vector = write.let(f"insertelement {write.vector} {vector}, double {chosen}, i32 {lane}")
@@ -200,7 +204,7 @@ def _called(write: Writer, x: str, near: SineCosine) -> SineCosine:
 
 
 def declarations(lanes: int) -> list[str]:
-    """What a module must declare for the functions above."""
+    """Return the declarations and metadata that a module needs for the functions above."""
     vector = f"<{lanes} x double>"
     return [
         f"declare {vector} @llvm.fabs.v{lanes}f64({vector})",

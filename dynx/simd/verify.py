@@ -1,7 +1,7 @@
-"""What a legal program and a legal schedule are, stated so that a machine can check it.
+"""Checks that a program and a schedule are well-formed.
 
-The stages of the compiler hand these on to each other: tracing ends with `check_program`, emission
-begins with `check_schedule`. Both take time in proportion to what they check.
+Tracing ends with `check_program`, code generation begins with `check_schedule`. Both take time proportional
+to the size of their input.
 """
 
 from __future__ import annotations
@@ -10,19 +10,19 @@ from collections.abc import Iterator, Sequence
 from typing import NoReturn
 
 from dynx.errors import CompileError
-from dynx.simd.expr import ARITY, COMMUTATIVE, Node, identity
+from dynx.simd.expr import ARITY, COMMUTATIVE, Node, constant_key
 from dynx.simd.program import Program
 from dynx.simd.rows import tiles
 from dynx.simd.schedule import LEAVES, Segment, Store, TrigGroup
 
 
 def check_nodes(nodes: Sequence[Node], n_inputs: int) -> None:
-    """Raise CompileError unless `nodes` is a graph.
+    """Raise CompileError unless `nodes` is a well-formed graph.
 
-    - Every operation is known and has as many arguments as it takes, all of them earlier nodes.
-    - An input's slot is one of the `n_inputs`; a constant's value is a float.
-    - No two nodes are the same operation on the same arguments, in either order where that means the
-      same; zeros of either sign are two constants, all NaN one.
+    - Every operation is known and has the right number of arguments, all of them earlier nodes.
+    - The slot of an input is below `n_inputs`; the value of a constant is a float.
+    - No two nodes are the same operation on the same arguments, in either order if it is commutative; 0.0
+      and -0.0 are distinct constants, all NaN are one.
     """
     known: dict[object, int] = {}
     for index, (op, args, slot, value) in enumerate(nodes):
@@ -41,7 +41,7 @@ def check_nodes(nodes: Sequence[Node], n_inputs: int) -> None:
         elif op == "constant":
             if type(value) is not float:
                 _fail(index, f"is the constant {value!r}, not a float")
-            key = identity(value)
+            key = constant_key(value)
         else:
             key = op, args if op not in COMMUTATIVE or args[0] <= args[1] else args[::-1]
         first = known.setdefault(key, index)
@@ -50,19 +50,19 @@ def check_nodes(nodes: Sequence[Node], n_inputs: int) -> None:
 
 
 def check_program(program: Program) -> None:
-    """Raise CompileError unless `program` is whole.
+    """Raise CompileError unless `program` is well-formed.
 
-    Its nodes are a graph, every result is one of them, there are as many results as the output ports
-    hold, no two ports of a side share a name, and every node is needed for a result.
+    Its nodes are a graph, every result is one of them, there is one result for each scalar of the output
+    ports, names are unique among inputs and among outputs, and every node is needed for a result.
     """
     check_nodes(program.nodes, program.n_inputs)
     for side in (program.inputs, program.outputs):
         names = [port.name for port in side]
         if len(set(names)) < len(names):
-            raise CompileError(f"two ports have one name: {', '.join(sorted(names))}")
-    wanted = sum(port.size for port in program.outputs)
-    if len(program.results) != wanted:
-        raise CompileError(f"the program has {len(program.results)} results, its ports hold {wanted}")
+            raise CompileError(f"two ports have the same name: {', '.join(sorted(names))}")
+    scalars = sum(port.size for port in program.outputs)
+    if len(program.results) != scalars:
+        raise CompileError(f"the program has {len(program.results)} results, its ports hold {scalars}")
     alive = [False] * len(program.nodes)
     for result in program.results:
         if not 0 <= result < len(alive):
@@ -78,47 +78,48 @@ def check_program(program: Program) -> None:
 def check_schedule(program: Program, segments: Sequence[Segment], lanes: int) -> None:
     """Raise CompileError unless `segments` compute all of `program`.
 
-    - Every node is computed once, after its arguments; sine and cosine in a group, by their angle.
-    - What is used in a later segment than it was computed in is kept by that one.
-    - Every output is stored once, in the tiles that its row is cut into, from the nodes it is made of.
+    - Every node is computed once, after its arguments; sines and cosines in a group, with their angle.
+    - A value used in a later segment than the one that computes it is spilled by that segment.
+    - Every output is stored once, in the tiles of its row, from the nodes of its results.
 
-    Inputs and constants are read where they are used, and neither computed nor kept.
+    Inputs and constants are read where they are used; they are neither computed nor spilled.
     """
-    home: dict[int, int] = {}
+    segment_of: dict[int, int] = {}
     stores: list[Store] = []
     for number, segment in enumerate(segments):
 
         def use(node: int, user: str, number: int = number) -> None:
             if program.nodes[node].op in LEAVES:
                 return
-            if node not in home:
+            if node not in segment_of:
                 _fail(node, f"is used by {user} before it is computed")
-            if home[node] < number and node not in segments[home[node]].kept:
-                _fail(node, f"is used by {user} in segment {number}; segment {home[node]} does not keep it")
+            if segment_of[node] < number and node not in segments[segment_of[node]].spilled:
+                by = f"segment {segment_of[node]} does not spill it"
+                _fail(node, f"is used by {user} in segment {number}; {by}")
 
         for step in segment.steps:
-            for node, arguments in _made(program, step):
-                if node in home or program.nodes[node].op in LEAVES:
-                    _fail(node, "is computed although it is known")
+            for node, arguments in _computed_nodes(program, step):
+                if node in segment_of or program.nodes[node].op in LEAVES:
+                    _fail(node, "is computed twice, or is an input or a constant")
                 for argument in arguments:
                     use(argument, f"node {node}")
-            for node, _ in _made(program, step):
-                home[node] = number
-        for node in segment.kept:
-            if home.get(node) != number:
-                _fail(node, f"is kept by segment {number}, which does not compute it")
+            for node, _ in _computed_nodes(program, step):
+                segment_of[node] = number
+        for node in segment.spilled:
+            if segment_of.get(node) != number:
+                _fail(node, f"is spilled by segment {number}, which does not compute it")
         for store in segment.stores:
             for node in store.nodes:
                 use(node, f"output {store.output}")
         stores += segment.stores
     for index, (op, *_) in enumerate(program.nodes):
-        if op not in LEAVES and index not in home:
+        if op not in LEAVES and index not in segment_of:
             _fail(index, f"({op}) is never computed")
     _check_stores(program, stores, lanes)
 
 
-def _made(program: Program, step: int | TrigGroup) -> Iterator[tuple[int, tuple[int, ...]]]:
-    """The nodes that a step computes, each with what it needs."""
+def _computed_nodes(program: Program, step: int | TrigGroup) -> Iterator[tuple[int, tuple[int, ...]]]:
+    """Yield the nodes that a step computes, each with its arguments."""
     if not isinstance(step, TrigGroup):
         if program.nodes[step].op in ("sin", "cos"):
             _fail(step, "is a sine or cosine outside of a group")
@@ -128,7 +129,7 @@ def _made(program: Program, step: int | TrigGroup) -> Iterator[tuple[int, tuple[
         for op, index in zip(("sin", "cos"), pair, strict=True):
             if index is not None:
                 if program.nodes[index].op != op or program.nodes[index].args != (angle,):
-                    _fail(index, f"is not the {op} of node {angle} that its group takes it for")
+                    _fail(index, f"is in a group as the {op} of node {angle}, which it is not")
                 yield index, (angle,)
 
 
@@ -137,13 +138,15 @@ def _check_stores(program: Program, stores: Sequence[Store], lanes: int) -> None
     for number, port in enumerate(program.outputs):
         own = sorted((store for store in stores if store.output == number), key=lambda s: s.columns.start)
         if [store.columns for store in own] != tiles(port.size, lanes):
-            raise CompileError(f"output {port.name} is stored in columns {[s.columns for s in own]}")
+            raise CompileError(f"output {port.name} is stored in wrong columns {[s.columns for s in own]}")
         for store in own:
             if store.nodes != tuple(program.results[first + column] for column in store.columns):
-                raise CompileError(f"columns {store.columns} of output {port.name} are other nodes' values")
+                raise CompileError(
+                    f"columns {store.columns} of output {port.name} are stored from wrong nodes"
+                )
         first += port.size
     if any(not 0 <= store.output < len(program.outputs) for store in stores):
-        raise CompileError("an output is stored that the program does not have")
+        raise CompileError("a store refers to an output that the program does not have")
 
 
 def _fail(index: int, what: str) -> NoReturn:

@@ -10,7 +10,7 @@ import pytest
 import dynx
 from dynx.bench.cases import ARGUMENTS, answer_shape
 from dynx.bench.cost import SINE_COSINE_PAIRS, SINE_COSINE_SINGLES, Cost, cost_of, program_of
-from dynx.simd.text import Writer
+from dynx.simd.ir_writer import Writer
 from dynx.simd.trace import trace
 from dynx.simd.trigonometry import sines_and_cosines
 from dynx.spatial.scalar import Array

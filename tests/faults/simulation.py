@@ -19,7 +19,7 @@ SIMULATION_FAULTS = (
         right="even, odd = (0, 4, 2, 6), (1, 5, 3, 7)",
         wrong="even, odd = (0, 4, 2, 6), (1, 3, 5, 7)",
         test_file="tests/simd/test_emit.py",
-        test="test_inputs_go_through_to_outputs_of_every_width",
+        test="test_inputs_are_copied_to_outputs_of_every_width",
     ),
     Fault(
         "compiled_factor_without_fill_in",

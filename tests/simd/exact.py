@@ -1,4 +1,4 @@
-"""Sine and cosine to many digits, and how far from them a double is."""
+"""Errors of sines and cosines against many-digit values."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import numpy as np
 from dynx.spatial.scalar import Floats
 
 BITS = 240
-"""Working precision; arguments beyond 2^100 need as many bits more as they have before the point."""
+"""Working precision [bits]; large arguments need in addition as many bits as their integer part."""
 
 
 def errors(x: Floats, sin: Floats, cos: Floats) -> tuple[Floats, Floats]:
-    """Distances of `sin` and `cos` from the functions of `x`, in units of the last place of these."""
+    """Return the errors of `sin` and `cos` of `x`, in units in the last place of the exact values."""
     found = np.empty((2, len(x)))
     for k, angle in enumerate(x.tolist()):
         with mpmath.workprec(BITS + max(0, math.frexp(angle)[1])):

@@ -1,4 +1,4 @@
-"""Running what `emit` writes: LLVM, one call, nothing else between the text and the numbers."""
+"""Direct execution of the code that `emit` returns, by LLVM without the layers of `Kernel`."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from dynx.spatial.scalar import Floats
 
 X86 = platform.machine().lower() in ("x86_64", "amd64")
 TARGETS: tuple[Target, ...] = (host(), sse2()) if X86 else (host(),)
-"""This processor and, where it is one of them, the least of its family."""
+"""This processor and, if it is an x86-64 one, the baseline of that family."""
 
 LANES = (2, 4, 8)
 
@@ -34,14 +34,14 @@ class Machine:
         self._entry = ctypes.CFUNCTYPE(None, ctypes.c_void_p)(self._library[ENTRY])
 
     def fill(self, inputs: Sequence[Floats], outputs: Sequence[Floats], n: int) -> None:
-        """Evaluate `n` samples, at least as many as lanes. Rows (n, port size) may lie anywhere."""
+        """Evaluate `n` samples, at least as many as lanes; arrays (n, port size) may have any row stride."""
         words = [n]
         for array in (*inputs, *outputs):
             words += [array.ctypes.data, array.strides[0]]
         self._entry(np.array(words, dtype=np.int64).ctypes.data)
 
     def __call__(self, inputs: Sequence[Floats]) -> list[Floats]:
-        """The same into new arrays."""
+        """Evaluate all samples into new arrays."""
         n = len(inputs[0])
         outputs = [np.empty((n, port.size)) for port in self._program.outputs]
         self.fill(inputs, outputs, n)
@@ -49,6 +49,6 @@ class Machine:
 
 
 def same_bits(a: Floats, b: Floats) -> np.bool_:
-    """Whether all numbers are the same, zeros with their sign; every NaN counts as NaN."""
+    """Return whether all numbers have the same bits; all NaN count as equal."""
     a, b = np.ascontiguousarray(a), np.ascontiguousarray(b)
     return np.all((a.view(np.int64) == b.view(np.int64)) | (np.isnan(a) & np.isnan(b)))

@@ -1,4 +1,4 @@
-"""Random programs and numbers for them, for Hypothesis."""
+"""Hypothesis strategies for programs, and random inputs."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from dynx.simd.expr import ARITY, Graph, Op, Simplify
-from dynx.simd.program import Port, Program, finished
+from dynx.simd.program import Port, Program, extract_program
 from dynx.spatial.scalar import Floats
 
 OPERATIONS: tuple[Op, ...] = tuple(op for op, arity in ARITY.items() if arity)
@@ -18,11 +18,11 @@ SPECIAL = (
     *(0.0, 1.0, 2.0, 0.5, 3.0, 1e5, 1e-3, math.pi, math.pi / 2, 1e22, 5e-324, 2.0**-1022, 2.0**-1023),
     *(2.0**1023, 1.7976931348623157e308, 1.0 + 2.0**-52, 1e-160, 1e160, math.inf),
 )
-"""Doubles at which something changes, together with their negatives, and NaN."""
+"""Doubles at which an operation changes its behaviour; their negatives and NaN are used too."""
 
 
 def doubles(rng: np.random.Generator, shape: tuple[int, ...]) -> Floats:
-    """Numbers of every kind: ordinary ones, of any exponent, and special ones."""
+    """Draw numbers of every kind: ordinary ones, ones of any exponent, and special ones."""
     kind = rng.integers(0, 4, shape)
     sign = rng.choice([-1.0, 1.0], shape)
     any_exponent = np.ldexp(rng.uniform(1.0, 2.0, shape), rng.integers(-1074, 1024, shape))
@@ -31,7 +31,7 @@ def doubles(rng: np.random.Generator, shape: tuple[int, ...]) -> Floats:
 
 
 def ordinary(rng: np.random.Generator, shape: tuple[int, ...]) -> Floats:
-    """Numbers from 0.01 to 10 of either sign: what a robot's states are made of."""
+    """Draw numbers of magnitude 0.01 to 10, the range of a robot's states, with either sign."""
     return np.asarray(rng.choice([-1.0, 1.0], shape) * 10.0 ** rng.uniform(-2.0, 1.0, shape))
 
 
@@ -47,7 +47,7 @@ def programs(
     constants: st.SearchStrategy[float] = CONSTANTS,
     longest: int = 40,
 ) -> Program:
-    """A program as written, not simplified: several ports of 1 to 9 numbers on either side.
+    """Draw a program without simplification, with several input and output ports of 1 to 9 numbers.
 
     Results may be inputs, constants, or the same node several times.
     """
@@ -59,28 +59,30 @@ def programs(
         graph.constant(value)
     picks = st.integers(0, 2**16)
     for op, a, b in draw(st.lists(st.tuples(st.sampled_from(operations), picks, picks), max_size=longest)):
-        # The newest nodes are picked most often, so that expressions grow deep.
+        # Recent nodes are preferred as arguments, so that expressions become deep.
         args = (len(graph) - 1 - a % min(len(graph), 8), b % len(graph))
-        graph.literal(op, *args[: ARITY[op]])
+        graph.apply_unsimplified(op, *args[: ARITY[op]])
     outputs = [
         Port(f"out{k}", (size,)) for k, size in enumerate(draw(st.lists(SIZES, min_size=1, max_size=3)))
     ]
     results = [len(graph) - 1 - draw(picks) % len(graph) for port in outputs for _ in range(port.size)]
-    return finished(graph, inputs, outputs, results)
+    return extract_program(graph, inputs, outputs, results)
 
 
 SIZES = st.integers(1, 9)
 
 
 def simplified(program: Program, simplify: Simplify | None) -> Program:
-    """The same program, built again under `simplify`."""
+    """Return the program rebuilt with the simplifications `simplify`."""
     graph = Graph(simplify)
-    place: list[int] = []
+    new_index: list[int] = []
     for node in program.nodes:
         if node.op == "input":
-            place.append(graph.input(node.slot))
+            new_index.append(graph.input(node.slot))
         elif node.op == "constant":
-            place.append(graph.constant(node.value))
+            new_index.append(graph.constant(node.value))
         else:
-            place.append(graph.apply(node.op, *(place[arg] for arg in node.args)))
-    return finished(graph, program.inputs, program.outputs, [place[result] for result in program.results])
+            new_index.append(graph.apply(node.op, *(new_index[arg] for arg in node.args)))
+    return extract_program(
+        graph, program.inputs, program.outputs, [new_index[result] for result in program.results]
+    )

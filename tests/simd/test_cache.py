@@ -1,4 +1,4 @@
-"""The cache of machine code: what is found again, and what is never used."""
+"""The cache of machine code: hits, keys, damaged files, eviction."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ import platformdirs
 import pytest
 
 from dynx.simd import cache
-from dynx.simd.cache import cached_kernel, recipe_of
+from dynx.simd.cache import load_kernel, program_recipe
 from dynx.simd.emit import Settings
 from dynx.simd.kernel import Kernel
 from dynx.simd.program import Program
@@ -34,8 +34,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "cache" / "kernels"
 
 
-class Made:
-    """A program, and how often it was asked for."""
+class CountedProgram:
+    """A program that counts how often it was requested."""
 
     def __init__(self, program: Program) -> None:
         self.program, self.times = program, 0
@@ -55,26 +55,28 @@ def files(folder: Path) -> list[Path]:
     return sorted(folder.iterdir()) if folder.is_dir() else []
 
 
-def test_found_again_without_a_program(folder: Path) -> None:
-    made = Made(TWICE)
+def test_a_cached_kernel_needs_no_program(folder: Path) -> None:
+    made = CountedProgram(TWICE)
     for _ in range(3):
-        kernel = cached_kernel(b"twice", made)
+        kernel = load_kernel(b"twice", made)
         assert values(kernel) == [3.0, 21.0]
         assert (kernel.inputs, kernel.outputs) == (TWICE.inputs, TWICE.outputs)
     assert made.times == 1
     assert len(files(folder)) == 1
 
 
-def test_what_decides_the_code_decides_the_key(monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
-    made = Made(TWICE)
+def test_everything_that_determines_the_code_is_part_of_the_key(
+    monkeypatch: pytest.MonkeyPatch, folder: Path
+) -> None:
+    made = CountedProgram(TWICE)
     target = host()
     ways: list[Callable[[], Kernel]] = [
-        lambda: cached_kernel(b"twice", made),
-        lambda: cached_kernel(b"twicf", made),
-        lambda: cached_kernel(b"twice", made, settings=Settings(2)),
-        lambda: cached_kernel(b"twice", made, settings=Settings(target.lanes, fast=False)),
-        lambda: cached_kernel(b"twice", made, settings=Settings(target.lanes, segment=77)),
-        lambda: cached_kernel(b"twice", made, target=replace(target, cpu="x86-64")),
+        lambda: load_kernel(b"twice", made),
+        lambda: load_kernel(b"twicf", made),
+        lambda: load_kernel(b"twice", made, settings=Settings(2)),
+        lambda: load_kernel(b"twice", made, settings=Settings(target.lanes, fast=False)),
+        lambda: load_kernel(b"twice", made, settings=Settings(target.lanes, segment=77)),
+        lambda: load_kernel(b"twice", made, target=replace(target, cpu="x86-64")),
     ]
     if not target.triple.startswith("x86_64"):
         ways.pop()
@@ -83,7 +85,7 @@ def test_what_decides_the_code_decides_the_key(monkeypatch: pytest.MonkeyPatch, 
     assert made.times == len(ways)
     for name in ("compiler_version", "_emitter_version"):
         monkeypatch.setattr(cache, name, lambda: "another version")
-        cached_kernel(b"twice", made)
+        load_kernel(b"twice", made)
     assert made.times == len(ways) + 2 == len(files(folder))
 
 
@@ -92,8 +94,8 @@ def test_recipes_of_programs() -> None:
     close = trace(lambda x: np.nextafter(2.0, 3.0) * x + 1.0, {"x": (2,)})
     named = trace(lambda y: 2.0 * y + 1.0, {"y": (2,)})
     shaped = trace(lambda x: (2.0 * x + 1.0)[None], {"x": (2,)})
-    assert recipe_of(same) == recipe_of(TWICE)
-    assert len({recipe_of(p) for p in (TWICE, THRICE, close, named, shaped)}) == 5
+    assert program_recipe(same) == program_recipe(TWICE)
+    assert len({program_recipe(p) for p in (TWICE, THRICE, close, named, shaped)}) == 5
 
 
 def _flip(content: bytes, place: int) -> bytes:
@@ -101,8 +103,8 @@ def _flip(content: bytes, place: int) -> bytes:
 
 
 def test_altered_files_are_replaced(folder: Path) -> None:
-    """Bytes flipped all over the file, cut short, emptied, with something added."""
-    cached_kernel(b"twice", Made(TWICE))
+    """Files with flipped bytes, truncated, emptied or extended."""
+    load_kernel(b"twice", CountedProgram(TWICE))
     (path,) = files(folder)
     whole = path.read_bytes()
     spoiled = [_flip(whole, place) for place in range(0, len(whole), max(1, len(whole) // 60))]
@@ -110,38 +112,40 @@ def test_altered_files_are_replaced(folder: Path) -> None:
     spoiled += [whole + b"x", b"something else altogether"]
     for content in spoiled:
         path.write_bytes(content)
-        made = Made(TWICE)
-        assert values(cached_kernel(b"twice", made)) == [3.0, 21.0]
+        made = CountedProgram(TWICE)
+        assert values(load_kernel(b"twice", made)) == [3.0, 21.0]
         assert made.times == 1
         assert path.read_bytes() == whole
 
 
 def test_code_that_cannot_be_linked_is_replaced(folder: Path) -> None:
-    """Whole by its checksum, and yet no object file."""
-    image = cached_kernel(b"twice", Made(TWICE)).image
+    """The checksum is right, but the content is not an object file."""
+    image = load_kernel(b"twice", CountedProgram(TWICE)).image
     (path,) = files(folder)
     cache._write(path, replace(image, code=b"nothing of the kind"))
-    made = Made(TWICE)
-    assert values(cached_kernel(b"twice", made)) == [3.0, 21.0]
+    made = CountedProgram(TWICE)
+    assert values(load_kernel(b"twice", made)) == [3.0, 21.0]
     assert made.times == 1
 
 
-@pytest.mark.parametrize("spoil", ["off", "a file", "read-only", "writable by others"])
-def test_without_a_folder_everything_works(folder: Path, monkeypatch: pytest.MonkeyPatch, spoil: str) -> None:
-    if spoil == "off":
+@pytest.mark.parametrize("damage", ["off", "a file", "read-only", "writable by others"])
+def test_kernels_work_without_a_usable_folder(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, damage: str
+) -> None:
+    if damage == "off":
         monkeypatch.setenv("DYNX_CACHE", "0")
-    elif spoil == "a file":
+    elif damage == "a file":
         folder.parent.write_text("not a folder")
-    elif spoil == "read-only":
-        # Root writes where it likes, so the system's answer is given for it.
+    elif damage == "read-only":
+        # Root may write anywhere, so the system's result is simulated.
         folder.mkdir(parents=True)
         monkeypatch.setattr(os, "access", lambda path, mode: False)
     else:
         folder.mkdir(parents=True)
         folder.chmod(0o777)
-    made = Made(TWICE)
+    made = CountedProgram(TWICE)
     for _ in range(2):
-        assert values(cached_kernel(b"twice", made)) == [3.0, 21.0]
+        assert values(load_kernel(b"twice", made)) == [3.0, 21.0]
     assert made.times == 2
     assert files(folder) == []
 
@@ -151,36 +155,36 @@ def test_a_full_disk_is_no_error(folder: Path, monkeypatch: pytest.MonkeyPatch) 
         raise OSError("no space left on device")
 
     monkeypatch.setattr(os, "replace", full)
-    assert values(cached_kernel(b"twice", Made(TWICE))) == [3.0, 21.0]
+    assert values(load_kernel(b"twice", CountedProgram(TWICE))) == [3.0, 21.0]
     assert files(folder) == []
 
 
-def test_the_users_own_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_the_default_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.delenv("DYNX_CACHE_DIR")
     monkeypatch.setattr(platformdirs, "user_cache_path", lambda name: tmp_path / name)
-    cached_kernel(b"twice", Made(TWICE))
+    load_kernel(b"twice", CountedProgram(TWICE))
     assert len(files(tmp_path / "dynx" / "kernels")) == 1
 
 
-def test_the_folder_is_the_users_alone(folder: Path) -> None:
-    cached_kernel(b"twice", Made(TWICE))
+def test_the_folder_is_private(folder: Path) -> None:
+    load_kernel(b"twice", CountedProgram(TWICE))
     assert folder.stat().st_mode & 0o077 == 0
 
 
-def test_what_was_not_used_for_longest_goes(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_least_recently_used_file_is_evicted(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     recipes = [b"%d" % k for k in range(5)]
     paths: list[Path] = []
     for age, recipe in enumerate(recipes):
-        cached_kernel(recipe, Made(TWICE))
+        load_kernel(recipe, CountedProgram(TWICE))
         (new,) = set(files(folder)) - set(paths)
         paths.append(new)
         os.utime(new, (time.time() - 1000 + age,) * 2)
     # Reading the oldest makes it the newest.
-    made = Made(TWICE)
-    cached_kernel(recipes[0], made)
+    made = CountedProgram(TWICE)
+    load_kernel(recipes[0], made)
     assert made.times == 0
-    monkeypatch.setattr(cache, "LARGEST", 3 * paths[0].stat().st_size)
-    cached_kernel(b"one more", Made(TWICE))
+    monkeypatch.setattr(cache, "MAX_CACHE_BYTES", 3 * paths[0].stat().st_size)
+    load_kernel(b"one more", CountedProgram(TWICE))
     assert len(files(folder)) == 3
     assert {path.exists() for path in (paths[0], paths[4])} == {True}
     assert not any(paths[k].exists() for k in (1, 2, 3))
@@ -189,11 +193,11 @@ def test_what_was_not_used_for_longest_goes(folder: Path, monkeypatch: pytest.Mo
 WRITER = """
 import sys
 import numpy as np
-from dynx.simd.cache import cached_kernel
+from dynx.simd.cache import load_kernel
 from dynx.simd.trace import trace
 for turn in range(6):
     for k in range(4):
-        kernel = cached_kernel(b"%d" % k, lambda: trace(lambda x: (k + 2.0) * x, {"x": (3,)}))
+        kernel = load_kernel(b"%d" % k, lambda: trace(lambda x: (k + 2.0) * x, {"x": (3,)}))
         x, y = np.ones((9, 3)), np.empty((9, 3))
         kernel([x], [y])
         assert (y == k + 2.0).all()
@@ -202,7 +206,7 @@ print("done")
 
 
 def test_several_processes_at_once(folder: Path) -> None:
-    """All of them compile, write and read the same kernels, while another one spoils the files."""
+    """All of them compile, write and read the same kernels, while another one damages the files."""
     writers = [
         subprocess.Popen([sys.executable, "-c", WRITER], stdout=subprocess.PIPE, text=True) for _ in range(3)
     ]

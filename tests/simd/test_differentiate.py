@@ -1,4 +1,4 @@
-"""Derivatives of programs against difference quotients in 50 digits, and against the rules of calculus."""
+"""Derivatives of programs against difference quotients in 50 digits and the rules of calculus."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from hypothesis import strategies as st
 
 from dynx.errors import CompileError
 from dynx.simd.differentiate import Order, differentiate
-from dynx.simd.expr import Graph, Op, sign
-from dynx.simd.inlining import inlined
+from dynx.simd.expr import Graph, Op
+from dynx.simd.inlining import inline
 from dynx.simd.interp import interpret
-from dynx.simd.program import Port, Program, finished
+from dynx.simd.program import Port, Program, extract_program
 from dynx.simd.trace import trace
 from dynx.spatial.scalar import Array, Floats, arctan, cos, exp, sin, sqrt, tanh
 from tests.simd.programs import RANDOM, SPECIAL, doubles
 
 DIGITS = 50
 STEP = 15
-"""The step is 1e-15: a central difference is then wrong by 1e-30 times a third derivative, and by
+"""The step is 1e-15: a central difference is then off by 1e-30 times a third derivative, and by
 1e-35 for rounding."""
 CLOSE = 1e-20
 TAME = 1e3
@@ -32,7 +32,7 @@ ORDERS: tuple[Order, ...] = ("forward", "reverse", "markowitz")
 
 
 @pytest.fixture(autouse=True)
-def _many_digits() -> Iterator[None]:
+def _fifty_digits() -> Iterator[None]:
     with mpmath.workdps(DIGITS):
         yield
 
@@ -70,7 +70,7 @@ STEPS: tuple[Callable[[Array, Array], Array], ...] = (
 
 @st.composite
 def smooth_programs(draw: st.DrawFn) -> Program:
-    """Of x (3,) and y (2,), with an output z (2,) and another, every, of all that is on the way to it."""
+    """Draw a program of x (3,) and y (2,) with outputs z (2,) and `every`, all intermediate values."""
     picks = st.integers(0, 2**16)
     recipe = draw(st.lists(st.tuples(st.sampled_from(STEPS), picks, picks), min_size=1, max_size=14))
 
@@ -85,12 +85,12 @@ def smooth_programs(draw: st.DrawFn) -> Program:
 
 
 def quotient(program: Program, point: dict[str, Array], of: str, by: str) -> Array:
-    """Central differences, of the shape of the output followed by that of the input."""
+    """Return central differences, with the shape of the output followed by that of the input."""
     h = mpmath.mpf(10) ** -STEP
     columns = []
     for k in range(point[by].size):
         unit = exactly(np.eye(point[by].size)[k])
-        ahead, behind = (inlined(program, {**point, by: point[by] + s * h * unit})[of] for s in (1, -1))
+        ahead, behind = (inline(program, {**point, by: point[by] + s * h * unit})[of] for s in (1, -1))
         columns.append((ahead - behind) / (2 * h))
     return np.stack(columns, axis=-1)
 
@@ -115,20 +115,20 @@ def test_each_operation_s_derivatives_are_limits_of_difference_quotients(
 
     program = trace(function, {"x": (2,)}, simplify=None)
     point = random_point(program, rng)
-    found = inlined(differentiate(program, [("result", "x")], simplify=None), point)["dresult_dx"]
+    found = inline(differentiate(program, [("result", "x")], simplify=None), point)["dresult_dx"]
     assert_close(found, quotient(program, point, "result", "x"))
 
 
 @given(smooth_programs(), RANDOM)
 def test_derivatives_are_limits_of_difference_quotients(program: Program, rng: np.random.Generator) -> None:
     point = random_point(program, rng)
-    assume(all(abs(value) < TAME for value in inlined(program, point)["every"]))
+    assume(all(abs(value) < TAME for value in inline(program, point)["every"]))
     pairs = [("z", "x"), ("z", "y")]
     wanted = {f"d{of}_d{by}": quotient(program, point, of, by) for of, by in pairs}
     for order in ORDERS:
         derivatives = differentiate(program, pairs, order=order, simplify=None)
         assert [port.name for port in derivatives.outputs] == list(wanted)
-        found = inlined(derivatives, point)
+        found = inline(derivatives, point)
         for name, derivative in wanted.items():
             assert_close(found[name], derivative)
 
@@ -138,37 +138,37 @@ def test_the_chain_rule(outer: Program, inner: Program, rng: np.random.Generator
     point = random_point(inner, rng)
 
     def composed(x: Array, y: Array) -> Array:
-        z = inlined(inner, {"x": x, "y": y})["z"]
-        return inlined(outer, {"x": np.array([z[0], z[1], y[0]]), "y": y})["z"]
+        z = inline(inner, {"x": x, "y": y})["z"]
+        return inline(outer, {"x": np.array([z[0], z[1], y[0]]), "y": y})["z"]
 
     whole = trace(composed, {"x": (3,), "y": (2,)}, simplify=None)
-    by_x = inlined(differentiate(whole, [("result", "x")], simplify=None), point)["dresult_dx"]
-    z = inlined(inner, point)["z"]
-    assume(all(abs(value) < TAME for value in inlined(inner, point)["every"]))
+    by_x = inline(differentiate(whole, [("result", "x")], simplify=None), point)["dresult_dx"]
+    z = inline(inner, point)["z"]
+    assume(all(abs(value) < TAME for value in inline(inner, point)["every"]))
     middle = {"x": np.array([z[0], z[1], point["y"][0]]), "y": point["y"]}
-    assume(all(abs(value) < TAME for value in inlined(outer, middle)["every"]))
-    of_outer = inlined(differentiate(outer, [("z", "x")], simplify=None), middle)["dz_dx"]
-    of_inner = inlined(differentiate(inner, [("z", "x")], simplify=None), point)["dz_dx"]
+    assume(all(abs(value) < TAME for value in inline(outer, middle)["every"]))
+    of_outer = inline(differentiate(outer, [("z", "x")], simplify=None), middle)["dz_dx"]
+    of_inner = inline(differentiate(inner, [("z", "x")], simplify=None), point)["dz_dx"]
     assert_close(by_x, of_outer[:, :2] @ of_inner)
 
 
 @given(smooth_programs(), RANDOM)
 def test_the_product_rule(program: Program, rng: np.random.Generator) -> None:
     point = random_point(program, rng)
-    assume(all(abs(value) < TAME for value in inlined(program, point)["every"]))
+    assume(all(abs(value) < TAME for value in inline(program, point)["every"]))
 
     def product(x: Array, y: Array) -> Array:
-        f, g = inlined(program, {"x": x, "y": y})["z"]
+        f, g = inline(program, {"x": x, "y": y})["z"]
         return np.array([f * g], dtype=object)
 
     whole = trace(product, {"x": (3,), "y": (2,)}, simplify=None)
-    (row,) = inlined(differentiate(whole, [("result", "x")], simplify=None), point)["dresult_dx"]
-    f, g = inlined(program, point)["z"]
-    df, dg = inlined(differentiate(program, [("z", "x")], simplify=None), point)["dz_dx"]
+    (row,) = inline(differentiate(whole, [("result", "x")], simplify=None), point)["dresult_dx"]
+    f, g = inline(program, point)["z"]
+    df, dg = inline(differentiate(program, [("z", "x")], simplify=None), point)["dz_dx"]
     assert_close(row, df * g + dg * f)
 
 
-def test_values_come_first_and_as_they_were() -> None:
+def test_values_come_first_and_are_unchanged() -> None:
     program = trace(lambda x: {"s": sin(x), "c": cos(x)}, {"x": (2, 3)})
     found = differentiate(program, [("c", "x")], values=["s"])
     assert found.inputs == program.inputs
@@ -179,7 +179,7 @@ def test_values_come_first_and_as_they_were() -> None:
     np.testing.assert_array_equal(dc.reshape(6, 6), np.diag(-s[0]))
 
 
-def test_what_does_not_depend_is_not_computed() -> None:
+def test_zero_derivatives_are_not_computed() -> None:
     program = trace(lambda x, y: {"f": x[:2] * x[:2], "g": y * x[2]}, {"x": (3,), "y": (2,)})
     found = differentiate(program, [("f", "x"), ("f", "y"), ("g", "x")])
     constant = [found.nodes[k].op == "constant" for k in found.results]
@@ -216,10 +216,10 @@ def test_an_input_is_its_own_derivative() -> None:
 
 
 def at(op: Op, *arguments: float) -> Floats:
-    """The derivatives of one operation, at one point, in doubles."""
+    """Return the derivatives of one operation at one point, in float64."""
     graph = Graph()
-    node = graph.literal(op, *(graph.input(k) for k in range(len(arguments))))
-    program = finished(graph, [Port("x", (len(arguments),))], [Port("y", (1,))], [node])
+    node = graph.apply_unsimplified(op, *(graph.input(k) for k in range(len(arguments))))
+    program = extract_program(graph, [Port("x", (len(arguments),))], [Port("y", (1,))], [node])
     (found,) = interpret(differentiate(program, [("y", "x")]), [np.array([arguments])])
     return np.asarray(found[0])
 
@@ -258,12 +258,12 @@ def test_where_there_is_no_derivative(op: Op, arguments: tuple[float, ...], want
 @given(RANDOM)
 def test_the_sign_of_every_double(rng: np.random.Generator) -> None:
     graph = Graph()
-    program = finished(graph, [Port("x", (1,))], [Port("y", (1,))], [sign(graph, graph.input(0))])
+    program = extract_program(graph, [Port("x", (1,))], [Port("y", (1,))], [graph.sign(graph.input(0))])
     x = np.array([*doubles(rng, (64,)), *SPECIAL, *(-s for s in SPECIAL), math.nan, -0.0])
     np.testing.assert_array_equal(interpret(program, [x[:, None]])[0][:, 0], np.sign(x))
 
 
-def test_names_that_are_not_there() -> None:
+def test_unknown_names_raise() -> None:
     program = trace(lambda x: {"torque": x}, {"x": (2,)})
     with pytest.raises(CompileError, match="no output 'torq'; did you mean 'torque'"):
         differentiate(program, [("torq", "x")])

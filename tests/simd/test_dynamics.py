@@ -43,7 +43,7 @@ Algorithm = Callable[[Mechanism, Array, Array, Array], Array]
 
 
 def _jacobians(reference: Reference) -> Algorithm:
-    """J and dJ/dt of the last frame."""
+    """Return J and dJ/dt of the last frame."""
 
     def both(m: Mechanism, q: Array, v: Array, a: Array) -> Array:
         poses, frame = body_poses(m, q), len(m.frames) - 1
@@ -67,7 +67,7 @@ ALGORITHMS: dict[str, Algorithm] = {
     "potential_energy": lambda m, q, v, a: potential_energy(m, body_poses(m, q)),
 }
 SAMPLES = 6
-"""Few, and few robots: the programs as written have tens of thousands of nodes."""
+"""Number of samples; small, because unsimplified programs have tens of thousands of nodes."""
 
 
 def check(name: str, model: Model, rng: np.random.Generator) -> Floats:
@@ -82,12 +82,12 @@ def check(name: str, model: Model, rng: np.random.Generator) -> Floats:
     inputs = [np.asarray(rng.uniform(-1.0, 1.0, (SAMPLES, width))) for (width,) in ports.values()]
     if m.floating:
         inputs[0][:, 3:7] /= np.linalg.norm(inputs[0][:, 3:7], axis=1, keepdims=True)
-    # One by one: what no coordinate moves comes back from a batch without its axis.
+    # Sample by sample: a result that no coordinate affects has no batch axis.
     wanted = np.stack([np.ravel(function(*sample)) for sample in zip(*inputs, strict=True)])
     written, simplified = trace(function, ports, simplify=None), trace(function, ports, simplify=FAST)
     (one,), (other,) = bounds(written, inputs, any_order=True), bounds(simplified, inputs)
     assert agree(interpret(written, inputs)[0], wanted, one, one)
-    # What the constants of the simplified program were rounded from is bounded by the written one's.
+    # The bound of the unsimplified program covers the rounding of folded constants.
     assert agree(interpret(simplified, inputs)[0], wanted, one, one, other)
     compiled = Machine(simplified, host(), Settings(4, segment=300))
     assert agree(compiled(inputs)[0], wanted, one, one, other)
@@ -97,7 +97,7 @@ def check(name: str, model: Model, rng: np.random.Generator) -> Floats:
 @pytest.mark.parametrize("name", ALGORITHMS)
 @settings(max_examples=5)
 @given(models(min_links=2, max_links=3, solvable=True), RANDOM)
-def test_interpreted_and_compiled_are_what_floats_give(
+def test_interpreted_and_compiled_equal_evaluation_on_floats(
     name: str, model: Model, rng: np.random.Generator
 ) -> None:
     bound = check(name, model, rng)

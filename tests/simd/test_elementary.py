@@ -1,4 +1,4 @@
-"""Exponential, tanh and arctangent of kernels: how far from the exact values, wherever they are."""
+"""Errors of the kernels' exponential, tanh and arctangent over the whole range."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ import pytest
 
 from dynx.simd.elementary import (
     ARCTAN,
+    ARCTAN_MIDDLE,
+    ARCTAN_STEEP,
     EXP,
     LN2,
     LN2_SHORT,
-    MIDDLE,
     OVERFLOW,
-    QUARTER,
-    SMALL,
-    STEEP,
+    QUARTER_PI,
     TANH,
+    TANH_POLYNOMIAL_LIMIT,
     UNDERFLOW,
 )
 from dynx.simd.emit import Settings
@@ -31,10 +31,10 @@ from dynx.simd.trace import trace
 from dynx.spatial.scalar import Array, Floats, arctan, exp, tanh
 from tests.simd.machine import LANES, TARGETS, Machine, same_bits
 
-NEAR = 2.0
-"""What is promised, in units of the last place."""
+MAX_ERROR = 2.0
+"""Documented error bound, in units in the last place."""
 NUMPY = 4.0
-"""What NumPy holds its own functions to."""
+"""Error bound that NumPy uses for its own functions, in units in the last place."""
 FUNCTIONS: dict[str, Callable[[Array], Array]] = {"exp": exp, "tanh": tanh, "arctan": arctan}
 EXACT: dict[str, Callable[[Any], Any]] = {"exp": mpmath.exp, "tanh": mpmath.tanh, "arctan": mpmath.atan}
 each_target = pytest.mark.parametrize("target", TARGETS, ids=lambda target: target.cpu)
@@ -51,15 +51,15 @@ def evaluated(name: str, target: Target, x: Floats, *, lanes: int = 4, fast: boo
 
 
 def errors(name: str, x: Floats, found: Floats) -> Floats:
-    """Distances from the function of `x`, in units of the last place of that."""
+    """Return the errors of `found`, in units in the last place of the exact values."""
     distances = []
-    # Of 1 - tanh and of arctan x - x much is lost before the digits begin that are looked at.
+    # Extra digits: 1 - tanh and arctan x - x cancel many leading ones.
     with mpmath.workprec(2400):
         for number, got in zip(x.tolist(), found.tolist(), strict=True):
             with mpmath.workprec(200 if abs(number) > 1e-9 else 2400):
                 exact = EXACT[name](mpmath.mpf(number))
                 if not math.isfinite(got):
-                    # Beyond the largest double by half a unit.
+                    # The exact value rounds to infinity.
                     distances.append(0.0 if abs(exact) > mpmath.mpf(2) ** 1024 * (1 - 2.0**-54) else np.inf)
                 else:
                     distances.append(float(abs(mpmath.mpf(got) - exact) / math.ulp(float(exact))))
@@ -67,7 +67,7 @@ def errors(name: str, x: Floats, found: Floats) -> Floats:
 
 
 def around(*centers: float) -> Floats:
-    """Numbers close to these, with either sign."""
+    """Return numbers close to the centers, with either sign."""
     x = np.concatenate([np.nextafter(c, [np.inf, -np.inf]) + np.array([0.0, 0.0]) for c in centers])
     return np.concatenate([x, -x, centers, np.negative(centers)])
 
@@ -79,8 +79,12 @@ POINTS: dict[str, Floats] = {
     "over all magnitudes": SIGNS * 10.0 ** RNG.uniform(-30.0, 3.0, 2000),
     "ordinary": RNG.uniform(-4.0, 4.0, 4000),
     "up to the ends": RNG.uniform(-760.0, 720.0, 2000),
-    "where formulas change": around(SMALL, MIDDLE, STEEP, 1.0, 19.0, 19.1, 20.0, OVERFLOW, UNDERFLOW),
-    "close to there": np.concatenate([c + RNG.uniform(-0.05, 0.05, 1000) for c in (SMALL, MIDDLE, STEEP)]),
+    "where formulas change": around(
+        TANH_POLYNOMIAL_LIMIT, ARCTAN_MIDDLE, ARCTAN_STEEP, 1.0, 19.0, 19.1, 20.0, OVERFLOW, UNDERFLOW
+    ),
+    "close to there": np.concatenate(
+        [c + RNG.uniform(-0.05, 0.05, 1000) for c in (TANH_POLYNOMIAL_LIMIT, ARCTAN_MIDDLE, ARCTAN_STEEP)]
+    ),
     "between multiples of ln 2": np.concatenate([MULTIPLES, MULTIPLES + 0.5 * math.log(2.0)]),
     "subnormal results": RNG.uniform(-745.2, -708.3, 2000),
     "largest results": RNG.uniform(709.0, 709.79, 500),
@@ -94,7 +98,7 @@ POINTS: dict[str, Floats] = {
 @pytest.mark.parametrize("points", POINTS)
 def test_within_two_units_everywhere(name: str, target: Target, points: str) -> None:
     x = POINTS[points]
-    assert errors(name, x, evaluated(name, target, x)).max() <= NEAR
+    assert errors(name, x, evaluated(name, target, x)).max() <= MAX_ERROR
 
 
 @each_target
@@ -114,7 +118,7 @@ def test_limits_zeros_and_nan(name: str, target: Target, wanted: list[float]) ->
 @each_target
 @each_function
 def test_the_same_in_every_lane_and_mode_and_odd_where_it_should_be(name: str, target: Target) -> None:
-    """Bit for bit: the rule that takes a sign out of an odd function is exact."""
+    """Bit for bit: the simplification that moves the sign out of an odd function is exact."""
     x = np.concatenate([RNG.uniform(-30.0, 30.0, 400), [0.0, 5e-324, 1e300, np.inf, np.nan]])
     one = evaluated(name, target, x)
     for lanes in LANES:
@@ -127,7 +131,7 @@ def test_the_same_in_every_lane_and_mode_and_odd_where_it_should_be(name: str, t
 
 @each_target
 @each_function
-def test_what_one_lane_holds_leaves_the_others_alone(name: str, target: Target) -> None:
+def test_lanes_do_not_affect_each_other(name: str, target: Target) -> None:
     x = RNG.uniform(-10.0, 10.0, 8)
     clean = evaluated(name, target, x, lanes=8)
     for lane in range(8):
@@ -152,14 +156,14 @@ def test_the_parts_of_constants_add_up() -> None:
         for parts, exact, bits in (
             (LN2, mpmath.log(2), 105),
             (LN2_SHORT, mpmath.log(2), 70),
-            (QUARTER, mpmath.pi / 4, 105),
+            (QUARTER_PI, mpmath.pi / 4, 105),
         ):
             assert abs(mpmath.fsum(map(mpmath.mpf, parts)) / exact - 1) < mpmath.mpf(2) ** -bits
     # Products with up to 2^11 are exact.
     assert int(math.ldexp(math.frexp(LN2_SHORT[0])[0], 53)) % 2**32 == 0
 
 
-def test_the_polynomials_are_as_close_as_they_say() -> None:
+def test_errors_of_the_polynomials() -> None:
     """Relative errors of the functions below 2^-56."""
 
     def sum_of(coefficients: tuple[float, ...], x: Any) -> Any:
@@ -169,7 +173,10 @@ def test_the_polynomials_are_as_close_as_they_say() -> None:
         for k in range(1, 300):
             r = mpmath.log(2) / 2 * (2 * k - 300) / 300
             assert abs((1 + r + r * r * sum_of(EXP, r)) / mpmath.exp(r) - 1) < 2.0**-56
-            for coefficients, function, last in ((TANH, mpmath.tanh, SMALL), (ARCTAN, mpmath.atan, MIDDLE)):
+            for coefficients, function, last in (
+                (TANH, mpmath.tanh, TANH_POLYNOMIAL_LIMIT),
+                (ARCTAN, mpmath.atan, ARCTAN_MIDDLE),
+            ):
                 t = mpmath.mpf(last) * k / 299
                 found = t * (1 + t * t * sum_of(coefficients, t * t))
                 assert abs(found / function(t) - 1) < 2.0**-56

@@ -1,4 +1,4 @@
-"""What is emitted computes what the program means, on every target and however many lanes."""
+"""Emitted code against the interpreter, for every target and number of lanes."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from llvmlite import binding
 from dynx.simd.emit import Settings, emit
 from dynx.simd.expr import ARITY, Graph, Op, Simplify
 from dynx.simd.interp import Function, interpret
-from dynx.simd.program import Port, Program, finished
+from dynx.simd.program import Port, Program, extract_program
 from dynx.simd.simplify import FAST, STRICT
 from dynx.simd.target import Target
 from dynx.spatial.scalar import Floats
@@ -34,19 +34,19 @@ FUNCTIONS: tuple[Op, ...] = ("sin", "cos", "exp", "tanh", "arctan")
 TARGET = st.sampled_from(TARGETS)
 LANE = st.sampled_from(LANES)
 BATCH = st.integers(0, 17)
-"""How many samples there are above the least, up to two groups and one."""
+"""Number of samples beyond the least, up to two groups and one sample."""
 LAYOUTS = ("rows", "padded", "every second", "backwards", "one row")
 
 
 @functools.cache
-def own_functions(target: Target) -> dict[Op, Function]:
+def kernel_functions(target: Target) -> dict[Op, Function]:
     """Elementary functions as the kernels of `target` compute them; `test_trigonometry` and
     `test_elementary` judge these."""
     functions: dict[Op, Function] = {}
     for op in FUNCTIONS:
         graph = Graph()
-        result = graph.literal(op, graph.input(0))
-        program = finished(graph, [Port("x", (1,))], [Port(op, (1,))], [result])
+        result = graph.apply_unsimplified(op, graph.input(0))
+        program = extract_program(graph, [Port("x", (1,))], [Port(op, (1,))], [result])
         machine = Machine(program, target, Settings(2, fast=False))
 
         def function(x: Floats, machine: Machine = machine) -> Floats:
@@ -56,17 +56,17 @@ def own_functions(target: Target) -> dict[Op, Function]:
     return functions
 
 
-def laid_out(array: Floats, layout: str) -> Floats:
-    """A view with the numbers of `array`, whose rows lie in memory as `layout` says."""
+def with_layout(array: Floats, layout: str) -> Floats:
+    """Return a view with the numbers of `array` and the memory layout `layout`."""
     n, width = array.shape
     if layout == "padded":
-        room = np.full((n, width + 3), np.nan)
-        room[:, 1 : width + 1] = array
-        return room[:, 1 : width + 1]
+        block = np.full((n, width + 3), np.nan)
+        block[:, 1 : width + 1] = array
+        return block[:, 1 : width + 1]
     if layout == "every second":
-        room = np.full((2 * n, width), np.nan)
-        room[::2] = array
-        return room[::2]
+        block = np.full((2 * n, width), np.nan)
+        block[::2] = array
+        return block[::2]
     if layout == "backwards":
         return np.flip(np.flip(array, 0).copy(), 0)
     if layout == "one row":
@@ -74,9 +74,9 @@ def laid_out(array: Floats, layout: str) -> Floats:
     return array
 
 
-def drawn(program: Program, rng: np.random.Generator, n: int, *, special: bool) -> list[Floats]:
+def draw_inputs(program: Program, rng: np.random.Generator, n: int, *, special: bool) -> list[Floats]:
     numbers = doubles if special else ordinary
-    return [laid_out(numbers(rng, (n, port.size)), str(rng.choice(LAYOUTS))) for port in program.inputs]
+    return [with_layout(numbers(rng, (n, port.size)), str(rng.choice(LAYOUTS))) for port in program.inputs]
 
 
 @given(programs(), TARGET, LANE, BATCH, st.sampled_from((5, 2500)), RANDOM)
@@ -84,8 +84,8 @@ def test_strict_code_is_the_interpreter_bit_for_bit(
     program: Program, target: Target, lanes: int, more: int, segment: int, rng: np.random.Generator
 ) -> None:
     n = lanes + min(more, 2 * lanes + 1)
-    inputs = drawn(program, rng, n, special=True)
-    wanted = interpret(program, inputs, own_functions(target))
+    inputs = draw_inputs(program, rng, n, special=True)
+    wanted = interpret(program, inputs, kernel_functions(target))
     got = Machine(program, target, Settings(lanes, fast=False, segment=segment))(inputs)
     for port, a, b in zip(program.outputs, got, wanted, strict=True):
         assert same_bits(a, b), port
@@ -110,7 +110,7 @@ def test_fast_code_is_the_interpreter_to_rounding(
     rng: np.random.Generator,
 ) -> None:
     n = lanes + min(more, 2 * lanes + 1)
-    inputs = drawn(program, rng, n, special=False)
+    inputs = draw_inputs(program, rng, n, special=False)
     wanted = interpret(program, inputs)
     short = simplified(program, simplify)
     got = Machine(short, target, Settings(lanes, segment=segment))(inputs)
@@ -124,8 +124,11 @@ def test_fast_code_contracts_and_strict_code_does_not() -> None:
     """a b - c with a b = 1 - 2^-104, c = 1: one rounding gives -2^-104, two give 0."""
     graph = Graph()
     a, b, c = (graph.input(slot) for slot in range(3))
-    program = finished(
-        graph, [Port("x", (3,))], [Port("y", (1,))], [graph.literal("sub", graph.literal("mul", a, b), c)]
+    program = extract_program(
+        graph,
+        [Port("x", (3,))],
+        [Port("y", (1,))],
+        [graph.apply_unsimplified("sub", graph.apply_unsimplified("mul", a, b), c)],
     )
     x = np.array([[1.0 + 2.0**-52, 1.0 - 2.0**-52, 1.0]] * 2)
     for target in TARGETS:
@@ -134,22 +137,20 @@ def test_fast_code_contracts_and_strict_code_does_not() -> None:
         assert np.all(fast == (-(2.0**-104) if target.fma else 0.0))
 
 
-def everything() -> Program:
-    """Every operation on its own, on two inputs."""
+def all_operations() -> Program:
+    """Return a program with every operation once, on two inputs."""
     graph = Graph()
     pair = graph.input(0), graph.input(1)
-    results = [graph.literal(op, *pair[: ARITY[op]]) for op in OPERATIONS]
-    return finished(graph, [Port("x", (2,))], [Port("y", (len(results),))], results)
+    results = [graph.apply_unsimplified(op, *pair[: ARITY[op]]) for op in OPERATIONS]
+    return extract_program(graph, [Port("x", (2,))], [Port("y", (len(results),))], results)
 
 
 @pytest.mark.parametrize("target", TARGETS, ids=lambda target: target.cpu)
 @pytest.mark.parametrize("lanes", LANES)
 @pytest.mark.parametrize("fast", [False, True], ids=["strict", "fast"])
 @pytest.mark.parametrize("poison", [np.nan, np.inf, -np.inf, 1e300, 2.0**-1074])
-def test_a_lane_knows_nothing_of_its_neighbours(
-    target: Target, lanes: int, fast: bool, poison: float
-) -> None:
-    machine = Machine(everything(), target, Settings(lanes, fast=fast))
+def test_lanes_are_independent(target: Target, lanes: int, fast: bool, poison: float) -> None:
+    machine = Machine(all_operations(), target, Settings(lanes, fast=fast))
     x = ordinary(np.random.default_rng(lanes), (lanes, 2))
     (clean,) = machine([x])
     for lane in range(lanes):
@@ -163,33 +164,33 @@ def test_a_lane_knows_nothing_of_its_neighbours(
 
 
 @given(programs(), TARGET, LANE, BATCH, st.sampled_from(("padded", "every second")), RANDOM)
-def test_nothing_is_written_outside_of_the_rows(
+def test_no_memory_outside_the_rows_is_written(
     program: Program, target: Target, lanes: int, more: int, layout: str, rng: np.random.Generator
 ) -> None:
     n = lanes + min(more, 2 * lanes + 1)
-    inputs = drawn(program, rng, n, special=True)
+    inputs = draw_inputs(program, rng, n, special=True)
     machine = Machine(program, target, Settings(lanes, fast=False))
     wanted = machine(inputs)
     mark = -123.456
-    rooms = [np.full((2 * n, port.size + 3), mark) for port in program.outputs]
+    blocks = [np.full((2 * n, port.size + 3), mark) for port in program.outputs]
     views = [
-        room[:n, 1 : port.size + 1] if layout == "padded" else room[::2, : port.size]
-        for room, port in zip(rooms, program.outputs, strict=True)
+        block[:n, 1 : port.size + 1] if layout == "padded" else block[::2, : port.size]
+        for block, port in zip(blocks, program.outputs, strict=True)
     ]
     machine.fill(inputs, views, n)
-    for room, view, right in zip(rooms, views, wanted, strict=True):
+    for block, view, right in zip(blocks, views, wanted, strict=True):
         assert same_bits(view, right)
         view[:] = mark
-        assert np.all(room == mark)
+        assert np.all(block == mark)
 
 
-def test_samples_do_not_depend_on_their_place_in_the_batch() -> None:
-    """The last group overlaps the one before; every size gives every sample the same bits."""
+def test_results_do_not_depend_on_the_position_in_the_batch() -> None:
+    """The last group overlaps the one before; results are the same bits for every batch size."""
     rng = np.random.default_rng(4)
     x = doubles(rng, (33, 2))
     for target in TARGETS:
         for lanes in LANES:
-            machine = Machine(everything(), target, Settings(lanes))
+            machine = Machine(all_operations(), target, Settings(lanes))
             (whole,) = machine([x])
             for n in range(lanes, 33):
                 assert same_bits(machine([x[:n]])[0], whole[:n])
@@ -199,12 +200,12 @@ def _ports(sizes: Sequence[int], stem: str) -> list[Port]:
     return [Port(f"{stem}{k}", (size,)) for k, size in enumerate(sizes)]
 
 
-def test_inputs_go_through_to_outputs_of_every_width() -> None:
+def test_inputs_are_copied_to_outputs_of_every_width() -> None:
     """Loads and stores of every tile shape, with nothing in between."""
     sizes = range(1, 20)
     graph = Graph()
     slots = [graph.input(slot) for slot in range(sum(sizes))]
-    program = finished(graph, _ports(sizes, "in"), _ports(sizes, "out"), slots)
+    program = extract_program(graph, _ports(sizes, "in"), _ports(sizes, "out"), slots)
     rng = np.random.default_rng(5)
     for target in TARGETS:
         for lanes in LANES:
@@ -221,9 +222,9 @@ CROSS = (
 
 @pytest.mark.skipif(not X86, reason="LLVM is built for this machine's family")
 @pytest.mark.parametrize("target", CROSS, ids=lambda target: target.cpu)
-def test_other_processors_of_the_family_get_code(target: Target) -> None:
-    """It cannot be run here, but LLVM takes it, with vectors as wide as that processor has."""
-    program = everything()
+def test_code_for_other_processors_of_the_family(target: Target) -> None:
+    """The code cannot run here, but LLVM accepts it and uses that processor's widest vectors."""
+    program = all_operations()
     machine = target.machine()
     module = binding.parse_assembly(emit(program, target, Settings(target.lanes)))
     register = {8: "%zmm", 2: "%xmm"}[target.lanes]

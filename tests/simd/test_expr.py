@@ -1,4 +1,4 @@
-"""Nodes exist once; symbols build what the same code computes on numbers."""
+"""Nodes are unique; symbols build the expression that the same code computes on numbers."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dynx.simd.expr import Graph, Symbol, identity
+from dynx.simd.expr import Graph, Symbol, constant_key
 from dynx.simd.interp import interpret
-from dynx.simd.program import Port, finished
+from dynx.simd.program import Port, extract_program
 from tests.simd.machine import same_bits
 
 FUNCTIONS: dict[str, Callable[[Any, Any], Any]] = {
@@ -35,7 +35,7 @@ def symbols() -> tuple[Graph, Symbol, Symbol]:
 
 def value(graph: Graph, symbol: Any, x: float, y: float) -> float:
     assert isinstance(symbol, Symbol)
-    program = finished(graph, [Port("x", (2,))], [Port("z", (1,))], [symbol.index])
+    program = extract_program(graph, [Port("x", (2,))], [Port("z", (1,))], [symbol.index])
     return float(interpret(program, [np.array([[x, y]])])[0][0, 0])
 
 
@@ -65,7 +65,7 @@ def test_arithmetic_on_symbols_is_that_on_numbers(name: str, x: float, y: float,
         assert result == function(x, y)
 
 
-def test_methods_that_numpy_and_dynx_look_for() -> None:
+def test_methods_called_by_numpy_and_dynx() -> None:
     graph, a, b = symbols()
     for got, wanted in (
         (a.sin(), math.sin(0.3)),
@@ -91,7 +91,7 @@ def test_equal_operations_are_one_node() -> None:
     assert len(graph) == grown > size
 
 
-def test_constants_are_told_apart_by_their_bits() -> None:
+def test_constants_are_distinguished_by_their_bits() -> None:
     graph = Graph()
     zeros = graph.constant(0.0), graph.constant(-0.0)
     assert zeros[0] != zeros[1]
@@ -102,11 +102,11 @@ def test_constants_are_told_apart_by_their_bits() -> None:
 
 
 @given(st.floats(), st.floats())
-def test_identity_is_that_of_bits(x: float, y: float) -> None:
-    assert (identity(x) == identity(y)) == bool(same_bits(np.array([x]), np.array([y])))
+def test_constant_key_distinguishes_bits(x: float, y: float) -> None:
+    assert (constant_key(x) == constant_key(y)) == bool(same_bits(np.array([x]), np.array([y])))
 
 
-def test_other_operands_are_no_numbers() -> None:
+def test_other_operands_raise() -> None:
     _, a, _ = symbols()
     for other in ("1", None, [1.0], 1j):
         with pytest.raises(TypeError, match="unsupported operand"):

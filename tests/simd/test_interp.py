@@ -9,7 +9,7 @@ import pytest
 
 from dynx.simd.expr import ARITY, Graph, Op
 from dynx.simd.interp import interpret
-from dynx.simd.program import Port, finished
+from dynx.simd.program import Port, extract_program
 from tests.simd.machine import same_bits
 
 NAN, INF = math.nan, math.inf
@@ -60,7 +60,9 @@ CASES: list[tuple[Op, tuple[float, ...], float]] = [
 def test_an_operation_means(op: Op, numbers: tuple[float, ...], wanted: float) -> None:
     graph = Graph()
     args = [graph.input(slot) for slot in range(len(numbers))]
-    program = finished(graph, [Port("x", (len(args),))], [Port("y", (1,))], [graph.literal(op, *args)])
+    program = extract_program(
+        graph, [Port("x", (len(args),))], [Port("y", (1,))], [graph.apply_unsimplified(op, *args)]
+    )
     (y,) = interpret(program, [np.array([numbers])])
     assert same_bits(y, np.array([[wanted]]))
 
@@ -72,10 +74,11 @@ def test_every_operation_has_a_case() -> None:
 def test_ports_in_order_and_constants_for_every_sample() -> None:
     graph = Graph()
     a, b, c = (graph.input(slot) for slot in range(3))
-    results = [graph.constant(7.0), c, graph.literal("sub", a, b)]
+    results = [graph.constant(7.0), c, graph.apply_unsimplified("sub", a, b)]
     ports = [Port("p", (2,)), Port("q", ())], [Port("r", (1,)), Port("s", (2,))]
     r, s = interpret(
-        finished(graph, *ports, results), [np.array([[1.0, 2.0], [5.0, 3.0]]), np.array([[4.0], [8.0]])]
+        extract_program(graph, *ports, results),
+        [np.array([[1.0, 2.0], [5.0, 3.0]]), np.array([[4.0], [8.0]])],
     )
     assert r.tolist() == [[7.0], [7.0]]
     assert s.tolist() == [[4.0, -1.0], [8.0, 2.0]]

@@ -23,18 +23,18 @@ from dynx.simd.trace import trace
 from dynx.spatial.scalar import Array, Floats, cos, sin
 
 
-def law(x: Array, y: Array) -> Mapping[str, Array]:
-    """Of x (3,) and y (2,); each operation rounds alike in NumPy and in a strict kernel."""
+def function(x: Array, y: Array) -> Mapping[str, Array]:
+    """Compute sums of x (3,) and y (2,); each operation rounds alike in NumPy and in a strict kernel."""
     return {"sums": np.stack([x[0] + y[0], x[1] * y[1], x[2] - y[0], x[0] / y[1]]), "first": x[:1]}
 
 
-PROGRAM = trace(law, {"x": (3,), "y": (2,)}, simplify=None)
+PROGRAM = trace(function, {"x": (3,), "y": (2,)}, simplify=None)
 LANES = (2, 4, 8)
 
 
 @pytest.fixture(scope="module", params=LANES)
 def kernel(request: pytest.FixtureRequest) -> Kernel:
-    """A strict kernel of `law`, of every number of lanes."""
+    """Compile a strict kernel of `function`, for every number of lanes."""
     return Kernel(PROGRAM, settings=Settings(request.param, fast=False))
 
 
@@ -43,7 +43,7 @@ def batch(n: int) -> tuple[Floats, Floats]:
     return rng.standard_normal((n, 3)), rng.standard_normal((n, 2))
 
 
-def wanted(x: Floats, y: Floats) -> tuple[Floats, Floats]:
+def expected(x: Floats, y: Floats) -> tuple[Floats, Floats]:
     sums = np.stack([x[:, 0] + y[:, 0], x[:, 1] * y[:, 1], x[:, 2] - y[:, 0], x[:, 0] / y[:, 1]], axis=-1)
     return sums, x[:, :1].copy()
 
@@ -52,22 +52,22 @@ def empty(n: int) -> tuple[Floats, Floats]:
     return np.full((n, 4), np.nan), np.full((n, 1), np.nan)
 
 
-def assert_answers(found: tuple[Floats, Floats], x: Floats, y: Floats) -> None:
-    for got, want in zip(found, wanted(x, y), strict=True):
+def assert_results(found: tuple[Floats, Floats], x: Floats, y: Floats) -> None:
+    for got, want in zip(found, expected(x, y), strict=True):
         np.testing.assert_array_equal(got, want)
 
 
 @pytest.mark.parametrize("n", [*range(20), 100, 1001])
 def test_any_number_of_samples(kernel: Kernel, n: int) -> None:
     x, y = batch(n)
-    # What lies behind the last row stays as it is.
+    # Memory behind the last row is not written.
     around = np.full((n + 3, 4), 7.0), np.full((n + 3, 1), 7.0)
     kernel([x, y], [array[:n] for array in around])
-    assert_answers((around[0][:n], around[1][:n]), x, y)
+    assert_results((around[0][:n], around[1][:n]), x, y)
     assert all(np.all(array[n:] == 7.0) for array in around)
 
 
-ARRANGED: dict[str, Callable[[Floats], Floats]] = {
+LAYOUTS: dict[str, Callable[[Floats], Floats]] = {
     "every other row": lambda a: np.repeat(a, 2, axis=0)[::2],
     "backwards": lambda a: np.ascontiguousarray(a[::-1])[::-1],
     "columns of a wider array": lambda a: np.hstack([a, a])[:, : a.shape[1]],
@@ -92,21 +92,21 @@ def _locked(a: Floats) -> Floats:
 
 
 @pytest.mark.parametrize("n", [1, 3, 13])
-@pytest.mark.parametrize("arranged", ARRANGED.values(), ids=ARRANGED)
-def test_inputs_however_they_lie(kernel: Kernel, n: int, arranged: Callable[[Floats], Floats]) -> None:
+@pytest.mark.parametrize("layout", LAYOUTS.values(), ids=LAYOUTS)
+def test_inputs_of_any_layout(kernel: Kernel, n: int, layout: Callable[[Floats], Floats]) -> None:
     x, y = batch(n)
     found = empty(n)
-    kernel([arranged(x), arranged(y)], found)
-    assert_answers(found, x, y)
+    kernel([layout(x), layout(y)], found)
+    assert_results(found, x, y)
 
 
 @pytest.mark.parametrize("n", [1, 3, 13])
-@pytest.mark.parametrize("how", [how for how in ARRANGED if how != "read-only"])
-def test_outputs_however_they_lie(kernel: Kernel, n: int, how: str) -> None:
+@pytest.mark.parametrize("how", [how for how in LAYOUTS if how != "read-only"])
+def test_outputs_of_any_layout(kernel: Kernel, n: int, how: str) -> None:
     x, y = batch(n)
-    sums, first = (ARRANGED[how](array) for array in empty(n))
+    sums, first = (LAYOUTS[how](array) for array in empty(n))
     kernel([x, y], [sums, first])
-    assert_answers((sums, first), x, y)
+    assert_results((sums, first), x, y)
 
 
 @pytest.mark.parametrize("n", [1, 2, 9])
@@ -115,28 +115,28 @@ def test_one_sample_for_a_whole_batch(kernel: Kernel, n: int) -> None:
     row = np.broadcast_to(x[:1], (n, 3))
     found = empty(n)
     kernel([row, y], found)
-    assert_answers(found, np.array(row), y)
+    assert_results(found, np.array(row), y)
 
 
 @pytest.mark.parametrize("n", [1, 3, 21])
 @pytest.mark.parametrize("shift", [-1, 0, 1])
-def test_an_output_over_an_input(kernel: Kernel, n: int, shift: int) -> None:
-    """As if the answers had been written after all inputs were read."""
+def test_output_sharing_memory_with_an_input(kernel: Kernel, n: int, shift: int) -> None:
+    """The results are as if all inputs had been read before any output is written."""
     room = np.random.default_rng(n).standard_normal((n + 2, 5))
     x = room[1 : n + 1, :3]
     y = batch(n)[1]
     before = x.copy()
     sums, first = room[1 + shift : n + 1 + shift, 1:], np.empty((n, 1))
     kernel([x, y], [sums, first])
-    assert_answers((sums, first), before, y)
+    assert_results((sums, first), before, y)
 
 
-def test_outputs_over_each_other(kernel: Kernel) -> None:
+def test_outputs_sharing_memory(kernel: Kernel) -> None:
     """The later one is written last."""
     x, y = batch(9)
     room = np.empty((9, 4))
     kernel([x, y], [room, room[:, 2:3]])
-    want = wanted(x, y)
+    want = expected(x, y)
     np.testing.assert_array_equal(room[:, 2:3], want[1])
     np.testing.assert_array_equal(room[:, [0, 1, 3]], want[0][:, [0, 1, 3]])
 
@@ -153,8 +153,8 @@ def test_ports_without_entries() -> None:
     np.testing.assert_array_equal(constant, np.tile([1.0, 2.0], (5, 1)))
 
 
-def test_neighbours_do_not_matter() -> None:
-    """Bit for bit the same answer alone, in any lane, beside NaN, among others."""
+def test_results_do_not_depend_on_other_samples() -> None:
+    """A sample has the same result bits alone, in any lane, beside NaN and within a batch."""
     kernel = Kernel(trace(lambda x: np.stack([sin(x[0]) * x[1], cos(x[1]) + x[0]]), {"x": (2,)}))
     x = np.random.default_rng(1).uniform(-9.0, 9.0, (37, 2))
     x[5], x[20] = np.nan, 1e7
@@ -165,7 +165,7 @@ def test_neighbours_do_not_matter() -> None:
         alone = np.empty((1, 2))
         kernel([x[k : k + 1]], [alone])
         np.testing.assert_array_equal(alone[0], whole[k])
-        room.inputs[room.places[0]] = x[k].data
+        room.inputs[room.input_slices[0]] = x[k].data
         room.run()
         np.testing.assert_array_equal(room.results[0], whole[k])
     for first in range(12):
@@ -176,28 +176,28 @@ def test_neighbours_do_not_matter() -> None:
 
 @pytest.mark.parametrize("threads", [2, 3, 16])
 @pytest.mark.parametrize("n", [1, 3, 8, 9, 100, 1003])
-def test_threads_change_nothing(
+def test_results_do_not_depend_on_the_number_of_threads(
     kernel: Kernel, monkeypatch: pytest.MonkeyPatch, n: int, threads: int
 ) -> None:
-    monkeypatch.setattr(kernel_module, "PART", 1.0)
+    monkeypatch.setattr(kernel_module, "MIN_PART_WORK", 1.0)
     x, y = batch(n)
     found = empty(n)
     kernel([x, y], found, threads=threads)
-    assert_answers(found, x, y)
+    assert_results(found, x, y)
     backwards = empty(n)
     kernel([x[::-1], y[::-1]], [array[::-1] for array in backwards], threads=threads)
-    assert_answers(backwards, x, y)
+    assert_results(backwards, x, y)
 
 
 def test_several_threads_share_a_kernel(kernel: Kernel) -> None:
-    def ask(n: int) -> None:
+    def evaluate(n: int) -> None:
         x, y = batch(n)
         found = empty(n)
         kernel([x, y], found)
-        assert_answers(found, x, y)
+        assert_results(found, x, y)
 
     with ThreadPoolExecutor(4) as pool:
-        for done in [pool.submit(ask, n) for n in range(200)]:
+        for done in [pool.submit(evaluate, n) for n in range(200)]:
             done.result()
 
 
@@ -208,12 +208,12 @@ def test_workspace_of_several_samples(kernel: Kernel, samples: int) -> None:
         x, y = batch(n)
         room.input_rows[0][:n], room.input_rows[1][:n] = x, y
         room.run_rows(n)
-        assert_answers((room.output_rows[0][:n], room.output_rows[1][:n]), x, y)
-        room.inputs[room.places[0]] = x[0].data
-        room.inputs[room.places[1]] = y[0].data
+        assert_results((room.output_rows[0][:n], room.output_rows[1][:n]), x, y)
+        room.inputs[room.input_slices[0]] = x[0].data
+        room.inputs[room.input_slices[1]] = y[0].data
         room.run()
-        assert_answers((room.results[0][None], room.results[1][None]), x[:1], y[:1])
-        assert room.numbers[room.found_places[1]].tolist() == [x[0, 0]]
+        assert_results((room.results[0][None], room.results[1][None]), x[:1], y[:1])
+        assert room.output_values[room.output_slices[1]].tolist() == [x[0, 0]]
 
 
 # -- refused -----------------------------------------------------------------------------------------
@@ -242,7 +242,7 @@ def test_arrays_that_do_not_fit(kernel: Kernel) -> None:
     assert np.isnan(good[0]).all()
 
 
-def test_an_image_that_is_none() -> None:
+def test_an_invalid_image_raises() -> None:
     image = Kernel(PROGRAM).image
     with pytest.raises(CompileError, match="linked"):
         Kernel(replace(image, code=b"no object file"))
@@ -254,7 +254,7 @@ def test_an_image_that_is_none() -> None:
 def test_a_closed_kernel_refuses_and_frees_its_code() -> None:
     kernel = Kernel(PROGRAM)
     room = kernel.workspace()
-    code = weakref.ref(kernel._opened())
+    code = weakref.ref(kernel._open_code())
     kernel.close()
     kernel.close()
     x, y = batch(4)
@@ -262,19 +262,19 @@ def test_a_closed_kernel_refuses_and_frees_its_code() -> None:
         kernel([x, y], empty(4))
     with pytest.raises(ClosedError):
         kernel.workspace()
-    # A workspace that is still held works on.
-    room.inputs[room.places[0]], room.inputs[room.places[1]] = x[0].data, y[0].data
+    # A workspace that is still referenced keeps working.
+    room.inputs[room.input_slices[0]], room.inputs[room.input_slices[1]] = x[0].data, y[0].data
     room.run()
-    assert_answers((room.results[0][None], room.results[1][None]), x[:1], y[:1])
+    assert_results((room.results[0][None], room.results[1][None]), x[:1], y[:1])
     assert code() is not None
     del room
     gc.collect()
     assert code() is None
 
 
-def test_a_kernel_out_of_use_frees_its_code() -> None:
+def test_an_unreferenced_kernel_frees_its_code() -> None:
     kernel = Kernel(PROGRAM)
-    code = weakref.ref(kernel._opened())
+    code = weakref.ref(kernel._open_code())
     kernel([*batch(3)], empty(3))
     del kernel
     gc.collect()
@@ -286,7 +286,7 @@ def test_pickling(kernel: Kernel) -> None:
     x, y = batch(11)
     found = empty(11)
     copy([x, y], found)
-    assert_answers(found, x, y)
+    assert_results(found, x, y)
 
 
 def test_another_machines_code_is_refused() -> None:
@@ -301,14 +301,14 @@ def _ask_in_child(kernel: Kernel, x: Floats, y: Floats) -> None:
     found = empty(len(x))
     kernel([x, y], found, threads=2)
     Kernel(PROGRAM)([x, y], found)
-    assert_answers(found, x, y)
+    assert_results(found, x, y)
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="this system cannot fork")
 @pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
 def test_a_forked_child_uses_and_makes_kernels(kernel: Kernel, monkeypatch: pytest.MonkeyPatch) -> None:
     """After the parent has started threads, of which the child has none."""
-    monkeypatch.setattr(kernel_module, "PART", 1.0)
+    monkeypatch.setattr(kernel_module, "MIN_PART_WORK", 1.0)
     x, y = batch(1000)
     kernel([x, y], empty(1000), threads=2)
     child = multiprocessing.get_context("fork").Process(target=_ask_in_child, args=(kernel, x, y))

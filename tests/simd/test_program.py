@@ -7,7 +7,7 @@ from collections import Counter
 from hypothesis import given
 
 from dynx.simd.expr import Graph
-from dynx.simd.program import Port, Program, finished
+from dynx.simd.program import Port, Program, extract_program
 from tests.simd.programs import programs, simplified
 
 
@@ -18,8 +18,10 @@ def test_sizes() -> None:
 def test_dead_nodes_are_left_out_and_inputs_keep_their_number() -> None:
     graph = Graph()
     a, b = graph.input(0), graph.input(1)
-    graph.literal("sin", a)
-    program = finished(graph, [Port("x", (2,))], [Port("y", (2,))], [graph.literal("neg", b), b])
+    graph.apply_unsimplified("sin", a)
+    program = extract_program(
+        graph, [Port("x", (2,))], [Port("y", (2,))], [graph.apply_unsimplified("neg", b), b]
+    )
     assert [(node.op, node.args, node.slot) for node in program.nodes] == [
         ("input", (), 1),
         ("neg", (0,), -1),

@@ -1,4 +1,4 @@
-"""Segments: how long they are, what they keep, and that angles are taken together."""
+"""Segments: their length, the values they spill, and the grouping of angles."""
 
 from __future__ import annotations
 
@@ -6,25 +6,25 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dynx.simd.expr import Graph
-from dynx.simd.program import Port, Program, finished
-from dynx.simd.schedule import LEAVES, Segment, TrigGroup, places_of_kept, schedule
+from dynx.simd.program import Port, Program, extract_program
+from dynx.simd.schedule import LEAVES, Segment, TrigGroup, schedule, spill_slots
 from tests.simd.programs import programs
 
 
 @given(programs(), st.integers(1, 30))
-def test_segments_are_no_longer_than_asked(program: Program, longest: int) -> None:
-    """But for a group of angles, which is not cut."""
+def test_segments_respect_the_length_limit(program: Program, longest: int) -> None:
+    """A group of angles is exempt, since it is never divided."""
     for segment in schedule(program, 4, longest):
         if not any(isinstance(step, TrigGroup) for step in segment.steps):
             assert len(segment.steps) <= longest
 
 
 @given(programs(), st.integers(1, 30))
-def test_nothing_is_kept_that_no_later_segment_uses(program: Program, longest: int) -> None:
+def test_only_values_used_by_later_segments_are_spilled(program: Program, longest: int) -> None:
     segments = schedule(program, 4, longest)
     for number, segment in enumerate(segments):
-        assert segment.kept <= used_by(program, segments[number + 1 :])
-        assert not any(program.nodes[node].op in LEAVES for node in segment.kept)
+        assert segment.spilled <= used_by(program, segments[number + 1 :])
+        assert not any(program.nodes[node].op in LEAVES for node in segment.spilled)
 
 
 def used_by(program: Program, segments: list[Segment]) -> set[int]:
@@ -37,35 +37,35 @@ def used_by(program: Program, segments: list[Segment]) -> set[int]:
 
 
 @given(programs(), st.integers(1, 30))
-def test_what_is_still_wanted_is_not_overwritten(program: Program, longest: int) -> None:
-    """A segment writes what it keeps while later steps of its own still read what others kept."""
+def test_slots_still_in_use_are_not_overwritten(program: Program, longest: int) -> None:
+    """A segment writes its spilled values while its later steps still read those of other segments."""
     segments = schedule(program, 4, longest)
-    places = places_of_kept(program, segments)
-    assert set(places) == {value for segment in segments for value in segment.kept}
+    slots = spill_slots(program, segments)
+    assert set(slots) == {value for segment in segments for value in segment.spilled}
     for number, segment in enumerate(segments):
-        wanted = used_by(program, segments[number:])
-        earlier = {value for before in segments[:number] for value in before.kept} & wanted
-        alive = [places[value] for value in (*earlier, *segment.kept)]
+        needed = used_by(program, segments[number:])
+        earlier = {value for before in segments[:number] for value in before.spilled} & needed
+        alive = [slots[value] for value in (*earlier, *segment.spilled)]
         assert len(set(alive)) == len(alive)
 
 
 @given(programs())
-def test_a_short_program_is_one_segment_that_keeps_nothing(program: Program) -> None:
+def test_a_short_program_is_one_segment_without_spills(program: Program) -> None:
     (segment,) = schedule(program, 4, 10**6)
-    assert not segment.kept
+    assert not segment.spilled
 
 
-def test_angles_known_at_the_same_time_share_a_group() -> None:
+def test_angles_available_at_the_same_time_share_a_group() -> None:
     """sin a, cos a, sin(a + b) are in one group, sin(sin a) in the next."""
     graph = Graph()
     a, b = graph.input(0), graph.input(1)
-    first = graph.literal("sin", a)
+    first = graph.apply_unsimplified("sin", a)
     results = [
-        graph.literal("cos", a),
-        graph.literal("sin", graph.literal("add", a, b)),
-        graph.literal("sin", first),
+        graph.apply_unsimplified("cos", a),
+        graph.apply_unsimplified("sin", graph.apply_unsimplified("add", a, b)),
+        graph.apply_unsimplified("sin", first),
     ]
-    program = finished(graph, [Port("x", (2,))], [Port("y", (3,))], results)
+    program = extract_program(graph, [Port("x", (2,))], [Port("y", (3,))], results)
     (segment,) = schedule(program, 4, 10**6)
     groups = [step for step in segment.steps if isinstance(step, TrigGroup)]
     assert [len(group.angles) for group in groups] == [2, 1]

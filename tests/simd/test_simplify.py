@@ -1,4 +1,4 @@
-"""Every rule, by its name, means what it replaces; and every rule is tried here."""
+"""Every simplification rule against the expression that it replaces."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from hypothesis import given
 from dynx.simd import simplify
 from dynx.simd.expr import ARITY, Graph, Op
 from dynx.simd.interp import interpret
-from dynx.simd.program import Port, Program, finished
+from dynx.simd.program import Port, Program, extract_program
 from dynx.simd.simplify import EXACT, FAST, FINITE, ROUNDED, STRICT, Args, Rule, simplifier
 from dynx.spatial.scalar import Floats
 from tests.simd.machine import same_bits
@@ -30,11 +30,11 @@ from tests.simd.rounding import agree, bounds
 RULES = {rule.name: rule for rule in (*EXACT, *FINITE, *ROUNDED)}
 Value = float | str
 Shape = tuple["Op | str | float | Shape", ...]
-"""An operation and its arguments; x and y are inputs, c and d constants to be drawn."""
+"""An operation and its arguments; x and y are inputs, c and d random constants."""
 
 
 def _both_ways(*shapes: Shape) -> list[Shape]:
-    """Of the outermost operation, with its arguments exchanged too."""
+    """Return each shape, and with the arguments of the outermost operation exchanged."""
     return [*shapes, *((shape[0], *shape[:0:-1]) for shape in shapes)]
 
 
@@ -101,13 +101,13 @@ def _rules(value: object) -> Iterator[Rule]:
         yield from (rule for rule in value if isinstance(rule, Rule))
 
 
-def test_the_sets_are_sorted_by_what_they_need() -> None:
+def test_the_rule_sets_match_the_preconditions() -> None:
     for rules, precondition in ((EXACT, "exact"), (FINITE, "finite"), (ROUNDED, "rounded")):
         assert {rule.precondition for rule in rules} == {precondition}
 
 
 class Both:
-    """A shape, as it is written and as one rule rewrites it; `fired` is False where it does not."""
+    """A shape with and without one rule; `fired` says whether the rule applied."""
 
     def __init__(self, rule: Rule, shape: Shape, constants: dict[str, float]) -> None:
         self._constants = constants
@@ -116,12 +116,12 @@ class Both:
             graph.input(slot)
         op, args = self._operation(graph, shape)
         kinds = {graph.nodes[arg].op for arg in args}
-        found = rule.rewrite(graph, op, args) if op in rule.ops and kinds & set(rule.among) else None
+        found = rule.rewrite(graph, op, args) if op in rule.ops and kinds & set(rule.argument_ops) else None
         self.fired = found is not None
-        written = graph.literal(op, *args)
+        written = graph.apply_unsimplified(op, *args)
         self.written = self._program(graph, written)
         self.rewritten = self._program(graph, written if found is None else found)
-        # What the rule looks up by kinds of nodes, it finds as well.
+        # The lookup by operations of the arguments finds the rule too.
         by_table = simplifier([rule])(graph, op, args)
         assert by_table == found
 
@@ -135,7 +135,7 @@ class Both:
     def _node(self, graph: Graph, part: object) -> int:
         if isinstance(part, tuple):
             op, args = self._operation(graph, part)
-            return graph.literal(op, *args)
+            return graph.apply_unsimplified(op, *args)
         if isinstance(part, float):
             return graph.constant(part)
         assert isinstance(part, str)
@@ -144,7 +144,7 @@ class Both:
         return graph.input("xyz".index(part))
 
     def _program(self, graph: Graph, result: int) -> Program:
-        return finished(graph, [Port("x", (3,))], [Port("y", (1,))], [result])
+        return extract_program(graph, [Port("x", (3,))], [Port("y", (1,))], [result])
 
     def values(self, x: Floats) -> tuple[Floats, Floats]:
         return interpret(self.written, [x])[0], interpret(self.rewritten, [x])[0]
@@ -155,7 +155,7 @@ def _constants(c: float, d: float) -> dict[str, float]:
 
 
 def _numbers(rng: np.random.Generator) -> Floats:
-    """Every pair of special numbers, and random ones."""
+    """Return every pair of special numbers, and random pairs."""
     special = np.array([*SPECIAL, *(-x for x in SPECIAL), np.nan])
     pairs = np.stack([np.repeat(special, len(special)), np.tile(special, len(special))], axis=-1)
     chosen = np.concatenate([pairs, rng.permutation(pairs)[:, :1]], axis=-1)
@@ -163,7 +163,7 @@ def _numbers(rng: np.random.Generator) -> Floats:
 
 
 @pytest.mark.parametrize(("name", "shape"), SHAPES, ids=str)
-def test_it_fires(name: str, shape: Shape) -> None:
+def test_the_rule_applies(name: str, shape: Shape) -> None:
     assert Both(RULES[name], shape, _constants(3.0, 7.0)).fired
 
 
@@ -238,7 +238,7 @@ def test_all_rules_together_keep_random_programs_to_rounding(
 def test_bounds_of_rounding_are_finite_where_nothing_divides(
     program: Program, rng: np.random.Generator
 ) -> None:
-    """Otherwise the tests above would compare nothing."""
+    """Without finite bounds the tests above would compare nothing."""
     inputs = [ordinary(rng, (40, port.size)) for port in program.inputs]
     assert all(np.isfinite(bound).mean() > 0.5 for bound in bounds(program, inputs))
 
@@ -252,8 +252,8 @@ def test_one_division_serves_all_quotients_by_the_same_number() -> None:
     assert sum(node.op == "div" for node in graph.nodes) == 1
 
 
-def test_rules_do_not_chase_each_other() -> None:
-    """Every operation on every pair of small expressions ends."""
+def test_rewriting_terminates() -> None:
+    """Simplifying every operation on every pair of small expressions terminates."""
     for rules in (STRICT, FAST):
         graph = Graph(rules)
         x, y = graph.input(0), graph.input(1)

@@ -1,4 +1,4 @@
-"""Parts of a work on several threads."""
+"""Parts of a task on several threads."""
 
 from __future__ import annotations
 
@@ -8,12 +8,13 @@ from collections import Counter
 import pytest
 
 from dynx.errors import ArgumentError
-from dynx.simd.threads import checked_threads, cores, run_parts
+from dynx.simd.machine import core_count
+from dynx.simd.threads import checked_threads, run_parts
 
 
 @pytest.mark.parametrize("threads", [1, 2, 5, 50])
 @pytest.mark.parametrize("parts", [0, 1, 2, 7, 300])
-def test_every_part_is_done_once(parts: int, threads: int) -> None:
+def test_every_part_runs_once(parts: int, threads: int) -> None:
     done: list[int] = []
     run_parts(done.append, parts, threads)
     assert Counter(done) == Counter(range(parts))
@@ -31,7 +32,7 @@ def test_parts_run_at_the_same_time() -> None:
     run_parts(lambda part: meeting.wait(30), 2, 2)
 
 
-def test_no_more_threads_than_asked() -> None:
+def test_at_most_the_given_number_of_threads() -> None:
     most, now, lock = 0, 0, threading.Lock()
     step = threading.Event()
 
@@ -78,14 +79,14 @@ def test_many_callers_share_the_threads() -> None:
 
 
 def test_parts_within_parts() -> None:
-    """A part that asks for threads of its own does not wait for one that is busy with its caller."""
+    """A part that starts parts of its own does not wait for a thread that runs its caller."""
     done: list[int] = []
     run_parts(lambda part: run_parts(done.append, 3, 4), 6, 4)
     assert Counter(done) == Counter([0, 1, 2] * 6)
 
 
 def test_numbers_of_threads() -> None:
-    assert checked_threads(None) == cores() >= 1
+    assert checked_threads(None) == core_count() >= 1
     assert checked_threads(3) == 3
     for odd in (0, -1, 1.5, "2", True):
         with pytest.raises(ArgumentError, match="threads is"):

@@ -1,4 +1,4 @@
-"""Tracing: what a traced function may do, and which of its lines is named where it does more."""
+"""Tracing: permitted operations, and the line named in the error for others."""
 
 from __future__ import annotations
 
@@ -126,16 +126,18 @@ def _allclose(x: Array) -> Any:
     return np.array_equal(x, x[::-1])
 
 
-ASKING = (_if, _truth, _equal, _member, _key, _float, _index, _round)
-ASKING_THROUGH_NUMPY = (_maximum, _where, _sort, _clip, _median, _as_floats, _allclose)
+VALUE_NEEDED = (_if, _truth, _equal, _member, _key, _float, _index, _round)
+VALUE_NEEDED_BY_NUMPY = (_maximum, _where, _sort, _clip, _median, _as_floats, _allclose)
 
 
-@pytest.mark.parametrize("function", [*ASKING, *ASKING_THROUGH_NUMPY], ids=lambda function: function.__name__)
-def test_asking_for_a_value_names_the_line_that_asks(function: Callable[[Array], Any]) -> None:
+@pytest.mark.parametrize(
+    "function", [*VALUE_NEEDED, *VALUE_NEEDED_BY_NUMPY], ids=lambda function: function.__name__
+)
+def test_the_error_names_the_line_that_needs_a_value(function: Callable[[Array], Any]) -> None:
     with pytest.raises(TraceError) as caught:
         trace(function, {"x": (3,)})
     line = inspect.getsourcelines(function)[1] + 1
-    assert f"{__file__}:{line} asks for the value of a symbol" in str(caught.value)
+    assert f"{__file__}:{line} needs the value of a symbol" in str(caught.value)
 
 
 def test_two_traces_do_not_mix() -> None:
@@ -171,15 +173,15 @@ def test_results_may_be_any_real_number() -> None:
     assert y.tolist() == [[1.0, 1.0, 0.5, 3.0, 2.5]] * 2
 
 
-def test_tracing_ends_with_a_check_of_what_it_made(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_tracing_ends_with_a_check_of_the_program(monkeypatch: pytest.MonkeyPatch) -> None:
     broken = Program((), (), (Port("y", (1,)),), (5,))
-    monkeypatch.setattr("dynx.simd.trace.finished", lambda *_: broken)
+    monkeypatch.setattr("dynx.simd.trace.extract_program", lambda *_: broken)
     with pytest.raises(CompileError, match="a result is node 5 of 0"):
         trace(lambda x: x, {"x": (1,)})
 
 
 @pytest.mark.parametrize("fast", [True, False])
-def test_cutting_keeps_what_is_no_number(fast: bool) -> None:
+def test_clamping_propagates_nan(fast: bool) -> None:
     limit = np.array([1.0, 1.0, 1.0, np.inf, 2.0])
     program = trace(lambda x: clamp(x, limit), {"x": (5,)}, simplify=FAST if fast else STRICT)
     x = np.array([[np.nan, np.inf, -3.0, np.nan, 0.5]])

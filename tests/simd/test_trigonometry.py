@@ -1,4 +1,4 @@
-"""Sine and cosine of kernels: how far from the exact values, with and without fused multiply-add."""
+"""Errors of the kernels' sine and cosine, with and without fused multiply-add."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from dynx.spatial.scalar import Array, Floats, cos, sin
 from tests.simd.exact import errors
 from tests.simd.machine import LANES, TARGETS, Machine, same_bits
 
-NEAR = 2.0
-"""What is promised up to `LIMIT`, in units of the last place."""
-FAR = 1.0
-"""The same beyond it."""
+MAX_ERROR = 2.0
+"""Documented error bound up to `LIMIT`, in units in the last place."""
+MAX_ERROR_BEYOND_LIMIT = 1.0
+"""Error bound beyond `LIMIT`, in units in the last place."""
 
 
 @functools.cache
@@ -38,7 +38,7 @@ def evaluated(target: Target, x: Floats, *, lanes: int = 4, fast: bool = True) -
 
 
 def nearest_doubles(first: int, last: int, quarter: bool) -> Floats:
-    """Of the multiples of pi/2, or of the points halfway between them."""
+    """Return the doubles nearest to multiples of pi/2, or to the points halfway between them."""
     with mpmath.workprec(200):
         return np.array([float((k + mpmath.mpf(quarter) / 2) * mpmath.pi / 2) for k in range(first, last)])
 
@@ -62,7 +62,7 @@ POINTS: dict[str, Floats] = {
     "tiny": np.concatenate([2.0 ** np.arange(-1074.0, -20.0), -(2.0 ** np.arange(-1074.0, -20.0))]),
     "at the limit": np.array([LIMIT, -LIMIT, np.nextafter(LIMIT, 0.0), np.nextafter(-LIMIT, 0.0)]),
 }
-# Found among 10^6 random points: the worst with and the worst without a fused multiply-add.
+# Points with the largest errors among 10^6 random ones, with and without fused multiply-add.
 POINTS["worst known"] = np.array(
     [20012.73060153038, -87673.74460542334, -1.070266328123239, 974.6791207762334, 653.9557173179303]
 )
@@ -73,7 +73,7 @@ POINTS["worst known"] = np.array(
 def test_within_two_units_up_to_the_limit(target: Target, points: str) -> None:
     x = POINTS[points]
     worst = max(error.max() for error in errors(x, *evaluated(target, x)))
-    assert worst <= NEAR
+    assert worst <= MAX_ERROR
 
 
 @pytest.mark.parametrize("target", TARGETS, ids=lambda target: target.cpu)
@@ -81,7 +81,7 @@ def test_within_one_unit_beyond_it(target: Target) -> None:
     x = np.array([1e6, 1e15, 1e22, 1e300, np.nextafter(LIMIT, np.inf), np.finfo(float).max])
     x = np.concatenate([x, -x, 10.0 ** RNG.uniform(5.0, 308.0, 1000)])
     worst = max(error.max() for error in errors(x, *evaluated(target, x)))
-    assert worst <= FAR
+    assert worst <= MAX_ERROR_BEYOND_LIMIT
 
 
 @pytest.mark.parametrize("target", TARGETS, ids=lambda target: target.cpu)
@@ -93,7 +93,7 @@ def test_infinity_and_nan_give_nan_and_zero_keeps_its_sign(target: Target) -> No
 
 @pytest.mark.parametrize("target", TARGETS, ids=lambda target: target.cpu)
 def test_odd_and_even_and_the_same_in_every_lane_and_mode(target: Target) -> None:
-    """Bit for bit: the rule that takes a sign out of sine and cosine is exact."""
+    """Bit for bit: the simplification that moves the sign out of sine and cosine is exact."""
     x = np.concatenate(
         [RNG.uniform(0.0, 10.0, 500), RNG.uniform(0.0, 2.0 * LIMIT, 500), [0.0, 5e-324, 1e300]]
     )
@@ -106,8 +106,8 @@ def test_odd_and_even_and_the_same_in_every_lane_and_mode(target: Target) -> Non
 
 
 @pytest.mark.parametrize("target", TARGETS, ids=lambda target: target.cpu)
-def test_a_large_angle_in_one_lane_leaves_the_others_alone(target: Target) -> None:
-    """All lanes take the branch, but only that lane takes what the C library says."""
+def test_a_large_angle_in_one_lane_does_not_affect_the_others(target: Target) -> None:
+    """All lanes take the branch, but only that lane uses the result of the C library."""
     x = RNG.uniform(-10.0, 10.0, 8)
     clean = evaluated(target, x, lanes=8)
     for lane in range(8):
@@ -120,7 +120,7 @@ def test_a_large_angle_in_one_lane_leaves_the_others_alone(target: Target) -> No
 
 def test_the_interpreter_takes_the_c_library() -> None:
     x = np.concatenate([POINTS["one turn"], [1e6, 1e300]])
-    assert max(error.max() for error in errors(x, sine(x), cosine(x))) <= FAR
+    assert max(error.max() for error in errors(x, sine(x), cosine(x))) <= MAX_ERROR_BEYOND_LIMIT
     assert np.all(np.isnan(sine(np.array([np.inf, -np.inf, np.nan]))))
 
 
@@ -134,7 +134,7 @@ def test_the_parts_of_half_pi_add_up() -> None:
             assert int(math.ldexp(math.frexp(part)[0], 53)) % 2**20 == 0
 
 
-def test_the_polynomials_are_as_close_as_they_say() -> None:
+def test_errors_of_the_polynomials() -> None:
     """Relative errors below 2^-56 over [0, pi/4]."""
     with mpmath.workprec(200):
         for k in range(1, 500):

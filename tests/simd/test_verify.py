@@ -1,4 +1,4 @@
-"""Legal programs and schedules pass; each of the ways to be illegal is caught, and named."""
+"""Well-formed programs and schedules pass; every kind of violation is detected and named in the error."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from dynx.errors import CompileError
 from dynx.simd.emit import Settings, emit
 from dynx.simd.expr import Graph, Node
-from dynx.simd.program import Port, Program, finished
+from dynx.simd.program import Port, Program, extract_program
 from dynx.simd.schedule import Segment, Store, TrigGroup, schedule
 from dynx.simd.verify import check_nodes, check_program, check_schedule
 from tests.simd.machine import LANES, TARGETS
@@ -22,12 +22,19 @@ from tests.simd.programs import programs
 
 
 def example() -> Program:
-    """a b + sin a, cos a, 2, b: every kind of node; nodes 0 to 7."""
+    """Return the program of a b + sin a, cos a, 2, b, which has every kind of node."""
     graph = Graph()
     a, b = graph.input(0), graph.input(1)
-    product, sine = graph.literal("mul", a, b), graph.literal("sin", a)
-    results = [graph.literal("add", product, sine), graph.literal("cos", a), graph.constant(2.0), b]
-    return finished(graph, [Port("a", ()), Port("b", (1,))], [Port("x", (2,)), Port("y", (2,))], results)
+    product, sine = graph.apply_unsimplified("mul", a, b), graph.apply_unsimplified("sin", a)
+    results = [
+        graph.apply_unsimplified("add", product, sine),
+        graph.apply_unsimplified("cos", a),
+        graph.constant(2.0),
+        b,
+    ]
+    return extract_program(
+        graph, [Port("a", ()), Port("b", (1,))], [Port("x", (2,)), Port("y", (2,))], results
+    )
 
 
 NODES = example().nodes
@@ -41,7 +48,7 @@ def changed(index: int, **fields: Any) -> Program:
 
 
 def more(*nodes: Node) -> Program:
-    """With further nodes, which are results too."""
+    """Return the example with further nodes, which are results too."""
     base = example()
     places = range(len(base.nodes), len(base.nodes) + len(nodes))
     outputs = (*base.outputs, Port("more", (len(nodes),)))
@@ -53,12 +60,14 @@ def order(program: Program) -> list[str]:
 
 
 @given(programs(), st.sampled_from(LANES), st.sampled_from((1, 5, 2500)))
-def test_what_the_compiler_makes_is_legal(program: Program, lanes: int, longest: int) -> None:
+def test_programs_and_schedules_of_the_compiler_are_well_formed(
+    program: Program, lanes: int, longest: int
+) -> None:
     check_program(program)
     check_schedule(program, schedule(program, lanes, longest), lanes)
 
 
-ILLEGAL_PROGRAMS: dict[str, tuple[Program, str]] = {
+MALFORMED_PROGRAMS: dict[str, tuple[Program, str]] = {
     "operation": (
         changed(NUMBER["add"], op=cast(Any, "pow")),
         f"node {NUMBER['add']} is no known operation: 'pow'",
@@ -82,13 +91,13 @@ ILLEGAL_PROGRAMS: dict[str, tuple[Program, str]] = {
     ),
     "result": (replace(example(), results=(*example().results[:-1], 99)), "a result is node 99 of"),
     "too few": (replace(example(), results=example().results[:-1]), "has 3 results, its ports hold 4"),
-    "names": (replace(example(), outputs=(Port("x", (2,)), Port("x", (2,)))), "two ports have one name"),
+    "names": (replace(example(), outputs=(Port("x", (2,)), Port("x", (2,)))), "two ports have the same name"),
 }
 
 
-@pytest.mark.parametrize("kind", ILLEGAL_PROGRAMS)
-def test_an_illegal_program_is_refused(kind: str) -> None:
-    program, message = ILLEGAL_PROGRAMS[kind]
+@pytest.mark.parametrize("kind", MALFORMED_PROGRAMS)
+def test_a_malformed_program_raises(kind: str) -> None:
+    program, message = MALFORMED_PROGRAMS[kind]
     check_program(example())
     with pytest.raises(CompileError) as caught:
         check_program(program)
@@ -104,15 +113,15 @@ def test_a_graph_may_have_dead_nodes() -> None:
     check_nodes((*NODES, Node("neg", (0,))), 2)
 
 
-Spoil = Callable[[list[Segment]], None]
+Corruption = Callable[[list[Segment]], None]
 
 
 def _segments() -> list[Segment]:
-    """All of the example in segments of one step each, in which much is kept."""
+    """Return the schedule of the example with one step per segment, in which many values are spilled."""
     return schedule(example(), 2, 1)
 
 
-def _home(segments: list[Segment], op: str) -> Segment:
+def _segment_of(segments: list[Segment], op: str) -> Segment:
     (found,) = (
         s for s in segments for step in s.steps if not isinstance(step, TrigGroup) and NODES[step].op == op
     )
@@ -123,12 +132,12 @@ def _swap(segments: list[Segment]) -> None:
     segments.reverse()
 
 
-def _forget(segments: list[Segment]) -> None:
-    _home(segments, "mul").kept.clear()
+def _forget_spill(segments: list[Segment]) -> None:
+    _segment_of(segments, "mul").spilled.clear()
 
 
 def _leave_out(segments: list[Segment]) -> None:
-    segment = _home(segments, "add")
+    segment = _segment_of(segments, "add")
     segment.steps.clear()
     segment.stores[:] = []
 
@@ -141,8 +150,8 @@ def _compute_input(segments: list[Segment]) -> None:
     segments[0].steps.append(0)
 
 
-def _keep_another(segments: list[Segment]) -> None:
-    segments[-1].kept.add(NUMBER["mul"])
+def _spill_uncomputed(segments: list[Segment]) -> None:
+    segments[-1].spilled.add(NUMBER["mul"])
 
 
 def _exchange_sine_and_cosine(segments: list[Segment]) -> None:
@@ -188,32 +197,32 @@ def _store_early(segments: list[Segment]) -> None:
     segments[0].stores.append(store)
 
 
-ILLEGAL_SCHEDULES: dict[Spoil, str] = {
+MALFORMED_SCHEDULES: dict[Corruption, str] = {
     _swap: "before it is computed",
-    _forget: f"node {NUMBER['mul']} is used by node {NUMBER['add']} in segment",
+    _forget_spill: f"node {NUMBER['mul']} is used by node {NUMBER['add']} in segment",
     _leave_out: f"node {NUMBER['add']} (add) is never computed",
-    _compute_twice: f"node {NUMBER['mul']} is computed although it is known",
-    _compute_input: "node 0 is computed although it is known",
-    _keep_another: f"node {NUMBER['mul']} is kept by segment",
-    _exchange_sine_and_cosine: "its group takes it for",
-    _wrong_angle: "its group takes it for",
+    _compute_twice: f"node {NUMBER['mul']} is computed twice, or is an input",
+    _compute_input: "node 0 is computed twice, or is an input",
+    _spill_uncomputed: f"node {NUMBER['mul']} is spilled by segment",
+    _exchange_sine_and_cosine: "which it is not",
+    _wrong_angle: "which it is not",
     _sine_alone: "is a sine or cosine outside of a group",
-    _no_store: "output x is stored in columns []",
-    _store_twice: "output x is stored in columns [range(0, 2), range(0, 2)]",
-    _store_other: "columns range(0, 2) of output x are other nodes' values",
-    _store_elsewhere: "an output is stored that the program does not have",
+    _no_store: "output x is stored in wrong columns []",
+    _store_twice: "output x is stored in wrong columns [range(0, 2), range(0, 2)]",
+    _store_other: "columns range(0, 2) of output x are stored from wrong nodes",
+    _store_elsewhere: "refers to an output that the program does not have",
     _store_early: "is used by output 0 before it is computed",
 }
 
 
-@pytest.mark.parametrize("spoil", ILLEGAL_SCHEDULES, ids=lambda spoil: spoil.__name__)
-def test_an_illegal_schedule_is_refused(spoil: Spoil) -> None:
+@pytest.mark.parametrize("corrupt", MALFORMED_SCHEDULES, ids=lambda corrupt: corrupt.__name__)
+def test_a_malformed_schedule_raises(corrupt: Corruption) -> None:
     segments = _segments()
     check_schedule(example(), segments, 2)
-    spoil(segments)
+    corrupt(segments)
     with pytest.raises(CompileError) as caught:
         check_schedule(example(), segments, 2)
-    assert ILLEGAL_SCHEDULES[spoil] in str(caught.value)
+    assert MALFORMED_SCHEDULES[corrupt] in str(caught.value)
 
 
 def test_emission_checks_the_schedule(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -22,7 +22,7 @@ from dynx.model.model import Base
 from dynx.sim import Noise, Payload, Push, Rollout
 from dynx.sim.loop.clock import Clock
 from dynx.sim.named_controllers import ControllerRequest, Gains, named_controller
-from dynx.simd.machine import LARGEST_SHARE, memory
+from dynx.simd.machine import MAX_MEMORY_SHARE, memory_size
 
 GAINS = ("kp", "kd", "ki", "natural_frequency", "damping_ratio", "posture_kp", "posture_kd")
 PASSED_ON = ("plant", "integrator", "dt", "substeps", "control_dt", "delay", "position_limits")
@@ -220,8 +220,8 @@ def _mass_scale(model: Model, given: tuple[tuple[str | None, float], ...]) -> fl
 def _require_memory(model: Model, clock: Clock) -> None:
     """Raise ArgumentError for a record that would not fit beside what else the machine does."""
     needed = clock.n_steps * (STEP_BYTES + 8 * (3 * model.nq + 7 * model.nv))
-    if needed > LARGEST_SHARE * memory():
+    if needed > MAX_MEMORY_SHARE * memory_size():
         raise ArgumentError(
             f"{clock.n_steps} steps need about {needed / 1e9:.3g} GB; "
-            f"this machine has {memory() / 1e9:.3g} GB"
+            f"this machine has {memory_size() / 1e9:.3g} GB"
         )

@@ -24,7 +24,7 @@ from dynx.sim.batch.loads import BatchLoads
 from dynx.sim.batch.traced_controller import innermost, traced_controller
 from dynx.sim.loop.controller_checks import Unchanged, is_row
 from dynx.sim.plants.floating_step import floating_step
-from dynx.simd.cache import cached_kernel, recipe_of
+from dynx.simd.cache import load_kernel, program_recipe
 from dynx.simd.kernel import Kernel
 from dynx.simd.trace import trace
 from dynx.spatial.branchless import difference, integrate
@@ -125,7 +125,7 @@ class StepOf:
                 f"{self.controller.name} cannot be fused with the plant: run on symbols in the place of "
                 f"numbers it failed with {type(error).__name__}: {error}"
             ) from error
-        return cached_kernel(recipe_of(program), lambda: program)
+        return load_kernel(program_recipe(program), lambda: program)
 
     def sizes(self, *, controlled: bool, pushed: bool) -> dict[str, tuple[int]]:
         """The inputs of a step in their order, and their sizes."""

@@ -182,7 +182,7 @@ class _Run:
             **source,
         }
         answers = {"tau": self._tau, **target}
-        return kernel.bound(
+        return kernel.bind(
             [known[port.name] for port in kernel.inputs], [answers[port.name] for port in kernel.outputs]
         )
 

@@ -22,8 +22,8 @@ from dynx.sim.loop.plain import RUNAWAY, Loop
 from dynx.sim.loop.stages import Ask, Glue, Questions, refuse_impure, traced_controller
 from dynx.sim.plants.integrated import IntegratedPlant
 from dynx.sim.record.record import Record
+from dynx.simd.call_sequence import CallSequence, StridedRows, prepare_calls
 from dynx.simd.kernel import Kernel
-from dynx.simd.strides import Walk, Walked, walk
 from dynx.spatial.scalar import Array, Floats, clamp
 from dynx.trajectory.base import Setpoint
 
@@ -176,7 +176,7 @@ class GluedLoop:
         """Some steps, counted in the record as they are taken; False if something is wrong."""
         first, per = record.steps, self._loop.clock.steps_per_control
         steps = np.arange(first, min(len(record), first + at_once))
-        walked = {name: Walked(array, self._row(name, steps)) for name, array in arrays.items()}
+        walked = {name: StridedRows(array, self._row(name, steps)) for name, array in arrays.items()}
         last = first + len(steps)
         asked = _ready(self._asked, walked, record)
         if self._held is None:
@@ -189,19 +189,19 @@ class GluedLoop:
         return True
 
 
-def _ready(glue: Glue, walked: Mapping[str, Walked], record: Record) -> Take:
+def _ready(glue: Glue, walked: Mapping[str, StridedRows], record: Record) -> Take:
     """The next steps of the record, those of `walked`, as calls."""
     first = record.steps
     still = np.zeros(len(walked["q"].rows), dtype=np.int64)
     places = {name: np.zeros((1, size)) for name, size in (*glue.sizes.items(), ("defect", 1))}
     numbers = {name: value[None] for name, value in glue.numbers.items()}
-    every = {**walked, **{name: Walked(place, still) for name, place in {**places, **numbers}.items()}}
+    every = {**walked, **{name: StridedRows(place, still) for name, place in {**places, **numbers}.items()}}
 
-    def walked_by(kernel: Kernel) -> Walk:
+    def walked_by(kernel: Kernel) -> CallSequence:
         inputs, outputs = ([every[port.name] for port in side] for side in (kernel.inputs, kernel.outputs))
-        return walk(kernel, inputs, outputs)
+        return prepare_calls(kernel, inputs, outputs)
 
-    stages: list[tuple[Callable[[int], None], range, Ask, list[Floats], Any, Walk]] = []
+    stages: list[tuple[Callable[[int], None], range, Ask, list[Floats], Any, CallSequence]] = []
     for cut in glue.cuts:
         calls = walked_by(cut.kernel)
         arguments = [places[name].reshape(shape) for name, shape in cut.arguments]

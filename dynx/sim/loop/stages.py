@@ -19,11 +19,11 @@ import numpy as np
 from dynx.control.base import Controller, chain_of, gains_of, rebind
 from dynx.control.dynamics import QUANTITIES, Dynamics, EngineDynamics, Evaluation
 from dynx.errors import TraceError
-from dynx.simd.cache import cached_kernel, recipe_of
+from dynx.simd.cache import load_kernel, program_recipe
 from dynx.simd.emit import Settings
 from dynx.simd.expr import Graph, Symbol
 from dynx.simd.kernel import Kernel
-from dynx.simd.program import Port, Program, finished
+from dynx.simd.program import Port, Program, extract_program
 from dynx.simd.simplify import STRICT
 from dynx.simd.target import host
 from dynx.spatial.scalar import Array, Floats
@@ -160,7 +160,7 @@ class Questions:
     def _program(self, wanted: Mapping[str, Nodes]) -> Program:
         outputs = [Port(name, (len(nodes),)) for name, nodes in wanted.items()]
         results = [node for nodes in wanted.values() for node in nodes]
-        return _without_idle_inputs(finished(self._graph, self._ports, outputs, results))
+        return _without_idle_inputs(extract_program(self._graph, self._ports, outputs, results))
 
 
 class TracedEngineCalls(Dynamics):
@@ -222,11 +222,11 @@ def _without_idle_inputs(program: Program) -> Program:
 
 
 def _kernel(program: Program) -> Kernel:
-    recipe = recipe_of(program)
+    recipe = program_recipe(program)
     kernel = _made.get(recipe)
     if kernel is None:
         strict = Settings(host().lanes, fast=False)
-        kernel = _made[recipe] = cached_kernel(recipe, lambda: program, settings=strict)
+        kernel = _made[recipe] = load_kernel(recipe, lambda: program, settings=strict)
         for old in list(_made)[:-REMEMBERED]:
             _made.pop(old, None)
     return kernel

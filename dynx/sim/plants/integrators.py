@@ -16,7 +16,7 @@ import numpy as np
 from dynx.errors import ArgumentError, EngineError, nearest, shown
 from dynx.model import Model
 from dynx.sim.plants.floating_step import floating_step
-from dynx.simd.cache import cached_kernel, recipe_of
+from dynx.simd.cache import load_kernel, program_recipe
 from dynx.simd.emit import Settings
 from dynx.simd.kernel import Kernel
 from dynx.simd.simplify import STRICT
@@ -65,7 +65,7 @@ class SemiImplicitEuler:
             return *floating_step(q, v, a, self._step, self._center), a
         base, h = self._base, self._step
         numbers: Any = base.inputs
-        at, speed, change = base.places[:3]
+        at, speed, change = base.input_slices[:3]
         numbers[at], numbers[speed], numbers[change] = q[:7], v[:6], a[:6]
         base.run()
         pose, twist = base.results
@@ -82,7 +82,7 @@ def _base_step() -> Kernel:
 
     sizes = {"q": (7,), "v": (6,), "a": (6,), "h": (1,), "center": (3,)}
     program = trace(step, sizes, simplify=STRICT)
-    return cached_kernel(recipe_of(program), lambda: program, settings=Settings(host().lanes, fast=False))
+    return load_kernel(program_recipe(program), lambda: program, settings=Settings(host().lanes, fast=False))
 
 
 class _Flow:

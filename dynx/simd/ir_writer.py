@@ -1,7 +1,7 @@
-"""Writing LLVM IR as text: names, vector types, constants and shuffles.
+"""Writer of LLVM IR as text: names, vector types, constants and shuffles.
 
-Text rather than a builder library: a kernel has thousands of instructions and LLVM's own parser
-reads them faster than Python objects can be made.
+Text is used instead of a builder library because a kernel has thousands of instructions, which LLVM's parser
+reads faster than Python objects could be created.
 """
 
 from __future__ import annotations
@@ -22,42 +22,42 @@ class Writer:
         self._names = 0
 
     def let(self, instruction: str) -> str:
-        """A new value that `instruction` computes."""
+        """Write an instruction and return the new name of its value."""
         self._names += 1
         name = f"%v{self._names}"
         self.lines.append(f"  {name} = {instruction}")
         return name
 
     def do(self, instruction: str) -> None:
-        """An instruction without a value."""
+        """Write an instruction without a value."""
         self.lines.append(f"  {instruction}")
 
     def label(self, name: str) -> None:
-        """The start of a block."""
+        """Write the label that starts a basic block."""
         self.lines.append(f"{name}:")
 
     def fresh(self, stem: str) -> str:
-        """A name for a block that no other has."""
+        """Return a new, unique name for a basic block."""
         self._names += 1
         return f"{stem}{self._names}"
 
     def splat(self, value: float) -> str:
-        """A vector constant, `value` in every lane."""
-        return f"splat (double {number(value)})"
+        """Return the vector constant with `value` in every lane."""
+        return f"splat (double {hex_double(value)})"
 
     def integer_splat(self, value: int) -> str:
-        """The same for 64-bit integers."""
+        """Return the vector constant with the 64-bit integer `value` in every lane."""
         return f"splat (i64 {value})"
 
     def shuffle(self, a: str, b: str, picks: Sequence[int], width: int) -> str:
-        """Entries `picks` of the `width` entries of a followed by those of b."""
+        """Return the entries `picks` of the concatenation of vectors a and b, of `width` entries each."""
         mask = ", ".join(f"i32 {pick}" for pick in picks)
         kind = f"<{width} x double>"
         return self.let(f"shufflevector {kind} {a}, {kind} {b}, <{len(picks)} x i32> <{mask}>")
 
 
-def number(value: float) -> str:
-    """A double as LLVM reads it without rounding."""
+def hex_double(value: float) -> str:
+    """Return the hexadecimal form of a double, which LLVM reads without rounding."""
     if value != value:
         return "0x7FF8000000000000"
     return f"0x{struct.unpack('<Q', struct.pack('<d', value))[0]:016X}"
