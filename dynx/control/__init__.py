@@ -13,6 +13,10 @@ from dynx.control.open_loop import OpenLoop
 from dynx.control.operational_space import OperationalSpace
 from dynx.control.pd import PD
 from dynx.control.pid import PID
+from dynx.control.registry import from_document as controller_from_document
+from dynx.control.registry import register as register_controller
+from dynx.control.registry import to_document as controller_to_document
+from dynx.control.registry import unregister as unregister_controller
 from dynx.control.saturation import Saturated
 from dynx.control.velocity import Velocity
 
@@ -38,4 +42,8 @@ __all__ = [
     "TorqueMotor",
     "Velocity",
     "VelocityMotor",
+    "controller_from_document",
+    "controller_to_document",
+    "register_controller",
+    "unregister_controller",
 ]

@@ -1,14 +1,15 @@
-"""Laws by name, with gains that suit any robot: what the command line and the tutorial choose from.
+"""Controllers by name, with gains that suit any robot, for the command line and the tutorial.
 
-Gains in N m depend on what a joint has to move. Where none are given they are those of an error that obeys
+Gains in N m depend on the inertia of a joint. By default they are those of an error that obeys
 e'' + kd e' + kp e = 0 with kp = 400 and kd = 40 (natural frequency 20 rad/s, critically damped), times the
 inertia that each joint sees at the start: the diagonal of the mass matrix there.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, fields
+from inspect import signature
 from typing import Any, Literal
 
 import numpy as np
@@ -16,6 +17,7 @@ from numpy.typing import ArrayLike
 
 from dynx import control
 from dynx.backends import Backend, backend
+from dynx.control import registry
 from dynx.control.base import Controller
 from dynx.control.gains import checked_gain, feedback_gains
 from dynx.errors import GainError, UnknownNameError, nearest, shown
@@ -23,15 +25,15 @@ from dynx.model import Model
 from dynx.spatial.scalar import Floats
 
 NATURAL_FREQUENCY = 20.0
-"""Of the error where no gains are given [rad/s]."""
+"""Default natural frequency of the error [rad/s]."""
 
 
 @dataclass(frozen=True)
 class Gains:
-    """What is known of a law's gains; None for what is left to it. Each is one number, or one for each joint.
+    """Gains of a controller: one number or one for each joint, None for the default.
 
-    `kp` alone comes with the `kd` of `damping_ratio`. For laws of torque `natural_frequency` is that of
-    each joint alone, with the inertia that it sees at the start. `ki` is by default kp^2 / (2 kd).
+    `kp` alone comes with the `kd` of `damping_ratio`. For controllers with gains in N m, `natural_frequency`
+    is that of each joint alone, with its inertia at the start. `ki` is by default kp^2 / (2 kd).
     """
 
     kp: ArrayLike | None = None
@@ -43,17 +45,17 @@ class Gains:
     posture_kd: ArrayLike | None = None
 
     def given(self) -> dict[str, ArrayLike]:
-        """Those that are not None, by name."""
+        """Gains that are not None, by name."""
         pairs = ((field.name, getattr(self, field.name)) for field in fields(self))
         return {name: gain for name, gain in pairs if gain is not None}
 
 
 @dataclass(frozen=True)
 class ControllerRequest:
-    """What a law is made from; `start` (nq,) is where the inertia is looked at for gains of torque.
+    """Arguments from which a named controller is made.
 
-    `limit` is the most that motors give [N m or N], for the laws that want to know (PID, PyBullet's
-    motors); `frame` is that of the task-space laws.
+    Gains in N m are scaled by the inertia at `start` (nq,). `limit` is the effort limit of the motors
+    [N m or N], for PID and PyBullet's motors; `frame` is that of the task-space controllers.
     """
 
     model: Model
@@ -66,11 +68,11 @@ class ControllerRequest:
 
     @property
     def n_joints(self) -> int:
-        """How many coordinates have motors."""
+        """Number of coordinates with motors."""
         return self.model.nv - (6 if self.model.floating else 0)
 
     def rates(self, n: int | None = None) -> dict[str, Floats]:
-        """kp [1/s^2] and kd [1/s] of an error, (n,); n is by default that of the coordinates."""
+        """kp [1/s^2] and kd [1/s] of an error (n,), by default one for each coordinate."""
         return self._feedback(np.ones(self.model.nv if n is None else n))
 
     def torques(self) -> dict[str, Floats]:
@@ -97,19 +99,21 @@ class ControllerRequest:
 
 @dataclass(frozen=True)
 class NamedController:
-    """One entry of `CONTROLLERS`: what the law is, which `Gains` it takes, and how it is made."""
+    """One entry of `CONTROLLERS`."""
 
     what: str
+    """The control law in a few words."""
     takes: tuple[str, ...]
+    """Names of the `Gains` that it takes."""
     make: Callable[[ControllerRequest], Controller[Any]]
     wants: Literal["joints", "frame"] = "joints"
 
 
 def joint_inertia(model: Model, q: Floats) -> Floats:
-    """The inertia (n,) [kg m^2 or kg] that each joint sees at `q`, while the others hold still.
+    """Inertia (n,) [kg m^2 or kg] of each joint at `q`, with the others at rest.
 
-    A floating base yields, and the other joints with it: then it is 1 / (M^-1)_ii, the least that a joint
-    sees whatever the others do, so that gains which suit it do not overshoot.
+    With a floating base it is 1 / (M^-1)_ii, the inertia with all other coordinates free: the smallest
+    possible, so that gains scaled by it do not overshoot.
     """
     with backend("reference", model, validate=False) as bodies:
         M: Floats = bodies.mass_matrix(q)
@@ -120,17 +124,63 @@ def joint_inertia(model: Model, q: Floats) -> Floats:
 
 
 def named_controller(name: str, request: ControllerRequest) -> Controller[Any]:
-    """The law of that name. Raises UnknownNameError for another, GainError for gains it does not take."""
-    law = CONTROLLERS.get(name)
-    if law is None:
-        raise UnknownNameError(f"no law is called {shown(name)}{nearest(name, CONTROLLERS)}")
+    """The controller of that name, one of `CONTROLLERS`.
+
+    Raises UnknownNameError for another name, GainError for gains that the controller does not take.
+    """
+    if name not in CONTROLLERS:
+        raise UnknownNameError(f"no controller is called {shown(name)}{nearest(name, CONTROLLERS)}")
+    named = CONTROLLERS[name]
     for gain in request.gains.given():
-        if gain not in law.takes:
-            takes = f"it takes {', '.join(law.takes)}" if law.takes else "it has no gains"
+        if gain not in named.takes:
+            takes = f"it takes {', '.join(named.takes)}" if named.takes else "it has no gains"
             raise GainError(f"{name} takes no {gain}; {takes}")
-    if law.wants == "frame" and request.frame is None:
-        raise UnknownNameError(f"{name} is about a frame, and none is given")
-    return law.make(request)
+    if named.wants == "frame" and request.frame is None:
+        raise UnknownNameError(f"{name} controls a frame, and none is given")
+    return named.make(request)
+
+
+class NamedControllers(Mapping[str, NamedController]):
+    """The controllers of `BUILT_IN`, and those that programs and installed packages register."""
+
+    def __getitem__(self, name: str) -> NamedController:
+        if name in BUILT_IN:
+            return BUILT_IN[name]
+        if name not in self:
+            raise KeyError(name)
+        return _of_class(registry.controller_class(name))
+
+    def __iter__(self) -> Iterator[str]:
+        yield from BUILT_IN
+        yield from (name for name in registry.controller_names() if name not in registry.BUILT_IN)
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
+
+    def __contains__(self, name: object) -> bool:
+        # Entry points are read only for other names: that takes some milliseconds.
+        return name in BUILT_IN or name in tuple(self)
+
+
+CONTROLLERS = NamedControllers()
+"""Controllers that ``dynx sim --controller`` takes, by name."""
+
+
+def _of_class(kind: type[Controller[Any]]) -> NamedController:
+    """A registered class, made with the gains and the other arguments that its constructor has."""
+    parameters = signature(kind).parameters
+
+    def make(request: ControllerRequest) -> Controller[Any]:
+        options = {"frame": request.frame, "limit": request.limit, "backend": request.backend}
+        options |= {"control_dt": request.control_dt, **request.gains.given()}
+        try:
+            return kind(request.model, **{name: x for name, x in options.items() if name in parameters})  # type: ignore[call-arg]
+        except TypeError as error:
+            raise GainError(f"{kind.__name__} cannot be made: {error}") from None
+
+    takes = tuple(each.name for each in fields(Gains) if each.name in parameters)
+    what = (kind.__doc__ or kind.__name__).strip().splitlines()[0].rstrip(".")
+    return NamedController(what, takes, make, "frame" if "frame" in parameters else "joints")
 
 
 def _pid(request: ControllerRequest) -> Controller[Any]:
@@ -180,7 +230,7 @@ def _impedance(request: ControllerRequest) -> Controller[Any]:
 
 _FEEDBACK = ("kp", "kd", "natural_frequency", "damping_ratio")
 
-CONTROLLERS: dict[str, NamedController] = {
+BUILT_IN: dict[str, NamedController] = {
     "position-motor": NamedController(
         "PyBullet's POSITION_CONTROL, its own gains", ("kp", "kd"), _position_motor
     ),
@@ -232,4 +282,4 @@ CONTROLLERS: dict[str, NamedController] = {
         "spring and damper of a frame", ("kp", "kd", "posture_kd"), _impedance, "frame"
     ),
 }
-"""From little knowledge of the robot to much, the task-space laws last."""
+"""Controllers of dynx, those that know least of the robot first and those of a frame last."""

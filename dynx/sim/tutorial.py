@@ -26,7 +26,7 @@ from dynx.errors import (
 )
 from dynx.model import Model
 from dynx.model.loading import load
-from dynx.sim.named_controllers import CONTROLLERS, ControllerRequest, named_controller
+from dynx.sim.named_controllers import BUILT_IN, ControllerRequest, named_controller
 from dynx.sim.record.rollout import Rollout
 from dynx.sim.simulation import simulate
 from dynx.spatial.scalar import Floats
@@ -38,7 +38,7 @@ TO = (-1.5, -1.0, 1.0, -1.57, -1.57, -1.57)
 DURATION, DT, GRAVITY = 2.0, 1e-3, (0.0, 0.0, -9.8)
 BULLET, DYNX = PLANTS = ("pybullet", "pinocchio")
 """PyBullet's own stepper, and dynx's semi-implicit Euler over Pinocchio's forward dynamics."""
-MODES = tuple(name for name, law in CONTROLLERS.items() if law.wants == "joints")
+MODES = tuple(name for name, law in BUILT_IN.items() if law.wants == "joints")
 """All modes, from little knowledge of the robot to much."""
 
 
@@ -92,7 +92,7 @@ class Tutorial:
         for mode in MODES:
             yield Row(
                 mode,
-                CONTROLLERS[mode].what,
+                BUILT_IN[mode].what,
                 {
                     plant: self._outcome(mode, plant) if problem is None else Outcome(problem=problem)
                     for plant, problem in missing.items()

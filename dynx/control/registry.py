@@ -1,0 +1,109 @@
+"""Controllers by name, and as documents that JSON can hold.
+
+The classes of dynx have their own names; a program registers others, and installed packages offer theirs by
+entry points in the group ``dynx.controllers`` (`dynx.registry`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from dynx.backends import Backend, backend_class
+from dynx.control.base import Controller
+from dynx.control.content import attributes_of, fields_of
+from dynx.errors import ArgumentError, UnknownNameError, shown
+from dynx.model import Model
+from dynx.registry import ClassRegistry
+
+GROUP = "dynx.controllers"
+"""The entry-point group: ``name = "package.module:ControllerClass"``."""
+
+BUILT_IN = {
+    name: f"dynx.control.{module}:{name}"
+    for module, names in {
+        "computed_torque": ("ComputedTorque",),
+        "discrete_computed_torque": ("DiscreteComputedTorque",),
+        "engine_motors": ("PDMotor", "PositionMotor", "TorqueMotor", "VelocityMotor"),
+        "feed_forward": ("FeedForward",),
+        "friction_compensation": ("FrictionCompensation",),
+        "gravity_compensation": ("GravityCompensatedPD",),
+        "impedance": ("Impedance",),
+        "open_loop": ("OpenLoop",),
+        "operational_space": ("OperationalSpace",),
+        "pd": ("PD",),
+        "pid": ("PID",),
+        "saturation": ("Saturated",),
+        "velocity": ("Velocity",),
+    }.items()
+    for name in names
+}
+"""Controllers of dynx itself."""
+
+_classes: ClassRegistry[Controller[Any]] = ClassRegistry(
+    "controller", GROUP, BUILT_IN, lambda: Controller, error=ArgumentError, unknown=UnknownNameError
+)
+controller_names = _classes.names
+controller_class = _classes.find
+register = _classes.register
+unregister = _classes.unregister
+
+
+def to_document(controller: Controller[Any]) -> dict[str, Any]:
+    """The name of a controller's class and its constructor arguments, in types that JSON has.
+
+    Its model is left out. Numbers that are not finite are strings, such as "inf". Raises ArgumentError for
+    a class that is no registered dataclass, and for an argument that cannot be written.
+    """
+    kind, known = type(controller), fields_of(controller)
+    names = controller_names() if kind.__name__ not in BUILT_IN else (kind.__name__, *controller_names())
+    name = next((name for name in names if controller_class(name) is kind), None)
+    if name is None or not attributes_of(controller).keys() <= known.keys():
+        raise ArgumentError(
+            f"{kind.__name__} cannot be written: wanted a frozen dataclass that is registered as a controller"
+        )
+    arguments = {
+        each.metadata.get("argument") or field: _written(kind, field, getattr(controller, field))
+        for field, each in known.items()
+        if each.init and field != "model"
+    }
+    return {"controller": name, **arguments}
+
+
+def from_document(model: Model, document: Mapping[str, Any]) -> Controller[Any]:
+    """The controller of `model` that `to_document` wrote. Raises ArgumentError for any other document."""
+    arguments = {name: _read(model, value) for name, value in document.items() if name != "controller"}
+    kind = controller_class(document.get("controller", ""))
+    known = getattr(kind, "__dataclass_fields__", {})
+    if "model" in known and known["model"].init:
+        arguments["model"] = model
+    try:
+        return kind(**arguments)
+    except TypeError as error:
+        raise ArgumentError(f"the document of a {kind.__name__} is invalid: {error}") from None
+
+
+def _written(kind: type, name: str, value: Any) -> Any:
+    if isinstance(value, Controller):
+        return to_document(value)
+    if isinstance(value, Backend) and backend_class(value.name) is type(value):
+        return value.name
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    if isinstance(value, list | tuple):
+        return [_written(kind, name, entry) for entry in value]
+    if isinstance(value, float) and not np.isfinite(value):
+        return str(value)
+    if value is None or isinstance(value, bool | int | float | str):
+        return value
+    raise ArgumentError(f"{name} of {kind.__name__} cannot be written: {shown(value)}")
+
+
+def _read(model: Model, value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return from_document(model, value)
+    if isinstance(value, list):
+        return np.array(value, dtype=np.float64)
+    return float(value) if value in ("inf", "-inf", "nan") else value

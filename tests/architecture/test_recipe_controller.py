@@ -1,0 +1,78 @@
+"""The recipe "add a controller" of docs/architecture.md, carried out by a package of its own: one module."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import dynx
+from dynx import control
+from dynx.control.registry import controller_class
+from tests.cli.sim.command import sim
+
+MODULE = '''
+from dataclasses import dataclass
+
+from dynx.control.base import Controller, gain
+from dynx.control.gains import checked_gain
+from dynx.model import Model
+from dynx.spatial.scalar import Floats
+
+
+@dataclass(frozen=True)
+class Damper(Controller[None], pure=True):
+    """A damper on every joint."""
+
+    model: Model
+    kd: Floats = gain("N m s/rad or N s/m")
+
+    def __init__(self, model, *, kd):
+        self._set(model=model, kd=checked_gain("kd", kd, model.nv))
+
+    def torque(self, measurement, setpoint, state):
+        return -self.kd * measurement.v, None
+'''
+ENTRY_POINTS = """
+[dynx.controllers]
+damper = third_party_controller:Damper
+"""
+
+
+@pytest.fixture(autouse=True)
+def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A folder on the path with the module and the metadata that an installer writes."""
+    info = tmp_path / "third_party_controller-1.0.dist-info"
+    info.mkdir()
+    (tmp_path / "third_party_controller.py").write_text(MODULE, encoding="utf-8")
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: third-party-controller\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(ENTRY_POINTS, encoding="utf-8")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    yield tmp_path
+    sys.modules.pop("third_party_controller", None)
+
+
+def test_it_simulates_alone_and_in_a_batch() -> None:
+    arm = dynx.load("ur5")
+    law = controller_class("damper")(arm, kd=5.0)  # type: ignore[call-arg]
+    start = arm.neutral() + 0.1
+    one = dynx.simulate(arm, law, arm.neutral(), q0=start, duration=0.3, plant="compiled")
+    many = dynx.simulate_batch(arm, law, arm.neutral(), q0=start, duration=0.3, gains={"kd": [5.0, 6.0]})
+    np.testing.assert_allclose(many.q[0], one.q[-1], rtol=1e-9)
+    assert control.controller_from_document(arm, control.controller_to_document(law)) == law
+
+
+def test_the_command_line_finds_it() -> None:
+    result = sim("ur5", "--controller", "damper", "--kd", "5", "--duration", "0.05", "--json")
+    assert result.exit_code == 0, result.stderr
+    assert json.loads(result.stdout)["law"] == "damper"
+    result = sim("ur5", "--controller", "dampr")
+    assert "did you mean 'damper'?" in result.stderr
+
+
+def test_it_takes_one_module(installed: Path) -> None:
+    assert [path.name for path in installed.glob("*.py")] == ["third_party_controller.py"]
