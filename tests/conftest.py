@@ -41,6 +41,7 @@ LONGEST = (
     "tests/test_readme.py::test_python_blocks",
     "tests/properties/",
     "tests/doctor/test_raw_engines.py",
+    "tests/test_benchmarks_run.py",
 )
 """Beginnings of the names of tests that take up to a minute each."""
 
@@ -58,14 +59,18 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption("--one-in", type=int, default=1, metavar="N", help="run a random Nth of all tests")
+    parser.addoption("--one-in", type=int, default=1, metavar="N", help="run a random Nth of the quick tests")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Keep the sample of ``--one-in``; put the longest tests first, so that parallel workers end together."""
     one_in = config.getoption("--one-in")
-    left_out = [item for item in items if crc32(item.nodeid.encode()) % one_in]
-    if left_out:
-        config.hook.pytest_deselected(items=left_out)
-        items[:] = [item for item in items if crc32(item.nodeid.encode()) % one_in == 0]
-    items.sort(key=lambda item: not item.nodeid.startswith(LONGEST))
+    if one_in > 1:
+        sample = [item for item in items if is_quick(item) and crc32(item.nodeid.encode()) % one_in == 0]
+        config.hook.pytest_deselected(items=list(set(items) - set(sample)))
+        items[:] = sample
+    items.sort(key=is_quick)
+
+
+def is_quick(item: pytest.Item) -> bool:
+    return not item.nodeid.startswith(LONGEST)

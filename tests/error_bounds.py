@@ -1,6 +1,6 @@
-"""ErrorBounds as `dynx.agreement` judges it: error over natural size, against the derived tolerance.
+"""Bounds of errors, as `dynx.agreement` derives them: relative to the magnitude of the quantity.
 
-No test has a tolerance of its own; this is how they use those of `dynx.agreement.tolerances`.
+Tests have no tolerances of their own; they use those of `dynx.agreement.tolerances` through this module.
 """
 
 from __future__ import annotations
