@@ -84,8 +84,8 @@ class LazyGroup(click.Group):
             return self.table[name].help
         try:
             command = self.get_command(ctx, name)
-        except click.ClickException as error:
-            return error.message
+        except click.ClickException:
+            return "(cannot be loaded)"
         return "" if command is None else command.get_short_help_str(width)
 
 
