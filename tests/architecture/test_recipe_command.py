@@ -62,7 +62,9 @@ def test_it_runs_with_the_errors_and_exit_codes_of_dynx(package: Path) -> None:
 
 def test_it_is_listed_after_the_commands_of_dynx(package: Path) -> None:
     text = dynx_command(package, "--help").stdout
-    listed = [line.split()[0] for line in text.partition("Commands:")[2].splitlines() if line.startswith("  ")]
+    listed = [
+        line.split()[0] for line in text.partition("Commands:")[2].splitlines() if line.startswith("  ")
+    ]
     assert listed[: len(COMMANDS) + 1] == [*COMMANDS, "weigh"]
     assert "weigh     Print the total mass of a robot [kg]." in text
 

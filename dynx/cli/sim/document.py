@@ -1,4 +1,4 @@
-"""What ``dynx sim --json`` writes: one simulation as a document of numbers and text."""
+"""JSON document of one simulation."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 
 from dynx._version import __version__
-from dynx.cli.sim.errors import base_error, frame_error, joint_error
-from dynx.cli.sim.overshoot import overshoot
 from dynx.cli.sim.request import Prepared
 from dynx.errors import DivergedError, SimulationError
 from dynx.model import Model
 from dynx.sim import Noise, Push, Rollout, RolloutInterrupted
+from dynx.sim.overshoot import largest_overshoot
+from dynx.sim.record.tracking_error import base_error, frame_error, joint_error
 from dynx.spatial.scalar import Floats
 
 SCHEMA = 1
@@ -20,15 +20,15 @@ SCHEMA = 1
 Entry = dict[str, Any]
 
 DONE, DIVERGED, CONTROL_FAILED, INTERRUPTED = "done", "diverged", "control failed", "interrupted"
-"""How a simulation ended."""
+"""Values of ``status``."""
 
 
 def document(
     prepared: Prepared, rollout: Rollout, seconds: float, ended: SimulationError | KeyboardInterrupt | None
 ) -> Entry:
-    """The simulation that was asked for, and what came of it; `ended` is what ended it early.
+    """Describe a simulation and its results; `ended` is the error or interrupt that ended it early.
 
-    Numbers that are none (errors without a reference, limits that are not there) are null.
+    Absent numbers (errors without a reference, unlimited efforts) are null.
     """
     model, summary = prepared.model, _summary(rollout)
     return {
@@ -66,7 +66,7 @@ def document(
 
 
 def _summary(rollout: Rollout) -> Entry:
-    """The numbers of the whole robot, over all joints and times."""
+    """Numbers of the whole robot, over all joints and times."""
     with np.errstate(all="ignore"):
         of_all = rollout.summary()
         return {
@@ -79,7 +79,7 @@ def _summary(rollout: Rollout) -> Entry:
 
 
 def _joints(model: Model, rollout: Rollout) -> list[Entry]:
-    """One entry for each coordinate of v, those of a floating base first."""
+    """Entries of all coordinates of v, those of a floating base first."""
     with np.errstate(all="ignore"):
         summary = rollout.summary()
     in_force = rollout.settings.get("effort_limits")
@@ -104,7 +104,7 @@ def _joints(model: Model, rollout: Rollout) -> list[Entry]:
 
 
 def _names(model: Model) -> list[str]:
-    """What each coordinate of v is called; those of a floating base are along its own axes."""
+    """Names of the coordinates of v; those of a floating base are in its own axes."""
     base = ["base x", "base y", "base z", "base rx", "base ry", "base rz"] if model.floating else []
     return [*base, *model.joint_names]
 
@@ -117,7 +117,7 @@ def _units(model: Model) -> list[str]:
 
 
 def _settings(prepared: Prepared, rollout: Rollout) -> Entry:
-    """Those of the record, with objects where it has their Python text, and the inertia of the rotors."""
+    """Settings of the record, with objects in place of their Python text, and with the armature."""
     given, kept = prepared.arguments, rollout.settings
     return {
         **kept,
@@ -132,7 +132,7 @@ def _noise(noise: Noise) -> Entry:
 
 
 def _push(push: Push) -> Entry:
-    """One push; its `duration` None is for ever."""
+    """Entry of one push; `duration` None lasts until the end."""
     return {
         "frame": push.frame,
         "wrench": np.asarray(push.wrench).tolist(),
@@ -143,7 +143,7 @@ def _push(push: Push) -> Entry:
 
 
 def _is_passive(prepared: Prepared, rollout: Rollout) -> bool:
-    """Whether nothing does work on the robot, so that its energy should stay what it is."""
+    """Whether nothing does work on the robot, so that its energy is conserved."""
     joints = rollout.settings["joints"]
     loads = any(joints["damping"]) or any(joints["friction"]) or prepared.arguments["pushes"]
     return prepared.law is None and not loads and not prepared.arguments["position_limits"]
@@ -158,15 +158,15 @@ def _status(ended: SimulationError | KeyboardInterrupt | None) -> str:
 
 
 def _overshoot(prepared: Prepared, ended: object) -> Entry | None:
-    """The joint that a law of torque brakes too hard for the step, where that may be why it diverged."""
+    """Joint at which the damping is unstable for the step, where that can be the reason for divergence."""
     if not isinstance(ended, DivergedError):
         return None
-    found = overshoot(prepared.law, prepared.arguments["q0"], prepared.clock.control_dt)
+    found = largest_overshoot(prepared.law, prepared.arguments["q0"], prepared.clock.control_dt)
     return None if found is None else found._asdict()
 
 
 def _error(ended: SimulationError | KeyboardInterrupt | None) -> Entry | None:
-    """Why it ended early, where and when."""
+    """Reason why the simulation ended early, with time and state."""
     if isinstance(ended, RolloutInterrupted):
         kept = ended.rollout
         return {

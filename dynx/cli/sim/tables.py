@@ -1,7 +1,9 @@
-"""Tables of the document of one simulation: everything shown is a function of the document alone."""
+"""Text and table of one simulation, made from its JSON document alone."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from typing import Any
 
 from rich.console import Console
@@ -10,13 +12,15 @@ from dynx.cli.shell.exits import one_line
 from dynx.cli.shell.inputs import default_frame_note
 from dynx.cli.shell.tables import Table
 from dynx.cli.shell.terminal import counted, number
-from dynx.cli.sim.numbers import column_text, error_text, share_text
-from dynx.cli.sim.perturbed import perturbed, spread
+from dynx.cli.sim.deviations import deviations, value_range
 
 Entry = dict[str, Any]
 
-AT_REST = 1e-20
-"""Kinetic energy [J] that is nothing but rounding: at most 1e-10 m/s for each kilogram."""
+KINETIC_ENERGY_AT_REST = 1e-20
+"""Kinetic energy [J] that is rounding alone: at most 1e-10 m/s for each kilogram."""
+
+PLAIN_RANGE = (1e-3, 1e5)
+"""Range of a column's largest number in which the column is written without exponents."""
 
 _STEPPERS = {
     "engine": "its own stepper",
@@ -24,11 +28,11 @@ _STEPPERS = {
     "rk4": "Runge-Kutta 4",
     "adaptive": "adaptive steps",
 }
-"""What an integrator is called."""
+"""Integrators by their name in the document."""
 
 
 def show(out: Console, made: Entry) -> None:
-    """What was simulated, a table with a line for each joint, and what is to be said of all."""
+    """Print what was simulated, a table with a line for each joint, and a summary."""
     _show_header(out, made)
     out.print(_joint_table(made))
     out.print(_worst(made))
@@ -45,13 +49,13 @@ def show(out: Console, made: Entry) -> None:
 
 def _show_header(out: Console, made: Entry) -> None:
     settings = made["settings"]
-    law = "no motors" if made["law"] == "none" else made["law"]
+    controller = "no motors" if made["law"] == "none" else made["law"]
     if made["frame"] is not None and made["motion"]["line"] is None:
-        law += f" of {one_line(made['frame'])}"
+        controller += f" of {one_line(made['frame'])}"
     engine = "" if made["backend"] is None else f" computed by {made['backend']}"
     stepper = _STEPPERS.get(settings["integrator"], settings["integrator"])
     out.print(
-        f"{one_line(made['robot'])}, {made['base']} base: {law}{engine}, on {settings['plant']} "
+        f"{one_line(made['robot'])}, {made['base']} base: {controller}{engine}, on {settings['plant']} "
         f"with {stepper}",
         style="bold",
     )
@@ -61,26 +65,26 @@ def _show_header(out: Console, made: Entry) -> None:
     )
     if made["frame"] is not None and not made["frame_given"]:
         out.print(default_frame_note(made["frame"]))
-    gains = [f"{name} {spread(gain)}" for name, gain in made["gains"].items() if gain]
+    gains = [f"{name} {value_range(gain)}" for name, gain in made["gains"].items() if gain]
     if gains:
         out.print(", ".join(gains))
-    differs = perturbed(made)
-    if differs:
-        out.print(differs)
+    deviating = deviations(made)
+    if deviating:
+        out.print(deviating)
 
 
 def _motion(made: Entry) -> str:
     motion = made["motion"]
     if motion["profile"] == "hold":
-        return "nothing to follow" if motion["to"] is None else "a configuration to hold"
+        return "no reference" if motion["to"] is None else "constant reference"
     where = "" if motion["line"] is None else f", {one_line(made['frame'])} along a straight line"
     return f"{motion['profile']} motion of {number(motion['duration'])} s{where}"
 
 
 def _joint_table(made: Entry) -> Table:
-    """Errors are of positions, in the unit that the first column says."""
+    """Table with a line for each coordinate of v; errors are those of its position."""
     joints: list[Entry] = made["joints"]
-    right = ("max\nerror", "RMS\nerror", "max\nspeed", "max\ntorque", "limit", "of it")
+    right = ("max\nerror", "RMS\nerror", "max\nspeed", "max\ntorque", "torque\nlimit", "of\nlimit")
     table = Table("joint", "unit", *right, right=right, keys=1)
     base = 6 if made["base"] == "floating" else 0
     speeds = column_text([joint["max_speed"] for joint in joints])
@@ -95,16 +99,16 @@ def _joint_table(made: Entry) -> Table:
             speed,
             torque,
             "-" if limit is None else f"{limit:.4g}",
-            "-" if not limit else share_text(joint["max_torque"] / limit),
+            "-" if not limit else percent_text(joint["max_torque"] / limit),
         )
     return table
 
 
 def _worst(made: Entry) -> str:
     if made["motion"]["to"] is None:
-        return "no error: there was nothing to follow"
+        return "no tracking error: there is no reference"
     if made["max_error"] is None:
-        return "no error of joints: there are none"
+        return "no tracking error of joints: the robot has none"
     units = {joint["name"]: joint["unit"] for joint in made["joints"]}
     joint = made["max_error_joint"]
     return (
@@ -114,7 +118,7 @@ def _worst(made: Entry) -> str:
 
 
 def _body_error(what: str, error: Entry) -> str:
-    """Of the base or of a frame, which have metres and radians."""
+    """Make two lines with the position and rotation errors of the base or a frame."""
     parts = [
         f"{error_text(error[name]['max'])} {unit} at {number(error[name]['max_time'])} s, "
         f"{error_text(error[name]['final'])} at the end"
@@ -124,29 +128,59 @@ def _body_error(what: str, error: Entry) -> str:
 
 
 def _energy(made: Entry) -> str:
-    """A ratio only where it tells how well the energy was kept: of a robot on which nothing did work."""
+    """Make the line about energy: a relative drift where no work was done on the robot, else its change."""
     kinetic = made["max_kinetic_energy"]
-    if kinetic < AT_REST:
-        return "nothing moved"
+    if kinetic < KINETIC_ENERGY_AT_REST:
+        return "the robot stayed at rest"
     largest = f"largest kinetic energy {kinetic:.3g} J"
     if made["passive"]:
-        return f"energy drifted by {made['energy_drift']:.2g} times the {largest}"
+        return f"energy drift {made['energy_drift']:.2g} times the {largest}"
     return f"energy changed by up to {made['energy_change']:.3g} J; {largest}"
 
 
 def _saturation(made: Entry) -> str:
     if made["motor_limits"] is not None:
-        return "PyBullet held its motors to the limits; how often is not known"
+        return "PyBullet saturated its motors at the limits; how often is unknown"
     if made["settings"]["effort_limits"] is None:
-        return "torques were not cut to limits (--effort-limits urdf does)"
-    return f"motors were at their limits in {100.0 * made['saturated']:.3g} % of the steps"
+        return "torques were not limited (--effort-limits urdf limits them)"
+    return f"torques were saturated in {100.0 * made['saturated']:.3g} % of the steps"
 
 
 def _overshoot(made: Entry) -> str:
     settings, found = made["settings"], made["overshoot"]
     step = "--dt" if settings["control_dt"] == settings["dt"] else "--control-dt"
-    kd = "damping" if made["law"] == "impedance" else "kd"
+    gain = "damping" if made["law"] == "impedance" else "kd"
     return (
-        f"smaller gains or a smaller {step}: {kd} {step[2:].replace('-', '_')} / inertia is "
-        f"{found['ratio']:.3g} at {one_line(found['joint'])}, and above 2 a step overshoots"
+        f"smaller gains or a smaller {step} can help: {gain} {step[2:].replace('-', '_')} / inertia is "
+        f"{found['ratio']:.3g} at {one_line(found['joint'])}, and a step is unstable above 2"
     )
+
+
+def error_text(error: float | None) -> str:
+    """Write an error with two digits, or ``-`` for None."""
+    if error is None:
+        return "-"
+    return "0" if error == 0.0 else f"{error:.1e}"
+
+
+def column_text(values: Sequence[float]) -> list[str]:
+    """Write the numbers of a column with as many decimals as give the largest four digits."""
+    largest = max(values, default=0.0)
+    if largest == 0.0:
+        return ["0"] * len(values)
+    if not PLAIN_RANGE[0] <= largest < PLAIN_RANGE[1]:
+        return [f"{value:.1e}" for value in values]
+    decimals = max(0, 3 - math.floor(math.log10(largest)))
+    return [f"{value:.{decimals}f}" for value in values]
+
+
+def percent_text(ratio: float) -> str:
+    """Write a ratio as a percentage with two digits, between ``<0.01 %`` and ``>9999 %``."""
+    percent = 100.0 * ratio
+    if percent == 0.0:
+        return "0 %"
+    if percent < 0.01:
+        return "<0.01 %"
+    if percent < 9.95:
+        return f"{percent:.2f} %" if percent < 0.995 else f"{percent:.1f} %"
+    return f"{percent:.0f} %" if percent < 9999.5 else ">9999 %"

@@ -9,7 +9,7 @@ from rich.console import Console
 from dynx.cli.shell.exits import one_line
 from dynx.cli.shell.tables import Table
 from dynx.cli.shell.terminal import counted, number
-from dynx.cli.sim.numbers import error_text
+from dynx.cli.sim.tables import error_text
 
 Entry = dict[str, Any]
 

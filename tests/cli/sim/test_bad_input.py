@@ -85,7 +85,7 @@ GOES = ["ur5", "--to", "elbow_joint=0.1"]
         ([*GOES, "--save", "/nosuch/folder/x.npz"], "/nosuch/folder"),
         ([*GOES, "--save", "x.txt"], "wanted one of .npz, .csv"),
         ([*GOES, "--save", "x.npz", "--save", "x.npz"], "twice"),
-        ([*GOES, "--plot", "x.xyz"], "wanted one of"),
+        ([*GOES, "--plot", "x.xyz"], "a plot is saved as .png, .pdf or .svg"),
         ([*GOES, "--plot", "/nosuch/folder/x.png"], "/nosuch/folder"),
         ([*GOES, "--resume", "/nosuch.npz"], "/nosuch.npz cannot be read"),
         ([*GOES, "--resume-step", "3"], "--resume-step goes with --resume"),

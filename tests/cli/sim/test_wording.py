@@ -10,10 +10,10 @@ import pytest
 
 import dynx
 from dynx import control
-from dynx.cli.sim.numbers import column_text, share_text
-from dynx.cli.sim.overshoot import overshoot
+from dynx.cli.sim.tables import column_text, percent_text
 from dynx.sim import simulate
 from dynx.sim.named_controllers import CONTROLLERS
+from dynx.sim.overshoot import largest_overshoot
 from tests.cli.sim.command import SHORT, document, sim
 
 ELBOW = ["ur5", "--to", "elbow_joint=1"]
@@ -32,12 +32,12 @@ FALLING = ["solo12", "--base", "floating", "--controller", "pd", "--duration", "
         (["--armature", "0.1"], "plant: armature 0.1"),
         (["--push", "tool0:1,0,0"], "plant: push on tool0 from 0 s"),
         (["--push", "tool0:1,0,0:0.01:0.02"], "plant: push on tool0 from 0.01 s for 0.02 s"),
-        (["--position-limits"], "plant: stops at the limits of position"),
+        (["--position-limits"], "plant: stops at the position limits"),
         (["--substeps", "2"], "plant: 2 substeps"),
-        (["--noise-q", "1e-4", "--noise-v", "0.01"], "law: noise 0.0001 in q and 0.01 in v"),
-        (["--delay", "0.002"], "law: delay 0.002 s"),
-        (["--control-dt", "0.002"], "law: asked every 0.002 s"),
-        (["--friction", "0.5", "--delay", "0.002"], "plant: friction 0.5; law: delay 0.002 s"),
+        (["--noise-q", "1e-4", "--noise-v", "0.01"], "controller: noise 0.0001 in q and 0.01 in v"),
+        (["--delay", "0.002"], "controller: delay 0.002 s"),
+        (["--control-dt", "0.002"], "controller: period 0.002 s"),
+        (["--friction", "0.5", "--delay", "0.002"], "plant: friction 0.5; controller: delay 0.002 s"),
     ],
 )
 def test_the_header_says_what_differs_from_the_nominal_run(arguments: list[str], said: str) -> None:
@@ -69,21 +69,21 @@ SWING = ["pendulum", "--controller", "none", "--q0", "1", "--duration", "0.1"]
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (SWING, "energy drifted by "),
+        (SWING, "energy drift "),
         ([*SWING, "--damping", "urdf", "--friction", "urdf"], "energy changed by up to "),
         (FALLING, "energy changed by up to "),
-        (["pendulum", "--controller", "none", "--duration", "0.1"], "nothing moved"),
+        (["pendulum", "--controller", "none", "--duration", "0.1"], "the robot stayed at rest"),
         # What moves by rounding alone has no kinetic energy that a change could be compared with.
-        (["ur5", "--controller", "gravity-pd", "--duration", "0.05"], "nothing moved"),
+        (["ur5", "--controller", "gravity-pd", "--duration", "0.05"], "the robot stayed at rest"),
     ],
 )
 def test_no_cause_is_made_up_for_a_change_of_energy(arguments: list[str], said: str) -> None:
     lines = sim(*arguments).stdout.splitlines()
-    energy = [line for line in lines if line.startswith(("energy", "nothing moved"))]
+    energy = [line for line in lines if line.startswith(("energy", "the robot stayed at rest"))]
     assert len(energy) == 1
     assert energy[0].startswith(said)
     assert "work" not in energy[0]
-    assert (" times " in energy[0]) == (said == "energy drifted by ")
+    assert (" times " in energy[0]) == (said == "energy drift ")
 
 
 def test_the_change_of_energy_is_that_of_the_record() -> None:
@@ -172,7 +172,7 @@ def test_numbers_of_one_column_are_of_one_style() -> None:
     ],
 )
 def test_shares_are_no_wider_than_they_say(share: float, said: str) -> None:
-    assert share_text(share) == said
+    assert percent_text(share) == said
 
 
 @pytest.mark.parametrize("motion", [["--to", "panda_joint1=0.3"], ["--controller", "pd"]])
@@ -225,8 +225,8 @@ def test_gains_too_large_for_the_step_are_named(arguments: list[str], name: str)
     result = sim(*arguments)
     assert result.exit_code == 1
     (line,) = (line for line in result.stdout.splitlines() if line.startswith("smaller gains"))
-    assert line.startswith("smaller gains or a smaller --dt: ")
-    assert f" at {name}, and above 2 a step overshoots" in line
+    assert line.startswith("smaller gains or a smaller --dt can help: ")
+    assert f" at {name}, and a step is unstable above 2" in line
     made = document(*arguments, code=1)
     assert made["overshoot"]["joint"] == name
     assert made["overshoot"]["ratio"] > 2.0
@@ -235,12 +235,12 @@ def test_gains_too_large_for_the_step_are_named(arguments: list[str], name: str)
 def test_the_ratio_is_that_of_the_mass_matrix() -> None:
     arm = dynx.load("ur5")
     inertia = np.diag(dynx.backend("reference", arm).mass_matrix(arm.neutral()))
-    found = overshoot(control.PD(arm, kp=1.0, kd=40.0), arm.neutral(), 2e-3)
+    found = largest_overshoot(control.PD(arm, kp=1.0, kd=40.0), arm.neutral(), 2e-3)
     assert found is not None
     assert found.ratio == pytest.approx(40.0 * 2e-3 / inertia.min(), rel=1e-12)
     assert found.joint == arm.joint_names[int(np.argmin(inertia))]
     for law in (control.PD(arm, kp=1.0, kd=0.01), control.ComputedTorque(arm, kp=400, kd=40), None):
-        assert overshoot(law, arm.neutral(), 1e-3) is None
+        assert largest_overshoot(law, arm.neutral(), 1e-3) is None
 
 
 def test_a_run_that_diverges_otherwise_blames_no_gains() -> None:

@@ -1,6 +1,7 @@
-"""How far a robot was from what it was to follow: its joints, its floating base, a frame of it.
+"""Tracking errors of a rollout: of its joints, of its floating base, and of a frame.
 
-Joints, and the base and a frame, are told apart: the largest of metres and radians together means nothing.
+Joints are kept apart from bodies, and positions of a body from its rotation: the maximum of metres and
+radians together means nothing.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from dynx.backends import backend
-from dynx.sim import Rollout
+from dynx.sim.record.rollout import Rollout
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import pose_error
 
@@ -18,7 +19,7 @@ Entry = dict[str, Any]
 
 
 def joint_error(rollout: Rollout) -> Entry:
-    """Over all joints and times; None where there was nothing to follow, or where there are no joints."""
+    """Summarise the error over all joints and times; None for each number without a reference or joints."""
     base = 6 if rollout.model.floating else 0
     error = np.abs(rollout.error[:, base:])
     if rollout.reference is None or error.size == 0:
@@ -35,31 +36,31 @@ def joint_error(rollout: Rollout) -> Entry:
 
 
 def base_error(rollout: Rollout) -> Entry | None:
-    """Of a floating base; None for a fixed one, or where there was nothing to follow."""
+    """Summarise the error of a floating base; None for a fixed base, or without a reference."""
     if rollout.reference is None or not rollout.model.floating:
         return None
-    return _of_body(rollout.t, rollout.error[:, :3], rollout.error[:, 3:6])
+    return _body_error(rollout.t, rollout.error[:, :3], rollout.error[:, 3:6])
 
 
 def frame_error(rollout: Rollout, frame: str | None) -> Entry | None:
-    """Of a frame of the robot as it moved; None without a frame, or where there was nothing to follow."""
+    """Summarise the error of a frame of the robot; None without a frame or a reference."""
     if rollout.reference is None or frame is None:
         return None
-    with backend("reference", rollout.model) as bodies:
-        wanted = bodies.forward_kinematics(rollout.reference.q, frame)
-        found = bodies.forward_kinematics(rollout.q, frame)
-    return _of_body(rollout.t, *pose_error(wanted, found))
+    with backend("reference", rollout.model) as engine:
+        reference = engine.forward_kinematics(rollout.reference.q, frame)
+        actual = engine.forward_kinematics(rollout.q, frame)
+    return _body_error(rollout.t, *pose_error(reference, actual))
 
 
-def _of_body(t: Floats, position: Floats, rotation: Floats) -> Entry:
-    """The lengths of both errors (n + 1, 3): [m], and [rad] as the angle of the rotation that is left."""
+def _body_error(t: Floats, position: Floats, rotation: Floats) -> Entry:
+    """Summarise the norms of both errors (n + 1, 3): [m], and [rad] as the angle of a rotation vector."""
     return {
         name: {
-            "max": float(length.max()),
-            "max_time": float(t[int(np.argmax(length))]),
-            "final": float(length[-1]),
+            "max": float(norm.max()),
+            "max_time": float(t[int(np.argmax(norm))]),
+            "final": float(norm[-1]),
         }
-        for name, length in (
+        for name, norm in (
             ("position", np.linalg.norm(position, axis=1)),
             ("rotation", np.linalg.norm(rotation, axis=1)),
         )
