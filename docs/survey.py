@@ -149,10 +149,11 @@ def page(entries: Sequence[dict[str, Any]]) -> str:
         "# Real robots: why engines differ on them",
         "",
         "Written by `python docs/survey.py`. Every file is loaded by each engine as its users load it, fixed "
-        "and floating, and compared with the right answer; see [doctor.md](doctor.md). The effect of a cause "
-        "is how much an engine's answer changes when that cause alone is taken out, relative to the largest "
-        "right value; `no answer` means that the engine refuses the file, or the question, until it is taken "
-        "out. Every cause listed is proved. Rules are explained in [rules.md](rules.md).",
+        "and floating, and compared with reference values; see [doctor.md](doctor.md). The effect of a cause "
+        "is how much an engine's result changes when that cause alone is removed, relative to the "
+        "largest reference value; `no answer` means that the engine refuses the file, or cannot compute the "
+        "quantity, until "
+        "it is removed. Every cause listed is proved. Rules are explained in [rules.md](rules.md).",
         "",
     ]
     for group, title in GROUPS.items():

@@ -1,36 +1,7 @@
-"""What `dynx.diagnose` found out about one robot, and its JSON form (schema 1).
+"""Report of `dynx.diagnose` on one robot, and its JSON document (schema 1, docs/schemas/doctor.json).
 
-    {"schema": 1, "dynx": version, "results": [...], "summary": {...}, "not_done": [...]}
-
-One entry of ``results`` per robot and base:
-
-    robot, source, base      its name, where it was read from, "fixed" or "floating"
-    engines                  [{engine, version, call, refused, refused_after, before, after}]: `before`
-                             and `after` the mending are {quantity: relative error} against the answer
-                             dynx gives for the file (null: no number); `refused` is null or the
-                             engine's words
-    findings                 [{rule, name, kind, link, joint, line, message, engines, effect, effects,
-                             proved, remedy}]; `effect` is null or {quantity, relative_error}, the largest
-                             of `effects`, {engine: {quantity, relative_error}}; `relative_error` is null
-                             where the engine gives no number at all (quantity ``loading``: it refuses
-                             the file)
-    explained                whether no difference above `tolerance` remains after mending
-    residual                 the largest relative error that remains (null: an answer without number)
-    unexplained              [{engine, quantity, relative_error, joint, counterexample}]
-    tolerance, samples, seed what counts as a difference, and the states compared
-    referee                  largest relative error of the right answers themselves (mass matrix and inverse
-                             dynamics at one state) against the 50-digit referee
-    choices                  sentences: what was decided where the file is ambiguous, and what was done
-                             that changes the physics of the robot
-    calls                    [{engine, code}]: what only a call at run time can mend
-    pairs                    [{engines: [a, b], quantity, relative_error, joints: {joint: error}}]
-    model_difference         [{engine, part, name, property, file, engine_value}]: what an engine
-                             holds that the file does not say
-    error                    null, or {"type", "message"}: why the robot could not be examined
-    seconds                  wall-clock time
-
-``summary`` counts ``robots`` and of them ``alike`` (nothing differs), ``explained`` (all that differs has
-a proved cause), ``unexplained``, ``refused`` and ``not_done``.
+A number that is not finite is null in the document: an engine that refuses the file (quantity ``loading``) or
+computes NaN has no error.
 """
 
 from __future__ import annotations
@@ -50,7 +21,7 @@ SCHEMA = 1
 
 @dataclass(frozen=True)
 class Effect:
-    """How much a cause changes an answer: relative, infinite where there is no answer with it."""
+    """Relative change of a quantity by a cause, infinite where an engine computes nothing because of it."""
 
     quantity: str
     relative_error: float
@@ -60,9 +31,9 @@ class Effect:
 class Finding:
     """A cause at one place of the file.
 
-    `proved` says that it was taken away alone and an engine's answer changed, and that with all causes
-    taken away the engines agree. A finding of kind ``difference`` without effect is present in the file
-    but changes nothing on this base.
+    `proved` says that removing it alone changed a quantity of an engine, and that the engines agree once all
+    causes are removed. A finding of kind ``difference`` without effect is present in the file but changes
+    nothing on this base.
     """
 
     rule: str
@@ -77,12 +48,16 @@ class Finding:
     proved: bool = False
     remedy: str | None = None
     effects: Mapping[str, Effect] = field(default_factory=dict)
-    """The effect on each of the `engines`; `effect` is the largest of them."""
+    """Effect on each of the `engines`; `effect` is the largest of them."""
 
 
 @dataclass(frozen=True)
 class EngineResult:
-    """One engine: how it loads the file, and how far its answers are from the file's, before and after."""
+    """How one engine loads the file, and its relative errors `before` and `after` mending, by quantity.
+
+    Errors are against the reference values that dynx computes from the file. `refused` is the message with
+    which the engine refuses the file, `refused_after` that for the mended file.
+    """
 
     engine: str
     version: str
@@ -95,7 +70,7 @@ class EngineResult:
 
 @dataclass(frozen=True)
 class PairError:
-    """Two engines on one quantity as loaded, and where it can be said, joint by joint."""
+    """Relative error of two engines on one quantity as loaded, and of inverse dynamics joint by joint."""
 
     engines: tuple[str, str]
     quantity: str
@@ -105,7 +80,7 @@ class PairError:
 
 @dataclass(frozen=True)
 class Counterexample:
-    """The smallest robot and state found at which the difference is still there."""
+    """Smallest robot and state found at which a difference is still there."""
 
     urdf: str
     q: tuple[float, ...]
@@ -117,7 +92,7 @@ class Counterexample:
 
 @dataclass(frozen=True)
 class Unexplained:
-    """A difference for which no rule of the catalogue accounts."""
+    """A difference that no rule of the catalogue explains."""
 
     engine: str
     quantity: str
@@ -128,7 +103,7 @@ class Unexplained:
 
 @dataclass(frozen=True)
 class RunTimeCall:
-    """What no URDF can mend: a line of code for the users of one engine."""
+    """A remedy that no URDF can express: a line of code for the users of one engine."""
 
     engine: str
     code: str
@@ -144,7 +119,13 @@ class Failure:
 
 @dataclass(frozen=True, repr=False)
 class DoctorReport:
-    """Why engines differ on a file, with proof; true in a condition if they do not differ."""
+    """Why engines differ on a file, with proof; true in a condition if they do not differ.
+
+    `residual` is the largest relative error that remains after mending, `referee` that of the reference
+    values themselves (mass matrix and inverse dynamics at one state) against 50 digits. `choices` are
+    sentences: what was decided where the file is ambiguous, and what changed the physics of the robot.
+    `model_difference` lists the values of engines that the file does not state.
+    """
 
     robot: str
     source: str | None = None
@@ -163,29 +144,29 @@ class DoctorReport:
     model_difference: tuple[Deviation, ...] = ()
     error: Failure | None = None
     mended: str | None = field(default=None, compare=False)
-    """The URDF text that the engines load alike; None where nothing had to change or nothing helps."""
+    """URDF text that the engines load alike; None where nothing had to change or no remedy helps."""
     text: str | None = field(default=None, compare=False)
-    """The text that was examined: for excerpts."""
+    """Text that was examined, for excerpts."""
     form: TextForm | None = field(default=None, compare=False)
-    """In what encoding, and between what ends, the text was read: the mended text is written likewise.
-    None for text that declares its encoding itself."""
+    """Encoding and line ends of the text as it was read, for writing the mended text alike; None for text
+    that declares its encoding itself."""
     seconds: float = field(default=0.0, compare=False)
 
     @property
     def differences(self) -> tuple[Finding, ...]:
-        """The causes that change an answer here."""
+        """Causes that change a quantity of an engine."""
         return tuple(finding for finding in self.findings if finding.effect is not None)
 
     @property
     def alike(self) -> bool:
-        """Whether every engine that loads the file as it is gives its answers."""
+        """Whether every engine loads the file, with no error above the tolerance."""
         largest = max((e for each in self.engines for e in each.before.values()), default=0.0)
         refused = any(each.refused is not None for each in self.engines)
         return self.error is None and not refused and largest <= self.tolerance
 
     @property
     def explained(self) -> bool:
-        """Whether no difference above `tolerance` remains after the causes were taken away."""
+        """Whether no difference above `tolerance` remains after the causes were removed."""
         return self.error is None and not self.unexplained and self.residual <= self.tolerance
 
     def __bool__(self) -> bool:
@@ -196,7 +177,7 @@ class DoctorReport:
 
     @property
     def verdict(self) -> str:
-        """One sentence."""
+        """Verdict in one sentence."""
         if self.error is not None:
             return f"not examined ({self.error.type}: {self.error.message})"
         if self.alike:

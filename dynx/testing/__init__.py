@@ -1,10 +1,10 @@
-"""What dynx publishes for test suites.
+"""Tests of robots for other test suites.
 
-- `agreement_tests`: one line in a test file of yours, and your robot's agreement is tested
+- `agreement_tests`: one line in a test file of yours tests the agreement of engines on your robot
 - `dynx.testing.plugin`: the same for ``pytest --dynx-robot my.urdf``, without a test file
 - `dynx.testing.strategies`: Hypothesis strategies for robots and states (the extra ``testing``)
 
-Importing it imports neither Hypothesis nor an engine: pytest does so in every run, for the plugin.
+Importing it imports neither Hypothesis nor an engine, because pytest does so in every run for the plugin.
 """
 
 from __future__ import annotations

@@ -9,7 +9,7 @@ import pytest
 
 from dynx.errors import ArgumentError, nearest, shown
 from dynx.model.model import Base
-from dynx.testing.robot_checks import CHECKS, Disagreement, measured, require_agreement
+from dynx.testing.robot_checks import CHECKS, Disagreement, measured_agreement, require_agreement
 from dynx.testing.robot_plan import path_or_name
 
 _BASES: dict[str, tuple[Base, ...]] = {
@@ -46,7 +46,7 @@ def agreement_tests(
             """One quantity or law."""
             found = path_or_name(robot, request.path.parent)
             try:
-                require_agreement(measured(request.config, found, robot_base, chosen), check, robot)
+                require_agreement(measured_agreement(request.config, found, robot_base, chosen), check, robot)
             except Disagreement as difference:
                 pytest.fail(str(difference), pytrace=False)
 

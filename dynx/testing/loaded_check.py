@@ -1,4 +1,4 @@
-"""Whether engines that load a robot's file themselves differ, beyond what a baseline knows."""
+"""Check that engines that load a robot's file themselves differ no more than a baseline accepts."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from dynx.testing.robot_plan import RobotPlan
 
 
 def require_same_loading(plan: RobotPlan, robot: str, label: str, base: Base) -> None:
-    """Raise Disagreement where engines differ in what the baseline of the plan does not know."""
+    """Raise Disagreement where engines differ in a way that the baseline of the plan does not accept."""
     chosen: dict[str, Any] = {} if plan.tolerance is None else {"tolerance": plan.tolerance}
     head = f"{label}, {base} base, as engines load the file"
     try:
@@ -25,7 +25,7 @@ def require_same_loading(plan: RobotPlan, robot: str, label: str, base: Base) ->
         raise Disagreement(f"{head}: not examined\n  {type(error).__name__}: {error}") from None
     if report.error is not None:
         raise Disagreement(f"{head}: not examined\n  {report.error.type}: {report.error.message}")
-    # A baseline knows a robot by its name or by its path.
+    # A baseline identifies a robot by its name or by its path.
     baseline = plan.baseline or Baseline(os.curdir)
     new = baseline.compare(replace(report, robot=robot)).new
     if new:

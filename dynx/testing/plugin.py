@@ -4,8 +4,8 @@ Each robot and base becomes one test per quantity and per law of mechanics that 
 no test file is needed. ``--dynx-as-loaded`` adds one test in which every engine loads the file itself
 (`dynx.diagnose`). In an ini file, ``dynx_robots`` lists robots for every run. See ``docs/testing.md``.
 
-pytest imports this module in every run of everybody who has dynx installed, so it imports nothing that
-takes time and does nothing unless it is asked to.
+pytest imports this module in every run wherever dynx is installed, so it imports nothing that takes time and
+does nothing without its options.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _PLAN: pytest.StashKey[RobotPlan] = pytest.StashKey()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """The options, all of which begin with ``--dynx``."""
+    """Add the options, which all begin with ``--dynx``."""
     group = parser.getgroup("dynx", "agreement of rigid-body engines on your robot")
     group.addoption(
         "--dynx-robot",
@@ -44,7 +44,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption(
         "--dynx-base",
         choices=("fixed", "floating", "both"),
-        help="whether the root link is bolted to the world or free (default: fixed)",
+        help="whether the root link is fixed to the world or free (default: fixed)",
     )
     group.addoption(
         "--dynx-backends", metavar="A,B", help="the engines to compare (default: all that are installed)"
@@ -58,13 +58,13 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption(
         "--dynx-baseline",
         metavar="FILE",
-        help="of --dynx-as-loaded: differences to accept, as `dynx doctor --write-baseline` writes them",
+        help="differences that --dynx-as-loaded accepts, as `dynx doctor --write-baseline` writes them",
     )
     group.addoption(
         "--dynx-tolerance",
         type=float,
         metavar="ERROR",
-        help="of --dynx-as-loaded: relative error above which engines differ (default: 1e-12)",
+        help="relative error above which engines differ for --dynx-as-loaded (default: 1e-12)",
     )
     parser.addini(
         "dynx_robots",
@@ -88,7 +88,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_report_header(config: pytest.Config) -> str | None:
-    """What is compared, if anything is."""
+    """Describe what is compared, if anything is."""
     plan = config.stash.get(_PLAN, None)
     return None if plan is None else plan.header
 
@@ -97,7 +97,7 @@ def pytest_report_header(config: pytest.Config) -> str | None:
 def pytest_make_collect_report(
     collector: pytest.Collector,
 ) -> Generator[None, pytest.CollectReport, pytest.CollectReport]:
-    """Put the robots behind what the session collects from files."""
+    """Append the robots to what the session collects from files."""
     report = yield
     if isinstance(collector, pytest.Session) and report.passed:
         plan = collector.config.stash.get(_PLAN, None)
@@ -109,7 +109,7 @@ def pytest_make_collect_report(
 
 
 def _everything_is_run(config: pytest.Config) -> bool:
-    """Whether some argument is a directory: ``pytest test_one.py`` asks for that file alone."""
+    """Check that some argument is a directory: ``pytest test_one.py`` runs that file alone."""
     named = [Path(os.path.join(config.invocation_params.dir, arg.split("::")[0])) for arg in config.args]
     return not named or not all(path.is_file() for path in named)
 
@@ -117,4 +117,4 @@ def _everything_is_run(config: pytest.Config) -> bool:
 def _refuse_idle_options(config: pytest.Config) -> None:
     idle = [flag for name, flag in _OPTIONS.items() if getattr(config.option, name) is not None]
     if idle and not config.getini("dynx_robots"):
-        raise pytest.UsageError(f"{idle[0]} says how to test robots, and none is given: use --dynx-robot")
+        raise pytest.UsageError(f"{idle[0]} needs robots to test, and none is given: use --dynx-robot")

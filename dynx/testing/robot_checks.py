@@ -1,7 +1,7 @@
-"""What is tested of a robot: each quantity and each law of mechanics of `dynx.agree`.
+"""Checks of a robot: each quantity and each law of mechanics of `dynx.agree`.
 
-A robot on a base is measured once in a run of pytest, for all its tests; a test looks up what concerns
-it, and says where engines differ so that it can be seen again.
+The agreement of a robot on a base is measured once in a run of pytest, for all its tests; a test reads its
+part, and reports where engines differ so that it can be reproduced.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ _MEASURED = pytest.StashKey[dict[Key, AgreementReport]]()
 
 
 class Disagreement(AssertionError):
-    """Engines differ on a robot; the message is all there is to say, no traceback adds to it."""
+    """Engines differ on a robot; shown by its message alone, without a traceback."""
 
 
-def measured(
+def measured_agreement(
     config: pytest.Config, robot: str, base: Base, backends: Sequence[str] | None
 ) -> AgreementReport:
-    """The agreement about a robot, measured when it is first asked for in the run of `config`."""
+    """Return the agreement of a robot, which is measured by the first call in the run of `config`."""
     known = config.stash.setdefault(_MEASURED, {})
     key = (robot, base, None if backends is None else tuple(backends))
     if key not in known:
@@ -49,7 +49,7 @@ def measured(
 
 
 def require_agreement(report: AgreementReport, check: str, label: str) -> None:
-    """Raise Disagreement where a check fails; skip the test where the report has nothing about it."""
+    """Raise Disagreement where a check fails; skip the test where the report does not have it."""
     head = f"{check} of {label}, {report.base} base"
     if report.error is not None:
         raise Disagreement(f"{head}: not measured\n  {report.error.type}: {report.error.message}")

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -12,20 +13,32 @@ import pytest
 from dynx.errors import DynxError
 from dynx.model.loading import load
 from dynx.model.model import Base
-from dynx.testing.robot_checks import CHECKS, Disagreement, measured, require_agreement
+from dynx.testing.robot_checks import CHECKS, Disagreement, measured_agreement, require_agreement
 from dynx.testing.robot_plan import PlannedRobot, RobotPlan
 
 READING = "description"
 """Name of the one test of a robot whose description cannot be read."""
 
 AS_LOADED = "as loaded"
+"""Name of the test in which engines load the file themselves."""
 
 
 def robot_nodes(session: pytest.Session, plan: RobotPlan) -> Iterator[RobotNode]:
-    """A collector for each robot and base of the plan."""
-    for robot in plan.robots:
+    """Make a collector for each robot and base of the plan.
+
+    A node is named ``my.urdf::fixed``; ``pytest -n auto --dist loadscope`` leaves it to one worker.
+    """
+    for planned in plan.robots:
         for base in plan.bases:
-            yield RobotNode.of(session, plan, robot, base)
+            yield RobotNode.from_parent(
+                session,
+                name=f"{planned.label} {base}",
+                nodeid=f"{planned.label}::{base}",
+                path=session.path,
+                plan=plan,
+                planned=planned,
+                robot_base=base,
+            )
 
 
 class RobotNode(pytest.Collector):
@@ -37,76 +50,51 @@ class RobotNode(pytest.Collector):
         self.planned = planned
         self.robot_base = robot_base
 
-    @classmethod
-    def of(cls, session: pytest.Session, plan: RobotPlan, planned: PlannedRobot, base: Base) -> RobotNode:
-        """The node ``my.urdf::fixed``; ``pytest -n auto --dist loadscope`` leaves it to one worker."""
-        node: RobotNode = cls.from_parent(
-            session,
-            name=f"{planned.label} {base}",
-            nodeid=f"{planned.label}::{base}",
-            path=session.path,
-            plan=plan,
-            planned=planned,
-            robot_base=base,
-        )
-        return node
-
     def collect(self) -> Iterator[RobotItem]:
-        """A test for each check; one that fails where the description cannot be read."""
+        """Make a test for each check, or one that fails where the description cannot be read."""
         try:
             load(self.planned.robot, base=self.robot_base)
-        except DynxError:
-            yield DescriptionItem.from_parent(self, name=READING)
+        except DynxError as error:
+            message = f"{self.name} base: {type(error).__name__}: {error}"
+            yield RobotItem.from_parent(self, name=READING, check=partial(self._fail, message))
             return
         for check in CHECKS:
-            yield AgreementItem.from_parent(self, name=check)
+            yield RobotItem.from_parent(self, name=check, check=partial(self._compare, check))
         if self.plan.as_loaded:
-            yield AsLoadedItem.from_parent(self, name=AS_LOADED)
+            yield RobotItem.from_parent(self, name=AS_LOADED, check=self._compare_as_loaded)
+
+    def _fail(self, message: str) -> None:
+        raise Disagreement(message)
+
+    def _compare(self, check: str) -> None:
+        report = measured_agreement(self.config, self.planned.robot, self.robot_base, self.plan.backends)
+        require_agreement(report, check, self.planned.label)
+
+    def _compare_as_loaded(self) -> None:
+        from dynx.testing.loaded_check import require_same_loading
+
+        require_same_loading(self.plan, self.planned.robot, self.planned.label, self.robot_base)
 
 
 class RobotItem(pytest.Item):
-    """One test of a robot."""
+    """One test of a robot: a check that raises Disagreement."""
 
     parent: RobotNode
 
+    def __init__(self, check: Callable[[], None], **node: Any) -> None:
+        super().__init__(**node)
+        self._check = check
+
+    def runtest(self) -> None:
+        """Run the check."""
+        self._check()
+
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], *_: Any) -> Any:
-        """What is said of a failure: no traceback where engines differ."""
+        """Show the message of a Disagreement without a traceback."""
         if isinstance(excinfo.value, Disagreement):
             return str(excinfo.value)
         return super().repr_failure(excinfo)
 
     def reportinfo(self) -> tuple[PathLike[str] | str, int | None, str]:
-        """Where the test is, and what it is called."""
+        """Return the file, the line and the title of the test."""
         return Path(self.parent.planned.label), None, f"{self.parent.name}: {self.name}"
-
-
-class DescriptionItem(RobotItem):
-    """Fails with what is wrong in the description."""
-
-    def runtest(self) -> None:
-        """Read it again."""
-        try:
-            load(self.parent.planned.robot, base=self.parent.robot_base)
-        except DynxError as error:
-            raise Disagreement(f"{self.parent.name} base: {type(error).__name__}: {error}") from None
-
-
-class AgreementItem(RobotItem):
-    """One quantity or law, in all engines."""
-
-    def runtest(self) -> None:
-        """Look it up in the robot's agreement."""
-        node = self.parent
-        report = measured(self.config, node.planned.robot, node.robot_base, node.plan.backends)
-        require_agreement(report, self.name, node.planned.label)
-
-
-class AsLoadedItem(RobotItem):
-    """The file, loaded by the engines themselves."""
-
-    def runtest(self) -> None:
-        """Ask the doctor."""
-        from dynx.testing.loaded_check import require_same_loading
-
-        node = self.parent
-        require_same_loading(node.plan, node.planned.robot, node.planned.label, node.robot_base)

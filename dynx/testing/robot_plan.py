@@ -1,4 +1,4 @@
-"""Which robots a pytest run tests, on which bases, in which engines; checked before any test runs."""
+"""Plan of a pytest run: robots, bases and engines, checked before any test runs."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class PlannedRobot:
-    """A robot: what `dynx.load` takes, and what it is called in a report of tests."""
+    """A robot: the argument of `dynx.load`, and its label in a report of tests."""
 
     robot: str
     label: str
@@ -34,7 +34,8 @@ class RobotPlan:
     """The robots of a run and how they are tested.
 
     `backends` None means all that are installed. `as_loaded` says whether engines also load the files
-    themselves, differing by more than `tolerance` (None: as `dynx.diagnose`) only as `baseline` knows.
+    themselves; there they may differ by at most `tolerance` (None: that of `dynx.diagnose`), except for the
+    differences in `baseline`.
     """
 
     robots: tuple[PlannedRobot, ...]
@@ -46,12 +47,12 @@ class RobotPlan:
 
     @property
     def engines(self) -> tuple[str, ...] | None:
-        """The engines among the backends that load files; None for all that are installed."""
+        """Engines among the backends that load files; None for all that are installed."""
         return tuple(name for name in self.backends or () if name in ENGINES) or None
 
     @property
     def header(self) -> str:
-        """One line for the head of a report."""
+        """Line for the head of a report."""
         labels = [robot.label for robot in self.robots]
         listed = ", ".join(labels[:5]) + (f" and {len(labels) - 5} more" if len(labels) > 5 else "")
         engines = ", ".join(self.backends or ["all engines"])
@@ -59,8 +60,8 @@ class RobotPlan:
 
 
 def plan_robots(config: pytest.Config, asked: Sequence[tuple[str, Path]]) -> RobotPlan:
-    """The plan for the options of `config` and robots, each with the folder to which its path is
-    relative. Raises UsageError for what is wrong in them."""
+    """Make the plan from the options of `config` and robots, each with the folder to which its path is
+    relative. Raises UsageError for invalid ones."""
     option = config.option
     try:
         robots = dict.fromkeys(each for robot, folder in asked for each in _found(robot, folder, config))
@@ -77,7 +78,7 @@ def plan_robots(config: pytest.Config, asked: Sequence[tuple[str, Path]]) -> Rob
 
 
 def path_or_name(robot: str, folder: Path) -> str:
-    """A robot as `dynx.load` takes it, a path in it being relative to `folder`."""
+    """Return a robot as `dynx.load` takes it; a path is relative to `folder`."""
     if robot == ALL or is_library_name(robot):
         return robot
     path = os.path.join(folder, os.path.expanduser(robot))
@@ -94,7 +95,7 @@ def _found(robot: str, folder: Path, config: pytest.Config) -> list[PlannedRobot
         except RobotNotFoundError:
             raise
         except DynxError:
-            pass  # what cannot be read is a failing test, not a wrong command
+            pass  # a description that cannot be read is a failing test, not an invalid command
         found.append(PlannedRobot(each.robot, _label(each.robot, config.rootpath)))
     return found
 
@@ -120,7 +121,7 @@ def _baseline(config: pytest.Config) -> Baseline | None:
     if not option.dynx_as_loaded:
         for value, flag in ((option.dynx_baseline, "baseline"), (option.dynx_tolerance, "tolerance")):
             if value is not None:
-                raise pytest.UsageError(f"--dynx-{flag} is about what --dynx-as-loaded looks at; give both")
+                raise pytest.UsageError(f"--dynx-{flag} needs --dynx-as-loaded; give both")
         return None
     if option.dynx_tolerance is not None and not 0.0 < option.dynx_tolerance < 1.0:
         raise pytest.UsageError(f"--dynx-tolerance is {option.dynx_tolerance}; wanted it between 0 and 1")

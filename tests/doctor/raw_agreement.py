@@ -15,7 +15,7 @@ import numpy as np
 
 from dynx.agreement.tolerances import BAR
 from dynx.doctor.examine.engine_input import without_meshes
-from dynx.doctor.examine.right_answers import TILTED, draw_states, free_model
+from dynx.doctor.examine.reference_values import TILTED_GRAVITY, draw_states, model_without_mimics
 from dynx.model.model import Base
 from dynx.model.xml.source import XmlSource
 
@@ -46,7 +46,7 @@ def beside(original: Path, data: bytes, folder: Path) -> Path:
 
 def task(path: Path, base: Base, samples: int = 3, seed: int = 1) -> dict[str, Any]:
     """What the scripts are asked about a file: names and states, from dynx's reading of it."""
-    model = free_model(XmlSource(path.read_bytes(), str(path)), base)
+    model = model_without_mimics(XmlSource(path.read_bytes(), str(path)), base)
     states = draw_states(model, samples, seed)
     start = 7 if model.floating else 0
     return {
@@ -54,7 +54,7 @@ def task(path: Path, base: Base, samples: int = 3, seed: int = 1) -> dict[str, A
         "floating": model.floating,
         "joints": list(model.joint_names),
         "links": [link.name for link in model.links],
-        "gravity": list(TILTED),
+        "gravity": list(TILTED_GRAVITY),
         "states": [
             {
                 "base": q[:7].tolist() if start else None,

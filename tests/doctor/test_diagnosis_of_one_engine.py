@@ -27,7 +27,7 @@ FRAMES = case_of(
 
 def diagnosed(monkeypatch: pytest.MonkeyPatch, engine: type[LoadedRobot], text: str) -> DoctorReport:
     """What the doctor says of a file and that engine alone."""
-    for module in ("examine.examination", "reporting"):
+    for module in ("examine.examination", "report_assembly"):
         monkeypatch.setattr(f"dynx.doctor.{module}.loader_class", lambda name: engine)
     return diagnose(text, engines=[NAME], counterexamples=False)
 

@@ -9,8 +9,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from dynx.doctor.examine.examination import Examination, Laboratory
-from dynx.doctor.examine.right_answers import free_model
+from dynx.doctor.examine.examination import Examination, Examiner
+from dynx.doctor.examine.reference_values import model_without_mimics
 from dynx.errors import EngineError
 from dynx.loaded import LoadedModel, LoadedRobot
 from dynx.model import Inertial, Model
@@ -39,7 +39,7 @@ class WilfulEngine(LoadedRobot):
         text = path.read_bytes()
         if SECRET.encode() in text:
             raise EngineError(f"{path.name} is a {SECRET}")
-        read = free_model(XmlSource(text), model.base)
+        read = model_without_mimics(XmlSource(text), model.base)
         links = tuple(replace(link, inertial=link.inertial or HEAVY) for link in read.links)
         self.model, self.right = model, ReferenceBackend(replace(read, links=links))
 
@@ -82,13 +82,13 @@ class WilfulEngine(LoadedRobot):
         self.right.close()
 
 
-def laboratory(engine: type[LoadedRobot] = WilfulEngine, samples: int = 3) -> Laboratory:
+def examiner(engine: type[LoadedRobot] = WilfulEngine, samples: int = 3) -> Examiner:
     """A laboratory with that engine alone."""
-    made = Laboratory((), samples, 0)
+    made = Examiner((), samples, 0)
     made.engines[NAME] = engine
     return made
 
 
 def examined(case: Case, engine: type[LoadedRobot] = WilfulEngine, samples: int = 3) -> Examination:
     """The engine's answers to a case."""
-    return laboratory(engine, samples).examine(case)
+    return examiner(engine, samples).examine(case)

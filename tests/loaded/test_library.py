@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dynx.agreement.tolerances import BAR
-from dynx.doctor.examine.engine_input import without_meshes, written
+from dynx.doctor.examine.engine_input import temporary_urdf, without_meshes
 from dynx.engines.pinocchio.as_loaded import LoadedPinocchio
 from dynx.errors import DynxError, EngineError
 from dynx.loaded.difference import model_difference
@@ -55,7 +55,7 @@ def test_there_is_one_robot_that_is_an_empty_shell() -> None:
 @pytest.mark.parametrize("name", SOURCES)
 def test_pinocchio_loads_it_as_dynx_reads_it(name: str, base: Base) -> None:
     model = in_tree_coordinates(SOURCES[name], base)
-    with written(SOURCES[name]) as path, LoadedPinocchio(path, model) as robot:
+    with temporary_urdf(SOURCES[name]) as path, LoadedPinocchio(path, model) as robot:
         if model.nv:
             assert_alike(robot, model, solve=False)
         assert model_difference(model, [robot.describe()]) == ()
@@ -72,10 +72,10 @@ def test_pybullet_differs_where_the_model_difference_says_so(name: str, base: Ba
     q, v, a = motion(model)
     refusal = _refusal(model)
     if refusal is not None:
-        with written(SOURCES[name]) as path, pytest.raises(EngineError, match=refusal):
+        with temporary_urdf(SOURCES[name]) as path, pytest.raises(EngineError, match=refusal):
             LoadedPyBullet(path, model)
         return
-    with written(SOURCES[name]) as path, LoadedPyBullet(path, model) as robot:
+    with temporary_urdf(SOURCES[name]) as path, LoadedPyBullet(path, model) as robot:
         rows = model_difference(model, [robot.describe()])
         poses = reference.forward_kinematics(q)[: len(model.links)]
         assert error(robot.link_poses(q), poses) <= BAR
@@ -103,7 +103,7 @@ def test_some_robots_are_loaded_alike_and_most_are_not() -> None:
     for name in ("ur5", "solo12", "panda", "talos", "g1"):
         model = in_tree_coordinates(SOURCES[name], "fixed")
         q = model.random(0)
-        with written(SOURCES[name]) as path, bullet.LoadedPyBullet(path, model) as robot:
+        with temporary_urdf(SOURCES[name]) as path, bullet.LoadedPyBullet(path, model) as robot:
             M = ReferenceBackend(model).mass_matrix(q)
             alike.append(bool(np.max(np.abs(robot.mass_matrix(q) - M)) <= BAR * np.max(M)))
     assert alike == [True, True, False, False, False]

@@ -6,7 +6,7 @@ from hypothesis import given, note
 from hypothesis import strategies as st
 
 from dynx.agreement.tolerances import BAR
-from dynx.doctor.examine.right_answers import TILTED
+from dynx.doctor.examine.reference_values import TILTED_GRAVITY
 from dynx.model.model import Base
 from dynx.model.xml.source import XmlSource
 from dynx.rules import Case, Rule, all_rules
@@ -18,7 +18,7 @@ BASES: tuple[Base, ...] = ("fixed", "floating")
 
 @given(urdf_text(), st.sampled_from(BASES))
 def test_a_remedy_removes_its_cause_from_any_robot(text: str, base: Base) -> None:
-    case = Case(XmlSource(text), base, TILTED)
+    case = Case(XmlSource(text), base, TILTED_GRAVITY)
     for rule in all_rules():
         detections = rule.detect(case)
         assert len(set(detections)) == len(detections)

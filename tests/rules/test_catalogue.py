@@ -9,7 +9,7 @@ import pytest
 from packaging.specifiers import SpecifierSet
 
 from dynx.agreement.tolerances import BAR
-from dynx.doctor.examine.right_answers import TILTED
+from dynx.doctor.examine.reference_values import TILTED_GRAVITY
 from dynx.errors import UnknownNameError
 from dynx.loaded import ENGINES
 from dynx.model.xml.source import SourceElement, XmlSource
@@ -121,7 +121,7 @@ def mended(rule: Rule) -> tuple[Case, Case, bool] | None:
     for choice in [None, *rule.choices]:
         trap = trap_case(rule)
         choices = None if choice is None else {rule.id: choice}
-        case = Case(trap.source, trap.base, TILTED, choices=choices)
+        case = Case(trap.source, trap.base, TILTED_GRAVITY, choices=choices)
         remedy = rule.remedy(case, rule.detect(case))
         if remedy is not None:
             assert remedy.changed

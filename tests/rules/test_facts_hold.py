@@ -14,8 +14,8 @@ import pytest
 from packaging.specifiers import SpecifierSet
 
 from dynx.agreement.tolerances import BAR
-from dynx.doctor.examine.examination import Examination, Laboratory
-from dynx.doctor.examine.right_answers import Truth
+from dynx.doctor.examine.examination import Examination, Examiner
+from dynx.doctor.examine.reference_values import ReferenceValues
 from dynx.doctor.prove.mending import mend
 from dynx.errors import ModelError
 from dynx.loaded import installed_engines, loader_class
@@ -47,9 +47,9 @@ def stated(named: bool) -> list[Any]:
 
 
 @cache
-def laboratory(engine: str) -> Laboratory:
+def examiner(engine: str) -> Examiner:
     """A laboratory with one engine."""
-    return Laboratory([engine], STATES, SEED)
+    return Examiner([engine], STATES, SEED)
 
 
 def cured(rule: Rule) -> Case | None:
@@ -63,19 +63,19 @@ def cured(rule: Rule) -> Case | None:
     return None
 
 
-def right_answers(rule: Rule, engine: str) -> Truth:
+def right_answers(rule: Rule, engine: str) -> ReferenceValues:
     """Those for the trap; where dynx refuses its text, those for the robot that the remedy makes of it."""
     try:
-        return laboratory(engine).truth(trap_case(rule))
+        return examiner(engine).reference(trap_case(rule))
     except ModelError:
         mended = cured(rule)
         assert mended is not None
-        return laboratory(engine).truth(mended)
+        return examiner(engine).reference(mended)
 
 
 def said(examination: Examination, engine: str) -> str:
     """What an engine did, for the message of a failure."""
-    answers = examination.answers[engine]
+    answers = examination.outputs[engine]
     return (
         f"{engine}: {examination.errors(engine)}, refused: {answers.refused}, failed: {dict(answers.failed)}"
     )
@@ -83,19 +83,19 @@ def said(examination: Examination, engine: str) -> str:
 
 @pytest.mark.parametrize(("rule", "engine"), stated(named=True))
 def test_fact(rule: Rule, engine: str) -> None:
-    before = laboratory(engine).examine(trap_case(rule), truth=right_answers(rule, engine))
+    before = examiner(engine).examine(trap_case(rule), reference=right_answers(rule, engine))
     if VERSIONS[engine] not in SpecifierSet(rule.engines[engine], prereleases=True):
-        assert before.worst(engine) <= BAR, said(before, engine)
+        assert before.max_error(engine) <= BAR, said(before, engine)
         return
-    assert before.worst(engine) > BAR, said(before, engine)
+    assert before.max_error(engine) > BAR, said(before, engine)
     case = cured(rule)
     if case is None:
         return
-    after = laboratory(engine).examine(case)
-    if after.worst(engine) > BAR:
+    after = examiner(engine).examine(case)
+    if after.max_error(engine) > BAR:
         # A remedy may bring up another cause: links without mass between the halves of a split joint.
-        after = laboratory(engine).examine(mend(case).case)
-    assert after.worst(engine) <= BAR, said(after, engine)
+        after = examiner(engine).examine(mend(case).case)
+    assert after.max_error(engine) <= BAR, said(after, engine)
 
 
 @pytest.mark.parametrize("rule", all_rules(), ids=lambda rule: rule.id)
@@ -108,6 +108,6 @@ def test_a_remedy_at_run_time_is_known_to_its_engine(rule: Rule) -> None:
 
 @pytest.mark.parametrize(("rule", "engine"), stated(named=False))
 def test_an_engine_that_is_not_named_reads_the_trap_as_dynx_does(rule: Rule, engine: str) -> None:
-    before = laboratory(engine).examine(trap_case(rule), truth=right_answers(rule, engine))
-    wrong = before.worst(engine) > BAR
+    before = examiner(engine).examine(trap_case(rule), reference=right_answers(rule, engine))
+    wrong = before.max_error(engine) > BAR
     assert wrong == ((rule.id, engine) in WRONG_BESIDES), said(before, engine)

@@ -12,8 +12,8 @@ from typing import Any
 
 import pytest
 
-from dynx.doctor.examine.engine_input import without_meshes, written
-from dynx.doctor.examine.right_answers import free_model
+from dynx.doctor.examine.engine_input import temporary_urdf, without_meshes
+from dynx.doctor.examine.reference_values import model_without_mimics
 from dynx.engines.silence import silence
 from dynx.loaded import LoadedJoint, installed_engines, load_as, loader_class
 from dynx.rules.traps import find_trap, trap_case
@@ -28,9 +28,9 @@ def held(rule: str, engine: str) -> LoadedJoint:
     if engine not in INSTALLED:
         pytest.skip(f"{engine} is not installed")
     case = trap_case(rule)
-    model = free_model(case.source, case.base)
+    model = model_without_mimics(case.source, case.base)
     with (
-        written(without_meshes(case.source)) as path,
+        temporary_urdf(without_meshes(case.source)) as path,
         silence(),
         load_as(engine, path, model) as robot,
     ):
@@ -70,7 +70,7 @@ def test_equal_limits_that_are_written(engine: str, limits: tuple[float, float])
         pytest.skip(f"{engine} is not installed")
     equal = '<limit lower="0.5" upper="0.5" effort="1" velocity="1"/>'
     case = case_of(link("base"), link("arm"), joint("elbow", "base", "arm", limit=equal))
-    with written(case.source) as path, silence(), load_as(engine, path, case.model) as robot:
+    with temporary_urdf(case.source) as path, silence(), load_as(engine, path, case.model) as robot:
         assert robot.describe().joints["elbow"].limits == limits
 
 

@@ -19,7 +19,7 @@ from dynx.cli.shell.run import carry_out
 from dynx.cli.shell.tables import Table
 from dynx.cli.shell.terminal import console, counted
 from dynx.doctor.formats import wording
-from dynx.doctor.formats.vote import Vote, largest_error, vote, worst
+from dynx.doctor.formats.vote import Vote, largest_error, largest_quantity_error, vote
 from dynx.doctor.report import DoctorReport
 from dynx.doctor.task import DoctorTask, check_engines, missing_engines
 from dynx.model.expansion import expand, refusals
@@ -120,7 +120,7 @@ def _show_many(out: Console, reports: Sequence[DoctorReport], seconds: float, le
         cells: list[str | Text] = []
         for engine in engines:
             result = results.get(engine)
-            far = None if result is None else worst(result)
+            far = None if result is None else largest_quantity_error(result)
             if result is not None and result.refused is not None:
                 cells.append("refuses")
             else:
@@ -157,7 +157,7 @@ def vote_lines(report: DoctorReport, found: Vote) -> list[str]:
         has = "has" if len(found.right) == 1 else "have"
         lines.append(f"{_and(found.right)} {has} the answer that follows from the file itself")
     for engine in report.engines:
-        far = worst(engine)
+        far = largest_quantity_error(engine)
         if engine.engine in wrong and far is not None:
             quantity, error = far
             missing = f"gives no answer for {wording.quantity(quantity)}"

@@ -37,8 +37,8 @@ def show_one(out: Console, report: DoctorReport, saved: Mapping[int, str], mende
     show_engines(out, report)
     show_errors(out, report)
     found = causes(report)
-    _show_causes(out, "causes", [each for each in found if each.worst is not None])
-    rest = [each for each in found if each.worst is None]
+    _show_causes(out, "causes", [each for each in found if each.largest_effect is not None])
+    rest = [each for each in found if each.largest_effect is None]
     present = [each for each in rest if each.kind == "difference"]
     _show_causes(out, "present, without effect on this base", present)
     practice = [each for each in rest if each.kind == "practice"]
@@ -141,7 +141,7 @@ def _show_causes(out: Console, title: str, found: Sequence[Cause]) -> None:
         sentence(out, one_line(cause.title), 6)
         out.print(f"      {_extent(cause)}")
         _show_places(out, cause)
-        if cause.advice and (cause.worst is not None or cause.kind == "practice"):
+        if cause.advice and (cause.largest_effect is not None or cause.kind == "practice"):
             sentence(out, f"-> {one_line(cause.advice)}", 6)
 
 
@@ -160,7 +160,7 @@ def _place(finding: Finding) -> str:
 
 def _cause_line(cause: Cause) -> Text:
     """Rule, how large, where it counts; loud only where it is more than rounding."""
-    worst = cause.worst
+    worst = cause.largest_effect
     line = Text(f"  {wording.name(cause.rule)} {wording.name(cause.name)}", STYLES[cause.severity])
     if worst is not None:
         line.append(f"  {wording.effect(worst)}", STYLES[cause.severity])
@@ -255,7 +255,7 @@ def _largest(report: DoctorReport) -> Text:
 
 
 def _rules(report: DoctorReport) -> Text:
-    found = [cause for cause in causes(report) if cause.worst is not None]
+    found = [cause for cause in causes(report) if cause.largest_effect is not None]
     parts = [Text(wording.name(cause.rule), STYLES[cause.severity]) for cause in found[:_SHOWN_RULES]]
     if len(found) > _SHOWN_RULES:
         parts.append(Text(f"+{len(found) - _SHOWN_RULES}"))

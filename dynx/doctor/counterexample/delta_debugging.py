@@ -1,8 +1,8 @@
-"""Making as many changes as possible while something still holds: delta debugging.
+"""Delta debugging: as many changes as possible while a condition still holds.
 
 The minimising algorithm of Zeller and Hildebrandt, "Simplifying and isolating failure-inducing input"
-(IEEE Transactions on Software Engineering 28, 2002, section 3), with the complements left out: they pay
-where most changes must stay unmade, and of a robot that shows a difference most can be cut away.
+(IEEE Transactions on Software Engineering 28, 2002, section 3), without the complements: these save trials
+where few changes can be made, but of a robot that shows a difference most can be removed.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ from typing import TypeVar
 Change = TypeVar("Change")
 
 
-def most(changes: Sequence[Change], holds: Callable[[Sequence[Change]], bool]) -> list[Change]:
-    """Changes that can be made together with `holds` staying true, in their order; no other single one
-    of `changes` can be added to them.
+def maximal_changes(changes: Sequence[Change], holds: Callable[[Sequence[Change]], bool]) -> list[Change]:
+    """Find changes that can be made together with `holds` staying true, to which no other single one of
+    `changes` can be added; they keep their order.
 
-    `holds` is asked of sets of changes, large ones first; neighbours in the list are tried together.
+    `holds` is called with sets of changes, large ones first; neighbours in the list are tried together.
     """
     made: set[int] = set()
     size = len(changes)
@@ -32,7 +32,7 @@ def most(changes: Sequence[Change], holds: Callable[[Sequence[Change]], bool]) -
 def _tried(
     changes: Sequence[Change], holds: Callable[[Sequence[Change]], bool], made: set[int], size: int
 ) -> bool:
-    """Try the changes not made yet in chunks of `size`, and whether any could be made."""
+    """Try the changes not made yet in chunks of `size`; return whether any could be made."""
     waiting = [k for k in range(len(changes)) if k not in made]
     found = False
     for start in range(0, len(waiting), size):

@@ -1,4 +1,4 @@
-"""Ways to simplify what is left of a robot: elements and attributes dropped, numbers made round."""
+"""Reductions of what is left of a robot: elements and attributes removed, numbers rounded."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from xml.sax.saxutils import quoteattr
 
-from dynx.doctor.counterexample.tree_reductions import Cuts
+from dynx.doctor.counterexample.tree_reductions import Reductions
 from dynx.model.xml.source import Edit, SourceElement, XmlSource
 from dynx.rules.text.number_text import is_number
 
 DIGITS = (1, 2, 3)
-"""Numbers are tried with so many significant digits."""
+"""Numbers of significant digits that are tried."""
 
 _DYNAMIC = {
     "link": {"inertial"},
@@ -20,35 +20,35 @@ _DYNAMIC = {
 _NAMING = frozenset(["name", "type", "link", "joint", "filename"])
 
 Simpler = Callable[[SourceElement, str, str], str]
-"""From an element, the name of an attribute and a word in it that is a number: a simpler one."""
+"""(element, name of an attribute, a number in it as text) -> a simpler number."""
 
 
-def fewer_extras(source: XmlSource) -> Cuts:
-    """Drop what says nothing about dynamics: shapes, materials, transmissions, simulators' elements."""
+def fewer_extras(source: XmlSource) -> Reductions:
+    """Remove what does not concern dynamics: shapes, materials, transmissions, simulators' elements."""
     extras = [element for element in source.root.children if element.tag not in _DYNAMIC]
     for tag, dynamic in _DYNAMIC.items():
         for part in source.root.all(tag):
             extras += [element for element in part.children if element.tag not in dynamic]
-    return Cuts(extras, lambda chosen: source.edited(*_removing(source, chosen)))
+    return Reductions(extras, lambda chosen: source.edited(*_removing(source, chosen)))
 
 
-def fewer_elements(source: XmlSource) -> Cuts:
-    """Drop any element inside a link or a joint but a joint's ends."""
+def fewer_elements(source: XmlSource) -> Reductions:
+    """Remove elements inside links and joints, except a joint's ends."""
     parts = [part for tag in _DYNAMIC for part in source.root.all(tag)]
     inside = [element for part in parts for element in part.walk() if element is not part]
     droppable = [element for element in inside if element.tag not in ("parent", "child")]
-    return Cuts(droppable, lambda chosen: source.edited(*_removing(source, chosen)))
+    return Reductions(droppable, lambda chosen: source.edited(*_removing(source, chosen)))
 
 
-def fewer_attributes(source: XmlSource) -> Cuts:
-    """Drop attributes, names and references excepted."""
+def fewer_attributes(source: XmlSource) -> Reductions:
+    """Remove attributes, except names and references."""
     found = [
         (element, attribute)
         for element in source.root.walk()
         for attribute in element.places
         if attribute not in _NAMING
     ]
-    return Cuts(
+    return Reductions(
         found,
         lambda chosen: source.edited(*(source.removing_attribute(*each) for each in chosen)),
     )
@@ -56,15 +56,15 @@ def fewer_attributes(source: XmlSource) -> Cuts:
 
 @dataclass(frozen=True, eq=False)
 class _Rounding:
-    """Other words at some positions of an attribute that holds numbers."""
+    """New numbers, as text, at some positions of an attribute."""
 
     element: SourceElement
     attribute: str
     words: dict[int, str]
 
 
-def frame_axes(source: XmlSource) -> Cuts:
-    """Put the nearest axis of the frame for the axis of a joint."""
+def frame_axes(source: XmlSource) -> Reductions:
+    """Replace the axis of a joint by the nearest axis of its frame."""
     changes = []
     for element, attribute, words in _numbers(source):
         largest = max(range(len(words)), key=lambda k: abs(float(words[k])))
@@ -72,26 +72,26 @@ def frame_axes(source: XmlSource) -> Cuts:
         changed = any(complexity(new) < complexity(words[k]) for k, new in nearest.items())
         if element.tag == "axis" and changed:
             changes.append(_Rounding(element, attribute, nearest))
-    return Cuts(changes, lambda chosen: source.edited(*_rewriting(source, chosen)))
+    return Reductions(changes, lambda chosen: source.edited(*_rewriting(source, chosen)))
 
 
-def plain_numbers(source: XmlSource) -> Cuts:
-    """Put 0 for a number; 1 for a mass, a moment of inertia and a limit, -1 for a lower limit."""
+def plain_numbers(source: XmlSource) -> Reductions:
+    """Replace a number by 0; a mass, a moment of inertia and a limit by 1, a lower limit by -1."""
     return _roundings(source, _plain)
 
 
-def unit_numbers(source: XmlSource) -> Cuts:
-    """Put 1 or -1 for a number."""
+def unit_numbers(source: XmlSource) -> Reductions:
+    """Replace a number by 1 or -1."""
     return _roundings(source, lambda element, attribute, word: _unit(word))
 
 
-def round_numbers(source: XmlSource, digits: int) -> Cuts:
-    """Write numbers with so many significant digits."""
+def round_numbers(source: XmlSource, digits: int) -> Reductions:
+    """Round numbers to `digits` significant digits."""
     return _roundings(source, lambda element, attribute, word: shortest(f"{float(word):.{digits}g}"))
 
 
 def complexity(word: str) -> int:
-    """How much there is to a number: 0 for zero, 1 for one, else by the significant digits."""
+    """Complexity of a number: 0 for zero, 1 for one, else 1 plus its significant digits."""
     value = abs(float(word))
     if value in (0.0, 1.0):
         return int(value)
@@ -99,22 +99,22 @@ def complexity(word: str) -> int:
 
 
 def shortest(word: str) -> str:
-    """A number as few characters as read back the same; other words as they are."""
+    """Write a number in the fewest characters that read back the same; return other text as it is."""
     if not is_number(word):
         return word
     value = float(word)
     return repr(int(value)) if value == int(value) and abs(value) < 1e6 else repr(value)
 
 
-def tidy(source: XmlSource, *, numbers: bool) -> str:
-    """The document with two blanks of indentation and without comments, one element to a line; numbers
-    as short as they can be if `numbers`."""
+def formatted(source: XmlSource, *, numbers: bool) -> str:
+    """Format the document with two blanks of indentation and without comments, one element to a line, with
+    numbers as short as possible if `numbers`."""
     return "\n".join(_lines(source.root, "", numbers)) + "\n"
 
 
 def _lines(element: SourceElement, indent: str, numbers: bool) -> Iterator[str]:
     written = "".join(
-        f" {name}={quoteattr(_tidied(value) if numbers and name not in _NAMING else value)}"
+        f" {name}={quoteattr(_formatted_value(value) if numbers and name not in _NAMING else value)}"
         for name, value in element.attributes.items()
     )
     if not element.children:
@@ -126,12 +126,12 @@ def _lines(element: SourceElement, indent: str, numbers: bool) -> Iterator[str]:
     yield f"{indent}</{element.tag}>"
 
 
-def _tidied(value: str) -> str:
+def _formatted_value(value: str) -> str:
     return " ".join(shortest(word) for word in value.split(" "))
 
 
 def _removing(source: XmlSource, chosen: Sequence[SourceElement]) -> Iterator[Edit]:
-    """Edits that remove elements; what lies in another one goes with it."""
+    """Remove elements; an element inside another removed one needs no edit."""
     going = {id(element) for element in chosen}
     for element in chosen:
         above = element.parent
@@ -141,19 +141,19 @@ def _removing(source: XmlSource, chosen: Sequence[SourceElement]) -> Iterator[Ed
             yield source.removing(element)
 
 
-def _roundings(source: XmlSource, simpler: Simpler) -> Cuts:
-    """Changes of single words of number attributes to simpler ones; an axis is changed as a whole."""
+def _roundings(source: XmlSource, simpler: Simpler) -> Reductions:
+    """Change single numbers of attributes to simpler ones; an axis is changed as a whole."""
     changes = []
     for element, attribute, words in _numbers(source):
         found = {k: simpler(element, attribute, word) for k, word in enumerate(words)}
         found = {k: new for k, new in found.items() if complexity(new) < complexity(words[k])}
         if element.tag != "axis":
             changes += [_Rounding(element, attribute, {k: new}) for k, new in found.items()]
-    return Cuts(changes, lambda chosen: source.edited(*_rewriting(source, chosen)))
+    return Reductions(changes, lambda chosen: source.edited(*_rewriting(source, chosen)))
 
 
 def _numbers(source: XmlSource) -> Iterator[tuple[SourceElement, str, list[str]]]:
-    """The attributes that hold finite numbers and nothing else, with their words."""
+    """Attributes that hold finite numbers and nothing else, with these numbers as text."""
     for element in source.root.walk():
         for attribute in element.places:
             words = element.attributes[attribute].split()

@@ -1,50 +1,131 @@
-"""The simplest state at which a difference still shows: most parts at rest, the others round.
+"""The simplest state at which a difference still shows: most parts at rest, the others round numbers.
 
-Two ways, one after the other. The plain one starts from a state that shows the difference, puts as many
-parts as it can at rest, then rounds the others one by one; it always ends with a state that shows the
-difference. Hypothesis (the extra ``testing``) then looks at all combinations of simple values of those
-parts: it finds what needs two parts to change at once, which the plain way cannot. It cannot be told
-where to start, and among the many coordinates of the first state it would not find its way; so it comes
-second, and where it is not installed the plain result stands.
+The state goes by the names of the joints, so that it fits a robot from which joints were removed. Its
+reduction has two steps. The greedy one starts from a state that shows the difference, puts as many parts as
+it can at rest, then rounds the others one by one; it always ends with a state that shows the difference.
+Hypothesis (the extra ``testing``) then searches all combinations of simple values of the parts that are left:
+it finds what needs two parts to change at once. It cannot start from a given state and would not succeed
+among all coordinates, so it comes second; where it is not installed, the greedy result stands.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from random import Random
 from typing import TYPE_CHECKING
 
-from dynx.doctor.counterexample.delta_debugging import most
+import numpy as np
+
+from dynx.doctor.counterexample.delta_debugging import maximal_changes
 from dynx.doctor.counterexample.detail_reductions import DIGITS, complexity
-from dynx.doctor.counterexample.state_by_name import ATTITUDE, NamedState, Slot, Value, neutral
+from dynx.model import Model
+from dynx.spatial.scalar import Floats
 
 if TYPE_CHECKING:
     from hypothesis.strategies import SearchStrategy
 
-Holds = Callable[[NamedState], bool]
+Slot = tuple[str, int]
+"""A part of a state: the joint, or "" for the base, and the number of the part."""
 
-EXAMPLES = 60
+Value = tuple[float, ...]
+"""One number, or the four of an attitude."""
+
+ATTITUDE: Slot = ("", 3)
+UPRIGHT: Value = (0.0, 0.0, 0.0, 1.0)
+
+MAX_EXAMPLES = 60
 """Combinations that Hypothesis may try before it gives up."""
 
-_ROUND = (1.0, -1.0, 0.5, -0.5, 2.0, -2.0)
+ROUND_VALUES = (1.0, -1.0, 0.5, -0.5, 2.0, -2.0)
 _HALF = 0.5**0.5
-_TURNS: tuple[Value, ...] = tuple(
+QUARTER_TURNS: tuple[Value, ...] = tuple(
     tuple(_HALF if k in (axis, 3) else 0.0 for k in range(4)) for axis in range(3)
 )
 """Quarter turns about the axes of the world."""
 
 
-def simplest_state(state: NamedState, holds: Holds, seed: int) -> NamedState:
-    """A state of at most the moving parts of `state`, which holds, that holds and is as simple as found."""
-    return _searched(_plainly(state, holds), holds, seed)
+@dataclass(frozen=True)
+class ReducibleState:
+    """The parts of a state that are not at rest at zero.
+
+    A joint has the parts 0 (position), 1 (velocity) and 2 (acceleration). A floating base has its
+    position in 0-2, its attitude (quaternion xyzw) in 3, its velocity in 4-9, its acceleration in 10-15.
+    """
+
+    parts: Mapping[Slot, Value]
+
+    @classmethod
+    def of(cls, model: Model, q: Floats, v: Floats, a: Floats) -> ReducibleState:
+        """Make the state from q (nq,), v (nv,), a (nv,) of `model`."""
+        parts: dict[Slot, Value] = {}
+        nb = 6 if model.floating else 0
+        if model.floating:
+            base = [*q[:3], None, *v[:6], *a[:6]]
+            parts = {("", k): (float(x),) for k, x in enumerate(base) if x is not None}
+            parts[ATTITUDE] = tuple(float(x) for x in q[3:7])
+        for k, name in enumerate(model.joint_names):
+            values = (q[k + model.nq - len(model.joint_names)], v[nb + k], a[nb + k])
+            parts.update({(name, number): (float(x),) for number, x in enumerate(values)})
+        return cls({}).having(parts)
+
+    def on(self, model: Model) -> tuple[Floats, Floats, Floats]:
+        """Return (q, v, a) of `model`; parts that only one of the two has are left out or at rest."""
+        nb = 6 if model.floating else 0
+        q, v, a = model.neutral(), np.zeros(model.nv), np.zeros(model.nv)
+        if model.floating:
+            q[3:7] = self.parts.get(ATTITUDE, UPRIGHT)
+            flat = [self.parts.get(("", k), (0.0,))[0] for k in range(16) if k != ATTITUDE[1]]
+            q[:3], v[:6], a[:6] = flat[:3], flat[3:9], flat[9:]
+        for k, name in enumerate(model.joint_names):
+            values = [self.parts.get((name, number), (0.0,))[0] for number in range(3)]
+            q[nb + k + (1 if nb else 0)], v[nb + k], a[nb + k] = values
+        return q, v, a
+
+    def within(self, model: Model) -> ReducibleState:
+        """Keep the parts that `model` has."""
+        known = {*model.joint_names, *([""] if model.floating else [])}
+        return ReducibleState({slot: value for slot, value in self.parts.items() if slot[0] in known})
+
+    def having(self, changed: Mapping[Slot, Value]) -> ReducibleState:
+        """Change some parts; those at rest are not kept."""
+        parts = {**self.parts, **changed}
+        return ReducibleState({slot: value for slot, value in parts.items() if value != rest(slot)})
+
+    @property
+    def key(self) -> tuple[tuple[Slot, Value], ...]:
+        """Hashable form, equal for equal states."""
+        return tuple(sorted(self.parts.items()))
+
+    @property
+    def complexity(self) -> tuple[int, int, int]:
+        """Number of parts, digits of their numbers, and negative numbers: the smaller, the simpler."""
+        numbers = [number for value in self.parts.values() for number in value]
+        digits = sum(complexity(repr(number)) for number in numbers)
+        return len(self.parts), digits, sum(number < 0.0 for number in numbers)
 
 
-def _plainly(state: NamedState, holds: Holds) -> NamedState:
+Holds = Callable[[ReducibleState], bool]
+
+
+def rest(slot: Slot) -> Value:
+    """Return the value of a part at rest at zero."""
+    return UPRIGHT if slot == ATTITUDE else (0.0,)
+
+
+def simplest_state(state: ReducibleState, holds: Holds, seed: int) -> ReducibleState:
+    """Find a state as simple as possible that holds, from `state`, which holds; no part is added."""
+    return _searched(_greedily_reduced(state, holds), holds, seed)
+
+
+def _greedily_reduced(state: ReducibleState, holds: Holds) -> ReducibleState:
     slots = sorted(state.parts)
-    resting = most(slots, lambda chosen: holds(state.having({slot: neutral(slot) for slot in chosen})))
-    state = state.having({slot: neutral(slot) for slot in resting})
+    resting = maximal_changes(
+        slots, lambda chosen: holds(state.having({slot: rest(slot) for slot in chosen}))
+    )
+    state = state.having({slot: rest(slot) for slot in resting})
     for slot in sorted(state.parts):
-        for value in _simpler(slot, state.parts[slot]):
+        for value in _simpler_values(slot, state.parts[slot]):
             simpler = state.having({slot: value})
             if holds(simpler):
                 state = simpler
@@ -52,26 +133,26 @@ def _plainly(state: NamedState, holds: Holds) -> NamedState:
     return state
 
 
-def _searched(state: NamedState, holds: Holds, seed: int) -> NamedState:
-    """What Hypothesis finds that is simpler than `state`; `state` itself where it finds nothing."""
+def _searched(state: ReducibleState, holds: Holds, seed: int) -> ReducibleState:
+    """Let Hypothesis search for a simpler state; `state` itself where it finds none."""
     try:
         from hypothesis import HealthCheck, Phase, currently_in_test_context, find, settings
         from hypothesis.errors import NoSuchExample, Unsatisfiable
         from hypothesis.strategies import fixed_dictionaries, sampled_from
     except ImportError:
         return state
-    # Hypothesis refuses to work inside one of its own tests.
+    # Hypothesis refuses to run inside one of its own tests.
     if not state.parts or currently_in_test_context():
         return state
     ladders: dict[Slot, SearchStrategy[Value]] = {
-        slot: sampled_from([neutral(slot), *_simpler(slot, value), value])
+        slot: sampled_from([rest(slot), *_simpler_values(slot, value), value])
         for slot, value in sorted(state.parts.items())
     }
     profile = settings(
         database=None,
         deadline=None,
         derandomize=False,
-        max_examples=EXAMPLES,
+        max_examples=MAX_EXAMPLES,
         phases=[Phase.generate, Phase.shrink],
         suppress_health_check=list(HealthCheck),
     )
@@ -84,24 +165,15 @@ def _searched(state: NamedState, holds: Holds, seed: int) -> NamedState:
         )
     except (NoSuchExample, Unsatisfiable):
         return state
-    return min(state, state.having(parts), key=_size)
+    return min(state, state.having(parts), key=lambda each: each.complexity)
 
 
-def _simpler(slot: Slot, value: Value) -> list[Value]:
+def _simpler_values(slot: Slot, value: Value) -> list[Value]:
     """Values simpler than `value`, the simplest first; rest excepted."""
     if slot == ATTITUDE:
-        return [turn for turn in _TURNS if value not in _TURNS]
+        return [] if value in QUARTER_TURNS else list(QUARTER_TURNS)
     number = value[0]
-    tried = [*_ROUND, *(float(f"{number:.{digits}g}") for digits in DIGITS)]
-    order = list(dict.fromkeys(tried))
-    at = _ROUND.index(number) if number in _ROUND else len(order)
-    return [(each,) for each in order[:at] if each != number]
-
-
-def _size(state: NamedState) -> tuple[int, int, int]:
-    numbers = [number for value in state.parts.values() for number in value]
-    return (
-        len(state.parts),
-        sum(complexity(repr(number)) for number in numbers),
-        sum(number < 0.0 for number in numbers),
-    )
+    rounded = [*ROUND_VALUES, *(float(f"{number:.{digits}g}") for digits in DIGITS)]
+    order = list(dict.fromkeys(rounded))
+    end = ROUND_VALUES.index(number) if number in ROUND_VALUES else len(order)
+    return [(each,) for each in order[:end] if each != number]

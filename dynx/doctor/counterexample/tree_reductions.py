@@ -1,7 +1,7 @@
-"""Ways to cut a robot down: links merged into their neighbours, moving joints fixed.
+"""Reductions of the tree of a robot: links merged into their neighbours, moving joints fixed.
 
-Nothing is preserved but that the document is a tree: what is wanted is a smaller robot that still shows
-a difference, not the same robot.
+The document stays a tree, and nothing else is preserved: the purpose is a smaller robot that still shows a
+difference, not the same robot.
 """
 
 from __future__ import annotations
@@ -15,35 +15,35 @@ from dynx.rules.case import end_of
 
 
 @dataclass(frozen=True)
-class Cuts:
-    """Changes to one document, and how some of them are made together."""
+class Reductions:
+    """Changes to one document, and the function that makes some of them together."""
 
     changes: Sequence[Any]
     apply: Callable[[Sequence[Any]], XmlSource]
 
 
-def fewer_links(source: XmlSource) -> Cuts:
-    """Take links away with the joints above them; what they carried goes to the nearest link below the
-    root that stays. Limbs stand together in the list, so that whole ones go at once."""
-    return Cuts(_Tree(source).below_root(), lambda chosen: _Tree(source).without_children(chosen))
+def fewer_links(source: XmlSource) -> Reductions:
+    """Remove links with their parent joints; their children move to the nearest link towards the root that
+    stays. The links of a limb follow each other in the list, so that whole limbs can be removed at once."""
+    return Reductions(_Tree(source).below_root(), lambda chosen: _Tree(source).without_children(chosen))
 
 
-def higher_links(source: XmlSource) -> Cuts:
-    """Take links away with a joint *below* them, whose child takes their place: the root too."""
-    return Cuts(_Tree(source).below_root(), lambda chosen: _Tree(source).without_parents(chosen))
+def higher_links(source: XmlSource) -> Reductions:
+    """Remove links with one of their child joints, whose child replaces them; the root too."""
+    return Reductions(_Tree(source).below_root(), lambda chosen: _Tree(source).without_parents(chosen))
 
 
-def fewer_moving_joints(source: XmlSource) -> Cuts:
+def fewer_moving_joints(source: XmlSource) -> Reductions:
     """Make joints fixed."""
     moving = [joint for joint in source.root.all("joint") if joint.attributes.get("type") != "fixed"]
-    return Cuts(
+    return Reductions(
         moving,
         lambda chosen: source.edited(*(source.setting(joint, "type", "fixed") for joint in chosen)),
     )
 
 
 class _Tree:
-    """The joints of a document with their ends, which cuts move."""
+    """The joints of a document with their ends, which reductions change."""
 
     def __init__(self, source: XmlSource) -> None:
         self._source = source
@@ -53,7 +53,7 @@ class _Tree:
         self._gone_links: set[str] = set()
 
     def below_root(self) -> list[int]:
-        """The joints depth first: joint k stands for the link that it carries."""
+        """List the joints depth first: joint k stands for its child link."""
         carried: dict[str, list[int]] = {}
         for k, (parent, _) in enumerate(self._ends):
             carried.setdefault(parent, []).append(k)

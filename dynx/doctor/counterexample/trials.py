@@ -1,4 +1,4 @@
-"""Whether a smaller robot, at a simpler state, still shows a difference; asked a bounded number of times."""
+"""Trials of smaller robots at simpler states: whether each still shows a difference, within a budget."""
 
 from __future__ import annotations
 
@@ -7,9 +7,12 @@ import math
 from collections.abc import Callable
 from time import perf_counter
 
-from dynx.doctor.counterexample.state_by_name import NamedState
-from dynx.doctor.examine.right_answers import free_model
-from dynx.doctor.prove.mending import Place, detections, place
+import numpy as np
+
+from dynx.doctor.counterexample.state_reduction import ReducibleState
+from dynx.doctor.examine.examination import Examiner
+from dynx.doctor.examine.reference_values import States, model_without_mimics, reference_values
+from dynx.doctor.prove.mending import Place, detections, place_of
 from dynx.errors import DynxError
 from dynx.model import Model
 from dynx.rules import Case, all_rules
@@ -19,16 +22,16 @@ Difference = Callable[[Case, Model, Floats, Floats, Floats], float]
 """(case, model, q, v, a) -> relative error of the engine in question; 0 where it cannot be evaluated."""
 
 MAX_TRIALS = 1500
-"""Of which each loads an engine, for 5 to 50 ms."""
+"""Largest number of trials; each loads an engine, which takes 5 to 50 ms."""
 
 
 class Trials:
-    """Asks `difference`, remembers its answers, and stops when the budget is spent.
+    """Evaluates `difference`, stores its values, and stops when the budget [s] is spent.
 
-    A robot counts only if it brings in no cause that the catalogue knows and that was not in the
-    `original` already: a link that loses its ``<inertial>``, say, would show that difference instead.
-    A state counts only within the limits of the joints, outside which some engines push; the joints of
-    the original whose limits leave no room are excepted.
+    A robot counts only if it has no cause of the catalogue that the `original` does not have: a link that
+    loses its ``<inertial>``, for example, would show that difference instead. A state counts only within the
+    limits of the joints, outside which some engines apply a force; joints of the original whose limits leave
+    no range are excepted.
     """
 
     def __init__(self, difference: Difference, original: Case, budget: float | None) -> None:
@@ -36,24 +39,24 @@ class Trials:
         self._known_causes = _causes(original)
         self._until = math.inf if budget is None else perf_counter() + budget
         self._errors: dict[tuple[bytes, object], float] = {}
-        self._sound: dict[bytes, bool] = {}
+        self._cause_free: dict[bytes, bool] = {}
         self._last_model: tuple[bytes, Model | None] = (b"", None)
         self._count = 0
         self.threshold = 0.0
         model = self.model(original)
-        self._stuck = frozenset() if model is None else _without_room(model)
+        self._without_range = frozenset() if model is None else _joints_without_range(model)
 
     @property
     def spent(self) -> bool:
-        """Whether nothing more can be tried."""
+        """Whether the budget is spent."""
         return self._count >= MAX_TRIALS or perf_counter() >= self._until
 
-    def holds(self, case: Case, state: NamedState) -> bool:
-        """Whether the error is above the threshold; False for what was not tried before the end."""
-        return self.error(case, state) > self.threshold and self._is_sound(case)
+    def holds(self, case: Case, state: ReducibleState) -> bool:
+        """Check that the error is above the threshold; False for what was not tried within the budget."""
+        return self.error(case, state) > self.threshold and self._adds_no_cause(case)
 
-    def error(self, case: Case, state: NamedState) -> float:
-        """The relative error, infinite for NaN; 0 for what does not count or cannot be tried any more."""
+    def error(self, case: Case, state: ReducibleState) -> float:
+        """Relative error, infinite for NaN; 0 for what does not count or exceeds the budget."""
         model = self.model(case)
         if model is None:
             return 0.0
@@ -68,11 +71,11 @@ class Trials:
         return self._errors[key]
 
     def model(self, case: Case) -> Model | None:
-        """The robot in the coordinates of all its moving joints; None where dynx refuses the text."""
+        """Robot in the coordinates of all its moving joints; None where dynx refuses the text."""
         text = _digest(case)
         if self._last_model[0] != text:
             try:
-                self._last_model = text, free_model(case.source, case.base)
+                self._last_model = text, model_without_mimics(case.source, case.base)
             except DynxError:
                 self._last_model = text, None
         return self._last_model[1]
@@ -82,13 +85,13 @@ class Trials:
         fine = (model.lower <= q) & (q <= model.upper)
         inside = fine[len(q) - len(joints) :]
         outside = {joint.name for joint, fits in zip(joints, inside, strict=True) if not fits}
-        return outside <= self._stuck
+        return outside <= self._without_range
 
-    def _is_sound(self, case: Case) -> bool:
+    def _adds_no_cause(self, case: Case) -> bool:
         text = _digest(case)
-        if text not in self._sound:
-            self._sound[text] = _causes(case) <= self._known_causes
-        return self._sound[text]
+        if text not in self._cause_free:
+            self._cause_free[text] = _causes(case) <= self._known_causes
+        return self._cause_free[text]
 
 
 def _digest(case: Case) -> bytes:
@@ -97,10 +100,31 @@ def _digest(case: Case) -> bytes:
 
 def _causes(case: Case) -> frozenset[Place]:
     causes = [rule for rule in all_rules() if rule.kind == "difference"]
-    return frozenset(place(rule, each) for rule, each in detections(case, causes))
+    return frozenset(place_of(rule, each) for rule, each in detections(case, causes))
 
 
-def _without_room(model: Model) -> frozenset[str]:
+def _joints_without_range(model: Model) -> frozenset[str]:
     return frozenset(
         joint.name for joint in model.coordinate_joints if joint.limits.lower >= joint.limits.upper
     )
+
+
+def difference_of(examiner: Examiner, engine: str, quantity: str) -> Difference:
+    """Return the relative error of `engine` in `quantity` when it loads the text of a case."""
+
+    def difference(case: Case, model: Model, q: Floats, v: Floats, a: Floats) -> float:
+        try:
+            free = model_without_mimics(case.source, case.base)
+            if (free.nq, free.nv) != (len(q), len(v)):
+                return 0.0
+            rows = [np.asarray(row, dtype=np.float64)[None] for row in (q, v, a)]
+            states = States(rows[0], rows[1], rows[2], np.zeros_like(rows[2]))
+            examination = examiner.examine(case, [engine], reference=reference_values(free, states))
+        except DynxError:
+            return 0.0
+        output = examination.outputs[engine]
+        if output.refused is not None or quantity in output.failed:
+            return 0.0
+        return examination.error(engine, quantity)
+
+    return difference

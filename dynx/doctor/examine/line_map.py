@@ -1,4 +1,4 @@
-"""Lines of the user's file for what was found in the file made readable, whose lines are others."""
+"""Line map from the file made readable to the user's file, in which the lines of findings are reported."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from dynx.model.xml.source import XmlSource
 from dynx.rules import Detection, Rule
 
 
-def at_given_lines(
+def with_original_lines(
     found: Sequence[tuple[Rule, Detection]], given: XmlSource, readable: XmlSource
 ) -> list[tuple[Rule, Detection]]:
-    """The detections with the lines of the `given` text; rules about the text have these already."""
+    """Translate the lines of detections to the `given` text; rules about the text have these already."""
     if given.data == readable.data:
         return list(found)
-    lines = _lines(given.text.splitlines(), readable.text.splitlines())
+    lines = line_map(given.text.splitlines(), readable.text.splitlines())
     return [
         (rule, replace(each, line=lines.get(each.line, each.line)))
         if rule.stage == "model" and each.line is not None
@@ -25,8 +25,8 @@ def at_given_lines(
     ]
 
 
-def _lines(given: Sequence[str], readable: Sequence[str]) -> dict[int, int]:
-    """Line of the readable text -> line of the given text; for a line that is new, that where it came in."""
+def line_map(given: Sequence[str], readable: Sequence[str]) -> dict[int, int]:
+    """Map each line of the readable text to its line in the given text; a new line to where it was added."""
     lines = {}
     for _, first, last, start, end in SequenceMatcher(None, readable, given, autojunk=False).get_opcodes():
         for k in range(first, last):

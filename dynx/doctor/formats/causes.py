@@ -1,4 +1,4 @@
-"""The findings of a report by rule: what a reader is told first, and how alarming it is."""
+"""Findings of a report grouped by rule, in the order of their severity."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from dynx.rules.registry import all_rules
 from dynx.rules.rule import Kind, Rule
 
 Severity = Literal["error", "warning", "note"]
-"""``error``: answers differ by more than rounding. ``warning``: by rounding that piles up.
+"""``error``: engines differ by more than rounding. ``warning``: by accumulated rounding.
 ``note``: nothing differs; bad practice, or a cause without effect on this base."""
 
 Status = Literal["alike", "explained", "unexplained", "refused"]
 """``explained``: engines differ and every difference has a proved cause. ``refused``: not examined."""
 
 ROUNDING = 1e-9
-"""Relative error up to which a difference is the price of float64 or of a float32 step somewhere, and
-not another robot: what PyBullet's diagonalisation of inertias leaves on healthy files."""
+"""Relative error up to which a difference is rounding of float64, or of a step in float32, and not another
+robot: PyBullet's diagonalisation of inertias leaves as much on healthy files."""
 
 _ORDER: tuple[Severity, ...] = ("error", "warning", "note")
 
@@ -45,19 +45,19 @@ class Cause:
 
     @property
     def advice(self) -> str:
-        """What to do, in one sentence; what was done where the catalogue has none."""
-        said = self.entry.advice if self.entry is not None else ""
-        return said or next((wording.name(each.remedy, 1000) for each in self.findings if each.remedy), "")
+        """Advice in one sentence; the remedy that was applied where the catalogue has none."""
+        advice = self.entry.advice if self.entry is not None else ""
+        return advice or next((wording.name(each.remedy, 1000) for each in self.findings if each.remedy), "")
 
     @property
     def remedies(self) -> tuple[str, ...]:
-        """What mending did about it, each sentence once."""
-        said = dict.fromkeys(each.remedy for each in self.findings if each.remedy)
-        return tuple(wording.name(remedy, 1000).rstrip(".") for remedy in said)
+        """Remedies that were applied, each sentence once."""
+        applied = dict.fromkeys(each.remedy for each in self.findings if each.remedy)
+        return tuple(wording.name(remedy, 1000).rstrip(".") for remedy in applied)
 
     @property
-    def worst(self) -> Effect | None:
-        """The largest effect; None where the cause changes no answer."""
+    def largest_effect(self) -> Effect | None:
+        """Largest effect; None where the cause changes nothing."""
         effects = [each.effect for each in self.findings if each.effect is not None]
         return max(effects, key=lambda effect: effect.relative_error, default=None)
 
@@ -73,13 +73,13 @@ class Cause:
 
     @property
     def severity(self) -> Severity:
-        """How alarming the worst finding is."""
+        """Severity of the most severe finding."""
         return min((severity(each) for each in self.findings), key=_ORDER.index)
 
 
 def causes(report: DoctorReport) -> list[Cause]:
-    """The rules found: the alarming first, of equals the largest effect, then by number; the places of
-    a rule by the size of their effect, then as in the file."""
+    """Group the findings by rule: the severe first, of equals the largest effect, then by number; the places
+    of a rule by the magnitude of their effect, then as in the file."""
     groups: dict[str, list[Finding]] = {}
     for finding in report.findings:
         groups.setdefault(finding.rule, []).append(finding)
@@ -87,24 +87,26 @@ def causes(report: DoctorReport) -> list[Cause]:
         Cause(rule, each[0].name, each[0].kind, tuple(sorted(each, key=lambda one: -_size(one.effect))))
         for rule, each in groups.items()
     ]
-    return sorted(found, key=lambda cause: (_ORDER.index(cause.severity), -_size(cause.worst), cause.rule))
+    return sorted(
+        found, key=lambda cause: (_ORDER.index(cause.severity), -_size(cause.largest_effect), cause.rule)
+    )
 
 
 def catalogue_entry(rule: str) -> Rule | None:
-    """The rule of that id; None where this version of dynx has none."""
+    """Find a rule by its id; None where this version of dynx has none."""
     return next((each for each in all_rules() if each.id == rule), None)
 
 
 def severity(finding: Finding) -> Severity:
-    """How alarming a finding is."""
+    """Return the severity of a finding."""
     if finding.effect is None:
         return "note"
-    # Written so that an error that is no number counts as large.
+    # NaN counts as large.
     return "warning" if finding.effect.relative_error <= ROUNDING else "error"
 
 
 def status(report: DoctorReport) -> Status:
-    """What became of a robot, in one word."""
+    """Return the verdict on a robot in one word."""
     if report.error is not None:
         return "refused"
     if report.alike:

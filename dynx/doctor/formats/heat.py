@@ -110,7 +110,7 @@ def joint_map(report: DoctorReport) -> HeatMap:
     ranked = sorted(differing, key=lambda joint: -largest[joint])
     shown = [joint for joint in differing if joint in set(ranked[:SHOWN_JOINTS])]
     measured = dict.fromkeys(wording.quantity(pair.quantity) for pair in report.pairs if pair.joints)
-    note = f"{', '.join(measured)}, relative to the joint's largest right answer. "
+    note = f"{', '.join(measured)}, relative to the joint's largest reference value. "
     if len(differing) > len(shown):
         note += f"{len(differing) - len(shown)} further joints differ less. "
     if len(largest) > len(differing):

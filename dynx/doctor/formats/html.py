@@ -7,6 +7,7 @@ made visible: names in a robot description may hold anything.
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Sequence
 from functools import cache
 from typing import TYPE_CHECKING, Any
@@ -41,7 +42,7 @@ def html_page(
     text = page.render(
         reports=reports,
         titles=wording.titles([report.robot for report in reports]),
-        counts=_counts(reports),
+        counts=Counter(map(status, reports)),
         rules=[entries[rule] for rule in sorted(entries)],
         baseline=baseline,
         command=command,
@@ -86,16 +87,6 @@ def bar_position(error: float) -> float:
         return 100.0
     power = math.log10(max(error, 10.0**LOWEST_BAR))
     return 100.0 * (1.0 - min(power, 0.0) / LOWEST_BAR)
-
-
-def _counts(reports: Sequence[DoctorReport]) -> str:
-    words = [status(report) for report in reports]
-    parts = [f"{words.count('alike')} alike", f"{words.count('explained')} differ, with every cause proved"]
-    parts += [f"{words.count('unexplained')} differ without a full explanation"]
-    parts += [f"{words.count('refused')} not examined"]
-    robots = len({report.robot for report in reports})
-    what = f"{robots} robots" if robots == len(reports) else f"{len(reports)} examinations of {robots} robots"
-    return f"{what}: " + ", ".join(part for part in parts if not part.startswith("0 ")) + "."
 
 
 def _footer(reports: Sequence[DoctorReport]) -> str:

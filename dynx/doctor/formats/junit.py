@@ -58,13 +58,15 @@ def _add_cases(suite: Element, title: str, report: DoctorReport, baseline: Basel
             lines.append(f"and {len(cause.findings) - _PLACES} more")
         text = "\n".join([cause.title, *lines, *([f"what to do: {cause.advice}"] if cause.advice else [])])
         known = new is not None and all(each.place.rule != cause.rule for each in new)
-        if cause.worst is None:
+        if cause.largest_effect is None:
             ElementTree.SubElement(case, "system-out").text = text
         elif known:
             case.append(_outcome("skipped", "known: in the baseline"))
         else:
             case.append(
-                _outcome("failure", f"{wording.effect(cause.worst)}: {cause.title}", cause.name, text)
+                _outcome(
+                    "failure", f"{wording.effect(cause.largest_effect)}: {cause.title}", cause.name, text
+                )
             )
     for each in report.unexplained:
         case = _case(suite, title, f"unexplained: {wording.quantity(each.quantity)} of {each.engine}")

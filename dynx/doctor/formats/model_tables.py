@@ -1,4 +1,4 @@
-"""What engines hold beside what the file says, link by link, number by number."""
+"""Tables of the values of engines that differ from the file, link by link, number by number."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from dynx.doctor.report import DoctorReport
 from dynx.loaded.difference import Deviation
 
 SHOWN_ROWS = 200
-"""Rows of a table; the JSON document has all."""
+"""Largest number of rows of a table; the JSON document has all."""
 
 _COMPONENTS = {
     "center": ("center x", "center y", "center z"),
@@ -29,7 +29,7 @@ _COMPONENTS = {
 
 @dataclass(frozen=True)
 class Row:
-    """One number of the file and, by engine, the values that are not the file's."""
+    """One number of the file and, by engine, the values that differ from it."""
 
     title: str
     file: str
@@ -38,7 +38,7 @@ class Row:
 
 @dataclass(frozen=True)
 class ModelTable:
-    """Rows by what they belong to, such as ``link tool0``; `count` is the number of deviations in it."""
+    """Rows by their owner, such as ``link tool0``; `count` is the number of deviations in the table."""
 
     engines: tuple[str, ...]
     owners: tuple[tuple[str, tuple[Row, ...]], ...]
@@ -46,25 +46,17 @@ class ModelTable:
     count: int
 
 
-@dataclass(frozen=True)
-class ModelTables:
-    """The deviations of a report, apart from those of rounding size."""
-
-    large: ModelTable
-    small: ModelTable
-
-
-def model_tables(report: DoctorReport) -> ModelTables:
-    """The deviations of the engines from the file."""
+def model_tables(report: DoctorReport) -> tuple[ModelTable, ModelTable]:
+    """Tabulate the deviations of the engines from the file: those above rounding, and the others."""
     engines = [each.engine for each in report.engines if each.refused is None]
     engines += sorted({each.engine for each in report.model_difference} - set(engines))
     large = [each for each in report.model_difference if _is_large(each)]
     small = [each for each in report.model_difference if not _is_large(each)]
-    return ModelTables(_table(large, engines), _table(small, engines))
+    return _table(large, engines), _table(small, engines)
 
 
 def _table(deviations: Sequence[Deviation], engines: Iterable[str]) -> ModelTable:
-    """A row for each number that some engine holds otherwise, by what it belongs to."""
+    """Make a row for each number that differs in some engine, by owner."""
     gathered: dict[tuple[str, str], dict[str, tuple[Any, dict[str, Any]]]] = {}
     for each in deviations:
         rows = gathered.setdefault((each.part, each.name), {})
@@ -86,7 +78,7 @@ def _row(title: str, file: Any, held: Mapping[str, Any]) -> Row:
 
 
 def _components(each: Deviation) -> Iterator[tuple[str, Any, Any]]:
-    """The single numbers of a deviation that differ, with their names."""
+    """Split a deviation into the single numbers that differ, with their names."""
     file, value = _components_of(each.file), _components_of(each.engine_value)
     titles = _COMPONENTS.get(each.property, ())
     if not titles or len(file) != len(titles) or len(value) != len(titles):
@@ -99,7 +91,7 @@ def _components(each: Deviation) -> Iterator[tuple[str, Any, Any]]:
 
 
 def _is_large(each: Deviation) -> bool:
-    """Whether two values differ by more than rounding, each number relative to the largest there."""
+    """Check whether two values differ by more than rounding, relative to their largest number."""
     file, engine = _numbers(each.file), _numbers(each.engine_value)
     if file is None or engine is None or file.shape != engine.shape:
         return True
@@ -108,7 +100,7 @@ def _is_large(each: Deviation) -> bool:
 
 
 def _components_of(value: Any) -> list[float]:
-    """The numbers of a vector, or the six of a symmetric matrix; none for anything else."""
+    """Return the numbers of a vector, or the six of a symmetric matrix; none for anything else."""
     numbers = _numbers(value)
     if numbers is None or numbers.ndim == 0:
         return []
@@ -117,7 +109,7 @@ def _components_of(value: Any) -> list[float]:
 
 
 def _numbers(value: Any) -> Any:
-    """The numbers of a value as an array; None where something else is in it."""
+    """Return a value as an array of numbers; None where it contains anything else."""
     if isinstance(value, bool) or not isinstance(value, int | float | list | tuple):
         return None
     try:
@@ -128,7 +120,7 @@ def _numbers(value: Any) -> Any:
 
 
 def _word(value: Any) -> Any:
-    """Whether something exists, in words."""
+    """Write None and truth values as words."""
     if value is None or isinstance(value, bool):
         return "there" if value else "not there"
     return value

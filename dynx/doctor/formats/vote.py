@@ -1,4 +1,4 @@
-"""Which engines agree with each other, and which of them with what the file says."""
+"""Groups of engines that agree with each other, and those that agree with the file."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from dynx.doctor.report import DoctorReport, EngineResult
 
 @dataclass(frozen=True)
 class Vote:
-    """Engines that load the file alike, largest group first.
+    """Groups of engines that load the file alike, the largest first.
 
-    Two are alike where no quantity differs by more than the tolerance; groups are what such pairs
-    connect. `right` are those whose answers are the file's own.
+    Two engines are alike where no quantity differs by more than the tolerance; such pairs connect a group.
+    `right` are the engines without an error against the reference values.
     """
 
     groups: tuple[tuple[str, ...], ...]
@@ -22,13 +22,13 @@ class Vote:
 
     @property
     def alone(self) -> tuple[str, ...]:
-        """Engines that no other agrees with, though others were asked."""
+        """Engines that agree with no other, where there are others."""
         single = tuple(group[0] for group in self.groups if len(group) == 1)
         return single if len(self.groups) > 1 else ()
 
 
 def vote(report: DoctorReport) -> Vote:
-    """The vote over the file as it was loaded."""
+    """Group the engines by how they loaded the file."""
     voters = [each.engine for each in report.engines if each.refused is None]
     differing = {
         frozenset(pair.engines) for pair in report.pairs if not pair.relative_error <= report.tolerance
@@ -36,13 +36,13 @@ def vote(report: DoctorReport) -> Vote:
     compared = {frozenset(pair.engines) for pair in report.pairs}
     groups: list[list[str]] = []
     for engine in voters:
-        friends = [
+        alike = [
             group
             for group in groups
             if any(frozenset((engine, other)) in compared - differing for other in group)
         ]
-        merged = [member for group in friends for member in group] + [engine]
-        groups = [group for group in groups if group not in friends] + [merged]
+        merged = [member for group in alike for member in group] + [engine]
+        groups = [group for group in groups if group not in alike] + [merged]
     ordered = sorted(groups, key=lambda group: (-len(group), voters.index(group[0])))
     right = tuple(each.engine for each in report.engines if each.refused is None and is_right(each, report))
     refused = tuple(each.engine for each in report.engines if each.refused is not None)
@@ -50,18 +50,18 @@ def vote(report: DoctorReport) -> Vote:
 
 
 def is_right(engine: EngineResult, report: DoctorReport) -> bool:
-    """Whether an engine's answers as loaded are those of the file."""
+    """Check that an engine has no error above the tolerance on the file as loaded."""
     return all(error <= report.tolerance for error in engine.before.values())
 
 
 def largest_error(report: DoctorReport) -> float:
-    """The largest error of any engine that loads the file as it is."""
-    found = [worst(each) for each in report.engines]
+    """Largest error of any engine that loads the file as it is."""
+    found = [largest_quantity_error(each) for each in report.engines]
     return max((error for _, error in filter(None, found)), default=0.0)
 
 
-def worst(engine: EngineResult) -> tuple[str, float] | None:
-    """The quantity in which an engine is farthest from the file, and by how much."""
+def largest_quantity_error(engine: EngineResult) -> tuple[str, float] | None:
+    """Quantity with the largest error of an engine, and that error."""
     if not engine.before:
         return None
     return max(engine.before.items(), key=lambda item: math.inf if math.isnan(item[1]) else item[1])

@@ -1,4 +1,4 @@
-"""How sizes, quantities, places and values are said, alike in every format."""
+"""Wording of errors, quantities, places and values, the same in every format."""
 
 from __future__ import annotations
 
@@ -11,34 +11,34 @@ from dynx.doctor.report import Effect, Finding
 from dynx.errors import escaped
 
 NAME_LENGTH = 120
-"""Characters of a name that are shown; a description may hold names of any length."""
+"""Number of characters of a name that are shown; a description may hold names of any length."""
 
 _PERCENT = 1e-3
-"""From here on an error is said in per cent, which everybody reads at once."""
+"""Relative error from which on it is written in per cent."""
 
 _DIGITS = (4, 6, 9, 12, 15, 17)
-"""Significant digits tried, the fewest first, until two values can be told apart."""
+"""Significant digits that are tried, the fewest first, until different values differ."""
 
 
 def name(text: object, limit: int = NAME_LENGTH) -> str:
-    """A name as one line without control characters, cut where it is very long."""
+    """Write a name in one line without control characters, shortened where it is very long."""
     return escaped(text, limit)
 
 
 def quantity(key: str) -> str:
-    """``mass_matrix`` as ``mass matrix``."""
+    """Write ``mass_matrix`` as ``mass matrix``."""
     return name(key.replace("_", " "))
 
 
 def relative(error: float) -> str:
-    """A relative error in two digits; ``none`` where an answer was missing."""
+    """Write a relative error in two digits; ``none`` where there is no value."""
     if not math.isfinite(error):
         return "none"
     return "0" if error == 0.0 else f"{error:.1e}"
 
 
 def size(error: float) -> str:
-    """A relative error in words: ``1900 %``, ``6e-06``, ``no answer``."""
+    """Write a relative error for readers: ``1900 %``, ``6e-06``, ``no answer``."""
     if not math.isfinite(error):
         return "no answer"
     if error < _PERCENT or error >= 1e4:
@@ -48,7 +48,7 @@ def size(error: float) -> str:
 
 
 def effect(each: Effect | None) -> str:
-    """``mass matrix off by 1900 %``, ``the file is refused``, or that a cause changes nothing."""
+    """Write ``mass matrix off by 1900 %``, ``the file is refused``, or that a cause changes nothing."""
     if each is None:
         return "no effect on this base"
     if not math.isfinite(each.relative_error):
@@ -57,7 +57,7 @@ def effect(each: Effect | None) -> str:
 
 
 def effects(finding: Finding) -> str:
-    """``54 % in pybullet, refused by mujoco``: the effect at a place, alike for all engines or by engine."""
+    """Write the effect at a place, by engine where it differs: ``54 % in pybullet, refused by mujoco``."""
     if finding.effect is None:
         return ""
     by_size: dict[str, list[str]] = {}
@@ -65,7 +65,7 @@ def effects(finding: Finding) -> str:
         by_size.setdefault(_at_place(each), []).append(name(engine))
     if len(by_size) < 2:
         return _at_place(finding.effect).removesuffix(" by").removesuffix(" in")
-    return ", ".join(f"{said} {' and '.join(engines)}" for said, engines in by_size.items())
+    return ", ".join(f"{text} {' and '.join(engines)}" for text, engines in by_size.items())
 
 
 def _at_place(each: Effect) -> str:
@@ -75,7 +75,7 @@ def _at_place(each: Effect) -> str:
 
 
 def titles(robots: Sequence[str]) -> list[str]:
-    """What robots are called: those given as paths by their files' names, where that tells them apart."""
+    """Name robots for titles: paths by their file names, where these differ."""
     stems = [PurePath(robot).name.removesuffix(".urdf") or robot for robot in robots]
     owners: dict[str, set[str]] = {}
     for stem, robot in zip(stems, robots, strict=True):
@@ -87,7 +87,7 @@ def titles(robots: Sequence[str]) -> list[str]:
 
 
 def part(finding: Finding) -> str:
-    """``link tool0``, ``joint elbow``, or ``robot``."""
+    """Name the part of a finding: ``link tool0``, ``joint elbow``, or ``robot``."""
     if finding.link is not None:
         return f"link {name(finding.link)}"
     if finding.joint is not None:
@@ -96,15 +96,15 @@ def part(finding: Finding) -> str:
 
 
 def values(several: Sequence[Any]) -> list[str]:
-    """Values of one property side by side, in as few digits as tell different ones apart.
+    """Write values of one property in the fewest digits in which different values differ.
 
     A value is a number, a text, None or a nested list of them.
     """
     distinct = {repr(each) for each in several}
     for digits in _DIGITS[:-1]:
-        said = [_value(each, digits) for each in several]
-        if len(set(said)) == len(distinct):
-            return said
+        texts = [_value(each, digits) for each in several]
+        if len(set(texts)) == len(distinct):
+            return texts
     return [_value(each, _DIGITS[-1]) for each in several]
 
 

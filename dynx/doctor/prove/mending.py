@@ -1,4 +1,4 @@
-"""Removing causes from a file: all of them, some of them, or all but one rule's."""
+"""Mending of a file: the removal of all causes, of some, or of all but those of one rule."""
 
 from __future__ import annotations
 
@@ -7,57 +7,54 @@ from dataclasses import dataclass
 
 from dynx.rules import Case, Detection, Remedy, Rule, all_rules
 
-ROUNDS = 4
-"""One remedy may bring up another (an explicit zero inertial makes a massless root); more rounds than
-this means that two rules undo each other."""
+MAX_ROUNDS = 4
+"""Repetitions of all remedies. One remedy may require another (an explicit zero inertial makes a massless
+root); where this does not end, two rules undo each other."""
 
 Place = tuple[str, "str | None", "str | None"]
-"""Rule, link and joint: what a detection is about, wherever in the text it stands."""
+"""Rule, link and joint of a detection, wherever in the text it is."""
 
-Wanted = Callable[[Rule, Detection], bool]
+DetectionFilter = Callable[[Rule, Detection], bool]
 
 
 @dataclass(frozen=True)
 class Mending:
-    """A case after remedies, and what was applied, in order."""
+    """A case after remedies, and the remedies that were applied, in order."""
 
     case: Case
     applied: tuple[tuple[Rule, Remedy], ...] = ()
 
     @property
     def choices(self) -> tuple[str, ...]:
-        """What was decided, one sentence each, and which remedies changed the physics of the robot."""
-        said = [remedy.choice for _, remedy in self.applied if remedy.choice]
-        said += [
+        """Sentences: what was decided, and which remedies changed the physics of the robot."""
+        sentences = [remedy.choice for _, remedy in self.applied if remedy.choice]
+        sentences += [
             f"{rule.id} changed the physics of the robot: {remedy.changed}"
             for rule, remedy in self.applied
             if remedy.changes_physics
         ]
-        return tuple(dict.fromkeys(said))
+        return tuple(dict.fromkeys(sentences))
 
 
-def place(rule: Rule, detection: Detection) -> Place:
-    """What the detection is about."""
+def place_of(rule: Rule, detection: Detection) -> Place:
+    """Return the place of a detection."""
     return rule.id, detection.link, detection.joint
 
 
 def readable(case: Case) -> Mending:
-    """The case with the doubtful text mended that dynx refuses; unchanged where dynx can read it.
-
-    Where the remedies do not make it readable, the case comes back as it was.
-    """
+    """Mend text that dynx refuses; the case stays as it is where dynx can read it, or no remedy helps."""
     mended = Mending(case)
     for rule in _rules("reading"):
         if mended.case.readable:
             break
-        mended = _with(mended, rule, rule.detect(mended.case))
+        mended = _after_remedy(mended, rule, rule.detect(mended.case))
     return mended if mended.case.readable else Mending(case)
 
 
 def detections(case: Case, rules: Sequence[Rule]) -> list[tuple[Rule, Detection]]:
-    """Each of the rules at every place where it applies.
+    """Detect each of the rules at every place.
 
-    Rules about the text see it as it is; rules about the robot see it made readable.
+    Rules about the text examine it as it is, rules about the robot the text made readable.
     """
     sound = readable(case).case
     found = [(rule, each) for rule in rules if rule.stage == "reading" for each in rule.detect(case)]
@@ -66,9 +63,9 @@ def detections(case: Case, rules: Sequence[Rule]) -> list[tuple[Rule, Detection]
     return found
 
 
-def mend(case: Case, rules: Sequence[Rule] | None = None, wanted: Wanted | None = None) -> Mending:
+def mend(case: Case, rules: Sequence[Rule] | None = None, wanted: DetectionFilter | None = None) -> Mending:
     """Apply the remedies of rules about differences, and of those about practice for which the user chose
-    one, in the order of their numbers and those about the text first, until none is left to apply.
+    one: those about the text first, in the order of their numbers, until none is left to apply.
 
     `rules` are those to choose from (default: the whole catalogue; text that dynx cannot read otherwise
     is mended by any rule), `wanted` says which detections to act on (default: all).
@@ -76,13 +73,13 @@ def mend(case: Case, rules: Sequence[Rule] | None = None, wanted: Wanted | None 
     chosen_rules = all_rules() if rules is None else rules
     ordered = [rule for stage in ("reading", "model") for rule in chosen_rules if rule.stage == stage]
     mended = Mending(case)
-    for _ in range(ROUNDS):
+    for _ in range(MAX_ROUNDS):
         before = mended.case
         for rule in ordered:
-            if not _is_asked_for(rule, case) or (rule.stage == "model" and not mended.case.readable):
+            if not _applies(rule, case) or (rule.stage == "model" and not mended.case.readable):
                 continue
             chosen = [each for each in rule.detect(mended.case) if wanted is None or wanted(rule, each)]
-            mended = _with(mended, rule, chosen)
+            mended = _after_remedy(mended, rule, chosen)
         if not mended.case.readable:
             then = readable(mended.case)
             mended = Mending(then.case, mended.applied + then.applied)
@@ -91,22 +88,22 @@ def mend(case: Case, rules: Sequence[Rule] | None = None, wanted: Wanted | None 
     return mended
 
 
-def all_but(places: Collection[Place]) -> Wanted:
-    """Act on every detection but those about these places."""
-    return lambda rule, detection: place(rule, detection) not in places
+def all_except(places: Collection[Place]) -> DetectionFilter:
+    """Select every detection except those at these places."""
+    return lambda rule, detection: place_of(rule, detection) not in places
 
 
-def treated(case: Case, rule: Rule, chosen: Sequence[Detection]) -> Remedy | None:
-    """The case with one rule's cause removed in the chosen places, and nothing else."""
+def remedy_of(case: Case, rule: Rule, chosen: Sequence[Detection]) -> Remedy | None:
+    """Remove the cause of one rule at the chosen places; None without places or remedy."""
     return rule.remedy(case, chosen) if chosen else None
 
 
-def _is_asked_for(rule: Rule, case: Case) -> bool:
+def _applies(rule: Rule, case: Case) -> bool:
     return rule.kind == "difference" or rule.id in (case.choices or {})
 
 
-def _with(mended: Mending, rule: Rule, chosen: Sequence[Detection]) -> Mending:
-    remedy = treated(mended.case, rule, chosen)
+def _after_remedy(mended: Mending, rule: Rule, chosen: Sequence[Detection]) -> Mending:
+    remedy = remedy_of(mended.case, rule, chosen)
     if remedy is None:
         return mended
     same = remedy.case.source.data == mended.case.source.data and remedy.case.calls == mended.case.calls

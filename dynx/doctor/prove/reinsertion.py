@@ -1,7 +1,7 @@
-"""A cause put back into a mended file: mended of everything else, though dynx cannot read it so.
+"""Reinsertion of a cause into a mended file: mended of everything else, though dynx cannot read it so.
 
 The remedies about the robot need a file that can be read. Where one cause keeps dynx itself from reading
-it, the file is mended of all, and the lines of that cause are put back as they were.
+it, the file is mended of all causes, and the lines of that cause are restored.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ Lines = tuple[int, int, int, int]
 """First and end in one text, first and end in another, where the same lines stand."""
 
 
-def put_back(given: XmlSource, without: XmlSource, mended: XmlSource) -> XmlSource | None:
-    """The `mended` text with the lines of a cause as they are `given`.
+def reinserted_text(given: XmlSource, without: XmlSource, mended: XmlSource) -> XmlSource | None:
+    """Return the `mended` text with the lines of one cause as they are `given`.
 
-    `without` is the given text after the cause alone is taken away. None where other remedies changed
-    the same lines, or the cause comes down to no line, or the two cannot be told apart.
+    `without` is the given text with the cause alone removed. None where other remedies changed the same
+    lines, the cause changes no line, or the changes overlap.
     """
     texts = (given.text, without.text, mended.text)
     old, base, new = ([*text.splitlines(keepends=True)] for text in texts)
@@ -40,7 +40,7 @@ def put_back(given: XmlSource, without: XmlSource, mended: XmlSource) -> XmlSour
     try:
         return XmlSource("".join([*parts, *new[done:]]), given.source)
     except DescriptionError:
-        # Where lines repeat, the two changes can be taken for others and cross.
+        # Where lines repeat, the matches of the two changes can overlap.
         return None
 
 
@@ -49,7 +49,7 @@ def _opcodes(one: Sequence[str], other: Sequence[str]) -> Sequence[tuple[str, in
 
 
 def _counterpart(kept: Sequence[Lines], first: int, last: int) -> int | None:
-    """Where these lines of one text stand in the other, if they stand there unchanged."""
+    """Find where lines of one text start in the other, if they are there unchanged."""
     for begin, end, start, _ in kept:
         if begin <= first and last <= end:
             return start + first - begin

@@ -7,14 +7,14 @@ from collections.abc import Sequence
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dynx.doctor.counterexample.delta_debugging import most
+from dynx.doctor.counterexample.delta_debugging import maximal_changes
 
 NUMBERS = st.sets(st.integers(0, 60))
 
 
 @given(st.integers(0, 61), NUMBERS)
 def test_all_but_what_is_needed(count: int, needed: set[int]) -> None:
-    made = most(range(count), lambda chosen: needed.isdisjoint(chosen))
+    made = maximal_changes(range(count), lambda chosen: needed.isdisjoint(chosen))
     assert made == [k for k in range(count) if k not in needed]
 
 
@@ -24,7 +24,7 @@ def test_no_single_change_can_be_added(count: int, one: set[int], other: set[int
         """Neither all of `one` nor all of `other` may go, if they have anything in them."""
         return not any(group and group <= set(chosen) for group in (one, other))
 
-    made = most(range(count), holds)
+    made = maximal_changes(range(count), holds)
     assert holds(made)
     assert not any(holds([*made, k]) for k in range(count) if k not in made)
 
@@ -38,5 +38,5 @@ def test_it_asks_seldom() -> None:
         asked += 1
         return 617 not in chosen
 
-    assert len(most(range(1000), holds)) == 999
+    assert len(maximal_changes(range(1000), holds)) == 999
     assert asked <= 2 * 10 + 5

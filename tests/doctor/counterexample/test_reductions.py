@@ -12,14 +12,19 @@ from dynx import load
 from dynx.doctor.counterexample.detail_reductions import (
     complexity,
     fewer_extras,
+    formatted,
     frame_axes,
     plain_numbers,
     round_numbers,
     shortest,
-    tidy,
     unit_numbers,
 )
-from dynx.doctor.counterexample.tree_reductions import Cuts, fewer_links, fewer_moving_joints, higher_links
+from dynx.doctor.counterexample.tree_reductions import (
+    Reductions,
+    fewer_links,
+    fewer_moving_joints,
+    higher_links,
+)
 from dynx.model import Model
 from dynx.model.library import find
 from dynx.model.xml.source import XmlSource
@@ -30,13 +35,13 @@ ROBOTS = models(from_urdf=True, locks=False, mimics=False)
 
 @pytest.mark.parametrize("cut", [fewer_links, higher_links])
 @given(st.data())
-def test_links_are_taken_from_a_tree(cut: Callable[[XmlSource], Cuts], data: st.DataObject) -> None:
+def test_links_are_taken_from_a_tree(cut: Callable[[XmlSource], Reductions], data: st.DataObject) -> None:
     model = data.draw(ROBOTS)
     source = XmlSource(model.to_urdf())
-    cuts = cut(source)
-    assert len(cuts.changes) == len(model.joints)
-    chosen = [change for change in cuts.changes if data.draw(st.booleans())]
-    left = load(cuts.apply(chosen).text)
+    reductions = cut(source)
+    assert len(reductions.changes) == len(model.joints)
+    chosen = [change for change in reductions.changes if data.draw(st.booleans())]
+    left = load(reductions.apply(chosen).text)
     assert len(left.links) == len(model.links) - len(chosen)
     assert {link.name for link in left.links} <= {link.name for link in model.links}
     stayed = {joint.name: joint for joint in model.joints}
@@ -57,19 +62,19 @@ def test_a_single_link_can_be_left_of_any_robot(model: Model) -> None:
 @given(st.data())
 def test_joints_become_fixed(data: st.DataObject) -> None:
     model = data.draw(ROBOTS)
-    cuts = fewer_moving_joints(XmlSource(model.to_urdf()))
-    chosen = [joint for joint in cuts.changes if data.draw(st.booleans())]
+    reductions = fewer_moving_joints(XmlSource(model.to_urdf()))
+    chosen = [joint for joint in reductions.changes if data.draw(st.booleans())]
     names = {joint.attributes["name"] for joint in chosen}
-    left = load(cuts.apply(chosen).text)
+    left = load(reductions.apply(chosen).text)
     assert left.joint_names == tuple(name for name in model.joint_names if name not in names)
 
 
 @pytest.mark.parametrize("robot", ["talos", "tiago", "ur5"])
 def test_what_says_nothing_about_dynamics_goes(robot: str) -> None:
     source = XmlSource(find(robot).read_bytes())
-    cuts = fewer_extras(source)
-    assert cuts.changes
-    left = cuts.apply(cuts.changes)
+    reductions = fewer_extras(source)
+    assert reductions.changes
+    left = reductions.apply(reductions.changes)
     assert load(left.text) == load(source.text)
     assert not fewer_extras(left).changes
 
@@ -77,22 +82,24 @@ def test_what_says_nothing_about_dynamics_goes(robot: str) -> None:
 @given(ROBOTS, st.booleans())
 def test_tidy_text_says_the_same(model: Model, numbers: bool) -> None:
     source = XmlSource(model.to_urdf())
-    tidied = tidy(source, numbers=numbers)
+    tidied = formatted(source, numbers=numbers)
     assert load(tidied) == load(source.text)
-    assert tidy(XmlSource(tidied), numbers=numbers) == tidied
+    assert formatted(XmlSource(tidied), numbers=numbers) == tidied
 
 
 @pytest.mark.parametrize(
     "cut", [plain_numbers, unit_numbers, frame_axes, lambda source: round_numbers(source, 2)]
 )
 @given(st.data())
-def test_numbers_become_simpler_and_stay_so(cut: Callable[[XmlSource], Cuts], data: st.DataObject) -> None:
+def test_numbers_become_simpler_and_stay_so(
+    cut: Callable[[XmlSource], Reductions], data: st.DataObject
+) -> None:
     source = XmlSource(data.draw(ROBOTS).to_urdf())
-    cuts = cut(source)
-    chosen = [change for change in cuts.changes if data.draw(st.booleans())]
-    simpler = cuts.apply(chosen)
+    reductions = cut(source)
+    chosen = [change for change in reductions.changes if data.draw(st.booleans())]
+    simpler = reductions.apply(chosen)
     assert _complexity(simpler) < _complexity(source) or not chosen
-    everything = cuts.apply(cuts.changes)
+    everything = reductions.apply(reductions.changes)
     assert not cut(everything).changes
 
 

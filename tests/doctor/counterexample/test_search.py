@@ -16,8 +16,8 @@ from dynx import load
 from dynx.agreement.tolerances import BAR
 from dynx.doctor.counterexample import trials
 from dynx.doctor.counterexample.detail_reductions import complexity
-from dynx.doctor.counterexample.search import FIRST_STATES, smallest
-from dynx.doctor.examine.right_answers import free_model
+from dynx.doctor.counterexample.search import INITIAL_STATES, smallest_counterexample
+from dynx.doctor.examine.reference_values import model_without_mimics
 from dynx.doctor.report import Counterexample
 from dynx.errors import DynxError
 from dynx.model import Model
@@ -37,7 +37,7 @@ def case_of(robot: str, base: Base = "fixed") -> Case:
 
 
 def found(case: Case, difference: Difference, budget: float | None = None, seed: int = 0) -> Counterexample:
-    result = smallest(case, difference, tolerance=BAR, seed=seed, budget=budget)
+    result = smallest_counterexample(case, difference, tolerance=BAR, seed=seed, budget=budget)
     assert result is not None
     return result
 
@@ -45,7 +45,7 @@ def found(case: Case, difference: Difference, budget: float | None = None, seed:
 def assert_shows(result: Counterexample, difference: Difference, base: Base) -> Model:
     """The text loads, the state is one of that robot, and the error is what is said."""
     case = Case(XmlSource(result.urdf), base)
-    model = free_model(case.source, base)
+    model = model_without_mimics(case.source, base)
     q, v, a = (np.array(row) for row in (result.q, result.v, result.a))
     assert (len(q), len(v), len(a)) == (model.nq, model.nv, model.nv)
     assert result.relative_error > BAR
@@ -163,10 +163,10 @@ def test_nothing_is_left_behind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
 
 
 def test_no_counterexample() -> None:
-    never = smallest(case_of("ur5"), lambda *_: BAR, tolerance=BAR, seed=0, budget=None)
+    never = smallest_counterexample(case_of("ur5"), lambda *_: BAR, tolerance=BAR, seed=0, budget=None)
     assert never is None
     no_robot = Case(XmlSource("<robot name='r'><link name='a'/><link name='b'/></robot>"))
-    assert smallest(no_robot, lambda *_: 1.0, tolerance=BAR, seed=0, budget=None) is None
+    assert smallest_counterexample(no_robot, lambda *_: 1.0, tolerance=BAR, seed=0, budget=None) is None
 
 
 def test_an_answer_that_is_no_number_counts() -> None:
@@ -199,12 +199,14 @@ class Clock:
         return self._difference(case, model, q, v, a)
 
 
-@pytest.mark.parametrize("budget", [1, FIRST_STATES + 1, 30])
+@pytest.mark.parametrize("budget", [1, INITIAL_STATES + 1, 30])
 def test_the_budget_is_respected(budget: int, monkeypatch: pytest.MonkeyPatch) -> None:
     difference = turning("arm_4_link", "arm_3_joint")
     clock = Clock(difference)
     monkeypatch.setattr(trials, "perf_counter", clock)
-    result = smallest(case_of("tiago"), clock.asked, tolerance=BAR, seed=0, budget=float(budget))
+    result = smallest_counterexample(
+        case_of("tiago"), clock.asked, tolerance=BAR, seed=0, budget=float(budget)
+    )
     assert clock.now <= budget
     if result is not None:
         assert_shows(result, difference, "fixed")
@@ -238,15 +240,15 @@ def robots_with_a_difference(draw: st.DrawFn) -> tuple[Case, Difference]:
 def test_on_random_robots(robot: tuple[Case, Difference], seed: int) -> None:
     case, difference = robot
     try:
-        result = smallest(case, difference, tolerance=BAR, seed=seed, budget=None)
+        result = smallest_counterexample(case, difference, tolerance=BAR, seed=seed, budget=None)
     except DynxError as error:
         raise AssertionError(f"{error}\n{case.source.text}") from error
     if result is None:
         return
     model = assert_shows(result, difference, case.base)
-    original = free_model(case.source, case.base)
+    original = model_without_mimics(case.source, case.base)
     assert len(model.links) <= len(original.links)
     assert result.moving_joints <= len(original.joint_names)
     assert load(result.urdf, base=case.base).nv <= original.nv
-    again = smallest(case, difference, tolerance=BAR, seed=seed, budget=None)
+    again = smallest_counterexample(case, difference, tolerance=BAR, seed=seed, budget=None)
     assert again == result

@@ -11,7 +11,7 @@ import pytest
 from dynx.agreement.tolerances import BAR
 from dynx.doctor import diagnose
 from dynx.doctor.examine.examination import LOADING
-from dynx.doctor.examine.right_answers import FARTHEST, draw_states, free_model
+from dynx.doctor.examine.reference_values import MAX_LIMIT_DISTANCE, draw_states, model_without_mimics
 from dynx.loaded import installed_engines
 from dynx.model.xml.source import XmlSource
 from dynx.rules.traps import find_trap
@@ -106,10 +106,12 @@ def test_states_are_within_limits_that_leave_zero_out(kind: str, lower: float, u
         f'<joint name="j" type="{kind}"><parent link="a"/><child link="b"/>'
         f'<limit lower="{lower}" upper="{upper}" effort="1" velocity="1"/></joint></robot>'
     )
-    q = draw_states(free_model(XmlSource(text), "fixed"), 20, 0).q
+    q = draw_states(model_without_mimics(XmlSource(text), "fixed"), 20, 0).q
     assert np.all((lower < q) & (q < upper))
-    far = text.replace(f'"{lower}"', f'"{FARTHEST * 2}"').replace(f'"{upper}"', f'"{FARTHEST * 3}"')
-    assert np.all(np.abs(draw_states(free_model(XmlSource(far), "fixed"), 20, 0).q) <= np.pi)
+    far = text.replace(f'"{lower}"', f'"{MAX_LIMIT_DISTANCE * 2}"').replace(
+        f'"{upper}"', f'"{MAX_LIMIT_DISTANCE * 3}"'
+    )
+    assert np.all(np.abs(draw_states(model_without_mimics(XmlSource(far), "fixed"), 20, 0).q) <= np.pi)
 
 
 def test_numbers_that_overflow_end_in_a_report() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from dynx.doctor.examine.engine_input import without_meshes, written
+from dynx.doctor.examine.engine_input import temporary_urdf, without_meshes
 from dynx.model.xml.source import XmlSource
 from tests.rules.documents import case_of, link
 
@@ -24,7 +24,7 @@ def test_a_file_is_written_as_it_was_read_and_is_gone_afterwards(tmp_path: Path)
     data = '<?xml version="1.0" encoding="iso-8859-1"?><robot name="é"><link name="ü"/></robot>'.encode(
         "latin-1"
     )
-    with written(without_meshes(XmlSource(data))) as path:
+    with temporary_urdf(without_meshes(XmlSource(data))) as path:
         assert path.read_bytes() == data
         assert path.suffix == ".urdf"
     assert not path.exists()

@@ -13,7 +13,7 @@ from dynx.doctor.examine.examination import (
     MASS,
     QUANTITIES,
     TORQUE,
-    change,
+    max_change,
 )
 from dynx.errors import EngineError
 from dynx.spatial.scalar import Floats
@@ -111,35 +111,35 @@ def test_a_force_that_acts_on_one_side_alone_shows() -> None:
 def test_what_is_no_number_is_no_agreement() -> None:
     lost = examined(ARM, Lost)
     assert lost.error(NAME, TORQUE) == lost.error(NAME, MASS) == lost.error(NAME, KINEMATICS) == np.inf
-    assert lost.worst(NAME) == np.inf
-    assert "no mass matrix today" in lost.answers[NAME].failed[MASS]
+    assert lost.max_error(NAME) == np.inf
+    assert "no mass matrix today" in lost.outputs[NAME].failed[MASS]
 
 
 def test_a_link_that_is_fused_away_is_not_compared_and_one_without_place_is() -> None:
-    assert set(examined(ARM, Lost).answers[NAME].deviation[KINEMATICS]) == {"upper", "lower"}
+    assert set(examined(ARM, Lost).outputs[NAME].deviation[KINEMATICS]) == {"upper", "lower"}
 
 
 def test_a_file_that_is_refused_has_no_errors_and_is_wrong() -> None:
     refusing = examined(case_of(link("base"), f"<!-- {SECRET} -->"))
-    assert refusing.answers[NAME].refused == f"robot.urdf is a {SECRET}"
+    assert refusing.outputs[NAME].refused == f"robot.urdf is a {SECRET}"
     assert refusing.errors(NAME) == {}
-    assert refusing.worst(NAME) == refusing.error(NAME, TORQUE) == np.inf
+    assert refusing.max_error(NAME) == refusing.error(NAME, TORQUE) == np.inf
 
 
 def test_fewer_states_are_the_first_of_them() -> None:
-    whole, first = examined(ARM, Weak, samples=3), examined(ARM, Weak, samples=3).take(1)
-    assert len(first.truth.states) == 1
+    whole, first = examined(ARM, Weak, samples=3), examined(ARM, Weak, samples=3).first(1)
+    assert len(first.reference.states) == 1
     for quantity in QUANTITIES:
-        for part, gap in whole.answers[NAME].deviation[quantity].items():
-            np.testing.assert_array_equal(first.answers[NAME].deviation[quantity][part], gap[:1])
+        for part, gap in whole.outputs[NAME].deviation[quantity].items():
+            np.testing.assert_array_equal(first.outputs[NAME].deviation[quantity][part], gap[:1])
 
 
 def test_how_far_answers_moved() -> None:
     one, two = np.zeros((3, 2)), np.array([[0.0, -2.0], [1.0, 0.0], [0.0, 0.0]])
-    assert change({"": one}, {"": two}) == change({"": two}, {"": one}) == 2.0
-    assert change({"a": one, "b": two}, {"a": one}) == 0.0
-    assert change({"": one}, {"": np.zeros((3, 3))}) == np.inf
-    assert change({"": one}, {"": np.full((3, 2), np.nan)}) == np.inf
+    assert max_change({"": one}, {"": two}) == max_change({"": two}, {"": one}) == 2.0
+    assert max_change({"a": one, "b": two}, {"a": one}) == 0.0
+    assert max_change({"": one}, {"": np.zeros((3, 3))}) == np.inf
+    assert max_change({"": one}, {"": np.full((3, 2), np.nan)}) == np.inf
 
 
 def test_a_joint_has_its_own_error() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dynx.doctor.examine.line_map import at_given_lines
+from dynx.doctor.examine.line_map import with_original_lines
 from dynx.doctor.prove.mending import detections, readable
 from dynx.model.xml.source import XmlSource
 from dynx.rules import Case, find_rule
@@ -20,7 +20,7 @@ def test_lines_behind_an_inserted_chain_of_joints_are_those_of_the_file() -> Non
     found = detections(case, rules)
     right = text.splitlines().index('  <link name="frame"/>') + 1
     assert [each.line for rule, each in found if rule.id == "DX101"] != [right]
-    placed = at_given_lines(found, case.source, sound.source)
+    placed = with_original_lines(found, case.source, sound.source)
     assert [each.line for rule, each in placed if rule.id == "DX101"] == [right]
     assert [each for rule, each in placed if rule.id == "DX210"] == [
         each for rule, each in found if rule.id == "DX210"

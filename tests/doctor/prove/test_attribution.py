@@ -13,7 +13,7 @@ from dynx.doctor.prove.mending import mend
 from dynx.loaded import LoadedRobot
 from dynx.rules import Case, Detection, Remedy, Rule, find_rule
 from dynx.spatial.scalar import Floats
-from tests.doctor.wilful_engine import NAME, SECRET, WilfulEngine, laboratory
+from tests.doctor.wilful_engine import NAME, SECRET, WilfulEngine, examiner
 from tests.rules.documents import case_of, joint, link
 
 BAR = 1e-12
@@ -58,7 +58,7 @@ def attributed(
     tolerance: float = BAR,
 ) -> list[Attribution]:
     """What is proved in a case by rules."""
-    made = laboratory(engine)
+    made = examiner(engine)
     before, after = made.examine(case), made.examine(mend(case, rules).case)
     attributor = Attributor(made, case, rules, before, after, tolerance, lambda step: None)
     return [each for rule in rules for each in attributor.attribute(rule, rule.detect(case))]
@@ -68,10 +68,10 @@ def test_a_cause_that_explains_all_is_proved_at_each_place_with_its_own_effect()
     near, far = attributed(TWO, find_rule("DX101"))
     assert near.proved
     assert far.proved
-    assert near.worst is not None
-    assert far.worst is not None
+    assert near.largest_effect is not None
+    assert far.largest_effect is not None
     # The far link slides along z and has a part of the torques alone.
-    assert near.worst.relative_error != far.worst.relative_error
+    assert near.largest_effect.relative_error != far.largest_effect.relative_error
     assert {*near.effects, *far.effects} == {NAME}
 
 
@@ -86,7 +86,7 @@ def test_an_effect_below_the_tolerance_is_none(tolerance: float) -> None:
     # 1 kg m^2 more than the arm's 2e4.
     assert bool(found.effects) == (tolerance == BAR)
     assert found.proved == (tolerance == BAR)
-    assert (found.worst is None) == (tolerance > BAR)
+    assert (found.largest_effect is None) == (tolerance > BAR)
 
 
 def test_a_cause_is_not_proved_where_the_engine_stays_wrong() -> None:
@@ -134,6 +134,6 @@ def test_the_quantity_is_the_one_that_moves_most() -> None:
 
     case = case_of(*(link("base"), link("odd", center=(0.1, 0.2, 0.3))), joint("j", "base", "odd"))
     (found,) = attributed(case, Replaced('"odd"', '"even"', changes_physics=True), engine=Wrong)
-    assert found.worst is not None
-    assert found.worst.quantity == TORQUE
-    assert found.worst.relative_error == pytest.approx(2.0)
+    assert found.largest_effect is not None
+    assert found.largest_effect.quantity == TORQUE
+    assert found.largest_effect.relative_error == pytest.approx(2.0)

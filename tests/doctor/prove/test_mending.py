@@ -7,8 +7,8 @@ from dataclasses import replace
 import pytest
 
 from dynx.agreement.tolerances import BAR
-from dynx.doctor.examine.examination import Laboratory
-from dynx.doctor.prove.mending import all_but, mend, place
+from dynx.doctor.examine.examination import Examiner
+from dynx.doctor.prove.mending import all_except, mend, place_of
 from dynx.loaded import installed_engines
 from dynx.rules import find_rule
 from tests.doctor.prove.test_attribution import Replaced
@@ -48,12 +48,12 @@ def test_a_change_of_the_physics_is_said() -> None:
 def test_the_numbers_of_the_file_are_kept_by_calls(rule_id: str) -> None:
     kept = mend(trap(rule_id, **{rule_id: "keep"}))
     engines = [engine for engine in ("pinocchio", "pybullet", "drake") if engine in installed_engines()]
-    after = Laboratory(engines, 3, 0).examine(kept.case)
-    assert all(after.worst(engine) <= BAR for engine in engines)
+    after = Examiner(engines, 3, 0).examine(kept.case)
+    assert all(after.max_error(engine) <= BAR for engine in engines)
 
 
 def test_a_place_that_is_left_out_stays_as_it_is() -> None:
     case, rule = trap("DX101"), find_rule("DX101")
     (found,) = rule.detect(case)
-    assert mend(case, wanted=all_but({place(rule, found)})).case.source.data == case.source.data
+    assert mend(case, wanted=all_except({place_of(rule, found)})).case.source.data == case.source.data
     assert not rule.detect(mend(case).case)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from dynx.doctor.prove.reinsertion import put_back
+from dynx.doctor.prove.reinsertion import reinserted_text
 from dynx.model.xml.source import XmlSource
 
 LINES = ("<robot>", *(f'  <link name="l{k}" mass="{k}"/>' for k in range(6)), "</robot>")
@@ -33,16 +33,16 @@ def test_the_cause_comes_back_and_nothing_else(
     if abs(cause - other) < 2:
         return
     given, without = text_with({cause: BAD}), text_with({cause: good})
-    found = put_back(given, without, text_with({cause: good, other: mended}))
+    found = reinserted_text(given, without, text_with({cause: good, other: mended}))
     assert found is not None
     assert found.text == text_with({cause: BAD, other: mended}).text
 
 
 def test_two_remedies_in_one_line_cannot_be_told_apart() -> None:
     given, without = text_with({2: BAD}), text_with({2: GOOD})
-    assert put_back(given, without, text_with({2: '  <link name="bad" mass="7"/>'})) is None
+    assert reinserted_text(given, without, text_with({2: '  <link name="bad" mass="7"/>'})) is None
 
 
 def test_a_remedy_that_changed_nothing_has_nothing_to_put_back() -> None:
     given = text_with({})
-    assert put_back(given, given, text_with({3: OTHER})) is None
+    assert reinserted_text(given, given, text_with({3: OTHER})) is None

@@ -1,8 +1,8 @@
-"""The right answers for a file: what dynx reads in it, evaluated by the algorithms of `dynx.rbd`.
+"""Reference values for a file: the robot as dynx reads it, evaluated by the algorithms of `dynx.rbd`.
 
-Coordinates are those of all moving joints, mimic joints included, because that is what engines load:
-the ``<mimic>`` tags are set aside. Gravity is tilted, so that an answer in the wrong frame shows. The
-backend `reference`, which evaluates here, is held to a 50-digit referee by ``dynx agree``.
+Coordinates are those of all moving joints, mimic joints included, because engines load them so: the
+``<mimic>`` tags are set aside. Gravity is tilted, so that a value in the wrong frame shows. ``dynx agree``
+compares the backend `reference`, which evaluates here, with a 50-digit referee.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ from dynx.model.xml.source import XmlSource
 from dynx.reference.backend import ReferenceBackend
 from dynx.spatial.scalar import Floats
 
-TILTED: Vector = (0.3, -0.7, -9.81)
+TILTED_GRAVITY: Vector = (0.3, -0.7, -9.81)
 """Gravity [m/s^2] at which files are compared: along no axis of any frame."""
 
-MOST_TIPS = 4
-"""Jacobians are compared at the ends of up to so many branches."""
+MAX_TIPS = 4
+"""Largest number of branches at whose ends Jacobians are compared."""
 
-FARTHEST = 100.0
-"""Limits beyond which a joint [rad or m] is compared near to zero all the same: so far from there the
-rounding of its coordinate would be what is compared."""
+MAX_LIMIT_DISTANCE = 100.0
+"""Distance from zero [rad or m] beyond which limits are ignored and states are drawn near zero: so far away
+the rounding of the coordinate would be what is compared."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,13 +48,13 @@ class States:
 
 
 @dataclass(frozen=True, eq=False)
-class Truth:
-    """The answers for `model` at `states`.
+class ReferenceValues:
+    """Values of all compared quantities for `model` at `states`.
 
     `poses` (n, n_links, 4, 4) of the links in the world; by link `jacobians` (n, 6, nv) of its frame, linear
     rows first, in axes of the world; `mass_matrix` (n, nv, nv); `torque` (n, nv) for the accelerations of
     `states`, and `bias` (n, nv) the part of it without acceleration. `solvable` says whether forward dynamics
-    has an answer at all.
+    has a solution.
     """
 
     model: Model
@@ -66,8 +66,8 @@ class Truth:
     bias: Floats
     solvable: bool
 
-    def take(self, count: int) -> Truth:
-        """The same at the first `count` states alone."""
+    def first(self, count: int) -> ReferenceValues:
+        """Keep the first `count` states."""
         states = self.states
         return replace(
             self,
@@ -79,25 +79,25 @@ class Truth:
             bias=self.bias[:count],
         )
 
-    def torque_taken(self, a: Floats) -> Floats:
-        """tau (n, nv) that accelerations (n, nv) really take at the states."""
+    def required_torque(self, a: Floats) -> Floats:
+        """Compute tau (n, nv) that accelerations a (n, nv) require at the states."""
         return np.asarray(np.einsum("nij,nj->ni", self.mass_matrix, a) + self.bias)
 
 
-def free_model(source: XmlSource, base: Base) -> Model:
-    """The robot of a document in the coordinates of all its moving joints, in tilted gravity."""
+def model_without_mimics(source: XmlSource, base: Base) -> Model:
+    """Read the robot of a document in the coordinates of all its moving joints, in tilted gravity."""
     joints = source.root.all("joint")
     followers = [mimic for joint in joints for mimic in joint.all("mimic")]
     free = source.edited(*(source.removing(mimic) for mimic in followers)) if followers else source
-    return read_model(free.text, source.source, base=base, gravity=TILTED)
+    return read_model(free.text, source.source, base=base, gravity=TILTED_GRAVITY)
 
 
 def draw_states(model: Model, count: int, seed: int) -> States:
-    """Random states: the middle four fifths of what limits allow, elsewhere any angle and lengths up to
-    1 m, or as much from the limit nearest to zero; velocities and accelerations up to 2.
+    """Draw random states: the middle four fifths of the range that limits allow, else any angle and lengths
+    up to 1 m, or as far from the limit nearest to zero; velocities and accelerations up to 2.
 
-    Engines that step meet a limit with a force, and no limit is to be met within a step. A range
-    without width leaves no middle, so there a joint may be anywhere.
+    Engines that step resist a limit with a force, so no limit may be reached within a step. A range without
+    width has no middle: there a joint may be anywhere.
     """
     rng = np.random.default_rng(seed)
     base = 7 if model.floating else 0
@@ -105,9 +105,9 @@ def draw_states(model: Model, count: int, seed: int) -> States:
     turning = np.array([joint.type != "prismatic" for joint in model.coordinate_joints], dtype=bool)
     reach = np.where(turning, np.pi, 1.0)
     lower, upper = model.lower[base:], model.upper[base:]
-    # What is near to zero may be beyond the limits: then it is what is near to the limits.
+    # Zero may be outside the limits: then positions near the closest limit are drawn.
     near = np.clip(0.0, lower, np.maximum(upper, lower))
-    near = np.where((np.abs(near) < reach) | (np.abs(near) > FARTHEST), 0.0, near)
+    near = np.where((np.abs(near) < reach) | (np.abs(near) > MAX_LIMIT_DISTANCE), 0.0, near)
     low, high = np.maximum(lower, near - reach), np.minimum(upper, near + reach)
     room = low < high
     low, high = np.where(room, low, -reach), np.where(room, high, reach)
@@ -116,21 +116,21 @@ def draw_states(model: Model, count: int, seed: int) -> States:
     return States(q, v, a, tau)
 
 
-def find_truth(model: Model, states: States) -> Truth:
-    """Evaluate the right answers; forward dynamics is asked with torques of the size of `torque`."""
-    # What a file without a single mass makes of these is compared, not announced by NumPy.
+def reference_values(model: Model, states: States) -> ReferenceValues:
+    """Compute the reference values; torques of the magnitude of `torque` drive forward dynamics."""
+    # A file without any mass gives NaN here, which is compared and needs no warning of NumPy.
     with np.errstate(all="ignore"), ReferenceBackend(model) as reference:
-        # Frames of links come first; those that dynx adds are no links to an engine.
+        # Frames of links come first; engines do not know those that dynx adds.
         poses = reference.forward_kinematics(states.q)[:, : len(model.links)]
         bias = reference.bias_torque(states.q, states.v)
         torque = reference.inverse_dynamics(states.q, states.v, states.a)
         mass_matrix = reference.mass_matrix(states.q)
-        tips = _tips(model)
-        return Truth(
+        return ReferenceValues(
             model=model,
-            states=States(states.q, states.v, states.a, _shuffled(torque)),
+            # The torques of other states have the robot's own magnitude but are not balanced.
+            states=States(states.q, states.v, states.a, np.roll(torque, 1, axis=0)),
             poses=poses,
-            jacobians={tip: reference.jacobian(states.q, tip) for tip in tips},
+            jacobians={tip: reference.jacobian(states.q, tip) for tip in _tips(model)},
             mass_matrix=mass_matrix,
             torque=torque,
             bias=bias,
@@ -138,21 +138,21 @@ def find_truth(model: Model, states: States) -> Truth:
         )
 
 
-def refereed(truth: Truth) -> float:
-    """Relative error of the right answers themselves at the first state, against 50 digits."""
-    if not truth.model.nv:
+def referee_error(reference: ReferenceValues) -> float:
+    """Relative error of the reference values themselves at the first state, against 50 digits."""
+    if not reference.model.nv:
         return 0.0
-    states, referee = truth.states, Referee(truth.model)
-    exact = referee.inverse_dynamics(states.q[:1], states.v[:1], states.a[:1])
-    exact_M = referee.mass_matrix(states.q[:1])
-    gaps = [(exact - truth.torque[:1], truth.torque), (exact_M - truth.mass_matrix[:1], truth.mass_matrix)]
-    return max(_ratio(gap.astype(np.float64), right) for gap, right in gaps)
+    states, referee = reference.states, Referee(reference.model)
+    exact_torque = referee.inverse_dynamics(states.q[:1], states.v[:1], states.a[:1])
+    exact_mass = referee.mass_matrix(states.q[:1])
+    pairs = ((exact_torque, reference.torque), (exact_mass, reference.mass_matrix))
+    return max(_ratio((exact - found[:1]).astype(np.float64), found) for exact, found in pairs)
 
 
 def _is_regular(mass_matrix: Floats) -> bool:
-    """Whether the mass matrices (n, nv, nv) stay regular under the errors that engines are allowed.
+    """Check that the mass matrices (n, nv, nv) stay regular under the errors that engines are allowed.
 
-    Scaled to a unit diagonal, each has its eigenvalues further from zero than `BAR`: nearer ones leave
+    Scaled to a unit diagonal, each must have its eigenvalues further from zero than `BAR`: nearer ones leave
     no digit of the acceleration, as on a floating base of 1e-15 kg that carries an arm.
     """
     diagonal = np.abs(np.einsum("nii->ni", mass_matrix))
@@ -163,22 +163,17 @@ def _is_regular(mass_matrix: Floats) -> bool:
     return bool(np.all(np.abs(values) > BAR))
 
 
-def _ratio(gap: Floats, right: Floats) -> float:
-    size = float(np.max(np.abs(right), initial=0.0))
-    return float(np.max(np.abs(gap), initial=0.0)) / (size or 1.0)
-
-
-def _shuffled(torque: Floats) -> Floats:
-    """The torques of other states: of the robot's own size, but not balanced."""
-    return np.roll(torque, 1, axis=0)
+def _ratio(gap: Floats, values: Floats) -> float:
+    magnitude = float(np.max(np.abs(values), initial=0.0))
+    return float(np.max(np.abs(gap), initial=0.0)) / (magnitude or 1.0)
 
 
 def _tips(model: Model) -> tuple[str, ...]:
-    """Links that carry none, moved by some joint, spread over the tree."""
+    """Choose links without children that some joint moves, spread over the tree."""
     if not model.nv:
         return ()
-    carrying = {joint.parent for joint in model.joints}
+    parents = {joint.parent for joint in model.joints}
     moved = {frame.name for frame in model.mechanism.frames if frame.body >= 0}
-    ends = [link.name for link in model.links if link.name not in carrying and link.name in moved]
+    ends = [link.name for link in model.links if link.name not in parents and link.name in moved]
     ends = ends or [model.links[-1].name]
-    return tuple(ends[:: max(1, len(ends) // MOST_TIPS)][:MOST_TIPS])
+    return tuple(ends[:: max(1, len(ends) // MAX_TIPS)][:MAX_TIPS])

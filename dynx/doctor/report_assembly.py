@@ -1,4 +1,4 @@
-"""What examinations and proofs say, as the parts of a report."""
+"""Assembly of a report from examinations and proofs."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import combinations
 
-from dynx.doctor.examine.examination import QUANTITIES, TORQUE, Examination, Laboratory
-from dynx.doctor.examine.right_answers import refereed
+from dynx.doctor.examine.examination import QUANTITIES, TORQUE, Examination, Examiner
+from dynx.doctor.examine.reference_values import referee_error
 from dynx.doctor.prove.attribution import Attribution
-from dynx.doctor.prove.mending import Mending, Place, place
+from dynx.doctor.prove.mending import Mending, Place, place_of
 from dynx.doctor.report import DoctorReport, EngineResult, Finding, PairError, RunTimeCall
 from dynx.loaded import loader_class
 from dynx.loaded.difference import model_difference
@@ -17,18 +17,18 @@ from dynx.rules import Case, Detection, Rule
 
 
 def first_report(case: Case, before: Examination, tolerance: float) -> DoctorReport:
-    """What there is to say of a case, as engines load it, before any cause is looked for."""
-    descriptions = [each.description for each in before.answers.values() if each.description is not None]
-    model = before.truth.model
+    """Report a case as engines load it, before any search for causes."""
+    descriptions = [each.description for each in before.outputs.values() if each.description is not None]
+    model = before.reference.model
     return DoctorReport(
         robot=model.name,
         source=case.source.source,
         base=case.base,
-        engines=tuple(_engine_result(case, name, before) for name in before.answers),
+        engines=tuple(_engine_result(case, name, before) for name in before.outputs),
         residual=_residual(before),
         tolerance=tolerance,
         pairs=_pairs(before),
-        referee=refereed(before.truth),
+        referee=referee_error(before.reference),
         model_difference=tuple(model_difference(model, descriptions)),
         text=case.source.text,
         form=case.source.form,
@@ -36,23 +36,23 @@ def first_report(case: Case, before: Examination, tolerance: float) -> DoctorRep
 
 
 def with_after(report: DoctorReport, after: Examination) -> DoctorReport:
-    """The report with what the engines say of the mended file."""
+    """Add the errors of the engines on the mended file."""
     engines = tuple(
-        replace(each, refused_after=after.answers[each.engine].refused, after=after.errors(each.engine))
+        replace(each, refused_after=after.outputs[each.engine].refused, after=after.errors(each.engine))
         for each in report.engines
     )
     return replace(report, engines=engines, residual=_residual(after))
 
 
 def _residual(examination: Examination) -> float:
-    """The largest error of the engines that load the file."""
-    errors = [examination.errors(engine) for engine in examination.answers]
+    """Largest error of the engines that load the file."""
+    errors = [examination.errors(engine) for engine in examination.outputs]
     return max((error for of_engine in errors for error in of_engine.values()), default=0.0)
 
 
 def _engine_result(case: Case, name: str, before: Examination) -> EngineResult:
     kind = loader_class(name)
-    errors, refused = before.errors(name), before.answers[name].refused
+    errors, refused = before.errors(name), before.outputs[name].refused
     return EngineResult(
         engine=name,
         version=kind.engine_version(),
@@ -65,7 +65,7 @@ def _engine_result(case: Case, name: str, before: Examination) -> EngineResult:
 
 
 def _pairs(examination: Examination) -> tuple[PairError, ...]:
-    loaded = [name for name, each in examination.answers.items() if each.refused is None]
+    loaded = [name for name, each in examination.outputs.items() if each.refused is None]
     return tuple(
         PairError(
             (one, other),
@@ -82,15 +82,15 @@ def _pairs(examination: Examination) -> tuple[PairError, ...]:
 def all_findings(
     found: Sequence[tuple[Rule, Detection]], proofs: Sequence[Attribution], mended: Mending
 ) -> tuple[Finding, ...]:
-    """Everything detected, with the effect where one was proved."""
+    """Report everything detected, with the effect where one was measured."""
     proved: dict[Place, list[Attribution]] = {}
     for each in proofs:
-        proved.setdefault(place(each.rule, each.detection), []).append(each)
+        proved.setdefault(place_of(each.rule, each.detection), []).append(each)
     done = {rule.id: remedy.changed for rule, remedy in mended.applied}
     findings = []
     for rule, detection in found:
-        # The same place twice (two fields of one link, say) has its proofs in the same order.
-        of_place = proved.get(place(rule, detection), [])
+        # A place found twice (two fields of one link, for example) has its proofs in the same order.
+        of_place = proved.get(place_of(rule, detection), [])
         attribution = of_place.pop(0) if of_place else None
         finding = Finding(
             rule.id, rule.name, rule.kind, detection.link, detection.joint, detection.line, detection.message
@@ -99,7 +99,7 @@ def all_findings(
             finding = replace(
                 finding,
                 engines=tuple(attribution.effects),
-                effect=attribution.worst,
+                effect=attribution.largest_effect,
                 effects=dict(attribution.effects),
                 proved=attribution.proved,
                 remedy=done.get(rule.id),
@@ -108,9 +108,9 @@ def all_findings(
     return tuple(sorted(findings, key=lambda finding: finding.kind))
 
 
-def run_time_calls(case: Case, laboratory: Laboratory) -> tuple[RunTimeCall, ...]:
-    """The code behind the remedies at run time that the mended case relies on."""
-    known = [(name, kind.CALLS) for name, kind in laboratory.engines.items()]
+def run_time_calls(case: Case, examiner: Examiner) -> tuple[RunTimeCall, ...]:
+    """Collect the code of the run-time remedies that the mended case requires."""
+    known = [(name, kind.CALLS) for name, kind in examiner.engines.items()]
     return tuple(
         RunTimeCall(engine, calls[call]) for engine, calls in known for call in calls if call in case.calls
     )

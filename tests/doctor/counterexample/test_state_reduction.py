@@ -1,4 +1,4 @@
-"""A state by names fits the robot it was made of, and any robot that is left of it."""
+"""A reducible state fits the robot it was made of, and any robot that is left of it."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dynx.doctor.counterexample.state_by_name import NamedState
+from dynx.doctor.counterexample.state_reduction import ReducibleState
 from dynx.testing.strategies import models, samples
 
 
@@ -14,7 +14,7 @@ from dynx.testing.strategies import models, samples
 def test_there_and_back(data: st.DataObject) -> None:
     model = data.draw(models())
     sample = data.draw(samples(model))
-    state = NamedState.of(model, *sample)
+    state = ReducibleState.of(model, *sample)
     for given_row, row in zip(sample, state.on(model), strict=True):
         np.testing.assert_array_equal(given_row, row)
     assert state.within(model) == state
@@ -22,11 +22,11 @@ def test_there_and_back(data: st.DataObject) -> None:
 
 @given(st.data())
 def test_on_another_robot(data: st.DataObject) -> None:
-    """What both have keeps its value, and what one of them has not is at rest."""
+    """Joints that both robots have keep their values; the others are at rest."""
     model = data.draw(models(base="floating", mimics=False))
     other = data.draw(models(mimics=False))
     q, v, a = data.draw(samples(model))
-    q_other, v_other, a_other = NamedState.of(model, q, v, a).on(other)
+    q_other, v_other, a_other = ReducibleState.of(model, q, v, a).on(other)
     assert (len(q_other), len(v_other), len(a_other)) == (other.nq, other.nv, other.nv)
     for name in other.joint_names:
         shift = 1 if other.floating else 0

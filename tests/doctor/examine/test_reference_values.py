@@ -1,4 +1,4 @@
-"""The right answers, and the states at which they are asked."""
+"""Reference values, and the states at which they are computed."""
 
 from __future__ import annotations
 
@@ -10,7 +10,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dynx.agreement.tolerances import BAR
-from dynx.doctor.examine.right_answers import TILTED, draw_states, find_truth, free_model, refereed
+from dynx.doctor.examine.reference_values import (
+    TILTED_GRAVITY,
+    draw_states,
+    model_without_mimics,
+    referee_error,
+    reference_values,
+)
 from dynx.model import Model
 from dynx.testing.strategies import models
 from tests.rules.documents import case_of, joint, link
@@ -24,32 +30,32 @@ PAIR = case_of(
 
 
 def test_followers_move_by_themselves_and_gravity_is_tilted() -> None:
-    model = free_model(PAIR.source, "floating")
+    model = model_without_mimics(PAIR.source, "floating")
     assert (model.nv, PAIR.model.nv) == (8, 1)
-    assert model.gravity == TILTED
-    assert min(map(abs, TILTED)) > 0.0
+    assert model.gravity == TILTED_GRAVITY
+    assert min(map(abs, TILTED_GRAVITY)) > 0.0
 
 
 @pytest.mark.parametrize("base", ["fixed", "floating"])
 def test_torques_and_accelerations_fit_and_no_state_is_balanced(base: str) -> None:
-    model = free_model(PAIR.source, "floating" if base == "floating" else "fixed")
-    truth = find_truth(model, draw_states(model, 4, 0))
-    size = np.max(np.abs(truth.torque))
-    assert np.max(np.abs(truth.torque_taken(truth.states.a) - truth.torque)) <= BAR * size
+    model = model_without_mimics(PAIR.source, "floating" if base == "floating" else "fixed")
+    reference = reference_values(model, draw_states(model, 4, 0))
+    size = np.max(np.abs(reference.torque))
+    assert np.max(np.abs(reference.required_torque(reference.states.a) - reference.torque)) <= BAR * size
     # Of the robot's own size, and asking for another acceleration than that of the state.
-    assert np.min(np.max(np.abs(truth.states.tau - truth.torque), axis=1)) > 1e-3 * size
-    assert sorted(map(tuple, truth.states.tau)) == sorted(map(tuple, truth.torque))
+    assert np.min(np.max(np.abs(reference.states.tau - reference.torque), axis=1)) > 1e-3 * size
+    assert sorted(map(tuple, reference.states.tau)) == sorted(map(tuple, reference.torque))
 
 
 def test_the_referee_finds_a_wrong_answer_of_either_kind() -> None:
-    model = free_model(PAIR.source, "fixed")
-    truth = find_truth(model, draw_states(model, 2, 0))
-    assert refereed(truth) <= BAR
+    model = model_without_mimics(PAIR.source, "fixed")
+    reference = reference_values(model, draw_states(model, 2, 0))
+    assert referee_error(reference) <= BAR
     for spoiled in (
-        replace(truth, torque=1.001 * truth.torque),
-        replace(truth, mass_matrix=truth.mass_matrix * 2.0),
+        replace(reference, torque=1.001 * reference.torque),
+        replace(reference, mass_matrix=reference.mass_matrix * 2.0),
     ):
-        assert refereed(spoiled) > 1e-4
+        assert referee_error(spoiled) > 1e-4
 
 
 @given(models(mimics=False, max_links=5), st.integers(0, 99))
@@ -64,7 +70,7 @@ def test_states_keep_away_from_limits(model: Model, seed: int) -> None:
 
 
 def test_one_seed_gives_the_same_states_and_another_gives_others() -> None:
-    model = free_model(PAIR.source, "floating")
+    model = model_without_mimics(PAIR.source, "floating")
     one, same, other = (draw_states(model, 3, seed) for seed in (0, 0, 1))
     assert all(np.array_equal(getattr(one, name), getattr(same, name)) for name in ("q", "v", "a", "tau"))
     assert not np.array_equal(one.q, other.q)
