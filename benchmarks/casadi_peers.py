@@ -16,8 +16,9 @@ import numpy as np
 from benchmarks.compiling_peer import CompilingPeer
 from benchmarks.jax_peers import version_of
 from benchmarks.urdf_for_peers import moving_joints, spelled_out
-from dynx.bench.cases import ARGUMENTS, Batch, Work
-from dynx.bench.implementations import Prepared
+from dynx.backends.quantities import QUANTITIES
+from dynx.bench.cases import Batch, BenchmarkCase
+from dynx.bench.implementations import PreparedCall
 from dynx.errors import NotInstalledError
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
@@ -47,13 +48,13 @@ class CasadiMap(CompilingPeer):
         self._robot = adam.KinDynComputations(spelled_out(model), moving_joints(model), gravity=gravity)
         self._functions: dict[str, tuple[Any, float]] = {}
 
-    def prepare(self, work: Work, batch: Batch, out: Floats) -> Prepared:
-        """Ready; the answers go to `out`."""
-        function = self._function(work.quantity, batch)
+    def prepare(self, case: BenchmarkCase, batch: Batch, out: Floats) -> PreparedCall:
+        """The call; the results go to `out`."""
+        function = self._function(case.quantity, batch)
         kind = ("serial",) if self.threads == 1 else ("thread", self.threads)
         mapped = function.map(len(batch), *kind)
         buffer, trigger = mapped.buffer()
-        for number, argument in enumerate(batch.arguments(work.quantity)):
+        for number, argument in enumerate(batch.arguments(case.quantity)):
             buffer.set_arg(number, argument.data)
         buffer.set_res(0, out.data)
 
@@ -62,16 +63,16 @@ class CasadiMap(CompilingPeer):
             trigger()
             return out
 
-        return Prepared(call)
+        return PreparedCall(call)
 
     def _function(self, quantity: str, batch: Batch) -> Any:
         if quantity not in self._functions:
             begin = time.perf_counter()
             casadi = self._casadi
-            arguments = [casadi.SX.sym(name, batch.model.nv) for name in ARGUMENTS[quantity]]
-            answer = self._expression(quantity, batch.frame, arguments)
-            # Row-major, as the array of the answers is; structural zeros are written too.
-            row_major = casadi.densify(casadi.vec(answer.T))
+            arguments = [casadi.SX.sym(name, batch.model.nv) for name in QUANTITIES[quantity].arguments]
+            result = self._expression(quantity, batch.frame, arguments)
+            # Row-major, as the array of the results is; structural zeros are written too.
+            row_major = casadi.densify(casadi.vec(result.T))
             function = casadi.Function(quantity, arguments, [row_major], self.options)
             self._functions[quantity] = function, time.perf_counter() - begin
         function, self.compile_seconds = self._functions[quantity]

@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from dynx.bench.cases import Batch
-from dynx.bench.implementations import Role, Way
+from dynx.bench.implementations import Implementation, Role
 from dynx.errors import EngineLimitError
 from dynx.model import Model
 from dynx.reference.backend import ReferenceBackend
@@ -17,7 +17,7 @@ EASY_JOINTS = 8
 """Up to so many joints these peers take `most_samples` in a call of two seconds at most (measured)."""
 
 
-class CompilingPeer(Way):
+class CompilingPeer(Implementation):
     """A peer that takes whole batches once it has compiled a function for them.
 
     `compile_seconds` is how long it took to make the function last prepared, which no timing contains.
@@ -29,7 +29,9 @@ class CompilingPeer(Way):
 
     def __init__(self, model: Model, threads: int) -> None:
         if model.mechanism.coupling is not None:
-            raise EngineLimitError(f"{self.name} knows no mimic joints: lock them, for every way alike")
+            raise EngineLimitError(
+                f"{self.name} supports no mimic joints: lock them for every implementation"
+            )
         if model.floating:
             raise EngineLimitError(f"{self.name} is timed on a fixed base only")
         self.threads = threads

@@ -19,13 +19,13 @@ UNCHECKED_MORE, UNCHECKED_RATIO = 0.7e-6, 1.5
 
 @pytest.fixture
 def record(request: pytest.FixtureRequest) -> Record:
-    """Keep the fastest round of a benchmark under (quantity, way), for the table at the end."""
+    """Keep the fastest round of a benchmark under (quantity, implementation), for the table at the end."""
     seconds = request.config.stash.setdefault(SECONDS, {})
 
-    def keep(quantity: str, way: str, benchmark: BenchmarkFixture) -> None:
+    def keep(quantity: str, implementation: str, benchmark: BenchmarkFixture) -> None:
         # Without stats, benchmarks are switched off and only run once.
         if benchmark.stats is not None:
-            seconds.setdefault(quantity, {})[way] = float(benchmark.stats.stats.min)
+            seconds.setdefault(quantity, {})[implementation] = float(benchmark.stats.stats.min)
 
     return keep
 
@@ -33,17 +33,21 @@ def record(request: pytest.FixtureRequest) -> Record:
 def pytest_terminal_summary(terminalreporter: TerminalReporter, config: pytest.Config) -> None:
     """A line per quantity, if raw, checked and unchecked calls were all timed."""
     complete = {
-        quantity: ways
-        for quantity, ways in config.stash.get(SECONDS, {}).items()
-        if ways.keys() >= {"raw", "checked", "unchecked"}
+        quantity: implementations
+        for quantity, implementations in config.stash.get(SECONDS, {}).items()
+        if implementations.keys() >= {"raw", "checked", "unchecked"}
     }
     if not complete:
         return
     write = terminalreporter.write_line
     terminalreporter.write_sep("-", "one call on UR5, fastest round [ns]")
     write(f"{'':22}{'pinocchio':>10}{'dynx':>9}{'more':>8}{'unchecked':>12}{'more':>8}{'ratio':>7}  bar")
-    for quantity, ways in complete.items():
-        raw, checked, unchecked = ways["raw"], ways["checked"], ways["unchecked"]
+    for quantity, implementations in complete.items():
+        raw, checked, unchecked = (
+            implementations["raw"],
+            implementations["checked"],
+            implementations["unchecked"],
+        )
         allowed = max(UNCHECKED_MORE, (UNCHECKED_RATIO - 1.0) * raw)
         kept = checked - raw <= CHECKED_MORE and unchecked - raw <= allowed
         write(

@@ -20,8 +20,9 @@ import numpy as np
 
 from benchmarks.compiling_peer import CompilingPeer, place_on_last_link
 from benchmarks.urdf_for_peers import moving_joints, spelled_out
-from dynx.bench.cases import OF_A_FRAME, Batch, Work
-from dynx.bench.implementations import Prepared
+from dynx.backends.quantities import QUANTITIES
+from dynx.bench.cases import Batch, BenchmarkCase
+from dynx.bench.implementations import PreparedCall
 from dynx.errors import EngineLimitError, NotInstalledError
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
@@ -46,7 +47,7 @@ MOST_JOINTS = 16
 class JaxPeer(CompilingPeer):
     """What a user of a library in JAX writes; subclasses say what that is for one sample.
 
-    Arguments are NumPy's arrays, and so is the answer: what it takes to hand them over is timed. (On a
+    Arguments are NumPy's arrays, and so is the result: what it takes to hand them over is timed. (On a
     processor JAX reads and gives such memory as it is, where it is aligned.)
     """
 
@@ -61,11 +62,11 @@ class JaxPeer(CompilingPeer):
     def of_one_sample(self, quantity: str, frame: str) -> OfOneSample:
         """The function that is mapped over the batch."""
 
-    def prepare(self, work: Work, batch: Batch, out: Floats) -> Prepared:
+    def prepare(self, case: BenchmarkCase, batch: Batch, out: Floats) -> PreparedCall:
         """Ready, compiled for this number of samples."""
-        arguments = batch.arguments(work.quantity)
-        answer = self.compiled(work.quantity, batch)
-        return Prepared(lambda: np.asarray(answer(*arguments)))
+        arguments = batch.arguments(case.quantity)
+        result = self.compiled(case.quantity, batch)
+        return PreparedCall(lambda: np.asarray(result(*arguments)))
 
     def compiled(self, quantity: str, batch: Batch) -> Any:
         """The function of the whole batch; made once."""
@@ -80,7 +81,7 @@ class JaxPeer(CompilingPeer):
 
 
 class OnDevice(CompilingPeer):
-    """The same function on arrays that JAX holds already, the answer left with it."""
+    """The same function on arrays that JAX holds already, the result left with it."""
 
     most_samples: ClassVar[int] = JaxPeer.most_samples
 
@@ -89,16 +90,16 @@ class OnDevice(CompilingPeer):
         self.version, self.threads, self.compile_seconds = peer.version, peer.threads, 0.0
         self._peer = peer
 
-    def does(self, work: Work) -> bool:
+    def supports(self, case: BenchmarkCase) -> bool:
         """What the peer does."""
-        return self._peer.does(work)
+        return self._peer.supports(case)
 
-    def prepare(self, work: Work, batch: Batch, out: Floats) -> Prepared:
+    def prepare(self, case: BenchmarkCase, batch: Batch, out: Floats) -> PreparedCall:
         """Ready."""
-        answer = self._peer.compiled(work.quantity, batch)
+        result = self._peer.compiled(case.quantity, batch)
         self.compile_seconds = self._peer.compile_seconds
-        held = [self._peer.jax.device_put(each) for each in batch.arguments(work.quantity)]
-        return Prepared(lambda: answer(*held).block_until_ready())
+        held = [self._peer.jax.device_put(each) for each in batch.arguments(case.quantity)]
+        return PreparedCall(lambda: result(*held).block_until_ready())
 
 
 class AdamJax(JaxPeer):
@@ -116,9 +117,9 @@ class AdamJax(JaxPeer):
         gravity = np.array([*model.gravity, 0.0, 0.0, 0.0])
         self._robot = adam.KinDynComputations(spelled_out(model), moving_joints(model), gravity=gravity)
 
-    def does(self, work: Work) -> bool:
+    def supports(self, case: BenchmarkCase) -> bool:
         """Dynamics of large robots takes minutes to compile (165 s for the mass matrix of 32 joints)."""
-        return work.quantity in OF_A_FRAME or self._robot.NDoF <= MOST_JOINTS
+        return QUANTITIES[case.quantity].of_frame or self._robot.NDoF <= MOST_JOINTS
 
     def of_one_sample(self, quantity: str, frame: str) -> OfOneSample:
         """By adam's functions of a base at rest in the origin."""
@@ -151,13 +152,13 @@ class Frax(JaxPeer):
         self._frax, self.version = imported("frax"), version_of("frax", "jax")
         self._model, self._chain = model, is_chain(model)
 
-    def does(self, work: Work) -> bool:
+    def supports(self, case: BenchmarkCase) -> bool:
         """Frames of a tree it has for its own humanoids only."""
-        return self._chain or work.quantity not in OF_A_FRAME
+        return self._chain or not QUANTITIES[case.quantity].of_frame
 
     def of_one_sample(self, quantity: str, frame: str) -> OfOneSample:
         """By frax's functions; its forward dynamics knows but one gravity, that of dynx's default."""
-        if quantity in OF_A_FRAME:
+        if QUANTITIES[quantity].of_frame:
             arm = self._end(frame)
             of_a_frame: dict[str, OfOneSample] = {
                 "forward_kinematics": arm.ee_transform,

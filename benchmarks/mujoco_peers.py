@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from dynx.bench.cases import Batch, Work
-from dynx.bench.implementations import Prepared, Role, Way
+from dynx.bench.cases import Batch, BenchmarkCase
+from dynx.bench.implementations import Implementation, PreparedCall, Role
 from dynx.errors import EngineLimitError
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
 
 
-class MujocoPeer(Way):
+class MujocoPeer(Implementation):
     """The engine's model is that of the backend `mujoco`, without contacts, limits and damping."""
 
     role: Role = "peer"
@@ -29,24 +29,24 @@ class MujocoPeer(Way):
 
         self.version = f"mujoco {mujoco.__version__}"
         if model.mechanism.coupling is not None:
-            raise EngineLimitError("MuJoCo has mimic joints as constraints: another work")
+            raise EngineLimitError("MuJoCo has mimic joints as constraints: a different problem")
         if model.floating:
             raise EngineLimitError("MuJoCo has other coordinates of a floating base: a fixed one is timed")
         self._mujoco: Any = mujoco
         self._engine: Any = build_tree(model).model
 
-    def does(self, work: Work) -> bool:
+    def supports(self, case: BenchmarkCase) -> bool:
         """One quantity."""
-        return work.quantity == self.quantity
+        return case.quantity == self.quantity
 
 
 class MujocoInverse(MujocoPeer):
-    """`mj_inverse` called once for each sample, as MuJoCo's users do; answers go to one array."""
+    """`mj_inverse` called once for each sample, as MuJoCo's users do; results go to one array."""
 
     name = "mujoco mj_inverse"
     quantity = "inverse_dynamics"
 
-    def prepare(self, work: Work, batch: Batch, out: Floats) -> Prepared:
+    def prepare(self, case: BenchmarkCase, batch: Batch, out: Floats) -> PreparedCall:
         """Ready."""
         rows = list(zip(batch.q, batch.v, batch.a, strict=True))
         engine, inverse = self._engine, self._mujoco.mj_inverse
@@ -59,7 +59,7 @@ class MujocoInverse(MujocoPeer):
                 out[k] = data.qfrc_inverse
             return out
 
-        return Prepared(call)
+        return PreparedCall(call)
 
 
 class MujocoRollout(MujocoPeer):
@@ -77,10 +77,10 @@ class MujocoRollout(MujocoPeer):
         super().__init__(model)
         self.threads = threads
         rollout = import_module("mujoco.rollout")
-        # A pool of no threads works on the thread that calls.
+        # A pool of no threads works on the calling thread.
         self._rollout = rollout.Rollout(nthread=0 if threads == 1 else threads)
 
-    def prepare(self, work: Work, batch: Batch, out: Floats) -> Prepared:
+    def prepare(self, case: BenchmarkCase, batch: Batch, out: Floats) -> PreparedCall:
         """Ready."""
         engine, step, nq, nv = self._engine, self._engine.opt.timestep, batch.model.nq, batch.model.nv
         state, kind = self._mujoco.mjtState, self._mujoco.mjtState.mjSTATE_FULLPHYSICS.value
@@ -105,7 +105,7 @@ class MujocoRollout(MujocoPeer):
             out[:] /= step
             return out
 
-        return Prepared(call)
+        return PreparedCall(call)
 
     def close(self) -> None:
         """End the threads."""

@@ -1,8 +1,9 @@
-"""What the batches are timed on and against: robots, a tree of a hundred joints, and ways to do a work.
+"""Robots of the batch benchmarks, a tree of a hundred joints among them, and the implementations compared.
 
-The ways are those of ``dynx bench`` (the compiled backend, Pinocchio's C++ batches, a loop over its
-binding), and what the extra ``benchmark`` installs: MuJoCo, adam on JAX and on CasADi, frax. The C++ within
-a call of the binding is a difference of two times, which pytest-benchmark cannot show: `dynx bench` does.
+The implementations are those of ``dynx bench`` (the compiled backend, Pinocchio's C++ batches, a loop over
+its binding), and what the extra ``benchmark`` installs: MuJoCo, adam on JAX and on CasADi, frax. The C++
+within a call of the binding is a difference of two times, which pytest-benchmark cannot show; `dynx bench`
+does.
 """
 
 from __future__ import annotations
@@ -16,9 +17,9 @@ from benchmarks.casadi_peers import CasadiCode, CasadiMap
 from benchmarks.compiling_peer import CompilingPeer
 from benchmarks.jax_peers import AdamJax, Frax
 from benchmarks.mujoco_peers import MujocoInverse, MujocoRollout
-from dynx.bench.backend_implementations import backend_way
-from dynx.bench.cases import ARGUMENTS, Batch, Work, draw_batch
-from dynx.bench.implementations import Prepared, Way
+from dynx.bench.backend_implementations import backend_implementation
+from dynx.bench.cases import BENCHMARK_QUANTITIES, Batch, BenchmarkCase, draw_batch
+from dynx.bench.implementations import Implementation, PreparedCall
 from dynx.bench.measurement import Preparation
 from dynx.bench.pinocchio_implementations import BATCH, LOOP, PinocchioBatch, PinocchioLoop
 from dynx.model import Inertial, Joint, Link, Model, Pose
@@ -28,20 +29,20 @@ FRAMES = {"ur5": "tool0", "panda": "panda_hand", "talos_reduced": "gripper_left_
 """The robots that are timed, and the frame of each."""
 
 COMPILED = "compiled"
-COMPILE_LOCK: tuple[type[CompilingPeer], ...] = (AdamJax, Frax, CasadiMap, CasadiCode)
+COMPILING_PEERS: tuple[type[CompilingPeer], ...] = (AdamJax, Frax, CasadiMap, CasadiCode)
 """Peers that take batches, once they have compiled."""
 
-WAYS: dict[str, tuple[str, ...]] = {
-    COMPILED: tuple(ARGUMENTS),
+SUPPORTED: dict[str, tuple[str, ...]] = {
+    COMPILED: tuple(BENCHMARK_QUANTITIES),
     BATCH: ("inverse_dynamics", "forward_dynamics"),
-    LOOP: tuple(ARGUMENTS),
+    LOOP: tuple(BENCHMARK_QUANTITIES),
     MujocoInverse.name: ("inverse_dynamics",),
     MujocoRollout.name: ("forward_dynamics",),
-    **{peer.name: tuple(ARGUMENTS) for peer in COMPILE_LOCK},
+    **{peer.name: tuple(BENCHMARK_QUANTITIES) for peer in COMPILING_PEERS},
 }
-"""Each way, and the quantities that it does."""
+"""Names of the implementations, and the quantities that each supports."""
 
-TAKE_SECONDS = frozenset({MujocoRollout.name, *(peer.name for peer in COMPILE_LOCK)})
+TAKE_SECONDS = frozenset({MujocoRollout.name, *(peer.name for peer in COMPILING_PEERS)})
 """Peers for large batches: getting ready takes seconds to minutes, handing over arrays much of a call."""
 HAVE_THREADS = frozenset({COMPILED, BATCH, *TAKE_SECONDS})
 ONLY_BATCHES = frozenset({BATCH, *TAKE_SECONDS})
@@ -60,28 +61,30 @@ def batch_of(robot: str, count: int) -> Batch:
 
 
 @cache
-def way_of(robot: str, name: str, threads: int) -> Way:
-    """The way of that name for a robot; an error of `dynx.errors` says why there is none."""
-    return make_way(model_of(robot), name, threads)
+def implementation_of(robot: str, name: str, threads: int) -> Implementation:
+    """The implementation of that name for a robot; an error of `dynx.errors` says why there is none."""
+    return make_implementation(model_of(robot), name, threads)
 
 
-def make_way(model: Model, name: str, threads: int) -> Way:
-    """The way of that name, on so many threads where it has any of its own."""
-    makers: dict[str, Callable[[], Way]] = {
+def make_implementation(model: Model, name: str, threads: int) -> Implementation:
+    """The implementation of that name, on so many threads where it has any of its own."""
+    makers: dict[str, Callable[[], Implementation]] = {
         BATCH: lambda: PinocchioBatch(model, threads),
         LOOP: lambda: PinocchioLoop(model),
         MujocoInverse.name: lambda: MujocoInverse(model),
         MujocoRollout.name: lambda: MujocoRollout(model, threads),
     }
-    for peer in COMPILE_LOCK:
+    for peer in COMPILING_PEERS:
         makers[peer.name] = partial(peer, model, threads)
-    return makers[name]() if name in makers else backend_way(model, name, threads)
+    return makers[name]() if name in makers else backend_implementation(model, name, threads)
 
 
-def checked_call(way: Way, work: Work, batch: Batch) -> tuple[Prepared, int]:
-    """The way made ready and its answers checked, and the number of samples in a call."""
-    found, ready = Preparation(work).of(way, batch)
-    assert ready is not None, f"{way.name}: {found.problem}"
+def checked_call(
+    implementation: Implementation, case: BenchmarkCase, batch: Batch
+) -> tuple[PreparedCall, int]:
+    """The implementation prepared and its results checked, and the number of samples in a call."""
+    found, ready = Preparation(case).prepare(implementation, batch)
+    assert ready is not None, f"{implementation.name}: {found.problem}"
     return ready, found.samples
 
 

@@ -1,9 +1,9 @@
 """Whole batches, few samples and one: the compiled backend beside its peers, in one run.
 
-``pytest benchmarks/test_batches.py`` times five quantities of three robots; every answer is checked
-against the backend `reference` first. Peers that answer one sample at a call may be timed at fewer
+``pytest benchmarks/test_batches.py`` times five quantities of three robots; every result is checked
+against the backend `reference` first. Peers that compute one sample at a call may be timed at fewer
 samples than the batch has; ``ns`` in the extra information is that of one sample. `dynx bench` prints
-the same with repetitions of all ways in turn, and how near a kernel comes to the machine's limits.
+the same with repetitions of all implementations in turn, and how near a kernel comes to the machine's limits.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ from benchmarks.peers import (
     FRAMES,
     HAVE_THREADS,
     ONLY_BATCHES,
+    SUPPORTED,
     TAKE_SECONDS,
-    WAYS,
     batch_of,
     checked_call,
+    implementation_of,
     tree_of_joints,
-    way_of,
 )
 from dynx.agreement.tolerances import BAR
 from dynx.backends import backend
-from dynx.bench.cases import Work
+from dynx.bench.cases import BenchmarkCase
 from dynx.errors import EngineLimitError, NotInstalledError
 from dynx.model import Model
 from dynx.model.loading import load
@@ -49,34 +49,52 @@ COMPILED_ROBOTS: dict[str, Callable[[], Model]] = {
     "talos_reduced": lambda: load("talos_reduced"),
     "tree of 100 joints": lambda: tree_of_joints(100),
 }
-"""Robots for which compiling is timed, from the model to the first answer."""
+"""Robots for which compiling is timed, from the model to the first result."""
 
-CASES = [(quantity, way) for way, quantities in WAYS.items() for quantity in quantities]
+CASES = [
+    (quantity, implementation) for implementation, quantities in SUPPORTED.items() for quantity in quantities
+]
 THREADED = [case for case in CASES if case[1] in HAVE_THREADS]
 
 
-@pytest.mark.parametrize(("quantity", "way"), CASES)
+@pytest.mark.parametrize(("quantity", "implementation"), CASES)
 @pytest.mark.parametrize("robot", FRAMES)
-def test_batch(benchmark: BenchmarkFixture, robot: str, quantity: str, way: str) -> None:
-    _time(benchmark, robot, Work(quantity, BATCH_UNTIMED if benchmark.disabled else BATCH), way)
+def test_batch(benchmark: BenchmarkFixture, robot: str, quantity: str, implementation: str) -> None:
+    _time(
+        benchmark,
+        robot,
+        BenchmarkCase(quantity, BATCH_UNTIMED if benchmark.disabled else BATCH),
+        implementation,
+    )
 
 
-@pytest.mark.parametrize(("quantity", "way"), THREADED)
+@pytest.mark.parametrize(("quantity", "implementation"), THREADED)
 @pytest.mark.parametrize("robot", FRAMES)
-def test_batch_on_two_threads(benchmark: BenchmarkFixture, robot: str, quantity: str, way: str) -> None:
-    _time(benchmark, robot, Work(quantity, BATCH_UNTIMED if benchmark.disabled else BATCH, threads=2), way)
+def test_batch_on_two_threads(
+    benchmark: BenchmarkFixture, robot: str, quantity: str, implementation: str
+) -> None:
+    _time(
+        benchmark,
+        robot,
+        BenchmarkCase(quantity, BATCH_UNTIMED if benchmark.disabled else BATCH, threads=2),
+        implementation,
+    )
 
 
-@pytest.mark.parametrize(("quantity", "way"), [case for case in CASES if case[1] not in TAKE_SECONDS])
+@pytest.mark.parametrize(
+    ("quantity", "implementation"), [case for case in CASES if case[1] not in TAKE_SECONDS]
+)
 @pytest.mark.parametrize("robot", FRAMES)
-def test_few_samples(benchmark: BenchmarkFixture, robot: str, quantity: str, way: str) -> None:
-    _time(benchmark, robot, Work(quantity, FEW), way)
+def test_few_samples(benchmark: BenchmarkFixture, robot: str, quantity: str, implementation: str) -> None:
+    _time(benchmark, robot, BenchmarkCase(quantity, FEW), implementation)
 
 
-@pytest.mark.parametrize(("quantity", "way"), [case for case in CASES if case[1] not in ONLY_BATCHES])
+@pytest.mark.parametrize(
+    ("quantity", "implementation"), [case for case in CASES if case[1] not in ONLY_BATCHES]
+)
 @pytest.mark.parametrize("robot", FRAMES)
-def test_one_sample(benchmark: BenchmarkFixture, robot: str, quantity: str, way: str) -> None:
-    _time(benchmark, robot, Work(quantity, 1), way)
+def test_one_sample(benchmark: BenchmarkFixture, robot: str, quantity: str, implementation: str) -> None:
+    _time(benchmark, robot, BenchmarkCase(quantity, 1), implementation)
 
 
 @pytest.mark.parametrize("cache", ["cold", "warm"])
@@ -106,23 +124,25 @@ def test_compiling(
     _repeat(benchmark, compile_and_call, rounds=rounds, setup=setup)
 
 
-def _time(benchmark: BenchmarkFixture, robot: str, work: Work, name: str) -> None:
+def _time(benchmark: BenchmarkFixture, robot: str, case: BenchmarkCase, name: str) -> None:
     _skip_untimed(benchmark, robot)
     try:
-        way = way_of(robot, name, work.threads)
+        implementation = implementation_of(robot, name, case.threads)
     except (NotInstalledError, EngineLimitError) as reason:
         pytest.skip(str(reason))
-    if not way.does(work):
+    if not implementation.supports(case):
         pytest.skip(f"{name} does not do this for this robot")
-    benchmark.group = f"{work.quantity}, {robot}, batch {work.batch}, threads {work.threads}"
-    ready, samples = checked_call(way, work, batch_of(robot, work.batch))
+    benchmark.group = f"{case.quantity}, {robot}, batch {case.batch}, threads {case.threads}"
+    ready, samples = checked_call(implementation, case, batch_of(robot, case.batch))
     rounds = REPETITIONS_OF_SECONDS if name in TAKE_SECONDS else REPETITIONS
     _repeat(benchmark, ready.call, rounds=rounds, iterations=max(1, 1000 // samples))
-    if isinstance(way, CompilingPeer):
-        benchmark.extra_info.update(compile_seconds=way.compile_seconds)
+    if isinstance(implementation, CompilingPeer):
+        benchmark.extra_info.update(compile_seconds=implementation.compile_seconds)
     if benchmark.stats is not None:
         benchmark.extra_info.update(
-            samples=samples, ns=1e9 * float(benchmark.stats.stats.median) / samples, version=way.version
+            samples=samples,
+            ns=1e9 * float(benchmark.stats.stats.median) / samples,
+            version=implementation.version,
         )
 
 

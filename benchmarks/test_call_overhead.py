@@ -21,14 +21,14 @@ from dynx.model.loading import load
 from dynx.spatial.scalar import Floats
 
 Call = Callable[[], Floats]
-WAYS = ("raw", "checked", "unchecked")
+IMPLEMENTATIONS = ("raw", "checked", "unchecked")
 QUANTITIES = ("forward_kinematics", "jacobian", "inverse_dynamics", "mass_matrix")
 FRAME = "tool0"
 
 
 @cache
 def calls() -> dict[tuple[str, str], Call]:
-    """What is timed, by (quantity, way); each call answers for one and the same sample."""
+    """What is timed, by (quantity, implementation); every call is at the same sample."""
     model = load("ur5")
     rng = np.random.default_rng(0)
     q, v, a = model.random(rng), rng.standard_normal(model.nv), rng.standard_normal(model.nv)
@@ -57,25 +57,29 @@ def calls() -> dict[tuple[str, str], Call]:
     timed: dict[tuple[str, str], Call] = {
         (quantity, "raw"): call for quantity, call in zip(QUANTITIES, raw, strict=True)
     }
-    for way in WAYS[1:]:
-        ours = backend("pinocchio", model, validate=way == "checked")
+    for implementation in IMPLEMENTATIONS[1:]:
+        ours = backend("pinocchio", model, validate=implementation == "checked")
         through_dynx = (
             lambda ours=ours: ours.forward_kinematics(q, FRAME),
             lambda ours=ours: ours.jacobian(q, FRAME),
             lambda ours=ours: ours.inverse_dynamics(q, v, a),
             lambda ours=ours: ours.mass_matrix(q),
         )
-        timed |= {(quantity, way): call for quantity, call in zip(QUANTITIES, through_dynx, strict=True)}
+        timed |= {
+            (quantity, implementation): call for quantity, call in zip(QUANTITIES, through_dynx, strict=True)
+        }
     return timed
 
 
 @pytest.mark.parametrize("quantity", QUANTITIES)
-@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("implementation", IMPLEMENTATIONS)
 @pytest.mark.benchmark(max_time=0.5, warmup=True)
-def test_call_overhead(benchmark: BenchmarkFixture, record: Record, quantity: str, way: str) -> None:
+def test_call_overhead(
+    benchmark: BenchmarkFixture, record: Record, quantity: str, implementation: str
+) -> None:
     benchmark.group = f"{quantity}, UR5, one call"
-    call, raw = calls()[quantity, way], calls()[quantity, "raw"]
+    call, raw = calls()[quantity, implementation], calls()[quantity, "raw"]
     expected = raw()
     np.testing.assert_allclose(call(), expected, rtol=0.0, atol=BAR * np.max(np.abs(expected)))
     benchmark(call)
-    record(quantity, way, benchmark)
+    record(quantity, implementation, benchmark)

@@ -23,7 +23,7 @@ def test_the_table_of_peers_has_dynx_first() -> None:
     finished = run("benchmarks.compare", *table)
     assert finished.returncode == 0, finished.stdout + finished.stderr
     rows = [line for line in finished.stdout.splitlines() if line.startswith("| ")]
-    assert [row.split(" | ")[0] for row in rows[:2]] == ["| way", "| compiled"]
+    assert [row.split(" | ")[0] for row in rows[:2]] == ["| implementation", "| compiled"]
 
 
 def test_simulators_are_right_and_timed() -> None:

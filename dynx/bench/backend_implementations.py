@@ -1,4 +1,4 @@
-"""The backends of dynx as ways: called as a user calls them."""
+"""Backends of dynx as implementations, called as a user calls them."""
 
 from __future__ import annotations
 
@@ -7,15 +7,16 @@ from collections.abc import Callable
 from typing import Any
 
 from dynx.backends.base import Backend
+from dynx.backends.quantities import QUANTITIES
 from dynx.backends.registry import backend, backend_class
-from dynx.bench.cases import OF_A_FRAME, Batch, Work
-from dynx.bench.implementations import Prepared, Role, Way
+from dynx.bench.cases import Batch, BenchmarkCase
+from dynx.bench.implementations import Implementation, PreparedCall, Role
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
 
 
-class BackendWay(Way):
-    """A backend, which checks its arguments as it does for a user."""
+class BackendImplementation(Implementation):
+    """A backend with its checks of arguments."""
 
     role: Role = "backend"
 
@@ -26,28 +27,25 @@ class BackendWay(Way):
         self.whole = whole
         self._engine = engine
 
-    def prepare(self, work: Work, batch: Batch, out: Floats) -> Prepared:
-        """Ready; the answers go to `out` where the backend can do so."""
-        ask: Callable[..., Floats] = getattr(self._engine, work.quantity)
-        arguments: list[Any] = list(batch.arguments(work.quantity))
-        frame = [batch.frame] if work.quantity in OF_A_FRAME else []
-        if work.batch == 1:
+    def prepare(self, case: BenchmarkCase, batch: Batch, out: Floats) -> PreparedCall:
+        """The call; the backend writes into `out` where its method takes that option."""
+        method: Callable[..., Floats] = getattr(self._engine, case.quantity)
+        arguments: list[Any] = list(batch.arguments(case.quantity))
+        frame = [batch.frame] if QUANTITIES[case.quantity].of_frame else []
+        if case.batch == 1:
             sample = [each[0] for each in arguments]
-            return Prepared(lambda: ask(*sample, *frame))
-        if "out" in inspect.signature(ask).parameters:
-            return Prepared(lambda: ask(*arguments, *frame, out=out))
-        return Prepared(lambda: ask(*arguments, *frame))
+            return PreparedCall(lambda: method(*sample, *frame))
+        if "out" in inspect.signature(method).parameters:
+            return PreparedCall(lambda: method(*arguments, *frame, out=out))
+        return PreparedCall(lambda: method(*arguments, *frame))
 
     def close(self) -> None:
         """Close the backend."""
         self._engine.close()
 
 
-def backend_way(model: Model, name: str, threads: int) -> BackendWay:
-    """The backend of that name, on so many threads if it has any of its own.
-
-    One that has does batches in compiled code.
-    """
+def backend_implementation(model: Model, name: str, threads: int) -> BackendImplementation:
+    """The backend of that name; one that takes `threads` evaluates a batch in one call of compiled code."""
     if "threads" not in inspect.signature(backend_class(name)).parameters:
-        return BackendWay(backend(name, model))
-    return BackendWay(backend(name, model, threads=threads), threads=threads, whole=True)
+        return BackendImplementation(backend(name, model))
+    return BackendImplementation(backend(name, model, threads=threads), threads=threads, whole=True)

@@ -1,4 +1,4 @@
-"""What is timed: a quantity, at how many samples, on how many threads; and the samples themselves."""
+"""Benchmark cases: a quantity, the number of samples and of threads; and the samples themselves."""
 
 from __future__ import annotations
 
@@ -8,34 +8,31 @@ from math import prod
 
 import numpy as np
 
+from dynx.backends.quantities import QUANTITIES
 from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
 from dynx.model import Model
 from dynx.simd.machine import MAX_MEMORY_SHARE, memory_size
 from dynx.spatial.scalar import Floats
 
-ARGUMENTS: dict[str, tuple[str, ...]] = {
-    "forward_kinematics": ("q",),
-    "jacobian": ("q",),
-    "inverse_dynamics": ("q", "v", "a"),
-    "forward_dynamics": ("q", "v", "tau"),
-    "mass_matrix": ("q",),
-}
-"""The quantities that can be timed, by the names that backends give them, and what each is asked with.
+BENCHMARK_QUANTITIES = (
+    "forward_kinematics",
+    "jacobian",
+    "inverse_dynamics",
+    "forward_dynamics",
+    "mass_matrix",
+)
+"""The quantities of the table that are timed by default. Quantities of frames are timed at one frame, at its
+origin and in the axes of the world."""
 
-The first two are asked of one frame; the Jacobian is that at its origin, in the axes of the world.
-"""
-
-OF_A_FRAME = frozenset({"forward_kinematics", "jacobian"})
-
-REACH = 2.0 * np.pi
+MAX_POSITION = 2.0 * np.pi
 """Positions are drawn within the limits, and no farther than this from zero [rad or m]."""
 
 
 @dataclass(frozen=True)
-class Work:
+class BenchmarkCase:
     """`quantity` at `batch` samples in one call; a batch of 1 is one sample without a batch axis.
 
-    `threads` is what a way that has threads may use.
+    `threads` bounds the threads that an implementation uses.
     """
 
     quantity: str
@@ -43,8 +40,8 @@ class Work:
     threads: int = 1
 
     def __post_init__(self) -> None:
-        if self.quantity not in ARGUMENTS:
-            raise UnknownNameError(f"no quantity {shown(self.quantity)}{nearest(self.quantity, ARGUMENTS)}")
+        if self.quantity not in QUANTITIES:
+            raise UnknownNameError(f"no quantity {shown(self.quantity)}{nearest(self.quantity, QUANTITIES)}")
         for name, count in (("batch", self.batch), ("threads", self.threads)):
             if count < 1:
                 raise ArgumentError(f"{name} is {count}; wanted at least 1")
@@ -65,8 +62,8 @@ class Batch:
         return len(self.q)
 
     def arguments(self, quantity: str) -> tuple[Floats, ...]:
-        """What `quantity` is asked with."""
-        return tuple(getattr(self, name) for name in ARGUMENTS[quantity])
+        """The arguments of `quantity`."""
+        return tuple(getattr(self, name) for name in QUANTITIES[quantity].arguments)
 
     def first(self, count: int) -> Batch:
         """The first `count` samples."""
@@ -85,31 +82,19 @@ def draw_batch(model: Model, frame: str, count: int, seed: int = 0) -> Batch:
     rng = np.random.default_rng(seed)
     q = np.ascontiguousarray(model.random(rng, count))
     base = 7 if model.floating else 0
-    np.clip(q[:, base:], -REACH, REACH, out=q[:, base:])
+    np.clip(q[:, base:], -MAX_POSITION, MAX_POSITION, out=q[:, base:])
     v, a, tau = (rng.uniform(-2.0, 2.0, (count, model.nv)) for _ in range(3))
     return Batch(model, frame, q, v, a, tau)
 
 
-def answer_shape(model: Model, quantity: str) -> tuple[int, ...]:
-    """The shape of one sample's answer."""
-    n = model.nv
-    return {
-        "forward_kinematics": (4, 4),
-        "jacobian": (6, n),
-        "inverse_dynamics": (n,),
-        "forward_dynamics": (n,),
-        "mass_matrix": (n, n),
-    }[quantity]
-
-
-def require_memory(model: Model, work: Work) -> None:
-    """Raise ArgumentError for a batch whose arrays would not fit beside what else the machine does."""
-    # Two arrays of answers: one that all ways share, and one that a backend makes itself.
+def require_memory(model: Model, case: BenchmarkCase) -> None:
+    """Raise ArgumentError for a batch whose arrays exceed the share of memory that a batch may take."""
+    # Two arrays of results: one that all implementations share, and one that a backend makes itself.
     state = np.dtype(np.float64).itemsize * (model.nq + 3 * model.nv)
-    answer = np.dtype(np.float64).itemsize * prod(answer_shape(model, work.quantity))
-    needed = work.batch * (state + 2 * answer)
+    result = np.dtype(np.float64).itemsize * prod(QUANTITIES[case.quantity].shape_of(model))
+    needed = case.batch * (state + 2 * result)
     if needed > MAX_MEMORY_SHARE * memory_size():
         raise ArgumentError(
-            f"{work.quantity} at a batch of {work.batch} needs {needed / 1e9:.3g} GB; this machine has "
+            f"{case.quantity} at a batch of {case.batch} needs {needed / 1e9:.3g} GB; this machine has "
             f"{memory_size() / 1e9:.3g} GB, of which a batch may take {MAX_MEMORY_SHARE:.0%}"
         )

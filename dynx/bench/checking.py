@@ -1,8 +1,7 @@
-"""Whether a way answers rightly: only what does is timed.
+"""Check of an implementation's results against the backend `reference`, before it is timed.
 
-The judge is the backend `reference`, and the tolerance that of `dynx agree`: an error counts relative to
-the natural size of the quantity (`dynx.agreement.magnitudes`). Forward dynamics is judged by the torque
-that the acceleration found really takes.
+The tolerance is that of `dynx agree`: errors are relative to the natural magnitude of the quantity. An
+acceleration is checked by its backward error, the torque that it takes by inverse dynamics.
 """
 
 from __future__ import annotations
@@ -14,68 +13,71 @@ import numpy as np
 from dynx.agreement import tolerances
 from dynx.agreement.comparison import judge
 from dynx.agreement.magnitudes import Magnitudes
-from dynx.agreement.natural_magnitudes import largest, mass_scale, pose_scale
-from dynx.agreement.sampling import Kind, Samples
+from dynx.agreement.natural_magnitudes import NATURAL_MAGNITUDES
+from dynx.agreement.sampling import FrameQuestion, Kind, Samples
+from dynx.backends.quantities import QUANTITIES, Quantity
 from dynx.bench.cases import Batch
+from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED
 from dynx.reference.backend import ReferenceBackend
 from dynx.spatial.scalar import Floats
 
-ENDS, BETWEEN = 16, 224
-"""Answers that are checked: so many at each end of a batch, where groups of samples are incomplete, and
-so many in between."""
+CHECKED_AT_ENDS, CHECKED_BETWEEN = 16, 224
+"""Number of samples that are checked at each end of a batch, where groups of samples are incomplete, and in
+between."""
 
 
 @dataclass(frozen=True)
 class Check:
-    """The largest error over its natural size, and what it may be."""
+    """The largest relative error, and its tolerance."""
 
     error: float
     tolerance: float
 
     @property
     def right(self) -> bool:
-        """Whether the answers may be timed."""
+        """Whether the error is within the tolerance."""
         return self.error <= self.tolerance
 
 
 def checked_rows(count: int, seed: int = 0) -> list[int]:
-    """The numbers of the samples whose answers are checked, of `count`."""
-    if count <= 2 * ENDS + BETWEEN:
+    """Numbers of the samples that are checked, of `count`."""
+    if count <= 2 * CHECKED_AT_ENDS + CHECKED_BETWEEN:
         return list(range(count))
-    between = np.random.default_rng(seed).choice(count, BETWEEN, replace=False)
-    return sorted({*range(ENDS), *range(count - ENDS, count), *between.tolist()})
+    between = np.random.default_rng(seed).choice(count, CHECKED_BETWEEN, replace=False)
+    return sorted({*range(CHECKED_AT_ENDS), *range(count - CHECKED_AT_ENDS, count), *between.tolist()})
 
 
 class Judge:
-    """Knows the right answers at some samples, all of which a way has to answer."""
+    """Checks results at given samples."""
 
     def __init__(self, samples: Batch) -> None:
         self._samples = samples
         self._sizes = Magnitudes(_as_agreement_samples(samples))
         self._reference = ReferenceBackend(samples.model)
 
-    def check(self, quantity: str, answers: Floats) -> Check:
-        """How far the answers (n, ...) are from the right ones.
+    def check(self, name: str, results: Floats) -> Check:
+        """The largest error of results (n, ...) of the quantity `name`.
 
-        Raises SingularMassMatrixError where there is no right acceleration.
+        Raises SingularMassMatrixError where there is no unique acceleration.
         """
-        if quantity == "forward_dynamics":
-            return self._check_forward_dynamics(answers)
-        right, scale = self._expected(quantity)
-        verdict = judge(answers - right, scale)
+        quantity = QUANTITIES[name]
+        if quantity.solves:
+            return self._check_forward_dynamics(results)
+        reference, scale = self._reference_values(quantity)
+        verdict = judge(results - reference, scale)
         return Check(verdict.relative, tolerances.rounding(self._sizes.depth))
 
-    def _expected(self, quantity: str) -> tuple[Floats, Floats]:
-        """The right answers, and their natural sizes."""
-        state, sizes, reference = self._samples, self._sizes, self._reference
-        if quantity == "forward_kinematics":
-            return reference.forward_kinematics(state.q, state.frame), pose_scale(sizes)[:, 0]
-        if quantity == "jacobian":
-            rows = [sizes.linear_column] * 3 + [sizes.angular_column] * 3
-            return reference.jacobian(state.q, state.frame), np.stack(rows, axis=1)
-        if quantity == "mass_matrix":
-            return reference.mass_matrix(state.q), mass_scale(sizes)
-        return reference.inverse_dynamics(state.q, state.v, state.a), largest(sizes.torque)
+    def _reference_values(self, quantity: Quantity) -> tuple[Floats, Floats]:
+        """Reference values and natural magnitudes, of one frame for a quantity of frames."""
+        frame = [self._samples.frame] if quantity.of_frame else []
+        method = getattr(self._reference, quantity.name)
+        magnitude = NATURAL_MAGNITUDES[quantity.natural_magnitude]
+        scale = magnitude.scale(self._sizes)
+        if magnitude.layout == "frames":
+            scale = scale[:, 0]
+        elif magnitude.layout != "samples":
+            scale = scale[0]
+        return method(*self._samples.arguments(quantity.name), *frame), scale
 
     def _check_forward_dynamics(self, a: Floats) -> Check:
         state = self._samples
@@ -90,6 +92,7 @@ class Judge:
 def _as_agreement_samples(batch: Batch) -> Samples:
     n = len(batch)
     kind: Kind = "within"
+    questions = (FrameQuestion(batch.frame, LOCAL_WORLD_ALIGNED, np.arange(n)),)
     return Samples(
         model=batch.model,
         index=np.arange(n),
@@ -100,6 +103,6 @@ def _as_agreement_samples(batch: Batch) -> Samples:
         tau=batch.tau,
         wrench=np.zeros((n, 6)),
         wrench_frame=batch.frame,
-        every_frame=(),
-        derivatives=(),
+        every_frame=questions,
+        derivatives=questions,
     )

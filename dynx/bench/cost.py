@@ -1,10 +1,10 @@
-"""What one sample of a program costs at least: bytes moved and operations done."""
+"""Least cost of one sample of a program: bytes moved and operations."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from dynx.bench.cases import ARGUMENTS
+from dynx.backends.quantities import QUANTITIES
 from dynx.compiled.kernels import compiles, evaluated, tidied
 from dynx.model import Model
 from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED
@@ -63,11 +63,15 @@ def program_of(model: Model, quantity: str, frame: str) -> Program | None:
     None where that backend evaluates the quantity by NumPy, since its code would be too long.
     """
     mechanism, number = tidied(model.mechanism), model.frame_index(frame)
-    name, details = {
-        "forward_kinematics": ("frame_placement", (number,)),
-        "jacobian": ("jacobian", (number, LOCAL_WORLD_ALIGNED)),
-    }.get(quantity, (quantity, ()))
+    described = QUANTITIES[quantity]
+    name, details = quantity, described.implied_details(model)
+    if described.of_frame:
+        details = (number, LOCAL_WORLD_ALIGNED)
+    if quantity == "forward_kinematics":
+        name, details = "frame_placement", (number,)
     if not compiles(mechanism, name):
         return None
-    inputs = {argument: (model.nq if argument == "q" else model.nv,) for argument in ARGUMENTS[quantity]}
+    inputs: dict[str, tuple[int, ...]] = {
+        argument: (model.nq if argument == "q" else model.nv,) for argument in described.arguments
+    }
     return trace(lambda **arguments: evaluated(mechanism, name, details, *arguments.values()), inputs)

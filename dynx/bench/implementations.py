@@ -1,4 +1,4 @@
-"""Ways to do a work: a name, and how it is made ready to be called again and again."""
+"""Implementations of benchmark cases: a backend of dynx, or another library beside it."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Literal
 
-from dynx.bench.cases import Batch, Work
+from dynx.bench.cases import Batch, BenchmarkCase
 from dynx.bench.timing import Call
 from dynx.spatial.scalar import Floats
 
@@ -14,11 +14,11 @@ Role = Literal["backend", "peer"]
 
 
 @dataclass(frozen=True)
-class Prepared:
-    """A way made ready for one batch.
+class PreparedCall:
+    """A call of one implementation with its arguments prepared.
 
-    `call()` does the whole batch and returns the answers (n, ...). `baseline`, where there is one, is
-    what every call does besides the work that is to be measured: its time is taken away.
+    `call()` does the whole batch and returns the results (n, ...). `baseline`, where there is one, is
+    what every call does besides the case that is to be measured: its time is taken away.
     """
 
     call: Call
@@ -30,8 +30,8 @@ class Prepared:
         return [self.call] if self.baseline is None else [self.call, self.baseline]
 
 
-class Way(ABC):
-    """One way to do a work: a backend of dynx, or a peer beside it.
+class Implementation(ABC):
+    """An implementation of quantities that can be timed.
 
     `threads` is how many it uses. `whole` says that it takes a batch in one call of compiled code;
     others are called once for each sample, or need much memory, and may be timed at fewer samples.
@@ -43,19 +43,19 @@ class Way(ABC):
     threads: int
     whole: bool
 
-    def does(self, work: Work) -> bool:
-        """Whether it is a way to do this work at all."""
+    def supports(self, case: BenchmarkCase) -> bool:
+        """Whether it implements this case."""
         return True
 
     @abstractmethod
-    def prepare(self, work: Work, batch: Batch, out: Floats) -> Prepared:
-        """Ready for `work` on the samples of `batch`; `out` (n, ...) may take the answers.
+    def prepare(self, case: BenchmarkCase, batch: Batch, out: Floats) -> PreparedCall:
+        """The call for `case` on the samples of `batch`; it may write the results into `out` (n, ...).
 
         Raises an error of `dynx.errors` where it cannot do this.
         """
 
     def samples(self, batch: Batch) -> Batch:
-        """The samples in the coordinates of this way; a way that has others says how it converts them."""
+        """The samples in the coordinates of this implementation."""
         return batch
 
     def close(self) -> None:  # most hold nothing

@@ -1,4 +1,4 @@
-"""One work by all ways: each is checked, then all that are right are timed in turn."""
+"""Measurement of one case: every implementation is checked, then those within tolerance are timed in turn."""
 
 from __future__ import annotations
 
@@ -9,39 +9,42 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dynx.bench.cases import Batch, Work, answer_shape
+from dynx.backends.quantities import QUANTITIES
+from dynx.bench.cases import Batch, BenchmarkCase
 from dynx.bench.checking import Judge, checked_rows
-from dynx.bench.implementations import Prepared, Way
+from dynx.bench.implementations import Implementation, PreparedCall
 from dynx.bench.timing import Times, interleaved, once
 from dynx.errors import DynxError
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
 
-TRIAL = 64
-"""Samples by which the speed of a way that is called for each sample is guessed."""
+TRIAL_SAMPLES = 64
+"""Number of samples from which the speed of an implementation without batches is estimated."""
 
-TRIALS = 3
-"""So often that speed is guessed; the fastest counts."""
+TRIAL_COUNT = 3
+"""Number of estimates of that speed; the fastest counts."""
 
-LONGEST_SECONDS = 0.02
-"""One repetition of such a way takes about so long at most: it is timed at fewer samples otherwise."""
+MAX_REPETITION_TIME = 0.02
+"""Longest time of one repetition of such an implementation [s]; it is timed at fewer samples otherwise."""
 
 
-LOST = "lost in the noise: in a quarter of the repetitions a call took no longer than one without the work"
-"""What is said where taking away what a call costs besides leaves nothing that can be relied on."""
+LOST_IN_NOISE = (
+    "lost in the noise: in a quarter of the repetitions a call took no longer than one without the work"
+)
+"""Problem of a measurement whose time is not above that of its baseline."""
 
 
 @dataclass(frozen=True)
 class Measurement:
-    """What was found of one way to do a work.
+    """Result of one implementation of a case.
 
-    `times` are those of one sample, None where the way was not timed; `problem` then says why.
+    `times` are those of one sample, None where the implementation was not timed; `problem` then says why.
     `samples` is the number of samples in a call, `error` the largest one found before the timing, over
     the natural size of the quantity.
     """
 
-    work: Work
-    way: str
+    case: BenchmarkCase
+    implementation: str
     role: str
     version: str
     threads: int
@@ -52,23 +55,25 @@ class Measurement:
     problem: str | None = None
 
 
-def measure(work: Work, ways: Sequence[Way], batch: Batch, repetitions: int) -> list[Measurement]:
-    """The measurements of all `ways` that do this work, in their order.
+def measure(
+    case: BenchmarkCase, implementations: Sequence[Implementation], batch: Batch, repetitions: int
+) -> list[Measurement]:
+    """The measurements of all `implementations` that support this case, in their order.
 
-    `batch` holds at least ``work.batch`` samples, the first of which are used.
+    `batch` holds at least ``case.batch`` samples, the first of which are used.
     """
-    preparation = Preparation(work)
-    candidates = [preparation.of(way, batch) for way in ways if way.does(work)]
+    preparation = Preparation(case)
+    candidates = [preparation.prepare(each, batch) for each in implementations if each.supports(case)]
     calls = [call for each in candidates if each.ready is not None for call in each.ready.calls]
     times = iter(interleaved(calls, repetitions))
     return [_timed(each, times) for each in candidates]
 
 
 class Candidate(NamedTuple):
-    """A way and what is known of it before it is timed; `ready` is None where it will not be."""
+    """An implementation and what is known of it before it is timed; `ready` is None where it will not be."""
 
     found: Measurement
-    ready: Prepared | None
+    ready: PreparedCall | None
 
 
 def _timed(candidate: Candidate, times: Iterator[Times]) -> Measurement:
@@ -79,56 +84,56 @@ def _timed(candidate: Candidate, times: Iterator[Times]) -> Measurement:
     if ready.baseline is not None:
         of_call = of_call.less(next(times))
         if of_call.quartiles[0] <= 0.0:
-            return replace(found, problem=LOST)
+            return replace(found, problem=LOST_IN_NOISE)
     return replace(found, times=of_call.per(found.samples))
 
 
 class Preparation:
-    """Makes ways ready for one work, and checks them."""
+    """Prepares implementations for one case, and checks them."""
 
-    def __init__(self, work: Work) -> None:
-        self._work = work
+    def __init__(self, case: BenchmarkCase) -> None:
+        self._case = case
         self._judges: dict[tuple[Model, int], tuple[Judge, list[int]]] = {}
         self._memory = np.empty(0)
 
-    def of(self, way: Way, batch: Batch) -> Candidate:
-        """The way made ready for the samples of `batch`, unless it cannot do them or answers wrongly."""
-        work = self._work
-        own = way.samples(batch.first(work.batch))
-        found = Measurement(work, way.name, way.role, way.version, way.threads, len(own))
+    def prepare(self, implementation: Implementation, batch: Batch) -> Candidate:
+        """The implementation prepared for the samples of `batch`, if its results are right."""
+        case, each = self._case, implementation
+        own = each.samples(batch.first(case.batch))
+        found = Measurement(case, each.name, each.role, each.version, each.threads, len(own))
         try:
-            if not way.whole:
-                own = own.first(self._affordable(way, own))
+            if not implementation.whole:
+                own = own.first(self._affordable(implementation, own))
                 found = replace(found, samples=len(own))
-            out = self._answers(own)
-            ready = way.prepare(work, own, out)
-            # What a way leaves out must not be another's right answer.
+            out = self._result_array(own)
+            ready = implementation.prepare(case, own, out)
+            # Results that an implementation omits must not be those of another.
             out.fill(np.nan)
-            answers = np.reshape(np.asarray(ready.call()), out.shape)
+            results = np.reshape(np.asarray(ready.call()), out.shape)
             judge, rows = self._judge(own)
-            check = judge.check(work.quantity, answers[rows])
+            check = judge.check(case.quantity, results[rows])
         except DynxError as error:
             return Candidate(replace(found, problem=str(error)), None)
         found = replace(found, error=check.error, tolerance=check.tolerance)
         if check.right:
             return Candidate(found, ready)
-        problem = f"wrong answer, not timed: error {check.error:.1e}, tolerance {check.tolerance:.1e}"
+        problem = f"wrong result, not timed: error {check.error:.1e}, tolerance {check.tolerance:.1e}"
         return Candidate(replace(found, problem=problem), None)
 
-    def _affordable(self, way: Way, batch: Batch) -> int:
+    def _affordable(self, implementation: Implementation, batch: Batch) -> int:
         """How many samples fit into a repetition: all of them, or a power of two."""
-        if len(batch) <= TRIAL:
+        if len(batch) <= TRIAL_SAMPLES:
             return len(batch)
-        few = batch.first(TRIAL)
-        trial = way.prepare(self._work, few, self._answers(few)).call
+        few = batch.first(TRIAL_SAMPLES)
+        trial = implementation.prepare(self._case, few, self._result_array(few)).call
         trial()
-        fastest = min(once(trial) for _ in range(TRIALS))
-        count = int(LONGEST_SECONDS / max(fastest, 1e-9) * TRIAL)
-        return len(batch) if count >= len(batch) else max(TRIAL, 2 ** (count.bit_length() - 1))
+        fastest = min(once(trial) for _ in range(TRIAL_COUNT))
+        count = int(MAX_REPETITION_TIME / max(fastest, 1e-9) * TRIAL_SAMPLES)
+        return len(batch) if count >= len(batch) else max(TRIAL_SAMPLES, 2 ** (count.bit_length() - 1))
 
-    def _answers(self, batch: Batch) -> Floats:
-        """An array for the answers; all ways use the same memory."""
-        shape = (len(batch), *answer_shape(batch.model, self._work.quantity))
+    def _result_array(self, batch: Batch) -> Floats:
+        """An array for the results; all implementations use the same memory."""
+        shape = (len(batch), *QUANTITIES[self._case.quantity].shape_of(batch.model))
         if self._memory.size < prod(shape):
             self._memory = np.empty(prod(shape))
         return self._memory[: prod(shape)].reshape(shape)

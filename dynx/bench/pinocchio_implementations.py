@@ -13,8 +13,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from dynx.bench.cases import Batch, Work
-from dynx.bench.implementations import Prepared, Role, Way
+from dynx.bench.cases import BENCHMARK_QUANTITIES, Batch, BenchmarkCase
+from dynx.bench.implementations import Implementation, PreparedCall, Role
 from dynx.bench.timing import Call
 from dynx.engines.pinocchio.backend import engine_model
 from dynx.engines.pinocchio.library import pin
@@ -23,17 +23,17 @@ from dynx.spatial.scalar import Floats
 
 BATCH, LOOP, INSIDE = "pinocchio C++ batch", "pinocchio binding", "pinocchio C++ call"
 """Names of the three: `rneaInParallel` and `abaInParallel`, a Python loop over the binding, and the same
-loop less what a call costs without the work."""
+loop less the overhead of a call."""
 
 
-FEWEST_CALLS = 1024
-"""So many samples are needed to tell the C++ from the rest of a call."""
+MIN_CALLS = 1024
+"""Smallest batch at which the C++ can be told from the rest of a call."""
 
-_ONE_JOINT_ANSWER = {"forward_kinematics": (4, 4), "jacobian": (6, 1), "mass_matrix": (1, 1)}
-"""Shape of the answers of a robot with one joint, where it is not (1,)."""
+_ONE_JOINT_SHAPE = {"forward_kinematics": (4, 4), "jacobian": (6, 1), "mass_matrix": (1, 1)}
+"""Shape of the results of a robot with one joint, where it is not (1,)."""
 
 
-class PinocchioWay(Way):
+class PinocchioImplementation(Implementation):
     """What the three have in common: the engine's model, and the samples in its coordinates."""
 
     role: Role = "peer"
@@ -48,7 +48,7 @@ class PinocchioWay(Way):
     def samples(self, batch: Batch) -> Batch:
         """With mimic joints as coordinates of their own, at the same state.
 
-        Each torque is shared among the joints that follow one coordinate so that it does the same work.
+        Each torque is distributed over the joints that follow one coordinate so that it does the same work.
         """
         coupling = batch.model.mechanism.coupling
         if coupling is None:
@@ -59,7 +59,7 @@ class PinocchioWay(Way):
         return Batch(self.model, batch.frame, *map(np.ascontiguousarray, arrays))
 
 
-class PinocchioBatch(PinocchioWay):
+class PinocchioBatch(PinocchioImplementation):
     """`rneaInParallel` and `abaInParallel`: OpenMP threads over the columns of column-major matrices.
 
     A row-major array of samples is, transposed, such a matrix: nothing has to be rearranged.
@@ -77,61 +77,65 @@ class PinocchioBatch(PinocchioWay):
         self.threads = threads
         self._pool = pin.ModelPool(self._engine, threads)
 
-    def does(self, work: Work) -> bool:
+    def supports(self, case: BenchmarkCase) -> bool:
         """The two that Pinocchio offers, for more than one sample."""
-        return work.batch > 1 and work.quantity in self._in_parallel
+        return case.batch > 1 and case.quantity in self._in_parallel
 
-    def prepare(self, work: Work, batch: Batch, out: Floats) -> Prepared:
-        """Ready."""
-        ask = getattr(pin, self._in_parallel[work.quantity])
-        columns = [each.T for each in batch.arguments(work.quantity)]
-        answers, threads, pool = out.T, self.threads, self._pool
+    def prepare(self, case: BenchmarkCase, batch: Batch, out: Floats) -> PreparedCall:
+        """The call."""
+        function = getattr(pin, self._in_parallel[case.quantity])
+        columns = [each.T for each in batch.arguments(case.quantity)]
+        results, threads, pool = out.T, self.threads, self._pool
 
         def call() -> Floats:
-            ask(threads, pool, *columns, answers)
+            function(threads, pool, *columns, results)
             return out
 
-        return Prepared(call)
+        return PreparedCall(call)
 
 
-class PinocchioLoop(PinocchioWay):
-    """The binding called once for each sample, the answers put into one array."""
+class PinocchioLoop(PinocchioImplementation):
+    """The binding called once for each sample, the results put into one array."""
 
     name = LOOP
 
-    def prepare(self, work: Work, batch: Batch, out: Floats) -> Prepared:
-        """Ready."""
+    def supports(self, case: BenchmarkCase) -> bool:
+        """The quantities that are timed by default."""
+        return case.quantity in BENCHMARK_QUANTITIES
+
+    def prepare(self, case: BenchmarkCase, batch: Batch, out: Floats) -> PreparedCall:
+        """The call."""
         frame = self._frame_ids[batch.model.frame_index(batch.frame)]
-        ask = _binding_call(self._engine, work.quantity, frame)
-        return Prepared(_looped(ask, work, batch, out))
+        function = _binding_call(self._engine, case.quantity, frame)
+        return PreparedCall(_looped(function, case, batch, out))
 
 
 class PinocchioInside(PinocchioLoop):
     """The C++ within those calls: the same loop, less a loop over a model of one joint.
 
-    Both convert arguments and answers, look up the overload, and write one row; what the second does
+    Both convert arguments and results, look up the overload, and write one row; what the second does
     besides is one joint's share of the work, by which this is too short rather than too long.
     """
 
     name = INSIDE
 
-    def does(self, work: Work) -> bool:
+    def supports(self, case: BenchmarkCase) -> bool:
         """Of few calls there is too little to be told from the noise."""
-        return work.batch >= FEWEST_CALLS
+        return case.batch >= MIN_CALLS and super().supports(case)
 
-    def prepare(self, work: Work, batch: Batch, out: Floats) -> Prepared:
-        """Ready."""
-        full = super().prepare(work, batch, out)
+    def prepare(self, case: BenchmarkCase, batch: Batch, out: Floats) -> PreparedCall:
+        """The call."""
+        full = super().prepare(case, batch, out)
         engine, frame = _one_joint()
         n = len(batch)
         one = Batch(batch.model, batch.frame, *(np.zeros((n, 1)) for _ in range(4)))
-        least = np.zeros((n, *_ONE_JOINT_ANSWER.get(work.quantity, (1,))))
-        ask = _binding_call(engine, work.quantity, frame)
-        return Prepared(full.call, _looped(ask, work, one, least))
+        least = np.zeros((n, *_ONE_JOINT_SHAPE.get(case.quantity, (1,))))
+        function = _binding_call(engine, case.quantity, frame)
+        return PreparedCall(full.call, _looped(function, case, one, least))
 
 
-def pinocchio_ways(model: Model, threads: int) -> Iterator[PinocchioWay]:
-    """The three ways; only the batches use threads."""
+def pinocchio_implementations(model: Model, threads: int) -> Iterator[PinocchioImplementation]:
+    """The three implementations; only the batches use threads."""
     yield PinocchioBatch(model, threads)
     yield PinocchioLoop(model)
     yield PinocchioInside(model)
@@ -165,19 +169,19 @@ def _binding_call(engine: Any, quantity: str, frame: int) -> Callable[..., Float
     return calls[quantity]
 
 
-def _looped(ask: Callable[..., Floats], work: Work, batch: Batch, out: Floats) -> Call:
-    """`ask` for every sample; for a single one nothing but the call."""
-    rows = list(zip(*batch.arguments(work.quantity), strict=True))
-    if work.batch == 1:
+def _looped(function: Callable[..., Floats], case: BenchmarkCase, batch: Batch, out: Floats) -> Call:
+    """`function` for every sample; for a single one nothing but the call."""
+    rows = list(zip(*batch.arguments(case.quantity), strict=True))
+    if case.batch == 1:
         sample = rows[0]
-        return lambda: ask(*sample)
+        return lambda: function(*sample)
 
     # Of a robot with one joint the binding returns its Jacobian as a vector.
-    answers = out[..., 0] if out.shape[1:] == (6, 1) else out
+    results = out[..., 0] if out.shape[1:] == (6, 1) else out
 
     def call() -> Floats:
         for k, sample in enumerate(rows):
-            answers[k] = ask(*sample)
+            results[k] = function(*sample)
         return out
 
     return call

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from dynx._version import __version__
-from dynx.bench.cases import Work
+from dynx.bench.cases import BenchmarkCase
 from dynx.bench.cost import Cost
 from dynx.bench.document import (
     BenchCase,
@@ -23,9 +23,9 @@ SCHEMA = 1
 
 
 def document(session: Session, found: Sequence[Sequence[Measurement]], processor: str) -> BenchDocument:
-    """What a session found: one entry of `found` for each work that was measured, in order."""
+    """What a session found: one entry of `found` for each case that was measured, in order."""
     plan = session.plan
-    measured = {group[0].work for group in found if group}
+    measured = {group[0].case for group in found if group}
     return {
         "schema": SCHEMA,
         "dynx": __version__,
@@ -43,39 +43,40 @@ def document(session: Session, found: Sequence[Sequence[Measurement]], processor
         "results": [
             result(group, [session.cost(each) for each in group], session.peaks) for group in found if group
         ],
-        "not_done": [_work(work) for work in plan.works if work not in measured],
+        "not_done": [_case(case) for case in plan.cases if case not in measured],
     }
 
 
 def result(
     group: Sequence[Measurement], costs: Sequence[Cost | None], peaks: Mapping[int, Peak]
 ) -> BenchResult:
-    """One work and all its ways. A ratio says how many times faster the way is than a peer."""
-    peers = {each.way: each.times.median for each in group if each.role == "peer" and each.times is not None}
+    """One case and all its implementations; a ratio is the time of a peer over that of the implementation."""
+    timed = [each for each in group if each.role == "peer"]
+    peers = {each.implementation: each.times.median for each in timed if each.times is not None}
     return {
-        **_work(group[0].work),
-        "ways": [_way(each, cost, peers, peaks) for each, cost in zip(group, costs, strict=True)],
+        **_case(group[0].case),
+        "ways": [_entry(each, cost, peers, peaks) for each, cost in zip(group, costs, strict=True)],
     }
 
 
 def wrong(found: Sequence[Sequence[Measurement]]) -> list[Measurement]:
-    """The measurements of ways that answered wrongly."""
+    """The measurements of implementations with wrong results."""
     return [each for group in found for each in group if is_wrong(each)]
 
 
 def is_wrong(measurement: Measurement) -> bool:
-    """Whether the answer was outside the tolerance."""
+    """Whether the error was outside the tolerance."""
     error, tolerance = measurement.error, measurement.tolerance
     return error is not None and tolerance is not None and not error <= tolerance
 
 
-def _way(
+def _entry(
     measurement: Measurement, cost: Cost | None, peers: Mapping[str, float], peaks: Mapping[int, Peak]
 ) -> BenchWay:
     times = measurement.times
     peak = peaks.get(measurement.threads)
     entry: BenchWay = {
-        "way": measurement.way,
+        "way": measurement.implementation,
         "role": measurement.role,
         "version": measurement.version,
         "threads": measurement.threads,
@@ -119,5 +120,5 @@ def _peak(peak: Peak) -> BenchPeak:
     }
 
 
-def _work(work: Work) -> BenchCase:
-    return {"quantity": work.quantity, "batch": work.batch, "threads": work.threads}
+def _case(case: BenchmarkCase) -> BenchCase:
+    return {"quantity": case.quantity, "batch": case.batch, "threads": case.threads}

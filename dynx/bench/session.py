@@ -1,4 +1,4 @@
-"""All works of one robot by all ways, one after the other."""
+"""Measurement of all cases of one robot, one after the other."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from functools import cached_property, partial
 
 from dynx.backends.registry import installed_backends
-from dynx.bench.backend_implementations import backend_way
-from dynx.bench.cases import ARGUMENTS, Batch, Work, draw_batch, require_memory
+from dynx.bench.backend_implementations import backend_implementation
+from dynx.bench.cases import BENCHMARK_QUANTITIES, Batch, BenchmarkCase, draw_batch, require_memory
 from dynx.bench.cost import Cost, cost_of, program_of
-from dynx.bench.implementations import Prepared, Role, Way
+from dynx.bench.implementations import Implementation, PreparedCall, Role
 from dynx.bench.machine import load, measured_peak
 from dynx.bench.measurement import Measurement, measure
 from dynx.bench.roofline import Peak
@@ -19,12 +19,12 @@ from dynx.model import Model
 from dynx.spatial.scalar import Floats
 
 BATCHES = (1, 8, 65536)
-"""What is timed unless other batches are asked for: a control loop, a few candidates, many samples."""
+"""Default batches: a control loop, a few candidates, many samples."""
 
 REPETITIONS, QUICK_REPETITIONS = 20, 5
 
-WORTH_THREADS = 1024
-"""A batch of fewer samples is not tried on several threads unless that is asked for."""
+MIN_BATCH_FOR_THREADS = 1024
+"""Smallest batch that is timed on several threads by default."""
 
 COMPILED = "compiled"
 """The backend whose programs `dynx.bench.cost` counts."""
@@ -32,42 +32,42 @@ COMPILED = "compiled"
 
 @dataclass(frozen=True)
 class Plan:
-    """What is to be timed on one robot. `frame` is that of kinematics; None for `backends` means all."""
+    """Cases to time on one robot. `frame` is that of kinematics; None for `backends` means all."""
 
     model: Model
     frame: str
-    works: tuple[Work, ...]
+    cases: tuple[BenchmarkCase, ...]
     backends: tuple[str, ...] | None = None
     repetitions: int = REPETITIONS
     seed: int = 0
 
     def __post_init__(self) -> None:
-        if not self.works:
-            raise ArgumentError("a plan without works: there is nothing to time")
+        if not self.cases:
+            raise ArgumentError("a plan without cases: there is nothing to time")
         if not self.model.nv:
             raise ArgumentError(f"{self.model.name} has no coordinates: there is nothing to time")
         self.model.frame_index(self.frame)
-        for work in self.works:
-            require_memory(self.model, work)
+        for case in self.cases:
+            require_memory(self.model, case)
 
     @property
     def threads(self) -> tuple[int, ...]:
-        """The numbers of threads that some work asks for, in order."""
-        return tuple(sorted({work.threads for work in self.works}))
+        """The numbers of threads of the cases, in order."""
+        return tuple(sorted({case.threads for case in self.cases}))
 
 
-def works(
-    quantities: Iterable[str] = tuple(ARGUMENTS),
+def benchmark_cases(
+    quantities: Iterable[str] = tuple(BENCHMARK_QUANTITIES),
     batches: Iterable[int] = BATCHES,
     threads: Iterable[int] = (1,),
-    least: int = WORTH_THREADS,
-) -> tuple[Work, ...]:
+    least: int = MIN_BATCH_FOR_THREADS,
+) -> tuple[BenchmarkCase, ...]:
     """Every quantity at every batch on every number of threads, large batches first.
 
     Several threads only at batches of at least `least`.
     """
     return tuple(
-        Work(quantity, batch, count)
+        BenchmarkCase(quantity, batch, count)
         for batch in sorted(set(batches), reverse=True)
         for quantity in dict.fromkeys(quantities)
         for count in sorted(set(threads))
@@ -76,7 +76,7 @@ def works(
 
 
 class Session:
-    """Measures a plan, one work at a time. Use it as a context: leaving it closes the backends.
+    """Measures a plan, one case at a time. Use it as a context: leaving it closes the backends.
 
     `load` is how busy the machine was before (`dynx.bench.machine.load`).
     """
@@ -86,49 +86,51 @@ class Session:
         plan: Plan,
         *,
         peak: Callable[[int], Peak] = measured_peak,
-        ways: Callable[[Plan, int], list[Way]] | None = None,
+        implementations: Callable[[Plan, int], list[Implementation]] | None = None,
     ) -> None:
         self.plan = plan
         self.load = load()
         self.peaks: dict[int, Peak] = {}
         self._measure_peak = peak
-        self._make_ways = all_ways if ways is None else ways
-        self._ways: dict[int, list[Way]] = {}
+        self._make_implementations = all_implementations if implementations is None else implementations
+        self._implementations: dict[int, list[Implementation]] = {}
         self._costs: dict[str, Cost | None] = {}
 
     def __enter__(self) -> Session:
         return self
 
     def __exit__(self, *_: object) -> None:
-        for ways in self._ways.values():
-            for way in ways:
-                way.close()
+        for implementations in self._implementations.values():
+            for implementation in implementations:
+                implementation.close()
 
     def measure_machine(self, threads: int) -> None:
         """Measure the peaks on so many threads; they are then in `peaks`."""
         self.peaks[threads] = self._measure_peak(threads)
 
-    def measure(self, work: Work) -> list[Measurement]:
-        """What was found of one work.
+    def measure(self, case: BenchmarkCase) -> list[Measurement]:
+        """The measurements of one case.
 
         On several threads the backends that have one thread are left out if they are timed on one.
         """
         plan = self.plan
-        if work.threads not in self._ways:
-            self._ways[work.threads] = self._make_ways(plan, work.threads)
+        if case.threads not in self._implementations:
+            self._implementations[case.threads] = self._make_implementations(plan, case.threads)
         fewest = min(plan.threads)
-        ways = [
-            way
-            for way in self._ways[work.threads]
-            if way.role == "peer" or way.threads == work.threads or work.threads == fewest
+        implementations = [
+            implementation
+            for implementation in self._implementations[case.threads]
+            if implementation.role == "peer"
+            or implementation.threads == case.threads
+            or case.threads == fewest
         ]
-        return measure(work, ways, self._batch, plan.repetitions)
+        return measure(case, implementations, self._batch, plan.repetitions)
 
     def cost(self, measurement: Measurement) -> Cost | None:
-        """What one sample costs at least, where it is known which operations the way does."""
-        if measurement.way != COMPILED:
+        """The least cost of one sample, where the operations of the implementation are known."""
+        if measurement.implementation != COMPILED:
             return None
-        quantity = measurement.work.quantity
+        quantity = measurement.case.quantity
         if quantity not in self._costs:
             program = program_of(self.plan.model, quantity, self.plan.frame)
             self._costs[quantity] = None if program is None else cost_of(program)
@@ -136,41 +138,42 @@ class Session:
 
     @cached_property
     def _batch(self) -> Batch:
-        count = max(work.batch for work in self.plan.works)
+        count = max(case.batch for case in self.plan.cases)
         return draw_batch(self.plan.model, self.plan.frame, count, self.plan.seed)
 
 
-def all_ways(plan: Plan, threads: int) -> list[Way]:
-    """The backends that are asked for or installed, then Pinocchio's own calls."""
+def all_implementations(plan: Plan, threads: int) -> list[Implementation]:
+    """The chosen or installed backends, then Pinocchio's own calls."""
     names = installed_backends() if plan.backends is None else plan.backends
-    found: list[Way] = []
+    found: list[Implementation] = []
     for name in names:
-        found += _or_refused(partial(_backend, plan.model, name, threads), name, "backend")
-    return found + _or_refused(partial(_peers, plan.model, threads), "pinocchio itself", "peer")
+        found += _or_unavailable(partial(_backend, plan.model, name, threads), name, "backend")
+    return found + _or_unavailable(partial(_peers, plan.model, threads), "pinocchio itself", "peer")
 
 
-def _backend(model: Model, name: str, threads: int) -> list[Way]:
-    return [backend_way(model, name, threads)]
+def _backend(model: Model, name: str, threads: int) -> list[Implementation]:
+    return [backend_implementation(model, name, threads)]
 
 
-def _peers(model: Model, threads: int) -> list[Way]:
-    from dynx.bench.pinocchio_implementations import pinocchio_ways  # imports the engine
+def _peers(model: Model, threads: int) -> list[Implementation]:
+    # The module imports the engine.
+    from dynx.bench.pinocchio_implementations import pinocchio_implementations
 
-    return list(pinocchio_ways(model, threads))
+    return list(pinocchio_implementations(model, threads))
 
 
-def _or_refused(make: Callable[[], list[Way]], name: str, role: Role) -> list[Way]:
-    """The ways, or one that says why there are none; nothing where their engine is missing."""
+def _or_unavailable(make: Callable[[], list[Implementation]], name: str, role: Role) -> list[Implementation]:
+    """The implementations, or one that raises why there are none; nothing where their engine is missing."""
     try:
         return make()
     except NotInstalledError:
         return []
     except DynxError as error:
-        return [_Refused(name, role, error)]
+        return [_Unavailable(name, role, error)]
 
 
-class _Refused(Way):
-    """Stands for ways that cannot be had for this robot."""
+class _Unavailable(Implementation):
+    """Placeholder of implementations that cannot hold this robot."""
 
     version = ""
     threads = 1
@@ -181,6 +184,6 @@ class _Refused(Way):
         self.role = role
         self._error = error
 
-    def prepare(self, work: Work, batch: Batch, out: Floats) -> Prepared:
-        """Raises why."""
+    def prepare(self, case: BenchmarkCase, batch: Batch, out: Floats) -> PreparedCall:
+        """Raise the error."""
         raise self._error

@@ -1,9 +1,10 @@
-"""Ways whose answers are known, right or wrong, and a session of such ways."""
+"""Implementations with known results, right or wrong, and a session of them."""
 
 from __future__ import annotations
 
-from dynx.bench.cases import OF_A_FRAME, Batch, Work
-from dynx.bench.implementations import Prepared, Role, Way
+from dynx.backends.quantities import QUANTITIES
+from dynx.bench.cases import Batch, BenchmarkCase
+from dynx.bench.implementations import Implementation, PreparedCall, Role
 from dynx.bench.roofline import Peak
 from dynx.bench.session import Plan, Session
 from dynx.errors import EngineError
@@ -14,7 +15,7 @@ from dynx.spatial.scalar import Floats
 PEAK = Peak(threads=1, copy_bandwidth=10e9, multiply_adds=20e9)
 
 
-class Scaled(Way):
+class Scaled(Implementation):
     """The right answers times a factor; one sample of a batch, `spoilt`, gets a factor of its own."""
 
     version = "reference"
@@ -29,10 +30,10 @@ class Scaled(Way):
         self.calls = 0
         self._factor, self._spoilt = factor, spoilt
 
-    def prepare(self, work: Work, batch: Batch, out: Floats) -> Prepared:
-        arguments = list(batch.arguments(work.quantity))
-        frame = [batch.frame] if work.quantity in OF_A_FRAME else []
-        right = getattr(ReferenceBackend(batch.model), work.quantity)(*arguments, *frame)
+    def prepare(self, case: BenchmarkCase, batch: Batch, out: Floats) -> PreparedCall:
+        arguments = list(batch.arguments(case.quantity))
+        frame = [batch.frame] if QUANTITIES[case.quantity].of_frame else []
+        right = getattr(ReferenceBackend(batch.model), case.quantity)(*arguments, *frame)
 
         def call() -> Floats:
             self.calls += 1
@@ -41,7 +42,7 @@ class Scaled(Way):
                 out[self._spoilt] += 1e-6
             return out
 
-        return Prepared(call)
+        return PreparedCall(call)
 
     def close(self) -> None:
         self.closed = True
@@ -50,18 +51,23 @@ class Scaled(Way):
 class Silent(Scaled):
     """Returns the array for the answers and writes none."""
 
-    def prepare(self, work: Work, batch: Batch, out: Floats) -> Prepared:
-        return Prepared(lambda: out)
+    def prepare(self, case: BenchmarkCase, batch: Batch, out: Floats) -> PreparedCall:
+        return PreparedCall(lambda: out)
 
 
 class Failing(Scaled):
     """Cannot be made ready."""
 
-    def prepare(self, work: Work, batch: Batch, out: Floats) -> Prepared:
+    def prepare(self, case: BenchmarkCase, batch: Batch, out: Floats) -> PreparedCall:
         raise EngineError("no such luck")
 
 
-def session_of(ways: list[Way], model: Model, works: tuple[Work, ...], repetitions: int = 2) -> Session:
-    """A session of these ways on a machine whose peaks are known."""
-    plan = Plan(model, model.frame_names[-1], works, repetitions=repetitions)
-    return Session(plan, peak=lambda threads: PEAK, ways=lambda plan, threads: ways)
+def session_of(
+    implementations: list[Implementation],
+    model: Model,
+    cases: tuple[BenchmarkCase, ...],
+    repetitions: int = 2,
+) -> Session:
+    """A session of these implementations on a machine whose peaks are known."""
+    plan = Plan(model, model.frame_names[-1], cases, repetitions=repetitions)
+    return Session(plan, peak=lambda threads: PEAK, implementations=lambda plan, threads: implementations)

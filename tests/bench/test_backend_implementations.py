@@ -1,4 +1,4 @@
-"""Every backend as a way, on robots with mimic joints and with a floating base."""
+"""Every backend as an implementation, on robots with mimic joints and with a floating base."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import pytest
 
 import dynx
 from dynx.backends.registry import installed_backends
-from dynx.bench.backend_implementations import backend_way
-from dynx.bench.cases import ARGUMENTS, Work, draw_batch
+from dynx.bench.backend_implementations import backend_implementation
+from dynx.bench.cases import BENCHMARK_QUANTITIES, BenchmarkCase, draw_batch
 from dynx.bench.measurement import measure
 from dynx.errors import UnknownBackendError
 from dynx.model.model import Base
@@ -19,30 +19,30 @@ from dynx.model.model import Base
 def test_every_backend_answers_every_work(name: str, base: Base, count: int) -> None:
     model = dynx.load("panda", base=base)
     batch = draw_batch(model, "panda_hand", count)
-    way = backend_way(model, name, 1)
-    for quantity in ARGUMENTS:
-        (found,) = measure(Work(quantity, count), [way], batch, 1)
+    implementation = backend_implementation(model, name, 1)
+    for quantity in BENCHMARK_QUANTITIES:
+        (found,) = measure(BenchmarkCase(quantity, count), [implementation], batch, 1)
         assert found.problem is None
         assert found.times is not None
 
 
 def test_a_backend_with_threads_gets_them() -> None:
     model = dynx.load("double_pendulum")
-    way = backend_way(model, "compiled", 2)
-    assert (way.name, way.threads, way.whole) == ("compiled", 2, True)
-    way = backend_way(model, "reference", 2)
-    assert (way.name, way.threads, way.whole) == ("reference", 1, False)
+    implementation = backend_implementation(model, "compiled", 2)
+    assert (implementation.name, implementation.threads, implementation.whole) == ("compiled", 2, True)
+    implementation = backend_implementation(model, "reference", 2)
+    assert (implementation.name, implementation.threads, implementation.whole) == ("reference", 1, False)
 
 
 def test_an_unknown_backend_is_refused() -> None:
     with pytest.raises(UnknownBackendError):
-        backend_way(dynx.load("double_pendulum"), "nosuch", 1)
+        backend_implementation(dynx.load("double_pendulum"), "nosuch", 1)
 
 
 def test_closing_closes_the_backend() -> None:
     model = dynx.load("double_pendulum")
-    way = backend_way(model, "reference", 1)
-    way.close()
-    (found,) = measure(Work("mass_matrix", 1), [way], draw_batch(model, "tip", 1), 1)
+    implementation = backend_implementation(model, "reference", 1)
+    implementation.close()
+    (found,) = measure(BenchmarkCase("mass_matrix", 1), [implementation], draw_batch(model, "tip", 1), 1)
     assert found.problem is not None
     assert "was closed" in found.problem

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 import dynx
-from dynx.bench.cases import ARGUMENTS, OF_A_FRAME, draw_batch
-from dynx.bench.checking import ENDS, Judge, checked_rows
+from dynx.backends.quantities import QUANTITIES
+from dynx.bench.cases import BENCHMARK_QUANTITIES, draw_batch
+from dynx.bench.checking import CHECKED_AT_ENDS, Judge, checked_rows
 from dynx.errors import SingularMassMatrixError
 from dynx.model import Joint, Link, Model
 from dynx.model.model import Base
@@ -21,14 +22,14 @@ def answers(quantity: str, robot: str, base: Base) -> tuple[Judge, Floats]:
     """The judge of some samples, and the right answers."""
     model = dynx.load(robot, base=base)
     batch = draw_batch(model, model.frame_names[-1], 20)
-    frame = [batch.frame] if quantity in OF_A_FRAME else []
+    frame = [batch.frame] if QUANTITIES[quantity].of_frame else []
     right = getattr(ReferenceBackend(model), quantity)(*batch.arguments(quantity), *frame)
     return Judge(batch), right
 
 
 @pytest.mark.parametrize("base", ["fixed", "floating"])
 @pytest.mark.parametrize("robot", ROBOTS)
-@pytest.mark.parametrize("quantity", ARGUMENTS)
+@pytest.mark.parametrize("quantity", BENCHMARK_QUANTITIES)
 def test_right_answers_pass_and_small_errors_do_not(quantity: str, robot: str, base: Base) -> None:
     judge, right = answers(quantity, robot, base)
     assert judge.check(quantity, right).right
@@ -42,10 +43,11 @@ def test_right_answers_pass_and_small_errors_do_not(quantity: str, robot: str, b
         assert check.error > check.tolerance
 
 
-@pytest.mark.parametrize("quantity", ARGUMENTS)
+@pytest.mark.parametrize("quantity", QUANTITIES)
 @pytest.mark.parametrize("wild", [np.nan, np.inf])
 def test_what_is_no_number_is_wrong(quantity: str, wild: float) -> None:
     judge, right = answers(quantity, "double_pendulum", "fixed")
+    assert judge.check(quantity, right).right
     right[7] = wild
     assert judge.check(quantity, right).error == np.inf
 
@@ -65,7 +67,7 @@ def test_all_rows_of_few_samples_are_checked() -> None:
 def test_of_many_samples_both_ends_and_some_between_are_checked() -> None:
     rows = checked_rows(10**6)
     assert rows == sorted(set(rows))
-    assert rows[:ENDS] == list(range(ENDS))
-    assert rows[-ENDS:] == list(range(10**6 - ENDS, 10**6))
+    assert rows[:CHECKED_AT_ENDS] == list(range(CHECKED_AT_ENDS))
+    assert rows[-CHECKED_AT_ENDS:] == list(range(10**6 - CHECKED_AT_ENDS, 10**6))
     # Groups of samples begin at multiples of 8: what is between must not all be at one place in them.
-    assert {row % 8 for row in rows[ENDS:-ENDS]} == set(range(8))
+    assert {row % 8 for row in rows[CHECKED_AT_ENDS:-CHECKED_AT_ENDS]} == set(range(8))

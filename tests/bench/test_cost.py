@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import dynx
-from dynx.bench.cases import ARGUMENTS, answer_shape
+from dynx.backends.quantities import QUANTITIES
 from dynx.bench.cost import SINE_COSINE_PAIRS, SINE_COSINE_SINGLES, Cost, cost_of, program_of
 from dynx.simd.ir_writer import Writer
 from dynx.simd.trace import trace
@@ -63,14 +63,16 @@ def test_that_cost_is_what_the_compiler_writes() -> None:
     assert len(single) == SINE_COSINE_SINGLES
 
 
-@pytest.mark.parametrize("quantity", ARGUMENTS)
+@pytest.mark.parametrize("quantity", QUANTITIES)
 @pytest.mark.parametrize("robot", ["double_pendulum", "panda"])
 def test_bytes_are_those_of_arguments_and_answer(robot: str, quantity: str) -> None:
     model = dynx.load(robot)
     program = program_of(model, quantity, model.frame_names[-1])
     assert program is not None
     sizes = {"q": model.nq, "v": model.nv, "a": model.nv, "tau": model.nv}
-    numbers = sum(sizes[name] for name in ARGUMENTS[quantity]) + prod(answer_shape(model, quantity))
+    numbers = sum(sizes[name] for name in QUANTITIES[quantity].arguments) + prod(
+        QUANTITIES[quantity].shape_of(model)
+    )
     assert cost_of(program).bytes == 8 * numbers
 
 

@@ -9,21 +9,21 @@ import pytest
 
 import dynx
 from dynx.bench import measurement
-from dynx.bench.cases import ARGUMENTS, Batch, Work, draw_batch
-from dynx.bench.implementations import Prepared
-from dynx.bench.measurement import LOST, TRIAL, measure
+from dynx.bench.cases import BENCHMARK_QUANTITIES, Batch, BenchmarkCase, draw_batch
+from dynx.bench.implementations import PreparedCall
+from dynx.bench.measurement import LOST_IN_NOISE, TRIAL_SAMPLES, measure
 from dynx.bench.timing import Call, Times
 from dynx.spatial.scalar import Floats
 from tests.bench.implementations import Failing, Scaled, Silent
 
 MODEL = dynx.load("double_pendulum")
 BATCH = draw_batch(MODEL, MODEL.frame_names[-1], 40)
-WORK = Work("inverse_dynamics", 40)
+WORK = BenchmarkCase("inverse_dynamics", 40)
 
 
 def test_right_ways_are_timed_per_sample() -> None:
-    way = Scaled("right")
-    (found,) = measure(WORK, [way], BATCH, 3)
+    implementation = Scaled("right")
+    (found,) = measure(WORK, [implementation], BATCH, 3)
     assert found.problem is None
     assert found.times is not None
     assert len(found.times.seconds) == 3
@@ -32,14 +32,14 @@ def test_right_ways_are_timed_per_sample() -> None:
     assert found.error == 0.0
 
 
-@pytest.mark.parametrize("quantity", ARGUMENTS)
+@pytest.mark.parametrize("quantity", BENCHMARK_QUANTITIES)
 def test_a_wrong_answer_is_reported_and_not_timed(quantity: str) -> None:
     wrong, right = Scaled("wrong", 1.01), Scaled("right")
-    found = measure(Work(quantity, 40), [wrong, right], BATCH, 2)
-    assert [each.way for each in found] == ["wrong", "right"]
+    found = measure(BenchmarkCase(quantity, 40), [wrong, right], BATCH, 2)
+    assert [each.implementation for each in found] == ["wrong", "right"]
     assert found[0].times is None
     assert found[0].problem is not None
-    assert found[0].problem.startswith("wrong answer, not timed: error ")
+    assert found[0].problem.startswith("wrong result, not timed: error ")
     assert wrong.calls == 1
     assert found[1].times is not None
 
@@ -66,8 +66,8 @@ class Slow(Scaled):
 
     whole = False
 
-    def prepare(self, work: Work, batch: Batch, out: Floats) -> Prepared:
-        call = super().prepare(work, batch, out).call
+    def prepare(self, case: BenchmarkCase, batch: Batch, out: Floats) -> PreparedCall:
+        call = super().prepare(case, batch, out).call
 
         def slow() -> Floats:
             for _ in range(len(batch) * 200):
@@ -75,21 +75,21 @@ class Slow(Scaled):
             answers: Floats = call()
             return answers
 
-        return Prepared(slow)
+        return PreparedCall(slow)
 
 
 def test_a_slow_way_is_timed_at_fewer_samples() -> None:
     batch = draw_batch(MODEL, MODEL.frame_names[-1], 65536)
-    found = measure(Work("inverse_dynamics", 65536), [Slow("slow"), Scaled("quick")], batch, 1)
-    assert TRIAL <= found[0].samples < 65536
+    found = measure(BenchmarkCase("inverse_dynamics", 65536), [Slow("slow"), Scaled("quick")], batch, 1)
+    assert TRIAL_SAMPLES <= found[0].samples < 65536
     assert found[1].samples == 65536
 
 
 class WithBaseline(Scaled):
-    """Something of its calls is not the work."""
+    """Something of its calls is not the case."""
 
-    def prepare(self, work: Work, batch: Batch, out: Floats) -> Prepared:
-        return Prepared(super().prepare(work, batch, out).call, lambda: None)
+    def prepare(self, case: BenchmarkCase, batch: Batch, out: Floats) -> PreparedCall:
+        return PreparedCall(super().prepare(case, batch, out).call, lambda: None)
 
 
 def made_up(monkeypatch: pytest.MonkeyPatch, *times: Times) -> None:
@@ -114,7 +114,7 @@ def test_a_baseline_is_taken_away(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_what_is_lost_in_the_noise_is_not_shown_as_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
     made_up(monkeypatch, Times((5e-6,) * 3), Times((6e-6, 5e-6, 1e-6)))
     (found,) = measure(WORK, [WithBaseline("less")], BATCH, 3)
-    assert (found.times, found.problem) == (None, LOST)
+    assert (found.times, found.problem) == (None, LOST_IN_NOISE)
     assert found.error == 0.0
 
 
@@ -122,10 +122,10 @@ def test_one_sample_has_no_batch_axis() -> None:
     shapes = []
 
     class Asked(Scaled):
-        def prepare(self, work: Work, batch: Batch, out: Floats) -> Prepared:
+        def prepare(self, case: BenchmarkCase, batch: Batch, out: Floats) -> PreparedCall:
             shapes.append((len(batch), out.shape))
-            return super().prepare(work, batch, out)
+            return super().prepare(case, batch, out)
 
-    (found,) = measure(Work("jacobian", 1), [Asked("asked")], BATCH, 1)
+    (found,) = measure(BenchmarkCase("jacobian", 1), [Asked("asked")], BATCH, 1)
     assert shapes == [(1, (1, 6, MODEL.nv))]
     assert isinstance(found.times, Times)

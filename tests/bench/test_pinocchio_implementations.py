@@ -7,14 +7,14 @@ import pinocchio as pin
 import pytest
 
 import dynx
-from dynx.bench.cases import ARGUMENTS, Work, draw_batch
+from dynx.bench.cases import BENCHMARK_QUANTITIES, BenchmarkCase, draw_batch
 from dynx.bench.measurement import measure
 from dynx.bench.pinocchio_implementations import (
-    FEWEST_CALLS,
+    MIN_CALLS,
     PinocchioBatch,
     PinocchioInside,
     PinocchioLoop,
-    pinocchio_ways,
+    pinocchio_implementations,
     without_mimics,
 )
 from dynx.model.model import Base
@@ -32,28 +32,31 @@ ROBOTS: tuple[tuple[str, Base], ...] = (
 def test_they_answer_rightly(robot: str, base: Base, count: int) -> None:
     model = dynx.load(robot, base=base)
     batch = draw_batch(model, model.frame_names[-1], count)
-    ways = list(pinocchio_ways(model, 2))
-    for quantity in ARGUMENTS:
-        for found in measure(Work(quantity, count, threads=2), ways, batch, 1):
+    implementations = list(pinocchio_implementations(model, 2))
+    for quantity in BENCHMARK_QUANTITIES:
+        for found in measure(BenchmarkCase(quantity, count, threads=2), implementations, batch, 1):
             assert found.problem is None
             assert found.error is not None
 
 
 def test_the_batches_are_for_two_quantities_and_several_samples() -> None:
-    way = PinocchioBatch(dynx.load("pendulum"), 2)
+    implementation = PinocchioBatch(dynx.load("pendulum"), 2)
     done = {
-        (quantity, batch) for quantity in ARGUMENTS for batch in (1, 2) if way.does(Work(quantity, batch))
+        (quantity, batch)
+        for quantity in BENCHMARK_QUANTITIES
+        for batch in (1, 2)
+        if implementation.supports(BenchmarkCase(quantity, batch))
     }
     assert done == {("inverse_dynamics", 2), ("forward_dynamics", 2)}
-    assert way.threads == 2
+    assert implementation.threads == 2
 
 
 def test_the_batches_write_where_they_are_told() -> None:
     model = dynx.load("panda")
-    way = PinocchioBatch(model, 1)
-    batch = way.samples(draw_batch(model, "panda_hand", 50))
-    out = np.full((50, way.model.nv), np.nan)
-    answers = way.prepare(Work("inverse_dynamics", 50), batch, out).call()
+    implementation = PinocchioBatch(model, 1)
+    batch = implementation.samples(draw_batch(model, "panda_hand", 50))
+    out = np.full((50, implementation.model.nv), np.nan)
+    answers = implementation.prepare(BenchmarkCase("inverse_dynamics", 50), batch, out).call()
     assert answers is out
     assert np.isfinite(out).all()
 
@@ -71,7 +74,7 @@ def test_mimic_joints_become_coordinates_at_the_same_state() -> None:
             )
         energy = theirs.kinetic_energy(own.q, own.v)
         np.testing.assert_allclose(energy, ours.kinetic_energy(batch.q, batch.v), rtol=1e-14)
-    # The same work: tau v of both.
+    # The same case: tau v of both.
     np.testing.assert_allclose(
         np.sum(own.tau * own.v, axis=-1), np.sum(batch.tau * batch.v, axis=-1), rtol=1e-12, atol=1e-14
     )
@@ -84,17 +87,17 @@ def test_a_robot_without_them_stays_as_it_is() -> None:
     assert PinocchioLoop(model).samples(batch) is batch
 
 
-@pytest.mark.parametrize("quantity", ARGUMENTS)
+@pytest.mark.parametrize("quantity", BENCHMARK_QUANTITIES)
 def test_the_baseline_runs_on_a_model_of_one_joint(quantity: str) -> None:
     model = dynx.load("pendulum")
-    way = PinocchioInside(model)
-    assert not way.does(Work(quantity, FEWEST_CALLS - 1))
-    work = Work(quantity, FEWEST_CALLS)
-    assert way.does(work)
-    (found,) = measure(work, [way], draw_batch(model, "tip", FEWEST_CALLS), 2)
+    implementation = PinocchioInside(model)
+    assert not implementation.supports(BenchmarkCase(quantity, MIN_CALLS - 1))
+    case = BenchmarkCase(quantity, MIN_CALLS)
+    assert implementation.supports(case)
+    (found,) = measure(case, [implementation], draw_batch(model, "tip", MIN_CALLS), 2)
     # Of a robot with one joint nothing is left; what is left of others is not for a test to time.
     assert found.error is not None
-    ready = way.prepare(work, draw_batch(model, "tip", 2), np.zeros((2, *answer_of(quantity))))
+    ready = implementation.prepare(case, draw_batch(model, "tip", 2), np.zeros((2, *answer_of(quantity))))
     assert len(ready.calls) == 2
 
 

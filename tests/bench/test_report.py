@@ -7,22 +7,22 @@ import json
 import pytest
 
 import dynx
-from dynx.bench.cases import Work
+from dynx.bench.cases import BenchmarkCase
 from dynx.bench.cost import Cost
 from dynx.bench.measurement import Measurement
 from dynx.bench.report import SCHEMA, document, is_wrong, result, wrong
-from dynx.bench.session import works
+from dynx.bench.session import benchmark_cases
 from dynx.bench.timing import Times
 from tests.bench.implementations import PEAK, Scaled, session_of
 
-WORK = Work("inverse_dynamics", 65536)
+WORK = BenchmarkCase("inverse_dynamics", 65536)
 COST = Cost(bytes=192, operations=750, multiply_adds=400)
 
 
-def found(way: str, nanoseconds: tuple[float, ...] | None, role: str = "backend") -> Measurement:
+def found(implementation: str, nanoseconds: tuple[float, ...] | None, role: str = "backend") -> Measurement:
     """A measurement of so many nanoseconds."""
     times = None if nanoseconds is None else Times(tuple(1e-9 * each for each in nanoseconds))
-    return Measurement(WORK, way, role, "1.0", 1, 65536, 1e-15, 1e-13, times)
+    return Measurement(WORK, implementation, role, "1.0", 1, 65536, 1e-15, 1e-13, times)
 
 
 GROUP = [
@@ -35,18 +35,18 @@ GROUP = [
 
 
 def test_a_ratio_says_how_many_times_faster_than_each_peer() -> None:
-    ways = result(GROUP, [None] * 5, {})["ways"]
-    assert ways[0]["ratios"] == pytest.approx({"batch": 25.0, "loop": 50.0})
-    assert ways[1]["ratios"] == pytest.approx({"batch": 0.25, "loop": 0.5})
-    assert ways[2]["ratios"] == pytest.approx({"batch": 1.0, "loop": 2.0})
-    assert ways[4]["ratios"] == {}
-    assert ways[4]["ns"] is None
+    implementations = result(GROUP, [None] * 5, {})["ways"]
+    assert implementations[0]["ratios"] == pytest.approx({"batch": 25.0, "loop": 50.0})
+    assert implementations[1]["ratios"] == pytest.approx({"batch": 0.25, "loop": 0.5})
+    assert implementations[2]["ratios"] == pytest.approx({"batch": 1.0, "loop": 2.0})
+    assert implementations[4]["ratios"] == {}
+    assert implementations[4]["ns"] is None
 
 
 def test_times_are_nanoseconds_of_one_sample() -> None:
-    way = result(GROUP, [None] * 5, {})["ways"][0]
-    assert way["ns"] == pytest.approx(40.0)
-    assert way["ns_quartiles"] == pytest.approx([39.0, 41.0])
+    implementation = result(GROUP, [None] * 5, {})["ways"][0]
+    assert implementation["ns"] == pytest.approx(40.0)
+    assert implementation["ns_quartiles"] == pytest.approx([39.0, 41.0])
 
 
 def test_the_roofline_is_that_of_the_threads_of_the_way() -> None:
@@ -71,7 +71,7 @@ def test_what_is_wrong() -> None:
 
 def test_the_document_says_what_was_done_and_what_was_not() -> None:
     model = dynx.load("double_pendulum")
-    both = works(["jacobian", "mass_matrix"], (4,))
+    both = benchmark_cases(["jacobian", "mass_matrix"], (4,))
     with session_of([Scaled("compiled"), Scaled("peer", role="peer")], model, both) as session:
         session.measure_machine(1)
         done = [session.measure(both[0])]
@@ -82,8 +82,10 @@ def test_the_document_says_what_was_done_and_what_was_not() -> None:
     assert made["peaks"] == [{"threads": 1, "copy_bandwidth": 10e9, "multiply_adds": 20e9}]
     (only,) = made["results"]
     assert (only["quantity"], only["batch"], only["threads"]) == ("jacobian", 4, 1)
-    ways = "way role version threads samples error tolerance problem ns ns_quartiles ratios roofline"
-    assert [set(way) for way in only["ways"]] == [set(ways.split())] * 2
+    implementations = (
+        "way role version threads samples error tolerance problem ns ns_quartiles ratios roofline"
+    )
+    assert [set(implementation) for implementation in only["ways"]] == [set(implementations.split())] * 2
     assert only["ways"][0]["roofline"] is not None
     assert only["ways"][1]["roofline"] is None
     assert made["not_done"] == [{"quantity": "mass_matrix", "batch": 4, "threads": 1}]

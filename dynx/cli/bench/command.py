@@ -13,11 +13,11 @@ from dynx.cli.shell.options import frame_option, json_flag, model_options, name_
 @click.option(
     "--quantity",
     "quantities",
-    type=one_of(source="dynx.bench.cases:ARGUMENTS"),
+    type=one_of(source="dynx.backends.quantities:QUANTITIES"),
     multiple=True,
     metavar="NAME",
     help="Quantity to time, such as inverse_dynamics or mass_matrix; may be given several times "
-    "(default: all; a wrong name lists them).",
+    "(default: poses, Jacobian, inverse and forward dynamics, mass matrix; a wrong name lists all).",
 )
 @click.option(
     "--batch",

@@ -5,11 +5,19 @@ from __future__ import annotations
 from itertools import count
 
 from dynx.backends.registry import backend_class
-from dynx.bench.cases import ARGUMENTS
+from dynx.bench.cases import BENCHMARK_QUANTITIES
 from dynx.bench.machine import described
 from dynx.bench.measurement import Measurement
 from dynx.bench.report import document, wrong
-from dynx.bench.session import BATCHES, QUICK_REPETITIONS, REPETITIONS, WORTH_THREADS, Plan, Session, works
+from dynx.bench.session import (
+    BATCHES,
+    MIN_BATCH_FOR_THREADS,
+    QUICK_REPETITIONS,
+    REPETITIONS,
+    Plan,
+    Session,
+    benchmark_cases,
+)
 from dynx.cli.bench.tables import show
 from dynx.cli.shell.exits import ANSWER_IS_NO, DONE, complain
 from dynx.cli.shell.inputs import chosen_frame
@@ -41,11 +49,11 @@ def bench(
     plan = Plan(
         model,
         chosen_frame(model, frame),
-        works(
-            quantities or tuple(ARGUMENTS),
+        benchmark_cases(
+            quantities or tuple(BENCHMARK_QUANTITIES),
             batches or BATCHES,
             threads or (1, processors()),
-            1 if threads else WORTH_THREADS,
+            1 if threads else MIN_BATCH_FOR_THREADS,
         ),
         backends,
         QUICK_REPETITIONS if quick else REPETITIONS,
@@ -58,20 +66,20 @@ def bench(
 def run_bench(session: Session, *, as_json: bool) -> int:
     """Measure every case and show the results, also after Ctrl-C; return the exit code."""
     found: list[list[Measurement]] = []
-    works = session.plan.works
+    cases = session.plan.cases
     with interruptible() as interruption:
         try:
-            with progress_bar(len(works) + len(session.plan.threads)) as advance:
+            with progress_bar(len(cases) + len(session.plan.threads)) as advance:
                 done = count()
                 for threads in session.plan.threads:
                     advance(next(done), f"the machine, {counted(threads, 'thread')}")
                     session.measure_machine(threads)
-                for work in works:
-                    quantity = work.quantity.replace("_", " ")
-                    advance(next(done), f"{quantity}, batch {work.batch}, {counted(work.threads, 'thread')}")
-                    found.append(session.measure(work))
+                for case in cases:
+                    quantity = case.quantity.replace("_", " ")
+                    advance(next(done), f"{quantity}, batch {case.batch}, {counted(case.threads, 'thread')}")
+                    found.append(session.measure(case))
         except KeyboardInterrupt:
-            complain(f"interrupted: {len(works) - len(found)} of {counted(len(works), 'work')} not done")
+            complain(f"interrupted: {len(cases) - len(found)} of {counted(len(cases), 'case')} not done")
         interruption.finishing = True
         made = document(session, found, described())
         if as_json:
@@ -80,7 +88,7 @@ def run_bench(session: Session, *, as_json: bool) -> int:
             show(console(), made)
         wrong_ones = wrong(found)
         for each in wrong_ones:
-            complain(f"{each.way}, {each.work.quantity.replace('_', ' ')}: {each.problem}")
+            complain(f"{each.implementation}, {each.case.quantity.replace('_', ' ')}: {each.problem}")
     if interruption.code is not None:
         return interruption.code
     return ANSWER_IS_NO if wrong_ones else DONE

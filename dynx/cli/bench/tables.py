@@ -19,7 +19,7 @@ _QUIET = 0.5
 
 
 def show(out: Console, made: Entry) -> None:
-    """The robot, the machine, and a table for each work."""
+    """The robot, the machine, and a table for each case."""
     out.print(
         f"{one_line(made['robot'])}, {made['base']} base, nq {made['nq']}, nv {made['nv']}, "
         f"frame {one_line(made['frame'])}, {counted(made['repetitions'], 'repetition')}"
@@ -37,32 +37,32 @@ def show(out: Console, made: Entry) -> None:
     for result in made["results"]:
         _show_result(out, result)
     if made["not_done"]:
-        out.print(f"\n{counted(len(made['not_done']), 'work')} not done", style="yellow")
+        out.print(f"\n{counted(len(made['not_done']), 'case')} not done", style="yellow")
 
 
 def _show_result(out: Console, result: Entry) -> None:
     quantity = result["quantity"].replace("_", " ")
     batch = "one sample" if result["batch"] == 1 else f"batch {result['batch']}"
     out.print(f"\n{quantity}, {batch}, {counted(result['threads'], 'thread')}", style="bold")
-    ways: list[Entry] = result["ways"]
-    peers = [way["way"] for way in ways if way["role"] == "peer" and way["ns"] is not None]
-    bounded = any(way["roofline"] is not None for way in ways)
+    entries: list[Entry] = result["ways"]
+    peers = [entry["way"] for entry in entries if entry["role"] == "peer" and entry["ns"] is not None]
+    bounded = any(entry["roofline"] is not None for entry in entries)
     ratios = ["faster than\n" + peer.replace(" ", "\n", 1) for peer in peers]
     limits = ["of copy\nbandwidth", "of multiply-\nadd peak", "binds"] if bounded else []
     right = ["threads", "samples", "ns per\nsample", "spread", *ratios, *limits[:2]]
     table = Table("", "threads", "samples", "ns per\nsample", "spread", *ratios, *limits, right=right, keys=1)
-    for way in sorted(ways, key=_speed):
-        cells = [way["way"], str(way["threads"]), str(way["samples"]), _ns(way["ns"]), _spread(way)]
-        cells += [_ratio(way["ratios"].get(peer)) for peer in peers]
-        table.add_row(*cells, *(_limits(way["roofline"]) if bounded else []))
+    for entry in sorted(entries, key=_speed):
+        cells = [entry["way"], str(entry["threads"]), str(entry["samples"]), _ns(entry["ns"]), _spread(entry)]
+        cells += [_ratio(entry["ratios"].get(peer)) for peer in peers]
+        table.add_row(*cells, *(_limits(entry["roofline"]) if bounded else []))
     out.print(table)
-    for problem in dict.fromkeys(way["problem"] for way in ways if way["problem"] is not None):
-        out.print(_problem(problem, [way for way in ways if way["problem"] == problem]))
+    for problem in dict.fromkeys(entry["problem"] for entry in entries if entry["problem"] is not None):
+        out.print(_problem(problem, [entry for entry in entries if entry["problem"] == problem]))
 
 
-def _speed(way: Entry) -> tuple[bool, float]:
+def _speed(entry: Entry) -> tuple[bool, float]:
     """The fastest first, what was not timed last."""
-    return way["ns"] is None, way["ns"] or 0.0
+    return entry["ns"] is None, entry["ns"] or 0.0
 
 
 def _ns(ns: float | None) -> str:
@@ -71,12 +71,12 @@ def _ns(ns: float | None) -> str:
     return f"{ns:.3g}" if ns < 1000.0 else f"{ns:.0f}"
 
 
-def _spread(way: Entry) -> str:
+def _spread(entry: Entry) -> str:
     """The distance of the quartiles over the median."""
-    if not way["ns"]:
+    if not entry["ns"]:
         return "-"
-    low, high = way["ns_quartiles"]
-    return f"{(high - low) / way['ns']:.0%}"
+    low, high = entry["ns_quartiles"]
+    return f"{(high - low) / entry['ns']:.0%}"
 
 
 def _ratio(ratio: float | None) -> str:
@@ -92,8 +92,10 @@ def _limits(roofline: Entry | None) -> Sequence[str]:
     return (f"{roofline['memory_share']:.0%}", f"{roofline['arithmetic_share']:.0%}", roofline["binds"])
 
 
-def _problem(problem: str, ways: Sequence[Entry]) -> Text:
-    """What kept some ways from being timed."""
-    wrong = any(way["error"] is not None for way in ways) and all(way["ns"] is None for way in ways)
-    names = ", ".join(way["way"] for way in ways)
+def _problem(problem: str, entries: Sequence[Entry]) -> Text:
+    """What kept some entries from being timed."""
+    wrong = any(entry["error"] is not None for entry in entries) and all(
+        entry["ns"] is None for entry in entries
+    )
+    names = ", ".join(entry["way"] for entry in entries)
     return Text(f"{names}: {one_line(problem)}", "bold red" if wrong else "yellow")

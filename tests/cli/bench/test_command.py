@@ -15,9 +15,10 @@ from click.testing import CliRunner, Result
 from rich.console import Console
 
 import dynx
-from dynx.bench.cases import ARGUMENTS, Work
+from dynx.backends.quantities import QUANTITIES
+from dynx.bench.cases import BenchmarkCase
 from dynx.bench.document import BenchWay
-from dynx.bench.implementations import Way
+from dynx.bench.implementations import Implementation
 from dynx.bench.report import document
 from dynx.bench.roofline import Peak
 from dynx.bench.session import BATCHES, QUICK_REPETITIONS, REPETITIONS
@@ -52,7 +53,7 @@ def test_the_options_are_those_of_the_library() -> None:
 def test_a_wrong_quantity_lists_those_of_the_library() -> None:
     result = bench("double_pendulum", "--quantity", "curvature")
     assert result.exit_code == 2
-    assert f"known: {', '.join(ARGUMENTS)} " in result.stderr
+    assert f"known: {', '.join(QUANTITIES)} " in result.stderr
 
 
 def test_a_table_for_each_work() -> None:
@@ -73,13 +74,17 @@ def test_json_has_the_document_alone() -> None:
     assert result.exit_code == 0
     made: dict[str, Any] = json.loads(result.stdout)
     assert (made["robot"], made["seed"], made["repetitions"]) == ("2dof_planar", 7, QUICK_REPETITIONS)
-    (work,) = made["results"]
-    assert (work["quantity"], work["batch"], work["threads"]) == ("inverse_dynamics", 16, 1)
-    assert [way["way"] for way in work["ways"]] == ["reference", "pinocchio C++ batch", "pinocchio binding"]
-    for way in work["ways"]:
-        assert way["error"] <= way["tolerance"]
-        assert way["ns"] > 0.0
-        assert set(way["ratios"]) == {"pinocchio C++ batch", "pinocchio binding"}
+    (case,) = made["results"]
+    assert (case["quantity"], case["batch"], case["threads"]) == ("inverse_dynamics", 16, 1)
+    assert [implementation["way"] for implementation in case["ways"]] == [
+        "reference",
+        "pinocchio C++ batch",
+        "pinocchio binding",
+    ]
+    for implementation in case["ways"]:
+        assert implementation["error"] <= implementation["tolerance"]
+        assert implementation["ns"] > 0.0
+        assert set(implementation["ratios"]) == {"pinocchio C++ batch", "pinocchio binding"}
     assert made["not_done"] == []
 
 
@@ -109,14 +114,14 @@ def test_arguments_that_cannot_be_used(arguments: list[str], clue: str) -> None:
     assert result.stderr.count("\n") == 1
 
 
-def made_up(*ways: Way) -> tuple[int, str]:
-    """The exit code and the table of a session of these ways."""
+def made_up(*implementations: Implementation) -> tuple[int, str]:
+    """The exit code and the table of a session of these implementations."""
     model = dynx.load("double_pendulum")
-    with session_of([*ways], model, (Work("mass_matrix", 4),), repetitions=1) as session:
+    with session_of([*implementations], model, (BenchmarkCase("mass_matrix", 4),), repetitions=1) as session:
         session.measure_machine(1)
         code = run_bench(session, as_json=False)
         out = StringIO()
-        found = [session.measure(work) for work in session.plan.works]
+        found = [session.measure(case) for case in session.plan.cases]
         show(Console(file=out, width=10_000), document(session, found, "a processor"))
     return code, out.getvalue()
 
@@ -125,9 +130,9 @@ def test_a_wrong_answer_is_said_and_is_exit_code_1(capsys: pytest.CaptureFixture
     code, table = made_up(Scaled("right"), Scaled("wrong", 1.5))
     assert code == 1
     err = capsys.readouterr().err
-    assert err.startswith("dynx: error: wrong, mass matrix: wrong answer, not timed: error ")
+    assert err.startswith("dynx: error: wrong, mass matrix: wrong result, not timed: error ")
     assert err.count("\n") == 1
-    assert "wrong: wrong answer, not timed" in table
+    assert "wrong: wrong result, not timed" in table
 
 
 def test_an_engine_that_cannot_do_it_is_said_and_no_failure(capsys: pytest.CaptureFixture[str]) -> None:
@@ -139,30 +144,34 @@ def test_an_engine_that_cannot_do_it_is_said_and_no_failure(capsys: pytest.Captu
 
 def test_the_fastest_is_shown_first_and_what_was_not_timed_last() -> None:
     model = dynx.load("double_pendulum")
-    work = Work("mass_matrix", 4)
-    with session_of([], model, (work,)) as session:
+    case = BenchmarkCase("mass_matrix", 4)
+    with session_of([], model, (case,)) as session:
         made = document(session, [], "a processor")
-    ways = [way("slow", 900.0), way("not timed", None), way("fast", 9.0)]
-    made["results"] = [{"quantity": "mass_matrix", "batch": 4, "threads": 1, "ways": ways}]
+    implementations = [
+        implementation("slow", 900.0),
+        implementation("not timed", None),
+        implementation("fast", 9.0),
+    ]
+    made["results"] = [{"quantity": "mass_matrix", "batch": 4, "threads": 1, "ways": implementations}]
     out = StringIO()
     show(Console(file=out, width=10_000), made)
     text = out.getvalue()
     assert text.index(" fast ") < text.index(" slow ") < text.index(" not timed ")
-    assert "1 work not done" in text
+    assert "1 case not done" in text
 
 
 @pytest.mark.parametrize(("load", "said"), [(None, False), (0.2, False), (3.14, True)])
 def test_a_machine_that_was_busy_is_said(load: float | None, said: bool) -> None:
     model = dynx.load("double_pendulum")
-    with session_of([], model, (Work("mass_matrix", 4),)) as session:
+    with session_of([], model, (BenchmarkCase("mass_matrix", 4),)) as session:
         made = document(session, [], "a processor")
     out = StringIO()
     show(Console(file=out, width=10_000), {**made, "load": load})
     assert ("load 3.1 before the run" in out.getvalue()) == said
 
 
-def way(name: str, ns: float | None) -> BenchWay:
-    """The entry of a way."""
+def implementation(name: str, ns: float | None) -> BenchWay:
+    """The entry of an implementation."""
     quartiles = None if ns is None else [ns, ns]
     return {
         "way": name,
