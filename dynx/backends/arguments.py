@@ -18,7 +18,7 @@ from dynx.errors import (
     shown,
 )
 from dynx.model import Model
-from dynx.model.configuration import TOO_LARGE, UNIT, checked_array, checked_q, checked_vector
+from dynx.model.configuration import MAX_MAGNITUDE, UNIT, checked_array, checked_q, checked_vector
 from dynx.rbd.jacobians import REFERENCES, Reference
 from dynx.spatial.scalar import Floats
 
@@ -44,7 +44,7 @@ class Arguments:
             raise ClosedError(f"this backend of {self._model.name} was closed; make a new one")
         if type(q) is np.ndarray and q.dtype is _FLOAT64 and q.shape == self._q_shape:
             values = q.tolist()
-            if hypot(*values) < TOO_LARGE:
+            if hypot(*values) < MAX_MAGNITUDE:
                 if not self._floating:
                     return q
                 x, y, z, w = values[3:7]
@@ -58,7 +58,7 @@ class Arguments:
             type(v) is np.ndarray
             and v.dtype is _FLOAT64
             and v.shape == self._v_shape
-            and hypot(*v.tolist()) < TOO_LARGE
+            and hypot(*v.tolist()) < MAX_MAGNITUDE
         ):
             return v
         return checked_array(name, v, self._v_shape[0])

@@ -14,7 +14,7 @@ import numpy as np
 
 from dynx.backends.arguments import Arguments
 from dynx.errors import ClosedError
-from dynx.model.configuration import TOO_LARGE, UNIT
+from dynx.model.configuration import MAX_MAGNITUDE, UNIT
 from dynx.spatial.scalar import Floats
 
 _SHORT = 64
@@ -34,7 +34,7 @@ class BatchArguments(Arguments):
 
     def q(self, q: Any) -> Floats:
         """A configuration (..., nq), finite, with a unit quaternion for a floating base."""
-        if not self.closed and _is_batch(q, self._q_shape) and _below(q, TOO_LARGE):
+        if not self.closed and _is_batch(q, self._q_shape) and _below(q, MAX_MAGNITUDE):
             if not self._floating:
                 return np.asarray(q)
             quat = q[..., 3:7]
@@ -45,7 +45,7 @@ class BatchArguments(Arguments):
 
     def v(self, v: Any, name: str = "v") -> Floats:
         """A velocity, acceleration or torque (..., nv), finite."""
-        if _is_batch(v, self._v_shape) and _below(v, TOO_LARGE):
+        if _is_batch(v, self._v_shape) and _below(v, MAX_MAGNITUDE):
             return np.asarray(v)
         return super().v(v, name)
 

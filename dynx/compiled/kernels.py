@@ -34,7 +34,7 @@ from dynx.backends.quantities import QUANTITIES, Growth, Quantity
 from dynx.compiled import frames as compiled_frames
 from dynx.compiled.frames import Chain, on_chain
 from dynx.model import Mechanism
-from dynx.model.configuration import TOO_LARGE, UNIT
+from dynx.model.configuration import MAX_MAGNITUDE, UNIT
 from dynx.model.mechanism import Coupling
 from dynx.rbd import coriolis, crba, rnea
 from dynx.rbd.aba import inertia_matrix
@@ -49,7 +49,7 @@ from dynx.simd.target import host
 from dynx.simd.trace import trace
 from dynx.spatial.scalar import Array, Floats
 
-MAX_DEFECT = TOO_LARGE**2
+MAX_DEFECT = MAX_MAGNITUDE**2
 """Bound on the defect of a sample with valid arguments."""
 
 MAX_RESULT = 1e300

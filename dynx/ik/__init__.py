@@ -1,7 +1,7 @@
 """Inverse kinematics: targets, a bounded Levenberg-Marquardt solver with restarts, checked results.
 
-This package lies below `dynx.backends`: the solver knows a small protocol of poses and Jacobians and no
-engine, so that every backend can offer `inverse_kinematics` as one of its own quantities.
+This package lies below `dynx.backends`: the solver depends only on a small protocol of poses and Jacobians,
+so that every backend can offer `inverse_kinematics` as one of its quantities.
 """
 
 from dynx.ik.result import IKResult

@@ -1,4 +1,4 @@
-"""The coordinates that move one frame: which they are, their bounds, and how angles repeat."""
+"""Coordinates that move one frame: their indices, their bounds, and the periodicity of angles."""
 
 from __future__ import annotations
 
@@ -9,31 +9,30 @@ import numpy as np
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
 
-TURN = 2.0 * math.pi
+FULL_TURN = 2.0 * math.pi
 
-_GAP = 1e-8
-"""A range this much [rad] short of a whole turn still counts as one: files round their limits."""
+_FULL_TURN_TOLERANCE = 1e-8
+"""A range at most this much [rad] short of 2 pi counts as a full turn, since files round their limits."""
 
-_REACH = {"prismatic": 1.0}
-"""Half the range [m] that is searched where a length has no limits; for angles it is pi."""
+_DEFAULT_RANGE = {"prismatic": 1.0}
+"""Half the range [m] searched for a prismatic joint without limits; for angles it is pi [rad]."""
 
 Columns = slice | list[int]
 
 
 class FrameCoordinates:
-    """The coordinates of the model that move a frame, as the solver sees them.
+    """The coordinates of the model that move a frame, as variables of the solver.
 
-    They are a list of floats: for a floating base its six, counted from where the base is (a body
-    twist for unit time), then the joints between root and frame, in the order of q. Angles whose
-    range is a whole turn have infinite bounds here: they are brought back into their limits, as
-    near as possible to where the search began, once it ends. Coordinates of other branches of the
-    tree never change.
+    They are a list of floats: with a floating base its six, relative to the current base pose (a body twist
+    for unit time), then the joints between root and frame, in the order of q. Angles whose range is a full
+    turn have infinite bounds here; after the search they are brought back into their limits, as near as
+    possible to the initial configuration. Coordinates of other branches of the tree never change.
     """
 
     def __init__(self, model: Model, frame: str) -> None:
         self._model = model
         self._base = 7 if model.floating else 0
-        joints = _joints_above(model, frame)
+        joints = _joints_on_path(model, frame)
         self._in_q = _as_slice([self._base + k for k in joints])
         offset = 6 if model.floating else 0
         self.columns: Columns = _as_slice([*range(offset), *(offset + k for k in joints)])
@@ -44,26 +43,28 @@ class FrameCoordinates:
         self._low, self._high = model.lower[self._in_q], model.upper[self._in_q]
         drivers = {joint.mimic.joint for joint in model.joints if joint.mimic is not None}
         kinds = [model.coordinate_joints[k] for k in joints]
-        # A joint that drives others is not where it was after a turn, since they move on.
+        # A joint that drives others is not periodic, since its followers keep moving.
         turns = np.array([j.type != "prismatic" and j.name not in drivers for j in kinds], dtype=bool)
-        self._repeats = np.flatnonzero(turns & (self._high - self._low >= TURN - _GAP)).tolist()
+        self._periodic = np.flatnonzero(
+            turns & (self._high - self._low >= FULL_TURN - _FULL_TURN_TOLERANCE)
+        ).tolist()
 
         lower, upper = self._low.tolist(), self._high.tolist()
-        for k in self._repeats:
+        for k in self._periodic:
             lower[k], upper[k] = -math.inf, math.inf
         self.lower: list[float] = [-math.inf] * offset + lower
         """Lower bounds of the search."""
         self.upper: list[float] = [math.inf] * offset + upper
         """Upper bounds of the search."""
-        self._reach = np.array([_REACH.get(joint.type, math.pi) for joint in kinds])
+        self._default_range = np.array([_DEFAULT_RANGE.get(joint.type, math.pi) for joint in kinds])
 
-    def of(self, q: Floats) -> list[float]:
-        """The coordinates at configuration q (nq,)."""
+    def values(self, q: Floats) -> list[float]:
+        """Return the coordinates at configuration q (nq,)."""
         joints: list[float] = q[self._in_q].tolist()
         return [0.0] * 6 + joints if self._base else joints
 
-    def moved(self, q: Floats, to: list[float]) -> Floats:
-        """The configuration q (nq,) with these coordinates changed to `to`."""
+    def with_values(self, q: Floats, to: list[float]) -> Floats:
+        """Return the configuration q (nq,) with these coordinates set to `to`."""
         if self._base:
             v = np.zeros(self._model.nv)
             v[:6] = to[:6]
@@ -74,38 +75,40 @@ class FrameCoordinates:
         return moved
 
     def random(self, q0: Floats, rng: np.random.Generator) -> Floats:
-        """q0 with its joints drawn uniformly within their limits; the base stays.
+        """Return q0 with its joints drawn uniformly within their limits; the base does not move.
 
-        What has no limits is drawn around its value in q0, by up to pi [rad] or 1 m either way.
+        A joint without limits is drawn from within pi [rad] or 1 m of its value in q0.
         """
         here = q0[self._in_q]
-        low = np.where(np.isfinite(self._low), self._low, np.minimum(here, self._high) - self._reach)
-        high = np.where(np.isfinite(self._high), self._high, np.maximum(here, self._low) + self._reach)
+        low = np.where(np.isfinite(self._low), self._low, np.minimum(here, self._high) - self._default_range)
+        high = np.where(
+            np.isfinite(self._high), self._high, np.maximum(here, self._low) + self._default_range
+        )
         drawn: Floats = q0.copy()
         drawn[self._in_q] = low + (high - low) * rng.random(len(low))
         return drawn
 
     def nearest(self, q: Floats, q0: Floats) -> Floats:
-        """The configuration within limits that is q but for whole turns, each angle nearest to q0."""
-        if not self._repeats:
+        """Return q with its periodic angles shifted by full turns, within their limits and nearest to q0."""
+        if not self._periodic:
             return q
         values, wanted = q[self._in_q].tolist(), q0[self._in_q].tolist()
-        for k in self._repeats:
+        for k in self._periodic:
             low, high = float(self._low[k]), float(self._high[k])
-            value = wanted[k] + math.remainder(values[k] - wanted[k], TURN)
-            value += TURN if value < low else -TURN if value > high else 0.0
+            value = wanted[k] + math.remainder(values[k] - wanted[k], FULL_TURN)
+            value += FULL_TURN if value < low else -FULL_TURN if value > high else 0.0
             values[k] = min(max(value, low), high)
         q = q.copy()
         q[self._in_q] = values
         return q
 
 
-def _joints_above(model: Model, frame: str) -> list[int]:
-    """Ascending numbers in `joint_names` of the joints, or their drivers, between root and frame."""
+def _joints_on_path(model: Model, frame: str) -> list[int]:
+    """Return the ascending indices in `joint_names` of the joints (or drivers) between root and frame."""
     link = model.frames[model.frame_index(frame)].link
     number = {name: k for k, name in enumerate(model.joint_names)}
     found: set[int] = set()
-    # Depth-first order: seen from the end, a joint comes before the one above it.
+    # In reversed depth-first order a joint precedes its ancestors.
     for joint in reversed(model.joints):
         if joint.child == link:
             link = joint.parent
@@ -115,7 +118,7 @@ def _joints_above(model: Model, frame: str) -> list[int]:
 
 
 def _as_slice(numbers: list[int]) -> Columns:
-    """Consecutive numbers as a slice, which indexes without a copy."""
+    """Return consecutive indices as a slice, which indexes without a copy, and others unchanged."""
     if numbers == list(range(numbers[0], numbers[-1] + 1) if numbers else ()):
         return slice(numbers[0], numbers[-1] + 1) if numbers else slice(0, 0)
     return numbers

@@ -1,9 +1,9 @@
-"""One damped least-squares step inside bounds: Levenberg-Marquardt with an active set.
+"""One damped least-squares step within bounds: Levenberg-Marquardt with an active set.
 
 The step minimises ``|error - J (y - x)|^2 + damping |y - x|^2`` over ``lower <= y <= upper``
-(Levenberg 1944; Marquardt 1963). A coordinate that the step would carry over a bound is put on it,
-its part of the error is taken away, and the others are solved for again. Every call begins with
-all coordinates free, so a coordinate leaves its bound as soon as that helps.
+(Levenberg 1944; Marquardt 1963). A coordinate that the step would move beyond a bound is fixed at that bound,
+its contribution to the error is subtracted, and the step is solved again for the others. Every call starts
+with all coordinates free, so a coordinate leaves its bound as soon as that reduces the error.
 """
 
 from __future__ import annotations
@@ -14,17 +14,17 @@ import numpy as np
 
 from dynx.spatial.scalar import Floats
 
-_RIDGE = 1e-10
-"""Damping, relative to the matrix, with which a system is solved that rounding made indefinite."""
+_RELATIVE_RIDGE = 1e-10
+"""Extra damping, relative to the largest diagonal entry, for a matrix that rounding made indefinite."""
 
 
 class BoundedStep:
-    """The step for fixed bounds on `n` coordinates; infinite bounds are none."""
+    """The step for fixed bounds on n coordinates; bounds may be infinite."""
 
     __slots__ = ("_dposv", "_lower", "_upper")
 
     def __init__(self, lower: Sequence[float], upper: Sequence[float]) -> None:
-        # Not at the top: importing dynx must be quick, and scipy.linalg is not.
+        # Imported here because scipy.linalg is slow to import and importing dynx must be fast.
         from scipy.linalg.lapack import dposv
 
         self._dposv = dposv
@@ -32,29 +32,29 @@ class BoundedStep:
         self._upper = upper
 
     def __call__(self, J: Floats, error: Sequence[float], x: Sequence[float], damping: float) -> list[float]:
-        """The new coordinates y (n,), from J (m, n), error (m,), x (n,) within bounds, damping > 0."""
+        """Return the new coordinates y (n,), from J (m, n), error (m,), x (n,) within bounds, damping > 0."""
         residual = np.array(error)
-        moved = self._displacement(J, residual, damping).tolist()
-        y = [a + b for a, b in zip(x, moved, strict=True)]
-        held: dict[int, float] = {}
+        displacement = self._displacement(J, residual, damping).tolist()
+        y = [a + b for a, b in zip(x, displacement, strict=True)]
+        fixed: dict[int, float] = {}
         while True:
-            over = {
+            violated = {
                 k: low if value < low else high
                 for k, (value, low, high) in enumerate(zip(y, self._lower, self._upper, strict=True))
                 if value < low or value > high
             }
-            if not over:
+            if not violated:
                 return y
-            held |= over
-            columns = list(held)
+            fixed |= violated
+            columns = list(fixed)
             free = J.copy()
             free[:, columns] = 0.0
-            carried = J[:, columns].dot([held[k] - x[k] for k in columns])
-            moved = self._displacement(free, residual - carried, damping).tolist()
-            y = [held.get(k, a + b) for k, (a, b) in enumerate(zip(x, moved, strict=True))]
+            fixed_error = J[:, columns].dot([fixed[k] - x[k] for k in columns])
+            displacement = self._displacement(free, residual - fixed_error, damping).tolist()
+            y = [fixed.get(k, a + b) for k, (a, b) in enumerate(zip(x, displacement, strict=True))]
 
     def _displacement(self, J: Floats, error: Floats, damping: float) -> Floats:
-        # The smaller of two equivalent systems: J'(J J' + d)^-1 e = (J'J + d)^-1 J'e.
+        # Solve the smaller of two equivalent systems: J'(J J' + d)^-1 e = (J'J + d)^-1 J'e.
         m, n = J.shape
         if m <= n:
             return np.asarray(self._solve(J.dot(J.T), error, damping).dot(J))
@@ -65,6 +65,6 @@ class BoundedStep:
         diagonal += damping
         _, solution, not_definite = self._dposv(A, b)
         if not_definite:
-            diagonal += _RIDGE * float(diagonal.max())
+            diagonal += _RELATIVE_RIDGE * float(diagonal.max())
             _, solution, not_definite = self._dposv(A, b)
         return np.zeros_like(b) if not_definite else np.asarray(solution)

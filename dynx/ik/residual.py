@@ -1,7 +1,7 @@
-"""How far a frame is from its target, in plain floats.
+"""Error between a frame and its target, in plain floats.
 
-One sample of six numbers is too small for array code to pay: these few lines of arithmetic take a
-third of the time of their NumPy equivalents, and they are evaluated at every step of the solver.
+One sample of six numbers is too small for array code to pay: this arithmetic on floats takes a third of the
+time of its NumPy equivalent, and it is evaluated at every step of the solver.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ Triple = tuple[float, float, float]
 
 
 class Residual:
-    """The way from a frame to one target: position [m], then rotation vector [rad], world axes."""
+    """Error from a frame to one target: position [m], then rotation vector [rad], in world axes."""
 
     __slots__ = ("_point", "_position", "_rotation")
 
@@ -25,7 +25,7 @@ class Residual:
         self._point = point
 
     def __call__(self, T_world_frame: Floats) -> tuple[tuple[float, ...], float, float]:
-        """(residual of length 6, or 3 without a rotation; position error; rotation error)."""
+        """Return (residual (6,), or (3,) without a rotation; position error [m]; rotation error [rad])."""
         if self._point is None:
             px, py, pz, _ = T_world_frame[:, 3].tolist()
         else:
@@ -40,7 +40,7 @@ class Residual:
 
 
 def rotation_vector(R: Floats) -> tuple[float, float, float, float]:
-    """The rotation vector of R (3, 3) and its length in [0, pi] [rad] (Siciliano et al., eq. 2.27)."""
+    """Return the rotation vector of R (3, 3) and its norm in [0, pi] [rad] (Siciliano et al., eq. 2.27)."""
     (r00, r01, r02), (r10, r11, r12), (r20, r21, r22) = R.tolist()
     x, y, z = r21 - r12, r02 - r20, r10 - r01
     twice_sine = math.sqrt(x * x + y * y + z * z)
@@ -51,7 +51,7 @@ def rotation_vector(R: Floats) -> tuple[float, float, float, float]:
     elif twice_cosine > 0.0:
         scale = 0.5
     else:
-        # A half turn, where the antisymmetric part vanishes: R + 1 = 2 a a'.
+        # At an angle of pi the antisymmetric part vanishes: R + 1 = 2 a a'.
         a, b, c = max(
             (r00 + 1.0, r10, r20), (r01, r11 + 1.0, r21), (r02, r12, r22 + 1.0), key=_squared_length
         )

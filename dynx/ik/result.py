@@ -1,4 +1,4 @@
-"""What inverse kinematics found, measured by the kinematics that it was asked about."""
+"""Results of inverse kinematics, with errors measured by forward kinematics."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from dynx.spatial.scalar import Floats
 
 @dataclass(frozen=True, eq=False)
 class IKResult:
-    """Configurations with what forward kinematics says of each; leading axes are batch.
+    """Configurations with their errors by forward kinematics; leading axes are batch.
 
-    `success` is decided by forward kinematics at the `q` that is returned and by nothing else. Where
-    it is False, `q` is the best that was found, never a configuration outside the limits.
+    `success` is decided by forward kinematics at the returned `q` and nothing else. Where it is False, `q` is
+    the best configuration found; it always lies within the limits.
     """
 
     q: Floats
@@ -25,15 +25,15 @@ class IKResult:
     position_error: Floats
     """Distance from the target (...,) [m]."""
     rotation_error: Floats
-    """Angle to the target (...,) [rad], between 0 and pi; 0 where only a position was asked for."""
+    """Angle to the target (...,) [rad], between 0 and pi; 0 if the target is only a position."""
     iterations: NDArray[np.int64]
-    """Steps taken, over all starts (...,)."""
+    """Number of solver steps, summed over all starts (...,)."""
     restarts: NDArray[np.int64]
-    """Starts after the first (...,)."""
+    """Number of starts after the first (...,)."""
 
     @property
     def message(self) -> str:
-        """One sentence for a log or a terminal."""
+        """One sentence that summarises the result, for a log or a terminal."""
         worst = (
             f"at most {float(np.max(self.position_error, initial=0.0)):.3g} m "
             f"and {float(np.max(self.rotation_error, initial=0.0)):.3g} rad off"
@@ -50,5 +50,5 @@ class IKResult:
         )
 
     def __bool__(self) -> bool:
-        """Whether every target was reached."""
+        """Return whether every target was reached."""
         return bool(self.success.all())

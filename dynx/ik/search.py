@@ -1,12 +1,12 @@
 """Descent from one start, and restarts from random configurations until the target is reached.
 
-Levenberg-Marquardt whose damping is proportional to the remaining squared error, so that it is
-robust far from the target and converges quadratically at it, whether or not the target can be
-reached and the Jacobian has full rank (Sugihara, Solvability-unconcerned inverse kinematics by the
-Levenberg-Marquardt method, IEEE Trans. Robotics 27(5), 2011, eq. 13). Limits are kept at every
-step. No step is refused; a start is given up when the squared error has not fallen enough over a
-few steps, which needs no scale and holds at a bound, at a singularity and in a local minimum alike.
-If no start reaches the target, the best configuration is refined to a local minimum.
+The descent is Levenberg-Marquardt with a damping proportional to the remaining squared error: robust far from
+the target and quadratically convergent near it, whether or not the target can be reached and the Jacobian has
+full rank (Sugihara, Solvability-unconcerned inverse kinematics by the Levenberg-Marquardt method, IEEE Trans.
+Robotics 27(5), 2011, eq. 13). Every step respects the limits and is accepted. A start is abandoned when the
+squared error has not fallen enough over a few steps; this criterion is independent of scale and works at a
+bound, at a singularity and in a local minimum alike. If no start reaches the target, the best configuration
+is refined to a local minimum.
 """
 
 from __future__ import annotations
@@ -26,19 +26,19 @@ from dynx.spatial.scalar import Floats
 # Chosen on UR5, Panda, iiwa and a Talos arm for the fewest evaluations; a factor of 3 in either
 # direction, or a window of 2 to 6 steps, costs at most a third more.
 _DAMPING = 0.1
-"""Damping for a unit of squared error (half the squared length of the residual)."""
-_LEAST_DAMPING = 1e-9
-"""Keeps the system definite at a singular configuration on the target."""
+"""Damping per unit of squared error (half the squared norm of the residual)."""
+_MIN_DAMPING = 1e-9
+"""Damping that keeps the system definite at a singular configuration on the target."""
 _WINDOW = 3
-"""Steps over which progress is judged."""
-_PROGRESS = 0.6
-"""The squared error must fall below this part of itself over the window, or the start is given up."""
-_LEAST_PROGRESS = 1e-12
-"""Refinement of an unreached target ends with a step that takes off a smaller part than this."""
+"""Number of steps over which progress is measured."""
+_REQUIRED_REDUCTION = 0.6
+"""A start is abandoned unless the squared error falls below this fraction of itself over the window."""
+_MIN_RELATIVE_GAIN = 1e-12
+"""Refinement of an unreached target ends when a step changes the squared error by a smaller fraction."""
 
 
 class Kinematics(Protocol):
-    """What the solver asks of a backend: one sample, a frame by name."""
+    """Methods of a backend that the solver uses, for one sample and a frame by name."""
 
     @property
     def model(self) -> Model:
@@ -52,8 +52,8 @@ class Kinematics(Protocol):
 
 
 @dataclass(frozen=True)
-class Effort:
-    """When a target counts as reached, and how long to try."""
+class SearchLimits:
+    """Tolerances within which a target counts as reached, and limits on the number of steps and starts."""
 
     position_tolerance: float  # [m]
     rotation_tolerance: float  # [rad]
@@ -62,8 +62,8 @@ class Effort:
 
 
 @dataclass
-class Found:
-    """A configuration and how far it is from the target."""
+class Candidate:
+    """A configuration and its errors with respect to the target."""
 
     q: Floats
     position_error: float
@@ -75,13 +75,15 @@ class Found:
 
 
 class Search:
-    """Searches configurations that bring one frame (or a point of it) to targets."""
+    """Search for configurations that bring one frame (or a point of it) to targets."""
 
-    def __init__(self, kinematics: Kinematics, frame: str, point: Floats | None, effort: Effort) -> None:
+    def __init__(
+        self, kinematics: Kinematics, frame: str, point: Floats | None, limits: SearchLimits
+    ) -> None:
         self._kinematics = kinematics
         self._frame = frame
         self._point = point
-        self._effort = effort
+        self._limits = limits
         self._coordinates = FrameCoordinates(kinematics.model, frame)
         self._step = BoundedStep(self._coordinates.lower, self._coordinates.upper)
 
@@ -93,20 +95,22 @@ class Search:
         rng: np.random.Generator | int | None,
         *,
         begin_at_q0: bool,
-    ) -> Found:
-        """Reach the target from q0 (nq,) within limits, or from a random start."""
+    ) -> Candidate:
+        """Reach the target from q0 (nq,) within limits, or from a random start; return the best
+        configuration.
+        """
         residual = Residual(position, rotation, self._point)
         if self._coordinates.count == 0:
-            return self.measured(q0, residual)
+            return self.evaluate(q0, residual)
         start, best, iterations = q0, None, 0
-        for restarts in range(self._effort.max_restarts + 1):
+        for restarts in range(self._limits.max_restarts + 1):
             if restarts or not begin_at_q0:
-                # Made when it is first needed: that takes longer than a step.
+                # Created when first needed, since that takes longer than a step.
                 rng = np.random.default_rng(rng)
                 start = self._coordinates.random(q0, rng)
             q, steps = self._descend(start, residual)
             iterations += steps
-            found = self.measured(self._coordinates.nearest(q, q0), residual)
+            found = self.evaluate(self._coordinates.nearest(q, q0), residual)
             if best is None or found.squared_error < best.squared_error or found.success:
                 best = found
             best.iterations, best.restarts = iterations, restarts
@@ -114,7 +118,7 @@ class Search:
                 return best
         assert best is not None
         q, steps = self._refine(best.q, residual)
-        refined = self.measured(self._coordinates.nearest(q, q0), residual)
+        refined = self.evaluate(self._coordinates.nearest(q, q0), residual)
         if refined.success or refined.squared_error <= best.squared_error:
             refined.restarts = best.restarts
             best = refined
@@ -122,72 +126,74 @@ class Search:
         return best
 
     def within_limits(self, q: Floats, q0: Floats) -> Floats:
-        """q less whole turns, as near to q0 as its limits allow, and then clipped to them."""
+        """Return q with angles shifted by full turns to be near q0, then clipped to the limits."""
         return self._kinematics.model.clip(self._coordinates.nearest(q, q0))
 
-    def measured(self, q: Floats, residual: Residual) -> Found:
-        """What forward kinematics says of q."""
+    def evaluate(self, q: Floats, residual: Residual) -> Candidate:
+        """Measure the errors at q by forward kinematics."""
         placement = self._kinematics.forward_kinematics(q, self._frame)
-        way, position_error, rotation_error = residual(placement)
+        error_vector, position_error, rotation_error = residual(placement)
         success = (
-            position_error <= self._effort.position_tolerance
-            and rotation_error <= self._effort.rotation_tolerance
+            position_error <= self._limits.position_tolerance
+            and rotation_error <= self._limits.rotation_tolerance
         )
-        return Found(q, position_error, rotation_error, _half_square(way), success)
+        return Candidate(q, position_error, rotation_error, _half_square(error_vector), success)
 
     def _descend(self, q: Floats, residual: Residual) -> tuple[Floats, int]:
-        """(the best configuration on the way, the number of steps) from one start."""
+        """Descend from one start; return (the best configuration found, the number of steps)."""
         forward_kinematics, frame = self._kinematics.forward_kinematics, self._frame
-        position_tolerance = self._effort.position_tolerance
-        rotation_tolerance = self._effort.rotation_tolerance
+        position_tolerance = self._limits.position_tolerance
+        rotation_tolerance = self._limits.rotation_tolerance
         best, least = q, float("inf")
         recent: deque[float] = deque(maxlen=_WINDOW)
-        for steps in range(self._effort.max_iterations + 1):
-            way, position_error, rotation_error = residual(forward_kinematics(q, frame))
+        for steps in range(self._limits.max_iterations + 1):
+            error_vector, position_error, rotation_error = residual(forward_kinematics(q, frame))
             if position_error <= position_tolerance and rotation_error <= rotation_tolerance:
                 return q, steps
-            squared_error = _half_square(way)
+            squared_error = _half_square(error_vector)
             if squared_error < least:
                 best, least = q, squared_error
-            stagnant = len(recent) == _WINDOW and squared_error > _PROGRESS * recent[0]
-            if stagnant or steps == self._effort.max_iterations:
+            stagnant = len(recent) == _WINDOW and squared_error > _REQUIRED_REDUCTION * recent[0]
+            if stagnant or steps == self._limits.max_iterations:
                 break
             recent.append(squared_error)
-            q = self._moved(q, way, _DAMPING * squared_error + _LEAST_DAMPING)
+            q = self._step_from(q, error_vector, _DAMPING * squared_error + _MIN_DAMPING)
         return best, steps
 
     def _refine(self, q: Floats, residual: Residual) -> tuple[Floats, int]:
-        """(the configuration nearest to the target around q, the number of steps).
+        """Descend to a local minimum near q; return (the best configuration, the number of steps).
 
-        Where the error stays large the full step overshoots, so a step that does not help is
-        refused and the damping raised (Marquardt 1963).
+        Where the error stays large the full step overshoots, so a step that does not reduce the error is
+        rejected and the damping raised (Marquardt 1963).
         """
-        way, _, _ = residual(self._kinematics.forward_kinematics(q, self._frame))
-        squared_error, factor, steps = _half_square(way), _DAMPING, 0
-        while steps < self._effort.max_iterations:
+        error_vector, _, _ = residual(self._kinematics.forward_kinematics(q, self._frame))
+        squared_error, factor, steps = _half_square(error_vector), _DAMPING, 0
+        while steps < self._limits.max_iterations:
             steps += 1
-            trial = self._moved(q, way, factor * squared_error + _LEAST_DAMPING)
-            trial_way, _, _ = residual(self._kinematics.forward_kinematics(trial, self._frame))
-            trial_error = _half_square(trial_way)
+            trial = self._step_from(q, error_vector, factor * squared_error + _MIN_DAMPING)
+            trial_residual, _, _ = residual(self._kinematics.forward_kinematics(trial, self._frame))
+            trial_error = _half_square(trial_residual)
             gain = squared_error - trial_error
             if gain > 0.0:
-                q, way, squared_error = trial, trial_way, trial_error
+                q, error_vector, squared_error = trial, trial_residual, trial_error
                 factor *= 0.3
             else:
                 factor *= 4.0
-            if abs(gain) <= _LEAST_PROGRESS * squared_error:
+            if abs(gain) <= _MIN_RELATIVE_GAIN * squared_error:
                 break
         return q, steps
 
-    def _moved(self, q: Floats, way: tuple[float, ...], damping: float) -> Floats:
-        """The configuration after one step from q."""
+    def _step_from(self, q: Floats, error_vector: tuple[float, ...], damping: float) -> Floats:
+        """Return the configuration after one step from q."""
         if self._point is None:
             J = self._kinematics.jacobian(q, self._frame)
         else:
             J = self._kinematics.jacobian(q, self._frame, point=self._point)
         coordinates = self._coordinates
-        y = self._step(J[: len(way), coordinates.columns], way, coordinates.of(q), damping)
-        return coordinates.moved(q, y)
+        y = self._step(
+            J[: len(error_vector), coordinates.columns], error_vector, coordinates.values(q), damping
+        )
+        return coordinates.with_values(q, y)
 
 
 def _half_square(residual: tuple[float, ...]) -> float:

@@ -1,4 +1,4 @@
-"""`inverse_kinematics`: arguments checked, batches broadcast, a method chosen, the answer measured."""
+"""`inverse_kinematics`: checks arguments, broadcasts batches, runs a method and measures its result."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from numpy.typing import ArrayLike
 from dynx.errors import ArgumentError, ShapeError, shown
 from dynx.ik.residual import Residual
 from dynx.ik.result import IKResult
-from dynx.ik.search import Effort, Found, Kinematics, Search
+from dynx.ik.search import Candidate, Kinematics, Search, SearchLimits
 from dynx.ik.targets import checked_targets
 from dynx.model import Model
 from dynx.model.configuration import checked_q, checked_vector
 from dynx.spatial.scalar import Floats
 
 EngineSolver = Callable[[Floats, str, Floats], Floats]
-"""From a pose T_world_target (4, 4), a frame and q0 (nq,) to the engine's answer q (nq,)."""
+"""Function from a pose T_world_target (4, 4), a frame and q0 (nq,) to the engine's solution q (nq,)."""
 
 
 def inverse_kinematics(
@@ -35,33 +35,32 @@ def inverse_kinematics(
     rng: np.random.Generator | int | None = 0,
     method: str = "dynx",
 ) -> IKResult:
-    """The configuration within limits that brings `frame` to `target`.
+    """Find a configuration within limits that brings `frame` to `target`.
 
-    `target` is a pose T_world_target (..., 4, 4), or a position (..., 3) [m] with the rotation left
-    free. `q0` (..., nq) is where the search begins (what lies outside the limits is moved to them);
-    without it, it begins at random. Targets and q0 broadcast. `point` (3,) [m], in the axes of the
-    frame, is what is to reach the target's position instead of the frame's origin.
+    `target` is a pose T_world_target (..., 4, 4), or a position (..., 3) [m] with free rotation. The search
+    starts at `q0` (..., nq), moved into the limits, or at a random configuration if q0 is None. Targets and
+    q0 broadcast. `point` (3,) [m], in the axes of the frame, is the point that reaches the target position
+    instead of the origin of the frame.
 
-    A target counts as reached within `position_tolerance` [m] and `rotation_tolerance` [rad]. A start
-    is given up after `max_iterations` steps, or sooner if it stagnates; then the search begins again
-    at random, up to `max_restarts` times. `rng`, a seed or a generator, makes that repeatable: with
-    a seed (the default) equal calls give equal answers, and every sample of a batch the answer that
-    it would get alone.
+    A target counts as reached within `position_tolerance` [m] and `rotation_tolerance` [rad]. A start is
+    abandoned after `max_iterations` steps, or sooner if it stagnates; the search then restarts at a random
+    configuration, up to `max_restarts` times. `rng` is a seed or a generator. With a seed (the default) equal
+    calls return equal results, and each sample of a batch has the result that it has alone.
 
-    Only joints between the root and the frame move, and a floating base; the rest stay at q0 (or at
-    the neutral configuration). Angles that can turn a whole turn come out nearest to q0.
+    Only the joints between root and frame move, and a floating base; the others stay at q0 (or at the neutral
+    configuration). Angles whose range is a full turn are returned nearest to q0.
 
-    `method` is ``"dynx"`` (see `dynx.ik.search`) or ``"engine"``: the backend's own solver, alone.
-    Both answers are judged by forward kinematics: an unreached target is no error, but a result
-    with ``success`` False and the best q that was found.
+    `method` is ``"dynx"`` (see `dynx.ik.search`) or ``"engine"``: the backend's own solver, without restarts.
+    Both are judged by forward kinematics: a target that is not reached is no error, but a result with
+    `success` False and the best q found.
 
-    Raises UnknownNameError for the frame, ArgumentError (ShapeError, DTypeError, NotFiniteError)
-    for anything else that cannot be used, and for ``"engine"`` if the backend has no solver.
+    Raises UnknownNameError for the frame; ArgumentError (ShapeError, DTypeError, NotFiniteError) for an
+    invalid argument, and for method ``"engine"`` if the backend has no solver of its own.
     """
     model = kinematics.model
     model.frame_index(frame)
     targets = checked_targets(target)
-    effort = _checked_effort(position_tolerance, rotation_tolerance, max_iterations, max_restarts)
+    limits = _checked_limits(position_tolerance, rotation_tolerance, max_iterations, max_restarts)
     rng = _checked_rng(rng)
     at = None if point is None else checked_vector("point", point)
     start = _start(model, q0)
@@ -72,22 +71,22 @@ def inverse_kinematics(
             f"leading axes do not broadcast: target has {targets.batch}, q0 has {start.shape[:-1]}"
         ) from None
 
-    search = Search(kinematics, frame, at, effort)
+    search = Search(kinematics, frame, at, limits)
     if method == "dynx":
 
-        def solve(position: Floats, rotation: Floats | None, q: Floats) -> Found:
+        def solve(position: Floats, rotation: Floats | None, q: Floats) -> Candidate:
             return search.run(position, rotation, q, rng, begin_at_q0=q0 is not None)
 
     elif method == "engine":
-        ask = _engine_solver(kinematics, targets.rotations is None or at is not None)
+        engine_solve = _engine_solver(kinematics, targets.rotations is None or at is not None)
 
-        def solve(position: Floats, rotation: Floats | None, q: Floats) -> Found:
+        def solve(position: Floats, rotation: Floats | None, q: Floats) -> Candidate:
             T = np.eye(4)
             T[:3, :3], T[:3, 3] = rotation, position
-            answer = ask(T, frame, q)
-            # An engine that diverged has no answer; where it began is then the best there is.
-            within = search.within_limits(answer, q) if np.isfinite(answer).all() else q
-            return search.measured(within, Residual(position, rotation, None))
+            q_engine = engine_solve(T, frame, q)
+            # If the engine diverged, its start is the best configuration known.
+            within = search.within_limits(q_engine, q) if np.isfinite(q_engine).all() else q
+            return search.evaluate(within, Residual(position, rotation, None))
 
     else:
         raise ArgumentError(f"method is {shown(method)}; wanted 'dynx' or 'engine'")
@@ -109,7 +108,7 @@ def inverse_kinematics(
     return _result(found, batch, model.nq)
 
 
-def _result(found: list[Found], batch: tuple[int, ...], nq: int) -> IKResult:
+def _result(found: list[Candidate], batch: tuple[int, ...], nq: int) -> IKResult:
     return IKResult(
         q=np.array([one.q for one in found], dtype=np.float64).reshape(*batch, nq),
         success=np.array([one.success for one in found], dtype=np.bool_).reshape(batch),
@@ -121,7 +120,7 @@ def _result(found: list[Found], batch: tuple[int, ...], nq: int) -> IKResult:
 
 
 def _start(model: Model, q0: ArrayLike | None) -> Floats:
-    """q0, or the neutral configuration, within limits and with a quaternion of unit length."""
+    """Return q0, or the neutral configuration, moved into the limits and with a unit quaternion."""
     q = model.neutral() if q0 is None else checked_q(model, q0, "q0")
     q = np.minimum(np.maximum(q, model.lower), model.upper)
     if model.floating:
@@ -138,13 +137,13 @@ def _engine_solver(kinematics: Kinematics, restricted: bool) -> EngineSolver:
         )
     if restricted:
         raise ArgumentError("method 'engine' takes poses (..., 4, 4) of a frame only; use method 'dynx'")
-    ask: EngineSolver = solver
-    return ask
+    engine_solve: EngineSolver = solver
+    return engine_solve
 
 
-def _checked_effort(
+def _checked_limits(
     position_tolerance: float, rotation_tolerance: float, max_iterations: int, max_restarts: int
-) -> Effort:
+) -> SearchLimits:
     for name, tolerance in (
         ("position_tolerance", position_tolerance),
         ("rotation_tolerance", rotation_tolerance),
@@ -154,7 +153,7 @@ def _checked_effort(
     for name, count in (("max_iterations", max_iterations), ("max_restarts", max_restarts)):
         if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 0:
             raise ArgumentError(f"{name} is {shown(count)}; wanted a whole number, at least 0")
-    return Effort(
+    return SearchLimits(
         float(position_tolerance), float(rotation_tolerance), int(max_iterations), int(max_restarts)
     )
 

@@ -1,4 +1,4 @@
-"""What a frame is asked to reach: a pose, or the position of a point with the rotation left free."""
+"""Targets of inverse kinematics: a pose, or the position of a point with free rotation."""
 
 from __future__ import annotations
 
@@ -9,21 +9,21 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, ShapeError
-from dynx.model.configuration import TOO_LARGE, checked_entries, real_array
+from dynx.model.configuration import MAX_MAGNITUDE, checked_entries, real_array
 from dynx.spatial.scalar import Floats
 
-ORTHONORMALITY = 1e-6
-"""Largest entry of R'R - 1, and of the last row less (0, 0, 0, 1), in a pose that is accepted."""
+ORTHONORMALITY_TOLERANCE = 1e-6
+"""Largest accepted entry of R'R - 1, and of the last row minus (0, 0, 0, 1), in a pose."""
 
-_ROUNDED = 1e-12
-"""Above this departure from orthonormality (a pose in float32, say) the nearest rotation is taken."""
+_ROUNDING_TOLERANCE = 1e-12
+"""Deviation from orthonormality above which (a pose in float32, say) the nearest rotation is used."""
 
 
 @dataclass(frozen=True, eq=False)
 class Targets:
     """Poses or positions in world axes, with the leading axes `batch`.
 
-    `rotations` is None where only a position is asked for.
+    `rotations` is None if only positions are given.
     """
 
     positions: Floats  # (*batch, 3) [m]
@@ -31,16 +31,16 @@ class Targets:
 
     @property
     def batch(self) -> tuple[int, ...]:
-        """The leading axes."""
+        """Shape of the leading axes."""
         return self.positions.shape[:-1]
 
 
 def checked_targets(target: ArrayLike) -> Targets:
     """Read poses T_world_target (..., 4, 4) or positions (..., 3) [m].
 
-    A rotation that is orthonormal to 1e-6 only is replaced by the nearest rotation (Higham,
-    Matrix nearness problems, section 3). Raises ShapeError, DTypeError, NotFiniteError, or
-    ArgumentError for a matrix that is no rigid transform.
+    A rotation that is orthonormal only to 1e-6 is replaced by the nearest rotation (Higham, Matrix nearness
+    problems, section 3). Raises ShapeError, DTypeError, NotFiniteError, or ArgumentError for a matrix that is
+    not a rigid transform.
     """
     if (
         isinstance(target, np.ndarray)
@@ -58,11 +58,11 @@ def checked_targets(target: ArrayLike) -> Targets:
 
 
 def _is_rigid(T: list[list[float]]) -> bool:
-    """Whether one pose needs no further look; in floats, as array code would take ten times as long."""
+    """Return whether one pose is a rigid transform to rounding; on floats, ten times as fast as arrays."""
     a, b, c, bottom = T
-    if bottom != [0.0, 0.0, 0.0, 1.0] or not math.hypot(a[3], b[3], c[3]) < TOO_LARGE:
+    if bottom != [0.0, 0.0, 0.0, 1.0] or not math.hypot(a[3], b[3], c[3]) < MAX_MAGNITUDE:
         return False
-    departure = max(
+    deviation = max(
         abs(_dot(a, a) - 1.0),
         abs(_dot(b, b) - 1.0),
         abs(_dot(a, b)),
@@ -70,7 +70,7 @@ def _is_rigid(T: list[list[float]]) -> bool:
         abs(a[2] * b[0] - a[0] * b[2] - c[1]),
         abs(a[0] * b[1] - a[1] * b[0] - c[2]),
     )
-    return departure <= _ROUNDED
+    return deviation <= _ROUNDING_TOLERANCE
 
 
 def _dot(a: list[float], b: list[float]) -> float:
@@ -79,12 +79,12 @@ def _dot(a: list[float], b: list[float]) -> float:
 
 def _checked_rotations(T: Floats) -> Floats:
     R = T[..., :3, :3]
-    departure = np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max(axis=(-1, -2))
+    deviation = np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max(axis=(-1, -2))
     bottom = np.abs(T[..., 3, :] - (0.0, 0.0, 0.0, 1.0)).max(axis=-1)
-    _refuse(bottom > ORTHONORMALITY, "its last row is not (0, 0, 0, 1)")
-    _refuse(departure > ORTHONORMALITY, "its rotation is not orthonormal to 1e-6")
+    _refuse(bottom > ORTHONORMALITY_TOLERANCE, "its last row is not (0, 0, 0, 1)")
+    _refuse(deviation > ORTHONORMALITY_TOLERANCE, "its rotation is not orthonormal to 1e-6")
     _refuse(np.linalg.det(R) < 0.0, "its rotation has determinant -1 (a reflection)")
-    if (departure > _ROUNDED).any():
+    if (deviation > _ROUNDING_TOLERANCE).any():
         U, _, V_T = np.linalg.svd(R)
         R = U @ V_T
     return np.asarray(R)

@@ -17,13 +17,13 @@ if TYPE_CHECKING:
     from dynx.model.model import Model
 
 
-TOO_LARGE = 1e70
+MAX_MAGNITUDE = 1e70
 """Bound on the entries of an array: a moment is a product of two lengths, two speeds and a mass, and it
 must not overflow, or an engine would answer infinity or NaN and say nothing."""
 
 
 def checked_array(name: str, value: ArrayLike, length: int) -> Floats:
-    """`value` as float64 (..., length) of numbers below `TOO_LARGE`, or an error that says why not."""
+    """`value` as float64 (..., length) of numbers below `MAX_MAGNITUDE`, or an error that says why not."""
     array = real_array(name, value)
     if array.ndim == 0 or array.shape[-1] != length:
         raise ShapeError(f"{name} has shape {array.shape}; wanted (..., {length})")
@@ -54,16 +54,16 @@ def real_array(name: str, value: ArrayLike) -> Floats:
 
 
 def checked_entries(name: str, array: Floats) -> Floats:
-    """`array` itself, or an error that names an entry which is not finite or not below `TOO_LARGE`."""
+    """`array` itself, or an error that names an entry which is not finite or not below `MAX_MAGNITUDE`."""
     if not np.isfinite(array).all():
         where = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         raise NotFiniteError(
             f"{name}[{', '.join(map(str, where))}] is {array[where]}; wanted a finite number"
         )
-    if np.max(np.abs(array), initial=0.0) >= TOO_LARGE:
-        where = tuple(int(i) for i in np.argwhere(np.abs(array) >= TOO_LARGE)[0])
+    if np.max(np.abs(array), initial=0.0) >= MAX_MAGNITUDE:
+        where = tuple(int(i) for i in np.argwhere(np.abs(array) >= MAX_MAGNITUDE)[0])
         raise ArgumentError(
-            f"{name}[{', '.join(map(str, where))}] is {array[where]}; wanted less than {TOO_LARGE:g} "
+            f"{name}[{', '.join(map(str, where))}] is {array[where]}; wanted less than {MAX_MAGNITUDE:g} "
             "in size, for products of such numbers overflow"
         )
     return array
@@ -205,7 +205,7 @@ def clip(model: Model, q: ArrayLike) -> Floats:
 
 def _bounded(low: float, high: float, reach: float) -> tuple[float, float]:
     """Ends to draw between: those given, and within `reach` of 0 or of the one end where one is not."""
-    bounded_below, bounded_above = low > -TOO_LARGE, high < TOO_LARGE
+    bounded_below, bounded_above = low > -MAX_MAGNITUDE, high < MAX_MAGNITUDE
     if bounded_below and bounded_above:
         return low, high
     if not (bounded_below or bounded_above):

@@ -1,4 +1,4 @@
-"""Trajectories: where a robot is to be, how fast, and how fast that changes, at any time.
+"""Trajectories: desired position, velocity and acceleration of a robot as functions of time.
 
     from dynx import trajectory
 
@@ -7,15 +7,15 @@
     q, v, a = motion(np.arange(0.0, 2.0, 0.001))   # many: (n, nq), (n, nv), (n, nv)
     trajectory.check(model, motion)                # LimitError before anything moves
 
-Each function returns a `Trajectory`; docs/trajectories.md shows which is for what.
+Each function returns a `Trajectory`; docs/trajectories.md compares them.
 """
 
 from dynx.trajectory.base import Setpoint, Trajectory
+from dynx.trajectory.concatenation import concatenate
 from dynx.trajectory.cycloidal import cycloidal
 from dynx.trajectory.excitation import excitation
 from dynx.trajectory.identification import Identifiability
-from dynx.trajectory.joined import concatenate
-from dynx.trajectory.limits import check, violations
+from dynx.trajectory.limit_check import check, violations
 from dynx.trajectory.line import LineTrajectory, line
 from dynx.trajectory.polynomials import cubic, quintic
 from dynx.trajectory.rest_to_rest import s_curve, trapezoidal

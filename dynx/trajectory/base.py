@@ -1,4 +1,4 @@
-"""What a trajectory is: a motion that gives the setpoint q, v, a at any time, and stands still outside."""
+"""`Trajectory`: a motion that defines the setpoint q, v, a at any time, with the robot at rest outside it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from dynx.spatial.scalar import Floats
 
 
 class Setpoint(NamedTuple):
-    """Where a robot is to be, how fast, and how fast that is to change.
+    """Desired position, velocity and acceleration of a robot.
 
     `q` (nq,), `v` and `a` (nv,) for one time; (..., nq), (..., nv) for times (...,).
     """
@@ -27,21 +27,21 @@ class Setpoint(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Trajectory(ABC):
-    """A motion over ``0 <= t <= duration`` [s]: ``trajectory(t)`` is its `Setpoint`.
+    """A motion over ``0 <= t <= duration`` [s]: ``trajectory(t)`` returns its `Setpoint`.
 
-    `v` is the velocity and `a` the acceleration of dynx's contract: rates of the joints and, with a
-    floating base, linear and angular velocity of the base frame in its own axes, and their derivatives.
-    Where `a` jumps it is the value after the jump; at ``duration`` the value before.
+    `v` and `a` are velocity and acceleration as in all of dynx: rates of the joints and, with a floating
+    base, linear and angular velocity of the base frame in its own axes, and their time derivatives. Where `a`
+    jumps, its value is that after the jump; at ``duration``, that before it.
 
-    Before 0 and after `duration` the robot stands still at `start.q`, `end.q`. At both times the
-    setpoint is `start` or `end` exactly, with no rounding. Trajectories are never changed after they
-    are made, and pickle; evaluated for an array of times they give, bit for bit, what each time gives.
+    Before 0 and after `duration` the robot is at rest at `start.q` and `end.q`. At these two times the
+    setpoint is exactly `start` or `end`, without rounding. Trajectories are immutable and can be pickled;
+    evaluated for an array of times, the results equal those for each single time bit for bit.
 
-    A motion of your own is a subclass with `inside`.
+    To define your own motion, derive a class and implement `inside`.
     """
 
     duration: float
-    """How long it takes [s], more than 0."""
+    """Duration [s], greater than 0."""
     start: Setpoint
     """The setpoint at time 0."""
     end: Setpoint
@@ -67,17 +67,17 @@ class Trajectory(ABC):
 
     @abstractmethod
     def inside(self, t: Floats) -> Setpoint:
-        """The setpoints at times (n,) that lie in ``[0, duration]``; to be array code over the times."""
+        """Return the setpoints at times (n,) within ``[0, duration]``, by array code over the times."""
 
     def __call__(self, t: ArrayLike) -> Setpoint:
-        """The setpoint at a time, or at times (...,) [s].
+        """Return the setpoint at a time, or at times (...,) [s].
 
-        Raises DTypeError or NotFiniteError for what is no finite time.
+        Raises DTypeError or NotFiniteError for a time that is not a finite number.
         """
         times = checked_entries("t", real_array("t", t))
         flat = times.ravel()
         q, v, a = self.inside(np.clip(flat, 0.0, self.duration))
-        # Masked writing where it is needed only: most calls lie between the ends.
+        # Masks are applied only if needed: most calls lie between the ends.
         early, late = flat <= 0.0, flat >= self.duration
         if early.any() or late.any():
             q, v, a = np.array(q), np.array(v), np.array(a)
@@ -90,27 +90,29 @@ class Trajectory(ABC):
         return Setpoint(q.reshape(*shape, self.nq), v.reshape(*shape, self.nv), a.reshape(*shape, self.nv))
 
 
-SHORTEST, LONGEST = 1e-30, 1e30
-"""Bounds on a duration [s]: its fifth power must neither vanish nor overflow."""
+MIN_DURATION, MAX_DURATION = 1e-30, 1e30
+"""Bounds on a duration [s], so that its fifth power neither underflows nor overflows."""
 
 
 def checked_duration(duration: float) -> float:
-    """A time span [s] as a float, or an ArgumentError for what is not positive, or out of all proportion."""
+    """Return a duration [s] as a float; raise ArgumentError unless it is within the bounds."""
     number = isinstance(duration, int | float | np.number) and not isinstance(duration, bool)
     if not number or not 0.0 < duration < np.inf:
         raise ArgumentError(f"duration is {shown(duration)}; wanted a positive number of seconds")
-    if not SHORTEST <= duration <= LONGEST:
-        raise ArgumentError(f"duration is {duration:g}; wanted between {SHORTEST:g} and {LONGEST:g} s")
+    if not MIN_DURATION <= duration <= MAX_DURATION:
+        raise ArgumentError(
+            f"duration is {duration:g}; wanted between {MIN_DURATION:g} and {MAX_DURATION:g} s"
+        )
     return float(duration)
 
 
-def frozen(array: Floats) -> Floats:
-    """A copy of `array` that cannot be written to."""
+def read_only(array: Floats) -> Floats:
+    """Return a read-only copy of `array`."""
     copy = np.array(array, dtype=np.float64)
     copy.setflags(write=False)
     return copy
 
 
-def frozen_setpoint(q: Floats, v: Floats, a: Floats) -> Setpoint:
-    """A setpoint of copies that cannot be written to."""
-    return Setpoint(frozen(q), frozen(v), frozen(a))
+def read_only_setpoint(q: Floats, v: Floats, a: Floats) -> Setpoint:
+    """Return a setpoint of read-only copies."""
+    return Setpoint(read_only(q), read_only(v), read_only(a))

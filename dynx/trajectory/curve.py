@@ -1,7 +1,7 @@
-"""Curves: numbers that vary with time, and their first two derivatives, in closed form.
+"""Curves: vector functions of time and their first two derivatives, in closed form.
 
-A curve knows nothing of robots; `dynx.trajectory.displacement` makes motions of them. Evaluation is
-element by element: no matrix product, whose rounding would depend on how many times are asked for.
+A curve is independent of robots; `dynx.trajectory.displacement` turns curves into motions. Evaluation is
+element by element, without matrix products, whose rounding would depend on the number of times.
 """
 
 from __future__ import annotations
@@ -13,35 +13,35 @@ from dataclasses import dataclass
 import numpy as np
 
 from dynx.spatial.scalar import Floats
-from dynx.trajectory.base import frozen
+from dynx.trajectory.base import read_only
 
 
 class Curve(ABC):
-    """x(t), a function of time with k components."""
+    """A function x(t) of time with k components."""
 
     @property
     @abstractmethod
     def knots(self) -> Floats:
-        """Times (n,), ascending, between which the curve is smooth; its ends are the first and the last."""
+        """Times (n,), ascending, between which the curve is smooth; the first and the last are its ends."""
 
     @abstractmethod
     def __call__(self, t: Floats) -> tuple[Floats, Floats, Floats]:
-        """(x, dx/dt, d2x/dt2), each (n, k), at times (n,)."""
+        """Return (x, dx/dt, d2x/dt2), each (n, k), at times (n,)."""
 
 
 @dataclass(frozen=True, eq=False)
 class PiecewisePolynomial(Curve):
-    """In piece i, with s = t - breaks[i], x = sum over p of coefficients[i, p] s^p.
+    """Piecewise polynomial: in piece i, with s = t - breaks[i], x = sum over p of coefficients[i, p] s^p.
 
-    `breaks` (m + 1,) ascend; `coefficients` (m, degree + 1, k).
+    `breaks` (m + 1,) ascend; `coefficients` is (m, degree + 1, k).
     """
 
     breaks: Floats
     coefficients: Floats
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "breaks", frozen(self.breaks))
-        object.__setattr__(self, "coefficients", frozen(self.coefficients))
+        object.__setattr__(self, "breaks", read_only(self.breaks))
+        object.__setattr__(self, "coefficients", read_only(self.coefficients))
 
     @property
     def knots(self) -> Floats:
@@ -49,7 +49,7 @@ class PiecewisePolynomial(Curve):
         return self.breaks
 
     def __call__(self, t: Floats) -> tuple[Floats, Floats, Floats]:
-        """(x, dx/dt, d2x/dt2) by Horner's scheme; at a break, what the piece after it says."""
+        """Return (x, dx/dt, d2x/dt2) by Horner's scheme; at a break the piece after it applies."""
         piece = np.clip(np.searchsorted(self.breaks, t, side="right") - 1, 0, len(self.coefficients) - 1)
         s = (t - self.breaks[piece])[:, None]
         parts = [self.coefficients[piece, p] for p in range(self.coefficients.shape[1])]
@@ -62,20 +62,22 @@ class PiecewisePolynomial(Curve):
                 sums += term
         return x, v, a
 
-    def times(self, direction: Floats) -> PiecewisePolynomial:
-        """The curve x(t) `direction`, for a curve of one component and a direction (k,)."""
+    def along(self, direction: Floats) -> PiecewisePolynomial:
+        """Return the curve x(t) `direction`, for a curve of one component and a direction (k,)."""
         return PiecewisePolynomial(self.breaks, self.coefficients * direction)
 
 
-def one_polynomial(duration: float, *coefficients: Floats) -> PiecewisePolynomial:
-    """A single piece over [0, duration] with coefficients (k,) of s^0, s^1, ..."""
+def single_polynomial(duration: float, *coefficients: Floats) -> PiecewisePolynomial:
+    """Return a polynomial over [0, duration] with coefficients (k,) of s^0, s^1, ..."""
     return PiecewisePolynomial(np.array([0.0, duration]), np.stack(coefficients)[None])
 
 
-def from_phases(durations: Sequence[float], rates: Sequence[float], order: int) -> PiecewisePolynomial:
-    """A curve of one component from rest at 0 whose derivative of `order` is constant in each phase.
+def polynomial_from_phases(
+    durations: Sequence[float], rates: Sequence[float], order: int
+) -> PiecewisePolynomial:
+    """Return a curve of one component, from rest at 0, whose derivative of `order` is constant in each phase.
 
-    Phases of no duration are left out.
+    Phases of zero duration are left out.
     """
     breaks, pieces = [0.0], []
     state = [0.0] * order

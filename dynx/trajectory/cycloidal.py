@@ -1,4 +1,4 @@
-"""The cycloidal law: from rest to rest with a sine of acceleration, without a jump at the ends.
+"""Cycloidal motion from rest to rest, with a sinusoidal acceleration that is 0 at both ends.
 
     s(t) = t/T - sin(2 pi t/T) / (2 pi),   0 <= t <= T
 
@@ -14,30 +14,30 @@ from numpy.typing import ArrayLike
 
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
-from dynx.trajectory.base import Trajectory, checked_duration, frozen
+from dynx.trajectory.base import Trajectory, checked_duration, read_only
 from dynx.trajectory.curve import Curve
 from dynx.trajectory.displacement import checked_ends
 
 
 def cycloidal(q0: ArrayLike, q1: ArrayLike, duration: float, *, model: Model | None = None) -> Trajectory:
-    """From rest at `q0` to rest at `q1` (nq,) in `duration` [s]:
+    """Return the cycloidal motion from rest at `q0` to rest at `q1` (nq,) in `duration` [s]:
 
         q = q0 + (q1 - q0) (t/T - sin(2 pi t/T) / (2 pi))
 
-    The largest speed is 2 (q1 - q0) / T, halfway; the largest acceleration 2 pi (q1 - q0) / T^2, at T/4
-    and 3T/4. A robot with a floating base needs its `model`: the base moves along one screw, and
-    v, a are in its axes. A quaternion of q1 may come out with the other sign, which is the same attitude.
+    The largest speed is 2 (q1 - q0) / T, at T/2; the largest acceleration 2 pi (q1 - q0) / T^2, at T/4 and
+    3T/4. A robot with a floating base needs its `model`: the base moves along one screw axis, and v, a are in
+    its axes. The quaternion of q1 may be returned with the opposite sign, which is the same orientation.
 
-    Raises ArgumentError (ShapeError, DTypeError, NotFiniteError) for what cannot be used.
+    Raises ArgumentError (ShapeError, DTypeError, NotFiniteError) for invalid arguments.
     """
     ends = checked_ends(q0, q1, model)
     T = checked_duration(duration)
-    return ends.rest_to_rest(T, Cycloid(T, frozen(ends.displacement)))
+    return ends.rest_to_rest(T, Cycloid(T, read_only(ends.displacement)))
 
 
 @dataclass(frozen=True, eq=False)
 class Cycloid(Curve):
-    """`direction` (k,) times the cycloidal law over [0, duration]."""
+    """`direction` (k,) times the cycloidal motion law over [0, duration]."""
 
     duration: float
     direction: Floats
@@ -48,7 +48,7 @@ class Cycloid(Curve):
         return np.array([0.0, self.duration])
 
     def __call__(self, t: Floats) -> tuple[Floats, Floats, Floats]:
-        """The law and its exact derivatives, times the direction."""
+        """Return the motion law and its exact derivatives, times the direction."""
         T = self.duration
         part = t / T
         sine = np.sin(2.0 * np.pi * part)

@@ -1,11 +1,11 @@
-"""From one configuration to another: q0 moved along a curve of displacements.
+"""Motion of a configuration q0 along a curve of displacements.
 
     q(t) = q0 (+) x(t),  v = dx/dt,  a = d2x/dt2
 
-where (+) is `model.integrate`. For joints that is a sum. For a floating base the first six of x are
-always a multiple s(t) of one body twist d: the base moves along the screw exp(s d), and its velocity in
-its own axes is then exactly ds/dt d (Murray, Li and Sastry, A Mathematical Introduction to Robotic
-Manipulation, section 2.3).
+where (+) is `model.integrate`, a sum for joints. For a floating base the first six components of x are always
+a multiple s(t) of one body twist d: the base moves along the screw exp(s d), and its velocity in its own axes
+is then exactly ds/dt d (Murray, Li and Sastry, A Mathematical Introduction to Robotic Manipulation, section
+2.3).
 """
 
 from __future__ import annotations
@@ -19,24 +19,24 @@ from dynx.errors import ArgumentError, ShapeError
 from dynx.model import Model
 from dynx.model.configuration import checked_array, checked_entries, checked_q, real_array
 from dynx.spatial.scalar import Floats
-from dynx.trajectory.base import Setpoint, Trajectory, frozen_setpoint
+from dynx.trajectory.base import Setpoint, Trajectory, read_only_setpoint
 from dynx.trajectory.curve import Curve
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DisplacementTrajectory(Trajectory):
-    """`start.q` moved along a curve that begins at 0; `floating` is the model of a floating base."""
+    """`start.q` displaced along a curve that begins at 0; `floating` is the model if its base floats."""
 
     curve: Curve
     floating: Model | None = None
 
     @property
     def knots(self) -> Floats:
-        """Where the pieces of the curve meet."""
+        """The knots of the curve."""
         return self.curve.knots
 
     def inside(self, t: Floats) -> Setpoint:
-        """q0 (+) x and the derivatives of x."""
+        """Return q0 (+) x and the derivatives of x."""
         x, v, a = self.curve(t)
         q = self.start.q + x if self.floating is None else self.floating.integrate(self.start.q, x)
         return Setpoint(q, v, a)
@@ -44,7 +44,7 @@ class DisplacementTrajectory(Trajectory):
 
 @dataclass(frozen=True, eq=False)
 class Ends:
-    """Where a motion begins and ends, and the displacement (nv,) between: q1 = q0 (+) displacement."""
+    """Start and end of a motion, and the displacement (nv,) between them: q1 = q0 (+) displacement."""
 
     q0: Floats
     q1: Floats
@@ -58,20 +58,20 @@ class Ends:
 
     @property
     def floating(self) -> Model | None:
-        """The model if its base floats."""
+        """The model if its base floats, else None."""
         return self.model if self.model is not None and self.model.floating else None
 
     def name(self, k: int) -> str:
-        """What entry k of a velocity is called in a message."""
+        """Return the name of coordinate k of a velocity, for messages."""
         offset = 6 if self.floating is not None else 0
         if self.model is None or k < offset:
             return f"coordinate {k}"
         return f"joint '{self.model.joint_names[k - offset]}'"
 
     def velocity(self, name: str, value: ArrayLike | None) -> Floats:
-        """A velocity or an acceleration (nv,) at an end; zeros without one.
+        """Return a velocity or an acceleration (nv,) at an end, zeros if it is not given.
 
-        That of a floating base must be zero: its path is one screw, travelled from rest to rest.
+        The entries of a floating base must be zero: it moves along one screw axis from rest to rest.
         """
         if value is None:
             return np.zeros(self.nv)
@@ -85,28 +85,28 @@ class Ends:
     def trajectory(
         self, duration: float, curve: Curve, start: tuple[Floats, Floats], end: tuple[Floats, Floats]
     ) -> DisplacementTrajectory:
-        """The motion along `curve`, with (v, a) at its ends."""
+        """Return the motion along `curve`, with (v, a) at its ends."""
         q1 = self.q1
         if self.floating is not None:
-            # A quaternion and its negative are one attitude: take the one that the motion comes to.
+            # A quaternion and its negative are one orientation: take the one that the motion reaches.
             arrived = self.floating.integrate(self.q0, self.displacement)
             if np.dot(arrived[3:7], q1[3:7]) < 0.0:
                 q1 = np.concatenate([q1[:3], -q1[3:7], q1[7:]])
         return DisplacementTrajectory(
-            duration, frozen_setpoint(self.q0, *start), frozen_setpoint(q1, *end), curve, self.floating
+            duration, read_only_setpoint(self.q0, *start), read_only_setpoint(q1, *end), curve, self.floating
         )
 
     def rest_to_rest(self, duration: float, curve: Curve) -> DisplacementTrajectory:
-        """The motion along `curve`, with v and a zero at both ends."""
+        """Return the motion along `curve`, with v and a zero at both ends."""
         rest = np.zeros(self.nv), np.zeros(self.nv)
         return self.trajectory(duration, curve, rest, rest)
 
 
 def checked_ends(q0: ArrayLike, q1: ArrayLike, model: Model | None) -> Ends:
-    """Two configurations (nq,); without a model every coordinate is a joint's.
+    """Check two configurations (nq,); without a model every coordinate is a joint's.
 
-    Raises ShapeError, DTypeError, NotFiniteError, and ArgumentError for a quaternion that is not of
-    unit length.
+    Raises ShapeError, DTypeError, NotFiniteError, and ArgumentError for a quaternion that is not of unit
+    norm.
     """
     first, last = (configuration(name, q, model) for name, q in (("q0", q0), ("q1", q1)))
     if first.shape != last.shape:
@@ -116,7 +116,7 @@ def checked_ends(q0: ArrayLike, q1: ArrayLike, model: Model | None) -> Ends:
 
 
 def configuration(name: str, q: ArrayLike, model: Model | None) -> Floats:
-    """One configuration: (nq,) of the model, or of any length above 0 without one."""
+    """Check one configuration: (nq,) of the model, or of any length above 0 without a model."""
     if model is not None and not isinstance(model, Model):
         raise ArgumentError(f"model is of type {type(model).__name__}; wanted a Model or None")
     if model is None:

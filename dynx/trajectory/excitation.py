@@ -1,15 +1,15 @@
-"""Periodic motion that shows a robot's inertial parameters: a Fourier series that begins and ends at rest.
+"""Periodic excitation for identification: a Fourier series that starts and ends at rest.
 
     x_j(t) = sum over k of A_jk sin(k w t) + B_jk (cos(k w t) - 1),   w = 2 pi / T
 
-with sum k A_jk = 0 and sum k^2 B_jk = 0, so that position, velocity and acceleration are zero
-displacement and rest at t = 0 and, being periodic, at T (Swevers, Ganseman, Tükel, De Schutter and Van
-Brussel, Optimal robot excitation and identification, IEEE Trans. Robotics and Automation 13(5), 1997, with
-the conditions at the ends added). Coefficients are random; each joint is scaled until a limit is touched.
+with sum k A_jk = 0 and sum k^2 B_jk = 0, so that displacement, velocity and acceleration are zero at t = 0
+and, the series being periodic, at T (Swevers, Ganseman, Tükel, De Schutter and Van Brussel, Optimal robot
+excitation and identification, IEEE Trans. Robotics and Automation 13(5), 1997, with the conditions at the
+ends added). Coefficients are random; the motion of each joint is scaled until it reaches one of its limits.
 
-Limits are kept at all times and not only where they are looked at: a trigonometric polynomial of
-degree N whose size is at most r at M > 2 N evenly spaced points of its period is nowhere larger than
-r / cos(pi N / M) (Ehlich and Zeller, Schwankung von Polynomen zwischen Gitterpunkten, 1964).
+Limits hold at all times, not only at the evaluated ones: a trigonometric polynomial of degree N with
+magnitude at most r at M > 2 N evenly spaced points of its period is nowhere larger than r / cos(pi N / M)
+(Ehlich and Zeller, Schwankung von Polynomen zwischen Gitterpunkten, 1964).
 """
 
 from __future__ import annotations
@@ -23,22 +23,22 @@ from numpy.typing import ArrayLike
 from dynx.errors import ArgumentError, TrajectoryError, shown
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
-from dynx.trajectory.base import Trajectory, checked_duration, frozen
-from dynx.trajectory.bounds import ROUNDING, checked_bound
+from dynx.trajectory.base import Trajectory, checked_duration, read_only
 from dynx.trajectory.curve import Curve
 from dynx.trajectory.displacement import Ends, configuration
 from dynx.trajectory.identification import Identifiability
+from dynx.trajectory.motion_limits import LIMIT_MARGIN, checked_limit
 
-POINTS = 128
-"""Points for each harmonic at which the series is measured: its extremes are then known to 0.03 %."""
+POINTS_PER_HARMONIC = 128
+"""Points per harmonic at which the series is evaluated: its extremes are then known to 0.03 %."""
 
-REACH = {"prismatic": 1.0}
-"""How far [m] what has no limits goes from q0 at most; for angles it is pi [rad]."""
+DEFAULT_RANGE = {"prismatic": 1.0}
+"""Largest displacement [m] of a prismatic joint without limits from q0; for angles it is pi [rad]."""
 
 
 @dataclass(frozen=True, eq=False)
 class FourierSeries(Curve):
-    """x(t) as above; `sines` and `cosines` (N, k) are A and B, harmonic by harmonic."""
+    """The series x(t) of the module; `sines` and `cosines` (N, k) are A and B, harmonic by harmonic."""
 
     duration: float
     sines: Floats
@@ -50,11 +50,11 @@ class FourierSeries(Curve):
         return np.array([0.0, self.duration])
 
     def __call__(self, t: Floats) -> tuple[Floats, Floats, Floats]:
-        """The series and its derivatives, harmonic by harmonic."""
+        """Evaluate the series and its derivatives, harmonic by harmonic."""
         x, v, a = np.zeros((3, len(t), self.sines.shape[1]))
         for k, (A, B) in enumerate(zip(self.sines, self.cosines, strict=True), start=1):
             w = 2.0 * np.pi * k / self.duration
-            # The phase in turns is reduced first: w t for a late t would lose digits of the angle.
+            # Reduce the phase to one period first: w t for a large t would lose digits of the angle.
             phase = 2.0 * np.pi * np.remainder(k * (t / self.duration), 1.0)
             s, c, half = (f[:, None] for f in (np.sin(phase), np.cos(phase), np.sin(0.5 * phase)))
             x += A * s - 2.0 * B * (half * half)
@@ -75,29 +75,29 @@ def excitation(
     candidates: int = 1,
     backend: str = "pinocchio",
 ) -> Trajectory:
-    """One period of a random Fourier series around `q0` (nq,), from rest to rest there, in `duration` [s].
+    """Return one period of a random Fourier series around `q0` (nq,), from rest to rest, in `duration` [s].
 
-    `harmonics` (at least 3) are the multiples of 1 / duration [Hz] that it holds. Every joint goes as far
-    as a limit lets it: of position and velocity those of the model (`velocity` replaces the latter), and
-    `acceleration`, if given; one number or (nv,). `q0` is by default the middle of the position limits, 0 for
-    a joint that has none; such a joint goes at most pi [rad] or 1 m from there.
+    `harmonics` (at least 3) is the number of multiples of 1 / duration [Hz] in the series. The motion of
+    every joint is scaled until it reaches a limit: the model's limits of position and velocity (`velocity`
+    replaces the latter), and `acceleration`, if given; one number or (nv,). `q0` is by default the middle of
+    the position limits, or 0 for a joint without limits; such a joint moves at most pi [rad] or 1 m from
+    there.
 
-    Of `candidates` series that are drawn with `rng`, a seed or a generator, the one is taken whose samples
-    determine the inertial parameters best: that with the least condition number of the inertial regressor
-    (`dynx.trajectory.Identifiability`, by `backend`). Only for a fixed base.
+    Of `candidates` series drawn with `rng`, a seed or a generator, the one with the smallest condition number
+    of the inertial regressor is returned, since its samples determine the inertial parameters best
+    (`dynx.trajectory.Identifiability`, evaluated by `backend`). Only for a fixed base.
 
-    Raises ArgumentError for what cannot be used, TrajectoryError for a limit of 0 or a q0 that is not
-    between the limits.
+    Raises ArgumentError for invalid arguments, TrajectoryError for a limit of 0 or a q0 outside the limits.
     """
-    ends = _around(model, q0)
+    ends = _ends_around(model, q0)
     T = checked_duration(duration)
     for name, count, least in (("harmonics", harmonics, 3), ("candidates", candidates, 1)):
         if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < least:
             raise ArgumentError(f"{name} is {shown(count)}; wanted a whole number, at least {least}")
     generator = np.random.default_rng(rng)
-    bounds = _Room(ends, velocity, acceleration)
+    bounds = _MotionLimits(ends, velocity, acceleration)
     drawn = [
-        ends.rest_to_rest(T, bounds.filled(_random_series(generator, T, int(harmonics), ends.nv)))
+        ends.rest_to_rest(T, bounds.scale(_random_series(generator, T, int(harmonics), ends.nv)))
         for _ in range(candidates)
     ]
     if len(drawn) == 1:
@@ -106,56 +106,61 @@ def excitation(
         return min(drawn, key=measure.condition_number)
 
 
-class _Room:
-    """How far each joint may go from q0 either way, how fast, and how fast that may change."""
+class _MotionLimits:
+    """Limits of each joint's displacement from q0 in both directions, velocity and acceleration."""
 
     def __init__(self, ends: Ends, velocity: ArrayLike | None, acceleration: ArrayLike | None) -> None:
         model = ends.model
         assert model is not None
-        reach = np.array([REACH.get(joint.type, math.pi) for joint in model.coordinate_joints])
+        default_range = np.array(
+            [DEFAULT_RANGE.get(joint.type, math.pi) for joint in model.coordinate_joints]
+        )
         above, below = model.upper - ends.q0, ends.q0 - model.lower
-        self.above = np.where(np.isfinite(above), above, reach)
-        self.below = np.where(np.isfinite(below), below, reach)
+        self.above = np.where(np.isfinite(above), above, default_range)
+        self.below = np.where(np.isfinite(below), below, default_range)
         self.velocity = model.velocity_limit
         if velocity is not None:
-            self.velocity = checked_bound("velocity", velocity, ends.nv)
+            self.velocity = checked_limit("velocity", velocity, ends.nv)
         self.acceleration = np.full(ends.nv, np.inf)
         if acceleration is not None:
-            self.acceleration = checked_bound("acceleration", acceleration, ends.nv)
-        for name, room in (
+            self.acceleration = checked_limit("acceleration", acceleration, ends.nv)
+        for name, margin in (
             ("upper position", self.above),
             ("lower position", self.below),
             ("velocity", self.velocity),
             ("acceleration", self.acceleration),
         ):
-            shut = np.flatnonzero(~(room > 0.0))
-            if shut.size:
-                k = int(shut[0])
+            blocked = np.flatnonzero(~(margin > 0.0))
+            if blocked.size:
+                k = int(blocked[0])
                 raise TrajectoryError(
-                    f"{ends.name(k)} cannot move: at q0 = {ends.q0[k]:g} its {name} limit leaves {room[k]:g}"
+                    f"{ends.name(k)} cannot move: at q0 = {ends.q0[k]:g} its {name} limit leaves "
+                    f"{margin[k]:g}"
                 )
 
-    def filled(self, series: FourierSeries) -> FourierSeries:
-        """The series with each joint scaled until the first of its limits is touched."""
+    def scale(self, series: FourierSeries) -> FourierSeries:
+        """Return the series with each joint scaled until it reaches the first of its limits."""
         harmonics = len(series.sines)
-        points = POINTS * harmonics
+        points = POINTS_PER_HARMONIC * harmonics
         x, v, a = series(np.arange(0.0, points) * (series.duration / points))
-        growth = 1.0 / math.cos(math.pi * harmonics / points)
-        centre, radius = 0.5 * (x.max(axis=0) + x.min(axis=0)), 0.5 * growth * np.ptp(x, axis=0)
+        bound_factor = 1.0 / math.cos(math.pi * harmonics / points)
+        centre, radius = 0.5 * (x.max(axis=0) + x.min(axis=0)), 0.5 * bound_factor * np.ptp(x, axis=0)
         scale = np.min(
             [
                 self.above / (centre + radius),
                 self.below / (radius - centre),
-                self.velocity / (growth * np.abs(v).max(axis=0)),
-                self.acceleration / (growth * np.abs(a).max(axis=0)),
+                self.velocity / (bound_factor * np.abs(v).max(axis=0)),
+                self.acceleration / (bound_factor * np.abs(a).max(axis=0)),
             ],
             axis=0,
-        ) * (1.0 - ROUNDING)
-        return FourierSeries(series.duration, frozen(series.sines * scale), frozen(series.cosines * scale))
+        ) * (1.0 - LIMIT_MARGIN)
+        return FourierSeries(
+            series.duration, read_only(series.sines * scale), read_only(series.cosines * scale)
+        )
 
 
 def _random_series(rng: np.random.Generator, T: float, harmonics: int, nv: int) -> FourierSeries:
-    """Coefficients uniform on a sphere, but for the two conditions that hold at the ends."""
+    """Draw coefficients uniformly on a sphere within the subspace of the two conditions at the ends."""
     k = np.arange(1.0, harmonics + 1.0)[:, None]
     sines, cosines = rng.standard_normal((2, harmonics, nv)) / k
     for coefficients, weights in ((sines, k), (cosines, k * k)):
@@ -163,7 +168,7 @@ def _random_series(rng: np.random.Generator, T: float, harmonics: int, nv: int) 
     return FourierSeries(T, sines, cosines)
 
 
-def _around(model: Model, q0: ArrayLike | None) -> Ends:
+def _ends_around(model: Model, q0: ArrayLike | None) -> Ends:
     if not isinstance(model, Model):
         raise ArgumentError(f"model is of type {type(model).__name__}; wanted a Model")
     if model.floating or not model.nv:

@@ -1,8 +1,9 @@
-"""How well a motion shows the inertial parameters of a robot.
+"""Condition number of a motion for the identification of inertial parameters.
 
-Torque is linear in them, tau = Y pi; samples of a motion stacked give a least-squares problem whose
-condition number says by how much noise of the torque is magnified in the parameters (Swevers et al. 1997).
-Not all of them can be found from torques; those that can are as many as the rank of Y over all motions.
+Torque is linear in the parameters, tau = Y pi; the stacked samples of a motion form a least-squares problem
+whose condition number bounds how much the noise of the torque is amplified in the parameters (Swevers et al.
+1997). Only some linear combinations of parameters affect the torque; their number is the rank of Y over all
+motions.
 """
 
 from __future__ import annotations
@@ -18,13 +19,13 @@ from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Trajectory
 
 SAMPLES = 200
-"""Samples of a motion that are looked at."""
+"""Default number of samples of a motion."""
 
 
 class Identifiability:
-    """The condition number of the inertial regressor along motions of one robot.
+    """Condition number of the inertial regressor along motions of one robot.
 
-    To be closed after use, or used in a ``with`` statement, as the backend that it holds.
+    It holds a backend: close it after use, or use it in a ``with`` statement.
     """
 
     def __init__(self, model: Model, *, backend: str = "pinocchio", samples: int = SAMPLES) -> None:
@@ -35,28 +36,29 @@ class Identifiability:
         rng = np.random.default_rng(0)
         v, a = rng.standard_normal((2, SAMPLES, model.nv))
         Y = self._engine.inertial_regressor(model.random(rng, SAMPLES), v, a)
-        _, sizes, directions = np.linalg.svd(_stacked(Y), full_matrices=False)
-        # numpy.linalg.matrix_rank's bound; what can be shown is many orders of magnitude above it.
-        least = sizes[0] * max(SAMPLES * model.nv, Y.shape[-1]) * np.finfo(np.float64).eps
-        self.identifiable = int(np.sum(sizes > least))
+        _, singular_values, directions = np.linalg.svd(_stack_samples(Y), full_matrices=False)
+        # Bound of numpy.linalg.matrix_rank; identifiable combinations are many orders of magnitude above it.
+        least = singular_values[0] * max(SAMPLES * model.nv, Y.shape[-1]) * np.finfo(np.float64).eps
+        self.identifiable = int(np.sum(singular_values > least))
         """How many combinations of parameters torques can show at all."""
         self._combinations = directions[: self.identifiable].T
 
     def condition_number(self, trajectory: Trajectory) -> float:
-        """Largest over least singular value of Y at evenly spaced times, over what can be identified.
+        """Return the ratio of the largest to the smallest singular value of Y at evenly spaced times.
 
-        In SI units, with the ten parameters of each link about its frame (`Backend.inertial_regressor`);
-        infinity if the motion does not show all that can be shown.
+        Only identifiable combinations of parameters are considered. Units are SI, with the ten parameters of
+        each link about its frame (`Backend.inertial_regressor`). Returns infinity if the motion does not
+        excite all identifiable combinations.
         """
         model = self._engine.model
         if (trajectory.nq, trajectory.nv) != (model.nq, model.nv):
             raise ShapeError(f"the trajectory has nq {trajectory.nq}; {model.name} has {model.nq}")
         Y = self._engine.inertial_regressor(*trajectory(np.linspace(0.0, trajectory.duration, self._samples)))
-        shown_by = _stacked(Y) @ self._combinations
-        sizes = np.linalg.svd(shown_by, compute_uv=False)
-        if len(sizes) < self.identifiable or not sizes[-1] > 0.0:
+        regressor = _stack_samples(Y) @ self._combinations
+        singular_values = np.linalg.svd(regressor, compute_uv=False)
+        if len(singular_values) < self.identifiable or not singular_values[-1] > 0.0:
             return float("inf")
-        return float(sizes[0] / sizes[-1])
+        return float(singular_values[0] / singular_values[-1])
 
     def close(self) -> None:
         """Release the backend."""
@@ -74,6 +76,6 @@ class Identifiability:
         self.close()
 
 
-def _stacked(Y: Floats) -> Floats:
-    """The rows of all samples."""
+def _stack_samples(Y: Floats) -> Floats:
+    """Return the rows of all samples as one matrix."""
     return Y.reshape(-1, Y.shape[-1])

@@ -1,10 +1,10 @@
-"""Straight lines of a frame in space, followed by inverse kinematics.
+"""Straight-line motions of a frame in space, followed by inverse kinematics.
 
-The frame's origin goes straight, p(s) = p0 + s (p1 - p0), while its axes turn about one axis,
+The origin of the frame moves straight, p(s) = p0 + s (p1 - p0), while the frame rotates about one axis,
 R(s) = R0 exp(s log(R0' R1)), which is Shoemake's slerp (Lynch and Park, Modern Robotics, section 9.2.1).
-The configurations are solved for at evenly spaced s, each search beginning at the one before, and
-joined by a cubic spline q(s), which is C2. The spline is off the line between: how far is measured by forward
-kinematics, and the spacing halved until it is within the bounds.
+Configurations are solved for at evenly spaced s, each search starting at the previous solution, and are
+interpolated by a cubic spline q(s), which is C2. Between the solutions the spline deviates from the line: the
+deviation is measured by forward kinematics, and the spacing halved until it is within the bounds.
 """
 
 from __future__ import annotations
@@ -25,34 +25,35 @@ from dynx.spatial.se3 import homogeneous, pose_error
 from dynx.spatial.so3 import quat_exp, quat_from_rotation, quat_log, rotation_from_quat
 from dynx.trajectory.base import Trajectory
 from dynx.trajectory.curve import PiecewisePolynomial
-from dynx.trajectory.paced import PacedTrajectory, checked_law, paced
 from dynx.trajectory.polynomials import quintic
+from dynx.trajectory.time_scaling import TimeScaledTrajectory, checked_law, end_setpoints
 from dynx.trajectory.waypoints import spline_curve
 
-FEWEST, ENOUGH, MOST = 8, 256, 1024
-"""Intervals between solutions: to begin with; at which a place that is not reached counts as out of reach;
-to give up at."""
+MIN_INTERVALS, RELIABLE_INTERVALS, MAX_INTERVALS = 8, 256, 1024
+"""Numbers of intervals between solutions: the initial one; the one from which a failure of inverse kinematics
+counts as out of reach; the one at which the motion is given up.
+"""
 
-SOLVED = 1e-10
-"""Errors [m, rad] of each solution: its noise is divided by the square of an interval in the acceleration."""
+IK_TOLERANCE = 1e-10
+"""Tolerance [m, rad] of each solution; in the acceleration, its error is divided by the squared interval."""
 
-LEAST = 1e-9
-"""Least deviation [m, rad] that can be asked for: some times more than the errors of the solutions."""
+MIN_DEVIATION = 1e-9
+"""Smallest deviation [m, rad] that may be requested: a few times the errors of the solutions."""
 
-BETWEEN = 4
-"""Measurements of the deviation in each interval; a cubic is furthest off halfway or near it."""
+SAMPLES_PER_INTERVAL = 4
+"""Number of points per interval at which the deviation is measured; a cubic deviates most near the middle."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class LineTrajectory(PacedTrajectory):
-    """A straight line in space, with how well it is followed."""
+class LineTrajectory(TimeScaledTrajectory):
+    """A straight-line motion, with its measured deviation from the line."""
 
     deviation: float
-    """Largest distance of the frame's origin from its place on the line [m], as measured."""
+    """Largest measured distance of the frame origin from its position on the line [m]."""
     rotation_deviation: float
-    """Largest angle of its axes from theirs [rad], as measured; 0 where the rotation is free."""
+    """Largest measured rotation angle from the orientation on the line [rad]; 0 if the rotation is free."""
     intervals: int
-    """Pieces of the spline."""
+    """Number of pieces of the spline."""
 
 
 def line(
@@ -67,67 +68,69 @@ def line(
     rotation_deviation: float = 1e-5,
     backend: str | Backend = "pinocchio",
 ) -> LineTrajectory:
-    """From `q0` (nq,) with `frame` on a straight line to the pose `target`, T_world_target (4, 4).
+    """Return a motion from `q0` (nq,) that moves `frame` on a straight line to the pose `target`.
 
-    A position (3,) [m] as `target` leaves the rotation free. The search at each place begins at the
-    configuration before, so an arm with joints to spare takes the nearest.
+    `target` is T_world_target (4, 4), or a position (3,) [m], which leaves the rotation free. Each inverse
+    kinematics search starts at the previous configuration, so a redundant arm takes the nearest solution.
 
-    The law of motion along it is from rest to rest by a quintic in `duration` [s], or any trajectory
-    `law` of one coordinate from [0] to [1], such as ``trapezoidal([0], [1], velocity=0.5, acceleration=2)``:
-    its unit is the length of the line. The frame is at most `deviation` [m] and `rotation_deviation`
-    [rad] from where it should be at each moment; what was measured is in the trajectory. Joints that do
-    not move the frame stay at q0. Only for a fixed base.
+    The motion law s(t) (time scaling) along the line is a quintic from rest to rest in `duration` [s], or any
+    trajectory `law` of one coordinate from [0] to [1], such as ``trapezoidal([0], [1], velocity=0.5,
+    acceleration=2)``: its unit is the length of the line. The frame deviates at most `deviation` [m] and
+    `rotation_deviation` [rad] from the line at any time; the measured deviations are attributes of the
+    trajectory. Joints that do not move the frame stay at q0. Only for a fixed base.
 
-    Raises TrajectoryError with `at`, the part of the way (0 to 1) from which on no configuration within
-    limits is found next to the one before, or where the bounds are not met: there the arm is near a
-    singularity, or has to change its posture. ArgumentError for what cannot be used.
+    Raises TrajectoryError if beyond some fraction `at` (0 to 1) of the line no configuration within limits is
+    found near the previous one, or the bounds are not met: there the arm is near a singularity, or has to
+    change its posture. Raises ArgumentError for invalid arguments.
     """
     path = _Line(model, frame, q0, target, backend)
     if (law is None) == (duration is None):
         raise ArgumentError("wanted either a duration or a law, one of them")
-    pace = checked_law(law) if law is not None else quintic([0.0], [1.0], _given(duration))
+    motion_law = checked_law(law) if law is not None else quintic([0.0], [1.0], _given(duration))
     for name, bound in (("deviation", deviation), ("rotation_deviation", rotation_deviation)):
-        if not (isinstance(bound, int | float | np.number) and LEAST <= bound < np.inf):
-            raise ArgumentError(f"{name} is {shown(bound)}; wanted a number, at least {LEAST:g}")
-    with path.opened() as engine:
-        curve, n, off, turned = _refined(path, engine, deviation, rotation_deviation)
+        if not (isinstance(bound, int | float | np.number) and MIN_DEVIATION <= bound < np.inf):
+            raise ArgumentError(f"{name} is {shown(bound)}; wanted a number, at least {MIN_DEVIATION:g}")
+    with path.open_backend() as engine:
+        curve, n, off, angle = _refine(path, engine, deviation, rotation_deviation)
     q1 = curve(np.array([1.0]))[0][0]
-    start, end = paced(curve, pace, path.q0, q1)
-    return LineTrajectory(pace.duration, start, end, curve, pace, off, turned, n)
+    start, end = end_setpoints(curve, motion_law, path.q0, q1)
+    return LineTrajectory(motion_law.duration, start, end, curve, motion_law, off, angle, n)
 
 
-def _refined(
+def _refine(
     path: _Line, engine: Backend, deviation: float, rotation_deviation: float
 ) -> tuple[PiecewisePolynomial, int, float, float]:
-    """The spline within the bounds, its intervals, and its largest distance and angle from the line."""
-    n = FEWEST
+    """Return the spline within the bounds, its number of intervals, and its largest distance and angle
+    errors.
+    """
+    n = MIN_INTERVALS
     while True:
         try:
-            points = path.solved(engine, n)
+            points = path.solve(engine, n)
         except TrajectoryError:
-            # Further apart than that, the solution before may be too far away to begin at.
-            if n >= ENOUGH:
+            # With fewer intervals, the previous solution may be too far away as a start.
+            if n >= RELIABLE_INTERVALS:
                 raise
             n *= 2
             continue
         curve = spline_curve(np.linspace(0.0, 1.0, n + 1), points)
-        s, off, turned = path.deviations(engine, curve)
-        excess = np.maximum(off / deviation, turned / rotation_deviation)
+        s, off, angle = path.deviations(engine, curve)
+        excess = np.maximum(off / deviation, angle / rotation_deviation)
         worst = int(np.argmax(excess))
         if excess[worst] <= 1.0:
-            return curve, n, float(off.max()), float(turned.max())
+            return curve, n, float(off.max()), float(angle.max())
         n *= 2
-        if n > MOST:
+        if n > MAX_INTERVALS:
             raise TrajectoryError(
-                f"{shown(path.frame)} leaves the line by {off[worst]:.3g} m and {turned[worst]:.3g} rad at "
-                f"{s[worst]:.4f} of the way; near a singularity or a change of posture no smooth motion "
-                "of the joints follows it",
+                f"{shown(path.frame)} leaves the line by {off[worst]:.3g} m and {angle[worst]:.3g} rad at "
+                f"{s[worst]:.4f} of the way; near a singularity or a change of posture no smooth "
+                "joint motion follows it",
                 at=float(s[worst]),
             )
 
 
 class _Line:
-    """The straight line itself, and the configurations that follow it."""
+    """The straight line, and the configurations that follow it."""
 
     def __init__(
         self, model: Model, frame: str, q0: ArrayLike, target: ArrayLike, engine: str | Backend
@@ -143,41 +146,41 @@ class _Line:
         self.q0 = checked_q(model, q0, "q0")
         if self.q0.shape != (model.nq,):
             raise ShapeError(f"q0 has shape {self.q0.shape}; wanted ({model.nq},)")
-        goal = checked_targets(target)
-        if goal.batch:
+        targets = checked_targets(target)
+        if targets.batch:
             raise ShapeError(f"target has shape {np.shape(target)}; wanted a pose (4, 4) or a position (3,)")
-        self._outside()
+        self._require_start_within_limits()
         self._engine = engine
-        self._goal, self._turns = goal.positions, goal.rotations is not None
-        with self.opened() as kinematics:
+        self._target_position, self._has_rotation = targets.positions, targets.rotations is not None
+        with self.open_backend() as kinematics:
             T = kinematics.forward_kinematics(self.q0, frame)
-        self._origin, self._axes = T[:3, 3], T[:3, :3]
-        rotation = self._axes if goal.rotations is None else goal.rotations
-        self._turn = quat_log(quat_from_rotation(self._axes.T @ rotation))
+        self._start_position, self._start_rotation = T[:3, 3], T[:3, :3]
+        rotation = self._start_rotation if targets.rotations is None else targets.rotations
+        self._rotation_vector = quat_log(quat_from_rotation(self._start_rotation.T @ rotation))
 
-    def opened(self) -> AbstractContextManager[Backend]:
-        """The backend: the caller's own stays open."""
+    def open_backend(self) -> AbstractContextManager[Backend]:
+        """Return the backend as a context that leaves the caller's own backend open."""
         if isinstance(self._engine, Backend):
             return nullcontext(self._engine)
         return backend(self._engine, self.model)
 
     def poses(self, s: Floats) -> Floats:
-        """T_world_frame (n, 4, 4) on the line at s (n,)."""
-        p = self._origin + s[:, None] * (self._goal - self._origin)
-        R = self._axes @ rotation_from_quat(quat_exp(s[:, None] * self._turn))
+        """Return T_world_frame (n, 4, 4) on the line at s (n,)."""
+        p = self._start_position + s[:, None] * (self._target_position - self._start_position)
+        R = self._start_rotation @ rotation_from_quat(quat_exp(s[:, None] * self._rotation_vector))
         return homogeneous(R, p)
 
-    def solved(self, engine: Backend, n: int) -> Floats:
-        """Configurations (n + 1, nq) at evenly spaced places, from q0 on."""
+    def solve(self, engine: Backend, n: int) -> Floats:
+        """Return configurations (n + 1, nq) at evenly spaced s, starting with q0."""
         places = np.linspace(0.0, 1.0, n + 1)
         found = [self.q0]
         for s, T in zip(places[1:].tolist(), self.poses(places[1:]), strict=True):
             result = engine.inverse_kinematics(
-                T if self._turns else T[:3, 3],
+                T if self._has_rotation else T[:3, 3],
                 self.frame,
                 found[-1],
-                position_tolerance=SOLVED,
-                rotation_tolerance=SOLVED,
+                position_tolerance=IK_TOLERANCE,
+                rotation_tolerance=IK_TOLERANCE,
                 max_restarts=0,
             )
             if not result.success:
@@ -191,16 +194,18 @@ class _Line:
         return np.array(found)
 
     def deviations(self, engine: Backend, curve: PiecewisePolynomial) -> tuple[Floats, Floats, Floats]:
-        """Places between the solutions, with the distance [m] and the angle [rad] from the line there."""
+        """Return s at and between the solutions, with the distance [m] and the angle [rad] from the line
+        there.
+        """
         n = len(curve.coefficients)
-        s = np.linspace(0.0, 1.0, BETWEEN * n + 1)
+        s = np.linspace(0.0, 1.0, SAMPLES_PER_INTERVAL * n + 1)
         reached = engine.forward_kinematics(curve(s)[0], self.frame)
-        off, turned = pose_error(self.poses(s), reached)
-        angle = np.linalg.norm(turned, axis=-1) if self._turns else np.zeros(len(s))
+        off, angle = pose_error(self.poses(s), reached)
+        angle = np.linalg.norm(angle, axis=-1) if self._has_rotation else np.zeros(len(s))
         return s, np.linalg.norm(off, axis=-1), angle
 
-    def _outside(self) -> None:
-        """Refuse a start outside the limits, to which inverse kinematics would move it."""
+    def _require_start_within_limits(self) -> None:
+        """Raise TrajectoryError if q0 is outside the limits, into which inverse kinematics would move it."""
         wrong = np.flatnonzero((self.q0 < self.model.lower) | (self.q0 > self.model.upper))
         if wrong.size:
             k = int(wrong[0])

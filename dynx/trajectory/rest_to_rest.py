@@ -1,9 +1,9 @@
-"""The fastest way along a straight line in joint space, from rest to rest, under limits.
+"""Time-optimal motions along a straight line in joint space, from rest to rest, under limits.
 
-Every coordinate is a multiple of one scalar s(t) from 0 to 1, so the joints start together, stop
-together and stay on the line; the limits of s are the least over the joints. Closed forms of our own
-for the trapezoidal profile and the double S (the profiles of Biagiotti and Melchiorri, Trajectory Planning
-for Automatic Machines and Robots, sections 3.2 and 3.4, from rest to rest).
+Every coordinate is a multiple of one path parameter s(t) from 0 to 1, so the joints start together, stop
+together and stay on the line; each limit of s is the smallest over the joints. The trapezoidal profile and
+the double S have closed forms (profiles as in Biagiotti and Melchiorri, Trajectory Planning for Automatic
+Machines and Robots, sections 3.2 and 3.4, from rest to rest).
 """
 
 from __future__ import annotations
@@ -15,10 +15,16 @@ from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, TrajectoryError
 from dynx.model import Model
-from dynx.trajectory.base import LONGEST, SHORTEST, Trajectory, checked_duration
-from dynx.trajectory.bounds import ROUNDING, along_line, checked_bound, refuse_standstill, velocity_bound
-from dynx.trajectory.curve import PiecewisePolynomial, from_phases, one_polynomial
+from dynx.trajectory.base import MAX_DURATION, MIN_DURATION, Trajectory, checked_duration
+from dynx.trajectory.curve import PiecewisePolynomial, polynomial_from_phases, single_polynomial
 from dynx.trajectory.displacement import Ends, checked_ends
+from dynx.trajectory.motion_limits import (
+    LIMIT_MARGIN,
+    checked_limit,
+    require_motion,
+    scalar_limit,
+    velocity_limits,
+)
 
 
 def trapezoidal(
@@ -30,27 +36,27 @@ def trapezoidal(
     duration: float | None = None,
     model: Model | None = None,
 ) -> Trajectory:
-    """From rest at `q0` to rest at `q1`: constant acceleration, constant velocity, constant deceleration.
+    """Return a motion from rest at `q0` to rest at `q1` with a trapezoidal velocity profile.
 
-    `velocity` and `acceleration` are limits, one number or (nv,), infinity for none; without `velocity`
-    it is that of the `model`. The motion is the shortest on the straight line, so that some joint is at a
-    limit at any time, or takes `duration` [s] if that is longer (time is then stretched evenly). A
-    floating base needs the `model` and moves along one screw.
+    `velocity` and `acceleration` are limits, one number or (nv,), infinite for none; the default of
+    `velocity` is the limit of the `model`. The motion is the fastest on the straight line, so that some joint
+    is at a limit at any time, or it takes `duration` [s] if that is longer (time is then scaled uniformly). A
+    floating base needs the `model` and moves along one screw axis.
 
-    Raises ArgumentError for limits that are negative or bound nothing that moves, TrajectoryError for a
-    limit of 0 on what has to move and for a duration that is too short.
+    Raises ArgumentError for limits that are negative, or infinite for every moving joint; TrajectoryError for
+    a limit of 0 of a joint that has to move, and for a duration that is too short.
     """
     ends = checked_ends(q0, q1, model)
-    V = along_line("velocity", velocity_bound(velocity, ends), ends)
-    A = along_line("acceleration", checked_bound("acceleration", acceleration, ends.nv), ends)
+    V = scalar_limit("velocity", velocity_limits(velocity, ends), ends)
+    A = scalar_limit("acceleration", checked_limit("acceleration", acceleration, ends.nv), ends)
     if duration is None or ends.displacement.any():
-        refuse_standstill(ends)
-        _refuse_unbounded("acceleration", A)
+        require_motion(ends)
+        _require_finite("acceleration", A)
         rise = min(V / A, math.sqrt(1.0 / A))
-        top = A * rise
-        spans, rates = (rise, max(0.0, 1.0 / top - rise), rise), (A, 0.0, -A)
-        return _stretched(ends, spans, rates, 2, duration)
-    return _standing(ends, duration)
+        top_speed = A * rise
+        spans, rates = (rise, max(0.0, 1.0 / top_speed - rise), rise), (A, 0.0, -A)
+        return _trajectory_of_phases(ends, spans, rates, 2, duration)
+    return _stationary(ends, duration)
 
 
 def s_curve(
@@ -63,53 +69,54 @@ def s_curve(
     duration: float | None = None,
     model: Model | None = None,
 ) -> Trajectory:
-    """As `trapezoidal`, with the rate of the acceleration limited too (the double S, seven phases).
+    """Return a motion as `trapezoidal` does, with limited jerk in addition (the double S, seven phases).
 
-    `jerk` is a limit as the others are. The acceleration is continuous and 0 at both ends.
+    `jerk` is a limit like the others. The acceleration is continuous and 0 at both ends.
     """
     ends = checked_ends(q0, q1, model)
-    V = along_line("velocity", velocity_bound(velocity, ends), ends)
-    A = along_line("acceleration", checked_bound("acceleration", acceleration, ends.nv), ends)
-    J = along_line("jerk", checked_bound("jerk", jerk, ends.nv), ends)
+    V = scalar_limit("velocity", velocity_limits(velocity, ends), ends)
+    A = scalar_limit("acceleration", checked_limit("acceleration", acceleration, ends.nv), ends)
+    J = scalar_limit("jerk", checked_limit("jerk", jerk, ends.nv), ends)
     if duration is None or ends.displacement.any():
-        refuse_standstill(ends)
-        _refuse_unbounded("jerk", J)
-        # The time with jerk, of which the acceleration or the velocity may have enough, or the way.
-        bend = min(A / J, math.sqrt(V / J), (0.5 / J) ** (1.0 / 3.0))
-        # The time at constant acceleration: until the velocity is reached, or half the way is done.
-        reached = V / (J * bend) - bend
-        halfway = 0.5 * (math.sqrt(bend * bend + 4.0 / (J * bend)) - 3.0 * bend)
-        steady = max(0.0, min(reached, halfway))
-        top = J * bend * (bend + steady)
-        cruise = max(0.0, 1.0 / top - (2.0 * bend + steady))
-        spans = (bend, steady, bend, cruise, bend, steady, bend)
-        return _stretched(ends, spans, (J, 0.0, -J, 0.0, -J, 0.0, J), 3, duration)
-    return _standing(ends, duration)
+        require_motion(ends)
+        _require_finite("jerk", J)
+        # Duration of a jerk phase, limited by the acceleration, the velocity or the distance.
+        jerk_time = min(A / J, math.sqrt(V / J), (0.5 / J) ** (1.0 / 3.0))
+        # Duration of constant acceleration, until the velocity limit or half the distance is reached.
+        reached = V / (J * jerk_time) - jerk_time
+        halfway = 0.5 * (math.sqrt(jerk_time * jerk_time + 4.0 / (J * jerk_time)) - 3.0 * jerk_time)
+        constant_time = max(0.0, min(reached, halfway))
+        top_speed = J * jerk_time * (jerk_time + constant_time)
+        cruise_time = max(0.0, 1.0 / top_speed - (2.0 * jerk_time + constant_time))
+        spans = (jerk_time, constant_time, jerk_time, cruise_time, jerk_time, constant_time, jerk_time)
+        return _trajectory_of_phases(ends, spans, (J, 0.0, -J, 0.0, -J, 0.0, J), 3, duration)
+    return _stationary(ends, duration)
 
 
-def _stretched(
+def _trajectory_of_phases(
     ends: Ends, spans: tuple[float, ...], rates: tuple[float, ...], order: int, duration: float | None
 ) -> Trajectory:
-    """The motion of these phases, slowed down evenly to take `duration`."""
+    """Return the motion of these phases, slowed down uniformly to take `duration`."""
     shortest = sum(spans)
-    if not SHORTEST <= shortest <= LONGEST:
+    if not MIN_DURATION <= shortest <= MAX_DURATION:
         raise TrajectoryError(
-            f"within the limits it takes {shortest:g} s; wanted between {SHORTEST:g} and {LONGEST:g} s"
+            f"within the limits it takes {shortest:g} s; "
+            f"wanted between {MIN_DURATION:g} and {MAX_DURATION:g} s"
         )
     if duration is not None:
         T = checked_duration(duration)
-        if T / shortest < 1.0 - ROUNDING:
+        if T / shortest < 1.0 - LIMIT_MARGIN:
             raise TrajectoryError(f"duration is {T:g}; within the limits it takes at least {shortest:.9g} s")
         factor = max(1.0, T / shortest)
         spans = tuple(span * factor for span in spans)
         rates = tuple(rate / factor**order for rate in rates)
-    curve = from_phases(spans, rates, order).times(ends.displacement)
+    curve = polynomial_from_phases(spans, rates, order).along(ends.displacement)
     T = float(curve.breaks[-1]) if duration is None else T
     return _at_rest(ends, T, PiecewisePolynomial(np.append(curve.breaks[:-1], T), curve.coefficients))
 
 
 def _at_rest(ends: Ends, T: float, curve: PiecewisePolynomial) -> Trajectory:
-    """v is exactly 0 at both ends; a is that of the first and the last phase there."""
+    """Return the motion with v exactly 0 at both ends, and a of the first and the last phase there."""
     rest = np.zeros(ends.nv)
     change = 2.0 * curve.coefficients[0, 2]
     if curve.coefficients.shape[1] == 4:
@@ -117,11 +124,11 @@ def _at_rest(ends: Ends, T: float, curve: PiecewisePolynomial) -> Trajectory:
     return ends.trajectory(T, curve, (rest, change), (rest, -change))
 
 
-def _standing(ends: Ends, duration: float) -> Trajectory:
+def _stationary(ends: Ends, duration: float) -> Trajectory:
     T = checked_duration(duration)
-    return ends.rest_to_rest(T, one_polynomial(T, np.zeros(ends.nv)))
+    return ends.rest_to_rest(T, single_polynomial(T, np.zeros(ends.nv)))
 
 
-def _refuse_unbounded(name: str, bound: float) -> None:
+def _require_finite(name: str, bound: float) -> None:
     if bound == math.inf:
         raise ArgumentError(f"{name} is infinite for everything that moves; wanted a limit")

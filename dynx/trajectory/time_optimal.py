@@ -1,8 +1,8 @@
-"""The fastest motion between two states under limits of velocity, acceleration and jerk, by Ruckig.
+"""Time-optimal motion between two states under limits of velocity, acceleration and jerk, by Ruckig.
 
-Each joint takes its own jerk-limited profile, as slow as the slowest (Berscheid and Kröger, Jerk-limited
-real-time trajectory generation with arbitrary target states, RSS 2021). Ruckig is asked once; what it found
-is kept as polynomials, so that the trajectory is like any other and needs no Ruckig to be used.
+Each joint follows its own jerk-limited profile, synchronised to the slowest one (Berscheid and Kröger,
+Jerk-limited real-time trajectory generation with arbitrary target states, RSS 2021). Ruckig runs once; its
+result is stored as polynomials, so that evaluating the trajectory does not need Ruckig.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from numpy.typing import ArrayLike
 from dynx.errors import ArgumentError, NotInstalledError, TrajectoryError
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
-from dynx.trajectory.base import LONGEST, SHORTEST, Trajectory
-from dynx.trajectory.bounds import checked_bound, refuse_unusable, velocity_bound
+from dynx.trajectory.base import MAX_DURATION, MIN_DURATION, Trajectory
 from dynx.trajectory.curve import PiecewisePolynomial
 from dynx.trajectory.displacement import Ends, checked_ends
+from dynx.trajectory.motion_limits import checked_limit, require_positive_finite, velocity_limits
 
 Phase = tuple[float, tuple[float, float, float, float]]
-"""Duration [s], and position, velocity, acceleration and jerk at its beginning."""
+"""Duration [s], and position, velocity, acceleration and jerk at the start of the phase."""
 
 
 def time_optimal(
@@ -38,69 +38,75 @@ def time_optimal(
     a1: ArrayLike | None = None,
     model: Model | None = None,
 ) -> Trajectory:
-    """From the state (`q0`, `v0`, `a0`) to (`q1`, `v1`, `a1`) (nq,) as fast as the limits allow.
+    """Return the fastest motion from the state (`q0`, `v0`, `a0`) to (`q1`, `v1`, `a1`) within the limits.
 
-    `velocity`, `acceleration` and `jerk` are limits, one number or (nv,), above 0 and finite; without
-    `velocity` it is that of the `model`. v and a are 0 by default. The joints arrive together, but do not
-    stay on a straight line as with `s_curve`; no limit of position is looked at between the ends
-    (`dynx.trajectory.check` does). Only for a fixed base.
+    `velocity`, `acceleration` and `jerk` are limits, one number or (nv,), positive and finite; the default of
+    `velocity` is the limit of the `model`. v and a default to 0. The joints arrive together, but do not stay
+    on a straight line as with `s_curve`; position limits are not considered between the ends
+    (`dynx.trajectory.check` checks them). Only for a fixed base.
 
-    Raises NotInstalledError without the extra ``trajectory``, TrajectoryError where no such motion is
-    found (an end that is faster than the limits, say), ArgumentError for what cannot be used.
+    Raises NotInstalledError without the extra ``trajectory``, TrajectoryError if no such motion is found (for
+    example if an end exceeds the limits), ArgumentError for invalid arguments.
     """
     ends = checked_ends(q0, q1, model)
     if ends.floating is not None:
         raise ArgumentError(f"{ends.floating.name} has a floating base; use s_curve, which follows one screw")
     limits = {
-        "velocity": velocity_bound(velocity, ends),
-        "acceleration": checked_bound("acceleration", acceleration, ends.nv),
-        "jerk": checked_bound("jerk", jerk, ends.nv),
+        "velocity": velocity_limits(velocity, ends),
+        "acceleration": checked_limit("acceleration", acceleration, ends.nv),
+        "jerk": checked_limit("jerk", jerk, ends.nv),
     }
     for name, bound in limits.items():
-        refuse_unusable(name, bound, ends)
+        require_positive_finite(name, bound, ends)
     begin = ends.velocity("v0", v0), ends.velocity("a0", a0)
     finish = ends.velocity("v1", v1), ends.velocity("a1", a1)
-    _refuse_fast_ends(ends, limits, {"v0": begin[0], "a0": begin[1], "v1": finish[0], "a1": finish[1]})
-    found = _asked(ends, limits, begin, finish)
+    _require_ends_within_limits(
+        ends, limits, {"v0": begin[0], "a0": begin[1], "v1": finish[0], "a1": finish[1]}
+    )
+    found = _run_ruckig(ends, limits, begin, finish)
     duration = float(found.duration)
     if duration == 0.0:
-        raise ArgumentError("q0 and q1 are the same, at the same velocity; there is nothing to do")
-    if not SHORTEST <= duration <= LONGEST:
-        raise TrajectoryError(f"it takes {duration:g} s; wanted between {SHORTEST:g} and {LONGEST:g} s")
+        raise ArgumentError("q0 and q1 are the same, at the same velocity; no motion is needed")
+    if not MIN_DURATION <= duration <= MAX_DURATION:
+        raise TrajectoryError(
+            f"it takes {duration:g} s; wanted between {MIN_DURATION:g} and {MAX_DURATION:g} s"
+        )
     phases = [list(_phases(profile, duration)) for profile in found.profiles[0]]
     return ends.trajectory(duration, _common_breaks(phases, duration), begin, finish)
 
 
-def _asked(
+def _run_ruckig(
     ends: Ends, limits: dict[str, Floats], begin: tuple[Floats, Floats], finish: tuple[Floats, Floats]
 ) -> Any:
-    """Ruckig's trajectory, counted from q0."""
+    """Return Ruckig's trajectory, relative to q0."""
     try:
         import ruckig
     except ImportError as error:
         raise NotInstalledError(
             f"time_optimal needs Ruckig: pip install 'dynx[trajectory]' ({error})"
         ) from error
-    question = ruckig.InputParameter(ends.nv)
-    question.current_position, question.target_position = [0.0] * ends.nv, ends.displacement.tolist()
-    question.current_velocity, question.current_acceleration = (x.tolist() for x in begin)
-    question.target_velocity, question.target_acceleration = (x.tolist() for x in finish)
-    question.max_velocity = limits["velocity"].tolist()
-    question.max_acceleration = limits["acceleration"].tolist()
-    question.max_jerk = limits["jerk"].tolist()
-    answer = ruckig.Trajectory(ends.nv)
+    parameters = ruckig.InputParameter(ends.nv)
+    parameters.current_position, parameters.target_position = [0.0] * ends.nv, ends.displacement.tolist()
+    parameters.current_velocity, parameters.current_acceleration = (x.tolist() for x in begin)
+    parameters.target_velocity, parameters.target_acceleration = (x.tolist() for x in finish)
+    parameters.max_velocity = limits["velocity"].tolist()
+    parameters.max_acceleration = limits["acceleration"].tolist()
+    parameters.max_jerk = limits["jerk"].tolist()
+    trajectory = ruckig.Trajectory(ends.nv)
     try:
-        result = ruckig.Ruckig(ends.nv).calculate(question, answer)
+        result = ruckig.Ruckig(ends.nv).calculate(parameters, trajectory)
     except (ruckig.RuckigError, ValueError) as error:
-        # The second where the result is one of its numbers for failures that has no name.
+        # Ruckig raises ValueError if its result code has no name.
         raise TrajectoryError(f"Ruckig finds no motion between these states: {_first_line(error)}") from error
     if result not in (ruckig.Result.Working, ruckig.Result.Finished):
         raise TrajectoryError(f"Ruckig finds no motion between these states: {result}")
-    return answer
+    return trajectory
 
 
 def _phases(profile: Any, duration: float) -> Iterator[Phase]:
-    """The phases of one joint: braking into the limits, the seven of the profile, and rest to the end."""
+    """Yield the phases of one joint: braking into the limits, the seven of the profile, and rest until the
+    end.
+    """
     passed = 0.0
     for part in (profile.brake, profile):
         states = zip(part.t, part.p, part.v, part.a, part.j, strict=False)
@@ -114,7 +120,7 @@ def _phases(profile: Any, duration: float) -> Iterator[Phase]:
 
 
 def _common_breaks(phases: list[list[Phase]], duration: float) -> PiecewisePolynomial:
-    """All joints over the same pieces: the breaks of each are breaks of all."""
+    """Return the polynomials of all joints over common pieces, divided at the breaks of every joint."""
     own = [np.cumsum([0.0] + [span for span, _ in joint]) for joint in phases]
     breaks = np.unique(np.concatenate([np.minimum(times[:-1], duration) for times in own]))
     breaks = np.append(breaks[breaks < duration], duration)
@@ -134,7 +140,7 @@ def _common_breaks(phases: list[list[Phase]], duration: float) -> PiecewisePolyn
     return PiecewisePolynomial(breaks, np.transpose(np.array(columns), (2, 1, 0)))
 
 
-def _refuse_fast_ends(ends: Ends, limits: dict[str, Floats], states: dict[str, Floats]) -> None:
+def _require_ends_within_limits(ends: Ends, limits: dict[str, Floats], states: dict[str, Floats]) -> None:
     for name, value in states.items():
         quantity = "velocity" if name.startswith("v") else "acceleration"
         over = np.flatnonzero(np.abs(value) > limits[quantity])
@@ -146,7 +152,7 @@ def _refuse_fast_ends(ends: Ends, limits: dict[str, Floats], states: dict[str, F
             )
     V, J = limits["velocity"], limits["jerk"]
     for n, after in ((0, 1.0), (1, -1.0)):
-        # The velocity at which the acceleration can be 0: soonest after the beginning, latest before the end.
+        # Velocity when the acceleration is 0 for the first time after the start, or the last before the end.
         v, a = states[f"v{n}"], states[f"a{n}"]
         reached = v + after * 0.5 * a * np.abs(a) / J
         over = np.flatnonzero(np.abs(reached) > V)
@@ -154,7 +160,7 @@ def _refuse_fast_ends(ends: Ends, limits: dict[str, Floats], states: dict[str, F
             k = int(over[0])
             raise TrajectoryError(
                 f"v{n} = {v[k]:g} with a{n} = {a[k]:g} of {ends.name(k)} takes a velocity of {reached[k]:g} "
-                f"{'after it' if n == 0 else 'before it'}, beyond its limit, {V[k]:g}"
+                f"{'afterwards' if n == 0 else 'before'}, beyond its limit, {V[k]:g}"
             )
 
 

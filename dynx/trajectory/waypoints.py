@@ -1,4 +1,4 @@
-"""Splines through waypoints at given times, by SciPy, kept as piecewise polynomials."""
+"""Splines through waypoints at given times, computed by SciPy and stored as piecewise polynomials."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from dynx.errors import ArgumentError, ShapeError, shown
 from dynx.model.configuration import checked_entries, real_array
 from dynx.spatial.scalar import Floats
-from dynx.trajectory.base import Trajectory, frozen_setpoint
+from dynx.trajectory.base import Trajectory, read_only_setpoint
 from dynx.trajectory.curve import PiecewisePolynomial
 from dynx.trajectory.displacement import DisplacementTrajectory
 
@@ -28,20 +28,20 @@ def spline(
     v0: ArrayLike | None = None,
     v1: ArrayLike | None = None,
 ) -> Trajectory:
-    """Through `waypoints` (n, nq), n >= 2, at `times` (n,) [s] that ascend from 0.
+    """Return a spline through `waypoints` (n, nq), n >= 2, at `times` (n,) [s] that ascend from 0.
 
-    `kind` is ``"cubic"`` (continuous acceleration) or ``"quintic"`` (continuous snap). `end` says what
-    holds at the first and the last waypoint:
+    `kind` is ``"cubic"`` (continuous acceleration) or ``"quintic"`` (continuous snap). `end` is the condition
+    at the first and the last waypoint:
 
     - ``"clamped"``: velocities `v0` and `v1` (nq,), 0 by default, and for a quintic acceleration 0
     - ``"natural"``: acceleration 0, and for a quintic jerk 0
-    - ``"periodic"``: every derivative is the same at both, which must be the same waypoint; a cubic
-      needs 3 waypoints, a quintic 6
+    - ``"periodic"``: every derivative is equal at both, which must be the same waypoint; a cubic needs 3
+      waypoints, a quintic 6
 
-    Coordinates are splined one by one, so this is for a fixed base; a floating base goes from waypoint
-    to waypoint by `concatenate`. (de Boor, A Practical Guide to Splines, chapters IV and XIII.)
+    Each coordinate has its own spline, so this is for a fixed base; for a floating base, use `concatenate`.
+    (de Boor, A Practical Guide to Splines, chapters IV and XIII.)
 
-    Raises ArgumentError (ShapeError, DTypeError, NotFiniteError) for what cannot be used.
+    Raises ArgumentError (ShapeError, DTypeError, NotFiniteError) for invalid arguments.
     """
     points = checked_entries("waypoints", real_array("waypoints", waypoints))
     if points.ndim != 2 or len(points) < 2 or not points.shape[1]:
@@ -53,22 +53,22 @@ def spline(
         raise ArgumentError(f"end is {shown(end)}; wanted 'clamped', 'natural' or 'periodic'")
     begin, finish = (_end_velocity(name, v, end, points.shape[1]) for name, v in (("v0", v0), ("v1", v1)))
     if end == "periodic":
-        _refuse_open(points, kind)
+        _require_periodic(points, kind)
     curve = _cubic(breaks, points, end, begin, finish)
     if kind == "quintic":
         curve = _quintic(breaks, points, end, begin, finish)
-    return _as_trajectory(curve, kind, end, points, begin, finish)
+    return _trajectory_of_curve(curve, kind, end, points, begin, finish)
 
 
 def spline_curve(breaks: Floats, points: Floats) -> PiecewisePolynomial:
-    """The cubic spline through points (n, k) whose third derivative has no jump next to the ends."""
+    """Return the cubic spline through points (n, k) with not-a-knot end conditions."""
     from scipy.interpolate import CubicSpline
 
     return from_scipy(CubicSpline(breaks, points, bc_type="not-a-knot"))
 
 
 def from_scipy(polynomial: Any) -> PiecewisePolynomial:
-    """SciPy's PPoly of vectors (k,), which lists the highest power first."""
+    """Convert SciPy's PPoly of vectors (k,), which lists the highest power first."""
     return PiecewisePolynomial(polynomial.x, np.transpose(polynomial.c[::-1], (1, 0, 2)))
 
 
@@ -89,15 +89,15 @@ def _quintic(breaks: Floats, points: Floats, end: End, v0: Floats, v1: Floats) -
     elif end == "natural":
         conditions = ([(2, zero), (3, zero)], [(2, zero), (3, zero)])
     basis = make_interp_spline(breaks, points, k=5, bc_type=conditions)
-    # Its knots are the breaks, where the derivatives are those of the piece after each.
+    # The knots are the breaks; derivatives there are those of the following piece.
     taylor = [basis(breaks[:-1], nu=p) / math.factorial(p) for p in range(6)]
     return PiecewisePolynomial(breaks, np.stack(taylor, axis=1))
 
 
-def _as_trajectory(
+def _trajectory_of_curve(
     curve: PiecewisePolynomial, kind: Kind, end: End, points: Floats, v0: Floats, v1: Floats
 ) -> Trajectory:
-    """The trajectory with what is known of its ends put in without rounding."""
+    """Return the trajectory, with the values known exactly at its ends inserted without rounding."""
     duration = float(curve.breaks[-1])
     _, v, a = curve(np.array([0.0, duration]))
     if end == "clamped":
@@ -110,8 +110,8 @@ def _as_trajectory(
     coefficients[:, 0] = points[:-1] - points[0]
     return DisplacementTrajectory(
         duration,
-        frozen_setpoint(points[0], v[0], a[0]),
-        frozen_setpoint(points[-1], v[1], a[1]),
+        read_only_setpoint(points[0], v[0], a[0]),
+        read_only_setpoint(points[-1], v[1], a[1]),
         PiecewisePolynomial(curve.breaks, coefficients),
     )
 
@@ -122,11 +122,11 @@ def _checked_times(times: ArrayLike, count: int) -> Floats:
         raise ShapeError(f"times has shape {breaks.shape}; wanted ({count},), one for each waypoint")
     if breaks[0] != 0.0:
         raise ArgumentError(f"times[0] is {breaks[0]:g}; wanted 0, where a trajectory begins")
-    behind = np.flatnonzero(np.diff(breaks) <= 0.0)
-    if behind.size:
-        k = int(behind[0]) + 1
+    not_ascending = np.flatnonzero(np.diff(breaks) <= 0.0)
+    if not_ascending.size:
+        k = int(not_ascending[0]) + 1
         raise ArgumentError(
-            f"times[{k}] is {breaks[k]:g} after {breaks[k - 1]:g}; wanted times that ascend, none twice"
+            f"times[{k}] is {breaks[k]:g} after {breaks[k - 1]:g}; wanted strictly ascending times"
         )
     return breaks
 
@@ -142,7 +142,7 @@ def _end_velocity(name: str, value: ArrayLike | None, end: End, nq: int) -> Floa
     return array
 
 
-def _refuse_open(points: Floats, kind: Kind) -> None:
+def _require_periodic(points: Floats, kind: Kind) -> None:
     least = 3 if kind == "cubic" else 6
     if len(points) < least:
         raise ArgumentError(f"waypoints are {len(points)}; a periodic {kind} spline needs {least}")

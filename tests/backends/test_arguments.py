@@ -18,7 +18,7 @@ from dynx.errors import (
     ShapeError,
     UnknownNameError,
 )
-from dynx.model.configuration import TOO_LARGE
+from dynx.model.configuration import MAX_MAGNITUDE
 from dynx.spatial.scalar import Floats
 from tests.backends.robots import chain, motion
 
@@ -100,8 +100,8 @@ def test_a_quaternion_must_have_length_one(quaternion: tuple[float, ...]) -> Non
 
 
 def test_numbers_below_the_bound_are_taken_though_their_norm_is_above() -> None:
-    tau = np.full(3, 0.9 * TOO_LARGE)
-    assert np.linalg.norm(tau) > TOO_LARGE
+    tau = np.full(3, 0.9 * MAX_MAGNITUDE)
+    assert np.linalg.norm(tau) > MAX_MAGNITUDE
     assert ENGINE._arguments.v(tau) is tau
 
 

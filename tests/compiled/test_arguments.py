@@ -13,7 +13,7 @@ from dynx.compiled.backend import CompiledBackend
 from dynx.compiled.call import FEW
 from dynx.errors import ArgumentError, NotFiniteError, ShapeError, SingularMassMatrixError
 from dynx.model import Inertial, Joint, Link, Model, Pose
-from dynx.model.configuration import TOO_LARGE
+from dynx.model.configuration import MAX_MAGNITUDE
 from tests.backends.robots import chain
 from tests.compiled.robots import ROBOTS, made, state
 from tests.error_bounds import ErrorBounds, samples_at
@@ -26,7 +26,7 @@ def engine(request: pytest.FixtureRequest) -> CompiledBackend:
 
 @pytest.mark.parametrize("n", [None, 1, 9, FEW + 9])
 @pytest.mark.parametrize("which", [0, 1, 2])
-@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, TOO_LARGE, -2 * TOO_LARGE, 1e300])
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, MAX_MAGNITUDE, -2 * MAX_MAGNITUDE, 1e300])
 def test_a_bad_number_anywhere(engine: CompiledBackend, n: int | None, which: int, value: float) -> None:
     given = state(engine.model, () if n is None else (n,))
     given[which].reshape(-1)[-1] = value
@@ -39,7 +39,7 @@ def test_large_numbers_that_are_allowed() -> None:
     """The sum of their squares passes the bound on one number, but not that on its square."""
     model = chain(2)
     engine = made(model)
-    v = np.full((3, 2), 0.9 * TOO_LARGE)
+    v = np.full((3, 2), 0.9 * MAX_MAGNITUDE)
     for rows in (v, v[0], np.tile(v, (FEW, 1))):
         tau = engine.inverse_dynamics(0 * rows, 0 * rows, rows)
         assert np.isfinite(tau).all()

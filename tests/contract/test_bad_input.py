@@ -23,7 +23,7 @@ from dynx.errors import (
     UnknownBackendError,
     UnknownNameError,
 )
-from dynx.model.configuration import TOO_LARGE
+from dynx.model.configuration import MAX_MAGNITUDE
 from dynx.model.loading import load
 from tests.contract.conftest import Make
 from tests.contract.engine_calls import ENGINE_CALLS, EngineCall, State, random_state
@@ -75,7 +75,7 @@ def test_an_array_that_cannot_be_used(make: Make, engine_call: EngineCall, kind:
 def test_the_largest_numbers_that_are_taken_overflow_nothing(make: Make, engine_call: EngineCall) -> None:
     """A quaternion stays one; everything else is as large as the bound allows."""
     engine = make(FLOATING)
-    large = 0.99 * TOO_LARGE
+    large = 0.99 * MAX_MAGNITUDE
     q = FLOATING.neutral()
     q[:3], q[7:] = large, large
     v = np.full(FLOATING.nv, large)

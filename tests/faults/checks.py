@@ -8,11 +8,11 @@ CHECKS_FAULTS = (
     Fault(
         "ik_success_by_position_alone",
         "dynx.ik.search",
-        right="            position_error <= self._effort.position_tolerance\n"
-        "            and rotation_error <= self._effort.rotation_tolerance\n",
-        wrong="            position_error <= self._effort.position_tolerance\n",
+        right="            position_error <= self._limits.position_tolerance\n"
+        "            and rotation_error <= self._limits.rotation_tolerance\n",
+        wrong="            position_error <= self._limits.position_tolerance\n",
         test_file="tests/ik/test_solutions.py",
-        test="test_a_result_is_what_forward_kinematics_says_of_it",
+        test="test_reported_errors_equal_those_of_forward_kinematics",
     ),
     Fault(
         "ik_rotation_error_in_frame_axes",
@@ -20,7 +20,7 @@ CHECKS_FAULTS = (
         right="rotation_vector(self._rotation.dot(T_world_frame[:3, :3].T))",
         wrong="rotation_vector(T_world_frame[:3, :3].T.dot(self._rotation))",
         test_file="tests/ik/test_solutions.py",
-        test="test_what_is_reachable_within_limits_is_reached",
+        test="test_a_target_reachable_within_limits_is_reached",
     ),
     Fault(
         "ik_batch_starts_at_the_first_sample",
@@ -28,7 +28,7 @@ CHECKS_FAULTS = (
         right="starts = np.broadcast_to(start, (*batch, model.nq)).reshape(len(positions), model.nq)",
         wrong="starts = np.resize(np.ravel(start)[: model.nq], (len(positions), model.nq))",
         test_file="tests/ik/test_solutions.py",
-        test="test_a_batch_gives_what_its_samples_give_alone",
+        test="test_a_batch_equals_its_samples_solved_alone",
     ),
     Fault(
         "agreement_with_one_refusal",

@@ -1,4 +1,4 @@
-"""What cannot be used is refused by name; what is merely unusual has a sensible answer."""
+"""Invalid arguments raise errors that name them; unusual ones are handled."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def engine() -> Iterator[Backend]:
         (np.eye(4) * 1j, DTypeError, "complex"),
     ],
 )
-def test_targets_that_are_none(engine: Backend, target: Any, error: type[Exception], says: str) -> None:
+def test_invalid_targets_raise(engine: Backend, target: Any, error: type[Exception], says: str) -> None:
     with pytest.raises(error, match=says):
         engine.inverse_kinematics(target, "flange")
 
@@ -69,9 +69,7 @@ def test_targets_that_are_none(engine: Backend, target: Any, error: type[Excepti
         ({"method": "engine"}, ArgumentError),
     ],
 )
-def test_options_that_cannot_be_used(
-    engine: Backend, options: dict[str, Any], error: type[Exception]
-) -> None:
+def test_invalid_options_raise(engine: Backend, options: dict[str, Any], error: type[Exception]) -> None:
     with pytest.raises(error):
         engine.inverse_kinematics(np.eye(4), "flange", **options)
 
@@ -82,7 +80,7 @@ def test_axes_that_do_not_broadcast(engine: Backend) -> None:
 
 
 @pytest.mark.parametrize("frame", ["flang", None, 3, ["flange"]])
-def test_frames_that_are_not_there(engine: Backend, frame: Any) -> None:
+def test_unknown_frames_raise(engine: Backend, frame: Any) -> None:
     with pytest.raises(UnknownNameError):
         engine.inverse_kinematics(np.eye(4), frame)
 
@@ -136,7 +134,7 @@ def test_arguments_are_not_written_to(engine: Backend) -> None:
     np.testing.assert_array_equal(q_start, before[1])
 
 
-def test_without_effort_the_start_is_judged(engine: Backend) -> None:
+def test_with_zero_iterations_the_start_is_evaluated(engine: Backend) -> None:
     q_start = engine.model.random(1)
     result = engine.inverse_kinematics(np.eye(4), "flange", q_start, max_iterations=0, max_restarts=0)
     assert isinstance(result, IKResult)
@@ -146,14 +144,14 @@ def test_without_effort_the_start_is_judged(engine: Backend) -> None:
 
 
 @pytest.mark.skipif("pybullet" not in installed_backends(), reason="PyBullet is not installed")
-def test_the_engine_s_own_solver_is_judged_like_any_other() -> None:
+def test_the_engine_s_own_solver_is_evaluated_by_forward_kinematics() -> None:
     model = load(MODELS / "six_axis_arm.urdf")
     with backend("pybullet", model) as engine:
         targets = engine.forward_kinematics(model.random(0, 20), "flange")
         result = engine.inverse_kinematics(targets, "flange", method="engine", position_tolerance=1e-3)
         reached = engine.forward_kinematics(result.q, "flange")
         distance = np.linalg.norm(targets[:, :3, 3] - reached[:, :3, 3], axis=-1)
-        # Metres apart, measured twice: each rounds as the positions do.
+        # The positions are metres apart, so both distances carry their rounding.
         np.testing.assert_allclose(result.position_error, distance, rtol=0.0, atol=BAR)
         assert (result.q >= model.lower).all()
         assert (result.q <= model.upper).all()

@@ -1,4 +1,4 @@
-"""Angles whose range is more than a whole turn: within limits first, then nearest to the start."""
+"""Angles whose range exceeds 2 pi: within limits first, then nearest to the start."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from dynx.backends import backend
 from dynx.model import Joint, Limits, Link, Model, Pose
 
 REACH = 4.0
-"""Limit [rad] to either side: more than half a turn, less than a whole one."""
+"""Limit [rad] in both directions, between pi and 2 pi."""
 
 
 def wheel() -> Model:
@@ -22,7 +22,7 @@ def wheel() -> Model:
 
 
 @given(st.floats(-REACH, REACH), st.sampled_from((-3.9, -2.0, 2.0, 3.9)))
-def test_an_angle_that_would_pass_its_limit_comes_from_the_other_side(angle: float, start: float) -> None:
+def test_an_angle_beyond_its_limit_is_shifted_by_a_full_turn(angle: float, start: float) -> None:
     with backend("reference", wheel()) as engine:
         target = engine.forward_kinematics(np.array([angle]), "tip")
         result = engine.inverse_kinematics(target, "tip", np.array([start]))

@@ -17,7 +17,7 @@ UNLIMITED = Limits()
 
 
 def arm(limits: Limits = UNLIMITED) -> Model:
-    """Two links in the plane z = 0; the tip is at (L1 + L2, 0) when both angles are zero."""
+    """Build two links in the plane z = 0; the tip is at (L1 + L2, 0) when both angles are zero."""
     z = (0.0, 0.0, 1.0)
     return Model.build(
         "planar",
@@ -31,7 +31,7 @@ def arm(limits: Limits = UNLIMITED) -> Model:
 
 
 def elbow(distance: float) -> float:
-    """The magnitude of the elbow's angle when the tip is this far from the shoulder."""
+    """Return the magnitude of the elbow angle for this distance of the tip from the shoulder."""
     return float(np.arccos((distance**2 - L1**2 - L2**2) / (2.0 * L1 * L2)))
 
 
@@ -57,7 +57,7 @@ def test_a_reachable_position_has_the_angles_of_the_closed_form(name: str) -> No
 
 @pytest.mark.parametrize("bend", [0.0, np.pi])
 def test_the_edge_of_the_workspace_is_reached(bend: float) -> None:
-    """There the Jacobian is singular and both solutions meet."""
+    """At the edge the Jacobian is singular and the two solutions coincide."""
     with backend("pinocchio", arm()) as engine:
         target = engine.forward_kinematics(np.array([0.4, bend]), "tip")[:3, 3]
         assert engine.inverse_kinematics(target, "tip", [0.0, 1.0]).success

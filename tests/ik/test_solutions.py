@@ -1,4 +1,4 @@
-"""What every result must be, over random robots: honest, within limits, repeatable, local."""
+"""Properties of every result on random robots: correct errors, limits, repeatability, locality."""
 
 from __future__ import annotations
 
@@ -15,24 +15,24 @@ from dynx.testing.strategies import configurations, models, poses
 from tests.oracles.closed_form import MODELS
 
 TOLERANCE = 1e-6
-"""What `inverse_kinematics` is asked for by default [m, rad]."""
+"""Default tolerances of `inverse_kinematics` [m, rad]."""
 SIX_AXIS_ARM = load(MODELS / "six_axis_arm.urdf")
 SEVEN_AXIS_ARM = load(MODELS / "seven_axis_arm.urdf")
 
 
 def errors(T_world_target: Floats, T_world_frame: Floats) -> tuple[float, float]:
-    """Distance [m] and angle [rad], by another way than the solver's."""
+    """Return distance [m] and angle [rad], by other formulas than the solver's."""
     position, rotation = pose_error(T_world_target, T_world_frame)
     return float(np.linalg.norm(position)), float(np.linalg.norm(rotation))
 
 
 def same_error(measured: float, reported: float) -> bool:
-    """Equal but for the rounding of an angle near zero, where its cosine says nothing."""
+    """Return whether two errors agree, up to rounding of an angle near 0, where its cosine is insensitive."""
     return bool(abs(measured - reported) <= np.sqrt(np.finfo(float).eps))
 
 
 @given(st.data())
-def test_a_result_is_what_forward_kinematics_says_of_it(data: st.DataObject) -> None:
+def test_reported_errors_equal_those_of_forward_kinematics(data: st.DataObject) -> None:
     model = data.draw(models(max_links=6))
     frame = data.draw(st.sampled_from(model.frame_names))
     q_start = data.draw(configurations(model))
@@ -54,7 +54,7 @@ def test_a_result_is_what_forward_kinematics_says_of_it(data: st.DataObject) -> 
 
 
 @given(st.data())
-def test_a_start_on_the_target_is_the_answer(data: st.DataObject) -> None:
+def test_a_start_on_the_target_is_returned(data: st.DataObject) -> None:
     model = data.draw(models(max_links=6))
     frame = data.draw(st.sampled_from(model.frame_names))
     q = data.draw(configurations(model, within_limits=True))
@@ -62,7 +62,7 @@ def test_a_start_on_the_target_is_the_answer(data: st.DataObject) -> None:
         result = engine.inverse_kinematics(engine.forward_kinematics(q, frame), frame, q)
     assert result.success
     assert result.iterations == 0
-    # The quaternion of a floating base is brought to unit length.
+    # The quaternion of a floating base is normalised.
     np.testing.assert_allclose(result.q, model.clip(q), rtol=4 * np.finfo(float).eps, atol=0)
 
 
@@ -92,7 +92,7 @@ def _joints_above(model: Model, frame: str) -> np.ndarray[tuple[int, ...], np.dt
 
 
 @given(configurations(SEVEN_AXIS_ARM, within_limits=True))
-def test_what_is_reachable_within_limits_is_reached(q: Floats) -> None:
+def test_a_target_reachable_within_limits_is_reached(q: Floats) -> None:
     frame = SEVEN_AXIS_ARM.frame_names[-1]
     with backend("pinocchio", SEVEN_AXIS_ARM) as engine:
         target = engine.forward_kinematics(q, frame)
@@ -112,14 +112,14 @@ def test_a_start_near_a_solution_stays_near_it(seed: int) -> None:
         smallest = np.linalg.svd(engine.jacobian(near, frame), compute_uv=False)[-1]
         result = engine.inverse_kinematics(engine.forward_kinematics(q, frame), frame, near)
     assert result.success
-    # Newton's basin: the change of J over the distance must be small beside its least singular value.
+    # Newton's basin: the change of J must be small compared with its smallest singular value.
     if smallest > 0.05:
         assert result.restarts == 0
         assert np.abs(result.q - near).max() <= 0.1
 
 
 @given(st.integers(0, 2**32 - 1))
-def test_a_batch_gives_what_its_samples_give_alone(seed: int) -> None:
+def test_a_batch_equals_its_samples_solved_alone(seed: int) -> None:
     rng = np.random.default_rng(seed)
     frame = "flange"
     with backend("pinocchio", SIX_AXIS_ARM) as engine:
@@ -137,7 +137,7 @@ def test_a_batch_gives_what_its_samples_give_alone(seed: int) -> None:
 
 
 @given(st.integers(0, 2**32 - 1))
-def test_equal_seeds_give_equal_answers(seed: int) -> None:
+def test_equal_seeds_give_equal_results(seed: int) -> None:
     frame = "flange"
     with backend("pinocchio", SIX_AXIS_ARM) as engine:
         target = engine.forward_kinematics(SIX_AXIS_ARM.random(seed), frame)
@@ -149,7 +149,7 @@ def test_equal_seeds_give_equal_answers(seed: int) -> None:
 
 
 @given(configurations(SIX_AXIS_ARM, within_limits=True), st.integers(0, 2**32 - 1))
-def test_a_position_alone_and_a_point_of_the_frame(q: Floats, seed: int) -> None:
+def test_position_targets_and_points_of_the_frame(q: Floats, seed: int) -> None:
     frame = "flange"
     point = np.random.default_rng(seed).uniform(-0.2, 0.2, 3)
     with backend("pinocchio", SIX_AXIS_ARM) as engine:
@@ -170,7 +170,7 @@ def test_a_position_alone_and_a_point_of_the_frame(q: Floats, seed: int) -> None
 
 
 @given(st.data())
-def test_angles_come_out_nearest_to_the_start(data: st.DataObject) -> None:
+def test_angles_are_returned_nearest_to_the_start(data: st.DataObject) -> None:
     turns = [data.draw(st.integers(-3, 3)) for _ in range(2)]
     model = _two_turning_joints()
     q_start = 2.0 * np.pi * np.array(turns)
@@ -194,8 +194,8 @@ def _two_turning_joints() -> Model:
     )
 
 
-def test_a_joint_that_drives_others_is_not_turned_round() -> None:
-    """A whole turn of the driver is half a turn of its follower: another pose."""
+def test_a_joint_that_drives_others_is_not_shifted_by_a_turn() -> None:
+    """A full turn of the driver is half a turn of its follower, which is another pose."""
     limits = Limits(-4.0, 8.0)
     model = Model.build(
         "geared",
@@ -218,7 +218,7 @@ def test_a_joint_that_drives_others_is_not_turned_round() -> None:
 
 
 @given(st.integers(0, 2**32 - 1), poses())
-def test_a_floating_base_goes_anywhere(seed: int, target: Floats) -> None:
+def test_a_floating_base_reaches_any_pose(seed: int, target: Floats) -> None:
     model = SIX_AXIS_ARM.with_base("floating")
     q_start = model.random(seed)
     with backend("pinocchio", model) as engine:

@@ -1,4 +1,4 @@
-"""Trajectories of every kind, drawn: what all must keep is tested on all."""
+"""Hypothesis strategies for trajectories of every kind."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ REACH = np.array([0.4, -1.2, 1.5, -1.0, -1.57, 0.3])
 
 
 class Motion(NamedTuple):
-    """A trajectory with where it was told to begin and to end; `model` if its base floats."""
+    """A trajectory with its requested start and end; `model` if its base floats."""
 
     trajectory: Trajectory
     q0: Floats
@@ -32,23 +32,23 @@ class Motion(NamedTuple):
 
 
 def hundredths(low: float, high: float) -> st.SearchStrategy[float]:
-    """Numbers with two decimals: none so small that it underflows, and they shrink well."""
+    """Draw numbers with two decimals, which neither underflow nor shrink badly."""
     return st.integers(round(100 * low), round(100 * high)).map(lambda n: n / 100)
 
 
 def vectors(n: int, reach: float = 3.0) -> st.SearchStrategy[Floats]:
-    """Vectors (n,)."""
+    """Draw vectors (n,)."""
     return st.lists(hundredths(-reach, reach), min_size=n, max_size=n).map(np.array)
 
 
 def bounds(n: int) -> st.SearchStrategy[Floats]:
-    """Limits (n,) above 0."""
+    """Draw positive limits (n,)."""
     return st.lists(hundredths(0.1, 5.0), min_size=n, max_size=n).map(np.array)
 
 
 @st.composite
 def displacements(draw: Draw, n: int) -> tuple[Floats, Floats]:
-    """Two configurations (n,) that differ."""
+    """Draw two different configurations (n,)."""
     q0, way = draw(vectors(n)), draw(vectors(n))
     way[draw(st.integers(0, n - 1))] = draw(hundredths(0.1, 3.0))
     return q0, q0 + way
@@ -56,7 +56,7 @@ def displacements(draw: Draw, n: int) -> tuple[Floats, Floats]:
 
 @st.composite
 def in_given_time(draw: Draw) -> Motion:
-    """Cycloidal, cubic and quintic motions."""
+    """Draw cycloidal, cubic and quintic motions."""
     n = draw(st.integers(1, 3))
     q0, q1 = draw(displacements(n))
     duration = draw(hundredths(0.2, 5.0))
@@ -71,7 +71,7 @@ def in_given_time(draw: Draw) -> Motion:
 
 @st.composite
 def within_limits(draw: Draw) -> Motion:
-    """Trapezoidal and S-curve motions, as short as may be or slowed down."""
+    """Draw trapezoidal and S-curve motions, of the shortest or a longer duration."""
     n = draw(st.integers(1, 3))
     q0, q1 = draw(displacements(n))
     v, a, j = draw(bounds(n)), draw(bounds(n)), draw(bounds(n))
@@ -89,7 +89,7 @@ def within_limits(draw: Draw) -> Motion:
 
 @st.composite
 def through_waypoints(draw: Draw) -> Motion:
-    """Splines of every kind and end."""
+    """Draw splines of every kind and end condition."""
     n, count = draw(st.integers(1, 2)), draw(st.integers(6, 8))
     steps = draw(st.lists(hundredths(0.2, 2.0), min_size=count - 1, max_size=count - 1))
     points = np.array([draw(vectors(n)) for _ in range(count)])
@@ -105,7 +105,7 @@ def through_waypoints(draw: Draw) -> Motion:
 
 @st.composite
 def of_a_floating_base(draw: Draw) -> Motion:
-    """Motions along a screw."""
+    """Draw motions of a floating base along a screw axis."""
     model = floating()
     q0, q1 = model.random(draw(st.integers(0, 1000)), 2)
     joints = [0.0] * 6 + [1.0] * (model.nv - 6)
@@ -119,39 +119,39 @@ def of_a_floating_base(draw: Draw) -> Motion:
 
 @st.composite
 def one_after_another(draw: Draw) -> Motion:
-    """A motion from rest to rest, and another from there."""
+    """Draw two motions from rest to rest, concatenated."""
     one = draw(within_limits())
     q1 = one.q1 + draw(vectors(len(one.q1)))
     return Motion(trajectory.concatenate(one.trajectory, trajectory.cycloidal(one.q1, q1, 1.3)), one.q0, q1)
 
 
 def motions() -> st.SearchStrategy[Motion]:
-    """Any of them."""
+    """Draw a motion of any kind."""
     return st.one_of(
         in_given_time(),
         within_limits(),
         through_waypoints(),
         of_a_floating_base(),
         one_after_another(),
-        st.deferred(lambda: st.sampled_from(made_once())),
+        st.deferred(lambda: st.sampled_from(slow_motions())),
     )
 
 
 @lru_cache(maxsize=1)
 def ur5() -> Model:
-    """The arm of the examples."""
+    """Load the UR5."""
     return dynx.load("ur5")
 
 
 @lru_cache(maxsize=1)
 def floating() -> Model:
-    """Two joints on a base that floats."""
+    """Build a robot of two joints on a floating base."""
     return dynx.load("double_pendulum", base="floating")
 
 
 @lru_cache(maxsize=1)
-def made_once() -> tuple[Motion, ...]:
-    """The kinds that take longer to make: a line, an excitation and, with TOPP-RA, a path."""
+def slow_motions() -> tuple[Motion, ...]:
+    """Build the motions that take long to compute: a line, an excitation and, with TOPP-RA, a path."""
     with dynx.backend("pinocchio", ur5()) as engine:
         target = engine.forward_kinematics(REACH, "tool0") @ turned(0.5)
     target[:3, 3] += (0.05, 0.1, -0.1)
@@ -166,7 +166,7 @@ def made_once() -> tuple[Motion, ...]:
 
 
 def turned(angle: float) -> Floats:
-    """A turn about z, (4, 4)."""
+    """Return the rotation about z as a transform (4, 4)."""
     T = np.eye(4)
     c, s = np.cos(angle), np.sin(angle)
     T[:2, :2] = [[c, -s], [s, c]]

@@ -1,4 +1,4 @@
-"""One clear error for each thing that cannot be used."""
+"""Invalid arguments of every trajectory function, and their errors."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def test_durations(made: Any, duration: Any) -> None:
 @pytest.mark.parametrize("made", IN_TIME)
 @pytest.mark.parametrize("duration", [1e-31, 1e31])
 def test_durations_out_of_all_proportion(made: Any, duration: float) -> None:
-    """Whose powers would overflow; those just inside do not."""
+    """Durations whose powers would overflow raise; those just inside the bounds do not."""
     with pytest.raises(ArgumentError, match=r"wanted between 1e-30 and 1e\+30 s"):
         made([0.0], [1.0], duration)
     for possible in (1e-30, 1e30):
@@ -119,7 +119,7 @@ def test_models() -> None:
             ShapeError,
             r"velocity has shape \(3,\); wanted one number, or \(2,\)",
         ),
-        ({"velocity": None}, ArgumentError, "velocity is not given, nor a model"),
+        ({"velocity": None}, ArgumentError, "neither velocity nor a model"),
         ({"acceleration": "fast"}, DTypeError, "acceleration has dtype"),
         ({"duration": 0.1}, TrajectoryError, "duration is 0.1; within the limits it takes at least"),
         ({"duration": -1.0}, ArgumentError, "duration is '-1.0'; wanted a positive number"),
@@ -136,7 +136,7 @@ def test_a_trapezoid_needs_a_limit_of_acceleration() -> None:
         trajectory.trapezoidal([0.0], [1.0], velocity=1.0, acceleration=INF)
 
 
-def test_a_joint_that_need_not_move_may_have_no_speed() -> None:
+def test_a_joint_that_does_not_move_may_have_a_velocity_limit_of_0() -> None:
     motion = trajectory.trapezoidal([0.0, 1.0], [1.0, 1.0], velocity=[1.0, 0.0], acceleration=[1.0, 0.0])
     assert motion(0.5).q[1] == 1.0
 
@@ -159,7 +159,13 @@ def test_standing_still_takes_a_duration() -> None:
         ([0.0], [[0.0]], {}, ShapeError, r"waypoints has shape \(1, 1\); wanted \(n, nq\) with n at least 2"),
         ([0.0, 1.0], [0.0, 1.0], {}, ShapeError, r"waypoints has shape \(2,\)"),
         ([0.0, 1.0, 2.0], [[0.0], [1.0]], {}, ShapeError, r"times has shape \(3,\); wanted \(2,\)"),
-        ([0.0, 0.0], [[0.0], [1.0]], {}, ArgumentError, r"times\[1\] is 0 after 0; wanted times that ascend"),
+        (
+            [0.0, 0.0],
+            [[0.0], [1.0]],
+            {},
+            ArgumentError,
+            r"times\[1\] is 0 after 0; wanted strictly ascending",
+        ),
         ([0.0, -1.0], [[0.0], [1.0]], {}, ArgumentError, r"times\[1\] is -1 after 0"),
         ([1.0, 2.0], [[0.0], [1.0]], {}, ArgumentError, r"times\[0\] is 1; wanted 0"),
         ([0.0, NAN], [[0.0], [1.0]], {}, NotFiniteError, r"times\[1\] is nan"),
@@ -253,10 +259,10 @@ def test_excitations(options: dict[str, Any], error: type[DynxError], message: s
         (
             {"v0": [1.0], "a0": [1.0]},
             TrajectoryError,
-            "takes a velocity of 1.5 after it, beyond its limit, 1",
+            "takes a velocity of 1.5 afterwards, beyond its limit, 1",
         ),
-        ({"v1": [1.0], "a1": [-1.0]}, TrajectoryError, "takes a velocity of 1.5 before it, beyond its limit"),
-        ({"q1": [0.0]}, ArgumentError, "there is nothing to do"),
+        ({"v1": [1.0], "a1": [-1.0]}, TrajectoryError, "takes a velocity of 1.5 before, beyond its limit"),
+        ({"q1": [0.0]}, ArgumentError, "no motion is needed"),
     ],
 )
 def test_time_optimal(options: dict[str, Any], error: type[DynxError], message: str) -> None:

@@ -1,4 +1,4 @@
-"""Laws against their formulas, evaluated in 40 digits where that is simple."""
+"""Motion laws against their formulas, evaluated in 40 digits where that is simple."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ parts = st.floats(0.0, 1.0)
 
 @given(vectors(2), vectors(2), hundredths(0.1, 5.0), parts)
 def test_the_cycloidal_law(q0: Floats, q1: Floats, duration: float, part: float) -> None:
-    """To rounding: a few units in the last place of the largest value of each."""
+    """The law agrees to a few units in the last place of its largest value."""
     t = part * duration
     got = cycloidal(q0, q1, duration)(t)
     with mpmath.workdps(40):
@@ -38,7 +38,7 @@ def test_the_cycloidal_law(q0: Floats, q1: Floats, duration: float, part: float)
 
 
 def test_the_cycloid_of_the_tutorial() -> None:
-    """Half way at half time at twice the mean speed; the largest accelerations at the quarters."""
+    """At T/2 half the distance is covered at twice the mean speed; the acceleration peaks at T/4 and 3T/4."""
     motion = cycloidal(np.zeros(6), TUTORIAL, duration=2.0)
     q, v, a = motion([0.5, 1.0, 1.5])
     np.testing.assert_allclose(q[1], TUTORIAL / 2.0, rtol=4.0 * EPS)
@@ -50,7 +50,7 @@ def test_the_cycloid_of_the_tutorial() -> None:
 
 @given(vectors(2), vectors(2), vectors(2), vectors(2), hundredths(0.2, 5.0))
 def test_a_cubic_has_its_ends(q0: Floats, q1: Floats, v0: Floats, v1: Floats, duration: float) -> None:
-    """From inside: the polynomial and not what is stored of the ends."""
+    """Evaluates the polynomial itself, not the stored end setpoints."""
     motion = cubic(q0, q1, duration, v0=v0, v1=v1)
     for end, time, q, v in ((motion.start, 0.0, q0, v0), (motion.end, duration, q1, v1)):
         np.testing.assert_array_equal(end.q, q)
@@ -84,7 +84,7 @@ def test_rest_to_rest_polynomials() -> None:
 
 
 def test_a_trapezoid_in_closed_form() -> None:
-    """10 rad at 2 rad/s and 4 rad/s^2: 0.5 s up, 4.5 s steady, 0.5 s down."""
+    """10 rad at 2 rad/s and 4 rad/s^2: 0.5 s acceleration, 4.5 s constant velocity, 0.5 s deceleration."""
     motion = trapezoidal([0.0], [10.0], velocity=2.0, acceleration=4.0)
     assert motion.duration == pytest.approx(5.5, rel=1e-12)
     np.testing.assert_allclose(motion.knots, [0.0, 0.5, 5.0, 5.5], rtol=1e-12)
@@ -94,8 +94,8 @@ def test_a_trapezoid_in_closed_form() -> None:
     np.testing.assert_allclose(a[:, 0], [4.0, 0.0, 0.0, -4.0], rtol=1e-12)
 
 
-def test_a_short_way_is_a_triangle() -> None:
-    """Without a limit that is reached the top speed is sqrt(a d), halfway."""
+def test_a_short_distance_gives_a_triangular_profile() -> None:
+    """If the velocity limit is not reached, the largest speed is sqrt(a d), at T/2."""
     motion = trapezoidal([0.0], [1.0], velocity=np.inf, acceleration=4.0)
     assert motion.duration == pytest.approx(1.0, rel=1e-12)
     assert motion(0.5).v[0] == pytest.approx(2.0, rel=1e-12)
@@ -104,19 +104,19 @@ def test_a_short_way_is_a_triangle() -> None:
 @pytest.mark.parametrize(
     ("velocity", "acceleration", "duration"),
     [
-        # All seven phases: way / v + v / a + a / j.
+        # All seven phases: distance / v + v / a + a / j.
         (2.0, 4.0, 10.0 / 2.0 + 2.0 / 4.0 + 4.0 / 8.0),
-        # The acceleration is not reached: way / v + 2 sqrt(v / j).
+        # The acceleration limit is not reached: distance / v + 2 sqrt(v / j).
         (2.0, 100.0, 10.0 / 2.0 + 2.0 * math.sqrt(2.0 / 8.0)),
-        # Nor the velocity: 4 (way / 2 j)^(1/3).
+        # Nor is the velocity limit: 4 (distance / 2 j)^(1/3).
         (100.0, 100.0, 4.0 * (10.0 / 16.0) ** (1.0 / 3.0)),
         (np.inf, np.inf, 4.0 * (10.0 / 16.0) ** (1.0 / 3.0)),
-        # The acceleration is reached, the velocity is not: a/j + sqrt((a/j)^2 + 4 way / a).
+        # Only the acceleration limit is reached: a/j + sqrt((a/j)^2 + 4 distance / a).
         (100.0, 2.0, 2.0 / 8.0 + math.sqrt((2.0 / 8.0) ** 2 + 4.0 * 10.0 / 2.0)),
     ],
 )
 def test_the_durations_of_a_double_s(velocity: float, acceleration: float, duration: float) -> None:
-    """Biagiotti and Melchiorri, section 3.4.2, with a jerk of 8 over a way of 10."""
+    """Biagiotti and Melchiorri, section 3.4.2, with a jerk of 8 over a distance of 10."""
     motion = s_curve([0.0], [10.0], velocity=velocity, acceleration=acceleration, jerk=8.0)
     assert motion.duration == pytest.approx(duration, rel=1e-12)
     half = motion(0.5 * motion.duration)

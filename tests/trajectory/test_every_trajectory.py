@@ -1,4 +1,4 @@
-"""What every trajectory keeps, whatever its kind."""
+"""Properties that every kind of trajectory has."""
 
 from __future__ import annotations
 
@@ -14,30 +14,32 @@ from numpy.typing import ArrayLike
 from dynx.errors import DTypeError, DynxError, NotFiniteError
 from dynx.spatial.scalar import Floats
 from dynx.trajectory import Setpoint, Trajectory, cycloidal
-from tests.trajectory.motions import Motion, made_once, motions, of_a_floating_base, within_limits
+from tests.trajectory.motions import Motion, motions, of_a_floating_base, slow_motions, within_limits
 
 EPS = float(np.finfo(np.float64).eps)
 STEP = 1e-4
-"""Step of the differences [s]."""
+"""Step of central differences [s]."""
 
 parts_of_the_duration = st.lists(st.floats(-0.5, 1.5), min_size=1, max_size=40)
 
 
 def central_difference(motion: Motion, t: Floats) -> tuple[Floats, Floats]:
-    """Rates of change of q and of v over STEP to either side of t (n,)."""
+    """Return the central differences of q and v over STEP to either side of t (n,)."""
     before, after = motion.trajectory(t - STEP), motion.trajectory(t + STEP)
     way = after.q - before.q if motion.model is None else motion.model.difference(before.q, after.q)
     return way / (2.0 * STEP), (after.v - before.v) / (2.0 * STEP)
 
 
 def smooth_times(trajectory: Trajectory, parts: list[float]) -> Floats:
-    """Those times at which the motion is smooth over STEP to either side."""
+    """Return the times at which the motion is smooth over STEP to either side."""
     t = np.clip(parts, 0.0, 1.0) * trajectory.duration
     return np.asarray(t[np.abs(t[:, None] - trajectory.knots).min(axis=1) > 1.01 * STEP])
 
 
 def assert_derivatives(motion: Motion, parts: list[float]) -> None:
-    """A central difference of x is off by at most h/4 times the span of x'' over the step, and by rounding.
+    """Check v and a against central differences.
+
+    A central difference of x is off by at most h/4 times the span of x'' over the step, and by rounding.
 
     (x(t + h) - x(t - h)) / 2h - x'(t) is the mean over u in [0, h] of x'(t + u)/2 + x'(t - u)/2 - x'(t),
     and that is at most u/2 times the span of x''. The span is looked at in nine places and doubled.
@@ -64,31 +66,31 @@ def test_v_and_a_are_the_derivatives(motion: Motion, parts: list[float]) -> None
 
 
 @given(of_a_floating_base(), parts_of_the_duration)
-def test_so_they_are_on_a_floating_base(motion: Motion, parts: list[float]) -> None:
+def test_v_and_a_are_the_derivatives_on_a_floating_base(motion: Motion, parts: list[float]) -> None:
     assert_derivatives(motion, parts)
 
 
-def test_so_they_are_of_those_that_take_longer_to_make() -> None:
-    """Which are drawn too seldom, being two or three among thousands."""
-    assert len(made_once()) >= 2
-    for motion in made_once():
+def test_v_and_a_are_the_derivatives_of_the_slow_motions() -> None:
+    """These motions are fixed examples, too slow to be drawn at random."""
+    assert len(slow_motions()) >= 2
+    for motion in slow_motions():
         assert_derivatives(motion, np.linspace(0.01, 0.99, 301).tolist())
 
 
 @given(motions())
-def test_it_begins_and_ends_exactly_where_it_was_told_to(motion: Motion) -> None:
+def test_start_and_end_are_exactly_the_requested_ones(motion: Motion) -> None:
     made = motion.trajectory
     np.testing.assert_array_equal(made(0.0).q, motion.q0)
     end = made(made.duration).q
     if motion.model is not None and end[3:7] @ motion.q1[3:7] < 0.0:
-        # The other quaternion of the same attitude: the one that the motion comes to.
+        # The quaternion of opposite sign is the same orientation.
         end = np.concatenate([end[:3], -end[3:7], end[7:]])
     np.testing.assert_array_equal(end, motion.q1)
 
 
 @given(motions())
-def test_q_and_v_come_to_the_ends_without_a_jump(motion: Motion) -> None:
-    """Over a step from an end, q moves by what v says and v by what a says, to twice the span of each."""
+def test_q_and_v_are_continuous_at_the_ends(motion: Motion) -> None:
+    """Over a step from an end, q changes by v dt and v by a dt, to twice the variation of v and a."""
     made = motion.trajectory
     step = 1e-6 * made.duration
     for end, inner in ((0.0, step), (made.duration, made.duration - step)):
@@ -102,7 +104,7 @@ def test_q_and_v_come_to_the_ends_without_a_jump(motion: Motion) -> None:
 
 
 @given(motions(), st.floats(1e-12, 1e6))
-def test_outside_it_stands_still_at_its_ends(motion: Motion, beyond: float) -> None:
+def test_the_robot_is_at_rest_outside_the_duration(motion: Motion, beyond: float) -> None:
     made = motion.trajectory
     for t, end in ((-beyond, made.start), (made.duration * (1.0 + 2.0 * EPS) + beyond, made.end)):
         q, v, a = made(t)
@@ -112,7 +114,7 @@ def test_outside_it_stands_still_at_its_ends(motion: Motion, beyond: float) -> N
 
 
 @given(motions(), parts_of_the_duration)
-def test_many_times_give_bit_for_bit_what_each_gives(motion: Motion, parts: list[float]) -> None:
+def test_an_array_of_times_equals_single_times_bit_for_bit(motion: Motion, parts: list[float]) -> None:
     made = motion.trajectory
     t = np.array([*parts, 0.0, 1.0]) * made.duration
     together = made(t)
@@ -156,7 +158,7 @@ def test_a_trajectory_cannot_be_changed(motion: Motion) -> None:
     for array in (*made.start, *made.end):
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 1.0
-    # What is given out is the caller's own.
+    # Returned arrays are copies.
     for time in (0.0, 0.5 * made.duration):
         for array in made(time):
             array[...] = 99.0
@@ -169,12 +171,12 @@ def test_a_trajectory_cannot_be_changed(motion: Motion) -> None:
     ("t", "error"),
     [(np.nan, NotFiniteError), ([0.0, np.inf], NotFiniteError), ("now", DTypeError), (1j, DTypeError)],
 )
-def test_what_is_no_time_is_refused(t: ArrayLike, error: type[DynxError]) -> None:
+def test_invalid_times_raise(t: ArrayLike, error: type[DynxError]) -> None:
     with pytest.raises(error, match="t"):
         cycloidal([0.0], [1.0], 1.0)(t)
 
 
-def test_a_motion_of_your_own() -> None:
+def test_a_user_defined_trajectory() -> None:
     class Still(Trajectory):
         def inside(self, t: Floats) -> Setpoint:
             nothing = np.zeros((len(t), self.nv))

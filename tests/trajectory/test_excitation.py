@@ -1,4 +1,4 @@
-"""Excitation: harmonics only, at rest at its ends, inside every limit at all times, and informative."""
+"""Excitation: harmonics, rest at the ends, limits at all times, condition number."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from dynx.trajectory import Identifiability, Trajectory, cycloidal, excitation
 from tests.trajectory.motions import REACH, hundredths, ur5
 
 EPS = float(np.finfo(np.float64).eps)
-LOSS = 1.0 / np.cos(np.pi / 128.0) - 1.0
-"""What the bound between samples costs of a limit: 0.03 %."""
+MAX_LOSS = 1.0 / np.cos(np.pi / 128.0) - 1.0
+"""Fraction of a limit lost to the bound between samples, 0.03 %."""
 
 
 def slides(*limits: Limits) -> Model:
-    """Sliding joints in a row."""
+    """Build a chain of prismatic joints."""
     links = [Link(f"link{k}") for k in range(len(limits) + 1)]
     joints = [
         Joint(f"joint{k}", "prismatic", f"link{k}", f"link{k + 1}", limits=limit)
@@ -44,7 +44,7 @@ def robots(draw: st.DrawFn) -> Model:
     st.integers(0, 1000),
     st.one_of(st.none(), hundredths(0.2, 5.0)),
 )
-def test_limits_are_kept_and_each_joint_touches_one(
+def test_limits_hold_and_each_joint_reaches_one(
     model: Model, duration: float, harmonics: int, seed: int, acceleration: float | None
 ) -> None:
     motion = excitation(model, duration, harmonics=harmonics, rng=seed, acceleration=acceleration)
@@ -63,13 +63,13 @@ def test_limits_are_kept_and_each_joint_touches_one(
         ],
         axis=0,
     )
-    # Twice the loss, for the bound is about the middle of what was seen; and what 2000 times miss.
+    # Twice the loss, as the bound is about the middle of the range, plus what 2000 samples miss.
     missed = 0.5 * (2.0 * np.pi * harmonics / 2000.0) ** 2
-    assert (touched >= 1.0 - 2.0 * LOSS - missed).all()
+    assert (touched >= 1.0 - 2.0 * MAX_LOSS - missed).all()
 
 
 @given(robots(), hundredths(0.5, 20.0), st.integers(3, 7), st.integers(0, 1000))
-def test_it_begins_and_ends_at_rest_and_holds_its_harmonics_alone(
+def test_rest_at_the_ends_and_only_the_stated_harmonics(
     model: Model, duration: float, harmonics: int, seed: int
 ) -> None:
     motion = excitation(model, duration, harmonics=harmonics, rng=seed)
@@ -92,8 +92,8 @@ def test_equal_seeds_give_equal_motions() -> None:
     assert not np.array_equal(at(5), at(6))
 
 
-def test_of_several_the_best_is_taken() -> None:
-    """By the condition number that `Identifiability` gives, which is that of the stacked regressor."""
+def test_the_best_candidate_is_returned() -> None:
+    """The best has the smallest condition number of the stacked regressor."""
     model = dynx.load("planar_2r")
     with Identifiability(model) as measure:
         rng = np.random.default_rng(3)
@@ -115,14 +115,14 @@ def test_the_condition_number_is_that_of_the_regressor(seed: int) -> None:
     motion = excitation(ur5(), 10.0, q0=REACH, rng=seed)
     sizes = np.linalg.svd(stacked_regressor(ur5(), motion), compute_uv=False)
     with Identifiability(ur5()) as measure:
-        # UR5's base parameters are 36 (Khalil and Dombre: 10 n less 3 a joint, and those of the first).
+        # UR5 has 36 base parameters (Khalil and Dombre: 10 n minus 3 per joint, minus those of the first).
         assert measure.identifiable == 36
         wanted = sizes[0] / sizes[35]
-        # The two are computed from matrices that differ by rounding, so by that times the number itself.
+        # The matrices differ by rounding, which the condition number amplifies.
         assert measure.condition_number(motion) == pytest.approx(wanted, rel=1e4 * EPS * wanted)
 
 
-def test_what_stands_still_shows_less() -> None:
+def test_a_constant_configuration_is_less_informative() -> None:
     model = dynx.load("planar_2r")
     q = np.zeros(model.nq)
     with Identifiability(model) as measure:

@@ -1,4 +1,4 @@
-"""Profiles under limits: never beyond one, always at one, all joints together, and no slower than need be."""
+"""Profiles under limits: never beyond a limit, always at one, synchronised, and time-optimal."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 
 from dynx.spatial.scalar import Floats
 from dynx.trajectory import Trajectory, s_curve, time_optimal, time_optimal_path, trapezoidal
-from dynx.trajectory.paced import PacedTrajectory
+from dynx.trajectory.time_scaling import TimeScaledTrajectory
 from tests.examples import one_robot
 from tests.trajectory.motions import bounds, displacements, floating, hundredths
 
-TOUCHED = 1e-12
-"""What is planned at a limit is this part of it below at most: 64 units of rounding, and those of a sum."""
+MAX_GAP = 1e-12
+"""Largest relative gap between a planned value and its limit: 64 units of rounding, and those of a sum."""
 
 Limits = tuple[Floats, Floats, Floats]
 
@@ -27,7 +27,7 @@ def problems(draw: st.DrawFn) -> tuple[Floats, Floats, Limits]:
 
 
 def times(motion: Trajectory) -> Floats:
-    """Close times, and every knot from both sides."""
+    """Return closely spaced times, and both sides of every knot."""
     knots = motion.knots
     even = np.linspace(0.0, motion.duration, 301)
     every = np.concatenate([even, knots, np.nextafter(knots, -1.0)])
@@ -35,7 +35,7 @@ def times(motion: Trajectory) -> Floats:
 
 
 def jerks(motion: Trajectory) -> Floats:
-    """The jerk in every piece with a length, where it is constant: from the change of a over its middle."""
+    """Return the constant jerk of every piece, from the change of a over its middle."""
     begin, length = motion.knots[:-1], np.diff(motion.knots)
     begin, length = begin[length > 1e-6], length[length > 1e-6]
     first, last = motion(begin + 0.25 * length).a, motion(begin + 0.75 * length).a
@@ -43,7 +43,7 @@ def jerks(motion: Trajectory) -> Floats:
 
 
 @given(problems())
-def test_a_trapezoid_keeps_its_limits_and_touches_one_at_any_time(
+def test_a_trapezoid_respects_its_limits_and_is_at_one_at_any_time(
     problem: tuple[Floats, Floats, Limits],
 ) -> None:
     q0, q1, (velocity, acceleration, _) = problem
@@ -54,11 +54,11 @@ def test_a_trapezoid_keeps_its_limits_and_touches_one_at_any_time(
     middles = 0.5 * (motion.knots[1:] + motion.knots[:-1])[np.diff(motion.knots) > 1e-6]
     _, v, a = motion(middles)
     part = np.maximum(np.abs(v) / velocity, np.abs(a) / acceleration).max(axis=1)
-    assert (part >= 1.0 - TOUCHED).all()
+    assert (part >= 1.0 - MAX_GAP).all()
 
 
 @given(problems())
-def test_a_double_s_keeps_its_limits_and_touches_one_at_any_time(
+def test_a_double_s_respects_its_limits_and_is_at_one_at_any_time(
     problem: tuple[Floats, Floats, Limits],
 ) -> None:
     q0, q1, (velocity, acceleration, jerk) = problem
@@ -75,12 +75,12 @@ def test_a_double_s_keeps_its_limits_and_touches_one_at_any_time(
     _, v, a = motion(middles)
     part = np.maximum(np.abs(v) / velocity, np.abs(a) / acceleration)
     part = np.maximum(part, (np.abs(rates) + noise) / jerk).max(axis=1)
-    assert (part >= 1.0 - TOUCHED).all()
+    assert (part >= 1.0 - MAX_GAP).all()
 
 
 @given(problems(), st.floats(0.0, 1.0))
 def test_the_joints_stay_on_a_straight_line(problem: tuple[Floats, Floats, Limits], part: float) -> None:
-    """Synchronised: at any time every joint has done the same part of its way."""
+    """At any time every joint has covered the same fraction of its distance."""
     q0, q1, (velocity, acceleration, jerk) = problem
     for motion in (
         trapezoidal(q0, q1, velocity=velocity, acceleration=acceleration),
@@ -94,7 +94,7 @@ def test_the_joints_stay_on_a_straight_line(problem: tuple[Floats, Floats, Limit
 
 
 @given(problems(), hundredths(1.0, 9.0))
-def test_a_longer_duration_slows_all_down_evenly(
+def test_a_longer_duration_scales_time_uniformly(
     problem: tuple[Floats, Floats, Limits], factor: float
 ) -> None:
     q0, q1, (velocity, acceleration, jerk) = problem
@@ -113,7 +113,7 @@ def test_a_longer_duration_slows_all_down_evenly(
 def test_time_optimal_is_within_limits_and_no_slower_than_a_straight_line(
     problem: tuple[Floats, Floats, Limits],
 ) -> None:
-    """Ruckig's limits are kept to its own precision, 1e-8 of each."""
+    """Ruckig respects limits to a relative 1e-8."""
     pytest.importorskip("ruckig")
     q0, q1, (velocity, acceleration, jerk) = problem
     motion = time_optimal(q0, q1, velocity=velocity, acceleration=acceleration, jerk=jerk)
@@ -122,7 +122,7 @@ def test_time_optimal_is_within_limits_and_no_slower_than_a_straight_line(
     assert (np.abs(a) <= acceleration * (1.0 + 1e-8)).all()
     straight = s_curve(q0, q1, velocity=velocity, acceleration=acceleration, jerk=jerk)
     assert motion.duration <= straight.duration * (1.0 + 1e-8)
-    # The slowest joint alone takes as long: nothing faster exists.
+    # The slowest joint alone takes as long, so no faster motion exists.
     slowest = max(
         s_curve([a], [b], velocity=v, acceleration=c, jerk=d).duration
         for a, b, v, c, d in zip(q0, q1, velocity, acceleration, jerk, strict=True)
@@ -147,7 +147,7 @@ def test_time_optimal_from_one_state_to_another() -> None:
 
 @one_robot
 @given(st.integers(0, 1000), st.integers(2, 5), st.integers(1, 3))
-def test_along_a_path_limits_are_kept_and_the_waypoints_passed(seed: int, count: int, nv: int) -> None:
+def test_a_path_respects_limits_and_passes_the_waypoints(seed: int, count: int, nv: int) -> None:
     pytest.importorskip("toppra")
     rng = np.random.default_rng(seed)
     points, velocity, acceleration = rng.uniform(-2.0, 2.0, (count, nv)), *rng.uniform(0.3, 4.0, (2, nv))
@@ -158,7 +158,7 @@ def test_along_a_path_limits_are_kept_and_the_waypoints_passed(seed: int, count:
     used = np.maximum(np.abs(v) / velocity, np.abs(a) / acceleration).max(axis=1)
     # 0.988 was the least over 40 routes with up to six joints.
     assert used.mean() >= 0.95
-    assert isinstance(motion, PacedTrajectory)
+    assert isinstance(motion, TimeScaledTrajectory)
     lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
     marks = np.concatenate([[0.0], np.cumsum(lengths)]) / lengths.sum()
     np.testing.assert_allclose(motion.path(marks)[0], points, atol=1e-12)
@@ -169,7 +169,7 @@ def test_along_a_path_limits_are_kept_and_the_waypoints_passed(seed: int, count:
 def test_between_two_waypoints_the_path_is_straight_and_as_fast_as_a_trapezoid(
     problem: tuple[Floats, Floats, Limits],
 ) -> None:
-    """But for its two corners: each may cost the time of one of a hundred places, and there is some room."""
+    """Each of the two corners may cost the time of one of a hundred grid intervals."""
     pytest.importorskip("toppra")
     q0, q1, (velocity, acceleration, _) = problem
     motion = time_optimal_path([q0, q1], velocity=velocity, acceleration=acceleration)
@@ -178,7 +178,7 @@ def test_between_two_waypoints_the_path_is_straight_and_as_fast_as_a_trapezoid(
 
 
 @given(st.integers(0, 1000))
-def test_a_floating_base_keeps_limits_too(seed: int) -> None:
+def test_limits_of_a_floating_base(seed: int) -> None:
     model = floating()
     q0, q1 = model.random(seed, 2)
     limit = np.array([0.5] * 3 + [0.8] * 3 + [1.0] * (model.nv - 6))
@@ -186,7 +186,7 @@ def test_a_floating_base_keeps_limits_too(seed: int) -> None:
     _, v, a = motion(times(motion))
     assert (np.abs(v) <= limit).all()
     assert (np.abs(a) <= 2.0 * limit).all()
-    # A displacement is travelled alike whether it is one of joints or along a screw.
+    # The profile is the same for joints and for a screw motion.
     way = model.difference(q0, q1)
     joints = s_curve(0.0 * way, way, velocity=limit, acceleration=2.0 * limit, jerk=9.0)
     assert motion.duration == joints.duration

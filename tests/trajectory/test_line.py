@@ -1,4 +1,4 @@
-"""Straight lines: followed as closely as was asked, and refused where they cannot be."""
+"""Straight lines: the deviation stays within its bound; impossible lines raise."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ def target(way: tuple[float, float, float], angle: float) -> Floats:
 
 
 def distances_from_the_line(motion: LineTrajectory, goal: Floats, t: Floats) -> tuple[Floats, Floats]:
-    """How far the origin is from the segment, and the axes from some turn on the way [m, rad]."""
+    """Return the distances of origin [m] and axes [rad] from the straight line."""
     T = pose(motion(t).q)
     start = pose(REACH)
     way = goal[:3, 3] - start[:3, 3]
     from_start = T[:, :3, 3] - start[:3, 3]
     part = np.clip(from_start @ way / (way @ way), 0.0, 1.0)
     off = np.linalg.norm(from_start - part[:, None] * way, axis=1)
-    # The axis z of the tool stays where it is, since the turn is about it.
+    # The z axis of the tool is constant, since the rotation is about it.
     tilt = np.linalg.norm(np.cross(T[:, :3, 2], start[:3, 2]), axis=1)
     return off, tilt
 
@@ -52,7 +52,7 @@ def test_the_frame_is_on_the_line(way: tuple[float, float, float], angle: float,
     motion = line(ur5(), FRAME, REACH, goal, 2.0, deviation=bound, rotation_deviation=bound)
     assert motion.deviation <= bound
     assert motion.rotation_deviation <= bound
-    # Looked at elsewhere than where it was measured, where it may be a little more.
+    # Between the points where it was measured, the deviation may be slightly larger.
     off, tilt = distances_from_the_line(motion, goal, np.linspace(0.0, 2.0, 97))
     assert off.max() <= 1.5 * bound
     assert tilt.max() <= 1.5 * bound
@@ -63,8 +63,8 @@ def test_the_frame_is_on_the_line(way: tuple[float, float, float], angle: float,
     assert not motion(2.0).v.any()
 
 
-def test_along_it_the_law_is_kept() -> None:
-    """The place on the line at each time is that of the law, as is the speed of the frame."""
+def test_the_motion_law_holds_along_the_line() -> None:
+    """Position and speed along the line at each time are those of the motion law."""
     goal = target((0.1, 0.1, -0.1), 0.0)
     law = trapezoidal([0.0], [1.0], velocity=0.8, acceleration=2.0)
     motion = line(ur5(), FRAME, REACH, goal, law=law)
@@ -77,12 +77,12 @@ def test_along_it_the_law_is_kept() -> None:
     assert np.abs(pose(q)[:, :3, 3] - start - s * way).max() <= 2.0 * motion.deviation + 1e-9
     with dynx.backend("pinocchio", ur5()) as engine:
         speed = engine.frame_velocity(q, v, FRAME)[:, :3]
-    # The spline is off by d within an interval of 1/n, so its slope by some n d.
+    # The spline deviates by d within an interval of 1/n, so its slope by about n d.
     assert np.abs(speed - rate * way).max() <= 20.0 * motion.intervals * motion.deviation
 
 
-def test_a_frame_that_too_few_joints_hold_is_refused() -> None:
-    """Three joints reach the pose, but not along the line."""
+def test_too_few_joints_for_the_line_raise() -> None:
+    """Three joints can reach the pose, but not along a straight line."""
     with dynx.backend("pinocchio", ur5()) as engine:
         goal = engine.forward_kinematics(REACH + np.array([0.3, 0.2, -0.2, 0.0, 0.0, 0.0]), "forearm_link")
     with pytest.raises(TrajectoryError, match=r"'forearm_link' cannot follow the line beyond 0\.0000"):
@@ -96,15 +96,15 @@ def test_joints_that_do_not_move_the_frame_stay() -> None:
         goal = engine.forward_kinematics(q0, "panda_hand")
         goal[:3, 3] += (0.1, 0.05, -0.05)
         motion = line(panda, "panda_hand", q0, goal, 1.0, backend=engine)
-        # The fingers are beyond the hand. The caller's backend is still open.
+        # The fingers are outboard of the hand. The caller's backend is still open.
         assert not motion(np.linspace(0.0, 1.0, 11)).v[:, 7:].any()
         reached = engine.forward_kinematics(motion.end.q, "panda_hand")
     np.testing.assert_allclose(reached, goal, atol=1e-9)
 
 
 @pytest.mark.parametrize("further", [1.3, 2.0])
-def test_beyond_reach_the_error_says_where(further: float) -> None:
-    """An arm of three links in the plane reaches as far as they are long, so a known part of the way."""
+def test_the_error_states_where_the_line_leaves_the_workspace(further: float) -> None:
+    """A planar arm of three links reaches their total length, so a known fraction of the line."""
     model, length = dynx.load("planar_3r"), 0.6 + 0.45 + 0.2
     q0 = np.array([0.0, 1.2, -0.4])
     with dynx.backend("pinocchio", model) as engine:
@@ -115,14 +115,14 @@ def test_beyond_reach_the_error_says_where(further: float) -> None:
         line(model, "tip", q0, further * length * direction, 1.0)
     possible = (length - reach) / (further * length - reach)
     assert caught.value.at is not None
-    # The solutions are 1/256 apart when it gives up, and close to the edge the arm is nearly singular.
+    # Solutions are then 1/256 apart, and near the edge of the workspace the arm is nearly singular.
     assert possible - 3.0 / 256.0 <= caught.value.at <= possible
     motion = line(model, "tip", q0, 0.99 * length * direction, 1.0)
     assert motion.deviation <= 1e-5
     assert motion.rotation_deviation == 0.0
 
 
-def test_a_line_through_the_base_is_refused_with_its_place() -> None:
+def test_a_line_through_the_base_raises_with_its_position() -> None:
     goal = pose(REACH)
     goal[:2, 3] *= -1.0
     with pytest.raises(TrajectoryError, match="of the way") as caught:

@@ -1,4 +1,4 @@
-"""Splines through waypoints: they pass them, hold what is asked at the ends, and are smooth."""
+"""Splines: waypoints, end conditions, smoothness."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from dynx.trajectory.waypoints import End, Kind
 from tests.examples import one_robot
 from tests.trajectory.motions import hundredths, vectors
 
-ROUNDING = 1e-9
-"""Part of the size of a derivative by which SciPy's banded solver may be off: its condition is below 1e6."""
+SPLINE_TOLERANCE = 1e-9
+"""Relative error of derivatives from SciPy's banded solver, whose condition number is below 1e6."""
 
 
 @st.composite
@@ -30,7 +30,7 @@ def routes(draw: st.DrawFn, *, closed: bool = False) -> tuple[Floats, Floats]:
 
 
 def derivatives(motion: object, order: int) -> tuple[Floats, Floats, float]:
-    """A derivative at the beginning and at the end of every piece (m, 2), and its largest size."""
+    """Return a derivative at the start and end of every piece (m, 2), and its largest magnitude."""
     assert isinstance(motion, DisplacementTrajectory)
     assert isinstance(motion.curve, PiecewisePolynomial)
     s = np.diff(motion.curve.breaks)[:, None]
@@ -44,7 +44,7 @@ def derivatives(motion: object, order: int) -> tuple[Floats, Floats, float]:
 
 @pytest.mark.parametrize("kind", ["cubic", "quintic"])
 @pytest.mark.parametrize("end", ["clamped", "natural", "periodic"])
-def test_it_passes_its_waypoints_smoothly(kind: Kind, end: End) -> None:
+def test_waypoints_are_passed_smoothly(kind: Kind, end: End) -> None:
     smooth_to = {"cubic": 2, "quintic": 4}[kind]
 
     @one_robot
@@ -56,16 +56,16 @@ def test_it_passes_its_waypoints_smoothly(kind: Kind, end: End) -> None:
         np.testing.assert_array_equal(motion.knots, times)
         for order in range(smooth_to + 1):
             first, last, size = derivatives(motion, order)
-            assert (np.abs(last[:-1] - first[1:]) <= ROUNDING * size).all(), order
+            assert (np.abs(last[:-1] - first[1:]) <= SPLINE_TOLERANCE * size).all(), order
             if end == "periodic":
-                # Displacements: where they begin is 0, and so is where they come back to.
-                assert (np.abs(last[-1] - first[0]) <= ROUNDING * size).all(), order
+                # Displacements start at 0, and a periodic spline returns to 0.
+                assert (np.abs(last[-1] - first[0]) <= SPLINE_TOLERANCE * size).all(), order
 
     passes()
 
 
 @pytest.mark.parametrize("kind", ["cubic", "quintic"])
-def test_what_holds_at_the_ends(kind: Kind) -> None:
+def test_end_conditions(kind: Kind) -> None:
     zero_at_ends = {
         "clamped": {"cubic": (), "quintic": (2,)}[kind],
         "natural": {"cubic": (2,), "quintic": (2, 3)}[kind],
@@ -79,12 +79,12 @@ def test_what_holds_at_the_ends(kind: Kind) -> None:
             motion = spline(*route, kind=kind, end=end, **velocities)
             for order in zero_at_ends[end]:
                 first, last, size = derivatives(motion, order)
-                assert (np.abs(first[0]) <= ROUNDING * size).all()
-                assert (np.abs(last[-1]) <= ROUNDING * size).all()
+                assert (np.abs(first[0]) <= SPLINE_TOLERANCE * size).all()
+                assert (np.abs(last[-1]) <= SPLINE_TOLERANCE * size).all()
             if end == "clamped":
                 first, last, size = derivatives(motion, 1)
-                assert (np.abs(first[0] - v0) <= ROUNDING * size).all()
-                assert (np.abs(last[-1] - v1) <= ROUNDING * size).all()
+                assert (np.abs(first[0] - v0) <= SPLINE_TOLERANCE * size).all()
+                assert (np.abs(last[-1] - v1) <= SPLINE_TOLERANCE * size).all()
                 np.testing.assert_array_equal(motion.start.v, v0)
                 np.testing.assert_array_equal(motion.end.v, v1)
 
@@ -102,4 +102,4 @@ def test_two_waypoints_are_a_polynomial(
     )
     for one, other in pairs:
         for got, wanted in zip(one(part * duration), other(part * duration), strict=True):
-            np.testing.assert_allclose(got, wanted, rtol=0.0, atol=ROUNDING * 1e3)
+            np.testing.assert_allclose(got, wanted, rtol=0.0, atol=SPLINE_TOLERANCE * 1e3)

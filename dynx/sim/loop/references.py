@@ -14,7 +14,7 @@ from dynx.model.configuration import checked_q
 from dynx.sim.loop.clock import Clock
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint, Trajectory
-from dynx.trajectory.limits import check
+from dynx.trajectory.limit_check import check
 
 SetpointOf = Callable[[Floats], Setpoint]
 """From times (n,) to setpoints (n, nq), (n, nv), (n, nv)."""

@@ -1,4 +1,4 @@
-"""Trajectories one after another."""
+"""Concatenated trajectories."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from tests.trajectory.motions import Motion, floating, within_limits
 
 
 @given(st.lists(within_limits(), min_size=1, max_size=3), st.floats(0.0, 1.0, exclude_max=True))
-def test_each_part_is_itself_at_its_time(drawn: list[Motion], part: float) -> None:
-    """Each is moved to where the one before ends; a time is rounded when it is counted from there."""
+def test_each_part_is_unchanged_during_its_time(drawn: list[Motion], part: float) -> None:
+    """Each part starts where the previous one ends; the time since then is rounded."""
     parts: list[Trajectory] = []
     for motion in drawn:
         begin = parts[-1].end.q[0] if parts else 0.0
@@ -37,12 +37,12 @@ def test_each_part_is_itself_at_its_time(drawn: list[Motion], part: float) -> No
         passed += one.duration
 
 
-def test_velocity_goes_on_where_they_meet() -> None:
+def test_velocity_is_continuous_at_the_boundary() -> None:
     one = cubic([0.0], [1.0], 1.0, v1=[0.7])
     other = cubic([1.0], [3.0], 2.0, v0=[0.7])
     whole = concatenate(one, other)
     assert whole(1.0).v[0] == 0.7
-    # The acceleration at the meeting is that after it.
+    # At the boundary the acceleration of the later part applies.
     assert whole(1.0).a[0] == other(0.0).a[0] != one(1.0).a[0]
     np.testing.assert_allclose(whole.knots, [0.0, 1.0, 3.0])
 

@@ -1,4 +1,4 @@
-"""Whether a robot can do a motion: its limits of position, velocity and effort, looked at beforehand."""
+"""Check of a motion against a robot's limits of position, velocity and effort."""
 
 from __future__ import annotations
 
@@ -16,17 +16,20 @@ from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Trajectory
 
 SAMPLES = 500
-"""Evenly spaced times that are looked at, besides both sides of every knot."""
+"""Number of evenly spaced times that are checked, besides both sides of every knot."""
 
-CLOSER = 16
-"""Further times next to the worst of those, on either side."""
+REFINEMENT_SAMPLES = 16
+"""Number of further times on either side of the worst of those."""
 
-WITHIN = 1e-12
-"""A limit is broken by more than this part of it, or of the largest value of the joint: what is planned
-up to a limit is on it to rounding."""
+RELATIVE_TOLERANCE = 1e-12
+"""A limit is violated if exceeded by more than this fraction of it, or of the largest value of the joint.
+
+A motion planned up to a limit meets it only to rounding.
+"""
 
 Excess = tuple[Literal["position", "velocity", "effort"], Floats, Floats, Floats]
-"""A quantity, its values (n, nv), the limit that each is nearer to, and by how much they break it."""
+"""A quantity, its values (n, nv), the limit that each is nearest to, and the amount by which they exceed it.
+"""
 
 
 def check(
@@ -37,9 +40,9 @@ def check(
     joint_dynamics: bool = False,
     backend: str | Backend = "pinocchio",
 ) -> None:
-    """Raise LimitError if the motion breaks a limit of the model; its `violations` are all of them.
+    """Raise LimitError if the motion violates a limit of the model; its `violations` lists all of them.
 
-    See `violations` for what is looked at.
+    See `violations` for the arguments and for what is checked.
     """
     found = violations(model, trajectory, effort=effort, joint_dynamics=joint_dynamics, backend=backend)
     if found:
@@ -56,15 +59,16 @@ def violations(
     joint_dynamics: bool = False,
     backend: str | Backend = "pinocchio",
 ) -> list[LimitViolation]:
-    """Every limit of position, velocity and effort that the motion breaks, joint by joint, each at its worst.
+    """List every limit of position, velocity and effort that the motion violates, each joint at its worst
+    time.
 
-    Effort is inverse dynamics along the motion (with `joint_dynamics`, damping, friction and armature
-    too) by `backend`, a name or a backend of the model; with a floating base that takes the wrench
-    that nothing exerts there, so it is the effort of a robot held by its base. ``effort=False`` leaves
-    it out. Looked at are 500 times, both sides of each knot of the trajectory, and more times around
-    the worst of them.
+    Effort is computed by inverse dynamics along the motion (including damping, friction and armature with
+    `joint_dynamics`) by `backend`, a name or a backend of the model. With a floating base inverse dynamics
+    assumes a wrench on the base that no actuator exerts, so the effort is that of a robot held by its base.
+    ``effort=False`` skips it. The motion is checked at 500 times, at both sides of each knot of the
+    trajectory, and at more times around the worst of them.
 
-    Raises ShapeError if the trajectory is not one of this model.
+    Raises ShapeError if the trajectory does not fit the model.
     """
     if not isinstance(model, Model):
         raise ArgumentError(f"model is of type {type(model).__name__}; wanted a Model")
@@ -78,18 +82,18 @@ def violations(
     if isinstance(backend, Backend) and backend.model != model:
         raise ArgumentError(f"backend is one of {shown(backend.model.name)}, not of this model")
     effort = effort and bool(np.isfinite(model.effort_limit).any())
-    with _opened(backend, model) if effort else nullcontext() as engine:
-        times = _first_times(trajectory)
+    with _open_backend(backend, model) if effort else nullcontext() as engine:
+        times = _coarse_times(trajectory)
         coarse = list(_excesses(model, trajectory, times, engine, joint_dynamics))
-        closer = _closer_times(times, coarse)
-        fine = list(_excesses(model, trajectory, closer, engine, joint_dynamics))
-    times = np.concatenate([times, closer])
+        refined = _refined_times(times, coarse)
+        fine = list(_excesses(model, trajectory, refined, engine, joint_dynamics))
+    times = np.concatenate([times, refined])
     found = []
     for (quantity, *near), (_, *far) in zip(coarse, fine, strict=True):
         value, limit, excess = (np.concatenate(pair) for pair in zip(near, far, strict=True))
         worst, size = np.argmax(excess, axis=0), np.abs(value).max(axis=0)
         for k, row in enumerate(worst.tolist()):
-            if excess[row, k] > WITHIN * max(abs(limit[row, k]), size[k]):
+            if excess[row, k] > RELATIVE_TOLERANCE * max(abs(limit[row, k]), size[k]):
                 joint = model.joint_names[k - (6 if model.floating else 0)]
                 number = float(times[row]), float(value[row, k]), float(limit[row, k])
                 found.append((k, LimitViolation(joint, quantity, *number)))
@@ -106,34 +110,34 @@ def _excesses(
     unbounded = np.full(base.shape[1], np.inf)
     lower = np.concatenate([-unbounded, model.lower[joints]])
     upper = np.concatenate([unbounded, model.upper[joints]])
-    yield "position", q_v, *_nearer(q_v, lower, upper)
-    yield "velocity", v, *_nearer(v, -model.velocity_limit, model.velocity_limit)
+    yield "position", q_v, *_nearest_limit(q_v, lower, upper)
+    yield "velocity", v, *_nearest_limit(v, -model.velocity_limit, model.velocity_limit)
     if engine is not None:
         tau = engine.inverse_dynamics(q, v, a, joint_dynamics=joint_dynamics)
-        yield "effort", tau, *_nearer(tau, -model.effort_limit, model.effort_limit)
+        yield "effort", tau, *_nearest_limit(tau, -model.effort_limit, model.effort_limit)
 
 
-def _nearer(x: Floats, lower: Floats, upper: Floats) -> tuple[Floats, Floats]:
-    """The limit that x breaks, or comes nearer to, and by how much it is beyond."""
+def _nearest_limit(x: Floats, lower: Floats, upper: Floats) -> tuple[Floats, Floats]:
+    """Return the limit that x exceeds, or is nearest to, and the amount by which x exceeds it."""
     over, under = x - upper, lower - x
     return np.where(over >= under, upper, lower), np.maximum(over, under)
 
 
-def _first_times(trajectory: Trajectory) -> Floats:
+def _coarse_times(trajectory: Trajectory) -> Floats:
     T = trajectory.duration
     knots = trajectory.knots
     times = np.concatenate([np.linspace(0.0, T, SAMPLES), knots, np.nextafter(knots, -np.inf)])
     return np.unique(np.clip(times, 0.0, T))
 
 
-def _closer_times(times: Floats, coarse: list[Excess]) -> Floats:
-    """Times on both sides of the worst of each joint and quantity."""
+def _refined_times(times: Floats, coarse: list[Excess]) -> Floats:
+    """Return times on both sides of the worst time of each joint and quantity."""
     worst = np.unique(np.concatenate([np.argmax(excess, axis=0) for *_, excess in coarse]))
     before, after = times[np.maximum(worst - 1, 0)], times[np.minimum(worst + 1, len(times) - 1)]
-    parts = np.linspace(0.0, 1.0, 2 * CLOSER + 1)[1:-1]
+    parts = np.linspace(0.0, 1.0, 2 * REFINEMENT_SAMPLES + 1)[1:-1]
     return np.unique(before[:, None] + parts * (after - before)[:, None])
 
 
-def _opened(backend: str | Backend, model: Model) -> AbstractContextManager[Backend]:
-    """A backend of the model: the caller's own stays open."""
+def _open_backend(backend: str | Backend, model: Model) -> AbstractContextManager[Backend]:
+    """Return a backend of the model as a context that leaves the caller's own backend open."""
     return nullcontext(backend) if isinstance(backend, Backend) else make_backend(backend, model)

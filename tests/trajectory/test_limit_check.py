@@ -1,4 +1,4 @@
-"""`check`: every limit that a motion breaks is reported, with the moment and the value, and nothing else."""
+"""`check` reports exactly the limits that a motion violates, with time and value."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from dynx.trajectory import check, concatenate, cubic, cycloidal, s_curve, trape
 from tests.trajectory.motions import floating, ur5
 
 MASS, ARM, SPIN = 2.0, 0.5, 0.1
-"""A pendulum: mass [kg], distance of its centre from the joint [m], central inertia about the axis."""
+"""Pendulum: mass [kg], distance of its centre from the joint [m], central inertia about the axis."""
 
 
 def pendulum(limits: Limits, friction: float = 0.0) -> Model:
@@ -45,14 +45,14 @@ def test_what_is_within_limits_passes() -> None:
 
 
 def test_position_velocity_and_effort_by_their_closed_forms() -> None:
-    """A slow swing of 2 rad: m g l sin q at its end; a fast one: the speed is 2 d / T in the middle."""
+    """A slow swing of 2 rad: m g l sin q at its end; a fast one: the largest speed is 2 d / T, at T/2."""
     model = pendulum(Limits(-1.0, 1.5, 3.0, 5.0))
     position, effort = violations(model, slow(2.0))
     assert (position.joint, position.quantity, position.limit) == ("hinge", "position", 1.5)
     assert position.time == pytest.approx(100.0, rel=1e-12)
     assert position.value == pytest.approx(2.0, rel=1e-12)
     assert (effort.quantity, effort.limit) == ("effort", 5.0)
-    # The largest effort is where the pendulum is level, at q = pi / 2, for the motion is slow.
+    # The motion is slow, so the largest effort occurs where the pendulum is horizontal, q = pi / 2.
     assert effort.value == pytest.approx(MASS * 9.81 * ARM, rel=1e-3)
     (velocity,) = violations(model, cycloidal([0.0], [1.4], 0.5), effort=False)
     assert velocity.quantity == "velocity"
@@ -60,7 +60,7 @@ def test_position_velocity_and_effort_by_their_closed_forms() -> None:
     assert velocity.value == pytest.approx(2.0 * 1.4 / 0.5, rel=1e-6)
 
 
-def test_limits_below_are_signed() -> None:
+def test_lower_limits_are_negative() -> None:
     model = pendulum(Limits(-1.0, 1.5, 3.0, 5.0))
     position, effort = violations(model, slow(-2.0))
     assert (position.limit, position.value) == (-1.0, -2.0)
@@ -68,7 +68,7 @@ def test_limits_below_are_signed() -> None:
     assert effort.value < -5.0
 
 
-def test_effort_counts_friction_if_it_is_asked_to() -> None:
+def test_effort_includes_friction_with_joint_dynamics() -> None:
     limits = Limits(-3.0, 3.0, 10.0, MASS * 9.81 * ARM + 0.5)
     model = pendulum(limits, friction=1.0)
     assert violations(model, slow(2.0)) == []
@@ -77,7 +77,7 @@ def test_effort_counts_friction_if_it_is_asked_to() -> None:
 
 
 @given(st.floats(0.5, 1.5), st.floats(0.5, 1.5))
-def test_what_was_planned_for_the_model_keeps_its_limits(part: float, acceleration: float) -> None:
+def test_a_motion_planned_for_the_model_respects_its_limits(part: float, acceleration: float) -> None:
     model = pendulum(Limits(-1.0, part, 0.9))
     for motion in (
         trapezoidal([-1.0], [part], acceleration=acceleration, model=model),
@@ -87,7 +87,7 @@ def test_what_was_planned_for_the_model_keeps_its_limits(part: float, accelerati
 
 
 def test_a_brief_excess_at_a_knot_is_found() -> None:
-    """The effort jumps where the deceleration of a trapezoid begins, and for less than a sample apart."""
+    """The effort jumps where the deceleration of a trapezoid begins, between two samples."""
     swing = 1e-4
     acceleration = 40.0
     motion = concatenate(
@@ -101,7 +101,7 @@ def test_a_brief_excess_at_a_knot_is_found() -> None:
     assert effort.value == pytest.approx(inertia * acceleration, rel=0.02)
 
 
-def test_the_error_holds_them_all_and_names_them() -> None:
+def test_the_error_lists_all_violations() -> None:
     model = ur5()
     motion = cubic(np.zeros(6), [7.0, 0.0, -3.0, 0.0, 0.0, 8.0], 1.0)
     with pytest.raises(LimitError, match="the motion breaks 5 limits of ur5") as caught:

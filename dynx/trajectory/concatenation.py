@@ -1,4 +1,4 @@
-"""Trajectories one after another."""
+"""Concatenation of trajectories."""
 
 from __future__ import annotations
 
@@ -9,45 +9,47 @@ import numpy as np
 
 from dynx.errors import ArgumentError, ShapeError, TrajectoryError
 from dynx.spatial.scalar import Floats
-from dynx.trajectory.base import Setpoint, Trajectory, frozen
+from dynx.trajectory.base import Setpoint, Trajectory, read_only
 
-MEETING = 1e-9
-"""How far apart [rad, m; rad/s, m/s] two trajectories may be where one follows the other: their ends are
-given numbers, not computed ones, so this is far above rounding and far below what a robot can show."""
+GAP_TOLERANCE = 1e-9
+"""Largest gap [rad, m; rad/s, m/s] between the end of a trajectory and the start of the next one.
+
+The ends are given numbers, not computed ones, so this is far above rounding and far below what matters.
+"""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class JoinedTrajectory(Trajectory):
-    """`parts` in order; part k begins at `begins[k]` [s]."""
+class ConcatenatedTrajectory(Trajectory):
+    """`parts` in order; part k starts at `start_times[k]` [s]."""
 
     parts: tuple[Trajectory, ...]
-    begins: Floats = field(repr=False)
+    start_times: Floats = field(repr=False)
 
     @property
     def knots(self) -> Floats:
         """The knots of all parts."""
-        shifted = [begin + part.knots for part, begin in zip(self.parts, self.begins, strict=True)]
+        shifted = [begin + part.knots for part, begin in zip(self.parts, self.start_times, strict=True)]
         return np.unique(np.clip(np.concatenate(shifted), 0.0, self.duration))
 
     def inside(self, t: Floats) -> Setpoint:
-        """What the part says that a time falls into; where two meet, the later one."""
-        number = np.searchsorted(self.begins, t, side="right") - 1
+        """Return the setpoint of the part that contains each time; the later part at a boundary."""
+        number = np.searchsorted(self.start_times, t, side="right") - 1
         whole = Setpoint(*(np.empty((len(t), n)) for n in (self.nq, self.nv, self.nv)))
         for k, part in enumerate(self.parts):
             here = np.flatnonzero(number == k)
             if here.size:
-                # Clipped, since rounding of the sum of durations must not put a time outside its part.
-                values = part(np.clip(t[here] - self.begins[k], 0.0, part.duration))
+                # Clipped, since the sum of durations is rounded and a time may fall outside its part.
+                values = part(np.clip(t[here] - self.start_times[k], 0.0, part.duration))
                 for array, value in zip(whole, values, strict=True):
                     array[here] = value
         return whole
 
 
 def concatenate(*trajectories: Trajectory) -> Trajectory:
-    """The trajectories one after another, each beginning when the one before it ends.
+    """Return the trajectories one after another, each starting when the previous one ends.
 
-    Raises ShapeError where they are of different robots, and TrajectoryError where one does not begin
-    where, and as fast as, the one before it ended (to 1e-9); the acceleration may jump.
+    Raises ShapeError if they belong to different robots, and TrajectoryError if one does not start at the
+    position and velocity at which the previous one ends (to 1e-9); the acceleration may jump.
     """
     if not trajectories:
         raise ArgumentError("no trajectory was given; wanted at least one")
@@ -57,9 +59,9 @@ def concatenate(*trajectories: Trajectory) -> Trajectory:
     for k, (one, following) in enumerate(pairwise(trajectories)):
         _refuse_gap(k, one, following)
     ends = np.cumsum([part.duration for part in trajectories])
-    begins = frozen(np.concatenate([[0.0], ends[:-1]]))
-    return JoinedTrajectory(
-        float(ends[-1]), trajectories[0].start, trajectories[-1].end, tuple(trajectories), begins
+    start_times = read_only(np.concatenate([[0.0], ends[:-1]]))
+    return ConcatenatedTrajectory(
+        float(ends[-1]), trajectories[0].start, trajectories[-1].end, tuple(trajectories), start_times
     )
 
 
@@ -72,7 +74,7 @@ def _refuse_gap(k: int, one: Trajectory, following: Trajectory) -> None:
     for name, left, right in (("q", one.end.q, following.start.q), ("v", one.end.v, following.start.v)):
         jump = np.abs(right - left)
         worst = int(np.argmax(jump))
-        if jump[worst] > MEETING:
+        if jump[worst] > GAP_TOLERANCE:
             raise TrajectoryError(
                 f"{name}[{worst}] is {left[worst]:.9g} where trajectory {k} ends and {right[worst]:.9g} "
                 f"where trajectory {k + 1} begins"
