@@ -11,6 +11,7 @@ ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
 PROJECT = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
 
+MAX_LINES = 400
 MAX_MEDIAN_LINES = 110
 MAX_MODULES_IN_FOLDER = 25
 FOLDERS_OF_INDEPENDENT_MODULES = {Path("dynx/rules/catalogue")}
@@ -50,6 +51,16 @@ def test_the_picture_has_the_rooms_in_the_order_of_the_import_contract() -> None
     for above, below in pairwise(heights):
         assert max(above) <= min(below)
     assert {room for layer in layers(PROJECT) for room in layer} == rooms()
+
+
+def test_recipes_name_tests_that_exist() -> None:
+    named = re.findall(r"`(tests/architecture/test_recipe_\w+\.py)`", PAGE)
+    assert len(named) == 6
+    assert all((ROOT / path).exists() for path in named)
+
+
+def test_no_module_is_long() -> None:
+    assert [path for path, lines in sources().items() if lines > MAX_LINES] == []
 
 
 def test_modules_are_small() -> None:
