@@ -1,4 +1,4 @@
-"""Tables of an agreement document: everything shown is a function of the document alone."""
+"""Tables of the results of ``dynx agree``, made from their JSON document alone."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ Check = dict[str, Any]
 """An entry of ``quantities`` or ``identities``."""
 
 _TITLES: dict[str | None, str] = {
-    None: "largest error of one engine against another",
+    None: "largest difference between two engines",
     "referee": "error against the referee (50 digits)",
-    "derived": "native answer against what follows from the engine's own poses and inverse dynamics",
+    "derived": "native result against the one derived from poses and inverse dynamics",
 }
-"""Titles of the tables, by the partner in a pair that is no backend; None where both are backends."""
+"""Titles of the tables by the reference in a pair; None where both are backends."""
 
-_SOLVED_TO_TOLERANCE = "inverse_kinematics"
-"""Found by iteration up to a tolerance that is asked for: its error says nothing of digits."""
+_ITERATIVE_QUANTITY = "inverse_kinematics"
+"""Quantity found by iteration: its error is the tolerance of the iteration, not rounding."""
 
-_SHOWN_DIFFERENCES = 6
-"""Differences listed for each robot of many; the JSON document has all."""
+_MAX_DIFFERENCES = 6
+"""Number of differences listed for each of several robots; the JSON document has all."""
 
 
 def show_one(out: Console, entry: Entry) -> None:
-    """The full report of one robot: quantities by pair, identities by backend, notes."""
+    """Print the full report of one robot: quantities by pair, identities by backend, notes."""
     if verdict(entry) == "refused":
         out.print(f"{label(entry)}: refused")
         return
@@ -44,14 +44,14 @@ def show_one(out: Console, entry: Entry) -> None:
         style="bold",
     )
     checks: list[Check] = entry["quantities"]
-    for judge, title in _TITLES.items():
-        group = [check for check in checks if _judge(check) == judge]
+    for reference, title in _TITLES.items():
+        group = [check for check in checks if _reference(check) == reference]
         if group:
             out.print(f"\n{title}, relative", style="bold")
             out.print(_pivot(group, "quantity", "pair", "max_rel_error"))
     identities: list[Check] = entry["identities"]
     if identities:
-        out.print("\nerror of each engine in the laws of mechanics, relative", style="bold")
+        out.print("\nresidual of the laws of mechanics, relative", style="bold")
         out.print(_pivot(identities, "identity", "backend", "max_error"))
     out.print()
     for note in dict.fromkeys(filter(None, (check["note"] for check in [*checks, *identities]))):
@@ -63,17 +63,17 @@ def show_one(out: Console, entry: Entry) -> None:
 
 
 def show_many(out: Console, entries: Sequence[Entry]) -> None:
-    """One line for each robot, the differences, and a summary."""
-    pairs = list(dict.fromkeys(c["pair"] for e in entries for c in e["quantities"] if _judge(c) is None))
-    met = {_judge(check) for entry in entries for check in entry["quantities"]}
-    judges = [judge for judge in _TITLES if judge is not None and judge in met]
+    """Print one line for each robot, then the differences."""
+    pairs = list(dict.fromkeys(c["pair"] for e in entries for c in e["quantities"] if _reference(c) is None))
+    found = {_reference(check) for entry in entries for check in entry["quantities"]}
+    references = [each for each in _TITLES if each is not None and each in found]
     headings = [_heading(pair) for pair in pairs]
-    right = ["nv", *headings, *judges, "s"]
-    table = Table("robot", "nv", *headings, *judges, "verdict", "s", right=right, keys=1)
+    right = ["nv", *headings, *references, "s"]
+    table = Table("robot", "nv", *headings, *references, "verdict", "s", right=right, keys=1)
     for entry in entries:
         checks: list[Check] = entry["quantities"]
         cells = [_worst([check for check in checks if check["pair"] == pair]) for pair in pairs]
-        cells += [_worst([check for check in checks if _judge(check) == judge]) for judge in judges]
+        cells += [_worst([check for check in checks if _reference(check) == each]) for each in references]
         refused = verdict(entry) == "refused"
         table.add_row(
             label(entry),
@@ -83,13 +83,13 @@ def show_many(out: Console, entries: Sequence[Entry]) -> None:
             f"{entry['seconds']:.1f}",
         )
     out.print(
-        "largest relative error over all quantities but inverse kinematics",
+        "largest relative error over all quantities except inverse kinematics",
         style="bold",
     )
     out.print(table)
     out.print()
     for entry in entries:
-        _show_differences(out, entry, _SHOWN_DIFFERENCES)
+        _show_differences(out, entry, _MAX_DIFFERENCES)
 
 
 def show_summary(out: Console, summary: dict[str, int], seconds: float) -> None:
@@ -113,7 +113,7 @@ def verdict(entry: Entry) -> str:
 
 
 def _pivot(checks: Sequence[Check], row_key: str, column_key: str, error_key: str) -> Table:
-    """Rows by quantity or identity, a column for each pair or backend, then digits and verdict."""
+    """Make a row for each quantity or identity, with a column for each pair or backend."""
     columns = list(dict.fromkeys(check[column_key] for check in checks))
     headings = [_heading(column) for column in columns]
     right = [*headings, "tolerance", "digits"]
@@ -132,13 +132,14 @@ def _pivot(checks: Sequence[Check], row_key: str, column_key: str, error_key: st
     return table
 
 
-def _judge(check: Check) -> str | None:
+def _reference(check: Check) -> str | None:
+    """Return ``referee`` or ``derived``, or None where the pair is two backends."""
     partner = check["pair"].partition("~")[2]
     return partner if partner in _TITLES else None
 
 
 def _heading(pair: str) -> str:
-    """A pair in two lines; one with a judge in one, since the title names the judge."""
+    """Write a pair of backends in two lines; of a pair with a reference only the backend."""
     first, _, partner = pair.partition("~")
     return first if not partner or partner in _TITLES else f"{first}\n~{partner}"
 
@@ -168,24 +169,24 @@ def _worst(checks: Sequence[Check]) -> Text:
 
 
 def _rounding_errors(checks: Sequence[Check]) -> list[float]:
-    """The relative errors that there are, but those of what is solved to a tolerance."""
+    """Return the relative errors that are due to rounding: all but those of iterations."""
     return [
         check["max_rel_error"]
         for check in checks
         if check["max_rel_error"] is not None
-        and (check["quantity"] != _SOLVED_TO_TOLERANCE or not check["agree"])
+        and (check["quantity"] != _ITERATIVE_QUANTITY or not check["agree"])
     ]
 
 
 def _error(error: float | None, agree: bool) -> str:
-    """An error in two digits; one that is no number is ``none`` where an answer was missing."""
+    """Write an error with two digits, or ``none`` where a result was absent."""
     if error is None:
         return "-" if agree else "none"
     return "0" if error == 0.0 else f"{error:.1e}"
 
 
 def _digits(error: float | None) -> str:
-    """How many decimal digits agree, at most the 16 of a double."""
+    """Write the number of decimal digits that agree, at most the 16 of a double."""
     if error is None or math.isnan(error):
         return "-"
     if error == 0.0:
@@ -204,7 +205,7 @@ def _verdict_text(entry: Entry) -> Text:
 
 
 def _show_differences(out: Console, entry: Entry, limit: int | None) -> None:
-    """What differs: quantity, pair, error, and where the worst sample was."""
+    """Print the checks that failed, each with the sample of its largest error, and the suspects."""
     failed = [
         *((check, check["quantity"], check["pair"], check["max_rel_error"]) for check in entry["quantities"]),
         *((check, check["identity"], check["backend"], check["max_error"]) for check in entry["identities"]),
@@ -233,7 +234,7 @@ def _difference(check: Check, what: str, who: str, error: float | None) -> str:
 
 
 def _conclusion(entry: Entry) -> Text:
-    """Who agrees, and how well: the digits are those of what is solved neither by iteration nor by steps."""
+    """Make the last line: whether the engines agree, and to how many digits."""
     engines: list[str] = entry["backends"]
     agree: bool = entry["agree"]
     if len(engines) == 1:
@@ -245,7 +246,7 @@ def _conclusion(entry: Entry) -> Text:
     worst = max(_rounding_errors(entry["quantities"]), default=None)
     if agree and worst is not None:
         text += (
-            f"; {whose} answers to {_digits(worst)} digits or more "
-            "(inverse kinematics and numerical derivatives apart)"
+            f"; {whose} results to {_digits(worst)} digits or more "
+            "(except inverse kinematics and numerical derivatives)"
         )
     return Text(f"{text}; {entry['seconds']:.1f} s", "bold green" if agree else "bold red")

@@ -72,7 +72,7 @@ def run_bench(session: Session, *, as_json: bool) -> int:
             with progress_bar(len(cases) + len(session.plan.threads)) as advance:
                 done = count()
                 for threads in session.plan.threads:
-                    advance(next(done), f"the machine, {counted(threads, 'thread')}")
+                    advance(next(done), f"peaks of the machine, {counted(threads, 'thread')}")
                     session.measure_machine(threads)
                 for case in cases:
                     quantity = case.quantity.replace("_", " ")

@@ -1,4 +1,4 @@
-"""Tables of a bench document: everything shown is a function of the document alone."""
+"""Tables of the results of ``dynx bench``, made from their JSON document alone."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from dynx.cli.shell.terminal import counted
 
 Entry = Mapping[str, Any]
 
-_QUIET = 0.5
-"""Programs that wanted to run before this one; with more, the machine was not quiet."""
+MAX_IDLE_LOAD = 0.5
+"""Load average before the run [processes] up to which the machine counts as idle."""
 
 
 def show(out: Console, made: Entry) -> None:
-    """The robot, the machine, and a table for each case."""
+    """Print the robot, the machine, and a table for each benchmark case."""
     out.print(
         f"{one_line(made['robot'])}, {made['base']} base, nq {made['nq']}, nv {made['nv']}, "
         f"frame {one_line(made['frame'])}, {counted(made['repetitions'], 'repetition')}"
@@ -27,12 +27,13 @@ def show(out: Console, made: Entry) -> None:
         style="bold",
     )
     out.print(made["processor"])
-    if made["load"] is not None and made["load"] > _QUIET:
-        out.print(f"load {made['load']:.1f} before the run: others were busy, and times vary", style="yellow")
+    if made["load"] is not None and made["load"] > MAX_IDLE_LOAD:
+        load = f"load {made['load']:.1f} before the run"
+        out.print(f"{load}: other processes were running, so times vary", style="yellow")
     for peak in made["peaks"]:
         out.print(
-            f"{counted(peak['threads'], 'thread')}: copies {peak['copy_bandwidth'] / 1e9:.3g} GB/s (read and "
-            f"written), multiplies and adds {2e-9 * peak['multiply_adds']:.3g} GFLOP/s"
+            f"{counted(peak['threads'], 'thread')}: copy bandwidth {peak['copy_bandwidth'] / 1e9:.3g} GB/s "
+            f"(read and written), multiply-add peak {2e-9 * peak['multiply_adds']:.3g} GFLOP/s"
         )
     for result in made["results"]:
         _show_result(out, result)
@@ -48,9 +49,9 @@ def _show_result(out: Console, result: Entry) -> None:
     peers = [entry["way"] for entry in entries if entry["role"] == "peer" and entry["ns"] is not None]
     bounded = any(entry["roofline"] is not None for entry in entries)
     ratios = ["faster than\n" + peer.replace(" ", "\n", 1) for peer in peers]
-    limits = ["of copy\nbandwidth", "of multiply-\nadd peak", "binds"] if bounded else []
-    right = ["threads", "samples", "ns per\nsample", "spread", *ratios, *limits[:2]]
-    table = Table("", "threads", "samples", "ns per\nsample", "spread", *ratios, *limits, right=right, keys=1)
+    limits = ["of copy\nbandwidth", "of multiply-\nadd peak", "bound by"] if bounded else []
+    columns = ["threads", "samples", "ns per\nsample", "spread", *ratios, *limits]
+    table = Table("implementation", *columns, right=[each for each in columns if each != "bound by"], keys=1)
     for entry in sorted(entries, key=_speed):
         cells = [entry["way"], str(entry["threads"]), str(entry["samples"]), _ns(entry["ns"]), _spread(entry)]
         cells += [_ratio(entry["ratios"].get(peer)) for peer in peers]
@@ -61,7 +62,7 @@ def _show_result(out: Console, result: Entry) -> None:
 
 
 def _speed(entry: Entry) -> tuple[bool, float]:
-    """The fastest first, what was not timed last."""
+    """Sort key: the fastest first, those without a time last."""
     return entry["ns"] is None, entry["ns"] or 0.0
 
 
@@ -72,7 +73,7 @@ def _ns(ns: float | None) -> str:
 
 
 def _spread(entry: Entry) -> str:
-    """The distance of the quartiles over the median."""
+    """Interquartile range over the median."""
     if not entry["ns"]:
         return "-"
     low, high = entry["ns_quartiles"]
@@ -80,7 +81,7 @@ def _spread(entry: Entry) -> str:
 
 
 def _ratio(ratio: float | None) -> str:
-    """How many times faster."""
+    """Write a ratio of times."""
     if ratio is None:
         return "-"
     return f"{ratio:.2f}x" if ratio < 10.0 else f"{ratio:.0f}x"
@@ -93,7 +94,7 @@ def _limits(roofline: Entry | None) -> Sequence[str]:
 
 
 def _problem(problem: str, entries: Sequence[Entry]) -> Text:
-    """What kept some entries from being timed."""
+    """Write why some implementations were not timed."""
     wrong = any(entry["error"] is not None for entry in entries) and all(
         entry["ns"] is None for entry in entries
     )

@@ -89,17 +89,17 @@ def _show_one(out: Console, report: DoctorReport) -> None:
         base = "" if report.base == "fixed" else f" --base {report.base}"
         out.print()
         out.print(
-            f"why, and how to mend it: dynx doctor {shlex.quote(short_line(report.robot))}{base}",
+            f"causes, and a mended file: dynx doctor {shlex.quote(short_line(report.robot))}{base}",
             style="bold",
         )
 
 
 def _show_pairs(out: Console, report: DoctorReport) -> None:
-    """Each engine against each other."""
+    """Print the difference of each pair of engines."""
     pairs = list(dict.fromkeys(pair.engines for pair in report.pairs))
     if not pairs:
         return
-    heading(out, "relative difference of two engines, as loaded")
+    heading(out, "relative difference between two engines, as loaded")
     heads = ["\n~".join(pair) for pair in pairs]
     table = Table("quantity", *heads, right=heads, keys=1)
     by_cell = {(pair.quantity, pair.engines): pair.relative_error for pair in report.pairs}
@@ -130,7 +130,7 @@ def _show_many(out: Console, reports: Sequence[DoctorReport], seconds: float, le
         alone = "each" if every else ", ".join(found.alone)
         words = "alike" if report.alike else "DIFFER"
         table.add_row(short_line(report.robot), *cells, alone, words if report.error is None else "refused")
-    out.print("largest relative error of each engine against what the file says, as loaded", style="bold")
+    out.print("largest relative error of each engine as it loads the file", style="bold")
     out.print(table)
     refusals = sum(report.error is not None for report in reports)
     same = sum(report.alike for report in reports)
@@ -141,7 +141,7 @@ def _show_many(out: Console, reports: Sequence[DoctorReport], seconds: float, le
 
 
 def vote_lines(report: DoctorReport, found: Vote) -> list[str]:
-    """The vote in sentences: who agrees, who stands alone, and who is right by the file."""
+    """Write the vote as sentences: which engines agree, which stand alone, and which match the file."""
     if not found.groups:
         return ["no engine loads the file"]
     lines = [f"{_and(group)} agree with each other" for group in found.groups if len(group) > 1]

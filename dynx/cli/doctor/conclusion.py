@@ -21,8 +21,8 @@ from dynx.errors import DynxError
 
 DoctorRun = Run[DoctorTask, DoctorReport]
 
-_SHOWN_DIFFERENCES = 6
-"""Differences listed for each robot against a baseline."""
+_MAX_DIFFERENCES = 6
+"""Number of differences listed for each robot against a baseline."""
 
 
 class Conclusion:
@@ -129,10 +129,10 @@ class Conclusion:
                 style="bold red" if found.new else "bold",
             )
         for word, style, group in (("new", "red", found.new), ("gone", "green", found.vanished)):
-            for each in group[:_SHOWN_DIFFERENCES]:
+            for each in group[:_MAX_DIFFERENCES]:
                 out.print(f"  {word}: {each.place} ({', '.join(sorted(each.engines))})", style=style)
-            if len(group) > _SHOWN_DIFFERENCES:
-                out.print(f"  {word}: and {len(group) - _SHOWN_DIFFERENCES} more", style=style)
+            if len(group) > _MAX_DIFFERENCES:
+                out.print(f"  {word}: and {len(group) - _MAX_DIFFERENCES} more", style=style)
 
 
 def refusal(report: DoctorReport) -> str:

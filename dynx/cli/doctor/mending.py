@@ -1,4 +1,4 @@
-"""Where mended descriptions go: decided before hours of work, and never over what was read."""
+"""Files for mended descriptions: chosen before the work, and never over an input by accident."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ from dynx.model.xml.source import XmlSource
 def planned_targets(
     inputs: Sequence[RobotInput], out: str | None, *, in_place: bool, bases: int
 ) -> list[str | None]:
-    """The file to be written for each input, None where nothing is to be mended."""
+    """Return the file for each input's mended description, or None."""
     if out is not None and in_place:
         raise ArgumentError("--fix and --in-place exclude each other")
     if (out is not None or in_place) and bases > 1:
-        raise ArgumentError("a file is mended for one base: --base fixed or --base floating")
+        raise ArgumentError("a file is mended for one base; choose --base fixed or --base floating")
     if in_place:
         return [*in_place_targets(inputs)]
     return [None] * len(inputs) if out is None else [*targets(inputs, out)]
 
 
 def targets(inputs: Sequence[RobotInput], out: str) -> list[str]:
-    """The file to be written for each input; ArgumentError where one could not be, or is an input.
+    """Return the file in `out` for each input; ArgumentError where it is an input or not writable.
 
-    One robot named itself goes to the file `out`, or into it where it is a directory; several go into
-    the directory `out`, those found below a directory under the same path as there.
+    A single robot goes to the file `out`, or into it where it is a directory; several go into the
+    directory `out`, those found below a directory under the same relative path.
     """
     several = len(inputs) > 1 or any(each.folder is not None for each in inputs)
     if several or os.path.isdir(out) or out.endswith(("/", os.sep)):
@@ -51,19 +51,21 @@ def targets(inputs: Sequence[RobotInput], out: str) -> list[str]:
     try:
         require_apart(paths, (each.robot for each in inputs), "the file that is read")
     except ArgumentError as error:
-        raise ArgumentError(f"--fix: {error}; --in-place mends it there") from None
+        raise ArgumentError(f"--fix: {error}; --in-place overwrites it") from None
     return paths
 
 
 def in_place_targets(inputs: Sequence[RobotInput]) -> list[str]:
-    """The inputs as the files to be written; ArgumentError for what is no file of the user's."""
+    """Return the inputs as the files to write; ArgumentError for an input that is no file of the user."""
     for each in inputs:
         if each.refusal is None and (not os.path.isfile(each.robot) or is_library_name(each.robot)):
             raise ArgumentError(
-                f"--in-place needs files; {shown(each.robot, 200)} is none (--fix writes another)"
+                f"--in-place needs files, and {shown(each.robot, 200)} is none (--fix writes a new one)"
             )
         if each.robot.endswith(".xacro"):
-            raise ArgumentError(f"{shown(each.robot, 200)} is a program that makes a URDF: --fix writes that")
+            raise ArgumentError(
+                f"{shown(each.robot, 200)} is xacro source; --fix writes the URDF that it expands to"
+            )
         if each.refusal is None:
             check_writable(each.robot)
     return [each.robot for each in inputs]
@@ -76,15 +78,14 @@ def require_other_file(path: str, read: str) -> None:
     except (OSError, ValueError):  # one of them is not there
         same = False
     if same:
-        raise ArgumentError(f"--fix {shown(path, 300)} is the file that is read; --in-place mends it there")
+        raise ArgumentError(f"--fix {shown(path, 300)} is the file that is read; --in-place overwrites it")
 
 
 def write_mended(path: str, report: DoctorReport, *, over_input: bool) -> bool:
-    """Write the mended description of a report; False where there is none to write.
+    """Write the mended description of a report; return False where there is none.
 
-    Where nothing in the text has to change it is written as it was read, so that the file is there in
-    any case. The encoding, the byte-order mark and the line ends are those that were read. A file that
-    was changed since it was read is not written over.
+    A description that needs no change is written as it was read, unless it is the input. Encoding,
+    byte-order mark and line ends are preserved. Raises ArgumentError for an input that changed meanwhile.
     """
     text = report.mended
     if text is None and not over_input:
@@ -102,7 +103,9 @@ def write_mended(path: str, report: DoctorReport, *, over_input: bool) -> bool:
 
 def _require_unchanged(path: str, report: DoctorReport) -> None:
     if XmlSource(read_file(path), path).text != report.text:
-        raise ArgumentError(f"{shown(path, 300)} was changed while it was examined, and is left as it is")
+        raise ArgumentError(
+            f"{shown(path, 300)} was changed by another program during the examination and is not overwritten"
+        )
 
 
 def _name(each: RobotInput) -> str:

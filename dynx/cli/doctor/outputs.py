@@ -1,4 +1,4 @@
-"""The files that `dynx doctor` writes besides its tables."""
+"""Files that `dynx doctor` writes."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ STDOUT = "-"
 
 @dataclass(frozen=True)
 class Outputs:
-    """Where each format goes; None where it was not asked for, and for JSON `STDOUT` is allowed."""
+    """The file of each format, or None; JSON can go to `STDOUT`."""
 
     json: str | None = None
     html: str | None = None
@@ -30,7 +30,7 @@ class Outputs:
     baseline: str | None = None
 
     def check(self) -> None:
-        """Raise ArgumentError for a path that plainly cannot be written, or that is given twice."""
+        """Raise ArgumentError for a path that cannot be written, or that is given twice."""
         paths = [path for path in vars(self).values() if path is not None]
         for path in paths:
             if path != STDOUT or path is not self.json:
@@ -39,9 +39,9 @@ class Outputs:
                 raise ArgumentError(f"two formats would be written to {path!r}")
 
     def keep_apart(self, read: Iterable[str], mended: Iterable[str | None], baseline: str | None) -> None:
-        """Raise ArgumentError for a path at which a robot is read, a mended file goes or the baseline lies.
+        """Raise ArgumentError for a path that is also a robot, a mended file, or the baseline.
 
-        To write a new baseline over the one that is compared with is to accept what is new.
+        Only a new baseline can replace the baseline that was read, which accepts all new differences.
         """
         paths = [
             path for path in (self.json, self.html, self.junit, self.sarif) if path not in (None, STDOUT)
@@ -53,7 +53,7 @@ class Outputs:
         targets = {os.path.realpath(path) for path in mended if path is not None}
         for path in every:
             if os.path.realpath(path) in targets:
-                raise ArgumentError(f"{shown(path, 300)} is where a mended file goes")
+                raise ArgumentError(f"{shown(path, 300)} is also the file of a mended description")
 
     @property
     def on_stdout(self) -> bool:
@@ -67,7 +67,7 @@ class Outputs:
         baseline: Baseline | None = None,
         command: str | None = None,
     ) -> None:
-        """Write all that was asked for; `command` is what a page says to run again."""
+        """Write all files; `command` is the command line that the HTML page shows."""
         if self.json is not None:
             self._json(reports, not_done)
         texts: dict[str | None, Callable[[], str]] = {
@@ -92,7 +92,7 @@ class Outputs:
 
 
 def save_counterexamples(folder: str, report: DoctorReport) -> Mapping[int, str]:
-    """Write the counterexamples of a report into a directory; their files by number."""
+    """Write the counterexamples of a report into a directory; return their files by number."""
     saved: dict[int, str] = {}
     written: dict[str, str] = {}
     for number, each in enumerate(report.unexplained):
@@ -111,7 +111,7 @@ def save_counterexamples(folder: str, report: DoctorReport) -> Mapping[int, str]
 
 
 def _with_state(found: Counterexample, each: Unexplained) -> str:
-    """The URDF, in ASCII, with the state at which the difference shows in a comment behind it."""
+    """Return the URDF in ASCII, followed by a comment with the state at which the difference occurs."""
     lines = [
         f"{symbol} = {list(values)}" for symbol, values in (("q", found.q), ("v", found.v), ("a", found.a))
     ]

@@ -1,4 +1,4 @@
-"""The reports of `dynx doctor` on a terminal: everything shown is a function of the reports alone."""
+"""Reports of `dynx doctor` on a terminal."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ from dynx.doctor.formats.causes import ROUNDING, Cause, Status, causes, severity
 from dynx.doctor.formats.vote import largest_error
 from dynx.doctor.report import DoctorReport, EngineResult, Finding
 
-_SHOWN_PLACES = 4
-"""Places of one rule on a terminal; ``--json`` and ``--html`` have all."""
+_MAX_PLACES = 4
+"""Number of places listed for one rule; ``--json`` and ``--html`` have all."""
 
-_SHOWN_RULES = 3
-"""Rules in the line of one robot among many."""
+_MAX_RULES = 3
+"""Number of rules listed for one of several robots."""
 
 
 def show_one(out: Console, report: DoctorReport, saved: Mapping[int, str], mended: str | None) -> None:
-    """The full report of one robot.
+    """Print the full report of one robot.
 
-    `saved` says where the counterexample of each unexplained difference was written, by its number,
-    `mended` where the mended description was.
+    `saved` has the file with the counterexample of each unexplained difference, by its number, and
+    `mended` is the file with the mended description.
     """
     show_verdict(out, report)
     if report.error is not None:
@@ -50,8 +50,8 @@ def show_one(out: Console, report: DoctorReport, saved: Mapping[int, str], mende
 
 
 def show_verdict(out: Console, report: DoctorReport) -> None:
-    """The first line: robot, base, verdict, and the file."""
-    if report.error is not None:  # whose words are said on standard error
+    """Print the first line: robot, base and verdict, then the file."""
+    if report.error is not None:  # its message is on standard error
         out.print(f"{short_line(report.robot)}, {report.base} base: not examined", style="yellow")
         return
     style = "bold green" if report.alike else "bold" if report.explained else "bold red"
@@ -61,8 +61,8 @@ def show_verdict(out: Console, report: DoctorReport) -> None:
 
 
 def show_engines(out: Console, report: DoctorReport) -> None:
-    """Each engine with its version and the exact call that loads the file."""
-    heading(out, "each engine loads the file as its users do")
+    """Print each engine with its version and the call that loads the file."""
+    heading(out, "each engine loads the file with the call of its documentation")
     for each in report.engines:
         out.print(f"  {each.engine} {one_line(each.version)}", style="bold")
         for line in each.call.splitlines():
@@ -75,7 +75,7 @@ def show_engines(out: Console, report: DoctorReport) -> None:
 
 
 def show_errors(out: Console, report: DoctorReport, *, mended: bool = True) -> None:
-    """Distance of each engine from the file by quantity, before mending and, if wanted, after."""
+    """Print the error of each engine by quantity, before mending and, with `mended`, after."""
     asked = [each for each in report.engines if each.before or each.after]
     rows = list(dict.fromkeys(key for each in asked for key in (*each.before, *each.after)))
     if not rows:
@@ -93,7 +93,7 @@ def show_errors(out: Console, report: DoctorReport, *, mended: bool = True) -> N
     out.print(table)
     if "inverse_dynamics" in rows and "forward_dynamics" not in rows:
         sentence(out, "forward dynamics is not compared: the mass matrix is singular", 1, "dim")
-    known = f", what the file says known to {report.referee:.0e}" if report.referee else ""
+    known = f", reference values accurate to {report.referee:.0e}" if report.referee else ""
     out.print(
         f" tolerance {report.tolerance:g}, {counted(report.samples, 'sample')}, seed {report.seed}{known}",
         style="dim",
@@ -101,10 +101,10 @@ def show_errors(out: Console, report: DoctorReport, *, mended: bool = True) -> N
 
 
 def show_many(out: Console, reports: Sequence[DoctorReport]) -> None:
-    """One line for each robot and base."""
+    """Print one line for each robot and base."""
     bases = len({report.base for report in reports}) > 1
-    columns = ["robot", *(["base"] if bases else []), "verdict", "error", "left", "causes"]
-    table = Table(*columns, right=["error", "left"], keys=1)
+    columns = ["robot", *(["base"] if bases else []), "verdict", "error", "residual", "causes"]
+    table = Table(*columns, right=["error", "residual"], keys=1)
     for report in reports:
         left = report.residual if report.error is None else None
         table.add_row(
@@ -115,14 +115,14 @@ def show_many(out: Console, reports: Sequence[DoctorReport]) -> None:
             "" if left is None else error_text(left, report.tolerance),
             _rules(report),
         )
-    out.print("largest relative error of any engine, as loaded (refused: by one of them)", style="bold")
-    out.print("and what is left of it after mending", style="bold")
+    out.print("largest relative error of any engine, as loaded (refused: an engine refuses it)", style="bold")
+    out.print("and the residual error after mending", style="bold")
     out.print(table)
     out.print()
 
 
 def show_summary(out: Console, reports: Sequence[DoctorReport], seconds: float, left: int) -> None:
-    """The last line: how many are alike, explained, unexplained, refused, and not done."""
+    """Print the last line: the number of robots alike, explained, unexplained, refused and not done."""
     verdicts = [status(report) for report in reports]
     parts = [f"{verdicts.count(word)} {word}" for word in get_args(Status)]
     if left:
@@ -146,11 +146,11 @@ def _show_causes(out: Console, title: str, found: Sequence[Cause]) -> None:
 
 
 def _show_places(out: Console, cause: Cause) -> None:
-    for finding in cause.findings[:_SHOWN_PLACES]:
+    for finding in cause.findings[:_MAX_PLACES]:
         said = [each for each in (wording.effects(finding), wording.name(finding.message, 300)) if each]
         sentence(out, f"{_place(finding)}: {'; '.join(said)}", 6, "dim")
-    if len(cause.findings) > _SHOWN_PLACES:
-        out.print(f"      and {len(cause.findings) - _SHOWN_PLACES} more", style="dim")
+    if len(cause.findings) > _MAX_PLACES:
+        out.print(f"      and {len(cause.findings) - _MAX_PLACES} more", style="dim")
 
 
 def _place(finding: Finding) -> str:
@@ -159,7 +159,7 @@ def _place(finding: Finding) -> str:
 
 
 def _cause_line(cause: Cause) -> Text:
-    """Rule, how large, where it counts; loud only where it is more than rounding."""
+    """Make the line of a cause: rule, largest effect, and whether it is proved."""
     worst = cause.largest_effect
     line = Text(f"  {wording.name(cause.rule)} {wording.name(cause.name)}", STYLES[cause.severity])
     if worst is not None:
@@ -172,7 +172,7 @@ def _cause_line(cause: Cause) -> Text:
 
 
 def _extent(cause: Cause) -> str:
-    """How many places, in which engines."""
+    """Write the number of places and the engines."""
     engines = f" in {', '.join(map(wording.name, cause.engines))}" if cause.engines else ""
     return f"{counted(len(cause.findings), 'place')}{engines}"
 
@@ -186,7 +186,7 @@ def _show_list(out: Console, title: str, items: Sequence[str]) -> None:
 
 def _show_calls(out: Console, report: DoctorReport) -> None:
     if report.calls:
-        heading(out, "what no URDF can mend: to be called after loading")
+        heading(out, "calls after loading, for what no URDF can express")
         for call in report.calls:
             out.print(f"  {wording.name(call.engine)}")
             block(out, call.code, 6)
@@ -195,7 +195,7 @@ def _show_calls(out: Console, report: DoctorReport) -> None:
 def _show_unexplained(out: Console, report: DoctorReport, saved: Mapping[int, str]) -> None:
     if not report.unexplained:
         return
-    heading(out, "unexplained: no rule accounts for", "bold red")
+    heading(out, "unexplained: no rule accounts for these differences", "bold red")
     for number, each in enumerate(report.unexplained):
         where = "" if each.joint is None else f", worst at joint {wording.name(each.joint)}"
         what = f"{wording.quantity(each.quantity)} of {wording.name(each.engine)}"
@@ -205,7 +205,7 @@ def _show_unexplained(out: Console, report: DoctorReport, saved: Mapping[int, st
             file = saved.get(number)
             joints = counted(found.moving_joints, "moving joint")
             at = "" if file is None else f": {one_line(file)}"
-            sentence(out, f"smallest robot that shows it, {joints}{at}", 6)
+            sentence(out, f"smallest robot that shows the difference, {joints}{at}", 6)
             for symbol, values in (("q", found.q), ("v", found.v), ("a", found.a)):
                 sentence(out, f"{symbol} = [{', '.join(f'{value:g}' for value in values)}]", 6, "dim")
 
@@ -223,12 +223,12 @@ def _show_next(out: Console, report: DoctorReport, mended: str | None) -> None:
         rule = causes(report)[0].rule
         out.print(f"more about a rule: dynx explain {shlex.quote(wording.name(rule))}", style="dim")
     if not report.alike:
-        left = f"what is left after mending: {wording.relative(report.residual)}"
+        left = f"residual error after mending: {wording.relative(report.residual)}"
         out.print(f"{left}; {report.seconds:.1f} s", style="dim")
 
 
 def _change(engine: EngineResult, key: str, tolerance: float, mended: bool) -> Text:
-    """One number where nothing had to change, else two."""
+    """Write the error before mending, and the one after where either exceeds the tolerance."""
     before, after = engine.before.get(key), engine.after.get(key)
     if before is None:
         first = Text("refused" if engine.refused is not None else "-", "red")
@@ -240,7 +240,7 @@ def _change(engine: EngineResult, key: str, tolerance: float, mended: bool) -> T
 
 
 def error_text(error: float, tolerance: float) -> Text:
-    """An error, loud as it is large."""
+    """Write an error in the style of its severity."""
     if error <= tolerance:
         return Text(wording.relative(error), "green")
     return Text(wording.relative(error), STYLES["warning" if error <= ROUNDING else "error"])
@@ -256,15 +256,15 @@ def _largest(report: DoctorReport) -> Text:
 
 def _rules(report: DoctorReport) -> Text:
     found = [cause for cause in causes(report) if cause.largest_effect is not None]
-    parts = [Text(wording.name(cause.rule), STYLES[cause.severity]) for cause in found[:_SHOWN_RULES]]
-    if len(found) > _SHOWN_RULES:
-        parts.append(Text(f"+{len(found) - _SHOWN_RULES}"))
+    parts = [Text(wording.name(cause.rule), STYLES[cause.severity]) for cause in found[:_MAX_RULES]]
+    if len(found) > _MAX_RULES:
+        parts.append(Text(f"+{len(found) - _MAX_RULES}"))
     return Text(" ").join(parts)
 
 
 def _verdict_text(report: DoctorReport) -> Text:
     word = status(report)
-    if word == "refused":  # why is said on standard error
+    if word == "refused":  # the reason is on standard error
         return Text("refused", "yellow")
     if word == "alike":
         return Text("alike", "green")

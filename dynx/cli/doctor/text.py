@@ -1,4 +1,4 @@
-"""Lines of a report on a terminal: headings, sentences that keep their indent, code as it stands."""
+"""Lines of a report on a terminal: headings, indented sentences, code."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from rich.console import Console
 from dynx.cli.shell.exits import one_line
 
 STYLES = {"error": "bold red", "warning": "yellow", "note": "dim"}
-"""How loud each severity is."""
+"""Style of each severity."""
 
 
 def heading(out: Console, text: str, style: str = "bold") -> None:
-    """A blank line and a title."""
+    """Print a blank line and a title."""
     out.print()
     out.print(text, style=style)
 
 
 def sentence(out: Console, text: str, indent: int, style: str = "") -> None:
-    """Words in lines of the terminal's width, each indented; a word that is too long runs over."""
+    """Print text wrapped to the terminal's width, each line indented; words are not broken."""
     blanks = " " * indent
     lines = textwrap.wrap(
         text,
@@ -34,7 +34,7 @@ def sentence(out: Console, text: str, indent: int, style: str = "") -> None:
 
 
 def block(out: Console, code: str, indent: int) -> None:
-    """Lines of code, each as it stands, to be copied."""
+    """Print lines of code without wrapping, so that they can be copied."""
     for line in code.splitlines():
         blanks = " " * (indent + len(line) - len(line.lstrip(" ")))
         out.print(f"{blanks}{one_line(line)}")

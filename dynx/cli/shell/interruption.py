@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM as a request to finish with what there is."""
+"""Ctrl-C and SIGTERM as requests to finish with the results so far."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from types import FrameType
 
 
 class Interruption:
-    """Whether the run was asked to end; `code` is then the exit code, 128 and the signal."""
+    """Request to end the run: `code` is None without one, else the exit code, 128 + signal."""
 
     def __init__(self) -> None:
         self.code: int | None = None
         self.finishing = False
 
     def arrived(self, number: int, frame: FrameType | None) -> None:
-        """The signal handler: the first signal ends the work, later ones must not lose the results."""
+        """Handle a signal: the first ends the work, later ones are ignored so that no results are lost."""
         if self.finishing or self.code is not None:
             return
         self.code = 128 + number
@@ -26,10 +26,10 @@ class Interruption:
 
 @contextmanager
 def interruptible() -> Iterator[Interruption]:
-    """Within the context the first SIGINT or SIGTERM raises KeyboardInterrupt, unless `finishing`."""
+    """Raise KeyboardInterrupt in the block at the first SIGINT or SIGTERM, unless `finishing`."""
     interruption = Interruption()
     if threading.current_thread() is not threading.main_thread():
-        yield interruption  # only the main thread may set handlers, and only it gets signals
+        yield interruption  # only the main thread can set handlers and receives signals
         return
     numbers = (signal.SIGINT, signal.SIGTERM)
     before = [signal.signal(number, interruption.arrived) for number in numbers]

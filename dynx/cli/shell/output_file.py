@@ -10,7 +10,7 @@ from dynx.errors import ArgumentError, shown
 
 
 def check_writable(path: str) -> None:
-    """Raise ArgumentError if `path` plainly cannot be written."""
+    """Raise ArgumentError if `path` is a directory, in no directory, or write-protected."""
     folder = os.path.dirname(path) or "."
     if os.path.isdir(path):
         problem = "is a directory"
@@ -24,27 +24,27 @@ def check_writable(path: str) -> None:
 
 
 def require_apart(paths: Iterable[str], kept: Iterable[str], what: str) -> None:
-    """Raise ArgumentError where a path is one of the files `kept`, under whatever name: it would be lost.
+    """Raise ArgumentError where a path is one of the files `kept`, under any name.
 
-    `what` says what they are, as in ``a file that is read``.
+    `what` describes these files in the message, as in ``a file that is read``.
     """
     files = {_identity(each) for each in kept} - {None}
     for path in paths:
         if _identity(path) in files:
-            raise ArgumentError(f"{shown(path, 300)} is {what}, and would be written over")
+            raise ArgumentError(f"{shown(path, 300)} is {what}, and would be overwritten")
 
 
 def make_folder(path: str) -> None:
-    """Make the directory of a file that is to be written, where there is none yet."""
+    """Create the directory of an output file where it does not exist."""
     folder = os.path.dirname(path) or "."
     try:
         os.makedirs(folder, exist_ok=True)
     except OSError as error:
-        raise ArgumentError(f"{shown(folder, 300)} cannot be made: {error.strerror}") from error
+        raise ArgumentError(f"{shown(folder, 300)} cannot be created: {error.strerror}") from error
 
 
 def _identity(path: str) -> tuple[int, int] | None:
-    """What tells a regular file from every other one, whatever it is called; None where there is none."""
+    """Return device and inode of a regular file; None where there is none."""
     try:
         found = os.stat(path)
     except (OSError, ValueError):

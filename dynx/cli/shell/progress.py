@@ -1,4 +1,4 @@
-"""The bar on standard error that long work shows, on a terminal only."""
+"""Progress bar on standard error, if that is a terminal."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from contextlib import contextmanager
 from dynx.cli.shell.terminal import console
 
 Advance = Callable[[int, str], None]
-"""Told how many are done, and what to say beside the bar."""
+"""Function that takes the number of items done and the text beside the bar."""
 
 
 @contextmanager
 def progress_bar(total: int, done: int = 0, words: str = "", *, wanted: bool = True) -> Iterator[Advance]:
-    """A bar of `total` pieces while the block lasts."""
+    """Show a bar of `total` items during the block."""
     if not wanted or not sys.stderr.isatty():
         yield lambda done, words: None
         return
@@ -28,7 +28,7 @@ def progress_bar(total: int, done: int = 0, words: str = "", *, wanted: bool = T
         TimeElapsedColumn(),
     )
     screen = console(err=True)
-    screen.soft_wrap = False  # a bar that ran over the line could not be drawn again in place
+    screen.soft_wrap = False  # a bar longer than the line could not be redrawn in place
     with Progress(*columns, console=screen, transient=True) as progress:
         bar = progress.add_task(words, total=total, completed=done)
         yield lambda done, words: progress.update(bar, completed=done, description=words)

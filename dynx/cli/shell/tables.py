@@ -1,4 +1,4 @@
-"""Tables of text whose cells are never broken: one too wide for the terminal goes on in further blocks."""
+"""Tables of text whose cells are never broken: a table too wide for the terminal continues in blocks."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from rich.text import Text
 Cell = str | Text
 
 _GAP, _NARROW_GAP = 3, 2
-"""Blanks between two columns, the second in a table that would not fit; one stands before the first."""
+"""Blanks between two columns in a table that fits and in one that does not; one precedes the first."""
 
-_LARGEST_SHARE_OF_KEYS = 0.4
-"""Of the width, in a table that does not fit: wider keys are broken between words."""
+_MAX_KEY_FRACTION = 0.4
+"""Width of a key as a fraction of the table's, in a table that does not fit: wider keys are wrapped."""
 
 
 class Table:
     """A table in the one style of dynx, for ``Console.print``.
 
-    Where it does not fit, its columns are printed in blocks that do, one below the other, each with
-    the first `keys` columns again (NumPy and Octave print wide matrices so). With no `keys` it is
-    never divided and its lines run over. Columns named in `right` are aligned right.
+    A table too wide is printed in blocks of columns, one below the other, each with the first `keys`
+    columns again, as Octave prints wide matrices. Without `keys` it is never divided. Columns named in
+    `right` are aligned right.
     """
 
     def __init__(
@@ -35,7 +35,7 @@ class Table:
         self._rows: list[list[Text]] = []
 
     def add_row(self, *cells: Cell) -> None:
-        """Add a row of cells; columns for which there is none stay empty."""
+        """Add a row of cells; columns without a cell stay empty."""
         filled = [*cells, *[""] * (len(self._columns) - len(cells))]
         self._rows.append([Text(cell) if isinstance(cell, str) else cell for cell in filled])
 
@@ -43,7 +43,7 @@ class Table:
         return self.lines(options.max_width, "-" if options.ascii_only else "─")
 
     def lines(self, width: int, rule: str = "─") -> Iterator[Text]:
-        """The table as lines without trailing blanks, at most `width` wide where the cells allow it."""
+        """Return the table as lines without trailing blanks, at most `width` wide where cells allow."""
         heads = [[Text(line, "bold") for line in column.split("\n")] for column in self._columns]
         body = [[[cell] for cell in row] for row in self._rows]
         widths = _widths([heads, *body])
@@ -51,7 +51,7 @@ class Table:
         if self._keys and _total(widths, gap) > width:
             gap = _NARROW_GAP
         if self._keys and _total(widths, gap) > width:
-            limit = int(_LARGEST_SHARE_OF_KEYS * width)
+            limit = int(_MAX_KEY_FRACTION * width)
             for row in body:
                 row[: self._keys] = [_broken(cell[0], limit) for cell in row[: self._keys]]
             widths = _widths([heads, *body])
@@ -67,7 +67,7 @@ class Table:
                 yield from self._row(row, block, widths, gap)
 
     def _blocks(self, widths: Sequence[int], width: int, gap: int) -> list[list[int]]:
-        """The columns of each block; one has at least one besides the keys, and half of `width` for them."""
+        """Return the columns of each block: besides the keys at least one, and half of `width` for them."""
         keys = list(range(self._keys))
         if not keys:
             return [list(range(len(widths)))]
@@ -83,7 +83,7 @@ class Table:
     def _row(
         self, cells: Sequence[Sequence[Text]], block: Sequence[int], widths: Sequence[int], gap: int
     ) -> Iterator[Text]:
-        """The lines of one row: cells of fewer lines than the longest are blank below."""
+        """Return the lines of one row; a cell with fewer lines than the tallest is blank below."""
         for k in range(max(len(cells[column]) for column in block)):
             line = Text()
             for number, column in enumerate(block):
@@ -96,7 +96,7 @@ class Table:
 
 
 def listing(heading: str, items: Iterable[str], width: int) -> str:
-    """``heading: a, b, c`` in lines of at most `width` where the items, which stay whole, allow it."""
+    """Write ``heading: a, b, c`` in lines of at most `width`, without breaking an item."""
     lines = [f"{heading}:"]
     parts = list(items)
     for number, item in enumerate(parts):
@@ -109,7 +109,7 @@ def listing(heading: str, items: Iterable[str], width: int) -> str:
 
 
 def _broken(cell: Text, limit: int) -> list[Text]:
-    """A key in lines of at most `limit`, broken between words only."""
+    """Wrap a key between words into lines of at most `limit`."""
     lines = textwrap.wrap(
         cell.plain, max(limit, 1), break_long_words=False, break_on_hyphens=False, subsequent_indent="  "
     )
@@ -121,5 +121,5 @@ def _widths(rows: Sequence[Sequence[Sequence[Text]]]) -> list[int]:
 
 
 def _total(widths: Sequence[int], gap: int) -> int:
-    """The length of a line of columns that wide."""
+    """Return the length of a line of columns of these widths."""
     return 1 + sum(widths) + gap * (len(widths) - 1)

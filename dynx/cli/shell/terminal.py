@@ -1,4 +1,4 @@
-"""Where output goes: tables through rich, JSON as text, both fit for pipes and old terminals."""
+"""Output: tables through rich and JSON as text, for terminals, pipes and files."""
 
 from __future__ import annotations
 
@@ -13,15 +13,14 @@ from rich.console import Console
 from dynx.files.documents import json_text
 
 PIPE_WIDTH = 10_000
-"""Columns where nobody watches: a table in a file or a pipe is never divided."""
+"""Width of a file or pipe [columns], so large that no table is divided."""
 
 
 def console(*, err: bool = False) -> Console:
-    """A console on standard output or error; `err` also sends tables away from JSON on stdout.
+    """Return a console on standard output, or with `err` on standard error.
 
-    Lines are not wrapped, so that paths and numbers can be copied: a terminal does that for itself.
-    Names of robots may hold anything, so neither markup nor emoji codes are read. NO_COLOR, TERM
-    and COLUMNS are honoured.
+    Lines are not wrapped, so that paths and numbers can be copied: terminals wrap them. Names of robots
+    can contain any text, so markup and emoji codes are not interpreted. NO_COLOR, TERM and COLUMNS apply.
     """
     stream = sys.stderr if err else _standard_output()
     width = None if stream.isatty() or "COLUMNS" in os.environ else PIPE_WIDTH
@@ -34,17 +33,17 @@ def echo_json(document: object) -> None:
 
 
 def number(value: float) -> str:
-    """A number of a table: nine significant digits, and zero as 0 whatever its sign."""
+    """Write a number with nine significant digits, and -0 as 0."""
     return "0" if value == 0.0 else f"{value:.9g}"
 
 
 def counted(count: int, noun: str) -> str:
-    """``1 robot``, ``2 robots``."""
+    """Write ``1 robot`` or ``2 robots``."""
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
 def _standard_output() -> TextIO:
-    """Standard output; OSError where the process was started without one."""
+    """Return standard output; OSError where the process has none."""
     if sys.stdout is None:
         raise OSError(errno.EBADF, os.strerror(errno.EBADF))
     return sys.stdout

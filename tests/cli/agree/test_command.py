@@ -31,7 +31,7 @@ def test_one_robot_gives_the_full_table() -> None:
     assert result.exit_code == 0
     assert "mass matrix" in result.stdout
     assert "reference alone agrees" in result.stdout
-    assert "digits or more (inverse kinematics and numerical derivatives apart)" in result.stdout
+    assert "digits or more (except inverse kinematics and numerical derivatives)" in result.stdout
     assert "1 sample," in result.stdout
     assert result.stderr == ""
 
@@ -199,7 +199,7 @@ def test_numbers_and_words_stay_whole_on_a_narrow_terminal(
     wanted = {word for word in full.split() if not word.startswith("─")}
     assert wanted - {*full.splitlines()[-1].split()} <= {*narrow.split()}
     table = narrow.splitlines()[2:-2]
-    assert max(len(line) for line in table if "native answer" not in line) <= width
+    assert max(len(line) for line in table if "native result" not in line) <= width
 
 
 def test_one_robot_is_singular() -> None:

@@ -156,7 +156,7 @@ def test_several_robots_and_bases(arm: Path, tmp_path: Path) -> None:
         (["panda", "--fix", "arm.urdf"], "arm.urdf"),
         (["--json", "arm.urdf"], "a robot that is read"),
         (["--write-baseline", "./arm.urdf"], "a robot that is read"),
-        (["--fix", "x.urdf", "--html", "./x.urdf"], "where a mended file goes"),
+        (["--fix", "x.urdf", "--html", "./x.urdf"], "the file of a mended description"),
     ],
 )
 def test_arguments_that_cannot_be_used_cost_no_work(arguments: list[str], clue: str, arm: Path) -> None:
@@ -206,7 +206,7 @@ def test_a_file_that_changed_meanwhile_is_left_as_it_is(arm: Path) -> None:
     report = diagnose(str(arm), engines=["pinocchio", "pybullet"], samples=2)
     newer = arm.read_bytes().replace(b"0.5", b"0.6")
     arm.write_bytes(newer)
-    with pytest.raises(ArgumentError, match="changed while it was examined"):
+    with pytest.raises(ArgumentError, match="changed by another program"):
         write_mended(str(arm), report, over_input=True)
     assert arm.read_bytes() == newer
 

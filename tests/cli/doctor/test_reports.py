@@ -100,7 +100,7 @@ def test_a_folder_that_cannot_be_made_is_said_and_the_rest_is_done(
     assert concluded([differing()], tmp_path / "file" / "folder") == 2
     found = capsys.readouterr()
     assert "DX901" in found.out
-    assert "cannot be made" in found.err
+    assert "cannot be created" in found.err
 
 
 @given(st.text())
