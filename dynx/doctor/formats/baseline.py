@@ -1,10 +1,8 @@
-"""Differences that are known and accepted: a JSON file that makes a check fail on new ones only.
+"""Baselines: JSON files of accepted differences, with which a check fails only on new ones.
 
-    {"schema": 1, "dynx": version, "known": [{robot, base, rule, link, joint, engines, relative_error}]}
-
-A difference is known by robot, base, rule, link or joint, and engines; not by its line, nor by its size.
-What has no rule has the rule ``unexplained``, and the quantity stands in its place. A difference is
-known where the file names all its engines, so that fewer engines at hand make nothing new.
+A difference is identified by robot, base, rule, link or joint, and engines; not by its line, nor by its
+magnitude. One without a rule has the rule ``unexplained``, and its quantity instead of a link or joint. It is
+known if the file names all its engines, so that nothing is new where fewer engines are installed.
 """
 
 from __future__ import annotations
@@ -25,12 +23,12 @@ from dynx.files.reading import read_file
 SCHEMA = 1
 
 UNEXPLAINED = "unexplained"
-"""In the place of a rule, for a difference that no rule accounts for."""
+"""Stands for the rule of a difference that no rule explains."""
 
 
 @dataclass(frozen=True)
 class Place:
-    """Where a difference is known: everything about it but the engines."""
+    """Identity of a difference, except for its engines."""
 
     robot: str
     base: str
@@ -66,7 +64,7 @@ class BaselineDocument:
 
 @dataclass(frozen=True)
 class Difference:
-    """A difference as a baseline knows it; `relative_error` is told, and not compared."""
+    """A difference with its engines; `relative_error` is shown, and not compared."""
 
     place: Place
     engines: frozenset[str]
@@ -75,7 +73,7 @@ class Difference:
 
 @dataclass(frozen=True)
 class Comparison:
-    """A report against a baseline: what is new, what was known, and what was known and is gone."""
+    """Differences of a report that are new or known, and known ones that have vanished."""
 
     new: tuple[Difference, ...]
     known: tuple[Difference, ...]
@@ -84,66 +82,64 @@ class Comparison:
 
 @dataclass(frozen=True)
 class Baseline:
-    """The known differences; `folder` is where their file lies, to which robots given as paths are
-    relative, so that a checkout elsewhere has the same baseline."""
+    """The known differences. Robots given as paths are relative to `folder`, where their file is, so that a
+    checkout elsewhere has the same baseline."""
 
     folder: str
     known: tuple[Difference, ...] = ()
 
     def compare(self, report: DoctorReport) -> Comparison:
-        """What of a report is new. A difference of an engine that did not take part is not gone."""
+        """Compare a report. A difference of an engine that did not take part has not vanished."""
         allowed: dict[Place, frozenset[str]] = {}
         for each in self.known:
             allowed[each.place] = allowed.get(each.place, frozenset()) | each.engines
         found = differences(report, self.folder)
         new = tuple(each for each in found if not each.engines <= allowed.get(each.place, frozenset()))
         known = tuple(each for each in found if each not in new)
-        return Comparison(new, known, self._vanished(report, {each.place for each in found}))
-
-    def _vanished(self, report: DoctorReport, found: set[Place]) -> tuple[Difference, ...]:
-        if report.error is not None:
-            return ()
-        key = (robot_key(report, self.folder), report.base or "")
+        robot = (robot_key(report, self.folder), report.base or "")
         present = {each.engine for each in report.engines}
-        return tuple(
+        gone = allowed.keys() - {each.place for each in found}
+        vanished = tuple(
             each
             for each in self.known
-            if (each.place.robot, each.place.base) == key
-            and each.engines & present
-            and each.place not in found
+            if each.place in gone and (each.place.robot, each.place.base) == robot and each.engines & present
         )
+        return Comparison(new, known, vanished)
 
 
 def differences(report: DoctorReport, folder: str) -> tuple[Difference, ...]:
-    """What makes a report one of differing engines: each cause with an effect, and what has none."""
+    """Collect what makes engines differ in a report: each cause with an effect, and what has no cause."""
     robot, base = robot_key(report, folder), report.base or ""
     merged: dict[Place, Difference] = {}
 
-    def add(place: Place, engines: Iterable[str], size: float) -> None:
+    def add(place: Place, engines: Iterable[str], error: float) -> None:
         old = merged.get(place, Difference(place, frozenset()))
-        merged[place] = Difference(place, old.engines | set(engines), max(old.relative_error, size))
+        merged[place] = Difference(place, old.engines | set(engines), max(old.relative_error, error))
+
+    def add_unexplained(engine: str, quantity: str, error: float, joint: str | None = None) -> None:
+        add(Place(robot, base, UNEXPLAINED, None, joint, quantity), (engine,), error)
 
     for finding in report.differences:
         assert finding.effect is not None
         place = Place(robot, base, finding.rule, finding.link, finding.joint)
         add(place, finding.engines, finding.effect.relative_error)
     for each in report.unexplained:
-        place = Place(robot, base, UNEXPLAINED, None, each.joint, each.quantity)
-        add(place, (each.engine,), each.relative_error)
+        add_unexplained(each.engine, each.quantity, each.relative_error, each.joint)
     named = {engine for each in merged.values() for engine in each.engines}
+    # Every engine that makes the report differ must have an entry.
     for engine in report.engines:
-        # Nothing that makes the report say "differ" may be missing here.
-        far = {key: error for key, error in engine.before.items() if not error <= report.tolerance}
-        if engine.engine not in named and engine.refused is not None:
-            add(Place(robot, base, UNEXPLAINED, None, None, "loading"), (engine.engine,), float("inf"))
-        elif engine.engine not in named:
-            for key, error in far.items():
-                add(Place(robot, base, UNEXPLAINED, None, None, key), (engine.engine,), error)
+        if engine.engine in named:
+            continue
+        if engine.refused is not None:
+            add_unexplained(engine.engine, "loading", math.inf)
+        for quantity, error in engine.before.items():
+            if engine.refused is None and not error <= report.tolerance:
+                add_unexplained(engine.engine, quantity, error)
     return tuple(merged.values())
 
 
 def robot_key(report: DoctorReport, folder: str) -> str:
-    """The robot's name, or its path from the folder of the baseline, with forward slashes."""
+    """Return the robot's name, or its path from the folder of the baseline, with forward slashes."""
     path = report.robot
     looks_like_path = any(sep in path for sep in (os.sep, "/")) or PurePath(path).suffix in (
         ".urdf",
@@ -158,7 +154,7 @@ def robot_key(report: DoctorReport, folder: str) -> str:
 
 
 def baseline_document(reports: Iterable[DoctorReport], folder: str) -> dict[str, Any]:
-    """The document in which everything that differs in these reports is known."""
+    """Make the document in which all differences of these reports are known."""
     found = [each for report in reports for each in differences(report, folder)]
     found.sort(key=lambda each: tuple(str(value or "") for value in vars(each.place).values()))
     known = []
@@ -170,7 +166,7 @@ def baseline_document(reports: Iterable[DoctorReport], folder: str) -> dict[str,
 
 
 def read_baseline(text: str, path: str) -> Baseline:
-    """The baseline in a file's text; ArgumentError, naming `path`, where it is none."""
+    """Read a baseline from the text of a file; ArgumentError names `path` where it is none."""
     where = shown(path, 300)
     try:
         document = read_document(text, BaselineDocument)
@@ -192,5 +188,5 @@ def read_baseline(text: str, path: str) -> Baseline:
 
 
 def load_baseline(path: str) -> Baseline:
-    """Read the baseline in a file; ArgumentError where it is none, or RobotNotFoundError without one."""
+    """Read a baseline from a file; RobotNotFoundError without it, ArgumentError where it is none."""
     return read_baseline(read_file(path).decode("utf-8", "replace"), path)

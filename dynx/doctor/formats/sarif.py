@@ -1,15 +1,15 @@
-"""SARIF 2.1.0 (OASIS standard), which code hosts show as marks at the lines of a file.
+"""SARIF 2.1.0 (OASIS standard), which code hosts show as annotations of the lines of a file.
 
-Results are the findings; level ``error`` where answers differ, ``warning`` where they differ by rounding,
-``note`` for the rest. A finding on both bases is one result. Fingerprints hold no line, so that a finding
-stays the same when text is put in above it.
+Results are the findings; level ``error`` where engines differ, ``warning`` where they differ by rounding,
+``note`` otherwise. A finding on both bases is one result. Fingerprints do not contain the line, so that a
+finding stays the same when text is inserted above it.
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path, PurePath
 from typing import Any
 from urllib.parse import quote
@@ -28,7 +28,7 @@ _FINGERPRINT = "dynxFinding/v1"
 
 
 def sarif_document(reports: Iterable[DoctorReport], baseline: Baseline | None = None) -> dict[str, Any]:
-    """The document. With a baseline, what is known there is marked as suppressed."""
+    """Make the document. Differences in the baseline are marked as suppressed."""
     reports = list(reports)
     merged: dict[str, dict[str, Any]] = {}
     for report in reports:
@@ -55,76 +55,73 @@ def sarif_document(reports: Iterable[DoctorReport], baseline: Baseline | None = 
     }
 
 
-def _results(report: DoctorReport, baseline: Baseline | None) -> list[dict[str, Any]]:
+def _results(report: DoctorReport, baseline: Baseline | None) -> Iterator[dict[str, Any]]:
     new = None if baseline is None else {_key(each.place) for each in baseline.compare(report).new}
-    found = []
-    for finding in report.findings:
-        message = f"{wording.name(finding.message, 1000)} ({wording.effect(finding.effect)}"
-        message += f", {report.base} base" + (
-            "" if not finding.engines else f": {', '.join(finding.engines)}"
-        )
-        advice = "" if finding.remedy is None else f" Remedy: {wording.name(finding.remedy, 1000)}"
-        found.append(
-            _result(report, wording.name(finding.rule), severity(finding), f"{message}).{advice}", finding)
-        )
-    for open_one in report.unexplained:
-        where = "" if open_one.joint is None else f", worst at joint {wording.name(open_one.joint)}"
-        message = (
-            f"{wording.quantity(open_one.quantity)} of {open_one.engine} is off by "
-            f"{wording.relative(open_one.relative_error)}{where} ({report.base} base), "
-            "and no rule accounts for it."
-        )
-        found.append(_result(report, UNEXPLAINED, "error", message, open_one))
-    if new is not None:
-        about: list[Finding | Unexplained] = [*report.findings, *report.unexplained]
-        for result, each in zip(found, about, strict=True):
-            known = _counts(each) and _key(each) not in new
-            result["suppressions"] = (
-                [{"kind": "external", "justification": "in the baseline"}] if known else []
-            )
-    return found
+    entries: list[Finding | Unexplained] = [*report.findings, *report.unexplained]
+    for each in entries:
+        result = _finding(report, each) if isinstance(each, Finding) else _unexplained(report, each)
+        if new is not None:
+            # A baseline cannot hold bad practice, which makes no check fail.
+            counts = isinstance(each, Unexplained) or each.effect is not None
+            known = counts and _key(each) not in new
+            justification = {"kind": "external", "justification": "in the baseline"}
+            result["suppressions"] = [justification] if known else []
+        yield result
 
 
-def _counts(each: Finding | Unexplained) -> bool:
-    """Whether a baseline can know it: bad practice alone makes nothing fail."""
-    return isinstance(each, Unexplained) or each.effect is not None
+def _finding(report: DoctorReport, each: Finding) -> dict[str, Any]:
+    engines = f": {', '.join(each.engines)}" if each.engines else ""
+    message = (
+        f"{wording.name(each.message, 1000)} ({wording.effect(each.effect)}, {report.base} base{engines})."
+    )
+    if each.remedy is not None:
+        message += f" Remedy: {wording.name(each.remedy, 1000)}"
+    rule = wording.name(each.rule)
+    result = _result(report, rule, severity(each), message, each.link, each.joint)
+    (location,) = result["locations"]
+    if each.line is not None:
+        location["physicalLocation"]["region"] = {"startLine": max(each.line, 1)}
+    parts = (("link", each.link), ("joint", each.joint))
+    if any(text for _, text in parts):
+        location["logicalLocations"] = [
+            {"name": wording.name(text), "kind": kind} for kind, text in parts if text
+        ]
+    return result
+
+
+def _unexplained(report: DoctorReport, each: Unexplained) -> dict[str, Any]:
+    where = "" if each.joint is None else f", worst at joint {wording.name(each.joint)}"
+    message = (
+        f"{wording.quantity(each.quantity)} of {each.engine} is off by "
+        f"{wording.relative(each.relative_error)}{where} ({report.base} base), and no rule accounts for it."
+    )
+    return _result(report, UNEXPLAINED, "error", message, each.quantity, each.engine)
+
+
+def _result(
+    report: DoctorReport, rule: str, level: str, message: str, *identity: str | None
+) -> dict[str, Any]:
+    uri = artifact_uri(report)
+    parts = ["" if part is None else f"={part}" for part in (uri, rule, *identity)]
+    digest = hashlib.sha256("\0".join(parts).encode("utf-8", "backslashreplace")).hexdigest()[:32]
+    return {
+        "ruleId": rule,
+        "level": level,
+        "message": {"text": message},
+        "locations": [{"physicalLocation": {"artifactLocation": {"uri": uri}}}],
+        "partialFingerprints": {_FINGERPRINT: digest},
+    }
 
 
 def _key(each: Finding | Unexplained | Place) -> tuple[str | None, ...]:
-    """What a finding and its place in a baseline have in common."""
+    """Identity that a finding shares with its place in a baseline."""
     if isinstance(each, Unexplained):
         return (UNEXPLAINED, None, each.joint, each.quantity)
     return (each.rule, each.link, each.joint, each.quantity if isinstance(each, Place) else None)
 
 
-def _result(
-    report: DoctorReport, rule: str, level: str, message: str, about: Finding | Unexplained
-) -> dict[str, Any]:
-    physical: dict[str, Any] = {"artifactLocation": {"uri": artifact_uri(report)}}
-    logical: list[dict[str, str]] = []
-    if isinstance(about, Finding):
-        key = [rule, about.link, about.joint]
-        if about.line is not None:
-            physical["region"] = {"startLine": max(about.line, 1)}
-        for kind, text in (("link", about.link), ("joint", about.joint)):
-            if text:
-                logical.append({"name": wording.name(text), "kind": kind})
-    else:
-        key = [rule, about.quantity, about.engine]
-    location: dict[str, Any] = {"physicalLocation": physical}
-    if logical:
-        location["logicalLocations"] = logical
-    return {
-        "ruleId": rule,
-        "level": level,
-        "message": {"text": message},
-        "locations": [location],
-        "partialFingerprints": {_FINGERPRINT: _digest([artifact_uri(report), *key])},
-    }
-
-
 def artifact_uri(report: DoctorReport) -> str:
-    """The file as a URI: relative where it lies below the working directory, as code hosts want it."""
+    """Return the URI of the file: relative where it is below the working directory, as code hosts require."""
     path = report.source or report.robot
     if not os.path.exists(path):
         return quote(wording.name(path))
@@ -136,21 +133,16 @@ def artifact_uri(report: DoctorReport) -> str:
     return Path(absolute).as_uri() if relative.startswith("../") else quote(relative)
 
 
-def _digest(parts: list[str | None]) -> str:
-    joined = "\0".join("" if part is None else f"={part}" for part in parts)
-    return hashlib.sha256(joined.encode("utf-8", "backslashreplace")).hexdigest()[:32]
-
-
 def _rules(reports: list[DoctorReport]) -> list[dict[str, Any]]:
-    """The rules that are met, with their pages as help."""
+    """List the rules of all findings, with their pages as help."""
     met: dict[str, tuple[str, str]] = {}
     for report in reports:
         for cause in causes(report):
             met.setdefault(cause.rule, (cause.name, cause.findings[0].message))
     found = [_rule(identity, name, message) for identity, (name, message) in sorted(met.items())]
     if any(report.unexplained for report in reports):
-        said = "Engines differ, and no rule of the catalogue accounts for it."
-        found.append({"id": UNEXPLAINED, "shortDescription": {"text": said}})
+        text = "Engines differ, and no rule of the catalogue accounts for it."
+        found.append({"id": UNEXPLAINED, "shortDescription": {"text": text}})
     return found
 
 
