@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from dynx.model.library import robots
     from dynx.model.loading import load
     from dynx.rbd.regressor import inertial_parameters
-    from dynx.sim import Noise, Payload, Push, Rollout, simulate, simulate_batch
+    from dynx.sim import Noise, Payload, Push, Rollout, Scenario, Simulation, simulate, simulate_batch
 
 __all__ = [
     "AgreementReport",
@@ -46,6 +46,8 @@ __all__ = [
     "Pose",
     "Push",
     "Rollout",
+    "Scenario",
+    "Simulation",
     "__version__",
     "agree",
     "backend",
@@ -77,6 +79,8 @@ _HOME = {
     "Pose": "dynx.model",
     "Push": "dynx.sim",
     "Rollout": "dynx.sim",
+    "Scenario": "dynx.sim",
+    "Simulation": "dynx.sim",
     "agree": "dynx.agreement",
     "backend": "dynx.backends",
     "compare_as_loaded": "dynx.doctor",

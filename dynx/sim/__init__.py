@@ -3,12 +3,15 @@
 from dynx.sim.batch.batch import BatchInterrupted, simulate_batch
 from dynx.sim.batch.rollouts import BatchRollouts
 from dynx.sim.loop.sensors import Noise
+from dynx.sim.one_rollout import RolloutInterrupted, simulate
 from dynx.sim.plants.disturbances import Push
 from dynx.sim.plants.model_error import Payload, plant_model
 from dynx.sim.plants.plant import Plant, StepResult
 from dynx.sim.plants.registry import register as register_plant
-from dynx.sim.record.rollout import Rollout, Summary
-from dynx.sim.simulation import RolloutInterrupted, simulate
+from dynx.sim.record.rollout import Rollout
+from dynx.sim.record.rollout_data import Summary
+from dynx.sim.scenario.scenario import Scenario
+from dynx.sim.simulation import Simulation, Snapshot, State
 
 __all__ = [
     "BatchInterrupted",
@@ -19,6 +22,10 @@ __all__ = [
     "Push",
     "Rollout",
     "RolloutInterrupted",
+    "Scenario",
+    "Simulation",
+    "Snapshot",
+    "State",
     "StepResult",
     "Summary",
     "plant_model",

@@ -1,274 +1,379 @@
-"""`simulate`: one controller, one plant, one rollout."""
+"""A simulation that is stepped in the caller's own loop; `dynx.simulate` runs one to its end."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from types import TracebackType
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.backends import backend
-from dynx.control.base import Controller
-from dynx.control.engine_motors import EngineMotor
-from dynx.control.friction import SLIP, Coefficients
-from dynx.control.saturation import checked_limit
-from dynx.errors import ArgumentError, SimulationError, shown
-from dynx.model import Model
-from dynx.model.configuration import checked_array, checked_q
-from dynx.sim.loop.clock import Clock
-from dynx.sim.loop.controller_checks import check_controller, controller_numbers
-from dynx.sim.loop.plain import Loop
-from dynx.sim.loop.references import SetpointOf, checked_reference, setpoints_of
-from dynx.sim.loop.sensors import Noise, Sensors
-from dynx.sim.loop.staged import glued
+from dynx.errors import ArgumentError, ClosedError, SimulationError, shown
+from dynx.model.configuration import checked_array
+from dynx.sim.clock import WHOLE
+from dynx.sim.loop.plain import Held, Loop
+from dynx.sim.loop.record import Record
+from dynx.sim.loop.references import setpoints_of
+from dynx.sim.loop.sensors import Sensors
+from dynx.sim.loop.staged import staged_loop
 from dynx.sim.loop.stops import Stops
-from dynx.sim.plants.disturbances import Disturbances, Push
-from dynx.sim.plants.model_error import MassScale, Payload, plant_model
-from dynx.sim.plants.registry import default_integrator, make_plant
-from dynx.sim.record.record import Record
+from dynx.sim.plants.registry import make_plant
 from dynx.sim.record.rollout import Rollout
+from dynx.sim.scenario.documents import in_words
+from dynx.sim.scenario.scenario import Scenario
+from dynx.sim.setup import Setup
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Trajectory
 
 Progress = Callable[[int, int], object]
-"""Called with the steps taken and those asked for."""
+"""Called with the number of steps taken and that of all."""
+
+MIN_BUFFER_STEPS = 1024
+"""Steps that fit into the first buffers of a simulation without a duration."""
 
 
-class RolloutInterrupted(KeyboardInterrupt):
-    """Ctrl-C in a simulation; `rollout` is what was computed until then."""
+class State(NamedTuple):
+    """The state of a robot at time `t` [s]: configuration `q` (nq,) and velocity `v` (nv,)."""
 
-    def __init__(self, rollout: Rollout, wanted: int) -> None:
-        super().__init__(f"interrupted after {len(rollout)} of {wanted} steps")
-        self.rollout = rollout
+    t: float
+    q: Floats
+    v: Floats
 
 
-def simulate(
-    model: Model,
-    controller: Controller[Any] | None = None,
-    reference: Trajectory | ArrayLike | None = None,
-    *,
-    plant: str = "pinocchio",
-    integrator: str | None = None,
-    controller_backend: str | None = None,
-    dt: float = 1e-3,
-    duration: float | None = None,
-    q0: ArrayLike | None = None,
-    v0: ArrayLike | None = None,
-    substeps: int = 1,
-    control_dt: float | None = None,
-    delay: float = 0.0,
-    noise: Noise | None = None,
-    damping: Coefficients = False,
-    friction: Coefficients = False,
-    friction_slip: float = SLIP,
-    armature: Coefficients = False,
-    effort_limits: bool | ArrayLike = False,
-    position_limits: bool = False,
-    payload: Payload | Sequence[Payload] | None = None,
-    mass_scale: MassScale = 1.0,
-    pushes: Sequence[Push] = (),
-    check_reference: bool = True,
-    method: str = "DOP853",
-    rtol: float = 1e-10,
-    atol: float = 1e-12,
-    resume: Rollout | None = None,
-    step: int | None = None,
-    progress: Progress | None = None,
-) -> Rollout:
-    """Let `model` move under `controller` along `reference`, and record it.
+@dataclass(frozen=True, eq=False)
+class Snapshot:
+    """A simulation at one moment, with its record until then; `Simulation.restore` returns to it."""
 
-    The engine of the plant and that of the controller (``controller_backend``, otherwise its own) are
-    chosen apart, so the effect of one being wrong can be studied.
+    scenario: Scenario
+    record: Record
+    held: Held
+    executor: tuple[str, ...]
+    departures: tuple[str, ...]
 
-    **What moves.** `plant` names a backend. ``plant="pybullet"`` is PyBullet's own stepper; any other
-    is a backend's forward dynamics under an `integrator` of dynx: ``semi_implicit`` (the default: v then
-    q, the scheme of Bullet), ``rk4``, or ``adaptive`` (SciPy's `method` with `rtol`, `atol`).
-    ``plant="pybullet", integrator="rk4"`` is PyBullet's forward dynamics under RK4.
-    `controller` None is a robot without motors. `reference` is a trajectory, one configuration (nq,) to
-    hold, or None. The start is `q0`, `v0`, or where the reference begins, or the neutral configuration.
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return self.record.steps * self.scenario.dt
 
-    **Time** [s]. `dt` is the step of the record; the plant takes `substeps` steps in each. The controller
-    is asked every `control_dt` (by default `dt`), which holds its torque in between, and sees the state
-    of `delay` ago (before the start: the state at the start). `duration` is by default the reference's.
-    All are multiples of `dt`.
 
-    **What the joints feel**, alike in every plant: `damping`, dry `friction` (over the speed
-    `friction_slip`, see `JointFriction`) and `armature`, each True for those of the description, one
-    number or one for each joint; `effort_limits`, True for the model's, cut torques and are recorded;
-    `position_limits` are stops without a bounce (`Stops`); `pushes` from outside.
+class Simulation:
+    """One scenario, in steps of the caller's own.
 
-    **Where the model is wrong.** A `payload`, and `mass_scale` for all links or some, are the plant's and
-    not the controller's; `noise` is on what the controller sees.
+        with dynx.Simulation(scenario) as simulation:
+            while simulation.time < 2.0:
+                simulation.step()
+                print(simulation.state.q)
 
-    **Resuming.** With `resume` the first `step` steps (by default all) are taken from that record, and
-    the rest computed, with all else given as then: the outcome is that of one run, to the last bit. That
-    takes a controller whose state is an argument and a result of `torque`, not kept in itself.
-
-    **Long runs.** `progress` is called now and then with the steps taken and those asked for. Ctrl-C
-    raises RolloutInterrupted, which has what was computed in ``.rollout`` and can be resumed.
-
-    Raises ArgumentError for what cannot be simulated, LimitError for a reference outside the limits of
-    position and velocity (unless `check_reference` is False) or an effort limit of 0, DivergedError and
-    ControlError in a step, with what was computed in ``error.rollout``.
+    Equal steps give equal bits: those of `dynx.simulate` on the same scenario, whoever steps and how many
+    steps at a time. All states are recorded (`rollout`). The engine of the plant stays open until `close`,
+    which the end of a ``with`` block calls.
     """
-    if controller is not None and not isinstance(controller, Controller):
-        raise ArgumentError(f"controller is of type {type(controller).__name__}; wanted a dynx.control law")
-    if controller is not None and controller_backend is not None:
-        controller = controller.on(controller_backend)
-    span = reference.duration if duration is None and isinstance(reference, Trajectory) else duration
-    if span is None:
-        raise ArgumentError("duration is not given, and the reference is no trajectory that has one")
-    clock = Clock.of(dt, span, control_dt, delay)
-    moved = plant_model(model, payload, mass_scale)
-    if controller is not None:
-        check_controller(model, controller, clock)
-    setpoint_of = checked_reference(model, reference, within_limits=check_reference)
-    disturbances = Disturbances(moved, damping, friction, friction_slip, armature, pushes, dt)
-    limit = _effort_limits(model, controller, effort_limits)
-    sensors = Sensors(model, clock, noise)
-    record = Record.begin(*_start(moved, setpoint_of, q0, v0), clock.n_steps)
-    settings: dict[str, Any] = {
-        "plant": plant,
-        "integrator": integrator or default_integrator(plant),
-        "controller": "none" if controller is None else controller.name,
-        "law": {} if controller is None else controller_numbers(controller),
-        "dt": clock.dt,
-        "control_dt": clock.control_dt,
-        "delay": clock.delay_steps * clock.dt,
-        "substeps": substeps,
-        "effort_limits": None if limit is None else limit.tolist(),
-        "position_limits": position_limits,
-        "joints": {
-            "damping": disturbances.friction.damping.tolist(),
-            "friction": disturbances.friction.friction.tolist(),
-            "slip": disturbances.friction.slip,
-        },
-        "noise": None if noise is None else repr(noise),
-        "pushes": [repr(push) for push in disturbances.pushes],
-    }
-    if resume is not None:
-        _take_over(record, resume, len(resume) if step is None else step, moved, settings)
-        _refuse_other_reference(resume, record.steps, setpoint_of, clock)
-    elif step is not None:
-        raise ArgumentError("step is that of a rollout to resume, which is not given")
-    options = {"method": method, "rtol": rtol, "atol": atol}
-    setpoints = setpoints_of(setpoint_of, clock, controller)
-    made = make_plant(
-        plant,
-        moved,
-        disturbances,
-        clock.dt,
-        integrator=settings["integrator"],
-        substeps=substeps,
-        options=options,
-    )
 
-    def so_far() -> Rollout:
-        n = record.steps
-        times, tau = clock.times()[: n + 1], record.tau[:n]
+    def __init__(self, scenario: Scenario, *, progress: Progress | None = None) -> None:
+        """Raises as `dynx.simulate` does for a scenario that cannot be simulated.
+
+        `progress` is called now and then in `run`.
+        """
+        if not isinstance(scenario, Scenario):
+            raise ArgumentError(f"scenario is of type {type(scenario).__name__}; wanted a dynx.Scenario")
+        self.scenario = scenario
+        """What is simulated."""
+        setup = self._setup = Setup.of(scenario)
+        bounded = scenario.duration is not None or isinstance(scenario.reference, Trajectory)
+        self.n_steps = setup.clock.n_steps if bounded else None
+        """Steps to the end of the scenario; None for one without a duration."""
+        clock = setup.clock if bounded else replace(setup.clock, n_steps=MIN_BUFFER_STEPS)
+        self._record = Record.begin(*setup.start, clock.n_steps)
+        self._progress = progress
+        setpoints = setpoints_of(setup.setpoint_of, clock, setup.controller)
+        sensors = Sensors(scenario.model, clock, scenario.noise)
+        self._plant = make_plant(
+            scenario.plant,
+            setup.model,
+            setup.disturbances,
+            clock.dt,
+            integrator=setup.integrator,
+            substeps=scenario.substeps,
+            options={"method": scenario.method, "rtol": scenario.rtol, "atol": scenario.atol},
+        )
+        self._held: Held | None = None
+        self._misplaced = self._closed = False
+        self._executor: tuple[str, ...] = ()
+        self._departures: tuple[str, ...] = ()
+        try:
+            self._plant.refuse(setup.controller)
+            bodies = backend("reference", setup.model, validate=False) if scenario.position_limits else None
+            armature = setup.disturbances.armature
+            stops = None
+            if bodies is not None:
+                stops = Stops(setup.model, lambda q: bodies.mass_matrix(q) + armature)
+            self._loop = Loop(self._plant, setup.controller, setpoints, clock, sensors, setup.limit, stops)
+        except BaseException:
+            self._plant.close()
+            raise
+
+    # -- stepping -----------------------------------------------------------------------------
+
+    def step(self, n: int = 1, tau: ArrayLike | None = None) -> State:
+        """Take `n` steps of `dt`, and return the state after them.
+
+        `tau` (nv,) [N m or N] replaces the torque of the controller in these steps; effort limits hold for
+        it, and the controller is not evaluated. Raises DivergedError and ControlError, with the record so
+        far in ``error.rollout``.
+        """
+        if not isinstance(n, int | np.integer) or isinstance(n, bool) or n < 1:
+            raise ArgumentError(f"n is {shown(n)}; wanted a number of steps, 1 or more")
+        given = None
+        if tau is not None:
+            given = checked_array("tau", tau, self._setup.model.nv)
+            if given.ndim != 1:
+                raise ArgumentError(f"tau has shape {given.shape}; wanted ({self._setup.model.nv},)")
+            self._depart("torques of the caller")
+        self._advance(self._record.steps + int(n), given)
+        return self.state
+
+    def run(self, until: float | None = None, *, real_time: bool = False) -> Rollout:
+        """Step to the time `until` [s], by default the end of the scenario, and return the record.
+
+        With `real_time` each step waits until as much time has passed on the clock of the machine.
+        Otherwise steps are compiled where that is possible; `Rollout.executor` says whether it was.
+        """
+        end = self.n_steps
+        if until is not None:
+            if not isinstance(until, int | float) or not math.isfinite(until):
+                raise ArgumentError(f"until is {shown(until)}; wanted a time in seconds")
+            end = math.ceil(until / self._loop.clock.dt - WHOLE)
+        if end is None:
+            raise ArgumentError("the scenario has no duration: wanted `until`")
+        if real_time:
+            self._run_in_real_time(end)
+        else:
+            self._run(end)
+        return self.rollout
+
+    def _run(self, end: int) -> None:
+        if end > len(self._record):
+            self._extend(end)
+        if self._progress is not None:
+            self._loop = replace(self._loop, progress=partial(_call, self._progress, end))
+        left = end - self._record.steps
+        if left <= 0:
+            return
+        self._advance(end, None, compiled=True)
+        if self._progress is not None:
+            self._progress(self._record.steps, end)
+
+    def _run_in_real_time(self, end: int) -> None:
+        started, first, dt = time.perf_counter(), self._record.steps, self._loop.clock.dt
+        while self._record.steps < end:
+            self.step()
+            ahead = started + (self._record.steps - first) * dt - time.perf_counter()
+            if ahead > 0.0:
+                time.sleep(ahead)
+
+    def _advance(self, end: int, given: Floats | None, *, compiled: bool = False) -> None:
+        if self._closed:
+            raise ClosedError("the simulation is closed")
+        record = self._record
+        if end > len(record):
+            self._extend(end)
+            record = self._record
+        try:
+            # A state that runs away is found by the loop, whose error says more than NumPy's warning.
+            with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+                if self._held is None:
+                    self._held = self._loop.start(record)
+                elif self._misplaced:
+                    self._plant.reset(record.q[record.steps].copy(), record.v[record.steps].copy())
+                self._misplaced, held = False, self._held
+                if compiled:
+                    self._advance_staged(record, held, end)
+                elif not self._executor:
+                    self._executor = ("plain: stepped by the caller",)
+                self._loop.advance(record, held, end, given)
+        except BaseException as error:
+            # The plant may be in the middle of a step: it is placed anew before the next one.
+            self._misplaced = True
+            if isinstance(error, SimulationError):
+                error.rollout = self.rollout
+            raise
+
+    def _advance_staged(self, record: Record, held: Held, end: int) -> None:
+        """Take as many steps to `end` as the staged executor can, and note which executor computed them."""
+        made = staged_loop(self._loop, end - record.steps)
+        if isinstance(made, str):
+            self._note(f"plain: {made}")
+            return
+        self._note("staged")
+        made.run(record, held, end)
+        if record.steps < end:
+            self._note(f"plain from step {record.steps}: {made.stopped}")
+
+    def _note(self, executor: str) -> None:
+        if executor not in self._executor:
+            self._executor = (*self._executor, executor)
+
+    def _depart(self, how: str) -> None:
+        if not any(each.startswith(how) for each in self._departures):
+            self._departures = (*self._departures, f"{how} from step {self._record.steps}")
+
+    def _extend(self, end: int) -> None:
+        """Make room for the steps until `end`, and twice as many as there was."""
+        clock = replace(self._loop.clock, n_steps=max(end, 2 * len(self._record)))
+        self._record = self._record.extended(clock.n_steps)
+        setpoints = setpoints_of(self._setup.setpoint_of, clock, self._setup.controller)
+        sensors = Sensors(self.scenario.model, clock, self.scenario.noise)
+        self._loop = replace(self._loop, clock=clock, setpoints=setpoints, sensors=sensors)
+
+    # -- state and record ---------------------------------------------------------------------
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return self._record.steps * self._loop.clock.dt
+
+    @property
+    def state(self) -> State:
+        """Time, configuration (nq,) and velocity (nv,) after the last step."""
+        k = self._record.steps
+        return State(k * self._loop.clock.dt, self._record.q[k].copy(), self._record.v[k].copy())
+
+    @property
+    def rollout(self) -> Rollout:
+        """The record so far."""
+        record, setup, n = self._record.copy(), self._setup, self._record.steps
+        times = self._loop.clock.times()[: n + 1]
+        limit, tau = setup.limit, record.tau
         at_limit = np.zeros(tau.shape, dtype=bool) if limit is None else np.abs(tau) >= limit
         return Rollout(
-            moved,
+            setup.model,
             times,
-            record.q[: n + 1],
-            record.v[: n + 1],
-            record.a[:n],
+            record.q,
+            record.v,
+            record.a,
             tau,
             at_limit,
-            None if setpoint_of is None else setpoint_of(times),
-            disturbances.armature,
-            settings,
+            None if setup.setpoint_of is None else setup.setpoint_of(times),
+            setup.disturbances.armature,
+            self.scenario,
+            "; ".join(self._executor),
+            self._departures,
         )
 
-    try:
-        made.refuse(controller)
-        stops = Stops(moved, _mass_matrix(moved, disturbances)) if position_limits else None
-        told = None if progress is None else partial(_tell, progress, clock.n_steps)
-        loop = Loop(made, controller, setpoints, clock, sensors, limit, stops, told)
-        # A state that runs away is seen by the loop, which says more than NumPy's warning.
-        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-            quick = glued(loop, record)
-            if quick is not None:
-                quick.run(record)
-            loop.run(record)
-        if told is not None:
-            told(record.steps)
-    except SimulationError as error:
-        error.rollout = so_far()
-        raise
-    except KeyboardInterrupt:
-        raise RolloutInterrupted(so_far(), clock.n_steps) from None
-    finally:
-        made.close()
-    return so_far()
+    def reset(self) -> State:
+        """Return to the start of the scenario, and forget the record."""
+        self._record.steps = 0
+        self._held, self._executor, self._departures = None, (), ()
+        return self.state
+
+    def save(self) -> Snapshot:
+        """The simulation as it is now, with its record; `restore` continues from it bit for bit."""
+        held = self._held or self._loop.start(self._record)
+        self._held = held
+        return Snapshot(self.scenario, self._record.copy(), replace(held), self._executor, self._departures)
+
+    def restore(self, snapshot: Snapshot) -> State:
+        """Continue from a snapshot of this simulation or of another of the same robot and `dt`.
+
+        In another scenario, such as one with another controller, that controller begins with its initial
+        state at its next control step. Raises ArgumentError for a snapshot of another robot or `dt`, and
+        for a controller that changes itself.
+        """
+        theirs, ours = snapshot.scenario, self.scenario
+        robots = [(each.model.joint_names, each.model.base) for each in (theirs, ours)]
+        if robots[0] != robots[1] or theirs.dt != ours.dt:
+            raise ArgumentError(
+                f"the snapshot is of {shown(theirs.model)} with dt = {theirs.dt:g} s; this simulation is of "
+                f"{shown(ours.model)} with dt = {ours.dt:g} s"
+            )
+        n = snapshot.record.steps
+        if n > len(self._record):
+            self._extend(n)
+        self._loop.refuse_self_changing(self._record)
+        changed = [] if theirs is ours else [each.field for each in theirs.differences(ours)]
+        self._record.take(snapshot.record, n)
+        self._executor, self._departures = snapshot.executor, snapshot.departures
+        q, v = self._record.q[n].copy(), self._record.v[n].copy()
+        self._plant.reset(q, v)
+        held = replace(snapshot.held)
+        if any(name.partition(".")[0] == "controller" for name in changed):
+            controller = self._setup.controller
+            held.controller_state = None if controller is None else controller.initial_state()
+            held.command = None
+        if changed:
+            self._depart(f"another {' and '.join(dict.fromkeys(changed))}")
+        self._held, self._misplaced = held, False
+        return self.state
+
+    def take_over(self, rollout: Rollout, step: int | None = None) -> None:
+        """Continue from `step` of a rollout of an equal scenario, by default its last.
+
+        The durations may differ. Raises ArgumentError that names the field for a rollout of another
+        scenario, and for one that is not of its scenario alone.
+        """
+        step = len(rollout) if step is None else step
+        most = len(rollout) if self.n_steps is None else min(len(rollout), self.n_steps)
+        if not isinstance(step, int) or not 0 <= step <= most:
+            wanted = "any number" if self.n_steps is None else self.n_steps
+            raise ArgumentError(
+                f"step is {shown(step)}; the rollout to resume has {len(rollout)} and this one {wanted}"
+            )
+        theirs = Record(rollout.q, rollout.v, rollout.a, rollout.tau)
+        if step:
+            self._loop.refuse_self_changing(self._record)
+        refuse_other_scenario(rollout, self.scenario)
+        if step > len(self._record):
+            self._extend(step)
+        self._record.take(theirs, step)
+        self._held = None
+
+    # -- end ----------------------------------------------------------------------------------
+
+    def close(self) -> None:
+        """Release the engine; a closed simulation cannot be stepped."""
+        if not self._closed:
+            self._closed = True
+            self._plant.close()
+
+    def __enter__(self) -> Simulation:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        model, plant = self.scenario.model.name, self.scenario.plant
+        return f"<Simulation of {model} on {plant}, at {self.time:.6g} s>"
 
 
-def _tell(progress: Progress, wanted: int, taken: int) -> None:
-    progress(taken, wanted)
-
-
-def _effort_limits(
-    model: Model, controller: Controller[Any] | None, effort_limits: bool | ArrayLike
-) -> Floats | None:
-    if effort_limits is False:
-        return None
-    if isinstance(controller, EngineMotor):
-        raise ArgumentError(f"effort_limits do not reach {controller.name}: give it `force`")
-    return checked_limit(model, None if effort_limits is True else effort_limits)
-
-
-def _start(
-    model: Model, setpoint_of: SetpointOf | None, q0: ArrayLike | None, v0: ArrayLike | None
-) -> tuple[Floats, Floats]:
-    q, v = model.neutral(), np.zeros(model.nv)
-    if setpoint_of is not None:
-        first = setpoint_of(np.zeros(1))
-        q, v = first.q[0], first.v[0]
-    if q0 is not None:
-        q, v = checked_q(model, q0, "q0"), np.zeros(model.nv)
-    if v0 is not None:
-        v = checked_array("v0", v0, model.nv)
-    if q.ndim != 1 or v.ndim != 1:
-        raise ArgumentError(f"q0 has shape {q.shape} and v0 {v.shape}; wanted one state")
-    return q, v
-
-
-def _take_over(record: Record, rollout: Rollout, step: int, model: Model, settings: dict[str, Any]) -> None:
-    """Begin where `rollout` was at `step`, if it is a record of the same simulation."""
-    if not isinstance(step, int) or not 0 <= step <= min(len(rollout), len(record)):
+def refuse_other_scenario(rollout: Rollout, scenario: Scenario) -> None:
+    """Raise ArgumentError where `rollout` is not of `scenario`, whose duration may be another."""
+    then = rollout.scenario
+    if then is None:
+        raise ArgumentError("the rollout to resume has no scenario, so it cannot be compared")
+    if rollout.departures:
         raise ArgumentError(
-            f"step is {shown(step)}; the rollout to resume has {len(rollout)} and this one {len(record)}"
+            f"the rollout to resume is not that of its scenario alone: it has {'; '.join(rollout.departures)}"
         )
-    if rollout.model != model:
-        raise ArgumentError(f"the rollout to resume is of {shown(rollout.model)}, not of {shown(model)}")
-    for name, now in settings.items():
-        then = rollout.settings.get(name)
-        if then != now:
-            raise ArgumentError(f"the rollout to resume had {name} {shown(then)}; now it is {shown(now)}")
-    if not (np.array_equal(record.q[0], rollout.q[0]) and np.array_equal(record.v[0], rollout.v[0])):
-        raise ArgumentError("the rollout to resume started somewhere else: its q0 and v0 are others")
-    record.q[: step + 1], record.v[: step + 1] = rollout.q[: step + 1], rollout.v[: step + 1]
-    record.a[:step], record.tau[:step] = rollout.a[:step], rollout.tau[:step]
-    record.steps = step
+    if then.model != scenario.model:
+        raise ArgumentError(
+            f"the rollout to resume is of {shown(then.model)}, not of {shown(scenario.model)}: "
+            "their model differs"
+        )
+    for name, old, new in then.differences(scenario):
+        if name != "duration":
+            raise ArgumentError(
+                f"the rollout to resume had {name} {in_words(old)}; now it is {in_words(new)}"
+            )
 
 
-def _refuse_other_reference(
-    rollout: Rollout, step: int, setpoint_of: SetpointOf | None, clock: Clock
-) -> None:
-    then = rollout.reference
-    if setpoint_of is None or then is None:
-        same = setpoint_of is None and then is None
-    else:
-        now = setpoint_of(clock.times()[: step + 1])
-        pairs = zip(then, now, strict=True)
-        same = all(np.allclose(old[: step + 1], new, rtol=1e-12, atol=1e-12) for old, new in pairs)
-    if not same:
-        raise ArgumentError("the rollout to resume followed another reference")
-
-
-def _mass_matrix(model: Model, disturbances: Disturbances) -> Callable[[Floats], Floats]:
-    """M of the plant for the stops, by the same text whatever the plant."""
-    bodies = backend("reference", model, validate=False)
-    return lambda q: bodies.mass_matrix(q) + disturbances.armature
+def _call(progress: Progress, wanted: int, taken: int) -> None:
+    progress(taken, wanted)

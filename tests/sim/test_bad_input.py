@@ -107,7 +107,7 @@ def test_what_is_missing_or_of_another_robot() -> None:
         simulate(other, LAW, other.neutral(), duration=0.01)
     with pytest.raises(ArgumentError, match="nq 6"):
         simulate(other, GravityCompensatedPD(other, kp=1, kd=1), tutorial_motion())
-    with pytest.raises(ArgumentError, match=r"wanted a dynx\.control law"):
+    with pytest.raises(ArgumentError, match=r"wanted a controller of dynx\.control"):
         simulate(ARM, no_law, REST, duration=0.01)
 
 

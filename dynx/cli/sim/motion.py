@@ -12,7 +12,7 @@ from dynx.cli.shell.terminal import counted
 from dynx.cli.sim.options import PROFILES
 from dynx.errors import ArgumentError, LimitError, LimitViolation, shown
 from dynx.model import Model
-from dynx.sim.loop.clock import positive
+from dynx.sim.clock import positive
 from dynx.sim.named_controllers import CONTROLLERS
 from dynx.spatial.scalar import Floats
 from dynx.trajectory import Trajectory

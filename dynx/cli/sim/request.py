@@ -20,7 +20,7 @@ from dynx.model import Model
 from dynx.model.loading import load
 from dynx.model.model import Base
 from dynx.sim import Noise, Payload, Push, Rollout
-from dynx.sim.loop.clock import Clock
+from dynx.sim.clock import Clock
 from dynx.sim.named_controllers import ControllerRequest, Gains, named_controller
 from dynx.simd.machine import MAX_MEMORY_SHARE, memory_size
 

@@ -25,7 +25,7 @@ from dynx.sim.batch.part import KernelOf, Part, PartDone, pushing
 from dynx.sim.batch.rollouts import BatchRollouts
 from dynx.sim.batch.store import Store
 from dynx.sim.batch.traced_controller import innermost
-from dynx.sim.loop.clock import Clock
+from dynx.sim.clock import Clock
 from dynx.sim.loop.controller_checks import check_controller
 from dynx.sim.loop.references import checked_reference
 from dynx.sim.loop.sensors import Noise

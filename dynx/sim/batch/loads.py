@@ -19,7 +19,7 @@ from dynx.control.gains import checked_gain
 from dynx.errors import ArgumentError, GainError
 from dynx.model import Mechanism, Model
 from dynx.model.configuration import real_array
-from dynx.sim.loop.clock import WHOLE, Clock
+from dynx.sim.clock import WHOLE, Clock
 from dynx.sim.plants.disturbances import Push
 from dynx.spatial.scalar import Array, Floats
 

@@ -12,7 +12,7 @@ from dynx.control.base import Controller, chain_of
 from dynx.control.content import attributes_of
 from dynx.errors import ArgumentError, shown
 from dynx.model import Model
-from dynx.sim.loop.clock import WHOLE, Clock
+from dynx.sim.clock import WHOLE, Clock
 
 MAX_LISTED_NUMBERS = 64
 """Size of the largest array that a record lists; it keeps a checksum of a larger one."""

@@ -1,7 +1,7 @@
-"""The closed loop: measure, command, cut to the limits, step, record.
+"""The plain executor of a closed loop: measure, compute the torque, clamp it, step the plant, record.
 
-All checks that can be made before are made before (`dynx.sim.simulation`); what is left inside is what
-only the loop can see: a torque that is none, and a state that runs away.
+Arguments are checked before (`dynx.sim.setup`); the loop itself finds a torque that is not finite and a state
+that runs away.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import cached_property
 from math import hypot, isfinite
 from typing import Any
 
@@ -17,65 +18,85 @@ import numpy as np
 from dynx.control.base import Controller, Measurement
 from dynx.control.engine_motors import EngineMotor
 from dynx.errors import ArgumentError, ControlError, DivergedError, shown
-from dynx.sim.loop.clock import Clock
+from dynx.sim.clock import Clock
 from dynx.sim.loop.controller_checks import Unchanged
+from dynx.sim.loop.record import Record
 from dynx.sim.loop.sensors import Sensors
 from dynx.sim.loop.stops import Stops
 from dynx.sim.plants.plant import Plant
-from dynx.sim.record.record import Record
 from dynx.spatial.scalar import Floats, clamp
 from dynx.trajectory.base import Setpoint
 
 FLOAT64 = np.dtype(np.float64)
 
-TELLING = 200
-"""Steps between two tellings."""
+PROGRESS_STEPS = 200
+"""Steps between two calls of `progress`."""
 
-RUNAWAY = 1e8
-"""Speed [rad/s or m/s] beyond which nothing can be learnt from a simulation."""
+DIVERGENCE_SPEED = 1e8
+"""Norm of the velocity [rad/s or m/s] from which on a simulation has diverged."""
+
+
+@dataclass
+class Held:
+    """What a loop carries from step to step beside the state of the plant."""
+
+    tau: Floats
+    """Torque (nv,) of the last control step."""
+    command: Any = None
+    """Motor command of the last control step, for an engine's own motors."""
+    controller_state: Any = None
 
 
 @dataclass(frozen=True)
 class Loop:
-    """One controller on one plant; a controller of None gives no torque."""
+    """One controller on one plant; without a controller there is no torque."""
 
     plant: Plant
     controller: Controller[Any] | None
     setpoints: Setpoint
-    """What the controller is given at each control step: arrays with a row for each."""
+    """Setpoints of all control steps: arrays with a row for each."""
     clock: Clock
     sensors: Sensors
     limit: Floats | None
     stops: Stops | None
-    told: Callable[[int], object] | None = None
-    """Told now and then how many steps were taken."""
+    progress: Callable[[int], object] | None = None
+    """Called now and then with the number of steps taken."""
 
-    def run(self, record: Record) -> None:
-        """From the state in row `record.steps` to the end.
+    @cached_property
+    def _setpoint_rows(self) -> list[Setpoint]:
+        return list(map(Setpoint, *self.setpoints))
 
-        Raises DivergedError and ControlError, with the steps before in `record`, which is whole too
-        where Ctrl-C cuts in.
+    def start(self, record: Record) -> Held:
+        """Place the plant at the last state of `record`, and recompute what the loop held there."""
+        begin = record.steps
+        self.plant.reset(record.q[begin].copy(), record.v[begin].copy())
+        tau, command = self._last_command(record)
+        return Held(tau, command, self.recovered_state(record))
+
+    def advance(self, record: Record, held: Held, end: int, given: Floats | None = None) -> None:
+        """Step from the last state of `record` to step `end`, where the plant is placed at that state.
+
+        The torque `given` (nv,) replaces that of the controller, which is then not evaluated. Raises
+        DivergedError and ControlError; `record` and `held` are then those after the last whole step, as
+        they are after a Ctrl-C.
         """
         plant, controller = self.plant, self.controller
         per_control, dt, limit = self.clock.steps_per_control, self.clock.dt, self.limit
         Q, V, A, applied = record.q, record.v, record.a, record.tau
         begin = record.steps
-        if begin == self.clock.n_steps:
-            return
-        if begin:
-            self._refuse_changing(record)
-        state = self.remembered(record)
-        plant.reset(Q[begin].copy(), V[begin].copy())
         q, v = Q[begin].copy(), V[begin].copy()
-        tau, command = self._held(record)
+        tau, command, state = held.tau, held.command, held.controller_state
         sensors = None if self.sensors.plain else self.sensors
         motors = controller if isinstance(controller, EngineMotor) else None
-        setpoints = list(map(Setpoint, *self.setpoints))
+        setpoints = self._setpoint_rows
         stops, shape = self.stops, (plant.model.nv,)
-        step, told, tell = plant.step, self.told, begin
-        # The next step at which the controller is asked; never, if there is none.
-        due = -1 if controller is None else -(-begin // per_control) * per_control
-        for k in range(begin, self.clock.n_steps):
+        step, progress, next_call = plant.step, self.progress, begin
+        # The step of the next control step; none without a controller.
+        due = -1 if controller is None or given is not None else -(-begin // per_control) * per_control
+        if given is not None:
+            tau, command = given if limit is None else clamp(given, limit), None
+            held.tau, held.command = tau, None
+        for k in range(begin, end):
             t = k * dt
             if k == due and controller is not None:
                 due += per_control
@@ -108,16 +129,19 @@ class Loop:
             except Exception as error:
                 # Also what an engine raises: its hooks are called bare (`dynx.control.dynamics`).
                 raise self._diverged(k, record, f"{type(error).__name__}: {error}") from error
-            if not hypot(*v.tolist()) < RUNAWAY:
-                raise self._diverged(k, record, "the velocity is no number or beyond all bounds")
+            if not hypot(*v.tolist()) < DIVERGENCE_SPEED:
+                raise self._diverged(
+                    k, record, f"the velocity is not finite, or its norm is above {DIVERGENCE_SPEED:g}"
+                )
             applied[k], A[k], Q[k + 1], V[k + 1] = tau, a, q, v
             record.steps = k + 1
-            if told is not None and k >= tell:
-                tell = k + TELLING
-                told(k + 1)
+            held.tau, held.command, held.controller_state = tau, command, state
+            if progress is not None and k >= next_call:
+                next_call = k + PROGRESS_STEPS
+                progress(k + 1)
 
     def _as_torque(self, k: int, record: Record, given: Any) -> Floats:
-        """What a law gave as a float64 array (nv,), or ControlError."""
+        """The torque of a controller as a float64 array (nv,). Raises ControlError."""
         wanted = (self.plant.model.nv,)
         try:
             array = np.asarray(given)
@@ -133,25 +157,25 @@ class Loop:
             raise self._control_failed(k, record, f"its torque has shape {array.shape}; wanted {wanted}")
         return np.array(array, dtype=np.float64)
 
-    def _refuse_changing(self, record: Record) -> None:
-        """Refuse to go on with a law that has hidden what it remembers in itself."""
+    def refuse_self_changing(self, record: Record) -> None:
+        """Raise ArgumentError for a controller that hides its state in itself: it cannot be resumed."""
         controller = self.controller
         if controller is None or isinstance(controller, EngineMotor):
             return
         watch = Unchanged(controller)
-        # What goes wrong here goes wrong in its step too.
+        # An error here is raised again in its step.
         with suppress(Exception):
             measurement = self.sensors(0, record.q, record.v)
             controller.torque(measurement, self._setpoint(0), controller.initial_state())
         if watch.changed:
             raise ArgumentError(
-                f"{watch.changed}, so a rollout under it cannot be resumed: let it return its state"
+                f"{watch.changed}, so a rollout under it cannot be resumed: return the changed state instead"
             )
 
-    def remembered(self, record: Record) -> Any:
-        """The controller's state at the step where the loop begins.
+    def recovered_state(self, record: Record) -> Any:
+        """The controller's state after the last step of `record`.
 
-        It is a function of what was measured until then, so it is not recorded but found again.
+        It is a function of the measurements until then, so it is not recorded but recomputed.
         """
         if self.controller is None:
             return None
@@ -167,16 +191,16 @@ class Loop:
     def _setpoint(self, number: int) -> Setpoint:
         return Setpoint(*(array[number] for array in self.setpoints))
 
-    def _held(self, record: Record) -> tuple[Floats, Any]:
-        """Torque and command that the last control step before the beginning left."""
+    def _last_command(self, record: Record) -> tuple[Floats, Any]:
+        """Torque and motor command of the last control step before the last state of `record`."""
         begin = record.steps
-        nothing = np.zeros(self.plant.model.nv)
+        none = np.zeros(self.plant.model.nv)
         if begin % self.clock.steps_per_control == 0:
-            return nothing, None
+            return none, None
         if isinstance(self.controller, EngineMotor):
             number = begin // self.clock.steps_per_control
             measurement = self.sensors(number * self.clock.steps_per_control, record.q, record.v)
-            return nothing, self.controller.command(measurement, self._setpoint(number))
+            return none, self.controller.command(measurement, self._setpoint(number))
         return record.tau[begin - 1].copy(), None
 
     def _diverged(self, k: int, record: Record, why: str) -> DivergedError:

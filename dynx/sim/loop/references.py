@@ -11,7 +11,7 @@ from dynx.control.base import Controller
 from dynx.errors import ArgumentError, LimitError, LimitViolation
 from dynx.model import Model
 from dynx.model.configuration import checked_q
-from dynx.sim.loop.clock import Clock
+from dynx.sim.clock import Clock
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint, Trajectory
 from dynx.trajectory.limit_check import check

@@ -11,7 +11,7 @@ from dynx.control.base import Measurement
 from dynx.control.gains import checked_gain
 from dynx.errors import ArgumentError, shown
 from dynx.model import Model
-from dynx.sim.loop.clock import Clock
+from dynx.sim.clock import Clock
 from dynx.spatial.scalar import Floats
 
 

@@ -1,14 +1,16 @@
-"""The closed loop in compiled stages: the record is that of `dynx.sim.loop.plain`, in two thirds of the time.
+"""The staged executor of a closed loop: steps in compiled stages between engine calls.
 
-What is left to Python is to ask the engines. Where anything looks wrong, an answer that is not finite or
-a robot that runs away, this loop stops before the step, and the plain one, which says what it is, repeats
-it.
+It gives the record of `dynx.sim.loop.plain` to the last bit, in two thirds of the time: engine calls are all
+that is left to Python. At a result that is not finite, a state that runs away or an error of an engine it
+stops before the step, which the plain executor repeats and reports.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from time import perf_counter
+from traceback import extract_tb
 from typing import Any
 
 import numpy as np
@@ -16,28 +18,28 @@ from numpy.typing import NDArray
 
 from dynx.control.base import Measurement
 from dynx.control.engine_motors import EngineMotor
-from dynx.errors import TraceError
+from dynx.errors import CompileError, TraceError
 from dynx.sim.loop.controller_checks import is_row
-from dynx.sim.loop.plain import RUNAWAY, Loop
+from dynx.sim.loop.plain import DIVERGENCE_SPEED, Held, Loop
+from dynx.sim.loop.record import Record
 from dynx.sim.loop.stages import Ask, Glue, Questions, refuse_impure, traced_controller
 from dynx.sim.plants.integrated import IntegratedPlant
-from dynx.sim.record.record import Record
 from dynx.simd.call_sequence import CallSequence, StridedRows, prepare_calls
 from dynx.simd.kernel import Kernel
 from dynx.spatial.scalar import Array, Floats, clamp
 from dynx.trajectory.base import Setpoint
 
-WORTH = 256
-"""Steps from which on tracing pays."""
+MIN_STEPS_TO_COMPILE = 256
+"""Number of steps from which on tracing saves time."""
 
-AT_ONCE = 4096
-"""Most steps whose calls are made ready together."""
+MAX_CHUNK_STEPS = 4096
+"""Largest number of steps whose kernel calls are prepared together."""
 
-TELLING = 0.1
-"""Time between two tellings of how far the loop is [s]."""
+PROGRESS_INTERVAL = 0.1
+"""Time between two calls of `progress` [s]."""
 
-MOST_SUBSTEPS = 16
-"""Sub-steps that are traced one after another."""
+MAX_TRACED_SUBSTEPS = 16
+"""Largest number of sub-steps that are traced one after another."""
 
 Steps = NDArray[np.int64]
 
@@ -48,31 +50,38 @@ SETPOINT = ("q_wanted", "v_wanted", "a_wanted")
 NOISE = ("noise_q", "noise_v")
 
 
-def glued(loop: Loop, record: Record) -> GluedLoop | None:
-    """The loop in stages, if it can be had and there are so many steps left that it pays."""
-    plant, left = loop.plant, len(record) - record.steps
-    if left < WORTH or isinstance(loop.controller, EngineMotor):
-        return None
-    if not isinstance(plant, IntegratedPlant) or not plant.is_array_code or plant.substeps > MOST_SUBSTEPS:
-        return None
-    if left < WORTH * plant.evaluations:
-        return None
-    if loop.stops is not None or not plant.model.nv:
-        return None
+def staged_loop(loop: Loop, left: int) -> StagedLoop | str:
+    """The loop in compiled stages for `left` more steps, or the reason why it has to be run plainly."""
+    plant = loop.plant
+    if left < MIN_STEPS_TO_COMPILE:
+        return f"fewer than {MIN_STEPS_TO_COMPILE} steps"
+    if isinstance(loop.controller, EngineMotor):
+        return f"{loop.controller.name} is a motor inside the engine"
+    if not isinstance(plant, IntegratedPlant):
+        return f"{type(plant).__name__} has a stepper of its own"
+    if not plant.is_array_code:
+        return "the plant has disturbances, or an integrator that is not compiled"
+    if plant.substeps > MAX_TRACED_SUBSTEPS:
+        return f"more than {MAX_TRACED_SUBSTEPS} sub-steps"
+    if left < MIN_STEPS_TO_COMPILE * plant.evaluations:
+        return f"fewer than {MIN_STEPS_TO_COMPILE * plant.evaluations} steps"
+    if loop.stops is not None:
+        return "position limits are not compiled"
+    if not plant.model.nv:
+        return "the robot has no coordinates"
     if plant.model.floating and loop.sensors.noise is not None:
-        return None
+        return "noise on the pose of a floating base is not compiled"
     try:
-        return GluedLoop(loop, plant)
-    except Exception:
-        # What is wrong with a law, or not known of it, the plain loop finds out and says.
-        return None
+        return StagedLoop(loop, plant)
+    except CompileError as error:
+        return str(error)
 
 
-class GluedLoop:
-    """A step in stages, once with the law asked and once with its torque held from before."""
+class StagedLoop:
+    """A step in stages, once with the controller evaluated and once with its torque held from before."""
 
     def __init__(self, loop: Loop, plant: IntegratedPlant) -> None:
-        """Raises TraceError, and whatever a law raises, for a law that cannot be traced."""
+        """Raises CompileError for a controller that cannot be traced."""
         self._loop, self._plant = loop, plant
         nq, nv = plant.model.nq, plant.model.nv
         sizes = dict.fromkeys(("v", "held", "seen_v", *SETPOINT, *NOISE), nv) | {"t": 1}
@@ -83,27 +92,37 @@ class GluedLoop:
             raise TraceError("the reference is not in float64")
         self._start = None if loop.controller is None else loop.controller.initial_state()
         if self._start is not None and not is_row(self._start):
-            raise TraceError("what the law remembers is no array (n,) of float64")
+            raise TraceError("the controller's state is no array (n,) of float64")
         self._state_size = 0 if self._start is None else self._start.size
         if self._state_size:
             sizes["state"] = self._state_size
         self._asked = self._step(Questions(sizes), asked=True)
         self._held = self._step(Questions(sizes), asked=False) if loop.clock.steps_per_control > 1 else None
+        self.stopped = ""
+        """Why it stopped before the end."""
 
-    def run(self, record: Record) -> None:
-        """From the state in row `record.steps` until the end, or until something is wrong."""
-        begin, n = record.steps, len(record)
+    def run(self, record: Record, held: Held, end: int) -> None:
+        """Step from the last state of `record` to step `end`, or until a step has to be repeated plainly."""
+        begin = record.steps
         self._plant.reset(record.q[begin], record.v[begin])
-        arrays = self._arrays(record)
-        at_once = min(WORTH, AT_ONCE)
-        while record.steps < n:
-            first, began = record.steps, perf_counter()
-            if not self._chunk(record, arrays, at_once):
-                return
-            if self._loop.told is not None:
-                self._loop.told(record.steps)
-            each = (perf_counter() - began) / (record.steps - first)
-            at_once = min(max(int(TELLING / each), 1), AT_ONCE)
+        arrays = self._arrays(record, held)
+        chunk = min(MIN_STEPS_TO_COMPILE, MAX_CHUNK_STEPS)
+        try:
+            while record.steps < end:
+                first, started = record.steps, perf_counter()
+                if not self._chunk(record, arrays, min(end, first + chunk)):
+                    break
+                if self._loop.progress is not None:
+                    self._loop.progress(record.steps)
+                each = (perf_counter() - started) / (record.steps - first)
+                chunk = min(max(int(PROGRESS_INTERVAL / each), 1), MAX_CHUNK_STEPS)
+        finally:
+            k = record.steps
+            if k > begin:
+                held.tau = record.tau[k - 1].copy()
+                if self._state_size:
+                    held.controller_state = arrays["state"][k].copy()
+            self._plant.reset(record.q[k].copy(), record.v[k].copy())
 
     def _step(self, questions: Questions, *, asked: bool) -> Glue:
         """One step of the plant, and of the law if it is `asked`."""
@@ -119,7 +138,11 @@ class GluedLoop:
                 q, v = q + given["noise_q"], v + given["noise_v"]
             measurement = Measurement(given["t"][0], q, v)
             law = traced_controller(loop.controller, questions)
-            tau, state = law.torque(measurement, Setpoint(*(given[name] for name in SETPOINT)), state)
+            try:
+                tau, state = law.torque(measurement, Setpoint(*(given[name] for name in SETPOINT)), state)
+            except Exception as error:
+                # On symbols in the place of numbers a controller of somebody else's may raise anything.
+                raise TraceError(_untraceable(loop.controller.name, error)) from error
             questions.refuse_rounded_otherwise()
             if tau.shape != given["v"].shape:
                 raise TraceError(f"the torque has shape {tau.shape}")
@@ -140,8 +163,8 @@ class GluedLoop:
         results["defect"] = np.array([v @ v + unsound], dtype=object)
         return questions.glue(results)
 
-    def _arrays(self, record: Record) -> dict[str, Floats]:
-        """What stages read and write, by the names of their ports; a row for a step or a control step."""
+    def _arrays(self, record: Record, held: Held) -> dict[str, Floats]:
+        """Inputs and outputs of the stages by the names of their ports, a row for each (control) step."""
         loop, n = self._loop, len(record)
         q, v, tau = record.q, record.v, record.tau
         arrays = {"q": q, "v": v, "seen_q": q, "seen_v": v, "next_q": q, "next_v": v}
@@ -156,7 +179,7 @@ class GluedLoop:
         arrays |= dict(zip(NOISE, loop.sensors.noise or (silence, silence), strict=True))
         if self._state_size:
             arrays["state"] = arrays["next_state"] = state = np.empty((n + 1, self._state_size))
-            state[record.steps] = loop.remembered(record)
+            state[record.steps] = held.controller_state
         return arrays
 
     def _row(self, name: str, steps: Steps) -> Steps:
@@ -172,67 +195,75 @@ class GluedLoop:
             return steps // clock.steps_per_control
         return steps
 
-    def _chunk(self, record: Record, arrays: Mapping[str, Floats], at_once: int) -> bool:
-        """Some steps, counted in the record as they are taken; False if something is wrong."""
+    def _chunk(self, record: Record, arrays: Mapping[str, Floats], end: int) -> bool:
+        """Step to `end`, counting in the record; False where a step has to be repeated plainly."""
         first, per = record.steps, self._loop.clock.steps_per_control
-        steps = np.arange(first, min(len(record), first + at_once))
+        steps = np.arange(first, end)
         walked = {name: StridedRows(array, self._row(name, steps)) for name, array in arrays.items()}
         last = first + len(steps)
-        asked = _ready(self._asked, walked, record)
+        asked = self._ready(self._asked, walked, record)
         if self._held is None:
             return asked(first, last)
-        held = _ready(self._held, walked, record)
+        held = self._ready(self._held, walked, record)
         while (k := record.steps) < last:
             due = k % per == 0
             if not (asked if due else held)(k, k + 1 if due else min(last, k - k % per + per)):
                 return False
         return True
 
+    def _ready(self, glue: Glue, walked: Mapping[str, StridedRows], record: Record) -> Take:
+        """The next steps of the record, those of `walked`, as kernel and engine calls."""
+        first = record.steps
+        still = np.zeros(len(walked["q"].rows), dtype=np.int64)
+        places = {name: np.zeros((1, size)) for name, size in (*glue.sizes.items(), ("defect", 1))}
+        numbers = {name: value[None] for name, value in glue.numbers.items()}
+        constant = {name: StridedRows(place, still) for name, place in {**places, **numbers}.items()}
+        every = {**walked, **constant}
 
-def _ready(glue: Glue, walked: Mapping[str, StridedRows], record: Record) -> Take:
-    """The next steps of the record, those of `walked`, as calls."""
-    first = record.steps
-    still = np.zeros(len(walked["q"].rows), dtype=np.int64)
-    places = {name: np.zeros((1, size)) for name, size in (*glue.sizes.items(), ("defect", 1))}
-    numbers = {name: value[None] for name, value in glue.numbers.items()}
-    every = {**walked, **{name: StridedRows(place, still) for name, place in {**places, **numbers}.items()}}
+        def walked_by(kernel: Kernel) -> CallSequence:
+            inputs = [every[port.name] for port in kernel.inputs]
+            return prepare_calls(kernel, inputs, [every[port.name] for port in kernel.outputs])
 
-    def walked_by(kernel: Kernel) -> CallSequence:
-        inputs, outputs = ([every[port.name] for port in side] for side in (kernel.inputs, kernel.outputs))
-        return prepare_calls(kernel, inputs, outputs)
+        stages: list[tuple[Callable[[int], None], range, Ask, list[Floats], Any, CallSequence]] = []
+        for cut in glue.cuts:
+            calls = walked_by(cut.kernel)
+            arguments = [places[name].reshape(shape) for name, shape in cut.arguments]
+            name, shape = cut.answer
+            found = places[name].reshape(shape)
+            # A view of memory takes a row of numbers in a third of the time that an array does.
+            room = found.data if found.ndim == 1 else found
+            stages.append((calls.run, calls.addresses, cut.ask, arguments, room, calls))
+        last = walked_by(glue.last)
+        finish, finishing = last.run, last.addresses
+        defect: Any = places["defect"].reshape(1).data
 
-    stages: list[tuple[Callable[[int], None], range, Ask, list[Floats], Any, CallSequence]] = []
-    for cut in glue.cuts:
-        calls = walked_by(cut.kernel)
-        arguments = [places[name].reshape(shape) for name, shape in cut.arguments]
-        name, shape = cut.answer
-        found = places[name].reshape(shape)
-        # A view of memory takes a row of numbers in a third of the time that an array does.
-        room = found.data if found.ndim == 1 else found
-        stages.append((calls.run, calls.addresses, cut.ask, arguments, room, calls))
-    last = walked_by(glue.last)
-    finish, finishing = last.run, last.addresses
-    defect: Any = places["defect"].reshape(1).data
-
-    def take(begin: int, end: int, _kept: object = last) -> bool:
-        k = begin - first
-        try:
-            for k in range(begin - first, end - first):
-                for run, addresses, ask, arguments, answer, _ in stages:
-                    run(addresses[k])
-                    if defect[0] != 0.0:
+        def take(begin: int, end: int, _kept: object = last) -> bool:
+            k = begin - first
+            try:
+                for k in range(begin - first, end - first):
+                    for run, addresses, ask, arguments, answer, _ in stages:
+                        run(addresses[k])
+                        if defect[0] != 0.0:
+                            return False
+                        answer[:] = ask(*arguments)
+                    finish(finishing[k])
+                    if not defect[0] < DIVERGENCE_SPEED**2:
                         return False
-                    answer[:] = ask(*arguments)
-                finish(finishing[k])
-                if not defect[0] < RUNAWAY**2:
-                    return False
-                defect[0] = 0.0
-            k = end - first
-        except Exception:
-            # Whatever it is, the plain loop meets it again, and says where.
-            return False
-        finally:
-            record.steps = first + k
-        return True
+                    defect[0] = 0.0
+                k = end - first
+            except Exception as error:
+                # An engine may raise anything; the plain executor repeats the step and reports it.
+                self.stopped = f"{type(error).__name__}: {error}"
+                return False
+            finally:
+                record.steps = first + k
+            return True
 
-    return take
+        return take
+
+
+def _untraceable(name: str, error: Exception) -> str:
+    """Message for an error of a controller on symbols, with the line of its `torque` where it was raised."""
+    torques = [frame for frame in extract_tb(error.__traceback__) if frame.name == "torque"]
+    place = f" ({Path(torques[-1].filename).name}, line {torques[-1].lineno})" if torques else ""
+    return f"{name}.torque() cannot be traced: {error or type(error).__name__}{place}"

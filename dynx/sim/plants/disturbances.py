@@ -22,7 +22,7 @@ from dynx.errors import ArgumentError, shown
 from dynx.model import Model
 from dynx.model.configuration import checked_array
 from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED, REFERENCES
-from dynx.sim.loop.clock import WHOLE
+from dynx.sim.clock import WHOLE
 from dynx.spatial.scalar import Floats
 
 

@@ -2,14 +2,14 @@
 
 The first line names the columns, in this order; ``c`` stands for each coordinate:
 
-| columns | what | unit |
+| columns | content | unit |
 |---|---|---|
 | `t` | time | s |
 | `q:c`, `v:c` | position, velocity | rad, m, per second |
-| `q*:c`, `v*:c`, `a*:c`, `error:c` | reference and what was missing to it, where there was one | likewise |
+| `q*:c`, `v*:c`, `a*:c`, `error:c` | reference and error, if there is a reference | likewise |
 | `energy` | kinetic and potential | J |
-| `a:c`, `tau:c` | acceleration and torque in the step that begins here | per second squared; N m, N |
-| `saturated:c` | 1 where the motor was at its limit in that step, otherwise 0 | |
+| `a:c`, `tau:c` | acceleration and torque in the step that starts at this time | per second squared; N m, N |
+| `saturated:c` | 1 if the motor was at its limit in that step, otherwise 0 | |
 
 Coordinates have the names of their joints. A floating base comes first: `x y z qx qy qz qw` in positions
 (of the base frame in the world, quaternion xyzw) and `vx vy vz wx wy wz` in rates (in the base frame).
@@ -19,15 +19,14 @@ same float64 again. Text is UTF-8, and a name with a comma or a quote in it stan
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, BinaryIO
+from typing import BinaryIO
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from dynx.sim.record.rollout import Rollout
+from dynx.sim.record.rollout_data import RolloutData
 
 
-def write_csv(rollout: Rollout, file: BinaryIO) -> None:
+def write_csv(rollout: RolloutData, file: BinaryIO) -> None:
     """A row for each state, with what acted from then on beside it."""
     model = rollout.model
     positions = [*(["x", "y", "z", "qx", "qy", "qz", "qw"] if model.floating else []), *model.joint_names]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import struct
+import tokenize
 import zipfile
 import zlib
 from collections.abc import Callable
@@ -18,10 +19,11 @@ from dynx.files.writing import atomic_file
 from dynx.model.loading import load as load_model
 from dynx.sim.record.csv_file import write_csv
 from dynx.sim.record.mcap_file import write_mcap
-from dynx.sim.record.rollout import Rollout
+from dynx.sim.record.rollout_data import RolloutData
+from dynx.sim.scenario.scenario import Scenario
 from dynx.trajectory.base import Setpoint
 
-SCHEMA = "dynx.rollout/1"
+SCHEMA = "dynx.rollout/2"
 """What the file says it is; another number means another layout."""
 
 ARRAYS = ("t", "q", "v", "a", "tau", "saturated", "rotors")
@@ -29,12 +31,12 @@ REFERENCE = ("reference_q", "reference_v", "reference_a")
 
 DAMAGED = (
     *(OSError, EOFError, ValueError, KeyError, RuntimeError, MemoryError),
-    *(zipfile.BadZipFile, zlib.error, struct.error),
+    *(zipfile.BadZipFile, zlib.error, struct.error, tokenize.TokenError, SyntaxError),
 )
 """What zipfile and NumPy raise for a file that is not there or was changed after it was written."""
 
 
-def save(rollout: Rollout, path: str | os.PathLike[str]) -> None:
+def save(rollout: RolloutData, path: str | os.PathLike[str]) -> None:
     """Write `rollout` in the format that the name ends with: all of it, or nothing under that name.
 
     Raises ArgumentError for another format or a file that cannot be written, NotInstalledError where
@@ -48,8 +50,8 @@ def save(rollout: Rollout, path: str | os.PathLike[str]) -> None:
         write(rollout, file)
 
 
-def load(path: str | os.PathLike[str]) -> Rollout:
-    """Read a ``.npz`` that `save` wrote. Raises ArgumentError for any other file.
+def load(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """Read the fields of a rollout from a ``.npz`` of `save`. Raises ArgumentError for any other file.
 
     The model comes back from the URDF text in the file; arrays are read without unpickling anything.
     """
@@ -66,7 +68,8 @@ def load(path: str | os.PathLike[str]) -> Rollout:
     try:
         robot: dict[str, Any] = json.loads(str(entries["robot"]))
         model = load_model(robot["urdf"], base=robot["base"], gravity=robot["gravity"])
-        settings = dict(robot["settings"])
+        scenario = None if robot["scenario"] is None else Scenario.from_dict(robot["scenario"])
+        executor, departures = str(robot["executor"]), tuple(robot["departures"])
     except (ValueError, KeyError, TypeError, ModelError) as error:
         raise ArgumentError(f"the robot in {name} cannot be read: {error}") from error
     n = len(entries["tau"]) if entries["tau"].ndim else 0
@@ -79,9 +82,15 @@ def load(path: str | os.PathLike[str]) -> Rollout:
             raise ArgumentError(
                 f"{entry} in {name} is {array.dtype} {array.shape}; wanted {kind} {shape} as n is {n}"
             )
-    return Rollout(
-        model, reference=reference, settings=settings, **{entry: entries[entry] for entry in ARRAYS}
-    )
+    arrays = {entry: entries[entry] for entry in ARRAYS}
+    return {
+        "model": model,
+        **arrays,
+        "reference": reference,
+        "scenario": scenario,
+        "executor": executor,
+        "departures": departures,
+    }
 
 
 def _entries(path: str | os.PathLike[str]) -> dict[str, Any]:
@@ -100,13 +109,15 @@ def _entries(path: str | os.PathLike[str]) -> dict[str, Any]:
     raise ArgumentError(f"{os.fspath(path)} cannot be read as a rollout: {problem}")
 
 
-def _write_npz(rollout: Rollout, file: BinaryIO) -> None:
+def _write_npz(rollout: RolloutData, file: BinaryIO) -> None:
     model = rollout.model
     robot = {
         "urdf": model.to_urdf(),
         "base": model.base,
         "gravity": list(model.gravity),
-        "settings": rollout.settings,
+        "scenario": None if rollout.scenario is None else rollout.scenario.to_dict(),
+        "executor": rollout.executor,
+        "departures": list(rollout.departures),
     }
     arrays: dict[str, Any] = {name: getattr(rollout, name) for name in ARRAYS}
     if rollout.reference is not None:
@@ -115,7 +126,7 @@ def _write_npz(rollout: Rollout, file: BinaryIO) -> None:
     np.savez(file, schema=SCHEMA, robot=json.dumps(robot), energy=rollout.energy, **arrays)
 
 
-WRITERS: dict[str, Callable[[Rollout, BinaryIO], None]] = {
+WRITERS: dict[str, Callable[[RolloutData, BinaryIO], None]] = {
     ".npz": _write_npz,
     ".csv": write_csv,
     ".mcap": write_mcap,

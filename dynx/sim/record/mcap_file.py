@@ -8,17 +8,15 @@ simulation and what else a `Rollout` knows: numbers and lists as JSON, text as i
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, BinaryIO
+from typing import BinaryIO
 
 import numpy as np
 
 from dynx._version import __version__
 from dynx.errors import NotInstalledError
+from dynx.sim.record.rollout_data import RolloutData
 from dynx.sim.record.ros_definitions import schema_name, schema_text
 from dynx.sim.record.ros_topics import topics_of
-
-if TYPE_CHECKING:
-    from dynx.sim.record.rollout import Rollout
 
 SCHEMA = "dynx.rollout.mcap/1"
 """What the metadata record says that the recording is."""
@@ -30,7 +28,7 @@ ABOUT_CHANNEL = {"offered_qos_profiles": ""}
 """The ROS 2 profile of MCAP wants this entry; empty, it leaves the quality of service to the player."""
 
 
-def write_mcap(rollout: Rollout, file: BinaryIO) -> None:
+def write_mcap(rollout: RolloutData, file: BinaryIO) -> None:
     """Record `rollout`. Raises NotInstalledError without mcap (``pip install 'dynx[mcap]'``)."""
     try:
         from mcap.writer import Writer
@@ -60,7 +58,7 @@ def write_mcap(rollout: Rollout, file: BinaryIO) -> None:
     writer.finish()
 
 
-def _metadata(rollout: Rollout) -> dict[str, str]:
+def _metadata(rollout: RolloutData) -> dict[str, str]:
     model = rollout.model
     known = {
         "schema": SCHEMA,

@@ -9,16 +9,14 @@ from __future__ import annotations
 
 import os
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from dynx.files.figures import new_figure, save_figure
 from dynx.model import Model
+from dynx.sim.record.rollout_data import RolloutData
 from dynx.spatial.scalar import Floats
-
-if TYPE_CHECKING:
-    from dynx.sim.record.rollout import Rollout
 
 STYLES = ("-", "--", "-.", ":")
 """With the ten colours of matplotlib they are twenty kinds of curves, told apart without colour too."""
@@ -42,7 +40,7 @@ class Column(NamedTuple):
     """Whether positions are in the world and all else in the axes of the base."""
 
 
-def plot(rollout: Rollout, path: str | os.PathLike[str] | None) -> Any:
+def plot(rollout: RolloutData, path: str | os.PathLike[str] | None) -> Any:
     """See `Rollout.plot`. The figure belongs to no window and no global state of matplotlib."""
     columns = _columns(rollout.model)
     figure = new_figure(7.0 if len(columns) == 1 else 3.8 * len(columns), 8.0)
@@ -75,7 +73,7 @@ def _columns(model: Model) -> list[Column]:
     return columns
 
 
-def _draw(rollout: Rollout, column: Column, axes: Any) -> None:
+def _draw(rollout: RolloutData, column: Column, axes: Any) -> None:
     positions, middle, efforts = axes
     t, (length, force) = rollout.t, column.units
     q = rollout.q[:, column.q]
@@ -124,13 +122,13 @@ def _draw(rollout: Rollout, column: Column, axes: Any) -> None:
         )
 
 
-def _title(rollout: Rollout) -> str:
+def _title(rollout: RolloutData) -> str:
     law, plant = (rollout.settings.get(name, "none") for name in ("controller", "plant"))
     controller = "no controller" if law == "none" else law
     return f"{rollout.model.name}: {controller}" + ("" if plant == "none" else f" on {plant}")
 
 
-def _effort_limits(rollout: Rollout) -> Floats:
+def _effort_limits(rollout: RolloutData) -> Floats:
     """Those that cut the torques; if none did, those of the robot."""
     cut = rollout.settings.get("effort_limits")
     return rollout.model.effort_limit if cut is None else np.asarray(cut, dtype=np.float64)

@@ -1,28 +1,28 @@
 """A rollout as topics of ROS 2 messages.
 
-| topic | type | what |
+| topic | type | content |
 |---|---|---|
 | `/joint_states` | sensor_msgs/JointState | positions, velocities and efforts of the joints |
 | `/accelerations` | trajectory_msgs/JointTrajectory | one point that has `accelerations` |
-| `/saturated` | sensor_msgs/JointState | `effort` is 1 where the motor was at its limit, otherwise 0 |
+| `/saturated` | sensor_msgs/JointState | `effort` is 1 if the motor was at its limit, otherwise 0 |
 | `/energy` | std_msgs/Float64 | kinetic and potential energy [J] |
-| `/reference` | sensor_msgs/JointState | positions and velocities that were wanted |
+| `/reference` | sensor_msgs/JointState | reference positions and velocities |
 | `/reference_accelerations` | trajectory_msgs/JointTrajectory | one point that has `accelerations` |
-| `/error` | sensor_msgs/JointState | `position` is what was missing to the reference |
-| `/robot_description` | std_msgs/String | the robot that moved as URDF, once, at the beginning |
+| `/error` | sensor_msgs/JointState | `position` is the reference minus the position |
+| `/robot_description` | std_msgs/String | the simulated robot as URDF, once, at the beginning |
 
 A floating base adds, with its pose in the frame ``world`` (``map``, where that is the root link itself)
 and all else in the axes of the root link:
 
-| topic | type | what |
+| topic | type | content |
 |---|---|---|
 | `/tf` | tf2_msgs/TFMessage | the pose of the root link |
 | `/base/odometry` | nav_msgs/Odometry | pose and velocity; covariances are 0 |
 | `/base/acceleration` | geometry_msgs/AccelStamped | the derivative of that velocity |
-| `/base/wrench` | geometry_msgs/WrenchStamped | what the controller asked of the base, which has no motor |
-| `/base/reference` | nav_msgs/Odometry | pose and velocity that were wanted |
+| `/base/wrench` | geometry_msgs/WrenchStamped | wrench of the controller on the base, which has no motor |
+| `/base/reference` | nav_msgs/Odometry | reference pose and velocity |
 | `/base/reference_acceleration` | geometry_msgs/AccelStamped | likewise |
-| `/base/error` | geometry_msgs/TwistStamped | the displacement [m, rad] that leads to the reference |
+| `/base/error` | geometry_msgs/TwistStamped | the displacement [m, rad] from the base to the reference |
 
 Every number is the float64 of the record. What acts from one state to the next is stamped with the time
 at which it begins, so the last state has no effort. Joints that follow others are not listed: the
@@ -32,15 +32,13 @@ description says how they follow.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from dynx.sim.record.cdr import CdrMessages
+from dynx.sim.record.rollout_data import RolloutData
 from dynx.spatial.scalar import Floats
-
-if TYPE_CHECKING:
-    from dynx.sim.record.rollout import Rollout
 
 NO_VALUES = np.zeros((0, 0))
 """In place of a field of a joint state that is left out."""
@@ -71,12 +69,12 @@ class Topic(NamedTuple):
         return list(zip(range(begin, end), messages.encoded(), strict=True))
 
 
-def topics_of(rollout: Rollout) -> list[Topic]:
+def topics_of(rollout: RolloutData) -> list[Topic]:
     """All topics of `rollout`; one that changes its layout at the last state is there twice."""
     return [*_joint_topics(rollout), *(_base_topics(rollout) if rollout.model.floating else [])]
 
 
-def _joint_topics(rollout: Rollout) -> list[Topic]:
+def _joint_topics(rollout: RolloutData) -> list[Topic]:
     model, n = rollout.model, len(rollout)
     base_q, base_v = (7, 6) if model.floating else (0, 0)
     names = model.joint_names
@@ -107,7 +105,7 @@ def _joint_topics(rollout: Rollout) -> list[Topic]:
     return topics
 
 
-def _base_topics(rollout: Rollout) -> list[Topic]:
+def _base_topics(rollout: RolloutData) -> list[Topic]:
     n, base = len(rollout), rollout.model.root
 
     world = "world" if base != "world" else "map"

@@ -75,16 +75,16 @@ OPTIONS: dict[str, dict[str, Any]] = {
 def glue(*, on: bool, seen: list[bool] | None = None) -> Iterator[None]:
     """Glue for rollouts of any length, or for none; `seen` is told whether it was used."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(staged, "WORTH", 1 if on else 10**9)
-        patch.setattr(staged, "AT_ONCE", 32)
+        patch.setattr(staged, "MIN_STEPS_TO_COMPILE", 1 if on else 10**9)
+        patch.setattr(staged, "MAX_CHUNK_STEPS", 32)
         if seen is not None:
-            run = staged.GluedLoop.run
+            run = staged.StagedLoop.run
 
-            def watched(loop: staged.GluedLoop, record: Any) -> None:
+            def watched(loop: staged.StagedLoop, *arguments: Any) -> None:
                 seen.append(True)
-                run(loop, record)
+                run(loop, *arguments)
 
-            patch.setattr(staged.GluedLoop, "run", watched)
+            patch.setattr(staged.StagedLoop, "run", watched)
         yield
 
 
@@ -299,7 +299,7 @@ def test_no_controller_is_at_no_limit() -> None:
 
 
 def test_progress_is_told_in_time_where_steps_are_slow(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(staged, "TELLING", 1e-6)
+    monkeypatch.setattr(staged, "PROGRESS_INTERVAL", 1e-6)
     told: list[int] = []
     simulate(ARM, q0=np.zeros(6), duration=0.5, progress=lambda taken, wanted: told.append(taken))
     assert len(told) > 200

@@ -1,0 +1,130 @@
+"""Data of one simulation, and a summary in a few numbers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
+
+from dynx.backends import backend
+from dynx.errors import ArgumentError
+from dynx.model import Model
+from dynx.sim.record.settings import settings_of
+from dynx.sim.scenario.scenario import Scenario
+from dynx.spatial.scalar import Floats
+from dynx.trajectory.base import Setpoint
+
+Self = TypeVar("Self", bound="RolloutData")
+
+
+class Summary(NamedTuple):
+    """Errors, speeds, torques and energy of a rollout; errors (nv,) are NaN where there was no reference."""
+
+    rms_error: Floats
+    max_error: Floats
+    max_speed: Floats
+    max_torque: Floats
+    energy_drift: float
+    """The largest change of the energy since the start, over the largest kinetic energy."""
+    saturated: float
+    """Share of the steps in which some motor was at its limit."""
+
+    def __str__(self) -> str:
+        lost = bool(np.isnan(self.max_error).any())
+        worst = "no reference" if lost else f"{self.max_error.max(initial=0.0):.3g}"
+        return (
+            f"largest error {worst}, largest torque {self.max_torque.max(initial=0.0):.3g}, "
+            f"energy drift {self.energy_drift:.2g}, saturated in {100 * self.saturated:.3g} % of the steps"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class RolloutData:
+    """n steps of a robot in motion: states at n + 1 times, and what acted between them.
+
+    Row k of `a`, `tau` and `saturated` belongs to the step from ``t[k]`` to ``t[k + 1]``: the torque that
+    acted on the plant, the acceleration as the step began, and where a motor was at its limit.
+    """
+
+    model: Model
+    """The robot that moved: that of the plant, with its payload and its masses."""
+    t: Floats
+    """Times (n + 1,) [s]."""
+    q: Floats
+    """Configurations (n + 1, nq)."""
+    v: Floats
+    """Velocities (n + 1, nv)."""
+    a: Floats
+    """Accelerations (n, nv)."""
+    tau: Floats
+    """Torques of the motors (n, nv) [N m or N]."""
+    saturated: np.ndarray[Any, np.dtype[np.bool_]]
+    """Where a motor was at its limit (n, nv)."""
+    reference: Setpoint | None
+    """The setpoint at each time: (n + 1, nq), (n + 1, nv), (n + 1, nv)."""
+    rotors: Floats
+    """Armature (nv, nv), zero unless the scenario has some."""
+    scenario: Scenario | None = None
+    """The simulation that this is the record of; None for a record made otherwise."""
+    executor: str = ""
+    """How the steps were computed: ``staged``, or ``plain`` and why; more than one with semicolons."""
+    departures: tuple[str, ...] = ()
+    """Interventions by which the record is not that of its scenario alone, such as a torque of the caller."""
+
+    def __len__(self) -> int:
+        """The number of steps."""
+        return len(self.tau)
+
+    @cached_property
+    def error(self) -> Floats:
+        """Tracking error, `model.difference(q, q*)` (n + 1, nv); NaN without a reference."""
+        if self.reference is None:
+            return np.full_like(self.v, np.nan)
+        return self.model.difference(self.q, self.reference.q)
+
+    @cached_property
+    def kinetic_energy(self) -> Floats:
+        """Kinetic energy of the links and the rotors (n + 1,) [J]."""
+        with backend("reference", self.model) as bodies:
+            turning = 0.5 * np.einsum("ki,ij,kj->k", self.v, self.rotors, self.v)
+            return np.asarray(bodies.kinetic_energy(self.q, self.v) + turning)
+
+    @cached_property
+    def energy(self) -> Floats:
+        """Kinetic and potential energy (n + 1,) [J], whichever engine moved the robot."""
+        with backend("reference", self.model) as bodies:
+            return np.asarray(self.kinetic_energy + bodies.potential_energy(self.q))
+
+    def summary(self) -> Summary:
+        """Errors, speeds, torques and the drift of the energy."""
+        with np.errstate(invalid="ignore"):
+            rms = np.sqrt(np.mean(self.error**2, axis=0))
+        peak = float(np.max(self.kinetic_energy))
+        drift = float(np.max(np.abs(self.energy - self.energy[0])))
+        return Summary(
+            rms_error=rms,
+            max_error=np.max(np.abs(self.error), axis=0),
+            max_speed=np.max(np.abs(self.v), axis=0),
+            max_torque=np.max(np.abs(self.tau), axis=0, initial=0.0),
+            energy_drift=drift / peak if peak else drift,
+            saturated=float(np.mean(self.saturated.any(axis=1))) if len(self) else 0.0,
+        )
+
+    @cached_property
+    def settings(self) -> dict[str, Any]:
+        """The scenario in short, as numbers and text; empty without one."""
+        return {} if self.scenario is None else settings_of(self.scenario)
+
+    def first(self: Self, n: int) -> Self:
+        """The record of its first n steps."""
+        if not 0 <= n <= len(self):
+            raise ArgumentError(f"there are {len(self)} steps; wanted 0 to {len(self)} of them, not {n}")
+        reference = None if self.reference is None else Setpoint(*(x[: n + 1] for x in self.reference))
+        states = {name: getattr(self, name)[: n + 1] for name in ("t", "q", "v")}
+        steps = {name: getattr(self, name)[:n] for name in ("a", "tau", "saturated")}
+        return replace(self, **states, **steps, reference=reference)
+
+    def __repr__(self) -> str:
+        return f"<Rollout of {self.model.name}: {len(self)} steps to {self.t[-1]:.6g} s>"

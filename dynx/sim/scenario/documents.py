@@ -1,0 +1,242 @@
+"""Parts of a scenario as JSON documents, and back: exact to the last bit.
+
+Numbers, text, lists and arrays stand for themselves; an array of anything but float64 has its dtype beside
+it. A registered controller is its name and the arguments of its constructor, a dataclass or named tuple its
+class and its fields. An object of any other class is known by a fingerprint alone: it can be compared, not
+rebuilt.
+"""
+
+from __future__ import annotations
+
+import importlib
+import json
+import math
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from hashlib import sha256
+from types import FunctionType
+from typing import Any
+
+import numpy as np
+
+from dynx.backends import Backend
+from dynx.control.base import Controller
+from dynx.control.content import attributes_of
+from dynx.control.registry import from_document, to_document
+from dynx.errors import ArgumentError, ModelError, UnknownNameError, shown
+from dynx.model import Model
+from dynx.model.loading import load
+from dynx.sim.loop.controller_checks import controller_numbers
+
+MAX_WORDS_LENGTH = 80
+"""Characters of a value in a message."""
+
+Document = Any
+"""What `json.dumps` takes."""
+
+FINGERPRINT, CLASS, MODEL, ARRAY, CONTROLLER = "fingerprint", "class", "model", "array", "controller"
+
+NUMBERS = "numbers"
+"""Entry for the public numbers of a controller that is known by its fingerprint."""
+
+SAME_MODEL = {MODEL: "of the scenario"}
+"""Stands for the model of the scenario inside its controller or reference."""
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """A controller or a reference of a scenario from a file, whose class cannot be rebuilt here."""
+
+    name: str
+    """Name of its class."""
+    text: str
+    """Its document as JSON."""
+
+    @property
+    def numbers(self) -> dict[str, Any]:
+        """Public numbers of a controller, such as gains."""
+        return dict(json.loads(self.text).get(NUMBERS, {}))
+
+
+def encode(value: Any, model: Model | None = None) -> Document:
+    """`value` as a document; `model` is that of the scenario it belongs to."""
+    if value is None or isinstance(value, bool | str):
+        return value
+    if isinstance(value, np.generic):
+        return encode(value.item(), model)
+    if isinstance(value, int):
+        return value
+    if isinstance(value, float):
+        return value if math.isfinite(value) else {"float": repr(value)}
+    if isinstance(value, np.ndarray):
+        return _array(value)
+    if isinstance(value, Model):
+        if model is not None and value == model:
+            return SAME_MODEL
+        gravity = [float(x) for x in value.gravity]
+        return {MODEL: {"urdf": value.to_urdf(), "base": value.base, "gravity": gravity}}
+    if isinstance(value, Backend):
+        return value.name
+    if isinstance(value, Unknown):
+        return json.loads(value.text)
+    if isinstance(value, Controller):
+        document = _controller(value, model)
+        if document is not None:
+            return document
+    elif isinstance(value, tuple) and hasattr(value, "_fields"):
+        return _object(value, dict(zip(value._fields, value, strict=True)), model)
+    elif isinstance(value, list | tuple):
+        return [encode(each, model) for each in value]
+    elif isinstance(value, Mapping):
+        return {"mapping": [[encode(key, model), encode(each, model)] for key, each in value.items()]}
+    elif _is_declared(value):
+        given = {each.name: getattr(value, each.name) for each in fields(value) if each.init}
+        return _object(value, given, model)
+    document = {FINGERPRINT: _name_of(type(value)), "sha256": _fingerprint(value, model)}
+    return document | ({NUMBERS: controller_numbers(value)} if isinstance(value, Controller) else {})
+
+
+def decode(document: Document, model: Model | None = None) -> Any:
+    """The value of a document that `encode` gave; `Unknown` for an object that cannot be rebuilt here.
+
+    Classes are looked up in dynx and in modules that are imported already: a file imports nothing. Raises
+    ArgumentError for a document of another form.
+    """
+    try:
+        return _decoded(document, model)
+    except (TypeError, ValueError, KeyError, AttributeError, ModelError) as error:
+        text = shown(json.dumps(document))
+        raise ArgumentError(f"a part of the scenario cannot be read: {error}; it is {text}") from error
+
+
+def in_words(document: Document) -> str:
+    """A document in short, for a message."""
+    if isinstance(document, dict):
+        if FINGERPRINT in document:
+            return f"{document[FINGERPRINT].rpartition(':')[2]} (fingerprint {document['sha256'][:8]})"
+        if CLASS in document:
+            inside = ", ".join(f"{name} {in_words(each)}" for name, each in document["fields"].items())
+            return f"{document[CLASS].rpartition(':')[2]}({inside})"
+        if CONTROLLER in document:
+            given = (f"{name} {in_words(each)}" for name, each in document[CONTROLLER].items())
+            return ", ".join(given)
+        if document == SAME_MODEL or MODEL in document:
+            return "of the scenario's model" if document == SAME_MODEL else "of another model"
+        for kind in (ARRAY, "float", "mapping"):
+            document = document.get(kind, document) if isinstance(document, dict) else document
+    if isinstance(document, str):
+        return shown(document)
+    text = str(document)
+    return text if len(text) <= MAX_WORDS_LENGTH else f"{text[:MAX_WORDS_LENGTH]}..."
+
+
+def _decoded(document: Document, model: Model | None) -> Any:
+    if isinstance(document, list):
+        return tuple(_decoded(each, model) for each in document)
+    if not isinstance(document, dict):
+        return document
+    if "float" in document:
+        return float(document["float"])
+    if ARRAY in document:
+        array = np.array(_with_infinities(document[ARRAY]), dtype=document.get("dtype", "float64"))
+        array = array.reshape(document["shape"]) if "shape" in document else array
+        array.setflags(write=False)
+        return array
+    if "mapping" in document:
+        return {_decoded(key, model): _decoded(each, model) for key, each in document["mapping"]}
+    if CONTROLLER in document:
+        try:
+            return from_document(_decoded(document[MODEL], model), document[CONTROLLER])
+        except UnknownNameError:
+            return Unknown(str(document[CONTROLLER]["controller"]), json.dumps(document))
+    if document == SAME_MODEL and model is not None:
+        return model
+    if MODEL in document:
+        robot = document[MODEL]
+        return load(robot["urdf"], base=robot["base"], gravity=robot["gravity"])
+    if FINGERPRINT in document:
+        return Unknown(document[FINGERPRINT].rpartition(":")[2], json.dumps(document))
+    kind = _class_of(document[CLASS])
+    if kind is None:
+        return Unknown(document[CLASS].rpartition(":")[2], json.dumps(document))
+    return kind(**{name: _decoded(each, model) for name, each in document["fields"].items()})
+
+
+def _object(value: Any, given: Mapping[str, Any], model: Model | None) -> Document:
+    return {
+        CLASS: _name_of(type(value)),
+        "fields": {name: encode(each, model) for name, each in given.items()},
+    }
+
+
+def _array(array: np.ndarray[Any, Any]) -> Document:
+    document: dict[str, Any] = {ARRAY: _without_infinities(array.tolist())}
+    if array.dtype != np.float64:
+        document["dtype"] = array.dtype.str
+    if not array.size:
+        document["shape"] = list(array.shape)
+    return document
+
+
+def _without_infinities(entry: Any) -> Any:
+    """`entry` with text for the numbers that JSON does not have."""
+    if isinstance(entry, list):
+        return [_without_infinities(each) for each in entry]
+    return repr(entry) if isinstance(entry, float) and not math.isfinite(entry) else entry
+
+
+def _with_infinities(entry: Any) -> Any:
+    if isinstance(entry, list):
+        return [_with_infinities(each) for each in entry]
+    return float(entry) if isinstance(entry, str) else entry
+
+
+def _is_declared(value: Any) -> bool:
+    """Whether `value` is of a class that is itself a dataclass, and has nothing beside its fields."""
+    if "__dataclass_fields__" not in vars(type(value)):
+        return False
+    return set(getattr(value, "__dict__", ())) <= {each.name for each in fields(value)}
+
+
+def _controller(controller: Controller[Any], model: Model | None) -> Document | None:
+    """A controller that is registered, and the model that it knows; None for any other."""
+    try:
+        return {CONTROLLER: to_document(controller), MODEL: encode(controller.model, model)}
+    except ArgumentError:
+        return None
+
+
+def _name_of(kind: type) -> str:
+    return f"{kind.__module__}:{kind.__qualname__}"
+
+
+def _class_of(name: str) -> Any:
+    """The class of that name in dynx or in a module that is imported already; None where there is none."""
+    module, _, path = name.partition(":")
+    if module.partition(".")[0] == "dynx":
+        importlib.import_module(module)
+    found: Any = sys.modules.get(module)
+    for part in path.split("."):
+        found = getattr(found, part, None)
+    allowed = isinstance(found, type) and (
+        "__dataclass_fields__" in vars(found) or (issubclass(found, tuple) and hasattr(found, "_fields"))
+    )
+    return found if allowed else None
+
+
+def _fingerprint(value: Any, model: Model | None) -> str:
+    """Checksum of the attributes of an object, and of those of the objects in it."""
+    digest = sha256()
+    if isinstance(value, FunctionType):
+        digest.update(value.__qualname__.encode() + value.__code__.co_code)
+        return digest.hexdigest()
+    try:
+        attributes = attributes_of(value)
+    except TypeError:
+        # An object that cannot be copied, such as a lock, is known by its class.
+        attributes = {}
+    for name in sorted(attributes):
+        content = json.dumps(encode(attributes[name], model), sort_keys=True)
+        digest.update(f"{name}={content};".encode())
+    return digest.hexdigest()

@@ -1,0 +1,223 @@
+"""A simulation as data: robot, controller, reference, plant, clock, sensors, disturbances and limits."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import KW_ONLY, dataclass, fields, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dynx.control.base import Controller
+from dynx.control.friction import SLIP, Coefficients
+from dynx.errors import ArgumentError, nearest, shown
+from dynx.model import Model
+from dynx.sim.loop.sensors import Noise
+from dynx.sim.plants.disturbances import Push
+from dynx.sim.plants.model_error import MassScale, Payload
+from dynx.sim.plants.registry import default_integrator
+from dynx.sim.scenario.documents import Document, Unknown, decode, encode
+from dynx.trajectory.base import Trajectory
+
+SCHEMA = "dynx.scenario/1"
+"""Name of the form of a scenario's document; another number means another form."""
+
+NUMBERS = ("reference", "q0", "v0", "damping", "friction", "armature", "effort_limits")
+"""Fields that may be given as lists of numbers, and are kept as arrays."""
+
+
+class Difference(NamedTuple):
+    """A field in which two scenarios differ, and the two values."""
+
+    field: str
+    """Its name; that of a field inside it has a dot, as in ``noise.seed``."""
+    ours: Any
+    theirs: Any
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Scenario:
+    """All of one simulation: what `dynx.simulate` and `dynx.simulate_batch` run, and what a record keeps.
+
+    The fields are the arguments of `dynx.simulate` and mean what is written there. Two scenarios are equal if
+    all fields are, element by element, with the defaults filled in. ``dataclasses.replace`` changes one
+    field; `to_json` and `from_json` keep every bit. A field is checked when a simulation is made of it.
+    """
+
+    model: Model
+    """The robot as the controller knows it."""
+    controller: Controller[Any] | Unknown | None = None
+    """None for a robot without motors; `Unknown` only in a scenario from a file."""
+    reference: Trajectory | ArrayLike | Unknown | None = None
+    _: KW_ONLY
+    plant: str = "pinocchio"
+    integrator: str | None = None
+    substeps: int = 1
+    method: str = "DOP853"
+    rtol: float = 1e-10
+    atol: float = 1e-12
+    dt: float = 1e-3
+    """Step of the record [s]."""
+    duration: float | None = None
+    """Time to simulate [s]; by default that of the reference. A `Simulation` needs none."""
+    control_dt: float | None = None
+    """Step of the controller [s]; by default `dt`."""
+    delay: float = 0.0
+    """Age of a measurement [s]."""
+    q0: ArrayLike | None = None
+    v0: ArrayLike | None = None
+    noise: Noise | None = None
+    damping: Coefficients = False
+    friction: Coefficients = False
+    friction_slip: float = SLIP
+    armature: Coefficients = False
+    effort_limits: bool | ArrayLike = False
+    position_limits: bool = False
+    payload: Payload | Sequence[Payload] | None = None
+    mass_scale: MassScale = 1.0
+    pushes: Sequence[Push] = ()
+    check_reference: bool = True
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.model, Model):
+            raise ArgumentError(f"model is of type {type(self.model).__name__}; wanted a Model")
+        if not isinstance(self.controller, Controller | Unknown | None):
+            kind = type(self.controller).__name__
+            raise ArgumentError(f"controller is of type {kind}; wanted a controller of dynx.control")
+        for name in NUMBERS:
+            object.__setattr__(self, name, _as_array(getattr(self, name)))
+        payload = () if self.payload is None else self.payload
+        payload = (payload,) if isinstance(payload, Payload) else tuple(payload)
+        object.__setattr__(self, "payload", payload)
+        object.__setattr__(self, "pushes", tuple(self.pushes))
+        if isinstance(self.mass_scale, Mapping):
+            object.__setattr__(self, "mass_scale", dict(self.mass_scale))
+
+    @property
+    def payloads(self) -> tuple[Payload, ...]:
+        """All payloads of the plant."""
+        return tuple(self.payload) if isinstance(self.payload, tuple) else ()
+
+    def with_defaults(self) -> Scenario:
+        """An equal scenario with the integrator, the control step and the duration that None stands for."""
+        duration = self.duration
+        if duration is None and isinstance(self.reference, Trajectory):
+            duration = self.reference.duration
+        return replace(
+            self,
+            integrator=self.integrator or default_integrator(self.plant),
+            control_dt=self.dt if self.control_dt is None else self.control_dt,
+            duration=duration,
+        )
+
+    def differences(self, other: Scenario) -> list[Difference]:
+        """Fields in which `other` is another simulation; empty for an equal one."""
+        found: list[Difference] = []
+        ours, theirs = self.with_defaults(), other.with_defaults()
+        for name in field_names():
+            mine, its = getattr(ours, name), getattr(theirs, name)
+            if name == "model":
+                if mine != its:
+                    found.append(Difference(name, mine, its))
+                continue
+            pair = encode(mine, self.model), encode(its, other.model)
+            found += _differences(name, *pair)
+        return found
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Scenario):
+            return NotImplemented
+        return not self.differences(other)
+
+    def __hash__(self) -> int:
+        return hash((self.model, self.plant))
+
+    def __repr__(self) -> str:
+        """The fields that are not left to their defaults."""
+        shown_fields = [f"Scenario({self.model.name}"]
+        for each in fields(self):
+            value = getattr(self, each.name)
+            default = () if each.name == "payload" else each.default
+            if each.name != "model" and encode(value, self.model) != encode(default, self.model):
+                shown_fields.append(f"{each.name}={value}")
+        return ",\n    ".join(shown_fields) + ")"
+
+    def to_dict(self) -> dict[str, Document]:
+        """A document of numbers and text, which `from_dict` turns back into an equal scenario.
+
+        A controller or a trajectory of your own can be rebuilt if its class is a frozen dataclass;
+        otherwise it is written as a fingerprint, which can only be compared.
+        """
+        document: dict[str, Document] = {"schema": SCHEMA, "model": encode(self.model)}
+        for name in field_names():
+            if name != "model":
+                document[name] = encode(getattr(self, name), self.model)
+        return document
+
+    @classmethod
+    def from_dict(cls, document: Mapping[str, Document]) -> Scenario:
+        """The scenario of a document. Raises ArgumentError for a document of another form."""
+        if not isinstance(document, Mapping) or document.get("schema") != SCHEMA:
+            raise ArgumentError(f"a scenario's document has schema {SCHEMA!r}; this one has not")
+        given = {name: value for name, value in document.items() if name != "schema"}
+        names = field_names()
+        for name in given:
+            if name not in names:
+                raise ArgumentError(f"a scenario has no field {shown(name)}{nearest(name, names)}")
+        if "model" not in given:
+            raise ArgumentError("the scenario's document has no model")
+        model = decode(given.pop("model"))
+        return cls(model, **{name: decode(value, model) for name, value in given.items()})
+
+    def to_json(self) -> str:
+        """`to_dict` as text."""
+        return json.dumps(self.to_dict(), indent=1)
+
+    @classmethod
+    def from_json(cls, text: str) -> Scenario:
+        """The scenario of a text that `to_json` gave. Raises ArgumentError for any other text."""
+        try:
+            document = json.loads(text)
+        except ValueError as error:
+            raise ArgumentError(f"the text is no JSON: {error}") from error
+        return cls.from_dict(document)
+
+
+def field_names() -> tuple[str, ...]:
+    """Names of all fields of a scenario."""
+    return tuple(each.name for each in fields(Scenario))
+
+
+def _as_array(value: Any) -> Any:
+    """Lists of numbers as a read-only array; anything else as it is."""
+    if not isinstance(value, list | tuple | np.ndarray):
+        return value
+    try:
+        array = np.array(value)
+    except ValueError:
+        return value
+    if array.dtype.kind in "iuf":
+        array = array.astype(np.float64)
+    array.setflags(write=False)
+    return array
+
+
+def _differences(name: str, ours: Document, theirs: Document) -> list[Difference]:
+    """The innermost entries in which two documents differ."""
+    if _same(ours, theirs):
+        return []
+    one, other = (each.get("fields") if isinstance(each, dict) else None for each in (ours, theirs))
+    if one is None or other is None or ours["class"] != theirs["class"] or one.keys() != other.keys():
+        return [Difference(name, ours, theirs)]
+    return [found for key in one for found in _differences(f"{name}.{key}", one[key], other[key])]
+
+
+def _same(one: Document, other: Document) -> bool:
+    """Equality of documents in which True and 1 are different."""
+    if isinstance(one, list) and isinstance(other, list):
+        return len(one) == len(other) and all(map(_same, one, other))
+    if isinstance(one, dict) and isinstance(other, dict):
+        return one.keys() == other.keys() and all(_same(one[key], other[key]) for key in one)
+    return isinstance(one, bool) == isinstance(other, bool) and bool(one == other)

@@ -1,0 +1,135 @@
+"""The checked parts of a scenario that every executor needs: clock, plant model, reference, limits, start."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dynx.control.base import Controller
+from dynx.control.engine_motors import EngineMotor
+from dynx.control.saturation import checked_limit
+from dynx.errors import ArgumentError
+from dynx.model import Model
+from dynx.model.configuration import checked_array, checked_q
+from dynx.sim.clock import Clock
+from dynx.sim.loop.controller_checks import check_controller
+from dynx.sim.loop.references import SetpointOf, checked_reference
+from dynx.sim.plants.disturbances import Disturbances
+from dynx.sim.plants.model_error import plant_model
+from dynx.sim.plants.registry import default_integrator
+from dynx.sim.scenario.documents import Unknown
+from dynx.sim.scenario.scenario import Scenario
+from dynx.spatial.scalar import Floats
+from dynx.trajectory.base import Trajectory
+
+
+@dataclass(frozen=True)
+class Setup:
+    """A scenario that passed all checks that need no engine."""
+
+    scenario: Scenario
+    controller: Controller[Any] | None
+    clock: Clock
+    """Of the scenario's duration; of one control step where it has none."""
+    model: Model
+    """The robot that moves: with its payload and its masses."""
+    setpoint_of: SetpointOf | None
+    disturbances: Disturbances
+    limit: Floats | None
+    """Effort limits (nv,) [N m or N]."""
+    start: tuple[Floats, Floats]
+    """q (nq,) and v (nv,) at time 0."""
+
+    @classmethod
+    def of(cls, scenario: Scenario) -> Setup:
+        """Check a scenario. Raises ArgumentError, LimitError and GainError for what cannot be simulated."""
+        controller = known_controller(scenario)
+        clock = clock_of(scenario)
+        moved = plant_model(scenario.model, scenario.payloads, scenario.mass_scale)
+        if controller is not None:
+            check_controller(scenario.model, controller, clock)
+        setpoint_of = checked_reference(
+            scenario.model, scenario.reference, within_limits=scenario.check_reference
+        )
+        disturbances = disturbances_of(scenario, moved)
+        limit = effort_limits_of(scenario)
+        start = _start(moved, setpoint_of, scenario.q0, scenario.v0)
+        return cls(scenario, controller, clock, moved, setpoint_of, disturbances, limit, start)
+
+    @property
+    def integrator(self) -> str:
+        """Name of the integrator, also where the scenario leaves it to the plant."""
+        return self.scenario.integrator or default_integrator(self.scenario.plant)
+
+
+def known_controller(scenario: Scenario) -> Controller[Any] | None:
+    """The controller of a scenario.
+
+    Raises ArgumentError where controller or reference were read from a file and their class is not here.
+    """
+    for part in (scenario.controller, scenario.reference):
+        if isinstance(part, Unknown):
+            raise ArgumentError(
+                f"{part.name} was read from a file, and cannot be rebuilt: import the module of its class "
+                "before, which must be a frozen dataclass, or replace it by dataclasses.replace"
+            )
+    controller = scenario.controller
+    assert not isinstance(controller, Unknown)
+    return controller
+
+
+def clock_of(scenario: Scenario) -> Clock:
+    """The clock of a scenario. Raises ArgumentError for times that are no multiples of `dt`."""
+    duration = scenario.duration
+    if duration is None and isinstance(scenario.reference, Trajectory):
+        duration = scenario.reference.duration
+    if duration is None:
+        duration = scenario.dt if scenario.control_dt is None else scenario.control_dt
+    return Clock.of(scenario.dt, duration, scenario.control_dt, scenario.delay)
+
+
+def require_duration(scenario: Scenario) -> None:
+    """Raise ArgumentError where neither the scenario nor its reference has a duration."""
+    if scenario.duration is None and not isinstance(scenario.reference, Trajectory):
+        raise ArgumentError("duration is not given, and the reference is no trajectory that has one")
+
+
+def disturbances_of(scenario: Scenario, moved: Model) -> Disturbances:
+    """Friction, armature and pushes of a scenario on `moved`, the model of its plant."""
+    return Disturbances(
+        moved,
+        scenario.damping,
+        scenario.friction,
+        scenario.friction_slip,
+        scenario.armature,
+        scenario.pushes,
+        scenario.dt,
+    )
+
+
+def effort_limits_of(scenario: Scenario) -> Floats | None:
+    """Effort limits (nv,) of a scenario. Raises ArgumentError for limits that its motors cannot have."""
+    if scenario.effort_limits is False:
+        return None
+    if isinstance(scenario.controller, EngineMotor):
+        raise ArgumentError(f"effort_limits do not reach {scenario.controller.name}: give it `force`")
+    return checked_limit(scenario.model, None if scenario.effort_limits is True else scenario.effort_limits)
+
+
+def _start(
+    model: Model, setpoint_of: SetpointOf | None, q0: ArrayLike | None, v0: ArrayLike | None
+) -> tuple[Floats, Floats]:
+    q, v = model.neutral(), np.zeros(model.nv)
+    if setpoint_of is not None:
+        first = setpoint_of(np.zeros(1))
+        q, v = first.q[0], first.v[0]
+    if q0 is not None:
+        q, v = checked_q(model, q0, "q0"), np.zeros(model.nv)
+    if v0 is not None:
+        v = checked_array("v0", v0, model.nv)
+    if q.ndim != 1 or v.ndim != 1:
+        raise ArgumentError(f"q0 has shape {q.shape} and v0 {v.shape}; wanted one state")
+    return q, v

@@ -1,0 +1,183 @@
+"""A rollout is resumed by its own scenario only: every other field is refused by name."""
+
+from __future__ import annotations
+
+from dataclasses import fields, is_dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dynx.control import PD, PID, ComputedTorque
+from dynx.errors import ArgumentError
+from dynx.model.loading import load
+from dynx.sim import Noise, Payload, Push, Rollout, Scenario, simulate
+from dynx.trajectory import cycloidal
+
+ARM = load("ur5")
+START, END = np.zeros(6), np.full(6, 0.02)
+SCENARIO = Scenario(
+    ARM,
+    ComputedTorque(ARM, kp=400, kd=40),
+    cycloidal(START, END, duration=0.02),
+    plant="reference",
+    integrator="adaptive",
+    control_dt=2e-3,
+    delay=1e-3,
+    q0=START,
+    v0=START,
+    noise=Noise(1e-4, 1e-3, seed=5),
+    damping=0.1,
+    friction=0.2,
+    armature=0.01,
+    effort_limits=np.full(6, 80.0),
+    payload=Payload("tool0", 1.0),
+    mass_scale={"forearm_link": 1.1},
+    pushes=[Push("tool0", [1.0, 0, 0, 0, 0, 0], start=0.002, duration=0.01)],
+    check_reference=True,
+)
+HEAVY = ARM.with_gravity([0.0, 0.0, -1.0])
+CHANGES: dict[str, Any] = {
+    "model": HEAVY,
+    "controller": ComputedTorque(ARM, kp=400, kd=41),
+    "reference": cycloidal(START, END + 1e-12, duration=0.02),
+    "plant": "compiled",
+    "integrator": "rk4",
+    "substeps": 2,
+    "method": "RK45",
+    "rtol": 1e-9,
+    "atol": 1e-11,
+    "dt": 5e-4,
+    "duration": None,
+    "control_dt": 1e-3,
+    "delay": 0.0,
+    "q0": START + 1e-15,
+    "v0": START + 1e-15,
+    "noise": Noise(1e-4, 1e-3, seed=6),
+    "damping": True,
+    "friction": 0.3,
+    "friction_slip": 2e-2,
+    "armature": np.full(6, 0.01),
+    "effort_limits": True,
+    "position_limits": True,
+    "payload": Payload("tool0", 1.0, center=(0.0, 0.0, 0.01)),
+    "mass_scale": {"forearm_link": 1.2},
+    "pushes": [Push("tool0", [1.0, 0, 0, 0, 0, 1e-9], start=0.002, duration=0.01)],
+    "check_reference": False,
+}
+"""Another value of each field."""
+
+WHOLE = simulate(SCENARIO)
+
+
+def test_every_field_has_another_value_here() -> None:
+    assert set(CHANGES) == {each.name for each in fields(Scenario)}
+    for name, value in CHANGES.items():
+        if name != "duration":
+            assert replace(SCENARIO, **{name: value}) != SCENARIO, name
+
+
+@pytest.mark.parametrize("name", [each.name for each in fields(Scenario) if each.name != "duration"])
+def test_another_value_of_any_field_is_refused_by_name(name: str) -> None:
+    other = replace(SCENARIO, **{name: CHANGES[name]})
+    if name == "model":
+        other = replace(other, controller=ComputedTorque(HEAVY, kp=400, kd=40))
+    with pytest.raises(ArgumentError, match=rf"the rollout to resume .*{name}.*") as caught:
+        simulate(other, resume=WHOLE)
+    assert "now it is" in str(caught.value) or "not of" in str(caught.value)
+
+
+INNER: dict[type, tuple[str, dict[str, Any]]] = {
+    Noise: ("noise", {"q": 2e-4, "v": 2e-3, "seed": 7}),
+    Payload: (
+        "payload",
+        {
+            "frame": "wrist_3_link",
+            "mass": 2.0,
+            "center": (0.0, 1e-9, 0.0),
+            "inertia": np.eye(3) * 1e-3,
+        },
+    ),
+    Push: (
+        "pushes",
+        {
+            "frame": "wrist_3_link",
+            "wrench": [2.0, 0, 0, 0, 0, 0],
+            "start": 0.003,
+            "duration": 0.02,
+            "reference": "local",
+        },
+    ),
+}
+"""Another value of each field of the dataclasses inside a scenario."""
+
+
+@pytest.mark.parametrize(
+    ("part", "field", "value"),
+    [(part, each.name, values[each.name]) for kind, (part, values) in INNER.items() for each in fields(kind)],
+)
+def test_another_value_inside_a_field_is_refused_too(part: str, field: str, value: Any) -> None:
+    inner = getattr(SCENARIO, part)
+    inner = inner[0] if isinstance(inner, tuple) else inner
+    assert is_dataclass(inner)
+    changed: Any = replace(inner, **{field: value})  # type: ignore[type-var]
+    change: dict[str, Any] = {part: [changed] if part == "pushes" else changed}
+    other = replace(SCENARIO, **change)
+    with pytest.raises(ArgumentError, match=rf"the rollout to resume had {part}"):
+        simulate(other, resume=WHOLE)
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        ComputedTorque(ARM, kp=[400, 400, 400, 400, 400, 400 + 1e-12], kd=40),
+        ComputedTorque(ARM, kp=400, kd=40, backend="reference"),
+        PD(ARM, kp=400, kd=40),
+        PID(ARM, kp=400, ki=1, kd=40, control_dt=2e-3),
+        None,
+    ],
+)
+def test_another_controller_or_another_engine_of_it_is_refused(other: Any) -> None:
+    with pytest.raises(ArgumentError, match=r"the rollout to resume had controller"):
+        simulate(replace(SCENARIO, controller=other), resume=WHOLE)
+
+
+def test_the_pendulum_with_another_armature_is_refused() -> None:
+    pendulum = load("pendulum")
+    free = simulate(pendulum, q0=[1.0], duration=0.1)
+    with pytest.raises(ArgumentError, match=r"had armature False; now it is 5\.0"):
+        simulate(pendulum, q0=[1.0], duration=0.1, armature=5.0, resume=free, step=50)
+
+
+@given(value=st.floats(1e-3, 1e3), change=st.sampled_from(["damping", "friction", "rtol"]))
+def test_the_smallest_change_of_a_number_is_refused(value: float, change: str) -> None:
+    before: dict[str, Any] = {change: value}
+    after: dict[str, Any] = {change: float(np.nextafter(value, np.inf))}
+    short = replace(SCENARIO, **before)
+    record = replace(WHOLE, scenario=short)
+    with pytest.raises(ArgumentError, match=rf"had {change} "):
+        simulate(replace(short, **after), resume=record)
+
+
+def test_a_longer_or_a_shorter_duration_resumes() -> None:
+    long = replace(SCENARIO, duration=0.03)
+    longer = simulate(long, resume=WHOLE)
+    assert np.array_equal(longer.q, simulate(long).q)
+    shorter = simulate(replace(SCENARIO, duration=0.01), resume=WHOLE, step=5)
+    assert np.array_equal(shorter.q, WHOLE.q[:11])
+
+
+def test_equal_scenarios_written_otherwise_resume(tmp_path: Path) -> None:
+    WHOLE.first(9).save(tmp_path / "part.npz")
+    part = Rollout.load(tmp_path / "part.npz")
+    same = simulate(
+        ARM,
+        ComputedTorque(ARM, kp=np.full(6, 400.0), kd=[40.0] * 6),
+        cycloidal([0.0] * 6, [0.02] * 6, duration=0.02),
+        **{each.name: getattr(SCENARIO, each.name) for each in fields(Scenario)[3:]},
+        resume=part,
+    )
+    assert np.array_equal(same.q, WHOLE.q)
