@@ -232,7 +232,7 @@ _FEEDBACK = ("kp", "kd", "natural_frequency", "damping_ratio")
 
 BUILT_IN: dict[str, NamedController] = {
     "position-motor": NamedController(
-        "PyBullet's POSITION_CONTROL, its own gains", ("kp", "kd"), _position_motor
+        "PyBullet's POSITION_CONTROL, default gains", ("kp", "kd"), _position_motor
     ),
     "velocity-motor": NamedController(
         "PyBullet's VELOCITY_CONTROL", (), lambda r: control.VelocityMotor(r.model, force=r.limit)
@@ -246,9 +246,9 @@ BUILT_IN: dict[str, NamedController] = {
     "pd": NamedController(
         "kp (q* - q) + kd (v* - v), no model", _FEEDBACK, lambda r: control.PD(r.model, **r.torques())
     ),
-    "pid": NamedController("pd and an integral, cut to the effort limits", ("ki", *_FEEDBACK), _pid),
+    "pid": NamedController("pd plus integral, saturated at the limits", ("ki", *_FEEDBACK), _pid),
     "gravity-pd": NamedController(
-        "pd and the weight g(q)",
+        "pd plus gravity compensation g(q)",
         _FEEDBACK,
         lambda r: control.GravityCompensatedPD(r.model, **r.torques(), backend=r.backend),
     ),
@@ -268,7 +268,7 @@ BUILT_IN: dict[str, NamedController] = {
         lambda r: control.ComputedTorque(r.model, **r.rates(), backend=r.backend),
     ),
     "discrete-computed-torque": NamedController(
-        "the plant's own step, inverted",
+        "inverse of the step of the plant",
         (),
         lambda r: control.DiscreteComputedTorque(r.model, control_dt=r.control_dt, backend=r.backend),
     ),

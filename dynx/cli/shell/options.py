@@ -52,8 +52,9 @@ def one_of(*names: str, source: str | None = None) -> Callable[[str], str]:
     """
 
     def name(word: str) -> str:
-        known = (*names, *(() if source is None else imported(source)))
-        if word not in known:
+        more = () if source is None else imported(source)
+        if word not in names and word not in more:
+            known = (*names, *more)
             close = nearest(word, known)
             # `nearest` shortens a long list; here all names are listed.
             clause = close if close.endswith("?") else f"; known: {', '.join(known)}"

@@ -1,4 +1,4 @@
-"""The motion that ``dynx sim`` is asked for: from where to where, by which profile, in which time."""
+"""Reference motion of ``dynx sim``, planned from the options of the command."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ from dynx.spatial.scalar import Floats
 from dynx.trajectory import Trajectory
 
 DURATION = 2.0
-"""Of a motion whose time is free [s]."""
+"""Default duration of a motion without limits [s]."""
 
 TIMED = {"cycloidal": trajectory.cycloidal, "cubic": trajectory.cubic, "quintic": trajectory.quintic}
-"""Profiles that take the time that they are given."""
+"""Profiles with a given duration."""
 
 LIMITED = {"trapezoidal": ("acceleration",), "s-curve": ("acceleration", "jerk")}
-"""Profiles that are as fast as limits allow, and the limits that they need besides that of velocity."""
+"""Profiles as fast as limits allow, and the limits that they require besides that of velocity."""
 
 Limit = float | list[float]
 
 
 @dataclass(frozen=True)
 class MotionInput:
-    """The options of a motion, by the names that click has for them."""
+    """Options of a motion, by their parameter names."""
 
     to: Numbers
     to_pose: Numbers
@@ -48,42 +48,42 @@ class MotionInput:
 
     @classmethod
     def of(cls, given: dict[str, Any]) -> MotionInput:
-        """Those among all options of the command."""
+        """Select the options of a motion from all options of the command."""
         return cls(**{field.name: given[field.name] for field in fields(cls)})
 
     @property
     def chosen(self) -> str:
-        """The profile that is asked for, or that follows from the rest."""
+        """The profile given, or the one that the other options imply."""
         if self.profile is not None:
             return self.profile
         return "cycloidal" if self.goes else "hold"
 
     @property
     def goes(self) -> bool:
-        """Whether there is somewhere to go to."""
+        """Whether a target is given."""
         return self.to is not None or self.to_pose is not None
 
     @property
     def needs_frame(self) -> bool:
-        """Whether a frame takes part."""
+        """Whether the target or the controller refers to a frame."""
         law = CONTROLLERS.get(self.controller)
         return self.to_pose is not None or (law is not None and law.wants == "frame")
 
 
 @dataclass(frozen=True)
 class Motion:
-    """What is to be followed (None: nothing), where the robot begins, and how long it is simulated [s]."""
+    """Reference (None for none), configuration at its start, and duration of the simulation [s]."""
 
     reference: Trajectory | Floats | None
     begin: Floats
     duration: float
     frame: str | None
     said: dict[str, Any]
-    """The same for the document."""
+    """Description of the motion for the JSON document."""
 
 
 def planned(model: Model, asked: MotionInput) -> Motion:
-    """The motion of `model` that the options mean. Raises ArgumentError where they contradict each other."""
+    """Plan the motion that the options describe. Raises ArgumentError where they contradict each other."""
     _refuse_contradictions(asked)
     frame = chosen_frame(model, asked.frame) if asked.needs_frame else None
     start = configuration(model, asked.start, "--from", model.clip(model.neutral()))
@@ -104,7 +104,7 @@ def planned(model: Model, asked: MotionInput) -> Motion:
     said |= {"to": motion.end.q.tolist(), "duration": motion.duration}
     span = motion.duration
     if profile in LIMITED and asked.duration is None:
-        # The fastest motion ends between two steps: the robot is watched until the next.
+        # The fastest motion ends between two steps; the simulation continues to the next.
         dt = positive("--dt", asked.dt)
         span = dt * math.ceil(motion.duration / dt - 1e-9)
     return Motion(motion, start, span + asked.settle, frame, said)
@@ -136,11 +136,11 @@ def _refuse_contradictions(asked: MotionInput) -> None:
     if asked.to is not None and asked.to_pose is not None:
         raise ArgumentError("--to and --to-pose are both given; wanted one of them")
     if not asked.goes and profile != "hold":
-        raise ArgumentError(f"--profile {profile} is a motion to --to or --to-pose, and neither is given")
+        raise ArgumentError(f"--profile {profile} needs --to or --to-pose")
     if asked.to_pose is not None and profile not in TIMED:
-        raise ArgumentError(f"--to-pose takes a profile of {', '.join(TIMED)}; {profile} has none")
+        raise ArgumentError(f"--to-pose takes --profile {', '.join(TIMED)}; not {profile}")
     if asked.frame is not None and not asked.needs_frame:
-        raise ArgumentError("--frame is of --to-pose and of the laws operational-space and impedance")
+        raise ArgumentError("--frame needs --to-pose or --controller operational-space or impedance")
     needed = LIMITED.get(profile, ())
     for name in needed:
         if getattr(asked, name) is None:
@@ -149,9 +149,9 @@ def _refuse_contradictions(asked: MotionInput) -> None:
     for name in ("velocity", "acceleration", "jerk"):
         if name not in allowed and getattr(asked, name) is not None:
             takers = [each for each in PROFILES if each in LIMITED and name in ("velocity", *LIMITED[each])]
-            raise ArgumentError(f"--{name} is of --profile {' and '.join(takers)}, not of {profile}")
+            raise ArgumentError(f"--{name} needs --profile {' or '.join(takers)}, not {profile}")
     if asked.settle < 0.0:
-        raise ArgumentError(f"--settle is {asked.settle:g}; wanted seconds, 0 or more")
+        raise ArgumentError(f"--settle is {asked.settle:g} s; wanted 0 or more")
 
 
 def _given(limit: Limit | None) -> Limit:

@@ -1,4 +1,4 @@
-"""The files that ``dynx sim`` writes: refused before the simulation rather than after it."""
+"""Files that ``dynx sim`` writes, checked before the simulation."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from dynx.sim.record.formats import WRITERS
 
 @dataclass(frozen=True)
 class Outputs:
-    """Where the record goes, in the format that each name ends with, and the picture (None for none)."""
+    """Files for the record, each in the format of its suffix, and for the plot (None for none)."""
 
     save: tuple[str, ...] = ()
     plot: str | None = None
 
     @property
     def files(self) -> list[str]:
-        """All of them."""
+        """All files."""
         return [*self.save, *([] if self.plot is None else [self.plot])]
 
     def check(self) -> None:
-        """Raise ArgumentError for a file that plainly cannot be written.
+        """Raise ArgumentError for a file that cannot be written or has an unknown format.
 
         NotInstalledError where a format needs a package that is missing.
         """
@@ -40,7 +40,7 @@ class Outputs:
             picture_format(self.plot)
 
     def write(self, rollout: Rollout) -> None:
-        """Write all of them. Raises ArgumentError where the system does not let it."""
+        """Write all files. Raises ArgumentError where one cannot be written."""
         for path in self.save:
             rollout.save(path)
         if self.plot is not None:
@@ -48,14 +48,14 @@ class Outputs:
 
 
 def check_record(path: str) -> None:
-    """Raise ArgumentError for a name that ends with no format of records.
+    """Raise ArgumentError for a name without the suffix of a record format.
 
     NotInstalledError where the format needs a package that is missing.
     """
     suffix = os.path.splitext(path)[1].lower()
     if suffix not in WRITERS:
         raise ArgumentError(
-            f"--save {shown(path, 300)} ends with no format; wanted one of {', '.join(WRITERS)}"
+            f"--save {shown(path, 300)} has no suffix of a record format; wanted one of {', '.join(WRITERS)}"
         )
     if suffix == ".mcap" and find_spec("mcap") is None:
         raise NotInstalledError("--save with .mcap needs mcap: pip install 'dynx[mcap]'")

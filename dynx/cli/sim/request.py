@@ -105,7 +105,7 @@ def _law(
     gains = Gains(**{name: given[name] for name in GAINS})
     if given["controller"] == "none":
         if gains.given() or given["friction_compensation"]:
-            raise ArgumentError("--controller none has no gains, and no friction to give back")
+            raise ArgumentError("--controller none takes no gains and no --friction-compensation")
         return None
     law = named_controller(
         given["controller"],
@@ -127,8 +127,7 @@ def _law(
         )
     if losses["damping"] is False and losses["friction"] is False:
         raise ArgumentError(
-            "--friction-compensation gives back what the joints lose: "
-            "say --damping, --friction or --joint-dynamics"
+            "--friction-compensation needs joint losses: --damping, --friction or --joint-dynamics"
         )
     return FrictionCompensation(
         law, damping=losses["damping"], friction=losses["friction"], slip=losses["friction_slip"]
@@ -170,7 +169,7 @@ def _refuse_idle(given: dict[str, Any], losses: dict[str, Any]) -> None:
     }
     for name, other in ONLY_WITH.items():
         if given[name] is not None and not has_use[other]:
-            raise ArgumentError(f"--{name.replace('_', '-')} goes with {other}, which is not given")
+            raise ArgumentError(f"--{name.replace('_', '-')} needs {other}")
 
 
 def _noise(given: dict[str, Any]) -> Noise | None:

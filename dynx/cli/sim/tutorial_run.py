@@ -1,4 +1,4 @@
-"""All modes of control with progress, the document of their errors, and their table."""
+"""Run of ``dynx sim --tutorial``: every controller with progress, then document and table."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ SCHEMA = 1
 
 
 def run_tutorial(robot: str | None, given: dict[str, Any], picture: str | None, *, as_json: bool) -> int:
-    """Do all modes and show them, also where Ctrl-C ended it early; the exit code.
+    """Simulate all controllers and show the results, also after Ctrl-C; return the exit code.
 
-    `given` are the options of the command, by the names that click has for them.
+    `given` are the values of the command's options by parameter name.
     """
     experiments = _experiments(robot, given)
     rows: list[Row] = []
@@ -39,7 +39,7 @@ def run_tutorial(robot: str | None, given: dict[str, Any], picture: str | None, 
                     rows.append(row)
                     advance(len(rows), MODES[min(len(rows), len(MODES) - 1)])
         except KeyboardInterrupt:
-            complain(f"interrupted: {counted(len(MODES) - len(rows), 'mode')} not done")
+            complain(f"interrupted: {counted(len(MODES) - len(rows), 'controller')} not done")
         interruption.finishing = True
         made = document(experiments, rows)
         undrawn = None if picture is None else _draw(experiments, rows, picture)
@@ -63,7 +63,7 @@ def run_tutorial(robot: str | None, given: dict[str, Any], picture: str | None, 
 
 
 def _draw(experiments: Tutorial, rows: Sequence[Row], picture: str) -> DynxError | None:
-    """Draw the picture; why not, where it cannot be written. What is shown must not be lost by that."""
+    """Draw the plot; return the error where that fails, so that the table is still shown."""
     try:
         plot_rows(rows, experiments, picture)
     except DynxError as error:
@@ -72,7 +72,7 @@ def _draw(experiments: Tutorial, rows: Sequence[Row], picture: str) -> DynxError
 
 
 def document(experiments: Tutorial, rows: Sequence[Row]) -> dict[str, Any]:
-    """What ``dynx sim --tutorial --json`` writes."""
+    """Make the JSON document of ``dynx sim --tutorial``."""
     model, motion = experiments.model, experiments.motion
     return {
         "schema": SCHEMA,

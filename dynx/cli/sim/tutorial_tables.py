@@ -1,4 +1,4 @@
-"""The table of the tutorial's modes of control: everything shown is a function of the document alone."""
+"""Table of the tutorial's controllers, made from their JSON document alone."""
 
 from __future__ import annotations
 
@@ -14,28 +14,27 @@ from dynx.cli.sim.tables import error_text
 Entry = dict[str, Any]
 
 _NAMES = {"pybullet": "PyBullet"}
-"""What a plant is called at the head of its columns: the others are dynx's stepper over an engine."""
+"""Plants with a stepper of their own, by their title; all others use the stepper of dynx."""
 
 
 def show(out: Console, made: Entry) -> None:
-    """The motion, a line for each mode, and why some have no numbers."""
+    """Print the motion, a line for each controller, and why some have no numbers."""
     out.print(
         f"{one_line(made['robot'])}, {made['base']} base: cycloidal motion of {number(made['duration'])} s "
         f"in steps of {number(made['dt'])} s, gravity {' '.join(number(g) for g in made['gravity'])} m/s^2",
         style="bold",
     )
-    out.print(f"to {' '.join(number(q) for q in made['to'])}; laws computed by {made['backend']}")
-    out.print(
-        f"kp {number(made['kp'])}, kd {number(made['kd'])}; for pd and its like times the joint's inertia"
-    )
+    out.print(f"to {' '.join(number(q) for q in made['to'])}; controllers compute with {made['backend']}")
+    gains = f"kp {number(made['kp'])} 1/s^2, kd {number(made['kd'])} 1/s"
+    out.print(f"{gains}; times the inertia of the joint for gains in N m")
     plants: list[str] = made["plants"]
     heads = [f"{_NAMES.get(plant, 'dynx')}\n{what}" for plant in plants for what in ("max", "RMS")]
-    table = Table("mode", *heads, "what it is", right=heads, keys=1)
+    table = Table("controller", *heads, "torque", right=heads, keys=1)
     for mode in made["modes"]:
         outcomes = [mode["plants"][plant] for plant in plants]
         errors = [outcome[key] for outcome in outcomes for key in ("max_error", "rms_error")]
         table.add_row(mode["mode"], *map(error_text, errors), mode["what"])
-    out.print("\ntracking errors of all joints [rad or m]")
+    out.print("\nlargest and RMS tracking error of all joints [rad or m]")
     out.print(table)
     steppers = ", ".join(
         "PyBullet: its own stepper" if plant in _NAMES else f"dynx: semi-implicit Euler over {plant}"
@@ -45,11 +44,11 @@ def show(out: Console, made: Entry) -> None:
     for (where, problem), modes in _problems(made).items():
         out.print(f"{', '.join(modes)} on {where}: {one_line(problem)}")
     if made["not_done"]:
-        out.print(f"{counted(len(made['not_done']), 'mode')} not done", style="yellow")
+        out.print(f"{counted(len(made['not_done']), 'controller')} not done", style="yellow")
 
 
 def _problems(made: Entry) -> dict[tuple[str, str], list[str]]:
-    """The modes by what kept them from an error, and on which plants it did."""
+    """Controllers without numbers, by the plants and the reason."""
     found: dict[tuple[str, str], list[str]] = {}
     for mode in made["modes"]:
         of_mode: dict[str, list[str]] = {}

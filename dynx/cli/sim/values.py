@@ -1,4 +1,4 @@
-"""How the options of ``dynx sim`` that are more than a number are written."""
+"""Types of the options of ``dynx sim`` that are more than one number."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from dynx.cli.shell.options import finite_number, plain_numbers
 from dynx.errors import shown
 
 URDF = "urdf"
-"""The word for what the robot's description says."""
+"""Value that selects the coefficients of the robot description."""
 
 Coefficients = float | list[float] | bool
-"""One number for all joints, one for each, or True for those of the description."""
+"""One number for all joints, one for each, or True for those of the robot description."""
 
-# The frame comes first and may itself hold a colon: the numbers at the end are what is told apart.
+# The name of the frame can contain colons, so the numbers are matched from the end.
 _PUSH = re.compile(
     r"(?P<frame>.+?):(?P<wrench>[^:,]+(,[^:,]+)+)(:(?P<start>[^:,]+))?(:(?P<duration>[^:,]+))?"
 )
@@ -24,7 +24,7 @@ _PAYLOAD = re.compile(r"(?P<frame>.+?):(?P<mass>[^:,]+)(:(?P<center>[^:,]+(,[^:,
 
 
 class PushInput(NamedTuple):
-    """What ``--push`` gives; `duration` None is for ever."""
+    """Value of ``--push``; `duration` None lasts until the end."""
 
     frame: str
     wrench: list[float]
@@ -33,7 +33,7 @@ class PushInput(NamedTuple):
 
 
 class PayloadInput(NamedTuple):
-    """What ``--payload`` gives."""
+    """Value of ``--payload``."""
 
     frame: str
     mass: float
@@ -41,18 +41,18 @@ class PayloadInput(NamedTuple):
 
 
 def gain(text: str) -> float | list[float]:
-    """One number for all joints, or one for each, separated by commas."""
+    """Read one number for all joints, or one for each, separated by commas."""
     numbers = plain_numbers(text)
     return numbers[0] if len(numbers) == 1 else numbers
 
 
 def coefficients(text: str) -> Coefficients:
-    """As `gain`, or the word ``urdf``."""
+    """Read the word ``urdf``, or numbers as `gain` does."""
     return True if text.strip() == URDF else gain(text)
 
 
 def vector(text: str) -> list[float]:
-    """Three numbers."""
+    """Read three numbers."""
     numbers = plain_numbers(text)
     if len(numbers) != 3:
         raise click.BadParameter(f"wanted 3 numbers x,y,z; got {len(numbers)}")
@@ -60,12 +60,12 @@ def vector(text: str) -> list[float]:
 
 
 def push(text: str) -> PushInput:
-    """``FRAME:fx,fy,fz,mx,my,mz[:start[:duration]]``; a wrench of three numbers is a force."""
+    """Read ``FRAME:fx,fy,fz,mx,my,mz[:start[:duration]]``; a wrench of three numbers is a force."""
     found = _PUSH.fullmatch(text.strip())
     wrench = [] if found is None else plain_numbers(found["wrench"])
     if found is None or len(wrench) not in (3, 6):
         raise click.BadParameter(
-            f"{shown(text)} is no FRAME:fx,fy,fz,mx,my,mz[:START[:DURATION]], "
+            f"{shown(text)} is not of the form FRAME:fx,fy,fz,mx,my,mz[:START[:DURATION]], "
             "such as tool0:20,0,0,0,0,0:0.5:0.1"
         )
     start, duration = found["start"], found["duration"]
@@ -78,19 +78,21 @@ def push(text: str) -> PushInput:
 
 
 def payload(text: str) -> PayloadInput:
-    """``FRAME:mass[:x,y,z]``."""
+    """Read ``FRAME:mass[:x,y,z]``."""
     found = _PAYLOAD.fullmatch(text.strip())
     center = [0.0, 0.0, 0.0]
     if found is not None and found["center"] is not None:
         center = plain_numbers(found["center"])
     if found is None or len(center) != 3:
-        raise click.BadParameter(f"{shown(text)} is no FRAME:MASS[:x,y,z], such as tool0:2.5:0,0,0.05")
+        raise click.BadParameter(
+            f"{shown(text)} is not of the form FRAME:MASS[:x,y,z], such as tool0:2.5:0,0,0.05"
+        )
     return PayloadInput(found["frame"], finite_number(found["mass"]), center)
 
 
 def scale(text: str) -> tuple[str | None, float]:
-    """A factor for all links, or ``LINK=factor``."""
+    """Read a factor for all links, or ``LINK=factor``."""
     link, equals, factor = text.rpartition("=")
     if equals and not link:
-        raise click.BadParameter(f"{shown(text)} is no LINK=FACTOR, such as forearm_link=1.1")
+        raise click.BadParameter(f"{shown(text)} is not of the form LINK=FACTOR, such as forearm_link=1.1")
     return (link if equals else None), finite_number(factor.strip())

@@ -181,8 +181,8 @@ def test_an_interrupted_run_shows_the_modes_that_are_done(monkeypatch: pytest.Mo
     monkeypatch.setattr(Tutorial, "rows", impatient)
     result = tutorial(*QUICK)
     assert result.exit_code == 130
-    assert f"interrupted: {len(MODES) - 5} modes not done" in result.stderr
-    assert f"{len(MODES) - 5} modes not done" in result.stdout
+    assert f"interrupted: {len(MODES) - 5} controllers not done" in result.stderr
+    assert f"{len(MODES) - 5} controllers not done" in result.stdout
     made = document(*QUICK, code=130)
     assert [mode["mode"] for mode in made["modes"]] + made["not_done"] == list(MODES)
     assert len(made["modes"]) == 5
