@@ -33,18 +33,19 @@ TESTS = tuple(f"tests/{room}" for room in (*ROOMS, "contract", "oracles"))
 def main() -> None:
     arguments = parser().parse_args()
     arguments.results.mkdir(parents=True, exist_ok=True)
-    folders = [f"dynx/{room}" for room in arguments.rooms]
+    folders = [f"dynx/{room}" for room in ROOMS]
     map_file = arguments.results / "coverage.json"
     coverage = CoverageMap.load(map_file)
     if arguments.record is not None:
         os.environ.setdefault("HYPOTHESIS_PROFILE", "coverage")
         tests = arguments.record or list(TESTS)
-        coverage.replace(record(ROOT, [f"dynx/{room}" for room in ROOMS], tests, arguments.results))
+        coverage.replace(record(ROOT, folders, tests, arguments.results))
         coverage.save(map_file)
         return
     if not coverage.durations:
         raise SystemExit("no coverage is recorded yet: python -m tests.mutation --record")
     mutants, total = sample(ROOT, folders, arguments.seed, arguments.count)
+    mutants = [mutant for mutant in mutants if mutant.path.split("/")[1] in arguments.rooms]
     kept = arguments.results / "outcomes.json"
     outcomes = load(kept)
     waiting = [
@@ -74,7 +75,13 @@ def parser() -> argparse.ArgumentParser:
     )
     made.add_argument("--seed", type=int, default=0, help="seed of the sample")
     made.add_argument("--count", type=int, default=300, help="number of mutants in the sample")
-    made.add_argument("--rooms", nargs="+", default=ROOMS, metavar="ROOM", help="packages of dynx to change")
+    made.add_argument(
+        "--rooms",
+        nargs="+",
+        default=ROOMS,
+        metavar="ROOM",
+        help="try the mutants of the sample in these packages only",
+    )
     made.add_argument("--jobs", type=int, default=2, help="mutants to try at a time")
     made.add_argument("--retry", action="store_true", help="try mutants again that were not caught")
     made.add_argument("--results", type=Path, default=ROOT / ".mutation", help="folder of what is kept")
