@@ -69,8 +69,10 @@ def test_each_test_comes_once_before_any_with_other_parameters() -> None:
 
 def test_a_verdict_names_the_test_that_failed() -> None:
     assert verdict(0, "") == (SURVIVED, "")
-    assert verdict(1, "FAILED t.py::a[1] - AssertionError\n") == (CAUGHT, "t.py::a[1]")
-    assert verdict(2, "ERROR t.py - ImportError\n") == (CAUGHT, "t.py")
+    assert verdict(1, "FAILED tests/t.py::a[1] - AssertionError\n") == (CAUGHT, "tests/t.py::a[1]")
+    assert verdict(2, "ERROR tests/t.py - ImportError\n") == (CAUGHT, "import of tests/t.py")
+    assert verdict(4, "ERROR: found no collectors for t.py::a\n") == (CAUGHT, "import of t.py")
+    assert verdict(4, "ERROR: not found: t.py::a\n")[0] == BROKEN
     assert verdict(-14, "") == (CAUGHT, "time limit")
     assert verdict(-11, "") == (CAUGHT, "signal 11")
     assert verdict(5, "no tests ran")[0] == BROKEN

@@ -102,10 +102,11 @@ def verdict(code: int, output: str) -> tuple[str, str]:
         return CAUGHT, "time limit"
     if code < 0:
         return CAUGHT, f"signal {-code}"
-    failed = re.search(r"^(?:FAILED|ERROR) (\S+)", output, re.MULTILINE)
-    # 2: a module of tests could not be imported.
-    if code in (1, 2) and failed:
+    failed = re.search(r"^(?:FAILED|ERROR) (tests\S+)", output, re.MULTILINE)
+    if code == 1 and failed:
         return CAUGHT, failed[1]
-    if code == 4 and "conftest" in output:
-        return CAUGHT, "conftest"
+    # A module of tests could not be imported: 2 where files were named, 4 where tests in them were.
+    unimported = re.search(r"found no collectors for (\S+)::", output) or failed
+    if code in (2, 4) and unimported:
+        return CAUGHT, f"import of {unimported[1]}"
     return BROKEN, output[-600:]
