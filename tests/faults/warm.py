@@ -25,9 +25,11 @@ from typing import Any
 
 ROOT = Path(__file__).resolve().parents[2]
 TIMEOUT = 300
-"""Longest run of the tests of one request [s]."""
-TIMED_OUT = -14
-"""Exit code of a run that took longer than it may: the negative number of its signal."""
+"""Processor time of the tests of one request, at most [s]."""
+WALL_PER_CPU = 10
+"""Wall time that a run may take for its processor time; others may use the machine."""
+TIMED_OUT = (-27, -14)
+"""Exit codes of a run that took too long: the negative numbers of SIGPROF and SIGALRM."""
 
 PRELOADED = (
     *("pytest", "numpy", "scipy.spatial.transform", "scipy.linalg.lapack", "mpmath"),
@@ -70,9 +72,9 @@ class Runner:
             self._server.communicate()
 
     def run(self, tests: list[str], change: Change | None = None, timeout: int = TIMEOUT) -> tuple[int, str]:
-        """Run tests up to the first failure, for at most `timeout` [s].
+        """Run tests up to the first failure, for at most `timeout` [s] of processor time.
 
-        Return the exit code of pytest (1: a test failed; `TIMED_OUT`) and its output.
+        Return the exit code of pytest (1: a test failed; or one of `TIMED_OUT`) and its output.
         """
         change_given = None if change is None else asdict(change)
         line = json.dumps({"tests": tests, "timeout": timeout, "change": change_given}) + "\n"
@@ -155,9 +157,10 @@ def run_in_child(asked: dict[str, Any], output: int) -> int:
 
 def run_here(asked: dict[str, Any], output: int) -> int:
     """Run the tests in this process, writing to the file descriptor `output`; return pytest's exit code."""
-    if hasattr(signal, "alarm"):
-        # A change may be one that never ends; the alarm ends the process, which is then no failed test.
-        signal.alarm(asked["timeout"])
+    if hasattr(signal, "setitimer"):
+        # A change may be one that never ends; the timers end the process, which is then no failed test.
+        signal.setitimer(signal.ITIMER_PROF, asked["timeout"])
+        signal.setitimer(signal.ITIMER_REAL, asked["timeout"] * WALL_PER_CPU)
     nothing = os.open(os.devnull, os.O_RDONLY)
     os.dup2(nothing, 0)
     os.dup2(output, 1)

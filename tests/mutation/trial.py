@@ -10,7 +10,7 @@ from tests.faults.warm import TIMED_OUT, Change, Runner
 from tests.mutation.coverage_map import CoverageMap
 from tests.mutation.population import Mutant
 
-STAGES = ((30, 15.0), (400, 120.0))
+STAGES = ((30, 10.0), (150, 40.0))
 """Tests to run, at most, and the time that they take without a mutant [s]; the next stage if none fails."""
 START = 20
 """Time that the import of dynx and the collection of tests may take [s]."""
@@ -98,7 +98,7 @@ def verdict(code: int, output: str) -> tuple[str, str]:
     """Return the status that an exit code of pytest means, and the test that failed."""
     if code == 0:
         return SURVIVED, ""
-    if code == TIMED_OUT:
+    if code in TIMED_OUT:
         return CAUGHT, "time limit"
     if code < 0:
         return CAUGHT, f"signal {-code}"
