@@ -46,7 +46,7 @@ class Referee:
     def __init__(self, model: Model) -> None:
         self.model = model
         with mpmath.mp.workdps(DIGITS):
-            self._mechanism: Mechanism = build_mechanism(model, numbers=exactly)
+            self._mechanism: Mechanism = build_mechanism(model, convert=exactly)
         self._poses: dict[object, Poses] = {}
         coupling = self._mechanism.coupling
         self._S = None if coupling is None else coupling.matrix()

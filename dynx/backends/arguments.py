@@ -18,7 +18,13 @@ from dynx.errors import (
     shown,
 )
 from dynx.model import Model
-from dynx.model.configuration import MAX_MAGNITUDE, UNIT, checked_array, checked_q, checked_vector
+from dynx.model.configuration import (
+    MAX_MAGNITUDE,
+    UNIT_NORM_TOLERANCE,
+    checked_array,
+    checked_q,
+    checked_vector,
+)
 from dynx.rbd.jacobians import REFERENCES, Reference
 from dynx.spatial.scalar import Floats
 
@@ -48,7 +54,7 @@ class Arguments:
                 if not self._floating:
                     return q
                 x, y, z, w = values[3:7]
-                if abs(x * x + y * y + z * z + w * w - 1.0) <= UNIT:
+                if abs(x * x + y * y + z * z + w * w - 1.0) <= UNIT_NORM_TOLERANCE:
                     return q
         return checked_q(self._model, q)
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from dynx.backends.arguments import Arguments
 from dynx.errors import ClosedError
-from dynx.model.configuration import MAX_MAGNITUDE, UNIT
+from dynx.model.configuration import MAX_MAGNITUDE, UNIT_NORM_TOLERANCE
 from dynx.spatial.scalar import Floats
 
 _SHORT = 64
@@ -39,7 +39,10 @@ class BatchArguments(Arguments):
                 return np.asarray(q)
             quat = q[..., 3:7]
             off = np.einsum("...i,...i->...", quat, quat) - 1.0
-            if np.max(off, initial=0.0) <= UNIT and np.min(off, initial=0.0) >= -UNIT:
+            if (
+                np.max(off, initial=0.0) <= UNIT_NORM_TOLERANCE
+                and np.min(off, initial=0.0) >= -UNIT_NORM_TOLERANCE
+            ):
                 return np.asarray(q)
         return super().q(q)
 

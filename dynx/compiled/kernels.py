@@ -34,7 +34,7 @@ from dynx.backends.quantities import QUANTITIES, Growth, Quantity
 from dynx.compiled import frames as compiled_frames
 from dynx.compiled.frames import Chain, on_chain
 from dynx.model import Mechanism
-from dynx.model.configuration import MAX_MAGNITUDE, UNIT
+from dynx.model.configuration import MAX_MAGNITUDE, UNIT_NORM_TOLERANCE
 from dynx.model.mechanism import Coupling
 from dynx.rbd import coriolis, crba, rnea
 from dynx.rbd.aba import inertia_matrix
@@ -206,7 +206,7 @@ def _defect(mechanism: Mechanism, q: Array, *rates: Array) -> Array:
     total = _sum_by_pairs([x * x for x in numbers])
     if mechanism.floating:
         off = abs(sum(x * x for x in q[3:7]) - 1.0)
-        total = total + (off - UNIT).maximum(0.0) * (MAX_DEFECT * 1e100)
+        total = total + (off - UNIT_NORM_TOLERANCE).maximum(0.0) * (MAX_DEFECT * 1e100)
     return np.array([total], dtype=object)
 
 

@@ -1,4 +1,4 @@
-"""The robot description: frozen model, URDF reader and writer, names of robots, configurations."""
+"""Robot description: immutable model, URDF reader and writer, library of robots, configuration arithmetic."""
 
 from dynx.model.elements import (
     Frame,

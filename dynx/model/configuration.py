@@ -1,4 +1,4 @@
-"""Arithmetic of configurations, so that nobody adds quaternions by hand."""
+"""Arithmetic of configurations (integrate, difference, sample, clip) and checks of arrays."""
 
 from __future__ import annotations
 
@@ -18,12 +18,18 @@ if TYPE_CHECKING:
 
 
 MAX_MAGNITUDE = 1e70
-"""Bound on the entries of an array: a moment is a product of two lengths, two speeds and a mass, and it
-must not overflow, or an engine would answer infinity or NaN and say nothing."""
+"""Bound on the magnitude of the entries of an array.
+
+A moment is a product of two lengths, two speeds and a mass; the bound keeps it from overflowing, which would
+make an engine silently return infinity or NaN.
+"""
 
 
 def checked_array(name: str, value: ArrayLike, length: int) -> Floats:
-    """`value` as float64 (..., length) of numbers below `MAX_MAGNITUDE`, or an error that says why not."""
+    """Return `value` as float64 (..., length) with entries below `MAX_MAGNITUDE`.
+
+    Raises DTypeError, ShapeError, NotFiniteError or ArgumentError, naming the argument `name`.
+    """
     array = real_array(name, value)
     if array.ndim == 0 or array.shape[-1] != length:
         raise ShapeError(f"{name} has shape {array.shape}; wanted (..., {length})")
@@ -31,19 +37,19 @@ def checked_array(name: str, value: ArrayLike, length: int) -> Floats:
 
 
 def checked_vector(name: str, value: ArrayLike) -> Floats:
-    """One vector (3,), read as `checked_array` does, or an error that says why not."""
+    """Return one vector (3,), checked like `checked_array`."""
     array = checked_array(name, value, 3)
     if array.ndim != 1:
         raise ShapeError(f"{name} has shape {array.shape}; wanted (3,)")
     return array
 
 
-UNIT = 4 * float(np.finfo(np.float64).eps)
-"""How far from 1 rounding leaves the length of a unit quaternion."""
+UNIT_NORM_TOLERANCE = 4 * float(np.finfo(np.float64).eps)
+"""Largest deviation from 1 of the norm of a quaternion that counts as rounding."""
 
 
 def real_array(name: str, value: ArrayLike) -> Floats:
-    """`value` as a float64 array of any shape; ShapeError if it is ragged, DTypeError if not real."""
+    """Return `value` as a float64 array of any shape; ShapeError if it is ragged, DTypeError if not real."""
     try:
         array = np.asarray(value)
     except ValueError as error:
@@ -54,7 +60,7 @@ def real_array(name: str, value: ArrayLike) -> Floats:
 
 
 def checked_entries(name: str, array: Floats) -> Floats:
-    """`array` itself, or an error that names an entry which is not finite or not below `MAX_MAGNITUDE`."""
+    """Return `array`; raise an error naming an entry that is not finite or not below `MAX_MAGNITUDE`."""
     if not np.isfinite(array).all():
         where = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         raise NotFiniteError(
@@ -64,16 +70,16 @@ def checked_entries(name: str, array: Floats) -> Floats:
         where = tuple(int(i) for i in np.argwhere(np.abs(array) >= MAX_MAGNITUDE)[0])
         raise ArgumentError(
             f"{name}[{', '.join(map(str, where))}] is {array[where]}; wanted less than {MAX_MAGNITUDE:g} "
-            "in size, for products of such numbers overflow"
+            "in magnitude, since products of larger numbers overflow"
         )
     return array
 
 
 def checked_q(model: Model, q: ArrayLike, name: str = "q") -> Floats:
-    """A configuration (..., nq) whose quaternion, if it has one, is of unit length to 1e-6.
+    """Return a configuration (..., nq), whose quaternion, if any, must have unit norm to 1e-6.
 
-    A quaternion that is off by more than rounding is scaled to unit length, in a copy: engines would
-    each make something else of it.
+    If its norm deviates by more than rounding, the quaternion is normalised in a copy, since engines treat
+    such quaternions differently.
     """
     array = checked_array(name, q, model.nq)
     if not model.floating:
@@ -87,14 +93,14 @@ def checked_q(model: Model, q: ArrayLike, name: str = "q") -> Floats:
             f"{name}[{where}] is a quaternion (x, y, z, w) of length {float(norm[at][0]):.9g}; "
             "wanted length 1"
         )
-    if np.any(off > UNIT):
+    if np.any(off > UNIT_NORM_TOLERANCE):
         array = np.array(array)
         array[..., 3:7] /= norm
     return array
 
 
 def checked_base(base: str) -> Literal["fixed", "floating"]:
-    """`base` itself, or an error for a word that is no kind of base."""
+    """Return `base`; raise ArgumentError unless it is ``"fixed"`` or ``"floating"``."""
     if base == "fixed":
         return "fixed"
     if base == "floating":
@@ -103,16 +109,16 @@ def checked_base(base: str) -> Literal["fixed", "floating"]:
 
 
 def checked_gravity(gravity: ArrayLike) -> Vector:
-    """Gravity as three finite floats [m/s^2]."""
+    """Return gravity as three finite floats [m/s^2]."""
     x, y, z = checked_vector("gravity", gravity).tolist()
     return (x, y, z)
 
 
 def position_limits(model: Model) -> tuple[Floats, Floats]:
-    """(lower, upper), each (nq,): the joint's own limits, narrowed by those of joints that mimic it.
+    """Return (lower, upper), each (nq,): each joint's own limits, narrowed by those of joints that mimic it.
 
-    A file whose lower limit exceeds its upper one is read with the two exchanged (the reader notes
-    it). Where a follower leaves its driver no room, the driver's own limits stand.
+    If the lower limit in the file exceeds the upper one, the two are exchanged (the reader adds a note). If
+    the limits of a follower leave no range for its driver, the driver's own limits apply.
     """
     base = 7 if model.floating else 0
     lower, upper = np.full(model.nq, -np.inf), np.full(model.nq, np.inf)
@@ -132,12 +138,12 @@ def position_limits(model: Model) -> tuple[Floats, Floats]:
         low, high = max(lower[k], ends[0]), min(upper[k], ends[1])
         if low <= high:
             lower[k], upper[k] = low, high
-    # Without -0.0: NumPy's generator refuses the range from 0.0 to -0.0.
+    # Adding 0.0 turns -0.0 into 0.0: NumPy's generator rejects the range from 0.0 to -0.0.
     return lower + 0.0, upper + 0.0
 
 
 def neutral(model: Model) -> Floats:
-    """Zeros, and the identity quaternion for a floating base."""
+    """Return zeros, with the identity quaternion for a floating base."""
     q = np.zeros(model.nq)
     if model.floating:
         q[6] = 1.0
@@ -147,18 +153,18 @@ def neutral(model: Model) -> Floats:
 def random(
     model: Model, rng: np.random.Generator | int | None = None, size: tuple[int, ...] | int = ()
 ) -> Floats:
-    """Uniform within the limits; (-pi, pi) for an angle without limits, (-1, 1) for a length.
+    """Sample uniformly within the limits; in (-pi, pi) for an angle without limits, (-1, 1) for a length.
 
-    A floating base gets a position in the unit cube around the origin and a uniform attitude
-    (Shoemake 1992). `rng` is a NumPy generator or a seed.
+    A floating base gets a position in the cube [-1, 1]^3 and a uniformly distributed orientation (Shoemake
+    1992). `rng` is a NumPy generator or a seed.
     """
     rng = np.random.default_rng(rng)
     shape = (size,) if isinstance(size, int) else tuple(size)
     q = np.empty((*shape, model.nq))
     base = 7 if model.floating else 0
     for k, joint in enumerate(model.coordinate_joints, start=base):
-        reach = 1.0 if joint.type == "prismatic" else np.pi
-        low, high = _bounded(float(model.lower[k]), float(model.upper[k]), reach)
+        default_range = 1.0 if joint.type == "prismatic" else np.pi
+        low, high = _sampling_range(float(model.lower[k]), float(model.upper[k]), default_range)
         q[..., k] = rng.uniform(low, high, shape)
     if model.floating:
         q[..., :3] = rng.uniform(-1.0, 1.0, (*shape, 3))
@@ -168,32 +174,32 @@ def random(
 
 
 def integrate(model: Model, q: ArrayLike, v: ArrayLike) -> Floats:
-    """q plus v for unit time: the base moves along the exponential of its body twist."""
+    """Return q plus v for unit time: the base moves along the exponential of its body twist."""
     q, v = checked_q(model, q), checked_array("v", v, model.nv)
     if not model.floating:
         return np.asarray(q + v)
     position, quat = se3_exp(v[..., :3], v[..., 3:6])
-    moved = q[..., :3] + rotate(rotation_from_quat(q[..., 3:7]), position)
-    turned = quat_product(q[..., 3:7], quat)
-    turned = turned / np.linalg.norm(turned, axis=-1, keepdims=True)
+    position = q[..., :3] + rotate(rotation_from_quat(q[..., 3:7]), position)
+    quat = quat_product(q[..., 3:7], quat)
+    quat = quat / np.linalg.norm(quat, axis=-1, keepdims=True)
     joints = q[..., 7:] + v[..., 6:]
-    return _join(moved, turned, joints)
+    return _join(position, quat, joints)
 
 
 def difference(model: Model, q0: ArrayLike, q1: ArrayLike) -> Floats:
-    """The v with integrate(q0, v) = q1; the rotation is the shorter way round."""
+    """Return the v with integrate(q0, v) = q1, whose rotation angle is at most pi."""
     q0, q1 = checked_q(model, q0, "q0"), checked_q(model, q1, "q1")
     if not model.floating:
         return np.asarray(q1 - q0)
     conjugate = q0[..., 3:7] * np.array([-1.0, -1.0, -1.0, 1.0])
-    turned = quat_product(conjugate, q1[..., 3:7])
-    moved = rotate_back(rotation_from_quat(q0[..., 3:7]), q1[..., :3] - q0[..., :3])
-    linear, angular = se3_log(moved, turned)
+    quat = quat_product(conjugate, q1[..., 3:7])
+    position = rotate_back(rotation_from_quat(q0[..., 3:7]), q1[..., :3] - q0[..., :3])
+    linear, angular = se3_log(position, quat)
     return _join(linear, angular, q1[..., 7:] - q0[..., 7:])
 
 
 def clip(model: Model, q: ArrayLike) -> Floats:
-    """q within the position limits; the quaternion is scaled to unit length."""
+    """Return q clipped to the position limits, with a normalised quaternion."""
     array = np.clip(checked_array("q", q, model.nq), model.lower, model.upper)
     if model.floating:
         norm = np.linalg.norm(array[..., 3:7], axis=-1, keepdims=True)
@@ -203,14 +209,16 @@ def clip(model: Model, q: ArrayLike) -> Floats:
     return array
 
 
-def _bounded(low: float, high: float, reach: float) -> tuple[float, float]:
-    """Ends to draw between: those given, and within `reach` of 0 or of the one end where one is not."""
+def _sampling_range(low: float, high: float, default_range: float) -> tuple[float, float]:
+    """Return the range to sample from: the limits, with a missing one `default_range` from 0 or 2 of it from
+    the other.
+    """
     bounded_below, bounded_above = low > -MAX_MAGNITUDE, high < MAX_MAGNITUDE
     if bounded_below and bounded_above:
         return low, high
     if not (bounded_below or bounded_above):
-        return -reach, reach
-    return (low, low + 2.0 * reach) if bounded_below else (high - 2.0 * reach, high)
+        return -default_range, default_range
+    return (low, low + 2.0 * default_range) if bounded_below else (high - 2.0 * default_range, high)
 
 
 def _join(*parts: Floats) -> Floats:

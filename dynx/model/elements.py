@@ -1,7 +1,7 @@
-"""The parts of a robot description, as the document states them.
+"""Parts of a robot description, as stated in the document.
 
-Numbers are those of the file, in SI units; nothing is lumped, diagonalised or repaired here.
-`line` is the line of the XML element, or None for a part that was made in a program.
+Values are those of the file, in SI units; inertias are neither merged nor diagonalised nor repaired here.
+`line` is the line of the XML element, or None for a part created by a program.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ Vector = tuple[float, float, float]
 ZERO: Vector = (0.0, 0.0, 0.0)
 INFINITY = float("inf")
 
-RIGID = 1e-6
-"""How far from orthonormal a rotation that is given as a matrix may be."""
+RIGIDITY_TOLERANCE = 1e-6
+"""Largest accepted deviation from orthonormality of a rotation matrix."""
 
 
 @dataclass(frozen=True)
@@ -37,9 +37,9 @@ class Pose:
 
     @classmethod
     def from_matrix(cls, T: ArrayLike) -> Pose:
-        """The pose of a homogeneous matrix (4, 4), such as `forward_kinematics` returns.
+        """Return the pose of a homogeneous matrix (4, 4), such as `forward_kinematics` returns.
 
-        Raises ArgumentError where T is not a rigid transform to 1e-6.
+        Raises ArgumentError unless T is a rigid transform to 1e-6.
         """
         try:
             array = np.asarray(T, dtype=np.float64)
@@ -49,7 +49,7 @@ class Pose:
             raise ShapeError(f"a pose has shape {array.shape}; wanted (4, 4)")
         R = array[:3, :3]
         off = max(float(np.max(np.abs(R.T @ R - np.eye(3)))), float(np.max(np.abs(array[3] - [0, 0, 0, 1]))))
-        if not off < RIGID or np.linalg.det(R) < 0 or not np.isfinite(array).all():
+        if not off < RIGIDITY_TOLERANCE or np.linalg.det(R) < 0 or not np.isfinite(array).all():
             raise ArgumentError("a pose is not a rigid transform: wanted [[R, p], [0, 1]] with R a rotation")
         x, y, z = (array[:3, 3] + 0.0).tolist()
         roll, pitch, yaw = (rpy_from_rotation(R) + 0.0).tolist()
@@ -57,7 +57,7 @@ class Pose:
 
     @cached_property
     def matrix(self) -> Floats:
-        """The pose as a homogeneous matrix (4, 4)."""
+        """Homogeneous matrix (4, 4) of the pose."""
         return homogeneous(rotation_from_rpy(np.array(self.rpy)), np.array(self.xyz))
 
 
@@ -66,7 +66,7 @@ IDENTITY = Pose()
 
 @dataclass(frozen=True)
 class Inertial:
-    """Mass [kg], pose of the inertial frame in the link, central inertia tensor in that frame."""
+    """Mass [kg], pose of the inertial frame in the link, central inertia tensor in that frame [kg m^2]."""
 
     mass: float = 0.0
     origin: Pose = Pose()
@@ -80,7 +80,7 @@ class Inertial:
 
     @property
     def tensor(self) -> Floats:
-        """The central inertia tensor (3, 3) [kg m^2], in the axes of `origin`."""
+        """Inertia tensor (3, 3) about the centre of mass [kg m^2], in the axes of `origin`."""
         return np.array(
             [
                 [self.ixx, self.ixy, self.ixz],
@@ -101,7 +101,7 @@ class Link:
 
 @dataclass(frozen=True)
 class Limits:
-    """Range of a coordinate [rad or m], and the largest speed and effort the joint allows."""
+    """Range of a joint position [rad or m], largest speed [rad/s or m/s] and largest effort [N m or N]."""
 
     lower: float = -INFINITY
     upper: float = INFINITY
@@ -111,7 +111,7 @@ class Limits:
 
 @dataclass(frozen=True)
 class JointDynamics:
-    """Viscous damping, dry friction and reflected rotor inertia of a joint (see `Backend`)."""
+    """Viscous damping, Coulomb friction and armature (reflected rotor inertia) of a joint (see `Backend`)."""
 
     damping: float = 0.0
     friction: float = 0.0
@@ -120,7 +120,7 @@ class JointDynamics:
 
 @dataclass(frozen=True)
 class Mimic:
-    """This joint follows another: ``value = multiplier * value_of(joint) + offset``."""
+    """Coupling to another joint: ``value = multiplier * value_of(joint) + offset``."""
 
     joint: str
     multiplier: float = 1.0
@@ -129,10 +129,11 @@ class Mimic:
 
 @dataclass(frozen=True)
 class Joint:
-    """A joint from `parent` to `child`; `origin` is its frame in the parent link at value 0.
+    """A joint from link `parent` to link `child`; `origin` is the pose of its frame in the parent at position
+    0.
 
-    `axis` is a unit vector in the joint frame. `locked_at` remembers the value at which a joint
-    that could move was locked; its type is then ``fixed`` and `origin` already holds that value.
+    `axis` is a unit vector in the joint frame. `locked_at` is the position at which a movable joint was
+    locked; its type is then ``fixed`` and `origin` includes that position.
     """
 
     name: str
@@ -149,13 +150,13 @@ class Joint:
 
     @property
     def moves(self) -> bool:
-        """Whether the joint can move, by itself or by following another."""
+        """Whether the joint can move, independently or by following another."""
         return self.type != "fixed"
 
 
 @dataclass(frozen=True)
 class Frame:
-    """A named frame fixed to a link; every link has one of its own name at the identity."""
+    """A named frame fixed to a link; every link has one with its own name at the identity."""
 
     name: str
     link: str
@@ -164,7 +165,7 @@ class Frame:
 
 @dataclass(frozen=True)
 class Note:
-    """Something in the description that was read as meant, and that the user should know."""
+    """A remark on an ambiguity in the description and on how it was read."""
 
     message: str
     line: int | None = None

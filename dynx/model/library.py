@@ -1,8 +1,8 @@
-"""Names of robots to files: example-robot-data, and the small models that come with dynx.
+"""Library of robots: names and files of example-robot-data and of the small models that come with dynx.
 
-example-robot-data is used as data alone: its Python loaders, which import an engine, are not.
-Its robots have the names of those loaders; a file without a loader has the stem of its file. The
-robots of dynx have their stems. A name that is taken already gets its folder in front.
+Only the data files of example-robot-data are used, not its Python loaders, which import an engine. Its robots
+have the names of those loaders; a file without a loader is named by its stem, as are the robots of dynx. If a
+name is taken already, the name of the folder is prepended.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from pathlib import Path
 from dynx.errors import RobotNotFoundError, nearest, shown
 
 EXAMPLE_ROBOT_DATA = "example-robot-data"
-OWN_MODELS = "dynx"
+DYNX_MODELS = "dynx"
 TRAPS = "traps"
-"""Folder among dynx's own models whose files show one cause of disagreement each."""
+"""Folder among the models of dynx whose files each show one cause of disagreement."""
 
 # The loaders' short names that differ from the stem of the file, by the file they load.
 _LOADER_NAMES = {
@@ -54,7 +54,7 @@ _LOADER_NAMES = {
 
 @dataclass(frozen=True)
 class RobotEntry:
-    """A robot of the library: its name, its file, where it comes from, and its other names."""
+    """A robot of the library: its name, file, source and aliases."""
 
     name: str
     path: Path
@@ -64,12 +64,12 @@ class RobotEntry:
 
 @lru_cache(maxsize=1)
 def robots() -> tuple[RobotEntry, ...]:
-    """Every robot of the library: example-robot-data, then dynx's own; each by name.
+    """List every robot of the library: example-robot-data, then dynx's own, each sorted by name.
 
-    Names are unique, and no alias is the name or the alias of another robot.
+    Names are unique, and no alias equals the name or an alias of another robot.
     """
     files = [(path, EXAMPLE_ROBOT_DATA, root) for root in _example_roots() for path in _urdf_files(root)]
-    files += [(path, OWN_MODELS, root) for root in own_roots() for path in _urdf_files(root)]
+    files += [(path, DYNX_MODELS, root) for root in own_roots() for path in _urdf_files(root)]
     relative = [path.relative_to(root).as_posix() for path, _, root in files]
     names: dict[str, int] = {}
     for index, inside in enumerate(relative):
@@ -91,9 +91,9 @@ def robots() -> tuple[RobotEntry, ...]:
 
 
 def find(name: str) -> Path:
-    """The file of a robot of the library, by its name or an alias.
+    """Return the file of a robot of the library, by its name or an alias.
 
-    Raises RobotNotFoundError with the nearest names.
+    Raises RobotNotFoundError, listing the nearest names.
     """
     by_name = {alias: entry.path for entry in robots() for alias in entry.aliases}
     by_name.update((entry.name, entry.path) for entry in robots())
@@ -113,9 +113,9 @@ def _free_name(stem: str, inside: str, source: str, taken: dict[str, int]) -> st
 
 
 def _urdf_files(root: Path) -> list[Path]:
-    # Descriptions lie at most three folders deep; the meshes, far more files, lie elsewhere.
+    # Descriptions are at most three folders deep; deeper folders hold many mesh files.
     found = {path for depth in ("*", "*/*", "*/*/*", "*/*/*/*") for path in root.glob(f"{depth}.urdf")}
-    # Traps are no robots but defects, one each; `dynx.rules.traps` knows them.
+    # Traps are not robots but examples of defects, listed by `dynx.rules.traps`.
     descriptions = (path for path in found if path.relative_to(root).parts[0] != TRAPS)
     return sorted(path for path in descriptions if path.is_file())
 
@@ -146,8 +146,8 @@ def _example_candidates() -> Iterator[Path]:
 
 
 def own_roots() -> list[Path]:
-    """The folder of dynx's own models, if there is one."""
-    # In a wheel the models lie inside the package, in a source checkout beside it.
+    """Return the folder of dynx's own models in a list, or an empty list if it is missing."""
+    # In a wheel the models are inside the package, in a source checkout beside it.
     package = Path(__file__).resolve().parent.parent
     for root in (package / "models", package.parent / "models"):
         if root.is_dir():

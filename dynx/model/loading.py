@@ -1,4 +1,4 @@
-"""`load`: a path, a text or a name to a model."""
+"""`load`: creates a model from a path, URDF text or the name of a robot."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from dynx.model.library import find, robots
 from dynx.model.model import STANDARD_GRAVITY, Base, Model
 from dynx.model.package_paths import StrPath
 from dynx.model.urdf.reader import read_urdf
+from dynx.model.xacro_reading import expand_xacro
 
 _SUFFIXES = (".urdf", ".xacro", ".xml")
 
@@ -27,29 +28,27 @@ def load(
     gravity: ArrayLike | None = None,
     package_dirs: Iterable[StrPath] = (),
 ) -> Model:
-    """The model of a robot.
+    """Load the model of a robot.
 
     `x` is one of
 
-    - URDF text: a `str` or `bytes` whose first character, after white space or a byte-order mark,
-      is ``<``;
-    - a path: any `os.PathLike`, or a `str` with a separator or with the suffix .urdf, .xacro or
-      .xml (.xacro needs the extra ``xacro``). Such a string is never looked up as a name;
-    - a name of the library, see ``dynx robots``. A name of the library wins over a file of that
-      name in the working directory; write ``./name`` for the file. A bare name that the library
-      lacks may still be a file;
-    - a `Model`, which keeps its base and gravity unless they are given.
+    - URDF text: a `str` or `bytes` whose first character, after white space or a byte-order mark, is ``<``;
+    - a path: any `os.PathLike`, or a `str` with a separator or with the suffix .urdf, .xacro or .xml (.xacro
+      needs the extra ``xacro``). Such a string is never looked up as a name;
+    - the name of a robot in the library, see ``dynx robots``. It takes precedence over a file of that name in
+      the working directory; write ``./name`` for the file. A name that is not in the library may be a file;
+    - a `Model`, whose base and gravity are kept unless they are given.
 
-    `base` is ``"fixed"`` (default) or ``"floating"``. `lock` fixes joints at values [rad or m], by
-    name; they leave q. `gravity` is (3,) [m/s^2] in the world, by default (0, 0, -9.81).
-    `package_dirs` are the roots in which xacro may look for packages.
+    `base` is ``"fixed"`` (default) or ``"floating"``. `lock` fixes joints, by name, at positions [rad or m];
+    they are removed from q. `gravity` is (3,) [m/s^2] in world axes, by default (0, 0, -9.81). `package_dirs`
+    are the folders in which xacro looks for packages.
 
-    Raises RobotNotFoundError where nothing is found, DescriptionError where the description is
-    malformed (with file and line), UnsupportedFeatureError where it needs what dynx refuses,
-    UnknownNameError for a joint to lock that is not there.
+    Raises RobotNotFoundError if no robot or file is found, DescriptionError if the description is malformed
+    (with file and line), UnsupportedFeatureError if it uses a feature that dynx does not support,
+    UnknownNameError for an unknown joint in `lock`.
     """
     if isinstance(x, Model):
-        return _changed(x, base, lock, gravity)
+        return _with_options(x, base, lock, gravity)
     data, source, name = read_description(x, package_dirs)
     return read_model(data, source, name, base=base, lock=lock, gravity=gravity)
 
@@ -57,8 +56,11 @@ def load(
 def read_description(
     x: StrPath | bytes | bytearray, package_dirs: Iterable[StrPath] = ()
 ) -> tuple[str | bytes, str, str | None]:
-    """The text that `load` would read: its bytes or characters, where it is from, and the name of the
-    file without suffixes (None for text). A .xacro file is expanded. Errors as in `load`."""
+    """Return the text that `load` would read, its source, and the name of the file without suffixes.
+
+    The text is bytes or characters; the name is None for text that is not from a file. A .xacro file is
+    expanded. Raises the errors of `load`.
+    """
     if isinstance(x, bytes | bytearray | memoryview):
         return bytes(x), "<string>", None
     if isinstance(x, str) and x.lstrip("\ufeff \t\r\n").startswith("<"):
@@ -68,8 +70,6 @@ def read_description(
     path = _path_of(x)
     name = PurePath(path).name.split(".")[0]
     if path.endswith(".xacro"):
-        from dynx.model.xacro_reading import expand_xacro
-
         return expand_xacro(path, package_dirs), printable(path), name
     return read_file(path), printable(path), name
 
@@ -111,8 +111,10 @@ def read_model(
     lock: Mapping[str, float] | None = None,
     gravity: ArrayLike | None = None,
 ) -> Model:
-    """The model of URDF text that is already at hand; errors name `source`. A robot that has no name
-    in the text is called `name`. Otherwise as `load`."""
+    """Create the model of URDF text; `source` names it in errors.
+
+    A robot without a name in the text is called `name`. The other arguments and errors are those of `load`.
+    """
     content = read_urdf(data, source)
     model = Model.build(
         content.name or name or "robot",
@@ -127,7 +129,7 @@ def read_model(
     for frame in content.frames:
         if frame.link not in model.frame_names:
             raise DescriptionError(
-                f"frame {shown(frame.name)} is on {shown(frame.link)}, which is no link"
+                f"frame {shown(frame.name)} is on {shown(frame.link)}, which is not a link"
                 + nearest(frame.link, model.frame_names),
                 source=source,
             )
@@ -135,7 +137,7 @@ def read_model(
     return model
 
 
-def _changed(
+def _with_options(
     model: Model, base: Base | None, lock: Mapping[str, float] | None, gravity: ArrayLike | None
 ) -> Model:
     if lock:

@@ -1,4 +1,4 @@
-"""Locking joints at a value: the joint becomes fixed and leaves q."""
+"""Locking of joints at a position: the joint becomes fixed and is removed from q."""
 
 from __future__ import annotations
 
@@ -15,11 +15,10 @@ from dynx.spatial.so3 import rotation_about, rpy_from_rotation
 
 
 def lock_joints(joints: list[Joint], lock: Mapping[str, float]) -> list[Joint]:
-    """`joints` with those named in `lock` fixed at the given values [rad or m].
+    """Return `joints` with those named in `lock` fixed at the given positions [rad or m].
 
-    Joints that follow a locked one are fixed with it, by `topology.resolve_mimics`. Raises
-    UnknownNameError for a name that is no joint, or a joint that cannot move; DTypeError or
-    NotFiniteError for a value that is no finite number.
+    Joints that follow a locked one are fixed by `topology.resolve_mimics`. Raises UnknownNameError for an
+    unknown or fixed joint; DTypeError or NotFiniteError for a position that is not a finite number.
     """
     by_name = {joint.name: joint for joint in joints}
     for name, value in lock.items():
@@ -31,11 +30,11 @@ def lock_joints(joints: list[Joint], lock: Mapping[str, float]) -> list[Joint]:
             raise DTypeError(f"cannot lock {shown(name)} at {shown(value)}; wanted a number")
         if not math.isfinite(value):
             raise NotFiniteError(f"cannot lock {shown(name)} at {value}: wanted a finite number")
-    return [fixed_at(joint, float(lock[joint.name])) if joint.name in lock else joint for joint in joints]
+    return [lock_joint(joint, float(lock[joint.name])) if joint.name in lock else joint for joint in joints]
 
 
-def fixed_at(joint: Joint, value: float) -> Joint:
-    """The moving joint welded at `value`: its origin takes the motion in."""
+def lock_joint(joint: Joint, value: float) -> Joint:
+    """Return the joint fixed at position `value`, which is included in its origin."""
     axis, T = np.array(joint.axis), joint.origin.matrix
     if joint.type == "prismatic":
         x, y, z = (T[:3, 3] + T[:3, :3] @ (axis * value)).tolist()

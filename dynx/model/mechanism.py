@@ -1,10 +1,11 @@
-"""The moving bodies of a model: fixed joints welded, inertias lumped, frames attached to bodies.
+"""Mechanism: the moving bodies of a model after fixed-joint merging, with merged inertias and attached
+frames.
 
-This is what the algorithms of `dynx.rbd` work on. It is generic in the scalar: the same text lumps
-in float64 for the backend `reference` and in 50 digits for the referee.
+The algorithms of `dynx.rbd` work on it. It is generic in the scalar type: inertias are merged in float64 for
+the backend `reference` and in 50 digits for the referee.
 
-A mechanism has its own *tree coordinates*: one for each moving joint, mimic joints included, after
-the six of a floating base. `Coupling` maps the coordinates of the model to them.
+A mechanism has its own *tree coordinates*: one for each moving joint, mimic joints included, after the six of
+a floating base. `Coupling` maps the coordinates of the model to them.
 """
 
 from __future__ import annotations
@@ -24,24 +25,24 @@ from dynx.spatial.so3 import rotate, rotation_about, rotation_from_rpy
 if TYPE_CHECKING:
     from dynx.model.model import Model
 
-Numbers = Callable[[object], Array]
-"""Turns nested floats into an array of the scalar in use."""
+ScalarConverter = Callable[[object], Array]
+"""Function that converts nested floats to an array of the scalar type in use."""
 
 ROOT = -1
 """Index of the root body: the world for a fixed base, the base link for a floating one."""
 
 
-def float64(numbers: object) -> Array:
-    """The scalar of the backends."""
-    return np.asarray(numbers, dtype=np.float64)
+def float64(convert: object) -> Array:
+    """Convert nested floats to a float64 array."""
+    return np.asarray(convert, dtype=np.float64)
 
 
 @dataclass(frozen=True)
 class Body:
-    """A rigid body and the one-degree-of-freedom joint that carries it.
+    """A rigid body and the joint of one degree of freedom that connects it to its parent.
 
-    The body frame is that of the joint's child link. (R, p) is the pose of the joint frame, at
-    value 0, in the parent's body frame; `axis` is the unit axis in the joint frame.
+    The body frame is that of the joint's child link. (R, p) is the pose of the joint frame, at position 0, in
+    the body frame of the parent; `axis` is the unit axis in the joint frame.
     """
 
     joint: str
@@ -54,13 +55,13 @@ class Body:
 
     @property
     def about_z(self) -> bool:
-        """Whether it turns about the z axis of its joint frame."""
+        """Whether the body rotates about the z axis of its joint frame."""
         return self.revolute and all(self.axis == (0, 0, 1))
 
 
 @dataclass(frozen=True)
 class BodyFrame:
-    """A named frame: its pose (R, p) in the frame of body number `body` (ROOT for the root)."""
+    """A named frame: its pose (R, p) in the frame of body number `body` (ROOT for the root body)."""
 
     name: str
     body: int
@@ -70,10 +71,10 @@ class BodyFrame:
 
 @dataclass(frozen=True)
 class Coupling:
-    """Mimic joints as a linear map: tree position = scale * model position[index] + offset.
+    """Mimic joints as an affine map: tree position = scale * model position[index] + offset.
 
-    Velocities and accelerations follow without the offset, torques by the transpose (virtual work).
-    Indices count joints, without the base.
+    Velocities and accelerations use the map without the offset, torques its transpose (virtual work). Indices
+    count joints, without the base.
     """
 
     index: tuple[int, ...]
@@ -83,7 +84,7 @@ class Coupling:
     floating: bool
 
     def matrix(self) -> Floats:
-        """S (nv of the tree, nv of the model) with v_tree = S v."""
+        """Return S (nv of the tree, nv of the model) with v_tree = S v."""
         base = 6 if self.floating else 0
         S = np.zeros((base + len(self.index), base + self.n_joints))
         S[:base, :base] = np.eye(base)
@@ -92,7 +93,7 @@ class Coupling:
         return S
 
     def expand_q(self, q: Floats) -> Floats:
-        """Model configuration (..., nq) to tree configuration."""
+        """Convert a model configuration (..., nq) to a tree configuration."""
         index, scale, offset = self._arrays
         if not self.floating:
             return np.asarray(q.take(index, axis=-1) * scale + offset)
@@ -106,7 +107,7 @@ class Coupling:
 
 @dataclass(frozen=True)
 class Mechanism:
-    """Bodies in depth-first order (a parent precedes its children), frames, gravity, coupling."""
+    """Bodies in depth-first order (a parent precedes its children), frames, gravity and coupling."""
 
     name: str
     floating: bool
@@ -140,61 +141,63 @@ class Mechanism:
         return len(self.bodies) + (7 if self.floating else 0)
 
 
-def pose_arrays(pose: Pose, numbers: Numbers) -> tuple[Array, Array]:
-    """(R, p) of a pose, in the scalar that `numbers` makes."""
-    return rotation_from_rpy(numbers(pose.rpy)), numbers(pose.xyz)
+def pose_arrays(pose: Pose, convert: ScalarConverter) -> tuple[Array, Array]:
+    """Return (R, p) of a pose, in the scalar type of `convert`."""
+    return rotation_from_rpy(convert(pose.rpy)), convert(pose.xyz)
 
 
-def build_mechanism(model: Model, numbers: Numbers = float64) -> Mechanism:
-    """Weld what cannot move and lump its inertia, in the scalar that `numbers` makes."""
-    # Where each link sits: its body and its pose (R, p) in that body's frame.
-    here: dict[str, tuple[int, Array, Array]] = {model.root: (ROOT, numbers(np.eye(3)), numbers(np.zeros(3)))}
-    carried: list[tuple[str, int, bool, Array, Array, Array]] = []
+def build_mechanism(model: Model, convert: ScalarConverter = float64) -> Mechanism:
+    """Merge the links connected by fixed joints and their inertias, in the scalar type of `convert`."""
+    # Placement of each link: its body and its pose (R, p) in the frame of that body.
+    placed: dict[str, tuple[int, Array, Array]] = {
+        model.root: (ROOT, convert(np.eye(3)), convert(np.zeros(3)))
+    }
+    moving: list[tuple[str, int, bool, Array, Array, Array]] = []
     for joint in model.joints:
-        body, R_parent, p_parent = here[joint.parent]
-        R_joint, p_joint = pose_arrays(joint.origin, numbers)
+        body, R_parent, p_parent = placed[joint.parent]
+        R_joint, p_joint = pose_arrays(joint.origin, convert)
         R, p = R_parent @ R_joint, p_parent + rotate(R_parent, p_joint)
         if joint.moves:
             revolute = joint.type != "prismatic"
-            # The axis is unit to rounding in float64; a rotation about it must be one in any scalar.
-            axis = numbers(joint.axis)
+            # The axis has unit norm only to float64 rounding; normalise it in the scalar type in use.
+            axis = convert(joint.axis)
             axis = axis / sqrt(np.sum(axis * axis))
-            carried.append((joint.name, body, revolute, R, p, axis))
-            here[joint.child] = (len(carried) - 1, numbers(np.eye(3)), numbers(np.zeros(3)))
+            moving.append((joint.name, body, revolute, R, p, axis))
+            placed[joint.child] = (len(moving) - 1, convert(np.eye(3)), convert(np.zeros(3)))
         else:
-            here[joint.child] = (body, R, p)
+            placed[joint.child] = (body, R, p)
 
-    nothing = RigidInertia(numbers(0.0), numbers(np.zeros(3)), numbers(np.zeros((3, 3))))
-    lumped = dict.fromkeys(range(ROOT, len(carried)), nothing)
+    massless = RigidInertia(convert(0.0), convert(np.zeros(3)), convert(np.zeros((3, 3))))
+    merged = dict.fromkeys(range(ROOT, len(moving)), massless)
     for link in model.links:
         if link.inertial is None:
             continue
-        body, R, p = here[link.name]
-        R_inertial, p_inertial = pose_arrays(link.inertial.origin, numbers)
+        body, R, p = placed[link.name]
+        R_inertial, p_inertial = pose_arrays(link.inertial.origin, convert)
         own = inertia_about_origin(
-            numbers(link.inertial.mass), p_inertial, R_inertial, numbers(link.inertial.tensor)
+            convert(link.inertial.mass), p_inertial, R_inertial, convert(link.inertial.tensor)
         )
-        lumped[body] = lumped[body] + own.transform(R, p)
+        merged[body] = merged[body] + own.transform(R, p)
 
     frames = []
     for frame in model.frames:
-        body, R, p = here[frame.link]
-        R_frame, p_frame = pose_arrays(frame.placement, numbers)
+        body, R, p = placed[frame.link]
+        R_frame, p_frame = pose_arrays(frame.placement, convert)
         frames.append(BodyFrame(frame.name, body, R @ R_frame, p + rotate(R, p_frame)))
 
     return Mechanism(
         name=model.name,
         floating=model.floating,
-        gravity=numbers(model.gravity),
-        root=lumped[ROOT],
-        bodies=tuple(Body(*fields, inertia=lumped[k]) for k, fields in enumerate(carried)),
+        gravity=convert(model.gravity),
+        root=merged[ROOT],
+        bodies=tuple(Body(*fields, inertia=merged[k]) for k, fields in enumerate(moving)),
         frames=tuple(frames),
         coupling=_coupling(model),
     )
 
 
 def joint_motion(body: Body, value: Array) -> tuple[Array, Array]:
-    """(R, p) of the body frame in its parent's body frame at joint position `value` (...,)."""
+    """Return (R, p) of the body frame in its parent's body frame at joint position `value` (...,)."""
     value = np.asarray(value)
     if body.revolute:
         return body.R @ rotation_about(body.axis, value), body.p

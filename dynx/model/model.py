@@ -1,4 +1,4 @@
-"""The robot description as every backend receives it: a frozen tree of links, joints and frames."""
+"""Robot model used by every backend: an immutable tree of links, joints and frames."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
 from dynx.model import configuration, locking, topology
 from dynx.model.elements import IDENTITY, Frame, Inertial, Joint, Link, Note, Pose, Vector
 from dynx.model.mechanism import Mechanism, build_mechanism
+from dynx.model.urdf.writer import write_urdf
 from dynx.spatial.scalar import Floats
 
 Base = Literal["fixed", "floating"]
@@ -24,13 +25,12 @@ STANDARD_GRAVITY: Vector = (0.0, 0.0, -9.81)
 class Model:
     """A robot: links and joints in depth-first order, its base, and gravity.
 
-    Make one with `dynx.load` or `Model.build`. Coordinates (`q`, `v`) list the moving joints in the
-    order of `joint_names`: depth-first from the root, children in the order of the document. With a
-    floating base, ``q[:3]`` is the position of the base frame in the world [m], ``q[3:7]`` its unit
-    quaternion (x, y, z, w), and ``v[:3]``, ``v[3:6]`` its linear [m/s] and angular [rad/s] velocity,
-    both expressed in the base frame.
+    Create one with `dynx.load` or `Model.build`. Coordinates (`q`, `v`) list the moving joints in the order
+    of `joint_names`: depth-first from the root, children in the order of the document. With a floating base,
+    ``q[:3]`` is the position of the base frame in the world [m], ``q[3:7]`` its unit quaternion (x, y, z, w),
+    and ``v[:3]``, ``v[3:6]`` its linear [m/s] and angular [rad/s] velocity, both expressed in the base frame.
 
-    Models compare by their content (`==`), hash, pickle and are never changed after they are made.
+    Models are immutable; they compare by content (`==`), hash and pickle.
     """
 
     name: str
@@ -55,16 +55,16 @@ class Model:
         notes: Iterable[Note] = (),
         source: str = "<memory>",
     ) -> Model:
-        """Check that links and joints form one tree, order them, lock joints, and make the model.
+        """Check that links and joints form one tree, order them, lock joints, and create the model.
 
-        Raises DescriptionError where they do not form a tree, UnknownNameError for a joint to lock
-        that is not there or cannot move.
+        Raises DescriptionError unless they form a tree, UnknownNameError for a joint in `lock` that is
+        unknown or fixed.
         """
         notes = list(notes)
         ordered_links, ordered_joints = topology.depth_first(list(links), list(joints), source)
         ordered_joints = locking.lock_joints(ordered_joints, lock or {})
         ordered_joints = topology.resolve_mimics(ordered_joints, notes, source)
-        notes += _weightless(ordered_links, ordered_joints)
+        notes += _missing_inertial_notes(ordered_links, ordered_joints)
         return cls(
             name=name,
             links=tuple(ordered_links),
@@ -79,17 +79,17 @@ class Model:
 
     @cached_property
     def coordinate_joints(self) -> tuple[Joint, ...]:
-        """The joints that own a coordinate: they move and follow no other."""
+        """Joints with a coordinate of their own: they move and follow no other joint."""
         return tuple(joint for joint in self.joints if joint.moves and joint.mimic is None)
 
     @cached_property
     def joint_names(self) -> tuple[str, ...]:
-        """Names of the coordinates, in order; entry k is ``v[k]``, after the 6 of a floating base."""
+        """Names of the coordinates, in order; name k belongs to ``v[k]``, after the 6 of a floating base."""
         return tuple(joint.name for joint in self.coordinate_joints)
 
     @cached_property
     def frames(self) -> tuple[Frame, ...]:
-        """One frame per link, in depth-first order, then the frames that were added."""
+        """One frame per link, in depth-first order, then the added frames."""
         return tuple(Frame(link.name, link.name) for link in self.links) + self.extra_frames
 
     @cached_property
@@ -123,28 +123,28 @@ class Model:
         return float(sum(link.inertial.mass for link in self.links if link.inertial is not None))
 
     def joint(self, name: str) -> Joint:
-        """The joint of that name (of any type)."""
+        """Return the joint of that name (of any type); UnknownNameError if there is none."""
         try:
             return self._joint_by_name[name]
         except (KeyError, TypeError):
-            raise UnknownNameError(self._no_such("joint", name, self._joint_by_name)) from None
+            raise UnknownNameError(self._unknown_name_message("joint", name, self._joint_by_name)) from None
 
     def link(self, name: str) -> Link:
-        """The link of that name."""
+        """Return the link of that name; UnknownNameError if there is none."""
         try:
             return self._link_by_name[name]
         except (KeyError, TypeError):
-            raise UnknownNameError(self._no_such("link", name, self._link_by_name)) from None
+            raise UnknownNameError(self._unknown_name_message("link", name, self._link_by_name)) from None
 
     def frame_index(self, name: str) -> int:
-        """Position of the frame in `frame_names`."""
+        """Return the index of the frame in `frame_names`; UnknownNameError if there is none."""
         try:
             return self._frame_index[name]
         except (KeyError, TypeError):
-            raise UnknownNameError(self._no_such("frame", name, self._frame_index)) from None
+            raise UnknownNameError(self._unknown_name_message("frame", name, self._frame_index)) from None
 
     def coordinate_index(self, joint: str) -> int:
-        """Position of the joint's coordinate in `v` (in `q` it is one further with a floating base)."""
+        """Return the index of the joint's coordinate in `v` (one higher in `q` with a floating base)."""
         offset = 6 if self.floating else 0
         if joint in self.joint_names:
             return offset + self.joint_names.index(joint)
@@ -168,63 +168,61 @@ class Model:
 
     @cached_property
     def velocity_limit(self) -> Floats:
-        """Largest speed of each coordinate (nv,) [rad/s or m/s], inf where there is none."""
+        """Largest speed of each coordinate (nv,) [rad/s or m/s], inf for no limit."""
         base = [np.inf] * (6 if self.floating else 0)
         return np.array(base + [joint.limits.velocity for joint in self.coordinate_joints])
 
     @cached_property
     def effort_limit(self) -> Floats:
-        """Largest effort of each coordinate (nv,) [N m or N], inf where there is none."""
+        """Largest effort of each coordinate (nv,) [N m or N], inf for no limit."""
         base = [np.inf] * (6 if self.floating else 0)
         return np.array(base + [joint.limits.effort for joint in self.coordinate_joints])
 
     # -- configuration arithmetic ------------------------------------------------------------
 
     def neutral(self) -> Floats:
-        """The configuration (nq,) at which every joint is 0 and the base is at the world's frame."""
+        """Return the configuration (nq,) with every joint at 0 and the base frame at the world frame."""
         return configuration.neutral(self)
 
     def random(
         self, rng: np.random.Generator | int | None = None, size: tuple[int, ...] | int = ()
     ) -> Floats:
-        """Configurations (*size, nq), uniform within limits; see `configuration.random`."""
+        """Sample configurations (*size, nq) uniformly within limits; see `configuration.random`."""
         return configuration.random(self, rng, size)
 
     def integrate(self, q: ArrayLike, v: ArrayLike) -> Floats:
-        """The configuration reached from `q` (..., nq) by the velocity `v` (..., nv) in unit time."""
+        """Return the configuration reached from `q` (..., nq) with velocity `v` (..., nv) in unit time."""
         return configuration.integrate(self, q, v)
 
     def difference(self, q0: ArrayLike, q1: ArrayLike) -> Floats:
-        """The velocity (..., nv) that `integrate` needs to go from `q0` to `q1` in unit time."""
+        """Return the velocity (..., nv) with which `integrate` moves from `q0` to `q1` in unit time."""
         return configuration.difference(self, q0, q1)
 
     def clip(self, q: ArrayLike) -> Floats:
-        """`q` (..., nq) moved into the position limits, and its quaternion to unit length."""
+        """Return `q` (..., nq) clipped to the position limits, with a normalised quaternion."""
         return configuration.clip(self, q)
 
     # -- other forms -------------------------------------------------------------------------
 
     @cached_property
     def mechanism(self) -> Mechanism:
-        """The moving bodies alone, in float64: what the algorithms of `dynx.rbd` work on."""
+        """The moving bodies in float64, on which the algorithms of `dynx.rbd` work."""
         return build_mechanism(self)
 
     def to_urdf(self) -> str:
-        """The model as URDF text, in canonical form; `dynx.load` of it gives an equal model."""
-        from dynx.model.urdf.writer import write_urdf
-
+        """Return the model as URDF text in canonical form; `dynx.load` of it returns an equal model."""
         return write_urdf(self)
 
     def with_base(self, base: Base) -> Model:
-        """The same robot on the other kind of base."""
+        """Return the same robot with the other kind of base."""
         return replace(self, base=configuration.checked_base(base))
 
     def with_gravity(self, gravity: ArrayLike) -> Model:
-        """The same robot in another field of gravity (3,) [m/s^2]."""
+        """Return the same robot with another gravity (3,) [m/s^2]."""
         return replace(self, gravity=configuration.checked_gravity(gravity))
 
     def with_frame(self, name: str, link: str, placement: Pose | ArrayLike = IDENTITY) -> Model:
-        """The same robot with one more named frame, fixed to `link` (a tool tip, say).
+        """Return the same robot with one more named frame, fixed to `link` (a tool tip, say).
 
         `placement` is the pose of the frame in the link: a `Pose`, or a matrix T_link_frame (4, 4).
         """
@@ -238,7 +236,7 @@ class Model:
         return replace(self, extra_frames=(*self.extra_frames, Frame(name, link, placement)))
 
     def inertial(self, link: str) -> Inertial:
-        """The inertial of a link; a link without one has no mass."""
+        """Return the inertial of a link; a link without one has no mass."""
         return self.link(link).inertial or Inertial()
 
     def __eq__(self, other: object) -> bool:
@@ -274,7 +272,7 @@ class Model:
     def _frame_index(self) -> dict[str, int]:
         return {name: index for index, name in enumerate(self.frame_names)}
 
-    def _no_such(self, kind: str, name: object, known: Mapping[str, object]) -> str:
+    def _unknown_name_message(self, kind: str, name: object, known: Mapping[str, object]) -> str:
         message = f"no {kind} {shown(name)} in {self.name}"
         if not isinstance(name, str):
             return f"{message}: a name is a str, not {type(name).__name__}"
@@ -288,8 +286,10 @@ class Model:
         return message + nearest(name, known)
 
 
-def _weightless(links: Iterable[Link], joints: Iterable[Joint]) -> list[Note]:
-    """A note for each link that a joint moves though it has no inertial: some engines make 1 kg of it."""
+def _missing_inertial_notes(links: Iterable[Link], joints: Iterable[Joint]) -> list[Note]:
+    """Return a note for each link without an inertial that a joint moves; some engines give it a mass of 1
+    kg.
+    """
     moved = {joint.child: joint.name for joint in joints if joint.moves}
     return [
         Note(

@@ -1,4 +1,4 @@
-"""``package://`` names to files, inside given roots only."""
+"""Resolution of ``package://`` paths within given folders."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ StrPath = str | os.PathLike[str]
 
 
 def find_package(name: str, roots: Iterable[StrPath]) -> Path:
-    """The folder of a ROS package: a root of that name, or a folder of that name in a root.
+    """Return the folder of a ROS package: a root of that name, or a folder of that name in a root.
 
-    Raises DescriptionError where no root has it.
+    Raises DescriptionError if no root has it.
     """
     tried = [Path(root).resolve() for root in roots]
     if name and name == os.path.basename(name) and name not in (".", ".."):
@@ -27,19 +27,19 @@ def find_package(name: str, roots: Iterable[StrPath]) -> Path:
 
 
 def resolve_package(uri: str, roots: Iterable[StrPath]) -> Path:
-    """The file that ``package://name/rest`` means.
+    """Return the file of ``package://name/rest``.
 
-    Raises DescriptionError for another scheme, a package that no root has, a file that is not there,
-    or a path that leaves its package by ``..`` or by a symbolic link.
+    Raises DescriptionError for another scheme, an unknown package, a missing file, or a path that leaves its
+    package by ``..`` or by a symbolic link.
     """
     scheme, _, rest = uri.partition("://")
     if scheme != "package" or not rest:
-        raise DescriptionError(f"{shown(uri)} is no package path; wanted package://NAME/FILE")
+        raise DescriptionError(f"{shown(uri)} is not a package path; wanted package://NAME/FILE")
     name, _, inside = rest.partition("/")
     package = find_package(name, roots)
     found = (package / inside).resolve()
     if not found.is_relative_to(package):
-        raise DescriptionError(f"{shown(uri)} leads out of package {shown(name)}, which is refused")
+        raise DescriptionError(f"{shown(uri)} leaves the package {shown(name)}, which is not allowed")
     if not found.is_file():
-        raise DescriptionError(f"{shown(uri)} is not there: no file {shown(inside)} in {package}")
+        raise DescriptionError(f"{shown(uri)} does not exist: no file {shown(inside)} in {package}")
     return found

@@ -1,4 +1,4 @@
-"""Links and joints must form one tree; here it is checked and put into depth-first order."""
+"""Checks that links and joints form one tree, and orders them depth-first."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from dataclasses import replace
 
 from dynx.errors import DescriptionError, nearest, shown
 from dynx.model.elements import Joint, Link, Mimic, Note
-from dynx.model.locking import fixed_at
+from dynx.model.locking import lock_joint
 
 MAX_LINKS = 10_000
-"""More links than any robot; a longer file is refused before an engine's recursion overflows."""
+"""Largest number of links, more than any robot has; a longer file would overflow an engine's recursion."""
 
 
 def depth_first(links: list[Link], joints: list[Joint], source: str) -> tuple[list[Link], list[Joint]]:
-    """Both lists in depth-first order from the root, children in the order of their joints.
+    """Return both lists in depth-first order from the root, children in the order of their joints.
 
-    Raises DescriptionError for a repeated name, an unknown link, a link with two parents, two
-    roots, a cycle, no link at all, or more than MAX_LINKS links.
+    Raises DescriptionError for a repeated name, an unknown link, a link with two parents, two roots, a cycle,
+    no link at all, or more than MAX_LINKS links.
     """
     if not links:
         raise DescriptionError("the robot has no link", source=source)
@@ -35,7 +35,7 @@ def depth_first(links: list[Link], joints: list[Joint], source: str) -> tuple[li
         for role, name in (("parent", joint.parent), ("child", joint.child)):
             if name not in by_name:
                 raise DescriptionError(
-                    f"{role} of joint {shown(joint.name)} is {shown(name)}, which is no link"
+                    f"{role} of joint {shown(joint.name)} is {shown(name)}, which is not a link"
                     + nearest(name, by_name),
                     source=source,
                     line=joint.line,
@@ -69,12 +69,12 @@ def depth_first(links: list[Link], joints: list[Joint], source: str) -> tuple[li
         raise _cycle(links[0].name, parent_joint, source)
 
     ordered_links, ordered_joints = [roots[0]], []
-    waiting = children[roots[0].name][::-1]
-    while waiting:
-        joint = waiting.pop()
+    stack = children[roots[0].name][::-1]
+    while stack:
+        joint = stack.pop()
         ordered_joints.append(joint)
         ordered_links.append(by_name[joint.child])
-        waiting.extend(reversed(children[joint.child]))
+        stack.extend(reversed(children[joint.child]))
     if len(ordered_links) < len(links):
         reached = {link.name for link in ordered_links}
         raise _cycle(next(n for n in by_name if n not in reached), parent_joint, source)
@@ -82,10 +82,10 @@ def depth_first(links: list[Link], joints: list[Joint], source: str) -> tuple[li
 
 
 def resolve_mimics(joints: list[Joint], notes: list[Note], source: str) -> list[Joint]:
-    """Let every mimic joint name the independent joint at the end of its chain.
+    """Make every mimic joint refer to the independent joint at the end of its chain.
 
-    A joint that follows a fixed or locked one is itself fixed; one that follows a joint that is not
-    there moves freely, with a note. Raises DescriptionError for a circle of mimics.
+    A joint that follows a fixed or locked one becomes fixed; one that follows an unknown joint becomes
+    independent, with a note. Raises DescriptionError for a cycle of mimic joints.
     """
     by_name = {joint.name: joint for joint in joints}
     resolved: dict[str, Joint] = {}
@@ -98,7 +98,7 @@ def resolve_mimics(joints: list[Joint], notes: list[Note], source: str) -> list[
 def _unresolved_chain(
     joint: Joint, by_name: dict[str, Joint], resolved: dict[str, Joint], source: str
 ) -> list[Joint]:
-    """`joint`, the joint it follows, and so on, up to one that follows none or is resolved."""
+    """Return `joint`, the joint it follows, and so on, up to one that follows none or is resolved."""
     chain: dict[str, Joint] = {}
     current: Joint | None = joint
     while current is not None and current.name not in resolved:
@@ -106,7 +106,7 @@ def _unresolved_chain(
             circle = list(chain)[list(chain).index(current.name) :]
             named = " -> ".join(shown(name) for name in [*circle[:5], current.name])
             raise DescriptionError(
-                f"mimic joints follow each other in a circle: {named}", source=source, line=joint.line
+                f"mimic joints follow each other in a cycle: {named}", source=source, line=joint.line
             )
         chain[current.name] = current
         current = by_name.get(current.mimic.joint) if current.moves and current.mimic else None
@@ -122,7 +122,9 @@ def _resolve_mimic(
     what = f"joint {shown(joint.name)} mimics {shown(joint.mimic.joint)}"
     if driver is None:
         hint = nearest(joint.mimic.joint, known)
-        notes.append(Note(f"{what}, which does not exist; it is read as moving freely{hint}", joint.line))
+        notes.append(
+            Note(f"{what}, which does not exist; it is read as an independent joint{hint}", joint.line)
+        )
         return replace(joint, mimic=None)
     scale, offset = joint.mimic.multiplier, joint.mimic.offset
     if driver.moves and driver.mimic is None:
@@ -142,7 +144,7 @@ def _resolve_mimic(
         return replace(joint, mimic=Mimic(driver.mimic.joint, scale, offset))
     if driver.locked_at is None:
         notes.append(Note(f"{what}, which cannot move; it is read as fixed at {offset}", joint.line))
-    return fixed_at(joint, offset)
+    return lock_joint(joint, offset)
 
 
 def _refuse_duplicates(kind: str, parts: Iterable[Link | Joint], source: str) -> None:

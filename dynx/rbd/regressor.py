@@ -19,7 +19,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from dynx.model import Model
-from dynx.model.mechanism import Mechanism, Numbers, float64, pose_arrays
+from dynx.model.mechanism import Mechanism, ScalarConverter, float64, pose_arrays
 from dynx.rbd.jacobians import frame_jacobian
 from dynx.rbd.kinematics import BodyVectors, Poses, body_twists, frame_pose, joint_axis, joint_value
 from dynx.spatial.inertia import RigidInertia, inertia_about_origin
@@ -36,7 +36,7 @@ TENSOR_ENTRIES = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 def inertial_regressor(
     mechanism: Mechanism, poses: Poses, v: Array, a: Array, frames: Sequence[int]
 ) -> Array:
-    """Return Y (..., nv, 10 n) in tree coordinates, for a rigid body fixed to each of n `frames` (numbers).
+    """Return Y (..., nv, 10 n) in tree coordinates, for a rigid body fixed to each of n `frames` (convert).
 
     Columns of bodies that no coordinate moves are zero.
     """
@@ -103,18 +103,18 @@ def body_accelerations(
     return BodyVectors(tuple(linear), tuple(angular))
 
 
-def inertial_parameters(model: Model, numbers: Numbers = float64) -> Array:
+def inertial_parameters(model: Model, convert: ScalarConverter = float64) -> Array:
     """Return pi (10 n_links,): the ten parameters of each of `model.links`, zeros without an inertial."""
     return np.concatenate(
-        [parameters_from_inertia(link_inertia(model, link.name, numbers)) for link in model.links]
+        [parameters_from_inertia(link_inertia(model, link.name, convert)) for link in model.links]
     )
 
 
-def link_inertia(model: Model, link: str, numbers: Numbers = float64) -> RigidInertia:
+def link_inertia(model: Model, link: str, convert: ScalarConverter = float64) -> RigidInertia:
     """Return the inertia of one link about the origin of the link frame, in its axes."""
     inertial = model.inertial(link)
-    R, p = pose_arrays(inertial.origin, numbers)
-    return inertia_about_origin(numbers(inertial.mass), p, R, numbers(inertial.tensor))
+    R, p = pose_arrays(inertial.origin, convert)
+    return inertia_about_origin(convert(inertial.mass), p, R, convert(inertial.tensor))
 
 
 def parameters_from_inertia(inertia: RigidInertia) -> Array:

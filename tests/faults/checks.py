@@ -89,7 +89,7 @@ CHECKS_FAULTS = (
     Fault(
         "edit_line_ends_not_kept",
         "dynx.model.xml.source",
-        right='text = _BARE_FEED.sub(self._line_end, edit.text.encode("utf-8"))',
+        right='text = _BARE_LINE_FEED.sub(self._line_end, edit.text.encode("utf-8"))',
         wrong='text = edit.text.encode("utf-8")',
         test_file="tests/model/xml/test_source.py",
         test="test_line_ends_are_kept",

@@ -8,8 +8,8 @@ DESCRIPTION_FAULTS = (
     Fault(
         "joints_in_breadth_first_order",
         "dynx.model.topology",
-        right="joint = waiting.pop()",
-        wrong="joint = waiting.pop(0)",
+        right="joint = stack.pop()",
+        wrong="joint = stack.pop(0)",
         test_file="tests/contract/test_coordinates.py",
         test="test_order_is_depth_first_in_the_order_of_the_document",
     ),
@@ -27,7 +27,7 @@ DESCRIPTION_FAULTS = (
         right="offset += scale * (driver.locked_at or 0.0)",
         wrong="offset += 0.0 * scale",
         test_file="tests/model/test_locking.py",
-        test="test_followers_of_a_locked_joint_are_fixed_where_they_follow_to",
+        test="test_followers_of_a_locked_joint_are_fixed",
     ),
     Fault(
         "locked_prismatic_joint_moved_in_parent_axes",
@@ -60,7 +60,7 @@ DESCRIPTION_FAULTS = (
     Fault(
         "inertial_attitude_ignored",
         "dynx.model.mechanism",
-        right="p_inertial, R_inertial, numbers(link.inertial.tensor)",
+        right="p_inertial, R_inertial, convert(link.inertial.tensor)",
         wrong="p_inertial, 0 * R_inertial + numbers(np.eye(3)), numbers(link.inertial.tensor)",
         test_file="tests/contract/test_bodies.py",
         test="test_mass_matrix_is_the_sum_over_the_links[reference-fixed]",
@@ -68,16 +68,16 @@ DESCRIPTION_FAULTS = (
     Fault(
         "merged_link_not_moved_to_its_place",
         "dynx.model.mechanism",
-        right="lumped[body] = lumped[body] + own.transform(R, p)",
-        wrong="lumped[body] = lumped[body] + own",
+        right="merged[body] = merged[body] + own.transform(R, p)",
+        wrong="merged[body] = merged[body] + own",
         test_file="tests/contract/test_bodies.py",
         test="test_centre_of_mass_and_gravity_are_those_of_the_links[reference-fixed]",
     ),
     Fault(
         "integration_moves_the_base_in_world_axes",
         "dynx.model.configuration",
-        right="moved = q[..., :3] + rotate(rotation_from_quat(q[..., 3:7]), position)",
-        wrong="moved = q[..., :3] + position",
+        right="position = q[..., :3] + rotate(rotation_from_quat(q[..., 3:7]), position)",
+        wrong="position = q[..., :3] + position",
         test_file="tests/contract/test_coordinates.py",
         test="test_velocity_is_the_rate_of_the_pose[reference-floating]",
     ),
@@ -122,6 +122,6 @@ DESCRIPTION_FAULTS = (
         right="if not found.is_relative_to(package):",
         wrong="if not found.is_absolute():",
         test_file="tests/model/test_package_paths.py",
-        test="test_what_leads_out_or_nowhere_is_refused",
+        test="test_paths_outside_or_missing_raise",
     ),
 )

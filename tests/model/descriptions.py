@@ -1,4 +1,4 @@
-"""Small URDF texts that the tests of reading share."""
+"""Small URDF texts shared by the tests of the reader."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ INERTIAL = """<inertial>
 
 
 def robot(inside: str, name: str = 'name="test"') -> str:
-    """A document of one robot; `inside` begins in line 2."""
+    """Return a document of one robot; `inside` begins in line 2."""
     return f"<robot {name}>\n{inside}\n</robot>\n"
 
 
 def joint(inside: str = "", kind: str = "revolute", limit: str = '<limit lower="-1" upper="2"/>') -> str:
-    """Two links, in lines 2 and 3, and a joint between them whose `inside` begins in line 5."""
+    """Return two links, in lines 2 and 3, and a joint between them whose `inside` begins in line 5."""
     return robot(
         '  <link name="a"/>\n  <link name="b"/>\n'
         f'  <joint name="j" type="{kind}"><parent link="a"/><child link="b"/>{limit}\n{inside}\n  </joint>'
@@ -23,12 +23,12 @@ def joint(inside: str = "", kind: str = "revolute", limit: str = '<limit lower="
 
 
 def link(inside: str = INERTIAL) -> str:
-    """One link; `inside` begins in line 3."""
+    """Return a robot of one link; `inside` begins in line 3."""
     return robot(f'  <link name="a">\n{inside}\n  </link>')
 
 
 def chain(n: int) -> str:
-    """A chain of `n` links on continuous joints, one element a line."""
+    """Return a chain of `n` links with continuous joints, one element per line."""
     lines = [f'<link name="l{k}"/>' for k in range(n)]
     lines += [
         f'<joint name="j{k}" type="continuous"><parent link="l{k}"/><child link="l{k + 1}"/></joint>'

@@ -1,4 +1,4 @@
-"""Where links are, and what they weigh together: composed joint by joint, from the definitions.
+"""Poses and total inertia of links, computed joint by joint from the definitions.
 
 Only the parts of a model are used, none of its `Mechanism`, so that lumping can be tested by it.
 """
@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 
 
 def link_poses(model: Model, q: Floats) -> dict[str, Floats]:
-    """T_world_link of every link."""
+    """Return T_world_link of every link."""
     T = np.eye(4)
     base = 0
     if model.floating:
@@ -38,13 +38,13 @@ def link_poses(model: Model, q: Floats) -> dict[str, Floats]:
 
 
 def frame_poses(model: Model, q: Floats) -> list[Floats]:
-    """T_world_frame of every frame, in the order of `model.frame_names`."""
+    """Return T_world_frame of every frame, in the order of `model.frame_names`."""
     poses = link_poses(model, q)
     return [poses[frame.link] @ frame.placement.matrix for frame in model.frames]
 
 
 def total_inertia(model: Model, q: Floats) -> RigidInertia:
-    """The inertia of all links about the world's origin."""
+    """Return the inertia of all links about the origin of the world."""
     total = RigidInertia(np.zeros(()), np.zeros(3), np.zeros((3, 3)))
     for name, T in link_poses(model, q).items():
         inertial = model.inertial(name)

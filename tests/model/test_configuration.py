@@ -28,7 +28,7 @@ def scale(*arrays: Floats) -> float:
 
 
 def same_configuration(model: Model, a: Floats, b: Floats, operations: int, size: float) -> None:
-    """Equal to rounding; a quaternion and its negative are one attitude."""
+    """Assert equality to rounding; a quaternion and its negative are one orientation."""
     if model.floating:
         b = b.copy()
         b[3:7] *= np.copysign(1.0, np.dot(a[3:7], b[3:7]))
@@ -36,7 +36,7 @@ def same_configuration(model: Model, a: Floats, b: Floats, operations: int, size
 
 
 @given(st.data())
-def test_integrating_the_difference_arrives(data: st.DataObject) -> None:
+def test_integrating_the_difference_reaches_the_end(data: st.DataObject) -> None:
     model = data.draw(models(max_links=4))
     q0, q1 = data.draw(configurations(model)), data.draw(configurations(model))
     arrived = model.integrate(q0, model.difference(q0, q1))
@@ -47,7 +47,7 @@ def test_integrating_the_difference_arrives(data: st.DataObject) -> None:
 def test_the_difference_after_integrating_is_the_velocity(data: st.DataObject) -> None:
     model = data.draw(models(max_links=4))
     q, v = data.draw(configurations(model)), data.draw(velocities(model, reach=1.5))
-    # Turns of less than half a turn: 1.5 sqrt(3) < pi.
+    # Rotation angles below pi: 1.5 sqrt(3) < pi.
     assert_same_to_rounding(model.difference(q, model.integrate(q, v)), v, 256, scale(q, v))
 
 
@@ -60,7 +60,7 @@ def test_nothing_moves_without_velocity(data: st.DataObject) -> None:
 
 
 @given(st.data())
-def test_two_halves_of_a_motion_are_the_whole(data: st.DataObject) -> None:
+def test_two_half_steps_equal_one_step(data: st.DataObject) -> None:
     q, v = data.draw(configurations(FREE_BODY)), data.draw(velocities(FREE_BODY))
     halfway = FREE_BODY.integrate(q, v / 2)
     same_configuration(
@@ -79,10 +79,10 @@ def test_the_floating_base_moves_as_pinocchios_free_flyer(data: st.DataObject) -
         FREE_BODY, pinocchio.integrate(engine, q, v), FREE_BODY.integrate(q, v), 256, scale(q, v)
     )
     ours = FREE_BODY.difference(q, q1)
-    # At a half turn both ways round are shortest, and either may be taken.
+    # At an angle of pi both directions are shortest, and either may be returned.
     if np.linalg.norm(ours[3:]) < math.pi - 1e-6:
         theirs = pinocchio.difference(engine, q, q1)
-        # Pinocchio takes the turn from a rotation matrix, whose trace loses half the digits at pi.
+        # Pinocchio computes the angle from the trace of a rotation matrix, which loses half the digits at pi.
         lost = 1.0 / (math.pi - float(np.linalg.norm(ours[3:])))
         assert_same_to_rounding(ours, theirs, 512, scale(q, q1) * max(1.0, lost))
 
@@ -102,7 +102,7 @@ def test_random_configurations_are_valid_and_within_the_limits(model: Model, see
 
 
 @given(st.data())
-def test_clipping_is_idempotent_and_moves_only_what_is_outside(data: st.DataObject) -> None:
+def test_clipping_is_idempotent_and_changes_only_entries_outside(data: st.DataObject) -> None:
     model = data.draw(models(max_links=4))
     q = data.draw(configurations(model)) * data.draw(st.sampled_from((1.0, 0.5, 3.0)))
     clipped = model.clip(q)
@@ -135,7 +135,7 @@ def test_random_angles_reach_both_ends() -> None:
         (Limits(0.5, 0.5), 0.5, 0.5),
     ],
 )
-def test_random_draws_between_ends_that_exist(limits: Limits, low: float, high: float) -> None:
+def test_random_samples_between_existing_limits(limits: Limits, low: float, high: float) -> None:
     model = Model.build("r", [Link("a"), Link("b")], [Joint("j", "revolute", "a", "b", limits=limits)])
     q = model.random(0, size=200)
     assert low <= q.min() <= q.max() <= high
@@ -172,7 +172,7 @@ def test_leading_axes_are_batches(data: st.DataObject) -> None:
             assert_same_to_rounding(clipped[i, j], model.clip(one), 64, scale(q, v))
 
 
-def test_neutral_is_zero_with_the_identity_attitude() -> None:
+def test_neutral_is_zero_with_the_identity_quaternion() -> None:
     np.testing.assert_array_equal(load("ur5").neutral(), np.zeros(6))
     np.testing.assert_array_equal(load("ur5", base="floating").neutral()[:8], [0, 0, 0, 0, 0, 0, 1, 0])
 
@@ -191,9 +191,9 @@ BAD: list[tuple[object, type[Exception], str]] = [
 ]
 
 
-@pytest.mark.parametrize(("q", "kind", "says"), BAD)
-def test_a_bad_configuration_is_named(q: Any, kind: type[Exception], says: str) -> None:
-    with pytest.raises(kind, match=says):
+@pytest.mark.parametrize(("q", "kind", "message"), BAD)
+def test_a_bad_configuration_is_named(q: Any, kind: type[Exception], message: str) -> None:
+    with pytest.raises(kind, match=message):
         FREE_BODY.integrate(q, np.zeros(6))
 
 

@@ -10,11 +10,11 @@ import pytest
 
 from dynx.errors import DescriptionError, RobotNotFoundError
 from dynx.model import library
-from dynx.model.library import EXAMPLE_ROBOT_DATA, OWN_MODELS, find, robots
+from dynx.model.library import DYNX_MODELS, EXAMPLE_ROBOT_DATA, find, robots
 from dynx.model.loading import load
 
 EXAMPLES = [entry for entry in robots() if entry.source == EXAMPLE_ROBOT_DATA]
-OWN = [entry for entry in robots() if entry.source == OWN_MODELS]
+OWN = [entry for entry in robots() if entry.source == DYNX_MODELS]
 
 # The file that each loader of example-robot-data loads.
 LOADERS = {
@@ -43,13 +43,13 @@ def test_every_installed_file_has_exactly_one_name() -> None:
     assert len(EXAMPLES) == len(files)
 
 
-def test_every_model_of_our_own_has_exactly_one_name() -> None:
+def test_every_model_of_dynx_has_exactly_one_name() -> None:
     folder = Path(__file__).resolve().parents[2] / "models"
     assert {entry.path for entry in OWN} == set(folder.glob("*.urdf"))
     assert len(OWN) == len({entry.path for entry in OWN})
 
 
-def test_no_name_means_two_robots() -> None:
+def test_names_are_unique() -> None:
     count = Counter(name for entry in robots() for name in (entry.name, *entry.aliases))
     assert [name for name, n in count.items() if n > 1] == []
 
@@ -67,7 +67,7 @@ def test_short_names_are_those_of_the_loaders(name: str) -> None:
     assert find(name).as_posix().endswith("/" + LOADERS[name])
 
 
-def test_names_of_files_that_share_a_stem_are_told_apart_by_their_folder() -> None:
+def test_files_with_the_same_stem_are_distinguished_by_their_folder() -> None:
     assert find("ur_description_ur3").name == "ur3.urdf"
     assert find("iris_description_iris").name == "iris.urdf"
     assert find("dynx_double_pendulum") != find("double_pendulum")
@@ -102,7 +102,7 @@ def test_an_unknown_name_offers_the_nearest() -> None:
         find("ur_5")
 
 
-def test_an_empty_library_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_error_of_an_empty_library(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(library, "_example_roots", list)
     monkeypatch.setattr(library, "own_roots", list)
     robots.cache_clear()

@@ -1,4 +1,4 @@
-"""What `load` takes: text, bytes, paths, names, models; and what wins where two could be meant."""
+"""Arguments of `load` (text, bytes, paths, names, models) and their precedence."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def test_errors_name_the_file_and_the_line(here: Path) -> None:
         load("x.urdf")
 
 
-def test_a_name_wins_over_a_file_of_that_name_and_a_path_over_the_name(here: Path) -> None:
+def test_a_name_takes_precedence_over_a_file_and_a_path_over_a_name(here: Path) -> None:
     Path("ur5").write_text(TEXT)
     assert load("ur5").name == "ur5"
     assert load("ur5").nq == 6
@@ -86,7 +86,7 @@ def test_the_home_folder_is_expanded(here: Path, monkeypatch: pytest.MonkeyPatch
 @pytest.mark.parametrize(
     "x", ["", " ", "no_such_robot", "a\0b", "x" * 10_000, "\x1b[31m", "robot\n", "nul\0.urdf"]
 )
-def test_what_is_nothing_is_not_found(here: Path, x: str) -> None:
+def test_unknown_names_and_files_raise(here: Path, x: str) -> None:
     with pytest.raises(RobotNotFoundError) as caught:
         load(x)
     assert str(caught.value).isprintable()
@@ -117,7 +117,7 @@ def test_a_broken_link_is_not_found(here: Path) -> None:
 
 
 @pytest.mark.parametrize("x", [None, 3, ["ur5"], object()])
-def test_what_can_be_no_description_is_an_argument_error(x: Any) -> None:
+def test_arguments_of_other_types_raise(x: Any) -> None:
     with pytest.raises(ArgumentError, match="wanted a path, URDF text, a name or a Model"):
         load(x)
 
@@ -128,7 +128,7 @@ def test_bytes_are_always_text(data: bytes) -> None:
         load(data)
 
 
-def test_base_gravity_and_locks_are_as_asked() -> None:
+def test_base_gravity_and_locks_are_applied() -> None:
     model = load(TEXT, base="floating", gravity=(1, 2, 3), lock={"j": 0.5})
     assert (model.base, model.gravity, model.nq, model.nv) == ("floating", (1.0, 2.0, 3.0), 7, 6)
     plain = load(TEXT)
@@ -152,7 +152,7 @@ def test_wrong_arguments_are_named() -> None:
         load(TEXT, lock={"j": float("inf")})
 
 
-def test_a_model_keeps_what_is_not_asked_to_change() -> None:
+def test_loading_a_model_keeps_options_that_are_not_given() -> None:
     model = load("ur5", base="floating", gravity=(0, 0, -1)).with_frame("tip", "tool0")
     assert load(model) == model
     assert load(model, base="fixed") == model.with_base("fixed")

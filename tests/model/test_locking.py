@@ -1,4 +1,4 @@
-"""A locked joint leaves q, and everything else is as it was with the joint at that value."""
+"""A locked joint is removed from q; poses and inertia equal those with the joint at that position."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tests.spatial.rounding import assert_same_to_rounding
 
 
 @given(st.data())
-def test_locking_is_holding(data: st.DataObject) -> None:
+def test_locking_equals_holding_the_joint(data: st.DataObject) -> None:
     model = data.draw(models(max_links=6, locks=False))
     q = data.draw(configurations(model))
     base = model.nq - len(model.joint_names)
@@ -43,7 +43,7 @@ def test_locking_is_holding(data: st.DataObject) -> None:
 
 
 @given(st.data())
-def test_locking_in_two_steps_is_locking_at_once(data: st.DataObject) -> None:
+def test_locking_in_two_steps_equals_locking_at_once(data: st.DataObject) -> None:
     model = data.draw(models(max_links=5, locks=False))
     lock = dict.fromkeys(model.joint_names, 0.5)
     one_by_one = model
@@ -55,7 +55,7 @@ def test_locking_in_two_steps_is_locking_at_once(data: st.DataObject) -> None:
     assert all(not joint.moves for joint in at_once.joints)
 
 
-def test_followers_of_a_locked_joint_are_fixed_where_they_follow_to() -> None:
+def test_followers_of_a_locked_joint_are_fixed() -> None:
     model = load("romeo")
     followers = [joint for joint in model.joints if joint.mimic is not None]
     assert followers
@@ -76,12 +76,12 @@ def test_a_follower_may_be_locked_alone() -> None:
 
 
 @pytest.mark.parametrize("name", ["no_such_joint", "ee_fixed_joint", "tool0"])
-def test_what_cannot_be_locked_is_named(name: str) -> None:
+def test_the_error_names_a_joint_that_cannot_be_locked(name: str) -> None:
     with pytest.raises(UnknownNameError, match=f"cannot lock '{name}'"):
         load("ur5", lock={name: 0.0})
 
 
-def test_a_locked_joint_says_why_it_has_no_coordinate() -> None:
+def test_the_error_for_the_coordinate_of_a_locked_joint() -> None:
     model: Model = load("ur5", lock={"elbow_joint": 0.0})
     with pytest.raises(UnknownNameError, match="'elbow_joint' of ur5 has no coordinate: it is locked"):
         model.coordinate_index("elbow_joint")

@@ -1,4 +1,4 @@
-"""Lumping loses nothing: masses, moments and frames are those of the links, in any scalar."""
+"""Fixed-joint merging preserves masses, inertias and frames, in any scalar type."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Floats = NDArray[np.float64]
 
 
 def body_poses(mechanism: Mechanism, q_joints: Floats, base: Floats) -> dict[int, tuple[Array, Array]]:
-    """(R, p) of every body in the world, and of the root."""
+    """Return (R, p) of every body in the world, and of the root."""
     poses = {ROOT: (base[:3, :3], base[:3, 3])}
     for k, (body, value) in enumerate(zip(mechanism.bodies, q_joints, strict=True)):
         R_parent, p_parent = poses[body.parent]
@@ -70,7 +70,7 @@ def test_tree_coordinates_are_the_moving_joints_in_order(model: Model) -> None:
 
 
 @given(st.data())
-def test_coupling_is_what_mimic_joints_say(data: st.DataObject) -> None:
+def test_coupling_matches_the_mimic_joints(data: st.DataObject) -> None:
     model = data.draw(models())
     q = data.draw(configurations(model))
     coupling, base = model.mechanism.coupling, 7 if model.floating else 0
@@ -98,7 +98,7 @@ def fifty_digits(numbers: object) -> Array:
 
 @settings(max_examples=50)
 @given(models(max_links=5))
-def test_the_same_text_lumps_fifty_digit_numbers(model: Model) -> None:
+def test_merging_in_fifty_digits(model: Model) -> None:
     with mpmath.workdps(50):
         exact = build_mechanism(model, fifty_digits)
     rounded = model.mechanism

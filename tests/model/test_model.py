@@ -59,7 +59,7 @@ def test_any_change_makes_another_model(model: Model) -> None:
 
 
 @pytest.mark.parametrize(
-    ("ask", "says"),
+    ("ask", "message"),
     [
         (lambda m: m.joint("elbow"), "no joint 'elbow' in ur5; did you mean 'elbow_joint'"),
         (lambda m: m.joint("forearm_link"), "that is a link; the joint that moves it is 'elbow_joint'"),
@@ -73,18 +73,18 @@ def test_any_change_makes_another_model(model: Model) -> None:
         (lambda m: m.frame_index(3), "no frame '3'"),
     ],
 )
-def test_a_name_that_is_not_there_is_an_error_that_helps(ask: object, says: str) -> None:
+def test_errors_for_unknown_names(ask: object, message: str) -> None:
     assert callable(ask)
-    with pytest.raises(UnknownNameError, match=says):
+    with pytest.raises(UnknownNameError, match=message):
         ask(load("ur5"))
 
 
-def test_a_frame_s_name_is_given_once() -> None:
+def test_names_of_frames_are_unique() -> None:
     with pytest.raises(ArgumentError, match="frame 'tool0' exists already") as caught:
         load("ur5").with_frame("tool0", "tool0")
     assert not isinstance(caught.value, UnknownNameError)
 
 
-def test_only_a_name_that_is_there_is_looked_up_by_case() -> None:
+def test_names_are_case_sensitive() -> None:
     with pytest.raises(UnknownNameError, match="did you mean 'tool0'"):
         load("ur5").frame_index("TOOL0")

@@ -1,4 +1,4 @@
-"""``package://`` leads to files inside the given roots, and nowhere else."""
+"""``package://`` resolves to files inside the given roots only."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def test_a_package_is_a_folder_in_a_root_or_a_root(root: Path) -> None:
         "",
     ],
 )
-def test_what_leads_out_or_nowhere_is_refused(root: Path, uri: str) -> None:
+def test_paths_outside_or_missing_raise(root: Path, uri: str) -> None:
     os.symlink(root.parent / "secret", root / "robot/link")
     os.symlink(root.parent, root / "outside")
     with pytest.raises(DescriptionError):

@@ -1,4 +1,4 @@
-"""PyBullet's own models, which are untidy: each loads, or is refused for a defect it has."""
+"""PyBullet's own models: each loads, or raises for a defect that it has."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ pytestmark = pytest.mark.skipif(ROOT is None, reason="pybullet_data is not insta
 @pytest.mark.parametrize("file", DEFECTS)
 def test_a_file_with_a_defect_is_refused_for_it(file: str) -> None:
     assert ROOT is not None
-    kind, line, says = DEFECTS[file]
+    kind, line, message = DEFECTS[file]
     with pytest.raises(kind) as caught:
         load(ROOT / file)
-    assert says in str(caught.value)
+    assert message in str(caught.value)
     assert caught.value.line == line
 
 

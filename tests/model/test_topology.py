@@ -1,4 +1,4 @@
-"""Links and joints become one tree in depth-first order; mimic chains become one step."""
+"""Links and joints form one tree in depth-first order; chains of mimic joints are resolved."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from dynx.testing.strategies import models
 
 
 def tree(*pairs: str) -> tuple[list[Link], list[Joint]]:
-    """Links and joints of pairs such as "ab", a joint from a to b that has that name."""
+    """Build links and joints from pairs such as "ab", a joint from a to b that has that name."""
     names = dict.fromkeys("".join(pairs))
     return [Link(name) for name in names], [Joint(pair, "fixed", pair[0], pair[1]) for pair in pairs]
 
@@ -28,7 +28,7 @@ def order(*pairs: str) -> tuple[str, str]:
 def test_children_follow_their_parent_at_once_in_the_order_of_the_document() -> None:
     assert order("ab", "ac", "bd", "be") == ("abdec", "ab bd be ac")
     assert order("ac", "ab", "be", "bd") == ("acbed", "ac ab be bd")
-    # Joints of one parent keep their order though others stand between or before them.
+    # Joints of one parent keep their order even if others are listed between or before them.
     assert order("cd", "ab", "bc", "ae") == ("abcde", "ab bc cd ae")
 
 
@@ -49,7 +49,7 @@ def test_every_parent_precedes_its_children_and_branches_stay_together(model: Mo
         assert place[joint.parent] < place[joint.child]
         last[joint.parent] = max(last[joint.parent], last[joint.child])
     for joint in model.joints:
-        # The branch below a joint is one run of links without a gap.
+        # The subtree of a joint is a contiguous range of links.
         below = {joint.child}
         for other in model.joints:
             if other.parent in below:
@@ -66,7 +66,7 @@ def test_ordering_is_idempotent(model: Model, random: shuffling.Random) -> None:
 
 
 @pytest.mark.parametrize(
-    ("pairs", "says"),
+    ("pairs", "message"),
     [
         (("ab", "cd"), "2 links have no parent"),
         (("ab", "cb"), "link 'b' has two parents: joints 'ab' and 'cb'"),
@@ -75,8 +75,8 @@ def test_ordering_is_idempotent(model: Model, random: shuffling.Random) -> None:
         (("aa",), "joins link 'a' to itself"),
     ],
 )
-def test_what_is_no_tree_is_refused(pairs: tuple[str, ...], says: str) -> None:
-    with pytest.raises(DescriptionError, match=says):
+def test_links_that_form_no_tree_raise(pairs: tuple[str, ...], message: str) -> None:
+    with pytest.raises(DescriptionError, match=message):
         depth_first(*tree(*pairs), "test")
 
 
@@ -90,7 +90,7 @@ def test_a_cycle_of_ten_thousand_links_is_named_in_short() -> None:
 
 
 def followers(*drivers: tuple[str, str, float, float], moving: str = "") -> list[Joint]:
-    """Joints that follow others, and the joints named in `moving`, which follow none."""
+    """Build joints that follow others, and independent joints, named in `moving`."""
     joints = [Joint(name, "revolute", "x", "y") for name in moving]
     joints += [
         Joint(name, "revolute", "x", "y", mimic=Mimic(driver, scale, offset))
@@ -112,7 +112,7 @@ def test_a_follower_of_a_joint_that_lost_its_driver_still_follows_it() -> None:
     c, b = resolve_mimics(followers(("c", "b", 2.0, 3.0), ("b", "gone", 5.0, 7.0)), notes, "test")
     assert (c.mimic, b.mimic) == (Mimic("b", 2.0, 3.0), None)
     assert [str(note) for note in notes] == [
-        "joint 'b' mimics 'gone', which does not exist; it is read as moving freely; known: c, b"
+        "joint 'b' mimics 'gone', which does not exist; it is read as an independent joint; known: c, b"
     ]
 
 
@@ -125,9 +125,9 @@ def test_a_follower_of_a_fixed_joint_is_fixed_at_its_offset() -> None:
 
 
 @pytest.mark.parametrize("drivers", [("aa",), ("ab", "ba"), ("ab", "bc", "cb")])
-def test_mimics_in_a_circle_are_refused(drivers: tuple[str, ...]) -> None:
+def test_mimics_in_a_cycle_raise(drivers: tuple[str, ...]) -> None:
     joints = followers(*((pair[0], pair[1], 1.0, 0.0) for pair in drivers))
-    with pytest.raises(DescriptionError, match="follow each other in a circle"):
+    with pytest.raises(DescriptionError, match="follow each other in a cycle"):
         resolve_mimics(joints, [], "test")
 
 

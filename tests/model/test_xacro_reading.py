@@ -1,4 +1,4 @@
-"""xacro files, through the package that the extra brings; without it, an error that names it."""
+"""xacro files: expansion, errors, and the error without the extra."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def test_a_package_outside_the_roots_is_not_found(robot: Path) -> None:
 
 @needs_xacro
 @pytest.mark.parametrize("text", ["<robot", "<robot>${1 +}</robot>", "<robot><xacro:gone/></robot>", ""])
-def test_what_xacro_refuses_is_one_error_of_ours(tmp_path: Path, text: str) -> None:
+def test_errors_of_xacro_become_one_error(tmp_path: Path, text: str) -> None:
     path = tmp_path / "bad.xacro"
     path.write_text(text.replace("<robot>", f"<robot {XMLNS}>"))
     with pytest.raises(DescriptionError, match=r"bad\.xacro: xacro failed: ") as caught:
@@ -78,8 +78,8 @@ def test_what_xacro_refuses_is_one_error_of_ours(tmp_path: Path, text: str) -> N
 
 
 @needs_xacro
-def test_an_expansion_that_does_not_end_is_stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(xacro_reading, "MAX_SECONDS", 0.01)
+def test_an_endless_expansion_is_terminated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(xacro_reading, "TIMEOUT", 0.01)
     path = tmp_path / "x.xacro"
     path.write_text(joint())
     with pytest.raises(DescriptionError, match=r"did not finish within 0\.01 s"):

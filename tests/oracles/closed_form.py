@@ -1,4 +1,4 @@
-"""What a closed form offers: the equations of motion of one of `models/`, derived by hand.
+"""Interface of a closed form: the equations of motion of one of `models/`, derived by hand.
 
 Nothing here comes from dynx: the formulas are written out from textbooks, per robot, with their own
 numbers, those in the head of the robot's file. Leading axes are batch.

@@ -41,10 +41,10 @@ class FreeBody(ClosedForm):
         return T
 
     def jacobian(self, q: Floats) -> Floats:
-        return self._turned(self.rotation(q))
+        return self._jacobian_at_mark(self.rotation(q))
 
     def jacobian_derivative(self, q: Floats, v: Floats) -> Floats:
-        return self._turned(self.rotation(q) @ cross_matrix(v[..., 3:]))
+        return self._jacobian_at_mark(self.rotation(q) @ cross_matrix(v[..., 3:]))
 
     def mass_matrix(self, q: Floats) -> Floats:
         C = cross_matrix(self.c)
@@ -70,6 +70,6 @@ class FreeBody(ClosedForm):
         world = body @ np.swapaxes(self.rotation(q), -1, -2)
         return np.concatenate([world[..., 0, :], world[..., 1, :]], axis=-1)
 
-    def _turned(self, R: Floats) -> Floats:
+    def _jacobian_at_mark(self, R: Floats) -> Floats:
         upper = np.concatenate([R, -R @ cross_matrix(self.mark)], axis=-1)
         return np.concatenate([upper, np.concatenate([0 * R, R], axis=-1)], axis=-2)

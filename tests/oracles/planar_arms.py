@@ -1,4 +1,4 @@
-"""The planar arms with two and three revolute joints, gravity turned into their plane."""
+"""The planar arms with two and three revolute joints, with gravity in their plane."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from tests.oracles.closed_form import FixedBaseForm, Floats, G, Vector, matrix, 
 
 
 def pose_about_z(angle: Floats, x: Floats, y: Floats) -> Floats:
-    """A frame at (x, y, 0), turned by `angle` about z."""
+    """A frame at (x, y, 0), rotated by `angle` about z."""
     c, s = np.cos(angle), np.sin(angle)
     return matrix([[c, -s, 0, x], [s, c, 0, y], [0, 0, 1, 0], [0, 0, 0, 1]])
 
@@ -103,7 +103,7 @@ class Planar3R(FixedBaseForm):
 
     @property
     def coupling(self) -> Floats:
-        """A (3, 3): A_ij = l_i (m_j c_j + l_j sum of the masses beyond j) for i < j."""
+        """A (3, 3): A_ij = l_i (m_j c_j + l_j sum of the masses outboard of j) for i < j."""
         A = np.zeros((3, 3))
         for j in range(3):
             beyond = float(np.sum(self.m[j + 1 :]))
@@ -114,7 +114,7 @@ class Planar3R(FixedBaseForm):
 
     @property
     def first_moments(self) -> Floats:
-        """b (3,): b_i = m_i c_i + l_i sum of the masses beyond i."""
+        """b (3,): b_i = m_i c_i + l_i sum of the masses outboard of i."""
         beyond = np.array([self.m[1] + self.m[2], self.m[2], 0.0])
         return np.asarray(self.m * self.c + self.length * beyond)
 

@@ -10,7 +10,7 @@ from tests.oracles.closed_form import FixedBaseForm, Floats, G, matrix, vector
 
 
 class Scara(FixedBaseForm):
-    """Quill and tool have their centres of mass on their axis, so that they load the arm as a point
+    """Quill and tool have their centres of mass on their axis, so that for the arm they are a point
     mass at its end, their moments of inertia about that axis add to the turning ones, and the quill
     is coupled to nothing (Siciliano et al., Robotics, problem 7.3).
     """

@@ -1,4 +1,4 @@
-"""What is known in closed form of the two arms in `models/`: where the wrist is."""
+"""Closed forms of the wrist positions of the two arms in `models/`."""
 
 from __future__ import annotations
 

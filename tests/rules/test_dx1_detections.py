@@ -9,7 +9,7 @@ import pytest
 from dynx.agreement.tolerances import BAR
 from dynx.engines.pybullet.inertia_checks import diagonalisation_error
 from dynx.model.elements import Inertial, Pose
-from dynx.model.library import OWN_MODELS, robots
+from dynx.model.library import DYNX_MODELS, robots
 from dynx.model.model import Base
 from dynx.model.xml.source import Edit, XmlSource
 from dynx.rules import Case, all_rules, find_rule
@@ -19,7 +19,7 @@ from dynx.rules.inertia.rigid_groups import rigid_groups
 from tests.rules.documents import case_of, joint, link
 
 RULES = [rule for rule in all_rules() if "DX101" <= rule.id <= "DX113"]
-OWN = [entry.path for entry in robots() if entry.source == OWN_MODELS and "dx" not in entry.name]
+OWN = [entry.path for entry in robots() if entry.source == DYNX_MODELS and "dx" not in entry.name]
 
 SOLID = Inertial(1.5, Pose((0.1, 0.02, 0.05)), ixx=0.02, iyy=0.03, izz=0.025)
 """Without a trace of any of the causes."""

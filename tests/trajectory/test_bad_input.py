@@ -67,7 +67,7 @@ def test_limits_out_of_all_proportion(limit: float, way: float) -> None:
         (0.0, 1.0, ShapeError, r"q0 has shape \(\)"),
         ([], [], ShapeError, r"q0 has shape \(0,\)"),
         (["a"], [0.0], DTypeError, "q0 has dtype"),
-        ([1e80], [0.0], ArgumentError, "products of such numbers overflow"),
+        ([1e80], [0.0], ArgumentError, "products of larger numbers overflow"),
     ],
 )
 def test_configurations(made: Any, q0: Any, q1: Any, error: type[DynxError], message: str) -> None:

@@ -38,7 +38,7 @@ def require_harmless(path: Path, model: Model) -> None:
             str(path),
             list[Note](),
             opaque=_OPAQUE,
-            at_most={"link": MAX_LINKS, "joint": MAX_LINKS},
+            max_counts={"link": MAX_LINKS, "joint": MAX_LINKS},
         )
     except ModelError as error:
         raise EngineError(f"pybullet is not given {model.name}: {error}") from error

@@ -1,4 +1,4 @@
-"""URDF's ``<joint>``: type, ends, origin, axis, limits, dynamics and mimic."""
+"""Reader of URDF's ``<joint>``: type, links, origin, axis, limits, dynamics and mimic."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from dynx.model.urdf.values import Reading
 from dynx.model.xml.reading import Element
 
 FRAME_TAG = "dynx_frame"
-"""Extension that `write_urdf` uses: the joint's child is a frame, added to the parent link."""
+"""Extension written by `write_urdf`: the joint's child is a frame, added to the parent link."""
 
 LOCKED_TAG = "dynx_locked"
-"""Extension that `write_urdf` uses: the value at which a joint, written as fixed, was locked."""
+"""Extension written by `write_urdf`: the position at which a joint, written as fixed, was locked."""
 
 _TYPES: dict[str, JointType] = {
     "revolute": "revolute",
@@ -33,7 +33,7 @@ _KNOWN = _READ | {"calibration", "safety_controller", "gazebo", LOCKED_TAG, FRAM
 
 
 def read_joint(element: Element, reading: Reading, floating_is_base: bool = False) -> Joint:
-    """The joint. `floating_is_base` says that a floating joint here is what ``base=`` decides."""
+    """Read a joint. With `floating_is_base`, a floating joint stands for ``base=`` and is read as fixed."""
     name = reading.name(element, "name", "a <joint>")
     what = f"joint {shown(name)}"
     reading.ignore_unknown(element, _KNOWN)
@@ -124,14 +124,14 @@ def _read_limits(element: Element, kind: JointType, what: str, reading: Reading)
     lower, upper = (_limit(limit, end, what, reading, 0.0) for end in ("lower", "upper"))
     missing = [end for end in ("lower", "upper") if end not in limit.attributes]
     if missing:
-        reading.note(limit, f"{what} has no {' and no '.join(missing)} limit; URDF says it is then 0")
+        reading.note(limit, f"{what} has no {' and no '.join(missing)} limit; URDF defines it as 0")
     if lower > upper:
         reading.note(limit, f"{what} has lower limit {lower} above upper limit {upper}; they are exchanged")
     return Limits(lower, upper, **most)
 
 
 def _limit(limit: Element, attribute: str, what: str, reading: Reading, default: float) -> float:
-    # The largest double stands for "no limit": it is a number that every engine can read.
+    # The largest double stands for "no limit": every engine can read it, unlike infinity.
     value = reading.number_or(limit, attribute, what, default)
     return math.copysign(INFINITY, value) if abs(value) == sys.float_info.max else value
 
@@ -144,7 +144,7 @@ def _read_dynamics(element: Element, what: str, reading: Reading) -> JointDynami
     for attribute in ("damping", "friction", "armature"):
         values[attribute] = reading.number_or(dynamics, attribute, what, 0.0)
         if values[attribute] < 0.0:
-            reading.note(dynamics, f"the {attribute} of {what} is negative, so the joint drives itself")
+            reading.note(dynamics, f"the {attribute} of {what} is negative, so the joint gains energy")
     return JointDynamics(**values)
 
 

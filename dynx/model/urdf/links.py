@@ -1,4 +1,4 @@
-"""URDF's ``<link>``: its name and its inertial. Shapes and materials are not dynamics."""
+"""Reader of URDF's ``<link>``: its name and inertial. Shapes and materials do not affect dynamics."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dynx.model.elements import Inertial, Link
 from dynx.model.urdf.values import Reading
 from dynx.model.xml.reading import Element
 
-# Read by some engine for contact, display or sensing; no quantity of dynx depends on them.
+# Elements that some engine reads for contact, display or sensing; they do not affect dynamics.
 _WITHOUT_DYNAMICS = frozenset(
     [
         *("visual", "collision", "contact", "material", "surface", "sensor", "gazebo", "gravity"),
@@ -22,7 +22,7 @@ _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
 def read_link(element: Element, reading: Reading) -> Link:
-    """The link; without ``<inertial>`` it has no mass."""
+    """Read a link; without ``<inertial>`` it has no mass."""
     name = reading.name(element, "name", "a <link>")
     reading.ignore_unknown(element, _KNOWN)
     inertial = reading.only(element, "inertial")
@@ -41,29 +41,29 @@ def _read_inertial(element: Element, link: str, reading: Reading) -> Inertial:
     inertial = Inertial(mass, reading.origin(element, what), **moments, line=element.line)
     fault = inertia_fault(inertial)
     if fault is not None:
-        reading.note(tensor, f"the inertia of {what} {fault}; its numbers are used as they stand")
+        reading.note(tensor, f"the inertia of {what} {fault}; it is used as stated")
     return inertial
 
 
 def inertia_fault(inertial: Inertial) -> str | None:
-    """Why no rigid body has this inertia, or None where one can.
+    """Return why no rigid body has this inertia, or None if it is physically consistent.
 
-    The principal moments are sums of two of three non-negative second moments of mass, so none is
-    negative and none exceeds the sum of the other two (Wensing, Kim and Slotine 2018, section II).
+    The principal moments are sums of two of three non-negative second moments of mass, so none is negative
+    and none exceeds the sum of the other two (Wensing, Kim and Slotine 2018, section II).
     """
     tensor = inertial.tensor
     scale = float(np.max(np.abs(tensor)))
     if scale == 0.0:
         return None
     if inertial.mass == 0.0:
-        return "is not zero though its mass is"
+        return "is not zero although its mass is"
     small, middle, large = np.linalg.eigvalsh(tensor / scale)
     rounding = 16.0 * np.finfo(float).eps * max(abs(small), abs(large))
     if small < -rounding:
-        return f"is that of no body: the principal moment {small * scale:.6g} is negative"
+        return f"is not physical: the principal moment {small * scale:.6g} is negative"
     if small + middle < large - rounding:
         return (
-            f"is that of no body: the principal moment {large * scale:.6g} exceeds "
+            f"is not physical: the principal moment {large * scale:.6g} exceeds "
             f"the sum of the others, {small * scale:.6g} and {middle * scale:.6g}"
         )
     return None

@@ -1,7 +1,7 @@
-"""URDF text to links, joints and frames, read as meant, with a note where it was not plain.
+"""Reader of URDF text: links, joints and frames, with a note for each ambiguity.
 
-Visual and collision shapes, materials, transmissions, sensors and simulators' own elements do not
-change rigid-body dynamics and are passed over; no mesh is looked for.
+Visual and collision shapes, materials, transmissions, sensors and extensions of simulators do not affect
+rigid-body dynamics and are skipped; meshes are not opened.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _KNOWN = _OPAQUE | {"link", "joint", "plugin", "static"}
 
 @dataclass(frozen=True)
 class UrdfContent:
-    """What a document says: parts in document order, not yet checked to form a tree."""
+    """Content of a document: parts in document order, not yet checked to form a tree."""
 
     name: str | None
     links: list[Link]
@@ -35,14 +35,14 @@ class UrdfContent:
 
 
 def read_urdf(data: str | bytes, source: str) -> UrdfContent:
-    """The content of a URDF document.
+    """Read a URDF document.
 
-    Raises DescriptionError for what is malformed, UnsupportedFeatureError for what dynx refuses; the
-    message begins with `source` and the line.
+    Raises DescriptionError for malformed content, UnsupportedFeatureError for a feature that dynx does not
+    support; the message begins with `source` and the line.
     """
     notes: list[Note] = []
-    at_most = {"link": MAX_LINKS, "joint": MAX_LINKS}
-    root = read_xml(data, source, notes, opaque=_OPAQUE, at_most=at_most)
+    max_counts = {"link": MAX_LINKS, "joint": MAX_LINKS}
+    root = read_xml(data, source, notes, opaque=_OPAQUE, max_counts=max_counts)
     reading = Reading(source, notes)
     _require_robot(root, reading)
     reading.ignore_unknown(root, _KNOWN)
@@ -91,10 +91,10 @@ def _robot_name(root: Element, reading: Reading) -> str | None:
 
 
 def _floating_base_joint(joints: list[Element], links: list[Link]) -> Element | None:
-    """The floating joint between an empty root link and the rest of the robot, if there is one.
+    """Return the floating joint between an empty root link and the rest of the robot, or None.
 
-    Such a pair is a way of writing that the base moves freely. It carries no body, so reading the
-    joint as fixed leaves the choice to ``base=`` and loses nothing.
+    Such a pair expresses that the base moves freely. The empty link has no body, so reading the joint as
+    fixed loses nothing and leaves the choice to ``base=``.
     """
     ends = []
     for joint in joints:

@@ -1,4 +1,4 @@
-"""Values of URDF attributes: names, numbers, vectors, poses; strict, and with the line in each error."""
+"""Strict readers of URDF attributes (names, numbers, vectors, poses), with the line in each error."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from dynx.model.elements import ZERO, Note, Pose, Vector
 from dynx.model.xml.reading import Element
 
 MAX_NAME = 1000
-"""Longest name; PyBullet's stack is overrun by one of 1,264 characters."""
+"""Largest length of a name [characters]; 1,264 characters overflow PyBullet's stack."""
 
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _NOT_IN_XML = "\ufffe\uffff"
@@ -21,22 +21,22 @@ _NOT_IN_XML = "\ufffe\uffff"
 
 @dataclass
 class Reading:
-    """One reading of one document: where it came from, and what the user should know about it."""
+    """State of reading one document: its source, and the notes for the user."""
 
     source: str
     notes: list[Note] = field(default_factory=list)
     _ignored: dict[tuple[str, str], tuple[int, int]] = field(default_factory=dict)
 
     def error(self, element: Element, message: str) -> DescriptionError:
-        """The error to raise about `element`."""
+        """Return the error to raise about `element`."""
         return DescriptionError(message, source=self.source, line=element.line)
 
     def unsupported(self, element: Element, message: str) -> UnsupportedFeatureError:
-        """The error to raise about a feature that dynx refuses."""
+        """Return the error to raise about a feature that dynx does not support."""
         return UnsupportedFeatureError(message, source=self.source, line=element.line)
 
     def note(self, element: Element, message: str) -> None:
-        """Tell the user how `element` was read."""
+        """Add a note on how `element` was read."""
         self.notes.append(Note(message, element.line))
 
     def ignore_unknown(self, parent: Element, known: Iterable[str]) -> None:
@@ -47,7 +47,7 @@ class Reading:
                 self._ignored[parent.tag, child.tag] = (count + 1, line)
 
     def note_ignored(self) -> None:
-        """Turn what `ignore_unknown` counted into notes."""
+        """Convert the counts of `ignore_unknown` to notes."""
         for (inside, tag), (count, line) in self._ignored.items():
             times = "" if count == 1 else f" ({count} times)"
             self.notes.append(
@@ -55,28 +55,28 @@ class Reading:
             )
 
     def only(self, parent: Element, tag: str) -> Element | None:
-        """The one element of that tag; the first, with a note, where there are several."""
+        """Return the element of that tag, or None; the first, with a note, if there are several."""
         found = parent.all(tag)
         if len(found) > 1:
             self.note(found[1], f"<{parent.tag}> has {len(found)} <{tag}>; the first is used, as engines do")
         return found[0] if found else None
 
     def required(self, parent: Element, tag: str, what: str) -> Element:
-        """The one element of that tag, or an error."""
+        """Return the element of that tag; raise an error if it is missing."""
         found = self.only(parent, tag)
         if found is None:
             raise self.error(parent, f"{what} has no <{tag}>")
         return found
 
     def attribute(self, element: Element, name: str, what: str) -> str:
-        """A required attribute, or an error."""
+        """Return a required attribute; raise an error if it is missing."""
         value = element.attributes.get(name)
         if value is None:
             raise self.error(element, f"<{element.tag}> of {what} has no attribute {name}")
         return value
 
     def name(self, element: Element, attribute: str, what: str) -> str:
-        """A required attribute that names something, or an error."""
+        """Return a required attribute that is a name; raise an error if it is missing or invalid."""
         value = element.attributes.get(attribute)
         if value is None:
             raise self.error(element, f'{what} has no {attribute}; wanted {attribute}="..."')
@@ -86,17 +86,19 @@ class Reading:
         return value
 
     def number(self, element: Element, attribute: str, what: str) -> float:
-        """A required attribute that is one finite number, or an error."""
+        """Return a required attribute that is one finite number; raise an error otherwise."""
         return self._parsed(element, attribute, self.attribute(element, attribute, what), what, "a number")
 
     def number_or(self, element: Element, attribute: str, what: str, default: float) -> float:
-        """An attribute that is one finite number, or `default` where it is absent."""
+        """Return an attribute that is one finite number, or `default` if it is missing."""
         if attribute not in element.attributes:
             return default
         return self.number(element, attribute, what)
 
     def vector(self, element: Element, attribute: str, what: str) -> Vector:
-        """A required attribute that is three finite numbers separated by white space, or an error."""
+        """Return a required attribute of three finite numbers separated by white space; raise an error
+        otherwise.
+        """
         text = self.attribute(element, attribute, what)
         words = text.split()
         wanted = "three numbers separated by white space"
@@ -106,7 +108,7 @@ class Reading:
         return (x, y, z)
 
     def origin(self, parent: Element, what: str) -> Pose:
-        """The pose in ``<origin>``; what is absent or empty is zero."""
+        """Return the pose in ``<origin>``; missing or empty attributes are zero."""
         element = self.only(parent, "origin")
         if element is None:
             return Pose()
@@ -133,18 +135,18 @@ class Reading:
         if "${" in text or "$(" in text:
             hint = "; this is xacro that was not expanded"
         elif "," in text:
-            hint = "; decimals take a point and no comma is read"
+            hint = "; decimals take a point, and numbers are separated by white space"
         message = f"{attribute} in <{element.tag}> of {what} is {shown(text)}; wanted {wanted}{hint}"
         return self.error(element, message)
 
 
 def name_fault(name: str) -> str | None:
-    """What is wrong with a name, or None where it can be used."""
+    """Return why a name is invalid, or None if it is valid."""
     if not name:
         return "is empty"
     if len(name) > MAX_NAME:
         return f"has {len(name)} characters; at most {MAX_NAME} are accepted"
     for character in name:
         if unicodedata.category(character) in ("Cc", "Cs", "Zl", "Zp") or character in _NOT_IN_XML:
-            return f"is {shown(name)}, which holds the control character U+{ord(character):04X}"
+            return f"is {shown(name)}, which contains the control character U+{ord(character):04X}"
     return None

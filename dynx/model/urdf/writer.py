@@ -1,4 +1,4 @@
-"""A model as URDF text in canonical form: every number the shortest that reads back the same."""
+"""Writer of a model as URDF text in canonical form, each number the shortest that reads back exactly."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ if TYPE_CHECKING:
 
 
 def write_urdf(model: Model) -> str:
-    """`model` as URDF; reading it back gives an equal model, given the same base and gravity.
+    """Return `model` as URDF; reading it with the same base and gravity returns an equal model.
 
-    URDF has no word for the base and for gravity, so ``load`` must be told them again. A locked joint
-    is written as fixed, with its value in the extension ``<dynx_locked>``; an added frame as a
-    massless link on a fixed joint, marked by ``<dynx_frame>``; other readers skip both marks.
-    A limit of infinity is written as the largest double, which every engine can read.
-    Raises DescriptionError for a name that URDF cannot hold.
+    URDF cannot express the base and gravity, so they must be given to ``load`` again. A locked joint is
+    written as fixed, with its position in the extension ``<dynx_locked>``; an added frame as a massless link
+    on a fixed joint, marked by ``<dynx_frame>``; other readers ignore both marks. An infinite limit is
+    written as the largest double, which every engine can read. Raises DescriptionError for a name that URDF
+    cannot express.
     """
     lines = ['<?xml version="1.0"?>', f"<robot name={_name(model.name)}>"]
     for link in model.links:
@@ -103,5 +103,5 @@ def _number(value: float) -> str:
 def _name(name: str) -> str:
     fault = name_fault(name)
     if fault is not None:
-        raise DescriptionError(f"a name that URDF cannot hold: it {fault}")
+        raise DescriptionError(f"a name that URDF cannot express: it {fault}")
     return quoteattr(name)

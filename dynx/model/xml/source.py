@@ -1,8 +1,8 @@
-"""XML text that can be edited in place: only what must change changes.
+"""XML text that can be edited in place, changing only what an edit replaces.
 
-`read_xml` gives what a document says; `XmlSource` also knows where it says it. An edit replaces a
-stretch of the text, so comments, order, quotes and white space everywhere else stay as they are. An
-`XmlSource` is never changed: editing gives a new one, read afresh.
+`read_xml` returns the content of a document; `XmlSource` also stores the position of every element and
+attribute. An edit replaces a range of the text, so comments, order, quotes and white space elsewhere are
+preserved. An `XmlSource` is immutable: editing returns a new one, parsed again.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ from xml.sax.saxutils import quoteattr
 
 from dynx.model.elements import Note
 from dynx.model.xml.reading import read_xml
-from dynx.model.xml.text import TextForm, decoded, without_ends
+from dynx.model.xml.text import TextForm, decode_with_encoding, strip_ends
 
 _DECLARED = re.compile(r"""<\?xml[^>]*?\bencoding\s*=\s*["']([A-Za-z0-9._-]+)["']""")
 _LINE_END = re.compile(rb"\r\n|\r|\n")
-_BARE_FEED = re.compile(rb"(?<!\r)\n")
+_BARE_LINE_FEED = re.compile(rb"(?<!\r)\n")
 _ATTRIBUTE = re.compile(rb"""\s+([^\s=/>]+)\s*=\s*("[^"]*"|'[^']*')""")
 
 
 @dataclass(frozen=True)
 class Span:
-    """The bytes from `start` up to, without, `end`."""
+    """The bytes from `start` up to but excluding `end`."""
 
     start: int
     end: int
@@ -34,7 +34,9 @@ class Span:
 
 @dataclass(eq=False, repr=False)
 class SourceElement:
-    """An element and where it stands: the whole of it, and each attribute with the blank before it."""
+    """An element with its position: the span of the element, and of each attribute with the white space
+    before it.
+    """
 
     tag: str
     attributes: dict[str, str]
@@ -54,15 +56,15 @@ class SourceElement:
         return self.span == self.start_tag
 
     def all(self, tag: str) -> list[SourceElement]:
-        """The elements of that tag directly inside, in document order."""
+        """Return the child elements of that tag, in document order."""
         return [child for child in self.children if child.tag == tag]
 
     def first(self, tag: str) -> SourceElement | None:
-        """The first element of that tag directly inside: the one engines use."""
+        """Return the first child element of that tag, which engines use, or None."""
         return next((child for child in self.children if child.tag == tag), None)
 
     def walk(self) -> Iterator[SourceElement]:
-        """This element and all below it, in document order."""
+        """Yield this element and all elements below it, in document order."""
         waiting = [self]
         while waiting:
             element = waiting.pop()
@@ -72,7 +74,7 @@ class SourceElement:
 
 @dataclass(frozen=True)
 class Edit:
-    """One stretch of the text, and what stands there instead; edits of one call do not overlap."""
+    """Replacement of the bytes from `start` to `end` by `text`; edits applied together must not overlap."""
 
     start: int
     end: int
@@ -80,18 +82,20 @@ class Edit:
 
 
 class XmlSource:
-    """The text of a document with its tree of elements.
+    """Text of a document with its tree of elements.
 
-    `data` may be text or bytes in any encoding that `dynx.load` reads; positions are those of the
-    text in UTF-8. Raises DescriptionError for what is no XML, as `read_xml` does.
+    `data` may be text, or bytes in any encoding that `dynx.load` reads; positions refer to the text in UTF-8.
+    Raises DescriptionError for text that is not XML, as `read_xml` does.
     """
 
     def __init__(self, data: str | bytes, source: str = "<string>") -> None:
         notes: list[Note] = []
-        # For its limits and its errors; the walk below relies on well-formed text.
+        # Checks limits and raises errors; `_SourceParser` relies on well-formed text.
         read_xml(data, source, notes)
-        whole, encoding = decoded(data, source, notes) if isinstance(data, bytes) else (data, None)
-        text, self._lines_before = without_ends(whole, notes)
+        whole, encoding = (
+            decode_with_encoding(data, source, notes) if isinstance(data, bytes) else (data, None)
+        )
+        text, self._lines_before = strip_ends(whole, notes)
         if encoding is None:
             self.form = TextForm(_declared_encoding(text))
         else:
@@ -101,7 +105,7 @@ class XmlSource:
         self.data = text.encode("utf-8")
 
     def _with_data(self, data: bytes) -> XmlSource:
-        """The same document with other text: made by edits of well-formed text, so it is not checked."""
+        """Return the same document with other text, which is well-formed by construction and not checked."""
         new = object.__new__(XmlSource)
         new.data, new.source, new.form = data, self.source, self.form
         new._lines_before = self._lines_before
@@ -113,24 +117,24 @@ class XmlSource:
         return self.data.decode("utf-8")
 
     def to_bytes(self) -> bytes:
-        """The document as it would be in a file: in the encoding and between the ends that it was read in.
+        """Return the document as bytes of a file, in the encoding and with the ends that it was read with.
 
-        What was read from text has the encoding that it declares, else UTF-8.
+        A document read from text has the encoding that it declares, or else UTF-8.
         """
         return self.form.encode(self.text)
 
     @cached_property
     def root(self) -> SourceElement:
         """The root element."""
-        return _Walk(self.data, self._lines_before).root()
+        return _SourceParser(self.data, self._lines_before).root()
 
     def edited(self, *edits: Edit) -> XmlSource:
-        """The document with the edits applied."""
+        """Return the document with the edits applied."""
         parts, at = [], 0
         for edit in sorted(edits, key=lambda edit: (edit.start, edit.end)):
             if edit.start < at:
                 raise ValueError(f"edits overlap at byte {edit.start} of {self.source}")
-            text = _BARE_FEED.sub(self._line_end, edit.text.encode("utf-8"))
+            text = _BARE_LINE_FEED.sub(self._line_end, edit.text.encode("utf-8"))
             parts += [self.data[at : edit.start], text]
             at = edit.end
         return self._with_data(b"".join([*parts, self.data[at:]]))
@@ -138,7 +142,7 @@ class XmlSource:
     # -- edits --------------------------------------------------------------------------------
 
     def setting(self, element: SourceElement, name: str, value: str) -> Edit:
-        """Give an attribute a value, in the place where it stands or at the end of the start tag."""
+        """Return the edit that sets an attribute, at its position or at the end of the start tag."""
         written = f" {name}={quoteattr(value)}"
         place = element.places.get(name)
         if place is not None:
@@ -152,16 +156,16 @@ class XmlSource:
         return Edit(at, at, written)
 
     def removing_attribute(self, element: SourceElement, name: str) -> Edit:
-        """Take an attribute away, with the blank before it."""
+        """Return the edit that removes an attribute and the white space before it."""
         place = element.places[name]
         return Edit(place.start, place.end, "")
 
     def replacing(self, element: SourceElement, text: str) -> Edit:
-        """Put other text in the place of an element; its further lines are indented like the first."""
+        """Return the edit that replaces an element by text, with further lines indented like the first."""
         return Edit(element.span.start, element.span.end, self._indented(text, self.indent_of(element)))
 
     def removing(self, element: SourceElement) -> Edit:
-        """Take an element away, and its line where it stood alone."""
+        """Return the edit that removes an element, and its line if nothing else is on it."""
         start, end = element.span.start, element.span.end
         before = self.data.rfind(b"\n", 0, start) + 1
         after = self.data.find(b"\n", end)
@@ -171,7 +175,9 @@ class XmlSource:
         return Edit(start, end, "")
 
     def inserting(self, parent: SourceElement, text: str, *, first: bool = False) -> Edit:
-        """Put text, one or more lines, inside an element: behind what is there, or before it."""
+        """Return the edit that inserts lines of text as the last or, with `first`, the first child of an
+        element.
+        """
         indent = self.indent_of(parent) + self.unit
         lines = f"\n{indent}{self._indented(text, indent)}"
         if parent.empty:
@@ -185,26 +191,26 @@ class XmlSource:
         return Edit(at, at, lines)
 
     def inserting_after(self, element: SourceElement, text: str) -> Edit:
-        """Put text, one or more lines, behind an element, on lines of its own."""
+        """Return the edit that inserts lines of text after an element, on lines of their own."""
         indent = self.indent_of(element)
         return Edit(element.span.end, element.span.end, f"\n{indent}{self._indented(text, indent)}")
 
     # -- white space --------------------------------------------------------------------------
 
     def indent_of(self, element: SourceElement) -> str:
-        """The white space in front of an element, as far as its line holds nothing else."""
+        """Return the white space before an element, if nothing else precedes it on its line."""
         before = self.data.rfind(b"\n", 0, element.span.start) + 1
         front = self.data[before : element.span.start]
         return front[: len(front) - len(front.lstrip())].decode("utf-8")
 
     @cached_property
     def unit(self) -> str:
-        """One step of indentation, as the document's first child has it."""
+        """One level of indentation, as at the document's first child."""
         children = self.root.children
         return (self.indent_of(children[0]) if children else "") or "  "
 
     def excerpt(self, line: int, around: int = 1) -> list[tuple[int, str]]:
-        """The lines about `line` with their numbers, for showing."""
+        """Return the lines around `line` with their numbers."""
         lines = _LINE_END.split(self.data)
         numbers = range(line - self._lines_before - around, line - self._lines_before + around + 1)
         return [
@@ -213,18 +219,18 @@ class XmlSource:
 
     @cached_property
     def _line_end(self) -> bytes:
-        """How the document ends its first line: what is put in ends its lines likewise."""
-        feed = self.data.find(b"\n")
-        if feed >= 0:
-            return b"\r\n" if self.data[:feed].endswith(b"\r") else b"\n"
+        """Line ending of the document's first line, used for inserted text."""
+        line_feed = self.data.find(b"\n")
+        if line_feed >= 0:
+            return b"\r\n" if self.data[:line_feed].endswith(b"\r") else b"\n"
         return b"\r" if b"\r" in self.data else b"\n"
 
     def _indented(self, text: str, indent: str) -> str:
         return text.replace("\n", f"\n{indent}")
 
 
-class _Walk:
-    """One pass of expat over well-formed text, noting where everything stands."""
+class _SourceParser:
+    """One pass of expat over well-formed text that records the positions of elements and attributes."""
 
     def __init__(self, data: bytes, lines_before: int) -> None:
         self._data = data
@@ -239,7 +245,7 @@ class _Walk:
         try:
             self._parser.Parse(self._data, True)
         finally:
-            # The handlers are methods of this object: without this the two keep each other alive.
+            # The handlers are methods of this object: the reference cycle would keep both alive.
             self._parser.StartElementHandler = None
             self._parser.EndElementHandler = None
         assert self._root is not None
@@ -271,7 +277,7 @@ class _Walk:
 
 
 def _declared_encoding(text: str) -> str:
-    """The encoding that text declares, where Python can write it so; else UTF-8."""
+    """Return the encoding that text declares if Python can encode the text with it, else UTF-8."""
     declared = _DECLARED.match(text)
     encoding = declared.group(1) if declared else "utf-8"
     try:

@@ -1,4 +1,4 @@
-"""Bytes of an XML document to text: byte-order marks, declared encodings, stray ends."""
+"""Decoding of XML documents: byte-order marks, declared encodings, stray characters at the ends."""
 
 from __future__ import annotations
 
@@ -25,34 +25,34 @@ _NOT_CHARACTER_SETS = frozenset(
 
 @dataclass(frozen=True)
 class TextForm:
-    """What a document is besides its text: its encoding, and what stands in front of the text and behind."""
+    """Encoding of a document, and the characters before and after its XML text."""
 
     encoding: str = "utf-8"
     front: str = ""
     end: str = ""
 
     def encode(self, text: str) -> bytes:
-        """The bytes of a document of this form; characters that its encoding lacks become references."""
+        """Return the bytes of the document; characters missing in the encoding become references."""
         return f"{self.front}{text}{self.end}".encode(self.encoding, "xmlcharrefreplace")
 
 
 def decode(data: bytes, source: str, notes: list[Note]) -> str:
-    """The text of `data`, by its byte-order mark, its declared encoding, or as UTF-8.
+    """Return the text of `data`, decoded by its byte-order mark, its declared encoding, or as UTF-8.
 
-    Text that is not UTF-8 though it should be is read as Latin-1, with a note: such bytes are found
-    in comments of old files, which every engine reads.
+    Text that should be UTF-8 but is not is read as Latin-1, with a note: such bytes occur in comments of old
+    files, which every engine reads.
     """
-    return decoded(data, source, notes)[0].removeprefix("\ufeff")
+    return decode_with_encoding(data, source, notes)[0].removeprefix("\ufeff")
 
 
-def decoded(data: bytes, source: str, notes: list[Note]) -> tuple[str, str]:
-    """The text as `decode` gives it, but with its byte-order mark, and the encoding that it is in."""
+def decode_with_encoding(data: bytes, source: str, notes: list[Note]) -> tuple[str, str]:
+    """Return the text like `decode`, but with its byte-order mark, and its encoding."""
     for mark, encoding in _MARKS:
         if data.startswith(mark):
-            return "\ufeff" + _strictly(data[len(mark) :], encoding, source), encoding
+            return "\ufeff" + _decode_strictly(data[len(mark) :], encoding, source), encoding
     for start, encoding in ((b"<\0", "utf-16-le"), (b"\0<", "utf-16-be")):
         if data.startswith(start):
-            return _strictly(data, encoding, source), encoding
+            return _decode_strictly(data, encoding, source), encoding
     declared = _DECLARED.match(data)
     name = declared.group(1).decode("ascii").lower().replace("_", "-") if declared else "utf-8"
     # The declaration itself was read as ASCII, so the text cannot be in 16 or 32 bits.
@@ -63,13 +63,13 @@ def decoded(data: bytes, source: str, notes: list[Note]) -> tuple[str, str]:
             line = data.count(b"\n", 0, error.start) + 1
             notes.append(Note("not valid UTF-8; read as Latin-1", line))
             return data.decode("latin-1"), "latin-1"
-    return _strictly(data, name, source), name
+    return _decode_strictly(data, name, source), name
 
 
-def without_ends(text: str, notes: list[Note]) -> tuple[str, int]:
-    """`text` without a byte-order mark, leading white space and trailing null characters.
+def strip_ends(text: str, notes: list[Note]) -> tuple[str, int]:
+    """Return `text` without a byte-order mark, leading white space and trailing null characters.
 
-    Returns it with the number of lines that were taken away in front.
+    Also returns the number of lines removed in front.
     """
     text = text.removeprefix("\ufeff")
     if text.endswith("\0"):
@@ -80,14 +80,14 @@ def without_ends(text: str, notes: list[Note]) -> tuple[str, int]:
     return stripped, len(re.findall(r"\r\n|\r|\n", front))
 
 
-def _strictly(data: bytes, encoding: str, source: str) -> str:
+def _decode_strictly(data: bytes, encoding: str, source: str) -> str:
     if encoding in _NOT_CHARACTER_SETS:
-        message = f"declares the encoding {shown(encoding)}, which is no character set"
+        message = f"declares the encoding {shown(encoding)}, which is not a character set"
         raise DescriptionError(message, source=source)
     try:
         return data.decode(encoding)
     except LookupError:
-        message = f"declares the encoding {shown(encoding)}, which is not known"
+        message = f"declares the encoding {shown(encoding)}, which is unknown"
         raise DescriptionError(message, source=source) from None
     except UnicodeError as error:
         reason = getattr(error, "reason", str(error))

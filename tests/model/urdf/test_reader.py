@@ -1,4 +1,4 @@
-"""A description is read as it is meant, an untidy one too, with a note where it was not plain."""
+"""Reading descriptions, ambiguous ones included, with a note for each ambiguity."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ UNTIDY: dict[str, tuple[str, str]] = {
 
 
 @pytest.mark.parametrize("case", UNTIDY)
-def test_an_untidy_joint_is_read_as_meant(case: str) -> None:
+def test_a_badly_written_joint_is_read_as_meant(case: str) -> None:
     inside, note = UNTIDY[case]
     model = load(joint(f'<origin xyz="1 2 3" rpy="0.1 0.2 0.3"/><axis xyz="0 0 1"/>{inside}'))
     assert model == PLAIN
@@ -103,7 +103,7 @@ def test_an_untidy_joint_is_read_as_meant(case: str) -> None:
         "1\u00a02 3",
     ],
 )
-def test_numbers_and_white_space_in_any_spelling(vector: str) -> None:
+def test_numbers_and_white_space_in_any_notation(vector: str) -> None:
     assert load(joint(f'<origin xyz="{vector}"/>')).joints[0].origin.xyz == (1.0, 2.0, 3.0)
 
 
@@ -112,7 +112,7 @@ def test_an_origin_that_is_absent_or_empty_is_the_identity(origin: str) -> None:
     assert load(joint(origin)).joints[0].origin == Pose()
 
 
-def test_elements_of_other_programs_are_passed_over() -> None:
+def test_elements_of_other_programs_are_skipped() -> None:
     inside = (
         '<link name="a"><visual><geometry><mesh filename="package://gone/x.dae"/></geometry></visual>'
         '<collision/><contact><lateral_friction value="1"/></contact></link>'
@@ -146,7 +146,7 @@ def test_a_robot_without_a_name_is_noted(attribute: str) -> None:
 NOTED = {
     "effort": (joint(limit='<limit lower="0" upper="1" velocity="1"/>'), "no effort limit; it is read as"),
     "velocity": (joint(limit='<limit lower="0" upper="1" effort="1"/>'), "no velocity limit; it is read as"),
-    "lower": (joint(limit='<limit upper="1" effort="1"/>'), "no lower limit; URDF says it is then 0"),
+    "lower": (joint(limit='<limit upper="1" effort="1"/>'), "no lower limit; URDF defines it as 0"),
     "both": (joint(limit="<limit/>"), "no lower and no upper limit"),
     "order": (joint(limit='<limit lower="2" upper="1"/>'), "lower limit 2.0 above upper limit 1.0"),
     "continuous": (joint(limit=LIMIT, kind="continuous"), "its lower and upper limits were ignored"),
@@ -157,19 +157,19 @@ NOTED = {
     "second inertial": (link(INERTIAL * 2), "<link> has 2 <inertial>"),
     "negative moment": (link(INERTIAL.replace("0.05", "-0.05")), "principal moment -0.05"),
     "triangle": (link(INERTIAL.replace("0.05", "0.08")), "exceeds the sum of the others"),
-    "inertia without mass": (link(INERTIAL.replace("2.5", "0")), "is not zero though its mass is"),
+    "inertia without mass": (link(INERTIAL.replace("2.5", "0")), "is not zero although its mass is"),
     "mimic of nobody": (joint('<mimic joint="k"/>'), "mimics 'k', which does not exist"),
 }
 
 
 @pytest.mark.parametrize("case", NOTED)
-def test_what_could_surprise_is_noted_with_its_line(case: str) -> None:
-    text, says = NOTED[case]
-    (note,) = [note for note in load(text).notes if says in note.message]
+def test_surprising_content_is_noted_with_its_line(case: str) -> None:
+    text, message = NOTED[case]
+    (note,) = [note for note in load(text).notes if message in note.message]
     assert note.line is not None
 
 
-def test_limits_that_are_absent_or_the_largest_float_are_none() -> None:
+def test_limits_that_are_absent_or_the_largest_float_are_infinite() -> None:
     limits = load(joint(limit='<limit lower="-1.7976931348623157e308" upper="1"/>')).joints[0].limits
     assert limits == Limits(-math.inf, 1.0, math.inf, math.inf)
 
@@ -183,14 +183,14 @@ def test_an_end_that_is_absent_is_zero_as_the_format_says(limit: str, ends: tupl
     assert (limits.lower, limits.upper) == ends
 
 
-def test_numbers_of_an_impossible_inertia_are_used_as_they_stand() -> None:
+def test_an_impossible_inertia_is_not_changed() -> None:
     assert load(link(INERTIAL.replace("0.05", "-0.05"))).inertial("a").izz == -0.05
 
 
 @pytest.mark.parametrize("exponent", [-320, -300, 0, 300, 307])
 def test_an_axis_of_any_length_becomes_a_unit_vector(exponent: int) -> None:
     x, y, z = load(joint(f'<axis xyz="3e{exponent} 0 -4e{exponent}"/>')).joints[0].axis
-    # A length below the smallest normal float has few digits left.
+    # A norm below the smallest normal float has lost digits.
     digits = 4.0 * 2.0**-52 if exponent > -308 else 1e-3
     assert y == 0.0
     assert max(abs(x - 0.6), abs(z + 0.8)) <= digits
@@ -216,7 +216,7 @@ FLOATING = robot(
 )
 
 
-def test_a_floating_joint_below_an_empty_root_is_what_base_says() -> None:
+def test_a_floating_joint_below_an_empty_root_is_left_to_base() -> None:
     fixed, floating = load(FLOATING), load(FLOATING, base="floating")
     assert (fixed.nq, fixed.nv, floating.nq, floating.nv) == (0, 0, 7, 6)
     assert fixed.frame_names == floating.frame_names == ("world", "body")
@@ -272,7 +272,7 @@ ODD_BYTES = [
     ),
     st.sampled_from(["fixed", "floating"]),
 )
-def test_no_edit_of_a_real_file_gives_anything_but_a_model_or_our_error(
+def test_any_edit_of_a_real_file_gives_a_model_or_a_dynx_error(
     edits: list[tuple[int, int, bytes]], base: str
 ) -> None:
     data = REAL
@@ -290,6 +290,6 @@ def test_no_edit_of_a_real_file_gives_anything_but_a_model_or_our_error(
 
 
 @given(st.one_of(st.text(), st.binary()))
-def test_no_text_at_all_gives_anything_but_our_error(data: str | bytes) -> None:
+def test_any_text_gives_a_dynx_error(data: str | bytes) -> None:
     with pytest.raises(ModelError):
         load(b"<" + data if isinstance(data, bytes) else "<" + data)

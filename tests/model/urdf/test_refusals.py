@@ -1,4 +1,4 @@
-"""Each bad description gives one error, with its line and its reason."""
+"""Malformed descriptions raise one error each, with line and reason."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ BAD: dict[str, tuple[str, int | None, str]] = {
     "a child that is no link": (
         robot('<link name="a"/>\n<joint name="j" type="fixed"><parent link="a"/><child link="A"/></joint>'),
         3,
-        "child of joint 'j' is 'A', which is no link; did you mean 'a'?",
+        "child of joint 'j' is 'A', which is not a link; did you mean 'a'?",
     ),
     "no limit": (joint(limit=""), 4, "joint 'j' is revolute and has no <limit>; wanted <limit lower="),
     "no limit of a prismatic joint": (joint(limit="", kind="prismatic"), 4, 'upper="..."/> in m'),
@@ -73,7 +73,7 @@ BAD: dict[str, tuple[str, int | None, str]] = {
     "axis without xyz": (joint("<axis/>"), 5, "<axis> of joint 'j' has no attribute xyz"),
     "two numbers": (joint('\n<axis xyz="0 1"/>'), 6, "xyz in <axis> of joint 'j' is '0 1'; wanted three"),
     "four numbers": (joint('<origin rpy="0 1 2 3"/>'), 5, "rpy in <origin> of joint 'j'"),
-    "commas": (joint('<origin xyz="0,1,2"/>'), 5, "no comma is read"),
+    "commas": (joint('<origin xyz="0,1,2"/>'), 5, "separated by white space"),
     "not a number": (joint('<origin xyz="0 nan 2"/>'), 5, "is '0 nan 2'; wanted three numbers"),
     "infinity": (joint('<origin xyz="0 inf 2"/>'), 5, "wanted three numbers"),
     "overflow": (joint('<origin xyz="0 1e999 2"/>'), 5, "wanted three numbers"),
@@ -88,7 +88,7 @@ BAD: dict[str, tuple[str, int | None, str]] = {
     "empty number": (joint(limit='<limit lower="" upper="1"/>'), 4, "is ''; wanted a number"),
     "damping in words": (joint('<dynamics damping="much"/>'), 5, "damping in <dynamics> of joint 'j'"),
     "mimic of nothing": (joint('<mimic multiplier="2"/>'), 5, "<mimic> of joint 'j' has no joint"),
-    "mimic of itself": (joint('<mimic joint="j"/>'), 4, "follow each other in a circle: 'j' -> 'j'"),
+    "mimic of itself": (joint('<mimic joint="j"/>'), 4, "follow each other in a cycle: 'j' -> 'j'"),
     "unknown type": (joint(kind="revolut"), 4, "unknown type 'revolut'; did you mean 'revolute'"),
     "no type": (joint().replace(' type="revolute"', ""), 4, "joint 'j' has no type; wanted one of"),
     "no parent": (joint().replace('<parent link="a"/>', ""), 4, "joint 'j' has no <parent>"),
@@ -99,7 +99,7 @@ BAD: dict[str, tuple[str, int | None, str]] = {
     ),
     "nameless link": (robot("<link/>"), 2, "a <link> has no name; wanted name="),
     "empty name": (robot('<link name=""/>'), 2, "the name of a <link> is empty"),
-    "control character": (robot('<link name="a&#10;b"/>'), 2, r"is 'a\nb', which holds the control"),
+    "control character": (robot('<link name="a&#10;b"/>'), 2, r"is 'a\nb', which contains the control"),
     "control character of the second kind": (robot('<link name="a&#x85;"/>'), 2, "U+0085"),
     "long name": (robot(f'<link name="{"x" * 10_000}"/>'), 2, "has 10000 characters; at most 1000"),
     "long joint name": (joint().replace('"j"', f'"{"x" * 1001}"'), 4, "has 1001 characters"),
@@ -117,17 +117,17 @@ BAD: dict[str, tuple[str, int | None, str]] = {
     "no inertia": (link('<inertial>\n<mass value="1"/></inertial>'), 3, "has no <inertia>"),
     "no ixy": (link(INERTIAL.replace('ixy="0.001"', "")), 6, "<inertia> of link 'a' has no attribute ixy"),
     "inertia not a number": (link(INERTIAL.replace("0.03", "NaN")), 6, "ixx in <inertia> of link 'a'"),
-    "too many links": (chain(10_001), 10_002, "holds more than 10000 <link>, the most accepted"),
+    "too many links": (chain(10_001), 10_002, "contains more than 10000 <link>, the limit"),
     "cut off": (joint()[:-30], 4, "ends too early"),
 }
 
 
 @pytest.mark.parametrize("case", BAD)
 def test_a_bad_description_is_refused_with_line_and_reason(case: str) -> None:
-    text, line, says = BAD[case]
+    text, line, message = BAD[case]
     with pytest.raises(DescriptionError) as caught:
         load(text)
-    assert says in str(caught.value)
+    assert message in str(caught.value)
     assert caught.value.line == line
     assert str(caught.value).startswith("<string>:" if line is None else f"<string>:{line}: ")
     assert len(str(caught.value)) < 600
@@ -135,7 +135,7 @@ def test_a_bad_description_is_refused_with_line_and_reason(case: str) -> None:
 
 
 @pytest.mark.parametrize("kind", ["planar", "spherical", "ball", "floating"])
-def test_joints_of_several_freedoms_are_refused_by_name(kind: str) -> None:
+def test_joints_of_several_degrees_of_freedom_raise(kind: str) -> None:
     with pytest.raises(UnsupportedFeatureError, match=f"joint 'j' is {kind}.*use") as caught:
         load(joint(kind=kind).replace('<link name="a"/>', f'<link name="a">{INERTIAL}</link>'))
     assert caught.value.line is not None
@@ -149,6 +149,6 @@ def test_unexpanded_xacro_is_refused_by_name() -> None:
 def test_a_chain_of_a_hundred_thousand_links_is_refused_quickly() -> None:
     text = chain(100_000)
     start = time.perf_counter()
-    with pytest.raises(DescriptionError, match="holds more than 10000 <link>"):
+    with pytest.raises(DescriptionError, match="contains more than 10000 <link>"):
         load(text)
     assert time.perf_counter() - start < 5.0

@@ -1,4 +1,4 @@
-"""What is written is read back as the same model, by dynx and by other readers."""
+"""Written models are read back equal, by dynx and by other readers."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ names = st.text(
 
 
 @given(st.lists(names, min_size=5, max_size=5, unique=True), st.lists(odd_floats, min_size=16, max_size=16))
-def test_any_name_and_any_number_survive(words: list[str], numbers: list[float]) -> None:
+def test_any_name_and_any_number_are_preserved(words: list[str], numbers: list[float]) -> None:
     robot, a, b, first, second = words
     n = iter(numbers)
     inertial = Inertial(abs(next(n)), Pose((next(n), next(n), next(n))), next(n), next(n), next(n))
@@ -89,11 +89,11 @@ def test_frames_that_were_added_stay_frames_and_are_links_to_others() -> None:
 
 
 @pytest.mark.parametrize("bad", ["", "a\nb", "\x00", "\ud800", "x" * 1001, "\uffff"])
-def test_a_name_that_urdf_cannot_hold_is_refused(bad: str) -> None:
+def test_a_name_that_urdf_cannot_express_raises(bad: str) -> None:
     model = Model.build("r", [Link("a")], [])
-    with pytest.raises(DescriptionError, match="a name that URDF cannot hold"):
+    with pytest.raises(DescriptionError, match="a name that URDF cannot express"):
         Model.build("r", [Link(bad)], []).to_urdf()
-    with pytest.raises(DescriptionError, match="a name that URDF cannot hold"):
+    with pytest.raises(DescriptionError, match="a name that URDF cannot express"):
         replace(model, name=bad).to_urdf()
 
 

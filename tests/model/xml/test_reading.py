@@ -1,4 +1,4 @@
-"""The hardened reading of XML: encodings, line numbers, and what is refused."""
+"""Hardened XML reader: encodings, line numbers, and errors."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def test_lines_are_counted_whatever_ends_them(end: str) -> None:
         '<?xml version="1.0" encoding="UTF-16"?><a n="ä☃𝄞"/>'.encode("utf-16-le"),
         codecs.BOM_UTF32_LE + "<a n='ä☃𝄞'/>".encode("utf-32-le"),
         "\r\n\t <?xml version='1.0' encoding='UTF-8'?>\n<a n='ä☃𝄞'/>".encode(),
-        # A declaration that was left behind when the text was saved in another encoding.
+        # The declaration was not updated when the text was saved in another encoding.
         '<?xml version="1.0" encoding="UTF-16"?><a n="ä☃𝄞"/>'.encode(),
         '<?xml version="1.0" encoding="ISO-8859-1"?><a n="ä☃𝄞"/>',
     ],
@@ -77,7 +77,7 @@ def test_bytes_that_are_not_utf8_are_latin1_with_a_note() -> None:
 @pytest.mark.parametrize(
     "encoding", ["no-such", "idna", "rot13", "hex", "zlib", "unicode_escape", "undefined"]
 )
-def test_an_encoding_that_is_none_is_refused(encoding: str) -> None:
+def test_an_invalid_encoding_raises(encoding: str) -> None:
     error = refusal(f"<?xml version='1.0' encoding='{encoding}'?><a/>".encode())
     assert "encoding" in error.message
 
@@ -89,7 +89,7 @@ def test_null_characters_after_the_end_are_noted() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "line", "says"),
+    ("text", "line", "message"),
     [
         ("", 1, "ends too early"),
         ("  \n ", 2, "ends too early"),
@@ -109,9 +109,9 @@ def test_null_characters_after_the_end_are_noted() -> None:
         ("<a>\n\ud800</a>", 2, "surrogate"),
     ],
 )
-def test_what_is_not_xml_is_refused_with_its_line(text: str, line: int, says: str) -> None:
+def test_malformed_xml_raises_with_its_line(text: str, line: int, message: str) -> None:
     error = refusal(text)
-    assert says in error.message
+    assert message in error.message
     assert error.line == line
 
 
@@ -160,7 +160,7 @@ def test_too_many_elements_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "more than 10 elements" in refusal("<a>" + "<b/>" * 10 + "</a>").message
 
 
-def test_the_inside_of_an_opaque_element_is_checked_but_not_kept() -> None:
+def test_the_content_of_an_opaque_element_is_checked_but_not_stored() -> None:
     text = "<a><visual><b><visual/></b></visual><c/><visual/><d/></a>"
     root, _ = read(text, frozenset({"visual"}))
     assert [child.tag for child in root.children] == ["visual", "c", "visual", "d"]

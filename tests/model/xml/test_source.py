@@ -1,4 +1,4 @@
-"""Editing XML in place: what must change changes, and nothing else."""
+"""Editing XML in place changes only the edited ranges."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ ARM = """<?xml version='1.0'?>
 
 
 def same_tree(read: Element, placed: SourceElement) -> bool:
-    """Whether two readings have the same tags, attributes, lines and children."""
+    """Return whether two trees have the same tags, attributes, lines and children."""
     return (
         (read.tag, read.attributes, read.line) == (placed.tag, placed.attributes, placed.line)
         and len(read.children) == len(placed.children)
@@ -45,7 +45,7 @@ def test_it_reads_what_the_reader_reads(text: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["ur5", "talos", "pr2"])
-def test_real_files_read_alike_and_every_place_is_right(name: str) -> None:
+def test_positions_of_all_elements_of_real_files(name: str) -> None:
     path = next(robot.path for robot in robots() if robot.name == name)
     source = XmlSource(path.read_bytes(), name)
     assert same_tree(read_xml(path.read_bytes(), name, []), source.root)
@@ -74,7 +74,7 @@ def test_an_attribute_is_set_and_all_else_stays(text: str, data: st.DataObject) 
 
 
 @given(urdf_text(), st.data())
-def test_what_is_inserted_can_be_taken_out_again(text: str, data: st.DataObject) -> None:
+def test_removing_an_inserted_element_restores_the_text(text: str, data: st.DataObject) -> None:
     source = XmlSource(text)
     parent = data.draw(st.sampled_from([each for each in source.root.walk() if not each.empty]))
     edited = source.edited(source.inserting(parent, "<new/>", first=data.draw(st.booleans())))
@@ -107,12 +107,12 @@ def test_edits_keep_comments_quotes_and_indentation() -> None:
     )
 
 
-def test_an_element_alone_on_its_line_goes_with_its_line() -> None:
+def test_an_element_alone_on_its_line_is_removed_with_the_line() -> None:
     source = XmlSource("<r>\n  <a/>\n  <b/>\n</r>")
     assert source.edited(source.removing(source.root.children[0])).text == "<r>\n  <b/>\n</r>"
 
 
-def test_what_stands_behind_an_element_stays() -> None:
+def test_text_behind_an_element_is_preserved() -> None:
     source = XmlSource("<r>\n  <a/> <!-- why -->\n  <b/><c/>\n</r>")
     a, b, c = source.root.children
     assert source.edited(source.removing(a)).text == "<r>\n   <!-- why -->\n  <b/><c/>\n</r>"
@@ -129,13 +129,13 @@ def test_line_ends_are_kept(end: str) -> None:
     assert edited.text == end.join(lines)
 
 
-def test_edits_that_overlap_are_a_mistake_of_the_program() -> None:
+def test_overlapping_edits_raise() -> None:
     source = XmlSource("<r><a/></r>")
     with pytest.raises(ValueError, match="overlap"):
         source.edited(Edit(3, 7, ""), Edit(4, 5, "x"))
 
 
-def test_lines_count_what_stands_before_the_first_element() -> None:
+def test_line_numbers_include_text_before_the_first_element() -> None:
     source = XmlSource("\ufeff\n\n<r>\n<a/>\n</r>")
     assert source.root.children[0].line == 4
     assert source.excerpt(4, around=1) == [(3, "<r>"), (4, "<a/>"), (5, "</r>")]
@@ -150,6 +150,6 @@ def test_a_declared_encoding_is_kept() -> None:
     )
 
 
-def test_what_is_no_xml_is_refused_with_file_and_line() -> None:
+def test_malformed_xml_raises_with_file_and_line() -> None:
     with pytest.raises(DescriptionError, match=r"arm\.urdf:2"):
         XmlSource("<r>\n<a></r>", "arm.urdf")
