@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 
+from dynx.agreement.report import Failure
 from dynx.agreement.tolerances import BAR
 from dynx.doctor.counterexample.search import smallest_counterexample
 from dynx.doctor.counterexample.trials import difference_of
@@ -26,7 +27,6 @@ from dynx.doctor.prove.mending import (
 )
 from dynx.doctor.report import (
     DoctorReport,
-    Failure,
     Unexplained,
 )
 from dynx.doctor.report_assembly import all_findings, first_report, run_time_calls, with_after

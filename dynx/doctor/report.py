@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from dynx._version import __version__
+from dynx.agreement.report import Failure
 from dynx.files.documents import document_of, to_json_values
 from dynx.loaded.difference import Deviation
 from dynx.model.xml.text import TextForm
@@ -109,14 +110,6 @@ class RunTimeCall:
     code: str
 
 
-@dataclass(frozen=True)
-class Failure:
-    """Why a robot could not be examined."""
-
-    type: str
-    message: str
-
-
 @dataclass(frozen=True, repr=False)
 class DoctorReport:
     """Why engines differ on a file, with proof; true in a condition if they do not differ.
@@ -193,7 +186,7 @@ class DoctorReport:
         return f"engines differ, for {len(causes)} cause{'s' * (len(causes) != 1)}, {share} proved"
 
     def to_dict(self) -> dict[str, Any]:
-        """One entry of ``results``, of plain numbers, strings and lists."""
+        """Make the entry of ``results``, of plain numbers, strings and lists."""
         return document_of(DoctorEntry, replace(self, seconds=round(self.seconds, 4)))
 
 
@@ -246,7 +239,7 @@ class DoctorDocument:
 
 
 def results_document(reports: Iterable[DoctorReport], not_done: Sequence[str] = ()) -> dict[str, Any]:
-    """The JSON document of many reports; `not_done` names the robots that an interrupted run left out."""
+    """Make the JSON document of reports; `not_done` names the robots that an interrupted run left out."""
     reports = list(reports)
     summary = DoctorSummary(
         robots=len(reports),

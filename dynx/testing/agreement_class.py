@@ -1,4 +1,4 @@
-"""`agreement_tests`: the tests of a robot as a class, for a test file."""
+"""Tests of a robot as a class of a test file."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ def agreement_tests(
     base: Literal["fixed", "floating", "both"] = "fixed",
     backends: Sequence[str] | None = None,
 ) -> type:
-    """A test class: do engines agree on this robot, quantity by quantity and law by law?
+    """Make a test class: do engines agree on this robot, in each quantity and law of mechanics?
 
         TestMyRobot = agreement_tests("my.urdf")
 
     `robot` is a URDF file, its path relative to the test file, or a name of the library. `backends` are
     the engines to compare (default: all that are installed). Name the class so that pytest collects it.
-    Raises ArgumentError for another base; what else is wrong fails the tests.
+    Raises ArgumentError for another base; other invalid arguments fail the tests.
     """
     if base not in _BASES:
         raise ArgumentError(f"base is {shown(base)}{nearest(str(base), _BASES)}")

@@ -14,7 +14,7 @@ from dynx.loaded import LoadedRobot
 from dynx.model import Inertial
 from dynx.reference.backend import ReferenceBackend
 from dynx.spatial.scalar import Floats
-from tests.doctor.wilful_engine import HEAVY, NAME, SECRET, WilfulEngine
+from tests.doctor.faulty_engine import HEAVY, NAME, SECRET, FaultyEngine
 from tests.rules.documents import case_of, joint, link
 
 FRAMES = case_of(
@@ -32,7 +32,7 @@ def diagnosed(monkeypatch: pytest.MonkeyPatch, engine: type[LoadedRobot], text: 
     return diagnose(text, engines=[NAME], counterexamples=False)
 
 
-class OnlyFlanges(WilfulEngine):
+class OnlyFlanges(FaultyEngine):
     """Takes a flange for a body, and no other frame."""
 
     def __init__(self, *arguments: Any) -> None:
@@ -45,7 +45,7 @@ class OnlyFlanges(WilfulEngine):
         self.right = ReferenceBackend(replace(model, links=tuple(links)))
 
 
-class Shy(WilfulEngine):
+class Shy(FaultyEngine):
     """Torques of the second joint are off by 1e-9 of their size."""
 
     def inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
@@ -65,11 +65,11 @@ def test_only_the_place_that_matters_is_mended(monkeypatch: pytest.MonkeyPatch) 
 def test_every_place_that_matters_is_mended_and_the_file_is_then_alike(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    report = diagnosed(monkeypatch, WilfulEngine, FRAMES.source.text)
+    report = diagnosed(monkeypatch, FaultyEngine, FRAMES.source.text)
     assert [(each.link, each.proved) for each in report.differences] == [("flange", True), ("camera", True)]
     (engine,) = report.engines
     assert max(engine.before.values()) > report.tolerance >= max(engine.after.values()) == report.residual
-    assert diagnosed(monkeypatch, WilfulEngine, report.mended or "").alike
+    assert diagnosed(monkeypatch, FaultyEngine, report.mended or "").alike
 
 
 def test_a_small_difference_that_no_rule_explains_is_said_with_its_joint(
@@ -86,7 +86,7 @@ def test_a_small_difference_that_no_rule_explains_is_said_with_its_joint(
 
 
 def test_a_file_that_is_refused_to_the_end_is_not_explained(monkeypatch: pytest.MonkeyPatch) -> None:
-    report = diagnosed(monkeypatch, WilfulEngine, case_of(link("base"), f"<!-- {SECRET} -->").source.text)
+    report = diagnosed(monkeypatch, FaultyEngine, case_of(link("base"), f"<!-- {SECRET} -->").source.text)
     (left,) = report.unexplained
     assert left.quantity == LOADING
     assert report.engines[0].refused_after == report.engines[0].refused == f"robot.urdf is a {SECRET}"
@@ -95,6 +95,6 @@ def test_a_file_that_is_refused_to_the_end_is_not_explained(monkeypatch: pytest.
 
 def test_meshes_that_are_nowhere_are_no_cause(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     mesh = f'<visual><geometry><mesh filename="{tmp_path.name}/none.stl"/></geometry></visual>'
-    report = diagnosed(monkeypatch, WilfulEngine, case_of(link("base", mesh)).source.text)
+    report = diagnosed(monkeypatch, FaultyEngine, case_of(link("base", mesh)).source.text)
     assert report.alike
     assert report.mended is None

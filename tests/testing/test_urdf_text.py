@@ -12,7 +12,7 @@ from dynx.errors import ArgumentError, DTypeError
 from dynx.model import Joint, Link, Model
 from dynx.model.loading import load
 from dynx.testing.strategies import models, urdf_text
-from dynx.testing.strategies.urdf_text import HABITS
+from dynx.testing.strategies.urdf_text import SPELLINGS
 from tests.testing.occurrence import assert_occurs, simplest
 
 ARM = Model.build("arm", [Link("a"), Link("b")], [Joint("turn", "revolute", "a", "b")])
@@ -50,7 +50,7 @@ SIGNS = {
 
 @pytest.mark.parametrize("habit", SIGNS)
 def test_every_habit_occurs(habit: str) -> None:
-    assert habit in HABITS
+    assert habit in SPELLINGS
     assert_occurs(urdf_text(ARM), lambda text: SIGNS[habit] in text)
 
 

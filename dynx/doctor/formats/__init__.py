@@ -1,7 +1,7 @@
-"""A `DoctorReport` for readers other than Python: a page for people, and the formats of CI services.
+"""Formats of a `DoctorReport` for readers other than Python: a page for people, and those of CI services.
 
-Every function here is a function of reports alone; none opens a file or asks an engine. Names in a
-robot description may hold anything, so each format escapes what it is given.
+The formats are functions of reports and baselines; they run no engine. Names in a robot description may hold
+anything, so each format escapes them.
 """
 
 from dynx.doctor.formats.baseline import Baseline, baseline_document, read_baseline

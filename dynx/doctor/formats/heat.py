@@ -28,7 +28,7 @@ class Step:
     css: str
 
     def is_shown(self, tolerance: float) -> bool:
-        """Whether the legend shows it: a step below the tolerance cannot occur."""
+        """Check whether the legend shows it: a step below the tolerance cannot occur."""
         return self in (SAME, NONE) or self.limit > tolerance
 
 
@@ -59,14 +59,14 @@ class HeatMap:
     def of(
         cls, corner: str, rows: Sequence[str], columns: Mapping[tuple[str, ...], Mapping[str, float]]
     ) -> HeatMap:
-        """The map of the errors of each column by row."""
+        """Make the map from the errors of each column by row."""
         label = wording.quantity if corner == "quantity" else wording.name
         errors = [(label(row), tuple(column.get(row) for column in columns.values())) for row in rows]
         return cls(corner, tuple(columns), tuple(errors))
 
 
 def step_of(error: float, tolerance: float) -> Step:
-    """The step that an error falls into."""
+    """Find the step of an error."""
     if not math.isfinite(error):
         return NONE
     if error <= tolerance:
@@ -75,7 +75,7 @@ def step_of(error: float, tolerance: float) -> Step:
 
 
 def engine_map(report: DoctorReport) -> HeatMap:
-    """Each engine against what the file says, quantity by quantity, as loaded and mended."""
+    """Map the errors of each engine by quantity, as loaded and mended."""
     rows = list(dict.fromkeys(key for each in report.engines for key in (*each.before, *each.after)))
     mended = any(each.after and dict(each.after) != dict(each.before) for each in report.engines)
     nothing = dict.fromkeys(rows, math.inf)
@@ -88,7 +88,7 @@ def engine_map(report: DoctorReport) -> HeatMap:
 
 
 def pair_map(report: DoctorReport) -> HeatMap:
-    """Each engine against each other, quantity by quantity, as loaded."""
+    """Map the errors of each pair of engines by quantity, as loaded."""
     columns: dict[tuple[str, ...], dict[str, float]] = {}
     for pair in report.pairs:
         columns.setdefault(pair.engines, {})[pair.quantity] = pair.relative_error
@@ -96,7 +96,7 @@ def pair_map(report: DoctorReport) -> HeatMap:
 
 
 def joint_map(report: DoctorReport) -> HeatMap:
-    """Each engine against each other, joint by joint: the largest error over the quantities."""
+    """Map the errors of each pair of engines by joint: the largest over the quantities."""
     columns: dict[tuple[str, ...], dict[str, float]] = {}
     largest: dict[str, float] = {}
     for pair in report.pairs:

@@ -1,4 +1,4 @@
-"""A page for people: one HTML file that needs no other, without scripts, for screen and paper.
+"""HTML page for people: one file that needs no other, without scripts, for screen and paper.
 
 The templates beside this module hold the markup. Everything they print is escaped, and control characters are
 made visible: names in a robot description may hold anything.
@@ -36,7 +36,7 @@ LOWEST_BAR = -16
 def html_page(
     reports: Sequence[DoctorReport], *, command: str | None = None, baseline: Baseline | None = None
 ) -> str:
-    """The page, in ASCII. `command` is what the page says to run for the same result."""
+    """Make the page, in ASCII. `command` is the command line that the page gives for the same result."""
     entries = {cause.rule: cause.entry for report in reports for cause in causes(report) if cause.entry}
     page = template_environment().get_template("page.html.j2")
     text = page.render(
@@ -54,7 +54,7 @@ def html_page(
 
 @cache
 def template_environment() -> Environment:
-    """The templates, with the functions that they use. This is the only place of dynx that uses Jinja2."""
+    """Return the templates with the functions that they use. Only this function uses Jinja2."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
@@ -75,14 +75,14 @@ def template_environment() -> Environment:
 
 
 def _printable(value: Any) -> Any:
-    """Show the control characters of a text, but line breaks and tabs; markup of templates stays."""
+    """Make the control characters of a text visible, except line breaks and tabs; markup stays as it is."""
     if not isinstance(value, str) or hasattr(value, "__html__"):
         return value
     return "".join(c if c.isprintable() or c in "\n\t" else repr(c)[1:-1] for c in value)
 
 
 def bar_position(error: float) -> float:
-    """Where on the bar an error is [%]; an error that is not finite fills it."""
+    """Position of an error on its bar [%]; an error that is not finite fills it."""
     if not math.isfinite(error):
         return 100.0
     power = math.log10(max(error, 10.0**LOWEST_BAR))

@@ -1,4 +1,4 @@
-"""The text of a robot's file: lines about a place, and what mending changed."""
+"""Text of a robot's file: excerpts about a line, and the changes by mending."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from dataclasses import dataclass
 from dynx.doctor.report import DoctorReport
 
 SHOWN_LINES = 400
-"""Lines of the difference of two texts."""
+"""Largest number of lines of the difference that are shown."""
 
 LONGEST_LINE = 400
-"""Characters of a line that are shown."""
+"""Largest number of characters of a line that are shown."""
 
 KINDS = {"+": "plus", "-": "minus", "@": "at"}
 
 
 @dataclass(frozen=True)
 class TextChanges:
-    """The unified difference between the file and the mended one: (kind of a line or None, its text)."""
+    """Unified difference between the file and the mended one; `lines` are (kind or None, text)."""
 
     lines: tuple[tuple[str | None, str], ...]
     added: int
@@ -34,7 +34,7 @@ class TextChanges:
 
 
 def changes(report: DoctorReport) -> TextChanges | None:
-    """What mending changed in the file; None where nothing was mended."""
+    """Compare the file with the mended one; None where nothing was mended."""
     if report.text is None or report.mended is None:
         return None
     before, after = lines_of(report.text), lines_of(report.mended)
@@ -45,7 +45,7 @@ def changes(report: DoctorReport) -> TextChanges | None:
 
 
 def excerpt(text: str | None, line: int | None, around: int = 2) -> list[tuple[int, str]]:
-    """The lines of a file about `line`, with their numbers; none where the text or the line is unknown."""
+    """Return the lines about `line` with their numbers; none where the text or the line is unknown."""
     if text is None or line is None:
         return []
     lines = lines_of(text)
@@ -56,5 +56,5 @@ def excerpt(text: str | None, line: int | None, around: int = 2) -> list[tuple[i
 
 
 def lines_of(text: str) -> list[str]:
-    """The lines as an XML parser counts them."""
+    """Split a text into lines as an XML parser counts them."""
     return re.split(r"\r\n|\r|\n", text)

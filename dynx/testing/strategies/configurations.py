@@ -22,9 +22,9 @@ from dynx.testing.strategies.geometry import (
     vectors,
 )
 
-QUARTER_TURNS = tuple(n * math.pi / 2 for n in (0, 1, -1, 2, -2))
-TURNS = 20.0
-"""How far [rad] an angle without limits is taken: some turns either way."""
+RIGHT_ANGLES = tuple(n * math.pi / 2 for n in (0, 1, -1, 2, -2))
+MAX_ANGLE = 20.0
+"""Largest angle [rad] of a joint without limits: some turns either way."""
 
 
 class Sample(NamedTuple):
@@ -78,7 +78,7 @@ def samples(model: Model) -> Strategy[Sample]:
 
 
 def checked_model(model: Model) -> Model:
-    """`model` itself, or an error if it is none."""
+    """Return `model`; DTypeError if it is not a Model."""
     if not isinstance(model, Model):
         raise DTypeError(f"model is {shown(type(model).__name__)}; wanted a dynx Model")
     return model
@@ -98,7 +98,7 @@ def _vectors_of(nv: int, reach: float) -> Strategy[Floats]:
 @lru_cache(maxsize=256)
 def _coordinate(sliding: bool, low: float, high: float, within_limits: bool) -> Strategy[float]:
     reach = 1.0 if sliding else math.pi
-    span = 2.0 * reach if within_limits else 2.0 * TURNS
+    span = 2.0 * reach if within_limits else 2.0 * MAX_ANGLE
     bounded_low = low if math.isfinite(low) else min(high, span / 2) - span
     bounded_high = high if math.isfinite(high) else bounded_low + span
     home = min(max(0.0, bounded_low), bounded_high)
@@ -110,12 +110,12 @@ def _coordinate(sliding: bool, low: float, high: float, within_limits: bool) -> 
     if math.isfinite(high):
         choices.append(inward.map(lambda step: max(high - step, bounded_low)))
     if not within_limits:
-        near = st.builds(operator.add, st.sampled_from(QUARTER_TURNS), st.sampled_from(SMALL_STEPS))
+        near = st.builds(operator.add, st.sampled_from(RIGHT_ANGLES), st.sampled_from(SMALL_STEPS))
         choices = [st.just(0.0), near, numbers(reach), *choices]
     return st.one_of(choices)
 
 
 def _between(home: float, low: float, high: float, fraction: float) -> float:
-    """From `home` (fraction 0) to `high` (1) or `low` (-1)."""
+    """Interpolate from `home` (fraction 0) to `high` (1) or `low` (-1)."""
     end = high if fraction >= 0 else low
     return min(max(home + abs(fraction) * (end - home), low), high)

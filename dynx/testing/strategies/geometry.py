@@ -1,4 +1,4 @@
-"""Numbers, vectors, attitudes, poses and wrenches: half of them round, half of them anything."""
+"""Numbers, vectors, attitudes, poses and wrenches: half of them round, half of them arbitrary."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ SMALL_STEPS = (0.0, 1e-12, -1e-9, 1e-6, -1e-3)
 """Distances from a singular attitude or posture at which cancellation shows in different digits."""
 
 
-# To make a strategy and have Hypothesis look it over takes longer than to draw from it, and composite
-# strategies ask for the same few again and again: those are made once.
+# Making a strategy, which Hypothesis then validates, takes longer than drawing from it, and composite
+# strategies use the same few repeatedly: those are cached.
 
 
 @lru_cache(maxsize=64)
@@ -107,7 +107,7 @@ def _wrenches(force: float, moment: float) -> Strategy[Floats]:
 
 
 def checked_reach(name: str, value: float) -> float:
-    """`value` as a positive finite float, or an error that says why not."""
+    """Return `value` as a positive finite float, or raise an error that names it."""
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise DTypeError(f"{name} is {shown(value)}; wanted a positive number")
     if not math.isfinite(value):
@@ -118,7 +118,7 @@ def checked_reach(name: str, value: float) -> float:
 
 
 def _on_sphere(below: float, azimuth: float) -> Vector:
-    """The direction at height 1 - below (Archimedes: uniform height is uniform on the sphere)."""
+    """Return the direction at height 1 - below (uniform height is uniform on the sphere: Archimedes)."""
     height = 1.0 - below
     ring = math.sqrt(max(0.0, 1.0 - height * height))
     x, y = ring * math.cos(azimuth), ring * math.sin(azimuth)

@@ -1,4 +1,4 @@
-"""Inertials: of bodies that can exist, of bodies that cannot, and of none."""
+"""Inertials of bodies that can exist, of bodies that cannot, and absent ones."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ KINDS: tuple[Kind, ...] = ("solid", "physical", "any")
 
 
 def inertials(kind: Kind = "physical") -> Strategy[Inertial | None]:
-    """What a link's ``<inertial>`` may say. Shrinks to none where that may occur, else to a cube of
-    1 kg at the link's origin.
+    """The ``<inertial>`` of a link, or None. Shrinks to None where that may occur, else to a cube of 1 kg at
+    the link's origin.
 
     - ``"solid"``: positive mass and extent along every axis, so that any motion has inertia
     - ``"physical"``: also plates, rods, point masses, an explicit zero, and no inertial at all
@@ -57,44 +57,24 @@ def _bodies(radius: Strategy[float]) -> Strategy[Inertial | None]:
 
 
 def _body(mass: float, radii: Vector, turn: Vector, origin: Pose) -> Inertial:
-    """A body with these radii of gyration along its axes, which `turn` (rpy) turns in `origin`."""
+    """Make a body with radii of gyration along axes that are rotated by `turn` (rpy) in `origin`."""
     squares = np.array(radii) ** 2
     principal = mass * (np.sum(squares) - squares)
     R = rotation_from_rpy(np.array(turn))
     tensor = R @ np.diag(principal) @ R.T if any(turn) else np.diag(principal)
     tensor = 0.5 * (tensor + tensor.T)
-    return Inertial(
-        mass,
-        origin,
-        ixx=float(tensor[0, 0]),
-        ixy=float(tensor[0, 1]),
-        ixz=float(tensor[0, 2]),
-        iyy=float(tensor[1, 1]),
-        iyz=float(tensor[1, 2]),
-        izz=float(tensor[2, 2]),
-    )
+    return Inertial(mass, origin, *tensor[np.triu_indices(3)].tolist())
 
 
 def _impossible() -> Strategy[Inertial | None]:
+    def inertial(mass: float, origin: Pose, moments: Vector, products: Vector) -> Inertial:
+        (xx, yy, zz), (xy, xz, yz) = moments, products
+        return Inertial(mass, origin, xx, xy, xz, yy, yz, zz)
+
     moments = st.tuples(numbers(0.5), numbers(0.5), numbers(0.5))
-    return st.builds(
-        lambda mass, origin, diagonal, products: Inertial(
-            mass,
-            origin,
-            ixx=diagonal[0],
-            iyy=diagonal[1],
-            izz=diagonal[2],
-            ixy=products[0],
-            ixz=products[1],
-            iyz=products[2],
-        ),
-        _masses(),
-        origins(0.5),
-        moments,
-        vectors(0.25),
-    )
+    return st.builds(inertial, _masses(), origins(0.5), moments, vectors(0.25))
 
 
 def _rounded(x: float) -> float:
-    """`x` to six significant digits, as people write them."""
+    """Round to six significant digits."""
     return 0.0 if x == 0.0 else round(x, 5 - math.floor(math.log10(abs(x))))

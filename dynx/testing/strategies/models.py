@@ -26,7 +26,7 @@ T = TypeVar("T")
 BaseChoice = Literal["fixed", "floating", "either"]
 JOINT_TYPES: tuple[JointType, ...] = get_args(JointType)
 MAX_LINKS = 64
-"""A larger random robot shows no more, and makes one example as long as a hundred."""
+"""Largest number of links; larger robots find no more defects and take much longer."""
 
 # Names as files have them: plain, the world as root, links and joints alike, with slashes, not ASCII.
 NAMINGS = (
@@ -38,13 +38,13 @@ NAMINGS = (
 )
 
 
-def seldom(strategy: Strategy[T]) -> Strategy[T | None]:
-    """What the strategy draws, one time in six, or None."""
+def optional(strategy: Strategy[T]) -> Strategy[T | None]:
+    """Draw from the strategy one time in six, otherwise None."""
     return st.integers(0, 5).flatmap(lambda n: strategy if n == 5 else st.none())
 
 
 def _limits(reach: float) -> Strategy[Limits]:
-    """None, of some width, of no width, or on one side."""
+    """Limits that are absent, of some width, of zero width, or on one side."""
     ends = st.tuples(numbers(reach), numbers(reach)).map(sorted)
     finite = ends.map(lambda ends: Limits(ends[0], ends[1], velocity=2.0, effort=50.0))
     return st.one_of(
@@ -67,7 +67,7 @@ LIMITS: dict[JointType, Strategy[Limits]] = {
     "continuous": _limits(3.0).map(lambda dropped: Limits()),
     "prismatic": _limits(1.0),
 }
-DYNAMICS = seldom(st.builds(JointDynamics, *[numbers(1.0).map(abs)] * 3)).map(
+DYNAMICS = optional(st.builds(JointDynamics, *[numbers(1.0).map(abs)] * 3)).map(
     lambda dynamics: dynamics or JointDynamics()
 )
 
@@ -96,8 +96,8 @@ def models(
     - `locks`: whether some joints are locked, so that they leave the coordinates
     - `physical`: False adds inertia tensors that no body can have
     - `solvable`: every body has mass and extent in all directions, so that the mass matrix is
-      positive definite at every configuration and forward dynamics has an answer
-    - `from_urdf`: only what a URDF file can say: standard gravity, no further frames, no locked
+      positive definite at every configuration and forward dynamics has a solution
+    - `from_urdf`: only what a URDF file can express: standard gravity, no further frames, no locked
       joint
 
     Shrinks to `min_links` links in a chain, with a fixed base if that is allowed, joints that are
@@ -129,11 +129,13 @@ def models(
         raise ArgumentError("solvable=True needs physical=True: other tensors may make M singular")
     allowed = tuple(kind for kind in JOINT_TYPES if kind in joint_types)
     bodies: Kind = "solid" if solvable else "physical" if physical else "any"
-    return _made_once(min_links, max_links, base, allowed, bodies, mimics, locks and not from_urdf, from_urdf)
+    return _cached_models(
+        min_links, max_links, base, allowed, bodies, mimics, locks and not from_urdf, from_urdf
+    )
 
 
 @lru_cache(maxsize=64)
-def _made_once(
+def _cached_models(
     min_links: int,
     max_links: int,
     base: BaseChoice,
@@ -143,7 +145,7 @@ def _made_once(
     locks: bool,
     from_urdf: bool,
 ) -> Strategy[Model]:
-    """`models` of arguments that were checked."""
+    """Make `models` of checked arguments."""
     inertial = inertials(bodies)
     limb = _limbs(joint_types, inertial, mimics, locks)
     bases: tuple[Base, ...] = ("fixed", "floating") if base == "either" else (base,)
@@ -152,7 +154,7 @@ def _made_once(
 
 @dataclass(frozen=True)
 class _Limb:
-    """A link and the joint that carries it, before the robot is known; `back` and `driver` count."""
+    """A link and its parent joint, before the robot is known; `back` counts links towards the root."""
 
     inertial: Inertial | None
     type: JointType
@@ -219,7 +221,7 @@ def _models(
 def _limbs(
     joint_types: tuple[JointType, ...], inertial: Strategy[Inertial | None], mimics: bool, locks: bool
 ) -> Strategy[_Limb]:
-    """The tip of a chain so far; shrinks to a massless link, fixed at its parent's origin."""
+    """A link at the end of a chain; shrinks to a massless link, fixed at its parent's origin."""
     follow = st.tuples(st.integers(0, MAX_LINKS), RATIOS, numbers(1.0))
 
     @st.composite
@@ -234,15 +236,15 @@ def _limbs(
             draw(AXES),
             draw(LIMITS[kind]),
             draw(DYNAMICS),
-            draw(seldom(follow)) if mimics else None,
-            draw(seldom(numbers(1.0))) if locks else None,
+            draw(optional(follow)) if mimics else None,
+            draw(optional(numbers(1.0))) if locks else None,
         )
 
     return limbs()
 
 
 def _with_mimics(joints: list[Joint], mimics: list[tuple[int, float, float] | None]) -> list[Joint]:
-    """Some joints follow others. A driver comes earlier in `joints` or is free: no cycle can form."""
+    """Let some joints follow others. A driver comes earlier in `joints` or is free, so no cycle can form."""
     moving = [k for k, joint in enumerate(joints) if joint.moves]
     followers = [k for k in moving if mimics[k] is not None]
     if len(followers) == len(moving):

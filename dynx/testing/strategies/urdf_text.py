@@ -1,12 +1,11 @@
-"""URDF text that says what a model says, in the spellings that real files use."""
+"""URDF text of a model, in the spellings that real files use."""
 
 from __future__ import annotations
 
 import math
 import sys
 from dataclasses import dataclass
-from functools import reduce
-from xml.sax.saxutils import quoteattr
+from xml.sax.saxutils import escape
 
 from hypothesis import strategies as st
 
@@ -19,7 +18,7 @@ from dynx.testing.strategies.models import models
 
 Pairs = list[tuple[str, str]]
 
-HABITS = (
+SPELLINGS = (
     "declaration",
     "byte_order_mark",
     "windows_line_ends",
@@ -44,8 +43,8 @@ HABITS = (
     "missing_meshes",
     "axis_of_fixed_joint",
 )
-"""What untidy files do. Leading blank lines before a declaration and undeclared prefixes are not
-well-formed XML, but every engine reads them."""
+"""Deviations of real files from tidy text. Leading blank lines before a declaration and undeclared prefixes
+are not well-formed XML, but every engine reads them."""
 
 
 def urdf_text(model: Model | None = None) -> Strategy[str]:
@@ -54,13 +53,13 @@ def urdf_text(model: Model | None = None) -> Strategy[str]:
     Every number is written so that it reads back as the same float, and joints keep their order, so
     ``dynx.load(text, base=model.base, gravity=model.gravity)`` gives a model equal to `model`. A
     limit that a revolute or prismatic joint does not have is written as the largest double. Raises
-    ArgumentError for a model with added frames or locked joints, for which URDF has no words.
+    ArgumentError for a model with added frames or locked joints, which URDF cannot express.
     """
-    habits = st.sets(st.sampled_from(HABITS))
+    spellings = st.sets(st.sampled_from(SPELLINGS))
     if model is None:
-        return st.builds(_text, models(base="fixed", from_urdf=True), habits)
+        return st.builds(_text, models(base="fixed", from_urdf=True), spellings)
     _check_expressible(checked_model(model))
-    return st.builds(_text, st.just(model), habits)
+    return st.builds(_text, st.just(model), spellings)
 
 
 def _check_expressible(model: Model) -> None:
@@ -73,96 +72,96 @@ def _check_expressible(model: Model) -> None:
 
 @dataclass(frozen=True)
 class _Element:
-    """An XML element that is still to be spelled."""
+    """An XML element before it is written as text."""
 
     tag: str
     attributes: Pairs
     children: tuple[_Element, ...] = ()
 
 
-def _text(model: Model, habits: set[str]) -> str:
-    links = [_link(link, habits) for link in model.links]
-    joints = [_joint(joint, habits) for joint in model.joints]
-    parts = joints + links if "joints_first" in habits else links + joints
-    if "unknown_tags" in habits:
+def _text(model: Model, spellings: set[str]) -> str:
+    links = [_link(link, spellings) for link in model.links]
+    joints = [_joint(joint, spellings) for joint in model.joints]
+    parts = joints + links if "joints_first" in spellings else links + joints
+    if "unknown_tags" in spellings:
         parts = [*_unknown_tags(model), *parts]
     attributes = [("name", model.name)]
-    if "namespaces" in habits:
+    if "namespaces" in spellings:
         attributes.append(("xmlns:xacro", "http://www.ros.org/wiki/xacro"))
         attributes.append(("xmlns:known", "http://example.org/known"))
         parts.append(_Element("known:thing", [("value", "1")]))
-    lines = _spelled(_Element("robot", attributes, tuple(parts)), habits, 0)
-    if "comments" in habits:
+    lines = _lines_of(_Element("robot", attributes, tuple(parts)), spellings, 0)
+    if "comments" in spellings:
         decoy = '<!-- <link name="decoy"/> <joint name="decoy" type="none"/> a < b & c > d -->'
         lines = [lines[0], decoy, *lines[1:], decoy]
-    if "declaration" in habits:
+    if "declaration" in spellings:
         lines.insert(0, '<?xml version="1.0" encoding="utf-8"?>')
-    if "leading_blank_lines" in habits:
+    if "leading_blank_lines" in spellings:
         lines = ["", "  ", *lines]
-    mark = "\ufeff" if "byte_order_mark" in habits else ""
-    end = "\r\n" if "windows_line_ends" in habits else "\n"
+    mark = "\ufeff" if "byte_order_mark" in spellings else ""
+    end = "\r\n" if "windows_line_ends" in spellings else "\n"
     return mark + end.join(lines) + end
 
 
-def _link(link: Link, habits: set[str]) -> _Element:
+def _link(link: Link, spellings: set[str]) -> _Element:
     children = []
-    if "missing_meshes" in habits:
+    if "missing_meshes" in spellings:
         mesh = _Element("mesh", [("filename", "package://nowhere/meshes/part.stl"), ("scale", "1 1 1")])
         children.append(_Element("visual", [], (_Element("geometry", [], (mesh,)),)))
     if link.inertial is not None:
-        children.append(_inertial(link.inertial, habits))
-    if "undeclared_prefixes" in habits:
+        children.append(_inertial(link.inertial, spellings))
+    if "undeclared_prefixes" in spellings:
         children.append(_Element("drake:proximity_properties", [("drake:value", "0.1")]))
-    return _Element("link", [("name", link.name)], _ordered(children, habits))
+    return _Element("link", [("name", link.name)], _ordered(children, spellings))
 
 
-def _inertial(inertial: Inertial, habits: set[str]) -> _Element:
+def _inertial(inertial: Inertial, spellings: set[str]) -> _Element:
     moments = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-    values = [(name, _number(getattr(inertial, name), habits)) for name in moments]
+    values = [(name, _number(getattr(inertial, name), spellings)) for name in moments]
     children = [
-        *_origin(inertial.origin, habits),
-        _Element("mass", [("value", _number(inertial.mass, habits))]),
+        *_origin(inertial.origin, spellings),
+        _Element("mass", [("value", _number(inertial.mass, spellings))]),
         _Element("inertia", values),
     ]
-    return _Element("inertial", [], _ordered(children, habits))
+    return _Element("inertial", [], _ordered(children, spellings))
 
 
-def _joint(joint: Joint, habits: set[str]) -> _Element:
+def _joint(joint: Joint, spellings: set[str]) -> _Element:
     children = [
-        *_origin(joint.origin, habits),
+        *_origin(joint.origin, spellings),
         _Element("parent", [("link", joint.parent)]),
         _Element("child", [("link", joint.child)]),
     ]
-    explicit = "explicit_defaults" in habits
+    explicit = "explicit_defaults" in spellings
     if joint.moves and (explicit or joint.axis != (1.0, 0.0, 0.0)):
-        children.append(_Element("axis", [("xyz", _vector(joint.axis, habits))]))
-    elif not joint.moves and "axis_of_fixed_joint" in habits:
+        children.append(_Element("axis", [("xyz", _vector(joint.axis, spellings))]))
+    elif not joint.moves and "axis_of_fixed_joint" in spellings:
         children.append(_Element("axis", [("xyz", "0 0 0")]))
-    children += _limit(joint, habits) + _dynamics(joint, habits) + _mimic(joint, habits)
-    return _Element("joint", [("name", joint.name), ("type", joint.type)], _ordered(children, habits))
+    children += _limit(joint, spellings) + _dynamics(joint, spellings) + _mimic(joint, spellings)
+    return _Element("joint", [("name", joint.name), ("type", joint.type)], _ordered(children, spellings))
 
 
-def _limit(joint: Joint, habits: set[str]) -> list[_Element]:
+def _limit(joint: Joint, spellings: set[str]) -> list[_Element]:
     if joint.type not in ("revolute", "prismatic"):
         return []
     values = [(end, getattr(joint.limits, end)) for end in ("lower", "upper")]
     values = [(end, math.copysign(sys.float_info.max, x) if math.isinf(x) else x) for end, x in values]
     most = ((name, getattr(joint.limits, name)) for name in ("velocity", "effort"))
     values += [(name, x) for name, x in most if x != INFINITY]
-    return [_Element("limit", [(name, _number(x, habits)) for name, x in values])]
+    return [_Element("limit", [(name, _number(x, spellings)) for name, x in values])]
 
 
-def _dynamics(joint: Joint, habits: set[str]) -> list[_Element]:
-    # URDF has no word for armature, so it is written only where there is some.
-    always = ("damping", "friction") if "explicit_defaults" in habits else ()
+def _dynamics(joint: Joint, spellings: set[str]) -> list[_Element]:
+    # URDF has no armature, so it is written only where there is some.
+    always = ("damping", "friction") if "explicit_defaults" in spellings else ()
     values = ((name, getattr(joint.dynamics, name)) for name in ("damping", "friction", "armature"))
     given = [(name, value) for name, value in values if value or name in always]
     if not joint.moves or not given:
         return []
-    return [_Element("dynamics", [(name, _number(value, habits)) for name, value in given])]
+    return [_Element("dynamics", [(name, _number(value, spellings)) for name, value in given])]
 
 
-def _mimic(joint: Joint, habits: set[str]) -> list[_Element]:
+def _mimic(joint: Joint, spellings: set[str]) -> list[_Element]:
     if joint.mimic is None:
         return []
     attributes = [("joint", joint.mimic.joint)]
@@ -170,22 +169,22 @@ def _mimic(joint: Joint, habits: set[str]) -> list[_Element]:
         ("multiplier", joint.mimic.multiplier, 1.0),
         ("offset", joint.mimic.offset, 0.0),
     ):
-        if value != default or "explicit_defaults" in habits:
-            attributes.append((name, _number(value, habits)))
+        if value != default or "explicit_defaults" in spellings:
+            attributes.append((name, _number(value, spellings)))
     return [_Element("mimic", attributes)]
 
 
-def _origin(pose: Pose, habits: set[str]) -> list[_Element]:
-    explicit = "explicit_defaults" in habits
+def _origin(pose: Pose, spellings: set[str]) -> list[_Element]:
+    explicit = "explicit_defaults" in spellings
     vectors = (("xyz", pose.xyz), ("rpy", pose.rpy))
-    given = [(name, _vector(vector, habits)) for name, vector in vectors if explicit or any(vector)]
-    if not given and "empty_origins" not in habits:
+    given = [(name, _vector(vector, spellings)) for name, vector in vectors if explicit or any(vector)]
+    if not given and "empty_origins" not in spellings:
         return []
     return [_Element("origin", given)]
 
 
 def _unknown_tags(model: Model) -> list[_Element]:
-    """Tags of other programs, with links and joints inside that are none of the robot's."""
+    """Make tags of other programs, with inner links and joints that do not belong to the robot."""
     name = model.joints[0].name if model.joints else "none"
     actuator = _Element("actuator", [("name", "motor")], (_Element("mechanicalReduction", []),))
     inner = _Element("joint", [("name", name)], (_Element("hardwareInterface", []),))
@@ -197,21 +196,21 @@ def _unknown_tags(model: Model) -> list[_Element]:
     ]
 
 
-def _ordered(children: list[_Element], habits: set[str]) -> tuple[_Element, ...]:
-    return tuple(reversed(children)) if "children_reversed" in habits else tuple(children)
+def _ordered(children: list[_Element], spellings: set[str]) -> tuple[_Element, ...]:
+    return tuple(reversed(children)) if "children_reversed" in spellings else tuple(children)
 
 
-def _vector(vector: tuple[float, ...], habits: set[str]) -> str:
-    numbers = [_number(x, habits) for x in vector]
-    if "odd_white_space" in habits:
+def _vector(vector: tuple[float, ...], spellings: set[str]) -> str:
+    numbers = [_number(x, spellings) for x in vector]
+    if "odd_white_space" in spellings:
         return " \t" + numbers[0] + "  " + "\n\t ".join(numbers[1:]) + " "
     return " ".join(numbers)
 
 
-def _number(x: float, habits: set[str]) -> str:
-    """`x` in digits that read back as the same float."""
+def _number(x: float, spellings: set[str]) -> str:
+    """Write `x` in digits that read back as the same float."""
     plain = repr(x)
-    if "odd_numbers" not in habits:
+    if "odd_numbers" not in spellings:
         return plain
     unsigned = plain.removeprefix("-")
     if "e" in unsigned:
@@ -223,31 +222,29 @@ def _number(x: float, habits: set[str]) -> str:
     return ("-" if plain.startswith("-") else "+") + odd
 
 
-def _spelled(element: _Element, habits: set[str], depth: int) -> list[str]:
-    """The element's lines of text."""
-    indent = "" if "no_indentation" in habits else "  " * depth
+def _lines_of(element: _Element, spellings: set[str], depth: int) -> list[str]:
+    """Write the lines of an element."""
+    indent = "" if "no_indentation" in spellings else "  " * depth
     attributes = list(element.attributes)
-    if "unknown_attributes" in habits and depth > 0:
+    if "unknown_attributes" in spellings and depth > 0:
         attributes.append(("note", "ignored"))
-    if "reversed_attributes" in habits:
+    if "reversed_attributes" in spellings:
         attributes.reverse()
-    equals, gap = (" = ", "\n    ") if "spaced_attributes" in habits else ("=", " ")
-    words = reduce(
-        lambda text, pair: f"{text}{gap}{pair[0]}{equals}{_quoted(pair[1], habits)}", attributes, element.tag
-    )
+    equals, gap = (" = ", "\n    ") if "spaced_attributes" in spellings else ("=", " ")
+    pairs = [f"{name}{equals}{_quoted(value, spellings)}" for name, value in attributes]
+    words = gap.join([element.tag, *pairs])
     if not element.children:
-        closed = f"></{element.tag}>" if "open_and_close" in habits else "/>"
+        closed = f"></{element.tag}>" if "open_and_close" in spellings else "/>"
         return [f"{indent}<{words}{closed}"]
-    inner = [line for child in element.children for line in _spelled(child, habits, depth + 1)]
-    if "comments" in habits:
+    inner = [line for child in element.children for line in _lines_of(child, spellings, depth + 1)]
+    if "comments" in spellings:
         inner.append(f"{indent}<!-- end of {element.tag} -->")
     return [f"{indent}<{words}>", *inner, f"{indent}</{element.tag}>"]
 
 
-def _quoted(value: str, habits: set[str]) -> str:
-    """The value as an attribute; saxutils would turn line ends into references, so it gets none."""
-    escaped = quoteattr(value.replace("\n", "\0").replace("\t", "\1"))[1:-1]
-    escaped = escaped.replace("\0", "\n").replace("\1", "\t")
-    if "character_references" in habits and escaped[:1].isalpha():
+def _quoted(value: str, spellings: set[str]) -> str:
+    """Quote a value as an attribute; its line ends stay as they are."""
+    escaped = escape(value, {'"': "&quot;", "'": "&apos;"})
+    if "character_references" in spellings and escaped[:1].isalpha():
         escaped = f"&#{ord(escaped[0])};{escaped[1:]}"
-    return f"'{escaped}'" if "single_quotes" in habits else f'"{escaped}"'
+    return f"'{escaped}'" if "single_quotes" in spellings else f'"{escaped}"'

@@ -17,7 +17,7 @@ from dynx.doctor.examine.examination import (
 )
 from dynx.errors import EngineError
 from dynx.spatial.scalar import Floats
-from tests.doctor.wilful_engine import NAME, SECRET, WilfulEngine, examined
+from tests.doctor.faulty_engine import NAME, SECRET, FaultyEngine, examined
 from tests.rules.documents import case_of, joint, link
 
 ARM = case_of(
@@ -27,7 +27,7 @@ ARM = case_of(
 )
 
 
-class Weak(WilfulEngine):
+class Weak(FaultyEngine):
     """All torques and mass matrices one in a hundred too large."""
 
     def mass_matrix(self, q: Floats) -> Floats:
@@ -37,14 +37,14 @@ class Weak(WilfulEngine):
         return 1.01 * super().inverse_dynamics(q, v, a)
 
 
-class Fast(WilfulEngine):
+class Fast(FaultyEngine):
     """All accelerations one in a hundred too large."""
 
     def forward_dynamics(self, q: Floats, v: Floats, tau: Floats) -> Floats:
         return np.asarray(1.01 * super().forward_dynamics(q, v, tau))
 
 
-class Stop(WilfulEngine):
+class Stop(FaultyEngine):
     """A stop that holds the first joint from turning backwards."""
 
     def forward_dynamics(self, q: Floats, v: Floats, tau: Floats) -> Floats:
@@ -53,7 +53,7 @@ class Stop(WilfulEngine):
         return a
 
 
-class Lost(WilfulEngine):
+class Lost(FaultyEngine):
     """No numbers for dynamics; one link fused away, one without a place."""
 
     def link_poses(self, q: Floats) -> Floats:
@@ -143,7 +143,7 @@ def test_how_far_answers_moved() -> None:
 
 
 def test_a_joint_has_its_own_error() -> None:
-    class Elbow(WilfulEngine):
+    class Elbow(FaultyEngine):
         def inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
             return super().inverse_dynamics(q, v, a) * [1.0, 1.5]
 

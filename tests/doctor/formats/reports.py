@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 
+from dynx.agreement.report import Failure
 from dynx.doctor.report import (
     Counterexample,
     DoctorReport,
     Effect,
     EngineResult,
-    Failure,
     Finding,
     PairError,
     RunTimeCall,

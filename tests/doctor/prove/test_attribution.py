@@ -13,7 +13,7 @@ from dynx.doctor.prove.mending import mend
 from dynx.loaded import LoadedRobot
 from dynx.rules import Case, Detection, Remedy, Rule, find_rule
 from dynx.spatial.scalar import Floats
-from tests.doctor.wilful_engine import NAME, SECRET, WilfulEngine, examiner
+from tests.doctor.faulty_engine import NAME, SECRET, FaultyEngine, examiner
 from tests.rules.documents import case_of, joint, link
 
 BAR = 1e-12
@@ -44,7 +44,7 @@ class Replaced(Rule):
         return Remedy(case.with_source(new), "replaced it", changes_physics=self._changes)
 
 
-class Heavy(WilfulEngine):
+class Heavy(FaultyEngine):
     """Wrong by one in a hundred, for which there is no rule."""
 
     def inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
@@ -54,7 +54,7 @@ class Heavy(WilfulEngine):
 def attributed(
     case: Case,
     *rules: Rule,
-    engine: type[LoadedRobot] = WilfulEngine,
+    engine: type[LoadedRobot] = FaultyEngine,
     tolerance: float = BAR,
 ) -> list[Attribution]:
     """What is proved in a case by rules."""
@@ -126,7 +126,7 @@ def test_a_rule_has_no_effect_on_an_engine_that_it_does_not_name() -> None:
 
 
 def test_the_quantity_is_the_one_that_moves_most() -> None:
-    class Wrong(WilfulEngine):
+    class Wrong(FaultyEngine):
         def inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
             links = self.right.model.links
             right = super().inverse_dynamics(q, v, a)

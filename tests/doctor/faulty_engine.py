@@ -29,7 +29,7 @@ HEAVY = Inertial(1.0, ixx=1.0, iyy=1.0, izz=1.0)
 """What a link without ``<inertial>`` weighs to it, as to PyBullet (DX101)."""
 
 
-class WilfulEngine(LoadedRobot):
+class FaultyEngine(LoadedRobot):
     """Right but for links without ``<inertial>``; subclasses spoil more."""
 
     name: ClassVar[str] = NAME
@@ -82,13 +82,13 @@ class WilfulEngine(LoadedRobot):
         self.right.close()
 
 
-def examiner(engine: type[LoadedRobot] = WilfulEngine, samples: int = 3) -> Examiner:
+def examiner(engine: type[LoadedRobot] = FaultyEngine, samples: int = 3) -> Examiner:
     """A laboratory with that engine alone."""
     made = Examiner((), samples, 0)
     made.engines[NAME] = engine
     return made
 
 
-def examined(case: Case, engine: type[LoadedRobot] = WilfulEngine, samples: int = 3) -> Examination:
+def examined(case: Case, engine: type[LoadedRobot] = FaultyEngine, samples: int = 3) -> Examination:
     """The engine's answers to a case."""
     return examiner(engine, samples).examine(case)
