@@ -2,7 +2,7 @@
 
 from dynx.sim.batch.batch import BatchInterrupted, simulate_batch
 from dynx.sim.batch.rollouts import BatchRollouts
-from dynx.sim.loop.sensors import Noise
+from dynx.sim.loop.noise import Noise
 from dynx.sim.one_rollout import RolloutInterrupted, simulate
 from dynx.sim.plants.disturbances import Push
 from dynx.sim.plants.model_error import Payload, plant_model

@@ -14,21 +14,20 @@ from dynx.backends.solvability import Solvability
 from dynx.compiled.parametric import ParametricDynamics
 from dynx.control.base import Controller, gains_of
 from dynx.control.friction import SLIP, Coefficients
-from dynx.control.gains import checked_gain
 from dynx.control.saturation import checked_limit
 from dynx.errors import ArgumentError, shown
 from dynx.model import Model
 from dynx.model.configuration import checked_array, checked_q
 from dynx.sim.batch.kernel import StepOf
 from dynx.sim.batch.loads import BatchLoads, refuse_ambiguous
-from dynx.sim.batch.part import KernelOf, Part, PartDone, pushing
+from dynx.sim.batch.part import KernelOf, Part, PartDone, PartNoise, pushing
 from dynx.sim.batch.rollouts import BatchRollouts
 from dynx.sim.batch.store import Store
 from dynx.sim.batch.traced_controller import innermost
 from dynx.sim.clock import Clock
 from dynx.sim.loop.controller_checks import check_controller
+from dynx.sim.loop.noise import Noise
 from dynx.sim.loop.references import checked_reference
-from dynx.sim.loop.sensors import Noise
 from dynx.sim.plants.disturbances import Push
 from dynx.sim.plants.model_error import MassScale, Payload, plant_model
 from dynx.simd.threads import checked_threads
@@ -94,7 +93,7 @@ def simulate_batch(
       mean for all rollouts what they mean in `simulate`
     - `q0` (n, nq), `v0` (n, nv); one row is for all. By default the start of the reference, and at rest
       where `q0` is given
-    - `noise` on what is measured, drawn for each part of `PART` rollouts from the seed and its number
+    - `noise` of the measurements: rollout k has that of ``simulate`` with ``Noise(..., rollout=k)``
 
     `rollouts` is n, where none of these tells. Times [s], `delay`, `noise`, `friction_slip`,
     `effort_limits`, `payload`, `mass_scale` and `pushes` are those of `simulate`. A `plant` together with
@@ -166,11 +165,7 @@ def simulate_batch(
         start["cut"] = zeros
     if state is not None:
         start["state"] = np.tile(state, (n, 1))
-    deviations = None
-    if noise is not None:
-        if not isinstance(noise.seed, int) or noise.seed < 0:
-            raise ArgumentError(f"seed is {shown(noise.seed)}; wanted a whole number, 0 or more")
-        deviations = checked_gain("noise.q", noise.q, model.nv), checked_gain("noise.v", noise.v, model.nv)
+    deviations = None if noise is None else noise.deviations(model.nv)
     wrenches = loads.wrenches(clock) if loads.pushes else np.zeros((clock.n_steps, 0))
     kernels = _kernels(step, clock, wrenches)
     goals = setpoint_of(clock.times()[1:]).q
@@ -187,7 +182,9 @@ def simulate_batch(
             setpoints,
             goals,
             wrenches,
-            None if noise is None or deviations is None else ((noise.seed, first // PART), *deviations),
+            None
+            if noise is None or deviations is None
+            else PartNoise(noise.seed, noise.rollout + first, *deviations),
             record_every,
         )
         for first in range(0, n, PART)

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dynx.sim.loop.noise import BLOCK_STEPS, NoiseStream
 from dynx.simd.kernel import Kernel
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint
@@ -32,6 +33,17 @@ class PartDone(NamedTuple):
     v_record: Floats  # (count, kept, nv)
     tau_record: Floats  # (count, kept, nv)
     saturated: Floats  # (count, nv), the share of steps with the motor at its limit
+
+
+class PartNoise(NamedTuple):
+    """Noise of the measurements of a part."""
+
+    seed: int
+    first: int
+    """Number of the part's first rollout in the batch."""
+    q: Floats
+    """Standard deviation (nv,)."""
+    v: Floats
 
 
 KernelOf = dict[tuple[bool, bool], Kernel]
@@ -65,8 +77,7 @@ class Part:
     """Where the robot should be after each step, (n_steps, nq)."""
     wrenches: Floats
     """What pushes in each step, (n_steps, 6 of each push)."""
-    noise: tuple[tuple[int, int], Floats, Floats] | None
-    """The seed, the number of this part, and the standard deviations of q and v."""
+    noise: PartNoise | None
     record_every: int
 
     def __call__(self) -> PartDone:
@@ -107,7 +118,8 @@ class _Run:
         self._common = {name: np.zeros((1, width)) for name, width in widths.items()}
         self._pushing = pushing(part.wrenches)
         if part.noise is not None:
-            self._random = np.random.default_rng(part.noise[0])
+            self._stream = NoiseStream(part.noise.seed)
+            self._drawn = np.zeros((self._rows, BLOCK_STEPS, 2, nv))
             self._noise = {name: np.zeros((self._rows, nv)) for name in ("noise_q", "noise_v")}
         else:
             self._noise = {}
@@ -164,9 +176,17 @@ class _Run:
         self._common["t"][0, 0] = first * part.dt
         self._common["held_for"][0, 0] = min(part.steps_per_control, part.n_steps - first)
         if part.noise is not None:
-            for (name, array), deviation in zip(self._noise.items(), part.noise[1:], strict=True):
-                self._random.standard_normal(out=array)
-                self._noise[name] *= deviation
+            self._draw(number, part.noise)
+
+    def _draw(self, number: int, noise: PartNoise) -> None:
+        """Set the noise at a control step; that of a block of steps is drawn together."""
+        step = number % BLOCK_STEPS
+        if step == 0:
+            left = -(-self._part.n_steps // self._part.steps_per_control) - number
+            for row in range(self._part.count):
+                self._stream.draw(noise.first + row, number, self._drawn[row, :left])
+        for half, (name, deviation) in enumerate((("noise_q", noise.q), ("noise_v", noise.v))):
+            np.multiply(self._drawn[:, step, half], deviation, out=self._noise[name])
 
     def _bound(self, kernel: Kernel, turn: int) -> Callable[[], None]:
         sets = len(self._sets)

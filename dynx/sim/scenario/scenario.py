@@ -14,7 +14,7 @@ from dynx.control.base import Controller
 from dynx.control.friction import SLIP, Coefficients
 from dynx.errors import ArgumentError, nearest, shown
 from dynx.model import Model
-from dynx.sim.loop.sensors import Noise
+from dynx.sim.loop.noise import Noise
 from dynx.sim.plants.disturbances import Push
 from dynx.sim.plants.model_error import MassScale, Payload
 from dynx.sim.plants.registry import default_integrator

@@ -91,7 +91,7 @@ def test_another_value_of_any_field_is_refused_by_name(name: str) -> None:
 
 
 INNER: dict[type, tuple[str, dict[str, Any]]] = {
-    Noise: ("noise", {"q": 2e-4, "v": 2e-3, "seed": 7}),
+    Noise: ("noise", {"q": 2e-4, "v": 2e-3, "seed": 7, "rollout": 3}),
     Payload: (
         "payload",
         {

@@ -1,0 +1,82 @@
+"""Measurement noise: one stream of normal numbers for each rollout, whoever draws it.
+
+The numbers are a function of the seed, the rollout and the control step. So a rollout of a batch has the
+same noise in any partition of the batch, on any processor and thread, and when it is simulated alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dynx.control.gains import checked_gain
+from dynx.errors import ArgumentError, shown
+from dynx.model import Model
+from dynx.spatial.scalar import Floats
+
+BLOCK_STEPS = 64
+"""Control steps whose noise follows from one state of the generator."""
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Gaussian noise on measurements: standard deviations of `q` [rad or m] and `v`, and a seed.
+
+    One number, or one for each coordinate (nv,); that of a floating base's pose is a displacement along
+    its own axes. Equal seeds give equal noise, in every plant. `rollout` is the number of the rollout in a
+    batch whose noise this is, and in a batch that of its first rollout: ``Noise(..., rollout=17)`` gives one
+    rollout the noise of rollout 17 of a batch with the same seed.
+    """
+
+    q: ArrayLike = 0.0
+    v: ArrayLike = 0.0
+    seed: int = 0
+    rollout: int = 0
+
+    def deviations(self, nv: int) -> tuple[Floats, Floats]:
+        """Standard deviations (nv,) of q and v.
+
+        Raises GainError for an invalid standard deviation, ArgumentError for an invalid seed or rollout.
+        """
+        for name, number in (("seed", self.seed), ("rollout", self.rollout)):
+            if not isinstance(number, int) or isinstance(number, bool) or number < 0:
+                raise ArgumentError(f"{name} is {shown(number)}; wanted a whole number, 0 or more")
+        return checked_gain("noise.q", self.q, nv), checked_gain("noise.v", self.v, nv)
+
+    def rows(self, model: Model, n_controls: int) -> tuple[Floats, Floats]:
+        """The noise of q and of v at each control step (n_controls, nv)."""
+        deviations = self.deviations(model.nv)
+        stream = NoiseStream(self.seed)
+        drawn = np.empty((n_controls, 2, model.nv))
+        for first in range(0, n_controls, BLOCK_STEPS):
+            stream.draw(self.rollout, first, drawn[first : first + BLOCK_STEPS])
+        return drawn[:, 0] * deviations[0], drawn[:, 1] * deviations[1]
+
+
+class NoiseStream:
+    """Standard normal numbers by Philox4x64 (Salmon et al., Parallel Random Numbers, 2011).
+
+    Its key is the seed and the number of the rollout, its counter begins at the block of control steps.
+    """
+
+    def __init__(self, seed: int) -> None:
+        self._bits: Any = np.random.Philox(0)
+        self._normal = np.random.Generator(self._bits).standard_normal
+        # The setter copies these arrays, so one dictionary serves all states.
+        self._key = np.array([np.random.SeedSequence(seed).generate_state(1, np.uint64)[0], 0])
+        self._counter = np.zeros(4, dtype=np.uint64)
+        self._state: dict[str, Any] = {
+            **self._bits.state,
+            "state": {"counter": self._counter, "key": self._key},
+            "buffer": np.zeros(4, dtype=np.uint64),
+            "buffer_pos": 4,
+        }
+
+    def draw(self, rollout: int, control_step: int, numbers: Floats) -> None:
+        """Fill `numbers` (n, 2, nv) from `control_step` on, where a block begins; n is at most its length."""
+        self._key[1], self._counter[3] = rollout, control_step // BLOCK_STEPS
+        self._bits.state = self._state
+        self._normal(out=numbers)
