@@ -1,9 +1,9 @@
-"""Worker processes that survive what they run: a crash or a hang costs one task, not the run.
+"""Worker processes for tasks that may crash or hang, which then costs one task and not the whole run.
 
-Engines are foreign code that can end the process or never return, and they hold the interpreter
-lock while they do. So each task runs in a child that is reused until it dies; only the task that it
-died of is marked. Each child is driven by one thread, which makes waiting portable and leaves the
-main thread free for Ctrl-C. Children are in a session of their own and never see Ctrl-C.
+Engines are foreign code that can end the process or never return while they hold the interpreter lock. So
+each task runs in a child process, which is reused until it ends; only the task that ended it has failed. One
+thread per child waits for it, which is portable and leaves the main thread free for Ctrl-C. Children are in a
+session of their own and do not receive Ctrl-C.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class Failure:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of task number `index`: its `value`, or the `failure` that it met."""
+    """The outcome of task number `index`: its `value`, or its `failure`."""
 
     index: int
     value: Any = None
@@ -64,7 +64,7 @@ class Outcome:
 
 
 class Workers:
-    """Up to `size` processes that answer tasks with ``target(task)``.
+    """Up to `size` processes that compute ``target(task)`` for each task.
 
     `target` is a module-level function; tasks and values are pickled. `timeout` [s] bounds one
     task, None does not. Use it as a context: leaving it ends the processes.
@@ -86,7 +86,7 @@ class Workers:
         self.close()
 
     def run(self, tasks: Sequence[Any]) -> Iterator[Outcome]:
-        """The outcome of every task, in the order in which they are done."""
+        """The outcome of every task, in the order of completion."""
         waiting: queue.SimpleQueue[tuple[int, Any]] = queue.SimpleQueue()
         for numbered in enumerate(tasks):
             waiting.put(numbered)
@@ -99,7 +99,7 @@ class Workers:
             yield outcomes.get()
 
     def close(self) -> None:
-        """End every process, whatever it is doing."""
+        """End every process, also during a task."""
         with self._lock:
             self._closed = True
             for worker in self._alive:
@@ -123,7 +123,7 @@ class Workers:
                 worker = worker or self._start()
                 if worker is None:
                     return
-                reply = worker.ask(task, self._timeout)
+                reply = worker.compute(task, self._timeout)
                 if isinstance(reply, Failure):
                     outcomes.put(Outcome(index, failure=reply))
                 else:
@@ -160,16 +160,16 @@ class _Worker:
             start_new_session=True,
         )
         self._target = target
-        self._greeted = False
+        self._has_target = False
         self._expired = False
 
     @property
     def ended(self) -> bool:
-        """Whether the process is no more, or will not be shortly."""
+        """Whether the process has ended or is being ended."""
         return self._expired or self._process.poll() is not None
 
-    def ask(self, task: Any, timeout: float | None) -> tuple[Any] | Failure:
-        """The value of one task, in a tuple of one, or why there is none."""
+    def compute(self, task: Any, timeout: float | None) -> tuple[Any] | Failure:
+        """The value of one task in a tuple of one, or the failure."""
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         timer = None if timeout is None else threading.Timer(timeout, self._expire)
@@ -177,9 +177,9 @@ class _Worker:
             timer.daemon = True
             timer.start()
         try:
-            if not self._greeted:
+            if not self._has_target:
                 pickle.dump(self._target, self._process.stdin)
-                self._greeted = True
+                self._has_target = True
             pickle.dump(task, self._process.stdin)
             self._process.stdin.flush()
             reply: tuple[Any] | Failure = pickle.load(self._process.stdout)
@@ -187,7 +187,7 @@ class _Worker:
             code = self._process.wait()
             if self._expired:
                 return Failure("timeout", f"took more than {timeout:g} s and was ended")
-            return Failure("crash", _how_it_ended(code))
+            return Failure("crash", _describe_exit(code))
         finally:
             if timer is not None:
                 timer.cancel()
@@ -199,13 +199,13 @@ class _Worker:
         self._process.kill()
 
     def end(self) -> None:
-        """Let an idle process go, and release what is held for it."""
+        """End an idle process and close its pipes."""
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         self._process.kill()
         self._process.wait()
         self._process.stdout.close()
-        # Closing flushes what a dead process did not take, which fails, and closes all the same.
+        # Closing flushes data that an ended process did not read, which fails, but the pipe is closed.
         try:
             self._process.stdin.close()
         except OSError:
@@ -217,7 +217,7 @@ class _Worker:
 
 
 def serve() -> None:
-    """The child: answer tasks from standard input until it ends."""
+    """Run in the child: compute tasks from standard input until it is closed."""
     replies = os.fdopen(os.dup(1), "wb")
     _silence()
     requests = sys.stdin.buffer
@@ -227,14 +227,14 @@ def serve() -> None:
             task = pickle.load(requests)
         except EOFError:
             return
-        pickle.dump(_answer(target, task), replies)
+        pickle.dump(_reply(target, task), replies)
         replies.flush()
 
 
-def _answer(target: Callable[[Any], Any], task: Any) -> tuple[Any] | Failure:
+def _reply(target: Callable[[Any], Any], task: Any) -> tuple[Any] | Failure:
     try:
         return (target(task),)
-    except Exception as error:  # the boundary of the process: nothing may pass it but a reply
+    except Exception as error:  # at the boundary of the process every exception becomes a reply
         import traceback
 
         if traceback_wanted():
@@ -243,7 +243,7 @@ def _answer(target: Callable[[Any], Any], task: Any) -> tuple[Any] | Failure:
 
 
 def _silence() -> None:
-    """Engines print to the C-level streams; standard output here carries pickles."""
+    """Discard what engines print, because standard output carries pickles."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, 1)
     if not traceback_wanted():
@@ -251,7 +251,7 @@ def _silence() -> None:
     os.close(nowhere)
 
 
-def _how_it_ended(code: int) -> str:
+def _describe_exit(code: int) -> str:
     if code < 0:
         try:
             return f"ended its process with {signal.Signals(-code).name}"

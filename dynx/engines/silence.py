@@ -1,4 +1,4 @@
-"""Engines print to the C-level streams of the process; this keeps them quiet for a moment."""
+"""Suppression and capture of the output that engines write to the C-level streams of the process."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from tempfile import TemporaryFile
 
 @contextmanager
 def silence() -> Iterator[None]:
-    """Send what the process writes to stdout and stderr, C libraries included, nowhere for a moment.
+    """Discard all output of the process to stdout and stderr, that of C libraries included.
 
-    It acts on the whole process: other threads are silent meanwhile.
+    The output of other threads is discarded too.
     """
     nowhere = os.open(os.devnull, os.O_WRONLY)
     try:
@@ -25,8 +25,9 @@ def silence() -> Iterator[None]:
 
 
 @contextmanager
-def overhear(lines: list[str]) -> Iterator[None]:
-    """As `silence`; what was written, line by line and without blank ones, is added to `lines`."""
+def capture_output(lines: list[str]) -> Iterator[None]:
+    """Capture all output of the process as `silence` does, and append its lines that are not blank to
+    `lines`."""
     with TemporaryFile() as file:
         try:
             with _streams_to(file.fileno()):
@@ -48,11 +49,11 @@ def _streams_to(target: int) -> Iterator[None]:
             try:
                 kept = os.dup(descriptor)
             except OSError:
-                continue  # the process runs without it
+                continue  # the process has no such stream
             undo.callback(os.close, kept)
             undo.callback(os.dup2, kept, descriptor)
             os.dup2(target, descriptor)
-        # Called first on the way out: what is in C's buffers must not come out after all.
+        # Called before the streams are restored, so that C's buffers are discarded or captured too.
         undo.callback(_flush_c_streams)
         yield
 

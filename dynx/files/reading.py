@@ -1,4 +1,4 @@
-"""Reading a file that somebody names: regular, of bounded size, and without ever waiting."""
+"""Safe reading of a file named by the user: a regular file of bounded size, without waiting."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import stat
 from dynx.errors import DescriptionError, RobotNotFoundError, shown
 
 MAX_BYTES = 64 * 1024 * 1024
-"""A larger description is refused; the largest in public use is under 2 MiB."""
+"""Largest size of a file [bytes]; the largest description in public use is under 2 MiB."""
 
 
 def read_file(path: str) -> bytes:
@@ -18,7 +18,7 @@ def read_file(path: str) -> bytes:
     device, a file that may not be read, or one above MAX_BYTES.
     """
     try:
-        # Looked at before it is opened: opening a device can act on it, opening a FIFO waits.
+        # Checked before it is opened, because opening a device can act on it and opening a FIFO waits.
         _require_regular(os.stat(path), path)
         flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
         descriptor = os.open(path, flags)
@@ -39,7 +39,7 @@ def read_file(path: str) -> bytes:
 
 
 def printable(path: str) -> str:
-    """`path` for use in a message: as it is, or quoted where it holds control characters."""
+    """`path` for use in a message, quoted where it is long or holds control characters."""
     return path if path.isprintable() and len(path) <= 300 else shown(path, 300)
 
 

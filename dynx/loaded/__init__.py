@@ -1,8 +1,8 @@
 """Robots as engines load them from the file itself, by the call that their users make.
 
-`dynx.backends` hands every engine a model that dynx has read, so that all give one answer. Here each
-engine reads the file, so that its own reading shows. Answers are in the coordinates of dynx all the
-same: what is compared is the robot, not conventions.
+`dynx.backends` gives every engine a model that dynx has read, so that all results agree. Here each engine
+reads the file itself, so that differences in reading show. Results are still in the coordinates of dynx:
+robots are compared, not conventions.
 """
 
 from dynx.loaded.description import LoadedInertial, LoadedJoint, LoadedModel

@@ -1,4 +1,4 @@
-"""What an engine holds after loading a file, in one form for all engines."""
+"""The model that an engine holds after loading a file, in one form for all engines."""
 
 from __future__ import annotations
 
@@ -12,25 +12,25 @@ Bounds = tuple[float, float]
 
 @dataclass(frozen=True, eq=False)
 class LoadedInertial:
-    """The inertia an engine holds for a link, with that of the links fused into it.
+    """The inertia that an engine holds for a link, with that of the links merged into it.
 
-    `center` (3,) [m] is the centre of mass in the link frame, `inertia` (3, 3) [kg m^2] the tensor
-    about it in the axes of the link frame. `fused` names the other links whose inertia is in it,
-    because the engine welds what fixed joints hold together.
+    `mass` is in kg, `center` (3,) [m] is the centre of mass in the link frame, `inertia` (3, 3) [kg m^2] the
+    tensor about it in the axes of the link frame. `merged` names the other links whose inertia is included,
+    because the engine merges links that fixed joints connect.
     """
 
     mass: float
     center: Floats
     inertia: Floats
-    fused: tuple[str, ...] = ()
+    merged: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
 class LoadedJoint:
-    """What an engine holds for a joint that moves; None where it does not say.
+    """The properties that an engine holds for a joint that moves; None where it reports none.
 
     `placement` (4, 4) is the pose of the joint frame at value 0 in the frame of the URDF parent link,
-    `axis` (3,) the axis in the joint frame, as the engine holds it (it may not be unit).
+    `axis` (3,) the axis in the joint frame, as the engine holds it (its length may not be 1).
     """
 
     type: str
@@ -46,11 +46,11 @@ class LoadedJoint:
 
 @dataclass(frozen=True, eq=False)
 class LoadedModel:
-    """Everything an engine says it has loaded.
+    """The whole model as the engine reports it.
 
     `links` has an entry for each link that still exists in the engine, `joints` for each joint that
     moves there. `base_frame` (4, 4) is the pose of the root link in the world at the neutral
-    configuration, `gravity` (3,) what the engine uses unless it is told.
+    configuration, `gravity` (3,) [m/s^2] the engine's default.
     """
 
     engine: str

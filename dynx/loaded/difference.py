@@ -1,9 +1,8 @@
-"""The model difference: what an engine holds after loading that the file does not say.
+"""The model difference: numbers that an engine holds after loading and that are not those of the file.
 
-The file is represented by a `Model`, whose numbers are those of the document. Where an engine fuses
-links that fixed joints hold together, lump is compared with lump. Ways of writing the same thing are
-no deviation: no limit as infinity, as 1e8 or as nothing; a revolute joint without limits as a
-continuous one.
+A `Model` stands for the file, since its numbers are those of the document. Where an engine merges links that
+fixed joints connect, merged inertias are compared. Equivalent forms are no deviation: an absent limit may be
+infinite, 1e8 or not given, and a revolute joint without limits may be continuous.
 """
 
 from __future__ import annotations
@@ -15,23 +14,23 @@ from typing import Any
 import numpy as np
 
 from dynx.loaded.description import LoadedInertial, LoadedJoint, LoadedModel
-from dynx.loaded.lumps import Lump, lumped, welds
+from dynx.loaded.merging import Placements, merged_inertial, rigid_placements
 from dynx.model import Joint, Model
 from dynx.model.model import STANDARD_GRAVITY
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import rpy_from_rotation
 
 ROUNDING = 1e-12
-"""Relative size of a difference that is rounding: composing rotations and lumping bodies takes some
-hundred roundings of 1.1e-16, and what lies below does not show in an answer that is judged at 1e-12."""
+"""Relative difference up to which two numbers are equal: composing rotations and merging bodies takes about a
+hundred roundings of 1.1e-16, and a smaller difference does not show in results that are judged at 1e-12."""
 
 NO_LIMIT = 1e8
-"""Size from which a limit is none: the largest double in some files, 1e9 or 1e10 in some engines."""
+"""Magnitude from which a limit counts as absent: files have the largest double, engines 1e9 or 1e10."""
 
 
 @dataclass(frozen=True)
 class Deviation:
-    """Something an engine holds that the file does not say. Values are numbers, lists, words or None."""
+    """A property that differs between an engine and the file. Values are numbers, lists, words or None."""
 
     engine: str
     part: str
@@ -51,7 +50,7 @@ Row = tuple[str, str, str, Any, Any]
 def model_difference(model: Model, loaded: Iterable[LoadedModel]) -> tuple[Deviation, ...]:
     """Every deviation of the engines from `model`, engine by engine, links before joints.
 
-    The inertia of the root link of a fixed base is left out: it moves nothing, and some engines drop
+    The inertia of the root link of a fixed base is left out: nothing depends on it, and some engines drop
     it. `model` has the base with which the engines loaded the file.
     """
     return tuple(Deviation(each.engine, *row) for each in loaded for row in _rows(model, each))
@@ -82,16 +81,16 @@ def _rows(model: Model, engine: LoadedModel) -> Iterator[Row]:
 
 
 def _links(model: Model, engine: LoadedModel, reach: float) -> Iterator[Row]:
-    fused = {name for inertial in engine.links.values() for name in inertial.fused}
-    places = welds(model)
+    merged = {name for inertial in engine.links.values() for name in inertial.merged}
+    placements = rigid_placements(model)
     for link in model.links:
         held = engine.links.get(link.name)
-        still = not model.floating and places[link.name][0] == model.root
+        static = not model.floating and placements[link.name][0] == model.root
         if held is None:
-            if not still and link.name not in fused:
+            if not static and link.name not in merged:
                 yield "link", link.name, "existence", True, False
-        elif not (still and link.name == model.root):
-            for property, file, value in _inertial(model, places, link.name, engine.links, reach):
+        elif not (static and link.name == model.root):
+            for property, file, value in _inertial(model, placements, link.name, engine.links, reach):
                 yield "link", link.name, property, file, value
     known = {link.name for link in model.links}
     for name in engine.links:
@@ -101,25 +100,26 @@ def _links(model: Model, engine: LoadedModel, reach: float) -> Iterator[Row]:
 
 def _inertial(
     model: Model,
-    places: Mapping[str, tuple[str, Floats]],
+    placements: Placements,
     link: str,
     held: Mapping[str, LoadedInertial],
     reach: float,
 ) -> Iterator[tuple[str, Any, Any]]:
     own = held[link]
-    # A fused link that the engine also holds by itself is judged there, not once more here.
-    wanted = lumped(model, places, link, own.fused, {name: held[name] for name in own.fused if name in held})
+    # A merged link that the engine also holds by itself is compared there, and not once more here.
+    instead = {name: held[name] for name in own.merged if name in held}
+    wanted = merged_inertial(model, placements, link, own.merged, instead)
     if _differ(wanted.mass, own.mass):
         yield "mass", float(wanted.mass), own.mass
     if wanted.mass and own.mass and _differ(wanted.center, own.center, reach):
         yield "center", _plain(wanted.center), own.center.tolist()
-    if _differ(wanted.inertia, own.inertia, _turning(wanted) if own.fused else 0.0):
+    if _differ(wanted.inertia, own.inertia, _offset_inertia(wanted) if own.merged else 0.0):
         yield "inertia", _plain(wanted.inertia), own.inertia.tolist()
 
 
-def _turning(lump: Lump) -> float:
-    """The moment of inertia about the link's origin that a lump has by its place alone."""
-    return float(lump.mass * np.sum(lump.center**2))
+def _offset_inertia(inertial: LoadedInertial) -> float:
+    """The part of the moment of inertia about the link's origin that comes from the centre of mass."""
+    return float(inertial.mass * np.sum(inertial.center**2))
 
 
 # -- joints -------------------------------------------------------------------------------------
@@ -136,7 +136,7 @@ def _joint(joint: Joint, held: LoadedJoint, reach: float) -> Iterator[tuple[str,
         yield from _ends(joint, held.limits)
     for property in ("velocity", "effort"):
         file, value = getattr(joint.limits, property), getattr(held, property)
-        # Engines write a bound that the file does not give as none, or as 0.
+        # For a limit that the file does not give, engines hold a very large number or 0.
         free = abs(file) >= NO_LIMIT and value is not None and (value == 0.0 or abs(value) >= NO_LIMIT)
         if value is not None and not free and _differ(file, value):
             yield property, _number(file), _number(value)
@@ -172,7 +172,7 @@ def _pose(wanted: Floats, held: Floats, reach: float) -> Iterator[tuple[str, Any
 
 
 def _differ(wanted: Any, held: Any, size: float = 0.0) -> bool:
-    """Whether two numbers or arrays differ by more than rounding of the larger, or of `size`."""
+    """Whether two numbers or arrays differ by more than rounding of the largest entry, or of `size`."""
     wanted, held = np.asarray(wanted, dtype=np.float64), np.asarray(held, dtype=np.float64)
     if np.array_equal(wanted, held):
         return False
@@ -183,14 +183,14 @@ def _differ(wanted: Any, held: Any, size: float = 0.0) -> bool:
 
 
 def _reach(model: Model) -> float:
-    """The largest offset in the file [m]: positions are rounded in proportion to it."""
+    """The largest offset in the file [m], in proportion to which positions are rounded."""
     offsets = [joint.origin.xyz for joint in model.joints]
     offsets += [link.inertial.origin.xyz for link in model.links if link.inertial is not None]
     return max((abs(x) for offset in offsets for x in offset), default=0.0)
 
 
 def _number(value: float) -> float | None:
-    """None for no limit: JSON has no infinity."""
+    """The limit, or None where there is none, because JSON has no infinity."""
     return float(value) if abs(value) < NO_LIMIT else None
 
 

@@ -1,39 +1,46 @@
-"""The engines that can load a file themselves, by name; each is imported when it is asked for."""
+"""The engines that load a file themselves, by name; each is imported when it is first looked up.
+
+Other packages add engines by entry points in the group ``dynx.loaded``.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Collection
-from importlib import import_module
 from pathlib import Path
 
-from dynx.errors import BackendError, UnknownBackendError, nearest, shown
+from dynx.errors import BackendError, UnknownBackendError
 from dynx.loaded.robot import LoadedRobot
 from dynx.model import Model
+from dynx.registry import ClassRegistry
 
-_CLASSES = {
-    "pinocchio": "dynx.engines.pinocchio.as_loaded:LoadedPinocchio",
-    "pybullet": "dynx.engines.pybullet.as_loaded:LoadedPyBullet",
-    "mujoco": "dynx.engines.mujoco.as_loaded:LoadedMujoco",
-    "drake": "dynx.engines.drake.as_loaded:LoadedDrake",
-}
+REGISTRY: ClassRegistry[LoadedRobot] = ClassRegistry(
+    "engine",
+    "dynx.loaded",
+    {
+        "pinocchio": "dynx.engines.pinocchio.as_loaded:LoadedPinocchio",
+        "pybullet": "dynx.engines.pybullet.as_loaded:LoadedPyBullet",
+        "mujoco": "dynx.engines.mujoco.as_loaded:LoadedMujoco",
+        "drake": "dynx.engines.drake.as_loaded:LoadedDrake",
+    },
+    lambda: LoadedRobot,
+    error=BackendError,
+    unknown=UnknownBackendError,
+)
 
-ENGINES = tuple(_CLASSES)
-"""Names of all engines that dynx can watch loading a file."""
+ENGINES = tuple(REGISTRY.built_in)
+"""Names of dynx's own engines."""
 
 
 def loader_class(engine: str) -> type[LoadedRobot]:
-    """The class behind a name; NotInstalledError where the engine is missing."""
-    if engine not in _CLASSES:
-        raise UnknownBackendError(f"no engine {shown(engine)} that loads files{nearest(engine, ENGINES)}")
-    module, _, attribute = _CLASSES[engine].partition(":")
-    found: type[LoadedRobot] = getattr(import_module(module), attribute)
+    """The class of that name; raises NotInstalledError where its engine is missing."""
+    found = REGISTRY.find(engine)
     found.engine_version()
     return found
 
 
 def installed_engines() -> tuple[str, ...]:
-    """The engines that can be used here; this imports them."""
-    return tuple(engine for engine in ENGINES if _works(engine))
+    """Names of the engines that can be used here; this imports them."""
+    return tuple(engine for engine in REGISTRY.names() if _is_installed(engine))
 
 
 def load_as(engine: str, path: Path, model: Model, calls: Collection[str] = ()) -> LoadedRobot:
@@ -41,7 +48,7 @@ def load_as(engine: str, path: Path, model: Model, calls: Collection[str] = ()) 
     return loader_class(engine)(path, model, calls)
 
 
-def _works(engine: str) -> bool:
+def _is_installed(engine: str) -> bool:
     try:
         loader_class(engine)
     except BackendError:

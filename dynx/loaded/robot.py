@@ -1,4 +1,4 @@
-"""The questions asked of a robot that an engine has loaded from its file."""
+"""The interface of a robot that an engine has loaded from its file."""
 
 from __future__ import annotations
 
@@ -18,24 +18,24 @@ Self = TypeVar("Self", bound="LoadedRobot")
 
 
 class LoadedRobot(ABC):
-    """A URDF file as one engine loads it, answering in the coordinates of dynx.
+    """A URDF file as one engine loads it, with results in the coordinates of dynx.
 
-    `model` says which coordinates: its base, its gravity, its joints (all that move: give a model
-    whose mimic joints were set free) and its links. It is used to name and to order, never to mend
-    what the engine loaded. Coordinates of the engine that the model lacks are held at zero.
+    `model` defines the coordinates: its base, its gravity, its joints (all that move: give a model
+    whose mimic joints were set free) and its links. It names and orders, and never corrects what the
+    engine loaded. Coordinates of the engine that the model lacks are held at zero.
 
-    One sample at a time: q (nq,), v, a, tau (nv,), float64 and finite. Answers are not checked: an
-    engine that answers NaN is reported as doing so.
+    Each method takes one sample: q (nq,), v, a, tau (nv,), float64 and finite. Results are not checked:
+    NaN from an engine is returned.
 
-    Raises EngineError where the engine refuses the file (its own words in the message), where it would
-    crash on it (without asking it), or where it lacks a joint of `model`.
+    Raises EngineError where the engine refuses the file (with the engine's message), where it would
+    crash on it (without giving it the file), or where it lacks a joint of `model`.
     """
 
     name: ClassVar[str]
-    """Of the engine: ``pinocchio``, ``pybullet``, ``mujoco``, ``drake``."""
+    """Name of the engine: ``pinocchio``, ``pybullet``, ``mujoco``, ``drake``."""
 
     CALLS: ClassVar[Mapping[str, str]] = {}
-    """Remedies at run time that this engine knows: id -> the line of code a user would write."""
+    """Engine settings that are remedies at run time: id -> the line of code a user would write."""
 
     @abstractmethod
     def __init__(self, path: Path, model: Model, calls: Collection[str] = ()) -> None:
@@ -49,20 +49,20 @@ class LoadedRobot(ABC):
     @classmethod
     @abstractmethod
     def load_call(cls, floating: bool) -> str:
-        """The documented call that loads a file, one line of code or several, as users write it."""
+        """The documented call that loads a file, as the line or lines of code that users write."""
 
     @abstractmethod
     def describe(self) -> LoadedModel:
-        """What the engine holds."""
+        """The model that the engine holds."""
 
     @abstractmethod
     def link_poses(self, q: Floats) -> Floats:
-        """T_world_link (n_links, 4, 4) in the order of `model.links`; NaN for links it has not."""
+        """T_world_link (n_links, 4, 4) in the order of `model.links`; NaN for links that it lacks."""
 
     @abstractmethod
     def jacobian(self, q: Floats, link: str) -> Floats:
         """Geometric Jacobian (6, nv) of a link frame, linear rows first, axes of the world; NaN for a
-        link it has not."""
+        link that it lacks."""
 
     @abstractmethod
     def mass_matrix(self, q: Floats) -> Floats:
@@ -70,7 +70,7 @@ class LoadedRobot(ABC):
 
     @abstractmethod
     def inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
-        """tau (nv,), as the engine computes it: with joint damping, say, if it adds that."""
+        """tau (nv,) as the engine computes it, including joint damping, say, if it adds that."""
 
     @abstractmethod
     def forward_dynamics(self, q: Floats, v: Floats, tau: Floats) -> Floats:
@@ -78,7 +78,7 @@ class LoadedRobot(ABC):
 
     @abstractmethod
     def close(self) -> None:
-        """Release what the engine holds."""
+        """Release the resources of the engine."""
 
     def _solved_acceleration(self, q: Floats, v: Floats, tau: Floats) -> Floats:
         """a (nv,) from the engine's mass matrix and inverse dynamics; NaN where the matrix is singular.
@@ -98,10 +98,16 @@ class LoadedRobot(ABC):
         self.close()
 
 
+def require_file(path: Path) -> None:
+    """Raise EngineError for anything but a regular file: engines crash on a folder and hang on a pipe."""
+    if not path.is_file():
+        raise EngineError(f"no regular file to load: {shown(path, 300)}")
+
+
 def lacking_joints(engine: str, model: Model, instead: Mapping[str, str]) -> EngineError:
     """The error of an engine in which joints of `model` do not have one degree of freedom.
 
-    `instead` says what each of them is there, by name.
+    `instead` maps the name of each to its type in the engine.
     """
     listed = ", ".join(f"{shown(name)} ({kind})" for name, kind in list(instead.items())[:5])
     return EngineError(f"{engine} lacks joints of {model.name} with one degree of freedom: {listed}")

@@ -8,7 +8,7 @@ from dynx.rules.case import Case
 from dynx.rules.editing import Correction, EditingRule, OptionalEditingRule, correction, found_at
 from dynx.rules.engine_versions import EVERY_ENGINE, measured_on
 from dynx.rules.registry import all_rules, find_rule
-from dynx.rules.rule import CallingRule, Detection, Remedy, Rule
+from dynx.rules.rule import CallingRule, Detection, Remedy, Rule, links_of
 
 __all__ = [
     "EVERY_ENGINE",
@@ -24,5 +24,6 @@ __all__ = [
     "correction",
     "find_rule",
     "found_at",
+    "links_of",
     "measured_on",
 ]

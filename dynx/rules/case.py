@@ -1,4 +1,4 @@
-"""A file under examination: its text with places, what dynx reads in it, and the base it is meant for."""
+"""A file under examination: its text, the model that dynx reads in it, and the base it is meant for."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from dynx.model.xml.source import SourceElement, XmlSource
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """The document `source`, meant for `base`, with the remedies at run time (`calls`) taken so far.
+    """The document `source`, meant for `base`, with the engine settings (`calls`) applied so far.
 
     `choices` are the user's choices where a remedy has several, by rule id (see `Rule.choices`).
     """
@@ -29,7 +29,7 @@ class Case:
 
     @cached_property
     def reading(self) -> Model | DynxError:
-        """What `dynx.load` makes of the document: a model, or the error."""
+        """The result of `dynx.load` on the document: a model, or the error."""
         try:
             return read_model(self.source.text, self.source.source, base=self.base, gravity=self.gravity)
         except DynxError as error:
@@ -37,41 +37,41 @@ class Case:
 
     @property
     def model(self) -> Model:
-        """What dynx reads; raises the error where it cannot."""
+        """The model that dynx reads; raises the error where it cannot."""
         if isinstance(self.reading, Model):
             return self.reading
         raise self.reading
 
     @property
     def readable(self) -> bool:
-        """Whether dynx can read the document as it stands."""
+        """Whether dynx can read the document."""
         return isinstance(self.reading, Model)
 
     @cached_property
     def links(self) -> dict[str, SourceElement]:
-        """The ``<link>`` elements by name, in document order; of two alike the first."""
+        """The ``<link>`` elements by name, in document order; the first of several with one name."""
         return _by_name(self.source.root.all("link"))
 
     @cached_property
     def joints(self) -> dict[str, SourceElement]:
-        """The ``<joint>`` elements by name, in document order; of two alike the first."""
+        """The ``<joint>`` elements by name, in document order; the first of several with one name."""
         return _by_name(self.source.root.all("joint"))
 
     @cached_property
     def inertials(self) -> Mapping[str, Inertial | None]:
-        """What dynx reads in the ``<inertial>`` of each link, by the link's name, in depth-first order."""
+        """The inertial of each link as dynx reads it, by the link's name, in depth-first order."""
         return {link.name: link.inertial for link in self.model.links}
 
     def choice(self, rule: str, default: str) -> str:
-        """What the user chose for a rule, or the default."""
+        """The user's choice for a rule, or the default."""
         return (self.choices or {}).get(rule, default)
 
     def with_source(self, source: XmlSource) -> Case:
-        """The same case with another text."""
+        """The case with another text."""
         return replace(self, source=source)
 
     def with_calls(self, *calls: str) -> Case:
-        """The same case with further remedies at run time."""
+        """The case with further engine settings."""
         return replace(self, calls=self.calls | set(calls))
 
 

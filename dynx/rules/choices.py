@@ -1,4 +1,4 @@
-"""What a user decides where a rule leaves several ways to mend: rule to choice, checked."""
+"""The user's choices where a rule has several remedies."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from dynx.rules.registry import find_rule
 def checked_choices(given: Iterable[tuple[str, str]]) -> dict[str, str]:
     """The choices by rule id, from pairs of a rule's id or name and one of its `choices`.
 
-    Raises UnknownNameError for a rule or a choice that there is not, ArgumentError for a rule that leaves
-    no choice or is decided twice.
+    Raises UnknownNameError for an unknown rule or choice, ArgumentError for a rule that has no choices or is
+    given twice with different ones.
     """
     chosen: dict[str, str] = {}
     for word, choice in given:

@@ -6,17 +6,18 @@ An installed package offers a rule in the entry-point group ``dynx.rules``; its 
 from __future__ import annotations
 
 import pkgutil
-from collections.abc import Iterator
 from functools import cache
 from importlib import import_module
-from importlib.metadata import EntryPoint, entry_points
 
 from dynx.errors import DynxError, UnknownNameError, nearest, shown
+from dynx.registry import ClassRegistry
 from dynx.rules import catalogue
 from dynx.rules.rule import Rule
 
-GROUP = "dynx.rules"
-"""The entry-point group: ``name = "package.module:RuleClass"``."""
+OTHERS: ClassRegistry[Rule] = ClassRegistry(
+    "rule", "dynx.rules", {}, lambda: Rule, error=DynxError, unknown=UnknownNameError
+)
+"""The rules of other packages."""
 
 
 @cache
@@ -25,15 +26,20 @@ def all_rules() -> tuple[Rule, ...]:
 
     Raises DynxError for an entry point that cannot be loaded, that is no rule, or whose id or name is taken.
     """
-    rules = list(_own_rules())
-    taken = {word for rule in rules for word in (rule.id.lower(), rule.name)}
-    for rule, provider in sorted(_provided_rules(), key=lambda pair: pair[0].id):
+    others = []
+    for name in OTHERS.names():
+        kind = OTHERS.find(name)
+        if not hasattr(kind, "id"):
+            raise DynxError(f'the rule {shown(name)}: its module does not begin with """ID name: Title."""')
+        others.append(kind())
+    rules = (*_own_rules(), *sorted(others, key=lambda rule: rule.id))
+    taken: set[str] = set()
+    for rule in rules:
         for word in (rule.id.lower(), rule.name):
             if word in taken:
-                raise DynxError(f"{provider} provides the rule {rule.id} {rule.name}; {word} is taken")
+                raise DynxError(f"two rules are called {word}; one is {type(rule).__module__}")
             taken.add(word)
-        rules.append(rule)
-    return tuple(rules)
+    return rules
 
 
 def find_rule(name: str) -> Rule:
@@ -55,24 +61,3 @@ def _own_rules() -> tuple[Rule, ...]:
         if isinstance(member, type) and issubclass(member, Rule) and member.__module__ == name
     ]
     return tuple(sorted(found, key=lambda rule: rule.id))
-
-
-def _provided_rules() -> Iterator[tuple[Rule, str]]:
-    """Rules of other packages, each with the words that name its provider."""
-    for point in entry_points(group=GROUP):
-        provider = _described(point)
-        try:
-            kind = point.load()
-            rule = kind() if isinstance(kind, type) and issubclass(kind, Rule) else None
-        except Exception as error:
-            raise DynxError(f"{provider} cannot be loaded: {type(error).__name__}: {error}") from error
-        if rule is None:
-            raise DynxError(f"{provider} is {shown(kind)}, which is no subclass of dynx.rules.Rule")
-        if not hasattr(rule, "id"):
-            raise DynxError(f'{provider}: the docstring of its module does not begin with "ID name: Title."')
-        yield rule, provider
-
-
-def _described(point: EntryPoint) -> str:
-    distribution = "" if point.dist is None else f" of {point.dist.name}"
-    return f"the entry point {point.name} = {point.value!r}{distribution}"

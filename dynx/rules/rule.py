@@ -37,6 +37,11 @@ class Detection:
     message: str
 
 
+def links_of(detections: Sequence[Detection]) -> list[str]:
+    """The names of the links in which something was detected."""
+    return [detection.link for detection in detections if detection.link is not None]
+
+
 @dataclass(frozen=True)
 class Remedy:
     """A case from which the cause was removed, and the decision that was taken.

@@ -93,7 +93,7 @@ def test_the_tutorial_s_trap(mode: str) -> None:
         client.command(MotorCommand(mode, positions=rest, velocities=rest))
         client.advance()
         client.place(rest, rest, None)
-        client.add(torque)
+        client.add_torques(torque)
         client.advance()
         trapped = client.joint_states()[1]
         client.place(rest, rest, None)

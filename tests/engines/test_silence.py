@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from dynx.engines.silence import overhear, silence
+from dynx.engines.silence import capture_output, silence
 
 
 def speak(words: str) -> None:
@@ -39,9 +39,9 @@ def test_nothing_comes_out_meanwhile_and_all_of_it_before_and_after(
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="reaches for the C library as on POSIX")
-def test_what_is_overheard_comes_line_by_line(capfd: pytest.CaptureFixture[str]) -> None:
+def test_captured_output_comes_line_by_line(capfd: pytest.CaptureFixture[str]) -> None:
     lines = ["kept"]
-    with overhear(lines):
+    with capture_output(lines):
         ctypes.CDLL(None).printf(b"  one\n\n")
         ctypes.CDLL(None).fflush(None)
         os.write(2, b"two \xff\nthree")
@@ -53,7 +53,7 @@ def test_what_was_said_before_an_error_is_kept() -> None:
     lines: list[str] = []
 
     def fail() -> None:
-        with overhear(lines):
+        with capture_output(lines):
             os.write(1, b"said\n")
             raise ValueError("no")
 

@@ -49,7 +49,7 @@ def held(model: Model) -> LoadedModel:
     return LoadedModel(ENGINE, links, joints, np.eye(4), np.array(STANDARD_GRAVITY))
 
 
-def fused(model: Model) -> LoadedModel:
+def merged(model: Model) -> LoadedModel:
     """The same where the engine holds one inertial for all links that fixed joints hold together."""
     mechanism = build_mechanism(model)
     lumps = {}
@@ -87,7 +87,7 @@ def test_what_is_read_alike_does_not_deviate(model: Model) -> None:
 
 @given(file_robots())
 def test_fused_links_are_compared_lump_with_lump(model: Model) -> None:
-    assert rows(model, fused(model)) == []
+    assert rows(model, merged(model)) == []
 
 
 def _link(name: str, **changes: Any) -> Callable[[LoadedModel], LoadedModel]:
@@ -219,8 +219,8 @@ def test_a_continuous_joint_may_be_revolute_without_limits() -> None:
 
 def test_a_deviation_among_fused_links_is_that_of_the_lump() -> None:
     model = robot()
-    engine = fused(model)
-    assert engine.links["hand"].fused == ("tool",)
+    engine = merged(model)
+    assert engine.links["hand"].merged == ("tool",)
     heavier = _link("hand", mass=engine.links["hand"].mass + 1.0)(engine)
     assert rows(model, heavier) == [("link", "hand", "mass")]
 
@@ -234,7 +234,7 @@ def test_a_fused_link_that_is_held_apart_too_is_judged_once() -> None:
             replace(link, inertial=Inertial()) if link.name == "tool" else link for link in model.links
         ),
     )
-    engine = fused(spoiled)
+    engine = merged(spoiled)
     engine = replace(engine, links={**engine.links, "tool": held(spoiled).links["tool"]})
     assert rows(model, engine) == [("link", "tool", "mass"), ("link", "tool", "inertia")]
 

@@ -94,7 +94,7 @@ def _refusal(model: Model) -> str | None:
         return "joints, fixed ones included"
     inertial = model.link(model.root).inertial
     massless = model.root == "world" if inertial is None else inertial.mass == 0.0
-    return "nails" if massless and model.floating else None
+    return "fixes" if massless and model.floating else None
 
 
 def test_some_robots_are_loaded_alike_and_most_are_not() -> None:

@@ -208,8 +208,8 @@ def test_misspelled_words_of_a_link_and_of_the_robot() -> None:
     )
     messages = [each.message for each in find_rule("DX515").detect(case)]
     assert messages == [
-        "<intertial> in <link> is skipped; <inertial> was meant",
-        "<transmision> is skipped; <transmission> was meant",
+        "<intertial> in <link> is ignored; <inertial> was meant",
+        "<transmision> is ignored; <transmission> was meant",
     ]
 
 

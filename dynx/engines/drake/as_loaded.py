@@ -1,10 +1,10 @@
 """A URDF file as Drake loads it: ``Parser(plant).AddModels(path)`` into a `MultibodyPlant`.
 
-The plant is continuous (``time_step=0.0``) and has no scene graph: what is asked are the equations of
-motion, and a discrete plant answers a step of its contact solver instead. Inverse dynamics is called as
-Drake's own `InverseDynamics` system calls it, with the forces of `CalcForceElementsContribution`, which
-are gravity and joint damping. A mimic joint becomes a constraint: kinematics, mass matrix and inverse
-dynamics leave it out, forward dynamics of a continuous plant refuses it.
+The plant is continuous (``time_step=0.0``) and has no scene graph, because the equations of motion are
+compared and a discrete plant returns a step of its contact solver. Inverse dynamics is called as Drake's own
+`InverseDynamics` system calls it, with the forces of `CalcForceElementsContribution`, which are gravity and
+joint damping. A mimic joint becomes a constraint: kinematics, mass matrix and inverse dynamics leave it out,
+forward dynamics of a continuous plant refuses it.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from dynx.engines.drake.library import (
     MultibodyForces,
     MultibodyPlant,
     Parser,
+    captured_log,
     drake_version,
-    gist,
-    said,
+    error_message,
 )
 from dynx.engines.drake.loaded_description import describe_joint, describe_link, remarks
 from dynx.engines.drake.settings import CALLS, set_before_finalize, set_in_context
@@ -41,7 +41,7 @@ _HERE: Floats = np.zeros(3)
 
 
 class LoadedDrake(LoadedRobot):
-    """A robot as Drake loads it; see `LoadedRobot` and the head of this file."""
+    """A robot as Drake loads it; see `LoadedRobot` and the module docstring."""
 
     name: ClassVar[str] = "drake"
     CALLS: ClassVar[Mapping[str, str]] = CALLS
@@ -51,7 +51,7 @@ class LoadedDrake(LoadedRobot):
         self._model = model
         self._plant = plant = MultibodyPlant(time_step=0.0)
         self._default_gravity: Floats = np.array(plant.gravity_field().gravity_vector())
-        with self._mapped("load"), said() as heard:
+        with self._mapped("load"), captured_log() as log:
             instances = Parser(plant).AddModels(str(path))
             plant.mutable_gravity_field().set_gravity_vector(np.array(model.gravity))
             self._bodies = self._find_bodies(instances)
@@ -65,7 +65,7 @@ class LoadedDrake(LoadedRobot):
             set_in_context(self._context, self._bodies, model, calls)
             self._forces = MultibodyForces(plant)
             self._joints = self._find_joints(instances)
-        self._remarks = remarks(heard, str(path), plant)
+        self._remarks = remarks(log, str(path), plant)
         self._coordinates = self._find_coordinates()
         self._torque = plant.get_applied_generalized_force_input_port()
         self._acceleration = plant.get_generalized_acceleration_output_port()
@@ -77,14 +77,14 @@ class LoadedDrake(LoadedRobot):
 
     @classmethod
     def load_call(cls, floating: bool) -> str:
-        """Four lines, or three: a base that is not welded to the world floats."""
+        """Four lines for a fixed base; without the weld to the world the base floats."""
         weld = "plant.WeldFrames(plant.world_frame(), plant.GetFrameByName(root_link))\n"
         return (
             "plant = MultibodyPlant(time_step=0.0)\n"
             f"Parser(plant).AddModels(path)\n{'' if floating else weld}plant.Finalize()"
         )
 
-    # -- answers ------------------------------------------------------------------------------
+    # -- quantities ------------------------------------------------------------------------------
 
     def link_poses(self, q: Floats) -> Floats:
         """``EvalBodyPoseInWorld``."""
@@ -98,7 +98,7 @@ class LoadedDrake(LoadedRobot):
         return T
 
     def jacobian(self, q: Floats, link: str) -> Floats:
-        """``CalcJacobianSpatialVelocity`` with respect to v, its angular rows moved down."""
+        """``CalcJacobianSpatialVelocity`` with respect to v, with the linear rows first."""
         if link not in self._bodies:
             return np.full((6, self._model.nv), np.nan)
         frame, world = self._bodies[link].body_frame(), self._plant.world_frame()
@@ -108,7 +108,7 @@ class LoadedDrake(LoadedRobot):
         return self._coordinates.forces_back(R, np.concatenate([J[3:], J[:3]]))
 
     def mass_matrix(self, q: Floats) -> Floats:
-        """``CalcMassMatrix``, which holds the reflected inertia of rotors."""
+        """``CalcMassMatrix``, which includes the reflected inertia of rotors."""
         with self._mapped("CalcMassMatrix"):
             R = self._place(q)
             return self._coordinates.matrix_back(R, np.array(self._plant.CalcMassMatrix(self._context)))
@@ -129,7 +129,7 @@ class LoadedDrake(LoadedRobot):
         ``CalcMassMatrix`` and ``CalcInverseDynamics``."""
         if self._model.nv < self._plant.num_velocities():
             return self._solved_acceleration(q, v, tau)
-        with self._mapped("answer forward dynamics of"):
+        with self._mapped("compute forward dynamics of"):
             R = self._place(q)
             self._plant.SetVelocities(self._context, self._coordinates.velocities(R, v))
             self._torque.FixValue(self._context, self._coordinates.forces(R, tau))
@@ -137,14 +137,14 @@ class LoadedDrake(LoadedRobot):
         return self._coordinates.accelerations_back(R, v, vdot)
 
     def close(self) -> None:
-        """Nothing is held that the interpreter does not free."""
+        """Do nothing: the interpreter frees all resources."""
 
     # -- what was loaded ----------------------------------------------------------------------
 
     def describe(self) -> LoadedModel:
-        """From the engine's bodies, joints and actuators; Drake fuses no links.
+        """The model from the engine's bodies, joints and actuators; Drake merges no links.
 
-        Joint friction is given as 0: Drake has none, and warns of a file that states some.
+        Joint friction is 0, because Drake has none and warns about files with joint friction.
         """
         rotors = {}
         for index in self._plant.GetJointActuatorIndices():
@@ -192,7 +192,7 @@ class LoadedDrake(LoadedRobot):
         return {joint.name(): joint for joint in joints if joint.name() in known}
 
     def _find_coordinates(self) -> DrakeCoordinates:
-        """Where the coordinates of dynx are among those of the plant."""
+        """The map between the coordinates of dynx and those of the plant."""
         plant, model = self._plant, self._model
         wanted = [self._joints.get(name) for name in model.joint_names]
         wrong = {
@@ -223,16 +223,16 @@ class LoadedDrake(LoadedRobot):
         )
 
     def _place(self, q: Floats) -> Floats:
-        """The context put at `q`; the attitude of the base."""
+        """Set the configuration of the context, and return the attitude of the base."""
         self._plant.SetPositions(self._context, self._coordinates.positions(q))
         return self._coordinates.attitude(q)
 
     @contextmanager
     def _mapped(self, call: str) -> Iterator[None]:
-        """The engine's exceptions as `EngineError`, in its own words."""
+        """Raise the engine's exceptions as `EngineError` with its messages."""
         try:
             yield
         except EngineError:
             raise
         except DRAKE_FAILURES as error:
-            raise EngineError(f"drake failed to {call} {self._model.name}: {gist(error)}") from error
+            raise EngineError(f"drake failed to {call} {self._model.name}: {error_message(error)}") from error

@@ -1,14 +1,14 @@
 """The backend `drake`: every quantity that Drake's `MultibodyPlant` computes, by Drake (Tedrake et al.).
 
-The plant is made body by body from the moving bodies of the `Model` (`drake_plant`), so that nothing of
-Drake's file reader takes part. It has no geometry, actuators, damping or limits and is continuous.
+The plant is made body by body from the moving bodies of the `Model` (`multibody_plant`), without Drake's file
+reader. It has no geometry, actuators, damping or limits and is continuous.
 
-Safe to use from several threads: the plant is never changed after it is made, and each thread has a
-context of its own, made on its first call. Calls hold the GIL, so threads give no speed.
+Safe to use from several threads: the plant is never changed after it is made, and each thread has a context
+of its own, made on its first call. Calls hold the GIL, so threads give no speed.
 
-Jacobian derivatives and Coriolis matrices are derived: Drake has J v and dJ/dt v, not dJ/dt. Forward
-dynamics is Drake's articulated-body algorithm; where that refuses a body whose inertia is not positive
-(a file may state one, and the mass matrix be regular all the same), it is solved from the mass matrix.
+Jacobian derivatives and Coriolis matrices are derived: Drake has J v and dJ/dt v, not dJ/dt. Forward dynamics
+is Drake's articulated-body algorithm; where that refuses a body whose inertia is not positive (a file may
+state one, and the mass matrix be regular all the same), it is solved from the mass matrix.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from dynx.engines.drake.library import (
     JacobianWrtVariable,
     MultibodyForces,
     drake_version,
-    gist,
+    error_message,
 )
 from dynx.engines.drake.multibody_plant import build_plant
 from dynx.errors import DynxError, EngineError
@@ -37,11 +37,11 @@ _V = JacobianWrtVariable.kV
 _HERE: Floats = np.zeros(3)
 _AT_WORLD = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
-_mapped = engine_errors("drake", gist, DRAKE_FAILURES)
+_mapped = engine_errors("drake", error_message, DRAKE_FAILURES)
 
 
 class _Workspace(local):
-    """What Drake computes in, one for each thread that asks for it."""
+    """The context and the forces of one thread."""
 
     def __init__(self, plant: Any) -> None:
         self.context = plant.CreateDefaultContext()
@@ -68,14 +68,14 @@ class DrakeBackend(Backend):
         except DynxError:
             raise
         except DRAKE_FAILURES as error:
-            raise EngineError(f"drake cannot hold {model.name}: {gist(error)}") from error
+            raise EngineError(f"drake cannot hold {model.name}: {error_message(error)}") from error
         self._coordinates = self._built.coordinates
         self._world = self._plant.world_frame()
         self._gravity: Floats = np.array(model.gravity)
         self._torque = self._plant.get_applied_generalized_force_input_port()
         self._acceleration = self._plant.get_generalized_acceleration_output_port()
-        # Drake divides by the mass of what can be weighed; nothing and less than nothing it refuses.
-        self._weighs = float(self._plant.CalcTotalMass(self._workspace.context)) > 0.0
+        # Drake divides by the total mass, and refuses one that is zero or negative.
+        self._has_mass = float(self._plant.CalcTotalMass(self._workspace.context)) > 0.0
 
     @property
     def engine_version(self) -> str:
@@ -136,7 +136,7 @@ class DrakeBackend(Backend):
         return self._referred(acceleration, on_robot, context, reference)
 
     def _referred(self, motion: Floats, frame: Any, context: Any, reference: Reference) -> Floats:
-        """A spatial vector at the frame's origin, in world axes, as `reference` wants it."""
+        """A spatial vector at the frame's origin, in world axes, converted to `reference`."""
         if reference == "local_world_aligned":
             return motion
         T = frame.CalcPoseInWorld(context)
@@ -171,7 +171,7 @@ class DrakeBackend(Backend):
         try:
             vdot = self._acceleration.Eval(context)
         except RuntimeError:
-            # A joint that carries an inertia which is not positive; see the head of this file.
+            # A joint carries an inertia that is not positive; see the module docstring.
             return super()._forward_dynamics(q, v, tau)
         return self._coordinates.accelerations_back(R, v, vdot)
 
@@ -179,15 +179,17 @@ class DrakeBackend(Backend):
     def _mass_matrix(self, q: Floats) -> Floats:
         context, R = self._placed(_upright(q) if self.model.floating else q)
         plant = self._plant
-        # A body in counterweighted parts has no composite inertia that Drake could divide by its mass.
-        ask = plant.CalcMassMatrixViaInverseDynamics if self._built.counterweighted else plant.CalcMassMatrix
-        M = self._coordinates.matrix_back(R, ask(context))
+        # The composite inertia of a body in counterweighted parts cannot be divided by its mass.
+        compute = (
+            plant.CalcMassMatrixViaInverseDynamics if self._built.counterweighted else plant.CalcMassMatrix
+        )
+        M = self._coordinates.matrix_back(R, compute(context))
         return np.asarray(0.5 * (M + M.T))
 
     @_mapped
     def _bias_torque(self, q: Floats, v: Floats) -> Floats:
         if self.model.floating:
-            # The base that has no acceleration in its own axes may have one in the world's, Drake's.
+            # Without acceleration in its own axes the base may have one in world axes, as Drake uses them.
             return self._inverse_dynamics(q, v, np.zeros_like(v))
         context, R = self._moving(q, v)
         bias = self._plant.CalcBiasTerm(context) - self._plant.CalcGravityGeneralizedForces(context)
@@ -202,7 +204,7 @@ class DrakeBackend(Backend):
 
     @_mapped
     def _center_of_mass(self, q: Floats) -> Floats:
-        if not self._weighs:
+        if not self._has_mass:
             return self._derive("center_of_mass", q)
         context, _ = self._placed(q)
         center: Floats = self._plant.CalcCenterOfMassPositionInWorld(context)
@@ -210,7 +212,7 @@ class DrakeBackend(Backend):
 
     @_mapped
     def _center_of_mass_jacobian(self, q: Floats) -> Floats:
-        if not self._weighs:
+        if not self._has_mass:
             return self._derive("center_of_mass_jacobian", q)
         context, R = self._placed(q)
         J = self._plant.CalcJacobianCenterOfMassTranslationalVelocity(context, _V, self._world, self._world)
@@ -218,7 +220,7 @@ class DrakeBackend(Backend):
 
     @_mapped
     def _centroidal_momentum(self, q: Floats, v: Floats) -> Floats:
-        if not self._weighs:
+        if not self._has_mass:
             return self._derive("centroidal_momentum", q, v)
         context, _ = self._moving(q, v)
         center = self._plant.CalcCenterOfMassPositionInWorld(context)
@@ -238,23 +240,24 @@ class DrakeBackend(Backend):
     # -- the state of the engine --------------------------------------------------------------
 
     def _placed(self, q: Floats) -> tuple[Any, Floats]:
-        """This thread's context, at `q`, and the attitude of the base."""
+        """The context of this thread at `q`, and the attitude of the base."""
         context = self._workspace.context
         self._plant.SetPositions(context, self._coordinates.positions(q))
         return context, self._coordinates.attitude(q)
 
     def _moving(self, q: Floats, v: Floats) -> tuple[Any, Floats]:
-        """This thread's context, at `q` and `v`, and the attitude of the base."""
+        """The context of this thread at `q` and `v`, and the attitude of the base."""
         context, R = self._placed(q)
         self._plant.SetVelocities(context, self._coordinates.velocities(R, v))
         return context, R
 
 
 def _upright(q: Floats) -> Floats:
-    """The configuration with the base at the world's frame, on which neither mass matrix nor motion depends.
+    """The configuration with the base at the world's frame; mass matrix and torques do not depend on the base
+    pose.
 
-    Drake works in world axes: a slender robot turned there, and its answers turned back, would lose
-    the digits by which its small moment is smaller than its large ones.
+    Drake works in world axes: rotating a slender robot there and its results back would lose the digits by
+    which its small moment differs from its large ones.
     """
     q = q.copy()
     q[:7] = _AT_WORLD
@@ -262,5 +265,5 @@ def _upright(q: Floats) -> Floats:
 
 
 def _linear_first(spatial: Floats) -> Floats:
-    """Drake's angular before linear, in the order of dynx: (6, ...)."""
+    """Reorder Drake's (angular, linear) vector (6, ...) to linear first."""
     return np.concatenate([spatial[3:], spatial[:3]])

@@ -1,12 +1,12 @@
-"""Drake's generalized coordinates, against those of dynx.
+"""Conversion between the generalized coordinates of Drake and of dynx.
 
 A floating base has in Drake the position (quaternion wxyz, origin in the world) and the velocity V =
-(angular, linear), both in world axes; in dynx (origin, quaternion xyzw) and (linear, angular) in base
-axes. With R = R_world_base, V = (R w, R u) for the dynx velocity (u, w), so dV/dt = (R dw, R (du + w x u)),
-and forces go back by the transpose (virtual work). Joints keep their numbers, in Drake's own order.
+(angular, linear), both in world axes; in dynx (origin, quaternion xyzw) and (linear, angular) in base axes.
+With R = R_world_base, V = (R w, R u) for the dynx velocity (u, w), so dV/dt = (R dw, R (du + w x u)), and
+forces go back by the transpose (virtual work). Joints keep their numbers, in Drake's own order.
 
-Source: Drake's documentation of `QuaternionFloatingJoint`; Featherstone, Rigid Body Dynamics
-Algorithms, section 2.10, for the two time derivatives.
+Source: Drake's documentation of `QuaternionFloatingJoint`; Featherstone, Rigid Body Dynamics Algorithms,
+section 2.10, for the two time derivatives.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ class DrakeCoordinates:
     """The map between the tree coordinates of dynx and those of a plant, one sample at a time.
 
     `q_index`, `v_index`: where each joint of dynx, in tree order, has its position and velocity in the
-    plant. `n_q`, `n_v`: how many the plant has; those that dynx does not know are zero. `base`: where
+    plant. `n_q`, `n_v`: how many the plant has; those unknown to dynx are zero. `base`: where
     the plant's floating base starts in its q and v, or None for a fixed base.
 
-    R is what `attitude` returns for the configuration concerned.
+    R is the result of `attitude` at the configuration.
     """
 
     def __init__(
@@ -46,14 +46,14 @@ class DrakeCoordinates:
         self._from_q, self._pad_q = _gather([*base_q, *q_index], n_q)
         self._from_v, self._pad_v = _gather([*base_v, *v_index], n_v)
         self._columns = np.array([*base_v, *v_index], dtype=int)
-        # Nothing to convert: the plant's numbers are those of dynx.
-        self._plain = base is None and list(q_index) == list(range(n_q)) and list(v_index) == list(range(n_v))
+        # No conversion is needed where the coordinates are the same.
+        self._same = base is None and list(q_index) == list(range(n_q)) and list(v_index) == list(range(n_v))
 
     def attitude(self, q: Floats) -> Floats:
-        """R_world_base (3, 3); of a fixed base an empty array, which nothing uses."""
+        """R_world_base (3, 3); an unused empty array for a fixed base."""
         if not self._floating:
-            return _NOTHING
-        # By hand, since arrays this small cost ten times as much in NumPy.
+            return _EMPTY
+        # In Python, because NumPy takes ten times as long for arrays this small.
         x, y, z, w = q[3:7].tolist()
         xx, yy, zz, xy, xz, yz = x * x, y * y, z * z, x * y, x * z, y * z
         wx, wy, wz = w * x, w * y, w * z
@@ -67,37 +67,37 @@ class DrakeCoordinates:
 
     def positions(self, q: Floats) -> Floats:
         """The plant's q at the configuration `q` of dynx."""
-        if self._plain:
+        if self._same:
             return q
         return (np.append(q, 0.0) if self._pad_q else q)[self._from_q]
 
     def velocities(self, R: Floats, v: Floats) -> Floats:
         """The plant's v at the velocity `v` of dynx."""
-        return v if self._plain else self._to_plant(R, v)
+        return v if self._same else self._to_plant(R, v)
 
     def accelerations(self, R: Floats, v: Floats, a: Floats) -> Floats:
         """The plant's dv/dt at the velocity `v` and the acceleration `a` of dynx."""
-        if self._plain:
+        if self._same:
             return a
         if self._floating:
             a = a.copy()
-            a[:3] += _turning(v)
+            a[:3] += _cross_product(v)
         return self._to_plant(R, a)
 
     def accelerations_back(self, R: Floats, v: Floats, vdot: Floats) -> Floats:
         """The acceleration of dynx at the plant's dv/dt."""
         a = self.forces_back(R, vdot)
         if self._floating:
-            a[:3] -= _turning(v)
+            a[:3] -= _cross_product(v)
         return a
 
     def forces(self, R: Floats, tau: Floats) -> Floats:
         """The plant's generalized force for the torque `tau` of dynx."""
-        return tau if self._plain else self._to_plant(R, tau)
+        return tau if self._same else self._to_plant(R, tau)
 
     def forces_back(self, R: Floats, force: Floats) -> Floats:
         """The torque of dynx for the plant's generalized force; also for the rows of a matrix (..., n_v)."""
-        if self._plain:
+        if self._same:
             return force
         out: Floats = force[..., self._columns]
         if self._floating:
@@ -108,7 +108,7 @@ class DrakeCoordinates:
 
     def matrix_back(self, R: Floats, M: Floats) -> Floats:
         """The mass matrix of dynx for the plant's."""
-        if self._plain:
+        if self._same:
             return M
         return self.forces_back(R, self.forces_back(R, M).T)
 
@@ -119,16 +119,17 @@ class DrakeCoordinates:
 
 
 def _gather(places: Sequence[int], length: int) -> tuple[Array, bool]:
-    """Which entry goes to each place of the plant, the last one beyond to those that none goes to."""
+    """The index of the entry for each place of the plant (one past the end for none), and whether some have
+    none."""
     source = np.full(length, len(places))
     source[list(places)] = range(len(places))
     return source, len(places) != length
 
 
-def _turning(v: Floats) -> tuple[float, float, float]:
+def _cross_product(v: Floats) -> tuple[float, float, float]:
     """w x u of a base velocity (u, w)."""
     a, b, c, x, y, z = v[:6].tolist()
     return (y * c - z * b, z * a - x * c, x * b - y * a)
 
 
-_NOTHING: Floats = np.zeros((0, 0))
+_EMPTY: Floats = np.zeros((0, 0))

@@ -1,7 +1,7 @@
-"""Files that Drake must not be asked to load, found before it is.
+"""Checks that find files which Drake must not load.
 
-Drake answers most faults with an exception, but some trip an internal check (``DRAKE_DEMAND``). In C++
-that ends the process; pydrake makes ``SystemExit`` of it, so a program ends that catches ``Exception``.
+For most faults Drake raises an exception, but some fail an internal check (``DRAKE_DEMAND``). In C++ that
+ends the process; pydrake raises ``SystemExit``, which also ends programs that catch ``Exception``.
 """
 
 from __future__ import annotations
@@ -13,18 +13,18 @@ from pathlib import Path
 
 from dynx.errors import EngineError, ModelError, located, shown
 from dynx.files.reading import read_file
-from dynx.loaded.opening import require_file
+from dynx.loaded.robot import require_file
 from dynx.model import Model
 from dynx.model.xml.source import SourceElement, XmlSource
 
 MAX_LINKS = 2000
-"""Most links: the time to load grows with the square of their number and nothing can stop it."""
+"""Largest number of links: the time to load grows with its square, and loading cannot be interrupted."""
 
 _MOVING = ("revolute", "continuous", "prismatic")
 
 
 def require_harmless(path: Path, model: Model) -> None:
-    """Raise EngineError for a file that Drake would end the process on, or that fits no question."""
+    """Raise EngineError for a file on which Drake would end the process, or which it misreads as a whole."""
     require_file(path)
     if len(model.links) > MAX_LINKS:
         raise EngineError(f"{model.name} has {len(model.links)} links; drake is given at most {MAX_LINKS}")
@@ -32,23 +32,23 @@ def require_harmless(path: Path, model: Model) -> None:
     try:
         source = XmlSource(read_file(str(path)), str(path))
     except ModelError as error:
-        raise EngineError(f"drake is not given what is no XML: {error}") from error
+        raise EngineError(f"drake is not given a file that is no XML: {error}") from error
     for message, line in _fatal(source):
         raise EngineError(located(f"drake would end the process: {message}", str(path), line))
 
 
 def _require_own_world(model: Model) -> None:
-    """Drake takes a link named ``world`` for its world, which neither moves nor hangs from a joint."""
+    """Raise EngineError if Drake would mistake a link named ``world`` for its world."""
     if "world" not in {link.name for link in model.links}:
         return
     if model.root != "world":
         raise EngineError(
-            f"drake takes the link 'world' of {model.name} for the world itself, so that the robot hangs "
-            "from there and not from its root"
+            f"drake mistakes the link 'world' of {model.name} for the world itself, so the robot is attached "
+            "there and not at its root"
         )
     if model.floating:
         raise EngineError(
-            f"drake takes the link 'world' of {model.name} for the world itself, so its base cannot float"
+            f"drake mistakes the link 'world' of {model.name} for the world itself, so its base cannot float"
         )
 
 
@@ -58,7 +58,7 @@ def _fatal(source: XmlSource) -> Iterator[tuple[str, int]]:
         yield "the robot's name is empty", root.line
     for transmission in root.all("transmission"):
         kind = transmission.first("type")
-        # Its text is taken without a look whether there is any.
+        # Drake does not check whether there is any text.
         if kind is not None and "type" not in transmission.attributes and not _begins_with_text(source, kind):
             yield "the <type> of a <transmission> has no text", kind.line
     for joint in root.all("joint"):
@@ -76,7 +76,7 @@ def _fatal(source: XmlSource) -> Iterator[tuple[str, int]]:
 
 
 def _begins_with_text(source: XmlSource, element: SourceElement) -> bool:
-    """Whether text, of more than blanks, stands in an element before any other; comments do not count."""
+    """Whether an element begins with text, other than blanks and comments."""
     if element.empty:
         return False
     end = (
@@ -87,7 +87,7 @@ def _begins_with_text(source: XmlSource, element: SourceElement) -> bool:
 
 
 def _number(element: SourceElement, attribute: str, default: float) -> float:
-    """The attribute as a number; the default where there is none, or none that Drake would take."""
+    """The attribute as a number; the default where it is absent or no number."""
     try:
         value = float(element.attributes.get(attribute, default))
     except ValueError:

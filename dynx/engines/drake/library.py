@@ -1,11 +1,11 @@
-"""Drake, as the few classes of pydrake that dynx uses; imported when this module is.
+"""The only import of Drake: the few classes of pydrake that dynx uses.
 
-Importing pydrake.multibody takes about half a second, most of it geometry and systems that
-`MultibodyPlant` cannot be had without. It sends Drake's log to Python's logger ``drake`` and adds no
-handler, so what Drake has to say about a file is heard with `said` and shown by nobody else.
+Importing pydrake.multibody takes about half a second, most of it for geometry and systems that
+`MultibodyPlant` needs. pydrake sends Drake's log to Python's logger ``drake`` and adds no handler, so
+messages about a file are captured with `captured_log` and shown nowhere else.
 
-The classes are of type Any: the stubs that come with some versions of pydrake take no NumPy array
-where the functions themselves take any.
+The classes are of type Any: the stubs that come with some versions of pydrake take no NumPy array where the
+functions themselves take any.
 """
 
 from __future__ import annotations
@@ -44,8 +44,8 @@ SpatialInertia: Any = _tree.SpatialInertia
 UnitInertia: Any = _tree.UnitInertia
 
 DRAKE_FAILURES = (Exception, SystemExit)
-"""What a call of Drake may raise: pydrake makes ``SystemExit`` of a failed internal check, on which C++
-would end the process."""
+"""Exceptions of engine calls; pydrake raises ``SystemExit`` for a failed internal check, on which C++ would
+end the process."""
 
 __all__ = [
     "DRAKE_FAILURES",
@@ -61,9 +61,9 @@ __all__ = [
     "RotationMatrix",
     "SpatialInertia",
     "UnitInertia",
+    "captured_log",
     "drake_version",
-    "gist",
-    "said",
+    "error_message",
 ]
 
 
@@ -75,30 +75,30 @@ def drake_version() -> str:
         return "unknown"
 
 
-def gist(error: BaseException) -> str:
-    """What Drake says, on one line of at most 400 characters, with the kind of exception before it."""
+def error_message(error: BaseException) -> str:
+    """Drake's message on one line of at most 400 characters, after the type of the exception."""
     words = " ".join(str(error).split())
     return f"{type(error).__name__}: {escaped(words, 400) if words else 'no message'}"
 
 
 @contextmanager
-def said() -> Iterator[list[str]]:
-    """What Drake logs meanwhile, as a list that fills; nothing of it reaches the user's own handlers.
+def captured_log() -> Iterator[list[str]]:
+    """Capture Drake's log messages in a list, without passing them to the user's own handlers.
 
-    Drake's logger is the process's: what other threads make Drake say in the meantime is in it too.
+    The process has one logger for Drake, so messages caused by other threads are captured too.
     """
     logger = logging.getLogger("drake")
-    heard = _Heard()
+    captured = _MessageList()
     kept = logger.handlers[:], logger.propagate
-    logger.handlers[:], logger.propagate = [heard], False
+    logger.handlers[:], logger.propagate = [captured], False
     try:
-        yield heard.messages
+        yield captured.messages
     finally:
         logger.handlers[:], logger.propagate = kept
 
 
-class _Heard(logging.Handler):
-    """Keeps every message."""
+class _MessageList(logging.Handler):
+    """Handler that keeps every message."""
 
     def __init__(self) -> None:
         super().__init__()

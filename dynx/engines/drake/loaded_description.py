@@ -1,4 +1,4 @@
-"""What Drake holds of a link and of a joint, and what it said while loading."""
+"""Description of a link and of a joint in Drake, and of the messages while loading."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from dynx.spatial.scalar import Floats
 
 
 def describe_link(body: Any, context: Any) -> LoadedInertial:
-    """The engine's inertia of a body, which is about the link's origin, about the centre of mass.
+    """The inertia of a body about its centre of mass; Drake holds it about the link's origin.
 
-    The world itself, which a link named ``world`` is, weighs nothing.
+    Drake's world, which is the body of a link named ``world``, has no mass.
     """
     if body.index() == 0:
         return LoadedInertial(0.0, np.zeros(3), np.zeros((3, 3)))
@@ -26,7 +26,7 @@ def describe_link(body: Any, context: Any) -> LoadedInertial:
 
 
 def describe_joint(joint: Any, actuator: Any | None) -> LoadedJoint:
-    """A joint that moves; effort and armature are those of its actuator, where the file makes one."""
+    """The description of a joint that moves; effort and armature are those of its actuator, if it has one."""
     placement = np.array(joint.frame_on_parent().GetFixedPoseInBodyFrame().GetAsMatrix4())
     kind = str(joint.type_name())
     if joint.num_velocities() != 1:
@@ -47,9 +47,9 @@ def describe_joint(joint: Any, actuator: Any | None) -> LoadedJoint:
     )
 
 
-def remarks(heard: Iterable[str], path: str, plant: Any) -> tuple[str, ...]:
-    """What Drake logged, each message once and on one line, and how many constraints it made."""
-    lines = [" ".join(message.replace(f"{path}:", "line ").split()) for message in heard]
+def remarks(log: Iterable[str], path: str, plant: Any) -> tuple[str, ...]:
+    """Drake's log messages, each once and on one line, and the number of constraints that it made."""
+    lines = [" ".join(message.replace(f"{path}:", "line ").split()) for message in log]
     if plant.num_constraints():
         lines.append(f"{plant.num_constraints()} mimic joints are constraints")
     return tuple(dict.fromkeys(lines))

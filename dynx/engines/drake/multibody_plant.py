@@ -1,10 +1,10 @@
-"""A `MultibodyPlant` with the moving bodies of a mechanism, and where dynx finds things in it.
+"""A `MultibodyPlant` with the moving bodies of a mechanism, and the map of its frames and coordinates.
 
-Drake's `SpatialInertia` is mass, centre of mass and inertia per unit of mass, and is taken as it stands
-when its check is skipped, physical or not. Inertia without mass does not fit in: such a body is made of
-two parts welded together whose masses are s and -s, so that what remains is the inertia. Drake's inverse
-dynamics, energies and articulated-body algorithm add forces and 6 x 6 matrices, so the parts cancel to
-rounding; its composite-body mass matrix divides by the mass of the sum and must not be asked.
+Drake's `SpatialInertia` is mass, centre of mass and inertia per unit of mass; without its check it may be
+unphysical. It cannot represent inertia without mass: such a body is made of two rigidly connected parts of
+mass s and -s, whose sum is the inertia. Drake's inverse dynamics, energies and articulated-body algorithm add
+forces and 6 x 6 matrices, so the parts cancel to rounding; its composite-body mass matrix divides by the mass
+of the sum and must not be used.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from dynx.spatial.inertia import RigidInertia
 from dynx.spatial.scalar import Array, Floats
 from dynx.spatial.se3 import homogeneous
 
-LARGEST = 1e150
+MAX_RATIO = 1e150
 """Length [m], or square of a radius of gyration [m^2], beyond which products with it may overflow."""
 
 
@@ -55,7 +55,7 @@ class BuiltPlant:
 
 
 def build_plant(mechanism: Mechanism) -> BuiltPlant:
-    """The plant of a mechanism: one body for each of its bodies, numbered names."""
+    """The plant of a mechanism, with one numbered body for each of its bodies."""
     plant = MultibodyPlant(time_step=0.0)
     plant.mutable_gravity_field().set_gravity_vector(np.array(mechanism.gravity))
     bodies: list[Any] = []
@@ -107,12 +107,12 @@ def build_plant(mechanism: Mechanism) -> BuiltPlant:
 
 
 def _parts(inertia: RigidInertia) -> list[Any]:
-    """The inertia as one of Drake's; as several where it has too little mass to be divided by it."""
+    """The inertia as one of Drake's, or as several where it cannot be divided by its mass."""
     mass = float(inertia.mass)
     if not (inertia.first_moment.any() or inertia.rotational_inertia.any()):
         return [_inertia(mass, inertia)]
     largest = float(max(np.max(np.abs(inertia.first_moment)), np.max(np.abs(inertia.rotational_inertia))))
-    if mass and largest < LARGEST * abs(mass):
+    if mass and largest < MAX_RATIO * abs(mass):
         return [_inertia(mass, inertia)]
     nothing = RigidInertia(inertia.mass, np.zeros(3), np.zeros((3, 3)))
     parts = [_inertia(largest, inertia), _inertia(-largest, nothing)]
@@ -120,7 +120,7 @@ def _parts(inertia: RigidInertia) -> list[Any]:
 
 
 def _inertia(mass: float, moments: RigidInertia) -> Any:
-    """Drake's inertia of this mass, with the first and second moment of `moments`."""
+    """Drake's inertia with this mass and the first and second moment of `moments`."""
     divisor = mass or 1.0
     G = moments.rotational_inertia / divisor
     unit = UnitInertia(G[0, 0], G[1, 1], G[2, 2], G[0, 1], G[0, 2], G[1, 2])
@@ -128,5 +128,5 @@ def _inertia(mass: float, moments: RigidInertia) -> Any:
 
 
 def _pose(R: Array, p: Array) -> Any:
-    # Release builds of Drake, which the wheels are, take a matrix as it is.
+    # Release builds of Drake, such as the wheels, do not check the matrix.
     return RigidTransform(RotationMatrix(np.asarray(R, dtype=float)), np.asarray(p, dtype=float))

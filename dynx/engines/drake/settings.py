@@ -1,4 +1,4 @@
-"""Remedies at run time for a robot that Drake has loaded."""
+"""Settings of a robot that Drake has loaded: the remedies at run time."""
 
 from __future__ import annotations
 
@@ -26,21 +26,21 @@ CALLS: Mapping[str, str] = {
         "    plant.get_mutable_joint_actuator(i).set_default_rotor_inertia(0)"
     ),
     "drake.set_inertias": (
-        "# for each link that Drake warned of; I is about the link's origin, in its axes;\n"
-        "# where the file has no mass, m = 2**-200, for Drake holds an inertia per unit of mass\n"
+        "# for each link in Drake's warnings; I is about the link's origin, in its axes;\n"
+        "# where the file has no mass, m = 2**-200, because Drake holds an inertia per unit of mass\n"
         "G = UnitInertia(*(I[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]] / m))\n"
         "M = SpatialInertia(m, center_of_mass, G, skip_validity_check=True)\n"
         "plant.GetBodyByName(link).SetSpatialInertiaInBodyFrame(context, M)"
     ),
 }
 
-FEATHER = 2.0**-200
-"""Mass [kg] of a link whose file states an inertia and no mass: a power of two, so that dividing by it is
-exact, and too light for its weight to be seen beside any inertia."""
+NEGLIGIBLE_MASS = 2.0**-200
+"""Mass [kg] of a link for which the file states an inertia and no mass: a power of two, so that dividing by
+it is exact, and too small for its weight to show beside any inertia."""
 
 
 def set_before_finalize(plant: Any, calls: Collection[str]) -> None:
-    """Apply those of `calls` that Drake takes before `Finalize`."""
+    """Apply those of `calls` that must precede `Finalize`."""
     if "drake.no_damping" in calls:
         for index in plant.GetJointIndices():
             joint = plant.get_mutable_joint(index)
@@ -54,7 +54,7 @@ def set_before_finalize(plant: Any, calls: Collection[str]) -> None:
 
 
 def set_in_context(context: Any, bodies: Mapping[str, Any], model: Model, calls: Collection[str]) -> None:
-    """Apply those of `calls` that Drake takes in a context; the numbers are those of `model`."""
+    """Apply those of `calls` that act on a context; the inertias are those of `model`."""
     if "drake.set_inertias" not in calls:
         return
     for link in model.links:
@@ -62,7 +62,7 @@ def set_in_context(context: Any, bodies: Mapping[str, Any], model: Model, calls:
             continue
         R, p = pose_arrays(link.inertial.origin, float64)
         stated = inertia_about_origin(float64(link.inertial.mass), p, R, float64(link.inertial.tensor))
-        mass = float(stated.mass) or FEATHER
+        mass = float(stated.mass) or NEGLIGIBLE_MASS
         G = np.asarray(stated.rotational_inertia / mass)
         unit = UnitInertia(G[0, 0], G[1, 1], G[2, 2], G[0, 1], G[0, 2], G[1, 2])
         inertia = SpatialInertia(mass, p, unit, skip_validity_check=True)

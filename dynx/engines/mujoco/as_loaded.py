@@ -1,11 +1,11 @@
 """A URDF as MuJoCo loads it from the file.
 
-Its answers are those of the calls that users make: `mj_inverse` and `mj_forward`, with whatever MuJoCo
-adds to the rigid bodies. Joint damping, dry friction, limits that are violated, `<mimic>` (an equality
-constraint) and shapes that touch all put forces into both; `CALLS` take them out, one by one.
+Quantities are those of the calls that users make, `mj_inverse` and `mj_forward`, with all forces that MuJoCo
+adds to rigid bodies. Joint damping, dry friction, violated limits, `<mimic>` (an equality constraint) and
+shapes that touch add forces to both; each of `CALLS` removes one kind.
 
-With a fixed base MuJoCo welds the root link, and all that hangs on fixed joints, into what carries
-them (`fusestatic`, the default for URDF): such links have no frame any more.
+With a fixed base MuJoCo merges the root link, and all links on fixed joints, into their parents
+(`fusestatic`, the default for URDF), so these links have no frame.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class LoadedMujoco(LoadedRobot):
         self._bodies = [self._body(link.name) for link in model.links]
         joints = [self._joint(name) for name in model.joint_names]
         base = 6 if model.floating else 0
-        # Where dynx's coordinates are among MuJoCo's; the free joint comes first in both.
+        # Places of dynx's coordinates among MuJoCo's; the free joint comes first in both.
         self._q = [int(loaded.jnt_qposadr[joint]) for joint in joints]
         self._v = [*range(base), *(int(loaded.jnt_dofadr[joint]) for joint in joints)]
         self._data = mujoco.MjData(loaded)
@@ -55,11 +55,11 @@ class LoadedMujoco(LoadedRobot):
         return FLOATING if floating else FIXED
 
     def describe(self) -> LoadedModel:
-        """What MuJoCo holds."""
+        """The description of MuJoCo's model."""
         return describe_model(self._loaded, self._model, self._gravity)
 
     def link_poses(self, q: Floats) -> Floats:
-        """T_world_link (n_links, 4, 4); NaN for links that MuJoCo has fused into others."""
+        """T_world_link (n_links, 4, 4); NaN for links that MuJoCo merged into others."""
         self._place(q)
         mujoco.mj_kinematics(self._loaded, self._data)
         T = np.full((len(self._bodies), 4, 4), np.nan)
@@ -90,7 +90,7 @@ class LoadedMujoco(LoadedRobot):
         self._place(q)
         mujoco.mj_forward(self._loaded, self._data)
         M = np.zeros((self._loaded.nv, self._loaded.nv))
-        # Since 4.0 it takes the data, before it took their field qM.
+        # Since 4.0 its argument is the data, before that their field qM.
         if hasattr(self._data, "qM"):
             mujoco.mj_fullM(self._loaded, M, self._data.qM)
         else:
@@ -103,7 +103,7 @@ class LoadedMujoco(LoadedRobot):
         return M
 
     def inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
-        """`mj_inverse`, (nv,): less the damping and the constraint forces that MuJoCo finds."""
+        """`mj_inverse`, (nv,), which subtracts damping and constraint forces."""
         self._place(q, v)
         self._data.qacc[self._v] = a
         if self._model.floating:
@@ -134,7 +134,7 @@ class LoadedMujoco(LoadedRobot):
     # -- from dynx to MuJoCo ------------------------------------------------------------------
 
     def _place(self, q: Floats, v: Floats | None = None) -> None:
-        """Everything as it was after loading, but for the state."""
+        """Reset the data to the state after loading, and set the configuration and the velocity."""
         data, base = self._data, 7 if self._model.floating else 0
         mujoco.mj_resetData(self._loaded, data)
         silence_warnings(data)
@@ -154,17 +154,17 @@ class LoadedMujoco(LoadedRobot):
         return R
 
     def _body(self, link: str) -> int | None:
-        """MuJoCo's body for a link; the world for a root of that name, as MuJoCo has it."""
+        """MuJoCo's body for a link; the world for a fixed root named ``world``."""
         if not link:
             return None
         number = int(mujoco.mj_name2id(self._loaded, mujoco.mjtObj.mjOBJ_BODY, link))
-        at_rest = number == WORLD and link == self._model.root and not self._model.floating
-        return number if number > WORLD or at_rest else None
+        is_world = number == WORLD and link == self._model.root and not self._model.floating
+        return number if number > WORLD or is_world else None
 
     def _joint(self, name: str) -> int:
         number = int(mujoco.mj_name2id(self._loaded, mujoco.mjtObj.mjOBJ_JOINT, name))
         one = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
         if number < 0 or self._loaded.jnt_type[number] not in [int(kind) for kind in one]:
-            there = "not there" if number < 0 else "of several degrees"
+            there = "not there" if number < 0 else "of several degrees of freedom"
             raise lacking_joints(self.name, self._model, {name: there})
         return number

@@ -1,14 +1,13 @@
 """The backend `mujoco`: MuJoCo's kinematics, Jacobians, accelerations and LDL' solver.
 
-The engine's model is built from the links and joints of the `Model` (`mujoco_tree`), independently of
-`dynx.model.mechanism`; there are no limits, contacts, damping or actuators in it, so that nothing is
-left for MuJoCo's constraint solver. Mass matrix and torques are put together from MuJoCo's poses, axes,
-accelerations and inertias, for `mj_crb` and `mj_rne` lose digits (`mujoco_projection`). Tree coordinates are
-MuJoCo's own but for a floating base: its quaternion is (w, x, y, z), and its linear velocity is in
-world axes.
+The engine's model is built from the links and joints of the `Model` (`tree`), independently of
+`dynx.model.mechanism`; it has no limits, contacts, damping or actuators, so MuJoCo's constraint solver has no
+work. Mass matrix and torques are computed from MuJoCo's poses, axes, accelerations and inertias, because
+`mj_crb` and `mj_rne` lose digits (`projection`). Tree coordinates are MuJoCo's own except for a floating
+base: its quaternion is (w, x, y, z), and its linear velocity is in world axes.
 
 Safe to use from several threads: the engine's workspace (`MjData`) exists once per thread, made on the
-thread's first call. MuJoCo lets go of the GIL in its calls.
+thread's first call. MuJoCo releases the GIL in its calls.
 """
 
 from __future__ import annotations
@@ -34,16 +33,16 @@ ORIGIN = np.zeros(3)
 ALMOST_SINGULAR = int(mujoco.mjtWarning.mjWARN_INERTIA)
 
 
-def _gist(error: BaseException) -> str:
+def _message(error: BaseException) -> str:
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     return f"{type(error).__name__}: {lines[0] if lines else 'no message'}"
 
 
-_mapped = engine_errors("mujoco", _gist)
+_mapped = engine_errors("mujoco", _message)
 
 
 class _Workspace(local):
-    """The engine's `MjData` and views into it, one for each thread that asks for it."""
+    """The engine's `MjData` and views into it, for one thread."""
 
     def __init__(self, engine: Any) -> None:
         self.data = data = silent_data(engine)
@@ -64,7 +63,7 @@ class MujocoBackend(Backend):
     name: ClassVar[str] = "mujoco"
 
     def __init__(self, model: Model, *, validate: bool = True) -> None:
-        """Raises EngineLimitError for a model that the engine has no room for."""
+        """Raises EngineLimitError for a model that is too large for the engine."""
         super().__init__(model, validate=validate)
         try:
             tree = build_tree(model)
@@ -73,7 +72,7 @@ class MujocoBackend(Backend):
         except DynxError:
             raise
         except Exception as error:
-            raise EngineError(f"mujoco cannot hold {model.name}: {_gist(error)}") from error
+            raise EngineError(f"mujoco cannot hold {model.name}: {_message(error)}") from error
         self._nv = self._mechanism.nv
         self._floating = model.floating
         self._dynamics = ProjectedDynamics(self._engine, floating=model.floating)
@@ -122,14 +121,14 @@ class MujocoBackend(Backend):
         J = self._columns(work, mujoco.mj_jac, p, body)
         dJ = self._columns(work, mujoco.mj_jacDot, p, body)
         if self._floating:
-            # The base's linear columns are its axes, which turn with it.
+            # The base's linear columns are its axes, which rotate with it.
             root = work.R[ROOT] @ skew(v[3:6])
             dJ[:3, :3] = root
         if reference == LOCAL_WORLD_ALIGNED:
             return dJ
-        velocity, turning = (J[:3] @ v, J[3:] @ v)
+        velocity, omega = (J[:3] @ v, J[3:] @ v)
         if reference == "local":
-            spin = skew(turning)
+            spin = skew(omega)
             return np.concatenate([R.T @ (dJ[:3] - spin @ J[:3]), R.T @ (dJ[3:] - spin @ J[3:])])
         return np.concatenate([dJ[:3] + skew(velocity) @ J[3:] + skew(np.array(p)) @ dJ[3:], dJ[3:]])
 
@@ -165,8 +164,8 @@ class MujocoBackend(Backend):
         before = warned.number
         mujoco.mj_forward(self._engine, work.data)
         if warned.number != before:
-            # A pivot below 1e-15 was replaced by it: a matter of units, or of a mass matrix that is
-            # not positive definite.
+            # A pivot below 1e-15 was replaced by it, because of small units or a mass matrix that is not
+            # positive definite.
             return super()._forward_dynamics(q, v, tau)
         a = np.array(work.a)
         if self._floating:
@@ -218,7 +217,7 @@ class MujocoBackend(Backend):
     # -- the engine's state -------------------------------------------------------------------
 
     def _placed(self, q: Floats) -> _Workspace:
-        """The workspace of this thread with all bodies where `q` has them."""
+        """The workspace of this thread with the poses of all bodies at `q`."""
         work = self._workspace
         work.q[:] = q
         if self._floating:
@@ -227,7 +226,7 @@ class MujocoBackend(Backend):
         return work
 
     def _moving(self, q: Floats, v: Floats) -> _Workspace:
-        """The same with the velocities of all bodies."""
+        """The workspace of this thread with poses and velocities of all bodies."""
         work = self._placed(q)
         work.v[:] = v
         if self._floating:
@@ -236,10 +235,10 @@ class MujocoBackend(Backend):
         mujoco.mj_comVel(self._engine, work.data)
         return work
 
-    def _columns(self, work: _Workspace, ask: Callable[..., None], point: Floats, body: int) -> Floats:
-        """A Jacobian of MuJoCo's, (6, nv), with the base's velocity in base axes."""
+    def _columns(self, work: _Workspace, function: Callable[..., None], point: Floats, body: int) -> Floats:
+        """A Jacobian (6, nv) by MuJoCo, with the base's velocity in base axes."""
         J = np.zeros((6, self._nv))
-        ask(self._engine, work.data, J[:3], J[3:], point, body)
+        function(self._engine, work.data, J[:3], J[3:], point, body)
         if self._floating:
             J[:3, :3] = J[:3, :3] @ work.R[ROOT]
         return J

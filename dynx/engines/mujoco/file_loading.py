@@ -1,4 +1,4 @@
-"""MuJoCo loading a URDF file as its users have it do, and what would crash it."""
+"""Loading a URDF file by MuJoCo as users do, after a check for files that would crash it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 from dynx.engines.mujoco.library import MAX_DEPTH, mujoco
 from dynx.engines.silence import silence
 from dynx.errors import EngineError, shown
-from dynx.loaded.opening import require_file
+from dynx.loaded.robot import require_file
 from dynx.model import Model
 
 CALLS: Mapping[str, str] = {
@@ -33,34 +33,37 @@ FLOATING = (
 
 
 def load_file(path: Path, model: Model, calls: Collection[str]) -> Any:
-    """MuJoCo's model of the file, `calls` applied; EngineError with MuJoCo's words where it refuses."""
+    """MuJoCo's model of the file, `calls` applied; raises EngineError with MuJoCo's message where it
+    refuses."""
     _refuse_crashes(path, model)
     names: dict[str, Any] = {"mujoco": mujoco, "path": str(path)}
     loading = FLOATING if model.floating else FIXED
     try:
         with _without_warnings():
-            # The lines that users are shown are those that run.
+            # The lines shown to users are those that are executed.
             exec(loading, names)
             for call, code in CALLS.items():
                 if call in calls:
                     exec(code, names)
     except Exception as error:
-        raise EngineError(f"mujoco refuses {path.name}: {_words(error)}") from error
+        raise EngineError(f"mujoco refuses {path.name}: {_message(error)}") from error
     loaded = names["model"]
     if model.floating:
         name = loaded.body(int(loaded.jnt_bodyid[0])).name if loaded.njnt else "nothing"
         if name != model.root:
             raise EngineError(
-                f"mujoco lets {shown(name)} float where the root of {path.name} is {shown(model.root)}"
-                + (": a root named 'world' is the world to MuJoCo" if model.root == "world" else "")
+                f"mujoco lets {shown(name)} float instead of the root {shown(model.root)} of {path.name}"
+                + (": MuJoCo mistakes a root named 'world' for the world" if model.root == "world" else "")
             )
     return loaded
 
 
 @contextmanager
 def _without_warnings() -> Iterator[None]:
-    """Keep what it warns of from stderr, from Python's warnings, and from a log file in the working
-    directory, which it writes unless a program takes the warnings."""
+    """Keep warnings out of stderr, Python's warnings and the log file in the working directory.
+
+    MuJoCo writes that file unless a program handles the warnings.
+    """
     before = mujoco.get_mju_user_warning()
     with silence(), warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -72,7 +75,7 @@ def _without_warnings() -> Iterator[None]:
 
 
 def _ignore(message: str) -> None:
-    """Take a warning."""
+    """Handle a warning by doing nothing."""
 
 
 def _refuse_crashes(path: Path, model: Model) -> None:
@@ -82,12 +85,12 @@ def _refuse_crashes(path: Path, model: Model) -> None:
         depth[joint.child] = depth[joint.parent] + 1
     if max(depth.values()) > MAX_DEPTH:
         raise EngineError(
-            f"mujoco was not asked: {path.name} has {max(depth.values())} links in a row, and it "
-            f"crashes on long chains (more than {MAX_DEPTH} are not tried)"
+            f"mujoco is not given {path.name}: it has {max(depth.values())} links in a row, and "
+            f"long chains crash MuJoCo (at most {MAX_DEPTH} are tried)"
         )
 
 
-def _words(error: Exception) -> str:
+def _message(error: Exception) -> str:
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
-    # Something like "Error: inertia must satisfy A + B >= C" and "Element name 'arm', id 2".
+    # Such as "Error: inertia must satisfy A + B >= C" and "Element name 'arm', id 2".
     return "; ".join(lines[:2]) or type(error).__name__

@@ -1,4 +1,4 @@
-"""MuJoCo, as the module `mujoco`, with what its users here must all heed."""
+"""The only import of MuJoCo, as the module `mujoco`, and how dynx silences its warnings."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dynx.errors import NotInstalledError
 try:
     import mujoco
 except (ImportError, AttributeError, OSError, RuntimeError) as error:
-    # The last three come from what it sets up for drawing: a wrong MUJOCO_GL, libraries that are not there.
+    # The last three come from the setup of its renderer: a wrong MUJOCO_GL, missing libraries.
     raise NotInstalledError(
         f"the engine 'mujoco' needs MuJoCo: pip install 'dynx[mujoco]' ({error})"
     ) from error
@@ -17,15 +17,15 @@ except (ImportError, AttributeError, OSError, RuntimeError) as error:
 __all__ = ["MAX_DEPTH", "mujoco", "silence_warnings", "silent_data"]
 
 MAX_DEPTH = 1000
-"""Most links in a row that MuJoCo is given. Its compiler has a limit of 1,024 bodies; its reader of files
-goes down the tree by recursion, and ends the process where the stack of the thread does (measured, 4.0)."""
+"""Largest depth of the tree of links that MuJoCo is given. Its compiler has a limit of 1,024 bodies; its
+reader of files is recursive, and ends the process when the stack of the thread is full (measured, 4.0)."""
 
 
 def silent_data(model: Any) -> Any:
-    """A new `MjData` of a model, that warns nobody.
+    """A new `MjData` of a model with warnings silenced.
 
-    MuJoCo prints the first warning of each kind and writes it to a log file in the working directory;
-    further ones it only counts. `mj_resetData` forgets: `silence_warnings` again after it.
+    MuJoCo prints the first warning of each kind and writes it to a log file in the working directory; it only
+    counts further ones. `mj_resetData` resets the counters: call `silence_warnings` after it.
     """
     data = mujoco.MjData(model)
     silence_warnings(data)
@@ -33,6 +33,6 @@ def silent_data(model: Any) -> Any:
 
 
 def silence_warnings(data: Any) -> None:
-    """Let the next warning of each kind be none that is printed."""
+    """Prevent MuJoCo from printing warnings, by counters that are not zero."""
     for warning in data.warning:
         warning.number = 1

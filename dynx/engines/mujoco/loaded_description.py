@@ -1,4 +1,4 @@
-"""What MuJoCo holds after loading a file, link by link and joint by joint."""
+"""The model that MuJoCo holds after loading a file, link by link and joint by joint."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ NAMES = {
 def describe_model(loaded: Any, model: Model, gravity: Floats) -> LoadedModel:
     """The description of a MuJoCo model `loaded` from a file with the names of `model`."""
     here = {loaded.body(number).name: number for number in range(1, loaded.nbody)}
-    fused = _fused(model, here)
+    merged = _merged(model, here)
     links = {
-        link.name: _inertial(loaded, here[link.name], fused.get(link.name, ()))
+        link.name: _inertial(loaded, here[link.name], merged.get(link.name, ()))
         for link in model.links
         if link.name in here
     }
@@ -35,7 +35,7 @@ def describe_model(loaded: Any, model: Model, gravity: Floats) -> LoadedModel:
     joints = {loaded.jnt(k).name: _joint(loaded, k, model, here) for k in range(first, loaded.njnt)}
     remarks = []
     if model.root not in here:
-        remarks.append(f"the root link {model.root} is fused into the world")
+        remarks.append(f"the root link {model.root} is merged into the world")
     if loaded.neq:
         remarks.append(f"{loaded.neq} equality constraints stand for <mimic>")
     if np.any(loaded.geom_contype[:] * loaded.geom_conaffinity[:]):
@@ -44,7 +44,7 @@ def describe_model(loaded: Any, model: Model, gravity: Floats) -> LoadedModel:
         engine="mujoco",
         links=links,
         joints=joints,
-        # MuJoCo puts the root link at the origin of the world, whether it keeps it or not.
+        # MuJoCo puts the root link at the origin of the world, even if it merges it.
         base_frame=_pose(loaded.body_pos[here[model.root]], loaded.body_quat[here[model.root]])
         if model.root in here
         else np.eye(4),
@@ -54,8 +54,8 @@ def describe_model(loaded: Any, model: Model, gravity: Floats) -> LoadedModel:
     )
 
 
-def _fused(model: Model, here: dict[str, int]) -> dict[str, tuple[str, ...]]:
-    """For each link that MuJoCo kept, the links it has fused into it."""
+def _merged(model: Model, here: dict[str, int]) -> dict[str, tuple[str, ...]]:
+    """For each link that MuJoCo kept, the links that it merged into it."""
     carrier = {model.root: model.root}
     found: dict[str, list[str]] = {}
     for joint in model.joints:
@@ -66,13 +66,13 @@ def _fused(model: Model, here: dict[str, int]) -> dict[str, tuple[str, ...]]:
     return {name: tuple(members) for name, members in found.items()}
 
 
-def _inertial(loaded: Any, body: int, fused: tuple[str, ...]) -> LoadedInertial:
+def _inertial(loaded: Any, body: int, merged: tuple[str, ...]) -> LoadedInertial:
     R = _rotation(loaded.body_iquat[body])
     return LoadedInertial(
         mass=float(loaded.body_mass[body]),
         center=np.array(loaded.body_ipos[body]),
         inertia=np.asarray((R * loaded.body_inertia[body]) @ R.T),
-        fused=fused,
+        merged=merged,
     )
 
 
@@ -95,7 +95,7 @@ def _joint(loaded: Any, number: int, model: Model, here: dict[str, int]) -> Load
 
 
 def _placement(loaded: Any, body: int, model: Model, here: dict[str, int]) -> Floats | None:
-    """The pose of a body in its parent link; None where MuJoCo has fused that link."""
+    """The pose of a body in its parent link; None where MuJoCo has merged that link."""
     child = loaded.body(body).name
     parents = [joint.parent for joint in model.joints if joint.child == child]
     if not parents:

@@ -1,12 +1,12 @@
-"""Mass matrix and torques projected from MuJoCo's kinematics, where its own ones lose digits.
+"""Mass matrix and torques projected from MuJoCo's kinematics, because MuJoCo's own lose digits.
 
-MuJoCo refers the inertia of every body to the centre of mass of the whole robot. For a finger of mass m at
-a distance d from there that adds m d^2 to an inertia that may be a thousandth of it, and takes it away
-again (`mj_crb`, `mj_rne`): on robots with hands the entries of its matrix are off by 1e-12 of sqrt(M_ii
-M_jj) (MuJoCo 4.0), and the torque about an axis through a point mass, which is zero, comes out as a
-rounding of the largest one. Here M is the sum of m Jp' Jp + Jr' I Jr over the bodies (Siciliano et al.,
-Robotics, eq. 7.32) and the torque the sum of Jp' m (a - g) + Jr' (I dw + w x I w) (Newton and Euler,
-projected as in Kane's method), with levers from joint to body, which need no distant point.
+MuJoCo refers the inertia of every body to the centre of mass of the whole robot. For a finger of mass m at a
+distance d from there that adds m d^2 to an inertia that may be a thousandth of it, and takes it away again
+(`mj_crb`, `mj_rne`): on robots with hands the entries of its matrix are off by 1e-12 of sqrt(M_ii M_jj)
+(MuJoCo 4.0), and the torque about an axis through a point mass, which is zero, comes out as a rounding of the
+largest one. Here M is the sum of m Jp' Jp + Jr' I Jr over the bodies (Siciliano et al., Robotics, eq. 7.32)
+and the torque the sum of Jp' m (a - g) + Jr' (I dw + w x I w) (Newton and Euler, projected as in Kane's
+method), with levers from joint to body, which need no distant point.
 """
 
 from __future__ import annotations
@@ -20,20 +20,21 @@ from dynx.spatial.scalar import Floats
 
 
 class ProjectedDynamics:
-    """Which bodies weigh, and which coordinates move them: all that does not change with q.
+    """Mass matrix and torques of one model; it keeps the bodies with inertia and the coordinates that move
+    them.
 
-    Coordinates are MuJoCo's, but for the velocity of a floating base, which is in base axes.
+    Coordinates are MuJoCo's, except that the velocity of a floating base is in base axes.
     """
 
     def __init__(self, engine: Any, *, floating: bool) -> None:
         self._base = 6 if floating else 0
         self._first = int(floating)
-        weighs = (engine.body_mass != 0.0) | engine.body_inertia.any(axis=1)
-        self._bodies = np.flatnonzero(weighs & (engine.body_weldid != 0))
+        has_inertia = (engine.body_mass != 0.0) | engine.body_inertia.any(axis=1)
+        self._bodies = np.flatnonzero(has_inertia & (engine.body_weldid != 0))
         self._roots = engine.body_rootid[self._bodies]
         self._mass: Floats = np.array(engine.body_mass[self._bodies])
         self._moments: Floats = np.array(engine.body_inertia[self._bodies])
-        self._turns = engine.jnt_type[self._first :] == int(mujoco.mjtJoint.mjJNT_HINGE)
+        self._hinges = engine.jnt_type[self._first :] == int(mujoco.mjtJoint.mjJNT_HINGE)
         self._moves: Floats = np.zeros((len(self._bodies), engine.nv))
         for row, body in enumerate(self._bodies):
             while body:
@@ -42,16 +43,16 @@ class ProjectedDynamics:
                 body = engine.body_parentid[body]
 
     def mass_matrix(self, data: Any, R_root: Floats, p_root: Floats) -> Floats:
-        """M (nv, nv); `data` after `mj_kinematics`, (R, p) the pose of the root."""
+        """The mass matrix (nv, nv); `data` after `mj_kinematics`, (R, p) the pose of the root."""
         Jp, Jr = self._jacobians(data, R_root, p_root)
         M: Floats = _weighted(Jp, np.repeat(self._mass, 3)) + _weighted(Jr, self._moments.ravel())
         return np.asarray(0.5 * (M + M.T))
 
     def torque(self, data: Any, R_root: Floats, p_root: Floats) -> Floats:
-        """tau (nv,); `data` after `mj_rnePostConstraint`, whose accelerations are less gravity."""
+        """The torque (nv,); `data` after `mj_rnePostConstraint`, whose accelerations are without gravity."""
         bodies = self._bodies
-        # MuJoCo's velocities and spatial accelerations are about the robot's centre of mass, world axes,
-        # angular part first; moved to the body's own, and the acceleration made the classical one.
+        # MuJoCo's velocities and spatial accelerations are about the robot's centre of mass, in world axes,
+        # angular part first; here they are converted to classical ones of the body's centre of mass.
         lever = data.xipos[bodies] - data.subtree_com[self._roots]
         w, dw = data.cvel[bodies, :3], data.cacc[bodies, :3]
         v = data.cvel[bodies, 3:] + np.cross(w, lever)
@@ -64,11 +65,11 @@ class ProjectedDynamics:
         return np.asarray(np.einsum("bij,bi->j", Jp, force) + np.einsum("bij,bi->j", Jr, moment))
 
     def _jacobians(self, data: Any, R_root: Floats, p_root: Floats) -> tuple[Floats, Floats]:
-        """Of all bodies (n, 3, nv): velocity of the centre of mass in world axes, and of turning in
-        principal axes."""
+        """Jacobians (n, 3, nv) of all bodies: velocity of the centre of mass in world axes, and angular
+        velocity in principal axes."""
         axes, anchors = data.xaxis[self._first :], data.xanchor[self._first :]
-        linear = np.where(self._turns[:, None], 0.0, axes)
-        angular = np.where(self._turns[:, None], axes, 0.0)
+        linear = np.where(self._hinges[:, None], 0.0, axes)
+        angular = np.where(self._hinges[:, None], axes, 0.0)
         if self._base:
             zero = np.zeros((3, 3))
             linear = np.concatenate([R_root.T, zero, linear])

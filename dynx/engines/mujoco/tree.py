@@ -1,12 +1,12 @@
-"""MuJoCo's model of a robot, built from links and joints: one body for each frame, one joint for each
-that moves.
+"""MuJoCo's model of a robot, built from links and joints: one body for each frame, one joint for each that
+moves.
 
-MuJoCo's compiler refuses inertias that a description can hold (no mass on a moving body, a broken
-triangle inequality, a negative principal moment). So it compiles the tree with stand-in inertias, and
-the numbers of the description are written into the compiled model: its algorithms take any, since
-they are affine in them. What the compiler derives from inertias and the algorithms here read is
-`body_subtreemass` alone, and written too. Stand-ins lie off the body frames, so that the compiler
-takes none of its short cuts for bodies whose inertia is diagonal.
+MuJoCo's compiler refuses inertias that a description can hold (no mass on a moving body, a violated triangle
+inequality, a negative principal moment). So it compiles the tree with substitute inertias, and the numbers of
+the description are written into the compiled model: the algorithms accept any, since they are affine in them.
+Of the fields that the compiler derives from inertias, the algorithms used here read `body_subtreemass` only,
+which is written too. The substitutes lie off the body frames, so that the compiler does not simplify bodies
+with a diagonal inertia.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from dynx.spatial.scalar import Array, Floats
 from dynx.spatial.so3 import quat_from_rotation, rotation_from_rpy
 
 MAX_NV = 1000
-"""Most tree velocities that are accepted: compiling a chain of as many takes 3 s, and time
-grows with their cube (measured, 4.0)."""
+"""Largest number of tree velocities: compiling such a chain takes 3 s, and the time grows with the cube
+(measured, 4.0)."""
 
 WORLD = 0
 """MuJoCo's body 0."""
@@ -39,7 +39,7 @@ ROOT = 1
 class MujocoTree:
     """MuJoCo's compiled model, and the number of the body that is each frame of `Model.frames`.
 
-    `masses_add` says whether centres of mass may be MuJoCo's own: there is mass, and none is negative.
+    `masses_add` says whether MuJoCo's own centres of mass are right: there is mass, and none is negative.
     """
 
     model: Any
@@ -48,7 +48,7 @@ class MujocoTree:
 
 
 def build_tree(model: Model) -> MujocoTree:
-    """The tree of a robot; raises EngineLimitError where MuJoCo has no room for it."""
+    """The tree of a robot; raises EngineLimitError for one that is too large for MuJoCo."""
     mechanism = model.mechanism
     if mechanism.nv > MAX_NV:
         raise EngineLimitError(
@@ -58,11 +58,11 @@ def build_tree(model: Model) -> MujocoTree:
     spec.compiler.degree = False
     spec.compiler.fusestatic = False
     spec.option.gravity = np.array(model.gravity)
-    # Frames are bodies; their numbers as names, so that no name of the description meets one of MuJoCo's.
+    # Frames become bodies named by numbers, so that no name of the description clashes with one of MuJoCo's.
     numbers = {name: str(number) for number, name in enumerate(model.frame_names)}
     root = _body(spec.worldbody, numbers[model.root], Pose())
     if model.floating:
-        # Aligning would move the body frame to the centre of mass.
+        # Alignment would move the body frame to the centre of mass.
         root.add_freejoint(align=False)
     bodies, depths = {model.root: root}, {model.root: 1}
     for joint in model.joints:
@@ -83,7 +83,7 @@ def build_tree(model: Model) -> MujocoTree:
     tree = tuple(compiled.body(numbers[name]).id for name in model.frame_names)
     joints = [tree[model.frame_index(joint.child)] for joint in model.joints if joint.moves]
     if list(compiled.jnt_bodyid[model.floating :]) != joints or compiled.nv != mechanism.nv:
-        raise EngineError(f"mujoco ordered the joints of {model.name} in a way that dynx does not know")
+        raise EngineError(f"mujoco ordered the joints of {model.name} in an unexpected way")
     masses = _write_inertias(model, compiled, tree)
     return MujocoTree(compiled, tree, masses_add=bool(masses.min() >= 0.0 and masses.sum() > mujoco.mjMINVAL))
 
@@ -99,7 +99,7 @@ def _body(parent: Any, name: str, pose: Pose) -> Any:
 
 
 def _write_inertias(model: Model, compiled: Any, tree: tuple[int, ...]) -> Floats:
-    """Put the numbers of the description in the place of the stand-ins; returns the masses, by body."""
+    """Replace the substitute inertias by those of the description; return the masses by body."""
     compiled.body_mass[:] = 0.0
     compiled.body_inertia[:] = 0.0
     compiled.body_ipos[:] = 0.0
@@ -116,8 +116,8 @@ def _write_inertias(model: Model, compiled: Any, tree: tuple[int, ...]) -> Float
     total = masses.copy()
     for number in range(len(total) - 1, WORLD, -1):
         total[compiled.body_parentid[number]] += total[number]
-    # MuJoCo refers all motion to the centre of mass of the tree, and without mass to that of its root
-    # body. Where negative masses are among them the former may be anywhere, and would cost digits.
+    # MuJoCo refers all velocities to the centre of mass of the tree, or without mass to that of its root
+    # body. With negative masses the former may be far away, which would cost digits.
     compiled.body_subtreemass[:] = total if masses.min() >= 0.0 else 0.0
     return masses
 

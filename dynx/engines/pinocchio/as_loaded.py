@@ -1,8 +1,8 @@
 """A URDF file as Pinocchio loads it: ``pin.buildModelFromUrdf`` and nothing more.
 
-Pinocchio has an order of joints of its own, counts a continuous joint as two numbers (cos, sin), and
-makes joints of several degrees of freedom where a file asks for them; here all of it is turned into
-the coordinates of dynx, by the names of the joints.
+Pinocchio orders joints in its own way, has two numbers (cos, sin) for a continuous joint, and makes joints of
+several degrees of freedom where the file has them. Here its coordinates are converted to those of dynx by the
+names of the joints.
 """
 
 from __future__ import annotations
@@ -15,16 +15,15 @@ from typing import Any, ClassVar
 import numpy as np
 
 from dynx.engines.pinocchio.library import pin
-from dynx.engines.silence import overhear
+from dynx.engines.silence import capture_output
 from dynx.errors import EngineError
 from dynx.loaded.description import LoadedInertial, LoadedJoint, LoadedModel
-from dynx.loaded.opening import require_file
-from dynx.loaded.robot import LoadedRobot, lacking_joints
+from dynx.loaded.robot import LoadedRobot, lacking_joints, require_file
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
 
 MAX_NV = 200
-"""Most degrees of freedom that are asked about: the engine's workspace takes 64 nv^3 bytes, twice."""
+"""Largest number of degrees of freedom: the engine's workspace takes 64 nv^3 bytes, twice."""
 
 WORLD = 0
 """Pinocchio's joint 0, the universe."""
@@ -41,17 +40,17 @@ class LoadedPinocchio(LoadedRobot):
         require_file(path)
         self._model = model
         root = [pin.JointModelFreeFlyer()] if model.floating else []
-        said: list[str] = []
+        messages: list[str] = []
         with self._mapped("buildModelFromUrdf"):
-            with overhear(said):
+            with capture_output(messages):
                 self._engine = pin.buildModelFromUrdf(str(path), *root)
             if self._engine.nv > MAX_NV:
                 raise EngineError(
-                    f"{model.name} has {self._engine.nv} degrees of freedom in pinocchio; more than {MAX_NV} "
-                    "are not asked about, for its workspace grows with their cube"
+                    f"{model.name} has {self._engine.nv} degrees of freedom in pinocchio; at most {MAX_NV} "
+                    "are supported, because its workspace grows with their cube"
                 )
             self._data = self._engine.createData()
-        self._said = tuple(said)
+        self._messages = tuple(messages)
         self._default_gravity: Floats = np.array(self._engine.gravity.linear)
         self._engine.gravity.linear = np.array(model.gravity)
         self._neutral: Floats = np.array(pin.neutral(self._engine))
@@ -62,7 +61,7 @@ class LoadedPinocchio(LoadedRobot):
             if frame.type == pin.FrameType.BODY
         }
         base = list(range(6)) if model.floating else []
-        # Where the coordinates of dynx are among the engine's velocities.
+        # Places of dynx's coordinates among the engine's velocities.
         self._v = np.array(base + [int(joint.idx_v) for joint in self._joints], dtype=np.intp)
 
     @classmethod
@@ -76,7 +75,7 @@ class LoadedPinocchio(LoadedRobot):
         root = ", pinocchio.JointModelFreeFlyer()" if floating else ""
         return f"model = pinocchio.buildModelFromUrdf(path{root})"
 
-    # -- answers ------------------------------------------------------------------------------
+    # -- quantities ------------------------------------------------------------------------------
 
     def link_poses(self, q: Floats) -> Floats:
         """Poses of the engine's BODY frames."""
@@ -130,15 +129,15 @@ class LoadedPinocchio(LoadedRobot):
         return np.asarray(a[self._v])
 
     def close(self) -> None:
-        """Nothing is held that the interpreter does not free."""
+        """Do nothing: the interpreter frees all resources."""
 
     # -- what was loaded ----------------------------------------------------------------------
 
     def describe(self) -> LoadedModel:
-        """From frames, joint models and the engine's vectors of limits.
+        """The model from frames, joint models and the engine's vectors of limits.
 
-        Pinocchio keeps the inertia of a link on a fixed joint apart, and that of a link on a moving
-        joint only together with the links welded to it; those are named in `LoadedInertial.fused`.
+        Pinocchio keeps the inertia of a link on a fixed joint separately, and that of a link on a moving
+        joint only merged with the links rigidly connected to it, which `LoadedInertial.merged` names.
         """
         engine = self._engine
         base = self.link_poses(self._model.neutral())[0]
@@ -154,7 +153,7 @@ class LoadedPinocchio(LoadedRobot):
             base_frame=base,
             gravity=self._default_gravity,
             missing_links=tuple(link.name for link in self._model.links if link.name not in self._links),
-            remarks=self._said,
+            remarks=self._messages,
         )
 
     def _inertials(self) -> Iterator[tuple[str, LoadedInertial]]:
@@ -162,17 +161,17 @@ class LoadedPinocchio(LoadedRobot):
         for name, number in self._links.items():
             frame = engine.frames[number]
             above = engine.frames[frame.parentFrame]
-            own, fused = frame.inertia, ()
+            own, merged = frame.inertia, ()
             if above.type == pin.FrameType.FIXED_JOINT:
                 own = above.inertia
             elif frame.parentJoint != WORLD:
                 own = engine.inertias[frame.parentJoint]
-                fused = tuple(
+                merged = tuple(
                     other
                     for other, at in self._links.items()
                     if other != name and engine.frames[at].parentJoint == frame.parentJoint
                 )
-            yield name, LoadedInertial(float(own.mass), np.array(own.lever), np.array(own.inertia), fused)
+            yield name, LoadedInertial(float(own.mass), np.array(own.lever), np.array(own.inertia), merged)
 
     def _describe_joint(self, number: int) -> LoadedJoint:
         engine, joint = self._engine, self._engine.joints[number]
@@ -237,12 +236,12 @@ class LoadedPinocchio(LoadedRobot):
 
     @contextmanager
     def _mapped(self, call: str) -> Iterator[None]:
-        """The engine's exceptions as `EngineError`, in its own words."""
+        """Raise the engine's exceptions as `EngineError` with its messages."""
         try:
             yield
         except EngineError:
             raise
         except Exception as error:
             lines = [line.strip() for line in str(error).splitlines() if line.strip()]
-            words = lines[-1] if lines else type(error).__name__
-            raise EngineError(f"pinocchio failed in {call} for {self._model.name}: {words}") from error
+            message = lines[-1] if lines else type(error).__name__
+            raise EngineError(f"pinocchio failed in {call} for {self._model.name}: {message}") from error

@@ -1,16 +1,15 @@
 """The backend `pinocchio`: every quantity by Pinocchio's own algorithms (Carpentier et al., 2019).
 
-The engine's model is built from the links and joints of the `Model`, so its fixed joints are welded
-and its inertias lumped by Pinocchio, independently of `dynx.model.mechanism`. Coordinates need no
-conversion: Pinocchio's free-flyer has the conventions of dynx, and tree coordinates are added in
-the same depth-first order.
+The engine's model is built from the links and joints of the `Model`, so Pinocchio merges fixed joints and
+inertias, independently of `dynx.model.mechanism`. Coordinates need no conversion: Pinocchio's free-flyer has
+the conventions of dynx, and tree coordinates are added in the same depth-first order.
 
-Safe to use from several threads: the engine's workspace (`Data`) exists once per thread, made on the
-thread's first call. A `Data` takes 64 nv^3 bytes (measured, Pinocchio 4.1: 0.5 GB at 200 degrees of
-freedom), hence `MAX_NV`.
+Safe to use from several threads: the engine's workspace (`Data`) exists once per thread, made on the thread's
+first call. A `Data` takes 64 nv^3 bytes (measured, Pinocchio 4.1: 0.5 GB at 200 degrees of freedom), hence
+`MAX_NV`.
 
-Every array that the binding returns is a copy which the caller owns (`tests/backends/test_pinocchio`
-proves it), and its mass matrix is symmetric: the binding fills the triangle that CRBA leaves out.
+Every array that the binding returns is a copy which the caller owns (a test proves it), and its mass matrix
+is symmetric: the binding fills the triangle that CRBA leaves out.
 """
 
 from __future__ import annotations
@@ -33,23 +32,23 @@ from dynx.rbd.regressor import inertia_from_parameters, parameters_from_inertia
 from dynx.spatial.scalar import Floats
 
 MAX_NV = 200
-"""Most tree velocities (mimic joints count) that the backend accepts; see the head of this file."""
+"""Largest number of tree velocities (mimic joints included); see the module docstring."""
 
-LEAST_MASS = float(np.finfo(float).eps)
-"""Least mass [kg] that several bodies may have together, unless it is zero."""
+MIN_MERGED_MASS = float(np.finfo(float).eps)
+"""Smallest total mass [kg] of several merged bodies, unless it is zero."""
 
 WORLD = 0
-"""Pinocchio's joint 0, the universe: it carries what a fixed base carries."""
+"""Pinocchio's joint 0, the universe, which carries a fixed base."""
 
 
-def _gist(error: BaseException) -> str:
-    """What the engine says, without the C++ signatures before and after it."""
-    _, _, said = str(error).rpartition("message:\n")
-    lines = [line.strip() for line in said.splitlines() if line.strip()]
+def _message(error: BaseException) -> str:
+    """The engine's message, without the C++ signatures before and after it."""
+    _, _, message = str(error).rpartition("message:\n")
+    lines = [line.strip() for line in message.splitlines() if line.strip()]
     return f"{type(error).__name__}: {lines[0] if lines else 'no message'}"
 
 
-_mapped = engine_errors("pinocchio", _gist)
+_mapped = engine_errors("pinocchio", _message)
 
 
 _FUNCTIONS: dict[str, Callable[..., Floats]] = {
@@ -62,7 +61,7 @@ _FUNCTIONS: dict[str, Callable[..., Floats]] = {
 
 
 class _Workspace(local):
-    """The engine's `Data`, one for each thread that asks for it."""
+    """The engine's `Data`, for one thread."""
 
     def __init__(self, engine: Any) -> None:
         self.data = engine.createData()
@@ -79,7 +78,7 @@ class PinocchioBackend(Backend):
     name: ClassVar[str] = "pinocchio"
 
     def __init__(self, model: Model, *, validate: bool = True) -> None:
-        """Raises EngineLimitError for a model that the engine cannot hold without harm."""
+        """Raises EngineLimitError for a model that the engine would hold wrongly or that is too large."""
         super().__init__(model, validate=validate)
         self._engine, self._frame_ids = engine_model(model)
         self._workspace = _Workspace(self._engine)
@@ -91,7 +90,7 @@ class PinocchioBackend(Backend):
         # At one degree of freedom the binding returns Jacobians as vectors; without any, its
         # derivative of a Jacobian ends the process.
         self._nv = self._mechanism.nv
-        # The engine's whole-body quantities leave out what is welded to the world.
+        # The engine's whole-body quantities leave out bodies that cannot move.
         at_rest = self._engine.inertias[WORLD]
         self._rest_mass = float(at_rest.mass)
         self._rest_moment: Floats = self._rest_mass * np.array(at_rest.lever)
@@ -105,9 +104,9 @@ class PinocchioBackend(Backend):
         return f"pinocchio {pin.__version__}"
 
     @cached_property
-    def _lumped(self) -> tuple[list[int], Floats]:
-        """Made when a regressor is first asked for: it takes as long as all else that is made."""
-        return _lumping(self._engine, self._frame_ids[: len(self.model.links)])
+    def _link_parameters(self) -> tuple[list[int], Floats]:
+        """Computed for the first regressor, because it takes as long as the rest of the constructor."""
+        return _joint_parameters_of_links(self._engine, self._frame_ids[: len(self.model.links)])
 
     def _release(self) -> None:
         # Calls that other threads are in keep their own reference until they end.
@@ -162,12 +161,12 @@ class PinocchioBackend(Backend):
         pin.updateFramePlacement(engine, data, frame)
         # d(J v)/dt is the classical acceleration where the origin moves with the frame and the
         # axes stand still, the spatial one in the other two references.
-        ask = (
+        function = (
             pin.getFrameClassicalAcceleration
             if reference == "local_world_aligned"
             else pin.getFrameAcceleration
         )
-        acceleration: Floats = ask(engine, data, frame, self._axes[reference]).vector
+        acceleration: Floats = function(engine, data, frame, self._axes[reference]).vector
         return acceleration
 
     # -- dynamics -----------------------------------------------------------------------------
@@ -212,12 +211,12 @@ class PinocchioBackend(Backend):
 
     @_mapped
     def _inertial_regressor(self, q: Floats, v: Floats, a: Floats) -> Floats:
-        joints, lumping = self._lumped
+        joints, matrices = self._link_parameters
         if not self._nv:
             return np.zeros((0, 10 * len(joints)))
         Y = pin.computeJointTorqueRegressor(self._engine, self._workspace.data, q, v, a)
         of_joints: Floats = Y.reshape(self._nv, -1, 10).transpose(1, 0, 2)
-        of_links: Floats = of_joints[joints] @ lumping
+        of_links: Floats = of_joints[joints] @ matrices
         return np.asarray(of_links.transpose(1, 0, 2).reshape(self._nv, -1))
 
     # -- the whole body -----------------------------------------------------------------------
@@ -262,9 +261,9 @@ class PinocchioBackend(Backend):
 def engine_model(model: Model) -> tuple[Any, tuple[int, ...]]:
     """Pinocchio's own model of `model`, and the number it gave to each frame of `model.frame_names`.
 
-    Made once for all backends of a model, which never change it. Its coordinates are those of the tree:
-    a mimic joint is one more. Raises EngineLimitError for a model that the engine cannot hold without
-    harm, EngineError where it refuses.
+    It is made once for all backends of a model, which never change it. Its coordinates are those of the tree,
+    mimic joints included. Raises EngineLimitError for a model that the engine would hold wrongly or that is
+    too large, EngineError where the engine refuses it.
     """
     nv = model.mechanism.nv
     if nv > MAX_NV:
@@ -277,7 +276,7 @@ def engine_model(model: Model) -> tuple[Any, tuple[int, ...]]:
     except DynxError:
         raise
     except Exception as error:
-        raise EngineError(f"pinocchio cannot hold {model.name}: {_gist(error)}") from error
+        raise EngineError(f"pinocchio cannot hold {model.name}: {_message(error)}") from error
 
 
 def _build(model: Model) -> tuple[Any, tuple[int, ...]]:
@@ -287,36 +286,36 @@ def _build(model: Model) -> tuple[Any, tuple[int, ...]]:
     carrier = WORLD
     if model.floating:
         carrier = engine.addJoint(WORLD, pin.JointModelFreeFlyer(), pin.SE3.Identity(), ":base")
-    # Where each link sits: the engine's joint that carries it, and its pose in that joint's frame.
-    here = {model.root: (carrier, pin.SE3.Identity())}
+    # For each link, the engine's joint that carries it, and its pose in that joint's frame.
+    placements = {model.root: (carrier, pin.SE3.Identity())}
     for index, joint in enumerate(model.joints):
-        carrier, T_carrier_parent = here[joint.parent]
+        carrier, T_carrier_parent = placements[joint.parent]
         T_carrier_joint = T_carrier_parent * _placement(joint.origin)
         if joint.moves:
-            # Numbered, so that a name of ours cannot meet one of the engine's own.
+            # Numbered, so that no name clashes with one of the engine's own.
             name = f"{index}:{joint.name}"
             number = engine.addJoint(carrier, _joint_model(joint), T_carrier_joint, name)
-            here[joint.child] = (number, pin.SE3.Identity())
+            placements[joint.child] = (number, pin.SE3.Identity())
         else:
-            here[joint.child] = (carrier, T_carrier_joint)
+            placements[joint.child] = (carrier, T_carrier_joint)
     for link in model.links:
         if link.inertial is not None:
-            _weld(engine, *here[link.name], link.inertial, link.name)
-    _refuse_feathers(engine)
+            _add_inertia(engine, *placements[link.name], link.inertial, link.name)
+    _refuse_light_groups(engine)
     frame_ids = []
     for index, frame in enumerate(model.frames):
-        carrier, T_carrier_link = here[frame.link]
+        carrier, T_carrier_link = placements[frame.link]
         T_carrier_frame = T_carrier_link * _placement(frame.placement)
         made = pin.Frame(f"{index}:{frame.name}", carrier, 0, T_carrier_frame, pin.FrameType.OP_FRAME)
         frame_ids.append(int(engine.addFrame(made, False)))
     return engine, tuple(frame_ids)
 
 
-def _lumping(engine: Any, links: Sequence[int]) -> tuple[list[int], Floats]:
-    """How links add to the inertia of the joints that carry them.
+def _joint_parameters_of_links(engine: Any, links: Sequence[int]) -> tuple[list[int], Floats]:
+    """The map from inertial parameters of links to those of the joints that carry them.
 
-    For each link its joint, counted without the universe, and the matrix (10, 10) from its parameters
-    in the order of dynx to those of the joint in the engine's; zeros for what the universe carries.
+    For each link it has the number of its joint, not counting the universe, and the matrix (10, 10) from its
+    parameters in dynx's order to those of the joint in the engine's; zeros for links on the universe.
     """
     theirs = [0, 1, 2, 3, 4, 5, 7, 6, 8, 9]  # the tensor goes down the columns of its upper triangle
     joints, matrices = [], []
@@ -337,7 +336,7 @@ def _placement(pose: Pose) -> Any:
 
 
 def _joint_model(joint: Joint) -> Any:
-    """The engine's joint; about a basis vector it has code of its own, which is faster."""
+    """The engine's joint; for axes along a basis vector the engine has faster code."""
     prismatic = joint.type == "prismatic"
     if joint.axis == (1.0, 0.0, 0.0):
         return pin.JointModelPX() if prismatic else pin.JointModelRX()
@@ -349,45 +348,45 @@ def _joint_model(joint: Joint) -> Any:
     return pin.JointModelPrismaticUnaligned(axis) if prismatic else pin.JointModelRevoluteUnaligned(axis)
 
 
-def _weld(engine: Any, carrier: int, T_carrier_link: Any, inertial: Inertial, link: str) -> None:
+def _add_inertia(engine: Any, carrier: int, T_carrier_link: Any, inertial: Inertial, link: str) -> None:
     """Add a link's inertia to the joint that carries it."""
     if inertial.mass < 0.0:
         raise EngineLimitError(
             f"link {shown(link)} has mass {inertial.mass}; the backend 'pinocchio' cannot hold a negative one"
         )
-    # The constructor refuses a tensor that no body can have; the attributes take it as it stands.
+    # The constructor refuses a tensor that no body can have; the attributes accept it.
     own = pin.Inertia.Zero()
     own.mass, own.inertia = inertial.mass, inertial.tensor
     placed = (T_carrier_link * _placement(inertial.origin)).act(own)
     before = engine.inertias[carrier]
-    if _is_nothing(placed):
+    if _is_zero(placed):
         return
-    if _is_nothing(before):
+    if _is_zero(before):
         engine.inertias[carrier] = placed
         return
-    _refuse_feather(before.mass + placed.mass, link)
+    _refuse_light_sum(before.mass + placed.mass, link)
     engine.appendBodyToJoint(carrier, placed, pin.SE3.Identity())
 
 
-def _is_nothing(inertia: Any) -> bool:
+def _is_zero(inertia: Any) -> bool:
     return not inertia.mass and not inertia.inertia.any()
 
 
-def _refuse_feathers(engine: Any) -> None:
-    """Refuse a joint that carries several bodies which together weigh next to nothing."""
+def _refuse_light_groups(engine: Any) -> None:
+    """Raise EngineLimitError for a joint that carries several bodies with a negligible total mass."""
     own = [float(inertia.mass) for inertia in engine.inertias]
     carried = list(own)
     for joint in range(len(own) - 1, WORLD, -1):
         if carried[joint] != own[joint]:
-            _refuse_feather(carried[joint], engine.names[joint].partition(":")[2])
+            _refuse_light_sum(carried[joint], engine.names[joint].partition(":")[2])
         carried[engine.parents[joint]] += carried[joint]
 
 
-def _refuse_feather(mass: float, carrier: str) -> None:
+def _refuse_light_sum(mass: float, carrier: str) -> None:
     # Where the engine adds two inertias it divides by max(mass, eps): below eps the centre of mass
     # of the sum, and with it the mass matrix, would be silently wrong.
-    if 0.0 < mass < LEAST_MASS:
+    if 0.0 < mass < MIN_MERGED_MASS:
         raise EngineLimitError(
-            f"the bodies joined at {shown(carrier)} weigh {mass:.3g} kg together; the backend 'pinocchio' "
-            f"adds bodies rightly only from {LEAST_MASS:.2g} kg up, or when they weigh nothing"
+            f"the bodies merged at {shown(carrier)} have {mass:.3g} kg together; the backend 'pinocchio' "
+            f"adds inertias correctly only from {MIN_MERGED_MASS:.2g} kg up, or without any mass"
         )

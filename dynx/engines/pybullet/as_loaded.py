@@ -1,15 +1,15 @@
 """A URDF file as PyBullet loads it, with the flag that makes it read the file's inertias.
 
-What a careful user gets right by knowing Bullet's conventions is got right here: its world is the
-inertial frame of the root (centre of mass, principal axes) for inverse dynamics, mass matrix and
-Jacobian of a free base; columns are angular before linear; the pose of a link is composed from the
-double-precision pose of its inertial frame; gravity is turned instead of the base. The frames are
-those that Bullet itself reports, never those of the file.
+Calls are made as by a careful user who knows Bullet's conventions: its world is the inertial frame of the
+root (centre of mass, principal axes) for inverse dynamics, mass matrix and Jacobian of a floating base;
+columns are angular before linear; the pose of a link is composed from the double-precision pose of its
+inertial frame; gravity is rotated instead of the base. The frames are those that Bullet reports, never those
+of the file.
 
-What loading did to the robot shows: masses and inertias that are not those of the file, a base that
-stays in place because its root has no mass, axes that are not of unit length, damping and limits that
-act in a step; and for a fixed base, that inverse dynamics and the Jacobian take the axes of the root's
-inertial frame for those of the world, since nothing that such a user does tells Bullet otherwise.
+The effects of loading show in the results: masses and inertias that differ from the file, a base that stays
+in place because its root has no mass, axes that are not of unit length, damping and limits that act in a
+step. With a fixed base, inverse dynamics and the Jacobian are in the axes of the root's inertial frame
+instead of those of the world, since such a user cannot change that.
 """
 
 from __future__ import annotations
@@ -21,23 +21,32 @@ from typing import ClassVar
 
 import numpy as np
 
-from dynx.engines.pybullet import settings as bullet_settings
+from dynx.engines.pybullet.connection import ORIGIN
 from dynx.engines.pybullet.file_checks import require_harmless
 from dynx.engines.pybullet.library import bullet
-from dynx.engines.pybullet.loaded_client import ROOT, BulletWorld
-from dynx.engines.pybullet.loaded_description import describe
-from dynx.engines.pybullet.settings import CALLS, set_inertias
+from dynx.engines.pybullet.loaded_client import LoadedClient
+from dynx.engines.pybullet.loaded_description import describe_model
+from dynx.engines.pybullet.robot import base_conversion, inverse_base_conversion
+from dynx.engines.pybullet.settings import (
+    CALLS,
+    disable_joint_damping,
+    disable_limits,
+    disable_simulation_settings,
+    set_inertias,
+    with_ballast,
+)
 from dynx.errors import EngineError, shown
 from dynx.loaded.description import LoadedModel
 from dynx.loaded.robot import LoadedRobot, lacking_joints
 from dynx.model import Model
+from dynx.model.mechanism import ROOT
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous, inverse
 from dynx.spatial.so3 import cross, quat_from_rotation, rotation_from_quat, skew
 
 
 class LoadedPyBullet(LoadedRobot):
-    """A robot as PyBullet loads it; see `LoadedRobot` and the head of this file."""
+    """A robot as PyBullet loads it; see `LoadedRobot` and the module docstring."""
 
     name: ClassVar[str] = "pybullet"
     CALLS: ClassVar[Mapping[str, str]] = CALLS
@@ -46,61 +55,55 @@ class LoadedPyBullet(LoadedRobot):
         engine = bullet()
         require_harmless(path, model)
         self._model = model
-        self._worlds = [BulletWorld(engine, path, model.name, fixed=not model.floating)]
+        self._clients = [LoadedClient(engine, path, model.name, fixed=not model.floating)]
         try:
             self._prepare(calls)
-            if self._world.refused and "pybullet.extrapolate_inertias" in calls:
+            if self._client.refused and "pybullet.extrapolate_inertias" in calls:
                 for times in (1, 2):
-                    other = BulletWorld(engine, path, model.name, fixed=not model.floating)
-                    self._worlds.append(other)
+                    other = LoadedClient(engine, path, model.name, fixed=not model.floating)
+                    self._clients.append(other)
                     self._set(other, calls)
-                    other.apply(bullet_settings.with_ballast(times))
+                    other.apply(with_ballast(times))
                     other.make_tree()
         except BaseException:
             self.close()
             raise
 
     def _prepare(self, calls: Collection[str]) -> None:
-        model, world = self._model, self._world
-        root = world.ask(world.engine.getBodyInfo, world.body)[0]
-        children = {_text(info[12]): k for k, info in enumerate(world.joints)}
+        model, client = self._model, self._client
+        root = client.call(client.engine.getBodyInfo, client.body)[0]
+        children = {_text(info[12]): k for k, info in enumerate(client.joints)}
         self._links = {_text(root): ROOT, **children}
-        if model.floating and world.static:
+        if model.floating and not client.floating:
             raise EngineError(
-                f"pybullet nails {model.name} to the world: there its root {shown(model.root)} has no mass"
+                f"pybullet fixes {model.name} to the world: there its root {shown(model.root)} has no mass"
             )
         self._order = self._find_joints()
-        self._set(world, calls)
+        self._set(client, calls)
         # Last: inertias that are set after the first inverse dynamics would be ignored.
-        world.make_tree()
-        # Which links of the model Bullet has, their numbers there, and where they are in its frames.
+        client.make_tree()
+        # The links of the model that Bullet has, their numbers there, and their poses in its frames.
         self._held = [k for k, link in enumerate(model.links) if link.name in self._links]
         self._numbers = [self._links[model.links[k].name] for k in self._held]
-        frames = [inverse(world.com_frame(number)) for number in self._numbers]
+        frames = [inverse(client.com_frame(number)) for number in self._numbers]
         self._T_com_link = np.array(frames).reshape(-1, 4, 4)
-        self._T_base_C = world.com_frame(ROOT)
+        self._T_base_C = client.com_frame(ROOT)
         axes, center = self._T_base_C[:3, :3], self._T_base_C[:3, 3]
-        # (angular, linear) of the root's inertial frame from (linear, angular) of the base frame.
-        self._X = np.zeros((6, 6))
-        self._X[:3, 3:] = self._X[3:, :3] = axes.T
-        self._X[3:, 3:] = -axes.T @ skew(center)
-        self._X_inverse = np.zeros((6, 6))
-        self._X_inverse[3:, :3] = self._X_inverse[:3, 3:] = axes
-        self._X_inverse[:3, :3] = skew(center) @ axes
+        self._X, self._X_inverse = base_conversion(axes, center), inverse_base_conversion(axes, center)
 
-    def _set(self, world: BulletWorld, calls: Collection[str]) -> None:
-        world.apply(bullet_settings.simulation_off)
+    def _set(self, client: LoadedClient, calls: Collection[str]) -> None:
+        client.apply(disable_simulation_settings)
         if "pybullet.set_inertias" in calls:
-            world.apply(set_inertias(self._model, self._links))
+            client.apply(set_inertias(self._model, self._links))
         if "pybullet.no_damping" in calls:
-            world.apply(bullet_settings.no_damping)
+            client.apply(disable_joint_damping)
         if "pybullet.no_limits" in calls:
-            world.apply(bullet_settings.no_limits)
+            client.apply(disable_limits)
 
     @property
-    def _world(self) -> BulletWorld:
+    def _client(self) -> LoadedClient:
         """The robot as it was loaded."""
-        return self._worlds[0]
+        return self._clients[0]
 
     @classmethod
     def engine_version(cls) -> str:
@@ -117,26 +120,26 @@ class LoadedPyBullet(LoadedRobot):
         return f"robot = p.loadURDF(path, useFixedBase={not floating}, flags=p.URDF_USE_INERTIA_FROM_FILE)"
 
     def describe(self) -> LoadedModel:
-        """From `getDynamicsInfo` and `getJointInfo`."""
+        """The model from `getDynamicsInfo` and `getJointInfo`."""
         base = self.link_poses(self._model.neutral())[0]
-        return describe(self._world, self._model, self._links, base)
+        return describe_model(self._client, self._model, self._links, base)
 
     def close(self) -> None:
         """Disconnect the client, or clients."""
-        for world in self._worlds:
-            world.close()
+        for client in self._clients:
+            client.close()
 
-    # -- answers ------------------------------------------------------------------------------
+    # -- quantities ------------------------------------------------------------------------------
 
     def link_poses(self, q: Floats) -> Floats:
-        """Composed from the poses of the inertial frames."""
-        world = self._world
+        """Poses composed from those of the inertial frames."""
+        client = self._client
         if self._model.floating:
             T_world_C = homogeneous(rotation_from_quat(q[3:7]), q[:3]) @ self._T_base_C
             quat = quat_from_rotation(T_world_C[:3, :3])
-            world.place_base(T_world_C[:3, 3].tolist(), quat.tolist())
-        positions, quats = world.com_poses(self._joints(q))
-        position, quat = map(np.array, world.base_pose())
+            client.place_base(T_world_C[:3, 3].tolist(), quat.tolist())
+        positions, quats = client.com_poses(self._joints(q))
+        position, quat = map(np.array, client.base_pose())
         # The root comes last, so that its number -1 finds it.
         T_world_com = homogeneous(
             rotation_from_quat(np.concatenate([quats, quat[None]])),
@@ -149,16 +152,16 @@ class LoadedPyBullet(LoadedRobot):
     def jacobian(self, q: Floats, link: str) -> Floats:
         """`calculateJacobian` at the origin of the link frame.
 
-        That call wants a joint that moves; of the root, and of a robot without such a joint, the
-        Jacobian follows from the poses.
+        That call needs a moving joint; for the root, and for a robot without such a joint, the Jacobian is
+        computed from the poses.
         """
         model = self._model
         base = 6 if model.floating else 0
         if link not in self._links:
             return np.full((6, model.nv), np.nan)
-        if self._links[link] == ROOT or not self._world.moving:
-            return self._carried(q, link)
-        J_C = self._worlds[-1].jacobian(self._joints(q), self._links[link])
+        if self._links[link] == ROOT or not self._client.moving:
+            return self._base_jacobian(q, link)
+        J_C = self._clients[-1].jacobian(self._joints(q), self._links[link], ORIGIN)
         J = np.zeros((6, model.nv))
         J[:, base:] = J_C[:, base:][:, self._order]
         if base:
@@ -167,8 +170,8 @@ class LoadedPyBullet(LoadedRobot):
             J = np.concatenate([R_world_C @ J[:3], R_world_C @ J[3:]])
         return J
 
-    def _carried(self, q: Floats, link: str) -> Floats:
-        """The Jacobian of a link that the base alone moves."""
+    def _base_jacobian(self, q: Floats, link: str) -> Floats:
+        """The Jacobian of a link that only the base moves."""
         J = np.zeros((6, self._model.nv))
         if self._model.floating:
             R = rotation_from_quat(q[3:7])
@@ -182,7 +185,7 @@ class LoadedPyBullet(LoadedRobot):
         """`calculateMassMatrix`."""
         if not self._coordinates:
             return np.zeros((0, 0))
-        M = self._extrapolated(lambda world: world.mass_matrix(self._joints(q)))
+        M = self._extrapolated(lambda client: client.mass_matrix(self._joints(q)))
         base = 6 if self._model.floating else 0
         kept = [*range(base), *(base + k for k in self._order)]
         M = M[np.ix_(kept, kept)]
@@ -198,9 +201,9 @@ class LoadedPyBullet(LoadedRobot):
         if not self._model.floating:
             gravity = list(self._model.gravity)
             x = self._joints(q), self._spread(v), self._spread(a), gravity
-            return self._extrapolated(lambda world: world.inverse_dynamics(*x))[self._order]
+            return self._extrapolated(lambda client: client.inverse_dynamics(*x))[self._order]
         v_C, a_C = self._X @ v[:6], self._X @ a[:6]
-        # dv/dt in turning axes to the classical acceleration of the centre of mass.
+        # dv/dt in rotating axes to the classical acceleration of the centre of mass.
         a_C[3:] += cross(v_C[:3], v_C[3:])
         x = (
             self._joints(q),
@@ -208,26 +211,26 @@ class LoadedPyBullet(LoadedRobot):
             [*a_C.tolist(), *self._spread(a[6:])],
             self._gravity_in_C(q),
         )
-        tau = self._extrapolated(lambda world: world.inverse_dynamics(*x))
-        # Bullet answers with the force first.
+        tau = self._extrapolated(lambda client: client.inverse_dynamics(*x))
+        # Bullet returns the force first.
         wrench = self._X.T @ np.concatenate([tau[3:6], tau[:3]])
         return np.concatenate([wrench, tau[6:][self._order]])
 
     def forward_dynamics(self, q: Floats, v: Floats, tau: Floats) -> Floats:
-        """What one step of unit length adds to the velocity.
+        """The change of the velocity in one step of unit length.
 
-        Where a joint that the model lacks is held, solved from mass matrix and inverse dynamics.
+        Where a joint that the model lacks is held, it is solved from mass matrix and inverse dynamics.
         """
         if not self._coordinates:
             return np.zeros(0)
-        if len(self._order) < len(self._world.moving):
+        if len(self._order) < len(self._client.moving):
             return self._solved_acceleration(q, v, tau)
         if not self._model.floating:
             gravity = list(self._model.gravity)
-            step = self._world.velocity_step(self._joints(q), self._spread(v), self._spread(tau), gravity)
+            step = self._client.velocity_step(self._joints(q), self._spread(v), self._spread(tau), gravity)
             return step[self._order]
         v_C, tau_C = self._X @ v[:6], self._X_inverse.T @ tau[:6]
-        step = self._world.velocity_step(
+        step = self._client.velocity_step(
             self._joints(q),
             [*v_C.tolist(), *self._spread(v[6:])],
             [*tau_C.tolist(), *self._spread(tau[6:])],
@@ -239,10 +242,10 @@ class LoadedPyBullet(LoadedRobot):
     # -- coordinates --------------------------------------------------------------------------
 
     def _find_joints(self) -> list[int]:
-        """For each coordinate of dynx, its place among the coordinates of Bullet."""
-        engine, world = self._world.engine, self._world
+        """The place of each coordinate of dynx among those of Bullet."""
+        engine, client = self._client.engine, self._client
         single = {engine.JOINT_REVOLUTE, engine.JOINT_PRISMATIC}
-        kinds = {_text(info[1]): info[2] for info in world.joints}
+        kinds = {_text(info[1]): info[2] for info in client.joints}
         names = self._model.joint_names
         missing = [name for name in names if kinds.get(name) not in single]
         missing += [name for name, kind in kinds.items() if kind not in {*single, engine.JOINT_FIXED}]
@@ -251,26 +254,27 @@ class LoadedPyBullet(LoadedRobot):
             words[engine.JOINT_FIXED] = "fixed"
             instead = {name: words.get(kinds.get(name), "not there") for name in missing}
             raise lacking_joints(self.name, self._model, instead)
-        place = {_text(world.joints[k][1]): n for n, k in enumerate(world.moving)}
+        place = {_text(client.joints[k][1]): n for n, k in enumerate(client.moving)}
         return [place[name] for name in names]
 
     @property
     def _coordinates(self) -> bool:
-        """Whether there is any: without, Bullet answers with None or an empty tuple."""
-        return bool(self._world.moving) or self._model.floating
+        """Whether there is any coordinate; without, Bullet returns None or an empty tuple."""
+        return bool(self._client.moving) or self._model.floating
 
-    def _extrapolated(self, answer: Callable[[BulletWorld], Floats]) -> Floats:
-        if len(self._worlds) == 1:
-            return answer(self._world)
-        return 2.0 * answer(self._worlds[1]) - answer(self._worlds[2])
+    def _extrapolated(self, quantity: Callable[[LoadedClient], Floats]) -> Floats:
+        if len(self._clients) == 1:
+            return quantity(self._client)
+        return 2.0 * quantity(self._clients[1]) - quantity(self._clients[2])
 
     def _joints(self, q: Floats) -> list[float]:
         return self._spread(q[7 if self._model.floating else 0 :])
 
     def _spread(self, values: Floats) -> list[float]:
-        """Values of dynx's joints, as many as it has of the last entries, among those of Bullet."""
+        """The last entries of `values`, one for each joint of dynx, in Bullet's order; zero for other
+        joints."""
         n = len(self._order)
-        x = [0.0] * len(self._world.moving)
+        x = [0.0] * len(self._client.moving)
         for place, value in zip(self._order, values[len(values) - n :].tolist(), strict=True):
             x[place] = value
         return x

@@ -1,8 +1,8 @@
 """The backend `pybullet`: Bullet's inverse dynamics, mass matrix, Jacobian, kinematics and stepper.
 
-What it takes to get the same answers out of Bullet as out of other engines is in the modules beside
-this one: `bullet_inertia` (principal inertias, ballast), `bullet_urdf` (the file Bullet is given),
-`bullet_client` (loading and asking), `bullet_robot` (conventions).
+The modules beside this one make Bullet's results agree with those of other engines: `inertia` (principal
+inertias, ballast), `canonical_urdf` (the file that Bullet is given), `client` (loading and engine calls),
+`robot` (conventions).
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ from dynx.rbd.jacobians import Reference
 from dynx.spatial.extended import longdouble
 from dynx.spatial.scalar import Floats
 
-REFINE_ABOVE = 16 * float(np.finfo(np.float64).eps)
+MIN_RESIDUAL_TO_REFINE = 16 * float(np.finfo(np.float64).eps)
 """Residual, relative to the largest torque, below which an acceleration needs no refinement."""
 
-REFINE_BELOW = 1e-6
-"""Relative change above which a refinement is not one of rounding."""
+MAX_REFINEMENT = 1e-6
+"""Relative change above which a refinement corrects more than rounding."""
 
-LOST = 1e-9
-"""Residual, relative to the terms it is the difference of, at which an acceleration is no answer."""
+MAX_RESIDUAL = 1e-9
+"""Residual of an acceleration, relative to the largest term, above which it is an error."""
 
 
 class PyBulletBackend(Backend):
@@ -85,7 +85,7 @@ class PyBulletBackend(Backend):
 
     @property
     def ballast(self) -> bool:
-        """Whether the model has an inertia that Bullet refuses, so that answers are extrapolated.
+        """Whether the model has an inertia that Bullet refuses, so that results are extrapolated.
 
         Inverse dynamics and mass matrix are then 2 f(I + s) - f(I + 2 s), exact because both are
         affine in the inertia, and forward dynamics is solved from them instead of by the stepper.
@@ -104,9 +104,9 @@ class PyBulletBackend(Backend):
     ) -> Floats:
         """The configuration (nq,) at which Bullet's own solver (damped least squares) stops.
 
-        `T_world_target` (4, 4) is where `frame` is wanted, `q0` (nq,) where to start; a floating
+        `T_world_target` (4, 4) is the wanted pose of `frame`, `q0` (nq,) the start; a floating
         base stays where `q0` has it. `residual` [m] ends the iteration; `limits` adds Bullet's
-        null-space task. The answer often misses the target and may violate the limits: check it
+        null-space task. The result often misses the target and may violate the limits: check it
         by `forward_kinematics`, as `inverse_kinematics` does. Mimic joints are solved for as if free,
         then brought to the nearest configuration (least squares).
         """
@@ -158,7 +158,7 @@ class PyBulletBackend(Backend):
     def _forward_dynamics(self, q: Floats, v: Floats, tau: Floats) -> Floats:
         if self.ballast:
             return super()._forward_dynamics(q, v, tau)
-        # What is too large for Bullet comes back infinite or NaN; the base sees it in the result.
+        # Overflow in Bullet gives infinity or NaN, which the base class finds in the result.
         with self._lock, np.errstate(over="ignore", invalid="ignore"):
             a = self._robot().forward_dynamics(q, v, tau)
             if a.all():
@@ -166,24 +166,24 @@ class PyBulletBackend(Backend):
         return super()._forward_dynamics(q, v, tau)
 
     def _refined(self, q: Floats, v: Floats, tau: Floats, a: Floats) -> Floats:
-        """`a` after one step of iterative refinement, where rounding is all that ails it.
+        """`a` after one step of iterative refinement, where its error is due to rounding.
 
         Under a root much lighter than what it carries, Bullet's inversion of the base's inertia
-        loses digits (ten at a ratio of 1e-6). A step that changes more is not taken: then something
-        else is wrong, which refinement must not hide. Raises EngineError where too few digits are left.
+        loses digits (ten at a ratio of 1e-6). A step that changes more is not taken: the error then
+        has another cause, which refinement must not hide. Raises EngineError where too few digits are left.
         """
         left = tau - self._inverse_dynamics(q, v, a)
-        if np.max(np.abs(left), initial=0.0) <= REFINE_ABOVE * np.max(np.abs(tau), initial=0.0):
+        if np.max(np.abs(left), initial=0.0) <= MIN_RESIDUAL_TO_REFINE * np.max(np.abs(tau), initial=0.0):
             return a
         again = self._robot().forward_dynamics(q, v, tau + left)
-        if np.max(np.abs(again - a)) <= REFINE_BELOW * np.max(np.abs(a)):
+        if np.max(np.abs(again - a)) <= MAX_REFINEMENT * np.max(np.abs(a)):
             return again
         # Weight and velocity products may cancel; a bound on them is as good as themselves here.
         fastest, gravity = np.max(np.abs(v)), np.linalg.norm(self._mechanism.gravity)
         inertia = np.abs(self._mass_matrix(q))
         unbalanced = np.max(inertia) * (fastest + fastest**2 + gravity)
         terms = np.max(inertia @ np.abs(a)) + np.max(np.abs(tau)) + unbalanced
-        if np.max(np.abs(left)) > LOST * terms:
+        if np.max(np.abs(left)) > MAX_RESIDUAL * terms:
             raise EngineError(
                 f"the stepper of pybullet loses its digits on {self.model.name}: the acceleration found "
                 f"misses the torque by {np.max(np.abs(left)) / terms:.1g}, relative "
@@ -207,8 +207,8 @@ class PyBulletBackend(Backend):
         return self._robots
 
     @staticmethod
-    def _extrapolated(answers: list[Floats]) -> Floats:
-        if len(answers) == 1:
-            return answers[0]
-        once, twice = answers
+    def _extrapolated(results: list[Floats]) -> Floats:
+        if len(results) == 1:
+            return results[0]
+        once, twice = results
         return 2.0 * once - twice

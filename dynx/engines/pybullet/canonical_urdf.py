@@ -1,12 +1,12 @@
 """The canonical URDF that Bullet is given instead of the user's file.
 
-Moving bodies only, fixed joints welded; generated ASCII names (`b`, then `l0`, `j0`, ...); unit
-axes; short lines; no shapes, limits, damping or meshes. Principal moments are written as zero:
-Bullet replaces what fails its checks, so they are set after loading (`BulletClient`).
+Moving bodies only, with fixed joints merged; generated ASCII names (`b`, then `l0`, `j0`, ...); unit axes;
+short lines; no shapes, limits, damping or meshes. Principal moments are written as zero: Bullet replaces
+moments that fail its checks, so they are set after loading (`BulletClient`).
 
-The root link's frame is the root's inertial frame (centre of mass, principal axes), because
-Bullet's inverse dynamics, mass matrix and Jacobian are expressed there and nowhere else. With a
-fixed base the root has no inertia and the frame is the base frame.
+The root link's frame is the root's inertial frame (centre of mass, principal axes), because Bullet's inverse
+dynamics, mass matrix and Jacobian are expressed there and nowhere else. With a fixed base the root has no
+inertia and the frame is the base frame.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class BulletTree:
     """A mechanism in Bullet's terms: the root's inertial frame, and links that start from it.
 
     Masses and moments are those of the mechanism divided by `unit`, a power of two [kg]. Bullet's
-    checks compare with absolute numbers, about 1e-15, and refuse a sound body of 10 kg that turns
+    checks compare with absolute numbers, about 1e-15, and refuse a possible body of 10 kg that rotates
     about an axis 1 m away; in units in which no moment exceeds 1 they pass. Forces scale alike.
     """
 
@@ -54,7 +54,7 @@ class BulletTree:
 
 
 def bullet_tree(mechanism: Mechanism, ballast: tuple[Ballast, ...], times: int) -> BulletTree:
-    """The tree Bullet is given for a long-double `mechanism`, with `times` the ballast on board."""
+    """The tree that Bullet is given for a long-double `mechanism`, with `times` the ballast."""
     root = principal_inertia(NOTHING)
     sizes = [0.0]
     if mechanism.floating:
@@ -66,12 +66,12 @@ def bullet_tree(mechanism: Mechanism, ballast: tuple[Ballast, ...], times: int) 
     sizes += [float(np.max(np.abs(inertia.rotational_inertia))) for inertia in inertias]
     unit = 2.0 ** max(0, int(np.frexp(max(sizes))[1]))
     links = []
-    for body, lumped in zip(mechanism.bodies, inertias, strict=True):
+    for body, merged in zip(mechanism.bodies, inertias, strict=True):
         R, p = body.R, body.p
         if body.parent == ROOT:
             R, p = root.axes.T @ R, rotate_back(root.axes, p - root.center)
         axis = body.axis / np.sqrt(body.axis @ body.axis)
-        inertia = _in_units(principal_inertia(lumped), unit)
+        inertia = _in_units(principal_inertia(merged), unit)
         links.append(BulletLink(body.parent, body.revolute, R, p, axis, inertia))
     return BulletTree(mechanism.floating, _in_units(root, unit), tuple(links), unit)
 
@@ -87,7 +87,7 @@ def write_bullet_urdf(tree: BulletTree) -> str:
             f'<child link="l{k}"/>',
             _origin(link.p, link.R),
             f'<axis xyz="{_vector(link.axis)}"/>',
-            # A prismatic joint must have limits; lower above upper means that it has none.
+            # A prismatic joint must have limits; lower above upper means unlimited.
             '<limit lower="1" upper="-1" effort="0" velocity="0"/>',
             "</joint>",
         ]

@@ -1,6 +1,6 @@
-"""What PyBullet is not given: files that are known to crash it (measured with pybullet 3.2.5 to 3.2.7).
+"""Checks that find files which are known to crash PyBullet (measured with pybullet 3.2.5 to 3.2.7).
 
-It checks nothing itself. A name is a printf format to it, an element without ``name`` or ``type`` or a
+PyBullet checks nothing itself. It uses names as printf formats, an element without ``name`` or ``type`` or a
 graph that is no tree ends the process, and joint states have room for 127 joints.
 """
 
@@ -11,17 +11,18 @@ from pathlib import Path
 
 from dynx.errors import EngineError, ModelError, shown
 from dynx.files.reading import read_file
-from dynx.loaded.opening import require_file
+from dynx.loaded.robot import require_file
 from dynx.model import Model
 from dynx.model.elements import Note
 from dynx.model.topology import MAX_LINKS
 from dynx.model.xml.reading import Element, read_xml
 
 MAX_JOINTS = 127
-"""Joints, fixed ones included, of which Bullet tells the state: from the 128th on it fails."""
+"""Largest number of joints, fixed ones included: from the 128th on Bullet returns no joint state."""
 
-LONGEST_NAME = 1000
-"""Bytes of a name: a joint's of 1,264 smashes Bullet's stack, a link's of 2,000 crashes it."""
+MAX_NAME_LENGTH = 1000
+"""Largest length of a name [bytes]: a joint's of 1,264 overflows Bullet's stack, a link's of 2,000 crashes
+it."""
 
 _OPAQUE = frozenset(["visual", "collision", "transmission", "gazebo", "sensor", "ros2_control"])
 
@@ -47,8 +48,7 @@ def require_harmless(path: Path, model: Model) -> None:
     joints = len(root.all("joint"))
     if joints > MAX_JOINTS:
         raise EngineError(
-            f"{model.name} has {joints} joints, fixed ones included; "
-            f"pybullet answers for at most {MAX_JOINTS}"
+            f"{model.name} has {joints} joints, fixed ones included; pybullet supports at most {MAX_JOINTS}"
         )
 
 
@@ -61,12 +61,12 @@ def _hazards(root: Element, model: Model) -> Iterator[str]:
                 yield f"line {element.line}: a <{kind}> without a name"
             if "%" in name:
                 yield f"line {element.line}: the name of a <{kind}>, {shown(name)}, has a %"
-            if len(name.encode("utf-8")) > LONGEST_NAME:
+            if len(name.encode("utf-8")) > MAX_NAME_LENGTH:
                 yield f"line {element.line}: the name of a <{kind}> has {len(name)} characters"
     for joint in named["joint"]:
         if "type" not in joint.attributes:
             yield f"line {joint.line}: joint {shown(joint.attributes['name'])} has no type"
-    # Each added frame stands in the file as a link on a fixed joint, under a name that is not kept.
+    # Each added frame is a link on a fixed joint in the file, and the joint has a generated name.
     added = {frame.name for frame in model.extra_frames}
     links = [element.attributes["name"] for element in named["link"]]
     if sorted(links) != sorted(added.union(link.name for link in model.links)):
@@ -78,7 +78,7 @@ def _hazards(root: Element, model: Model) -> Iterator[str]:
 
 
 def _ends(joint: Element) -> tuple[str, str, str]:
-    """Name, parent and child; the first of several, as in the reader."""
+    """Name, parent and child of a joint; the first of several ends, as in the reader."""
     ends = [joint.all(role)[:1] for role in ("parent", "child")]
     parent, child = ("".join(element.attributes.get("link", "") for element in end) for end in ends)
     return joint.attributes["name"], parent, child

@@ -1,14 +1,13 @@
 """Rigid-body inertia in the form Bullet takes: mass, centre of mass, principal moments and axes.
 
-Bullet's own diagonalisation stops at a relative 1e-6, and its checks refuse what rounding brings
-about. So the inertia is lumped and diagonalised here, in NumPy's long double, and Bullet is given
-moments and axes.
+Bullet's own diagonalisation stops at a relative 1e-6, and its checks fail because of rounding. So the inertia
+is merged and diagonalised here, in NumPy's long double, and Bullet is given moments and axes.
 
-Bullet also refuses some inertias that a description can hold: a negative principal moment, a rod or
-a point that meets a triangle inequality with equality, a mass that is not positive on a floating
-root (which it then nails to the world), a first moment without a mass. Inverse dynamics f and the
-mass matrix are affine in the inertia of every body, so such a body is carried with *ballast* s, once
-and twice: f(I) = 2 f(I + s) - f(I + 2 s).
+Bullet also refuses some inertias that a description can hold: a negative principal moment, a rod or a point
+that meets a triangle inequality with equality, a mass that is not positive on a floating root (which it then
+fixes to the world), a first moment without a mass. Inverse dynamics f and the mass matrix are affine in the
+inertia of every body, so such a body is carried with *ballast* s, once and twice: f(I) = 2 f(I + s) - f(I + 2
+s).
 """
 
 from __future__ import annotations
@@ -48,7 +47,7 @@ class Ballast:
     rotational: float = 0.0
 
     def added(self, inertia: RigidInertia, times: int) -> RigidInertia:
-        """The inertia of the body with `times` this ballast on board."""
+        """The inertia of the body with `times` this ballast."""
         return RigidInertia(
             np.asarray(inertia.mass + times * longdouble(self.mass)),
             inertia.first_moment,
@@ -70,7 +69,7 @@ def principal_inertia(inertia: RigidInertia, *, about_center: bool = False) -> P
         arm = skew(center)
         second = second + longdouble(inertia.mass) * (arm @ arm)
     values, axes = jacobi_eigen(second)
-    # A point mass has no moments, but lumping leaves it last digits of either sign. Negative ones
+    # A point mass has no moments, but merging leaves rounding errors of either sign. Negative ones
     # below the rounding of float64 in the moments about the origin stand for zero.
     noise = 4 * FLOAT64_EPS * _size(inertia.rotational_inertia)
     values = np.where((values < 0) & (values >= -noise), 0, values)
@@ -86,14 +85,14 @@ _CYCLIC = ([0, 1, 2], [1, 2, 0], [2, 0, 1])
 
 
 def _accepts(mass: float, lever: Floats, moments: Floats) -> bool:
-    """Whether Bullet's inverse dynamics takes a body with these moments about these axes.
+    """Whether Bullet's inverse dynamics accepts a body with these moments about these axes.
 
-    It wants x + y >= z and y + z >= x of the moments about the body's origin, to the last bit; that
-    z + x >= y is not asked (btInverseDynamics, `isValidInertiaMatrix`, where the second test is the
-    first once more). A body that meets one with equality must not depend on how Bullet rounds.
+    It requires x + y >= z and y + z >= x for the moments about the body's origin, to the last bit; it does
+    not check z + x >= y (btInverseDynamics, `isValidInertiaMatrix`, where the second test repeats the first).
+    The result for equality must not depend on Bullet's rounding.
     """
     squares = mass * lever * lever
-    # Dust that the other terms of a sum absorb.
+    # Terms that are lost in the rounding of the others.
     squares[squares <= FLOAT64_EPS**2 * np.max(squares)] = 0.0
     x, y, z = moments + (np.sum(squares) - squares)
     # With the centre of mass on one of the axes both sides add the same number.
@@ -103,7 +102,7 @@ def _accepts(mass: float, lever: Floats, moments: Floats) -> bool:
 
 
 def ballast_for(mechanism: Mechanism) -> tuple[Ballast, ...]:
-    """The ballast that the root and each body need for Bullet to take them; mostly none."""
+    """The ballast that the root and each body need for Bullet to accept them; mostly none."""
     inertias = [body.inertia for body in mechanism.bodies]
     total = sum(abs(float(inertia.mass)) for inertia in [mechanism.root, *inertias])
     unit = total / 16 if total > 0.0 else 1.0
@@ -112,10 +111,10 @@ def ballast_for(mechanism: Mechanism) -> tuple[Ballast, ...]:
 
 
 def _ballast(inertia: RigidInertia, unit: float, *, root: bool) -> Ballast:
-    """No more than it takes: what ballast adds is subtracted again, and costs digits."""
+    """The least ballast that suffices, because it is subtracted again and costs digits."""
     mass = float(inertia.mass)
-    weightless = mass == 0.0 and not root and not np.any(inertia.first_moment)
-    needed = Ballast() if mass > 0.0 or weightless else Ballast(mass=unit - mass)
+    massless = mass == 0.0 and not root and not np.any(inertia.first_moment)
+    needed = Ballast() if mass > 0.0 or massless else Ballast(mass=unit - mass)
     body = principal_inertia(needed.added(inertia, 1), about_center=root)
     if not body.accepted:
         negative = max(0.0, -float(np.min(body.moments)))

@@ -1,9 +1,9 @@
-"""What PyBullet makes of an ``<inertial>``: its diagonalisation and its checks, replayed in float64.
+"""PyBullet's diagonalisation and checks of an ``<inertial>``, repeated in float64.
 
-The loader turns a tensor with products of inertia to its principal axes by Jacobi's method, and sets
-all moments to zero where one is negative or exceeds the sum of the others, to the last bit. The tree
-of inverse dynamics, made later, shifts the inertia to the origin of the link and checks it again
-(btMatrix3x3::diagonalize, URDF importer, btInverseDynamics isValidInertiaMatrix; pybullet 3.2.7).
+The loader diagonalises a tensor with products of inertia by Jacobi's method, and sets all moments to zero
+where one is negative or exceeds the sum of the others, to the last bit. The tree of inverse dynamics, made
+later, shifts the inertia to the origin of the link and checks it again (btMatrix3x3::diagonalize, URDF
+importer, btInverseDynamics isValidInertiaMatrix; pybullet 3.2.7).
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ from dynx.spatial.extended import FLOAT64_EPS, longdouble
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import rotation_from_rpy, skew
 
-_STOP = 1e-6
-"""Share of the trace at which one more rotation is the last."""
+_STOP_RATIO = 1e-6
+"""Ratio to the trace below which one more rotation is the last."""
 
 _ABSOLUTE = 5 * FLOAT64_EPS
-"""How far below zero a leading minor may be, whatever the units [kg m^2 and its powers]."""
+"""Tolerance by which a leading minor may be negative, in all units [powers of kg m^2]."""
 
 _ROUNDING = 8 * FLOAT64_EPS
 """Bound on the rounding of a sum of a few products, relative to the largest."""
 
-MANY = 4096
-"""Inertials of which results are remembered: rules ask the same of every link, round after round."""
+CACHE_SIZE = 4096
+"""Number of cached inertials: rules check every link again after every remedy."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,13 +41,13 @@ class BulletInertia:
 
     @property
     def zeroed(self) -> bool:
-        """Whether the loader says "Bad inertia tensor properties" and takes zero instead."""
+        """Whether the loader prints "Bad inertia tensor properties" and uses zero instead."""
         x, y, z = self.moments
         return bool(x < 0 or y < 0 or z < 0 or x > y + z or y > x + z or z > x + y)
 
 
-@lru_cache(maxsize=MANY)
-def read_by_bullet(inertial: Inertial) -> BulletInertia:
+@lru_cache(maxsize=CACHE_SIZE)
+def bullet_reading(inertial: Inertial) -> BulletInertia:
     """The principal moments and axes that PyBullet's loader finds, before it checks them."""
     tensor = inertial.tensor
     if not (inertial.ixy or inertial.ixz or inertial.iyz):
@@ -55,10 +55,10 @@ def read_by_bullet(inertial: Inertial) -> BulletInertia:
     return BulletInertia(*_diagonalised(tensor))
 
 
-@lru_cache(maxsize=MANY)
+@lru_cache(maxsize=CACHE_SIZE)
 def diagonalisation_error(inertial: Inertial) -> float:
-    """How far the tensor that PyBullet holds is from the file's, as a share of the largest moment."""
-    held = read_by_bullet(inertial)
+    """The error of the tensor that PyBullet holds, relative to the largest moment of the file."""
+    held = bullet_reading(inertial)
     axes, tensor = longdouble(held.axes), longdouble(inertial.tensor)
     size = float(np.max(np.abs(tensor)))
     if size == 0.0:
@@ -66,18 +66,18 @@ def diagonalisation_error(inertial: Inertial) -> float:
     return float(np.max(np.abs((axes * longdouble(held.moments)) @ axes.T - tensor))) / size
 
 
-def tree_may_refuse(inertial: Inertial, *, welded: bool) -> bool:
-    """Whether the inertia is so near the edge that inverse dynamics may refuse the robot for it.
+def tree_may_reject(inertial: Inertial, *, on_fixed_joint: bool) -> bool:
+    """Whether the inertia is so near the bound that inverse dynamics may refuse the robot.
 
-    `welded` says that a fixed joint carries the link, of which no triangle inequality is asked.
+    `on_fixed_joint` says that a fixed joint carries the link, for which no triangle inequality is checked.
     """
-    held = read_by_bullet(inertial)
+    held = bullet_reading(inertial)
     R = longdouble(rotation_from_rpy(np.array(inertial.origin.rpy))) @ longdouble(held.axes)
     lever = R.T @ longdouble(inertial.origin.xyz)
     arm = skew(lever)
     about_origin = longdouble(np.diag(held.moments)) - longdouble(inertial.mass) * (arm @ arm)
     x, y, z = (float(value) for value in np.diagonal(about_origin))
-    if not welded:
+    if not on_fixed_joint:
         squares = np.asarray(inertial.mass * lever * lever, dtype=float)
         # With the centre of mass on one of the axes both sides of a sum get the same number.
         exact = np.count_nonzero(squares > FLOAT64_EPS**2 * np.max(squares)) <= 1
@@ -97,13 +97,13 @@ def tree_may_refuse(inertial: Inertial, *, welded: bool) -> bool:
 
 
 def _diagonalised(tensor: Floats) -> tuple[Floats, Floats]:
-    """Eigenvalues and eigenvectors by cyclic choice of the largest product, as Bullet does it."""
+    """Eigenvalues and eigenvectors by Jacobi's method, as in Bullet."""
     A, V = tensor.copy(), np.eye(3)
     for step in range(30, 0, -1):
         pairs = ((0, 1, 2), (0, 2, 1), (1, 2, 0))
         p, q, r = max(pairs, key=lambda pair: abs(A[pair[0], pair[1]]))
         largest = abs(A[p, q])
-        threshold = _STOP * (abs(A[0, 0]) + abs(A[1, 1]) + abs(A[2, 2]))
+        threshold = _STOP_RATIO * (abs(A[0, 0]) + abs(A[1, 1]) + abs(A[2, 2]))
         last = step == 1 or largest <= threshold
         if largest <= FLOAT64_EPS * threshold:
             break

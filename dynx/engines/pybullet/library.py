@@ -1,4 +1,4 @@
-"""PyBullet, imported when it is first asked for, and without the line that it prints."""
+"""The only import of PyBullet, which happens at the first use and without the line that PyBullet prints."""
 
 from __future__ import annotations
 

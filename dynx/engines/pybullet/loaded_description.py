@@ -1,4 +1,4 @@
-"""What PyBullet says it has loaded, in the frames of the URDF."""
+"""The model that PyBullet reports after loading, in the frames of the URDF."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from dynx.engines.pybullet.loaded_client import BulletWorld
+from dynx.engines.pybullet.loaded_client import LoadedClient
 from dynx.loaded.description import LoadedInertial, LoadedJoint, LoadedModel
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
@@ -15,24 +15,27 @@ from dynx.spatial.se3 import homogeneous
 from dynx.spatial.so3 import rotation_from_quat
 
 
-def describe(world: BulletWorld, model: Model, links: Mapping[str, int], base: Floats) -> LoadedModel:
-    """`links` are Bullet's numbers of the links, `base` the pose of the root link at the neutral q."""
-    # The inertial frame of each link is what Bullet takes for the frame of the link.
-    com = {k: world.com_frame(k) for k in links.values()}
+def describe_model(client: LoadedClient, model: Model, links: Mapping[str, int], base: Floats) -> LoadedModel:
+    """The description of a loaded robot.
+
+    `links` maps link names to Bullet's numbers; `base` is the pose of the root link at the neutral q.
+    """
+    # Bullet's frame of a link is its inertial frame.
+    com = {k: client.com_frame(k) for k in links.values()}
     joints = {}
-    for k, info in enumerate(world.joints):
-        if info[2] == world.engine.JOINT_FIXED:
+    for k, info in enumerate(client.joints):
+        if info[2] == client.engine.JOINT_FIXED:
             continue
         name = info[1].decode("utf-8", "surrogateescape")
-        joints[name] = _joint(world.engine, info, com[int(info[16])], com[k])
+        joints[name] = _joint(client.engine, info, com[int(info[16])], com[k])
     return LoadedModel(
         engine="pybullet",
-        links={name: _inertial(world.dynamics(k)) for name, k in links.items()},
+        links={name: _inertial(client.dynamics(k)) for name, k in links.items()},
         joints=joints,
         base_frame=base,
         gravity=np.zeros(3),
         missing_links=tuple(link.name for link in model.links if link.name not in links),
-        remarks=tuple(world.said),
+        remarks=tuple(client.messages),
     )
 
 
@@ -48,7 +51,7 @@ def _joint(engine: Any, info: Any, T_parent_com: Floats, T_child_com: Floats) ->
     R_child_parent = rotation_from_quat(np.array(info[15]))
     R = T_parent_com[:3, :3] @ R_child_parent.T @ T_child_com[:3, :3].T
     lower, upper = float(info[8]), float(info[9])
-    # Bullet has no word for a continuous joint: limits in the wrong order mean that there are none.
+    # Bullet has no continuous type: limits in the wrong order mean that there are none.
     limited = lower <= upper
     kinds = {engine.JOINT_PRISMATIC: "prismatic", engine.JOINT_REVOLUTE: "revolute"}
     kind = kinds.get(info[2], str(info[2]))

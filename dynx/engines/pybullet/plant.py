@@ -1,7 +1,7 @@
-"""PyBullet's own stepper as a plant: its articulated-body algorithm and its scheme, and nothing else of it.
+"""PyBullet's own stepper as a plant: its articulated-body algorithm and its integration scheme only.
 
-`dynx.engines.pybullet.stepping` says what is switched off and why. Friction, pushes and armature are those
-of `dynx.sim.plants.disturbances`, given as torque, so that they mean what they mean in every plant.
+`dynx.engines.pybullet.stepping` says which features are switched off, and why. Friction, pushes and armature
+are those of `dynx.sim.plants.disturbances`, given as torque, so that they mean what they mean in every plant.
 """
 
 from __future__ import annotations
@@ -32,19 +32,19 @@ class BulletPlant(Plant):
     """One robot in a Bullet world of its own, stepped by Bullet.
 
     Mimic joints and armature are unknown to Bullet's stepper. With them the acceleration is solved from
-    Bullet's mass matrix and bias, and the stepper is given the torque that brings exactly that about.
+    Bullet's mass matrix and bias, and the stepper is given the torque that causes it.
     """
 
     motor_commands: ClassVar[tuple[type, ...]] = (MotorCommand,)
 
     def __init__(self, model: Model, disturbances: Disturbances, dt: float, *, substeps: int = 1) -> None:
-        """Raises EngineLimitError for a robot with an inertia that Bullet's stepper does not take."""
+        """Raises EngineLimitError for a robot with an inertia that Bullet's stepper does not accept."""
         super().__init__(model, disturbances, dt, substeps=substeps)
         mechanism = build_mechanism(model, longdouble)
         ballast = ballast_for(mechanism)
         if any(load.mass or load.rotational for load in ballast):
             raise EngineLimitError(
-                f"{model.name} has an inertia that Bullet's stepper does not take as it stands (see dynx "
+                f"{model.name} has an inertia that Bullet's stepper does not accept (see dynx "
                 "doctor); the plant of another engine does"
             )
         tree = bullet_tree(mechanism, ballast, 0)
@@ -63,12 +63,12 @@ class BulletPlant(Plant):
 
     @cached_property
     def _engine(self) -> PyBulletBackend:
-        """Made when it is needed: it opens a client of its own."""
+        """The backend for bias and mass matrix, made at first use because it opens a client of its own."""
         return PyBulletBackend(self.model, validate=False)
 
     @cached_property
     def _tree(self) -> PyBulletBackend:
-        """The same robot with its mimic joints free: what Bullet's stepper sees of it."""
+        """The backend of the robot with its mimic joints free, as in Bullet's stepper."""
         joints = tuple(replace(joint, mimic=None) for joint in self.model.joints)
         return PyBulletBackend(replace(self.model, joints=joints), validate=False)
 
@@ -77,12 +77,12 @@ class BulletPlant(Plant):
         return DisturbedAcceleration(self._engine, self.disturbances)
 
     def reset(self, q: Floats, v: Floats) -> None:
-        """Make this the state."""
+        """Set the state."""
         self._q, self._v = q, v
         self._place()
 
     def step(self, t: float, tau: Floats) -> StepResult:
-        """Take one step, or as many sub-steps."""
+        """Take one step, in sub-steps if there are several."""
         first = self._substep(t, tau)
         for k in range(1, self.substeps):
             self._substep(t + k * self._h, tau)
@@ -110,7 +110,7 @@ class BulletPlant(Plant):
             )
 
     def close(self) -> None:
-        """Give the clients back."""
+        """Disconnect the clients."""
         self._client.close()
         for made in ("_engine", "_tree"):
             if made in self.__dict__:
@@ -132,7 +132,7 @@ class BulletPlant(Plant):
         disturbance: Floats = np.zeros(self.model.nv)
         if self.disturbances.has_torque:
             disturbance = self.disturbances.torque(self._engine, t, self._q, self._v)
-            self._client.add((disturbance[self._base_nv :] / self._unit).tolist())
+            self._client.add_torques((disturbance[self._base_nv :] / self._unit).tolist())
         return self._advance(disturbance), disturbance
 
     def _tree_torque(self, q: Floats, v: Floats, a: Floats) -> Floats:
@@ -144,7 +144,7 @@ class BulletPlant(Plant):
         return self._tree.inverse_dynamics(coupling.expand_q(q), S @ v, S @ a)
 
     def _advance(self, tau: Floats) -> Floats:
-        """Push the base, let time run, read the state; the acceleration (nv,) that there was."""
+        """Apply the wrench of the base, take one step and read the state; return the acceleration (nv,)."""
         v, h = self._v, self._h
         if not self._floating:
             self._client.advance()
@@ -158,15 +158,15 @@ class BulletPlant(Plant):
         after = self._client.base_state()
         joints, rates = self._joints()
         # The acceleration at the beginning, from that of the root's centre of mass.
-        turning = rotate_back(R, np.subtract(after.angular, before.angular) / h)
-        rising = rotate_back(R, np.subtract(after.linear, before.linear) / h)
+        alpha = rotate_back(R, np.subtract(after.angular, before.angular) / h)
+        acceleration = rotate_back(R, np.subtract(after.linear, before.linear) / h)
         w = v[3:6]
-        linear = rising - cross(turning, c) - cross(w, cross(w, c)) - cross(w, v[:3])
-        a = np.concatenate([linear, turning, (rates - v[6:]) / h])
+        linear = acceleration - cross(alpha, c) - cross(w, cross(w, c)) - cross(w, v[:3])
+        a = np.concatenate([linear, alpha, (rates - v[6:]) / h])
         self._read(*self._base_coordinates(after, joints, rates))
         return a
 
-    # -- between Bullet's state and ours ------------------------------------------------------
+    # -- between Bullet's state and dynx's ------------------------------------------------------
 
     def _joints(self) -> tuple[Floats, Floats]:
         """Positions and rates of the joints that own a coordinate."""
@@ -177,7 +177,7 @@ class BulletPlant(Plant):
 
     def _base_coordinates(self, base: BaseState, joints: Floats, rates: Floats) -> tuple[Floats, Floats]:
         quat = quat_product(np.array(base.quat_xyzw), self._axes_back)
-        # Bullet changes the sign at will; of the two that are one attitude, that which follows smoothly.
+        # Bullet may change the sign of the quaternion; the sign that continues smoothly is used.
         quat /= np.copysign(np.sqrt(quat.dot(quat)), quat.dot(self._q[3:7]))
         R = rotation_from_quat(quat)
         w = rotate_back(R, np.array(base.angular))
@@ -188,8 +188,8 @@ class BulletPlant(Plant):
     def _read(self, q: Floats, v: Floats) -> None:
         self._q, self._v = q, v
         if self._floating or self._coupling is not None:
-            # What is reported is the state: rounding of the conversion, or of a coupling, is not kept
-            # from it, and a rollout resumed from its record goes on to the last bit.
+            # Bullet is set to the reported state, rounding of the conversion included, so that a rollout
+            # resumed from its record continues bit for bit.
             self._place()
 
     def _place(self) -> None:

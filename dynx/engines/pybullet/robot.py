@@ -1,9 +1,9 @@
-"""A robot in Bullet, asked and answering in the conventions of dynx.
+"""A robot in Bullet, with arguments and results in the conventions of dynx.
 
-Bullet's world is here the inertial frame C of the root (centre of mass, principal axes), at every
-instant: the base never moves in Bullet, gravity turns instead, and the pose of the base is composed
-in NumPy. That is exact at every attitude, which Bullet's own decoding of the attitude is not, and
-one conversion, X, serves every quantity:
+Bullet's world is here the inertial frame C of the root (centre of mass, principal axes), at every instant:
+the base never moves in Bullet, gravity is rotated instead, and the pose of the base is composed in NumPy.
+That is exact at every attitude, which Bullet's own decoding of the attitude is not, and one conversion, X,
+serves every quantity:
 
     (angular, linear) of C  =  X (linear, angular) of the base frame.
 
@@ -22,27 +22,26 @@ from dynx.engines.pybullet.client import BulletClient
 from dynx.engines.pybullet.inertia import Ballast, PrincipalInertia
 from dynx.model.mechanism import ROOT, BodyFrame, Mechanism
 from dynx.rbd.jacobians import Reference
-from dynx.spatial.extended import longdouble
 from dynx.spatial.scalar import Array, Floats
 from dynx.spatial.se3 import homogeneous
 from dynx.spatial.so3 import cross, quat_from_rotation, skew
 
-_STILL = np.eye(4)
+_IDENTITY = np.eye(4)
 
 
 class BulletRobot:
-    """A mechanism, with `times` the ballast, in a client of its own. All calls: one sample."""
+    """A mechanism, with `times` the ballast, in a client of its own. Each call takes one sample."""
 
     def __init__(
         self, engine: ModuleType, mechanism: Mechanism, ballast: tuple[Ballast, ...], times: int
     ) -> None:
-        """`mechanism` is lumped in long double; Bullet gets it rounded once."""
+        """`mechanism` was merged in long double; Bullet gets it rounded once."""
         tree = bullet_tree(mechanism, ballast, times)
         self._floating = mechanism.floating
         self._gravity: Floats = _rounded(mechanism.gravity)
         self._T_base_C = _rounded(homogeneous(tree.root.axes, tree.root.center))
-        self._X = _rounded(_base_conversion(tree.root.axes, tree.root.center))
-        self._X_inverse = _rounded(_inverse_conversion(tree.root.axes, tree.root.center))
+        self._X = _rounded(base_conversion(tree.root.axes, tree.root.center))
+        self._X_inverse = _rounded(inverse_base_conversion(tree.root.axes, tree.root.center))
         # Bullet's unit of mass, a power of two, so that going there and back is exact.
         self._unit = tree.unit
         self._inertias = [link.inertia for link in tree.links]
@@ -102,12 +101,12 @@ class BulletRobot:
             tau = self._client.inverse_dynamics(q.tolist(), v.tolist(), a.tolist(), gravity)
             return self._unit * tau
         v_C, a_C = self._X @ v[:6], self._X @ a[:6]
-        # dv/dt in turning axes to the classical acceleration of the centre of mass.
+        # dv/dt in rotating axes to the classical acceleration of the centre of mass.
         a_C[3:] += cross(v_C[:3], v_C[3:])
         tau = self._client.inverse_dynamics(
             self._joints(q), [*v_C.tolist(), *v[6:].tolist()], [*a_C.tolist(), *a[6:].tolist()], gravity
         )
-        # Bullet answers with the force first.
+        # Bullet returns the force first.
         tau[:6] = self._X.T @ np.concatenate([tau[3:6], tau[:3]])
         return self._unit * tau
 
@@ -178,7 +177,7 @@ class BulletRobot:
     def _base(self, q: Floats) -> tuple[Floats, Floats]:
         """T_world_base and T_world_C, (4, 4) each."""
         if not self._floating:
-            return _STILL, _STILL
+            return _IDENTITY, _IDENTITY
         T = pose_matrices(q[:3], q[3:7])
         return T, np.asarray(T @ self._T_base_C)
 
@@ -186,8 +185,8 @@ class BulletRobot:
         gravity = self._gravity
         if self._floating:
             gravity = self._base(q)[1][:3, :3].T @ gravity
-        answer: list[float] = gravity.tolist()
-        return answer
+        numbers: list[float] = gravity.tolist()
+        return numbers
 
     def _jacobian_in_C(self, q: Floats, frame: int) -> Floats:
         """J (6, nv) of the velocity of the frame's origin, in the axes of C."""
@@ -220,8 +219,8 @@ class BulletRobot:
             point = root.axes.T @ (frame.p - root.center)
         else:
             point = self._inertias[frame.body].axes.T @ frame.p
-        answer: list[float] = _rounded(point).tolist()
-        return answer
+        numbers: list[float] = _rounded(point).tolist()
+        return numbers
 
 
 def pose_matrices(position: ArrayLike, quat_xyzw: ArrayLike) -> Floats:
@@ -233,7 +232,7 @@ def pose_matrices(position: ArrayLike, quat_xyzw: ArrayLike) -> Floats:
     quat = np.asarray(quat_xyzw, dtype=np.float64)
     products = quat[..., :, None] * quat[..., None, :]
     T = (products.reshape(*quat.shape[:-1], 16) @ _FROM_PRODUCTS).reshape(*quat.shape[:-1], 4, 4)
-    T += _STILL
+    T += _IDENTITY
     T[..., :3, 3] = position
     return np.asarray(T)
 
@@ -252,16 +251,17 @@ def _products_to_rotation() -> Floats:
 _FROM_PRODUCTS = _products_to_rotation()
 
 
-def _base_conversion(axes: Array, center: Array) -> Array:
-    """X (6, 6); see the head of this file."""
-    X = longdouble(np.zeros((6, 6)))
+def base_conversion(axes: Array, center: Array) -> Array:
+    """X (6, 6), for the axes (3, 3) and the origin (3,) of C in the base frame; see the head of this file."""
+    X = np.zeros((6, 6), dtype=axes.dtype)
     X[:3, 3:] = X[3:, :3] = axes.T
     X[3:, 3:] = -axes.T @ skew(center)
     return X
 
 
-def _inverse_conversion(axes: Array, center: Array) -> Array:
-    X = longdouble(np.zeros((6, 6)))
+def inverse_base_conversion(axes: Array, center: Array) -> Array:
+    """The inverse of `base_conversion`."""
+    X = np.zeros((6, 6), dtype=axes.dtype)
     X[3:, :3] = X[:3, 3:] = axes
     X[:3, :3] = skew(center) @ axes
     return X

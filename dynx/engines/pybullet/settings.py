@@ -1,4 +1,4 @@
-"""What a user can change in a robot after PyBullet has loaded it: the remedies at run time."""
+"""Settings of a robot that PyBullet has loaded: the remedies at run time, which a user applies by code."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from dynx.engines.pybullet.loaded_client import ROOT, BulletWorld, Setting
+from dynx.engines.pybullet.loaded_client import LoadedClient, Setting
 from dynx.model import Model
+from dynx.model.mechanism import ROOT
 from dynx.spatial.so3 import rotation_from_quat
 
 CALLS: Mapping[str, str] = {
@@ -31,68 +32,61 @@ CALLS: Mapping[str, str] = {
 """The lines of code, by the id of the remedy."""
 
 
-def simulation_off(world: BulletWorld) -> None:
-    """No motor, damping of the whole body or speed clamp: they belong to the simulation, not the file."""
-    engine = world.engine
-    # In a call of its own: together with a setting of a link Bullet would send that to the root.
-    world.ask(
-        engine.changeDynamics, world.body, ROOT, linearDamping=0.0, angularDamping=0.0, maxJointVelocity=1e300
-    )
-    if world.moving:
-        still = [0.0] * len(world.moving)
-        world.ask(
-            engine.setJointMotorControlArray, world.body, world.moving, engine.VELOCITY_CONTROL, forces=still
-        )
+def disable_simulation_settings(client: LoadedClient) -> None:
+    """Switch off motors, damping of the base and the limit of speeds, which do not come from the file."""
+    client.disable_damping()
+    client.release_motors()
 
 
-def no_damping(world: BulletWorld) -> None:
-    """No damping in the joints."""
-    for k in range(world.n_joints):
-        world.ask(world.engine.changeDynamics, world.body, k, jointDamping=0.0)
+def disable_joint_damping(client: LoadedClient) -> None:
+    """Set the damping of all joints to zero."""
+    for k in client.links:
+        client.call(client.engine.changeDynamics, client.body, k, jointDamping=0.0)
 
 
-def no_limits(world: BulletWorld) -> None:
-    """Limits that no joint reaches."""
-    for k in world.moving:
-        world.ask(world.engine.changeDynamics, world.body, k, jointLowerLimit=-1e300, jointUpperLimit=1e300)
+def disable_limits(client: LoadedClient) -> None:
+    """Set limits that no joint reaches."""
+    limits = {"jointLowerLimit": -1e300, "jointUpperLimit": 1e300}
+    for k in client.moving:
+        client.call(client.engine.changeDynamics, client.body, k, **limits)
 
 
 def set_inertias(model: Model, links: Mapping[str, int]) -> Setting:
-    """The moments that Bullet put to zero, as the file has them, about the axes that Bullet holds."""
+    """Setting of moments that Bullet replaced by zero: those of the file, about the axes of Bullet."""
 
-    def change(world: BulletWorld) -> None:
+    def change(client: LoadedClient) -> None:
         for name, k in links.items():
             inertial = model.inertial(name)
-            held = world.dynamics(k)
-            if any(held[2]) or not inertial.tensor.any() or (k == ROOT and world.static):
+            held = client.dynamics(k)
+            if any(held[2]) or not inertial.tensor.any() or (k == ROOT and not client.floating):
                 continue
             R = rotation_from_quat(np.array(held[4])).T @ inertial.origin.matrix[:3, :3]
             moments = np.diagonal(R @ inertial.tensor @ R.T).tolist()
-            world.ask(world.engine.changeDynamics, world.body, k, localInertiaDiagonal=moments)
+            client.call(client.engine.changeDynamics, client.body, k, localInertiaDiagonal=moments)
 
     return change
 
 
 def with_ballast(times: int) -> Setting:
-    """`times` the same rotational inertia about every axis, on each link that no body could be.
+    """Setting that adds `times` the same rotational inertia s about every axis to each impossible inertia.
 
     Inverse dynamics f and the mass matrix are affine in the inertia of each link, so that
-    f(I) = 2 f(I + s) - f(I + 2 s); and with s larger than any moment Bullet takes the link.
+    f(I) = 2 f(I + s) - f(I + 2 s); and with s larger than any moment Bullet accepts the link.
     """
 
-    def change(world: BulletWorld) -> None:
-        for k in range(ROOT, world.n_joints):
-            moments = world.dynamics(k)[2]
-            if (k == ROOT and world.static) or _possible(*sorted(moments)):
+    def change(client: LoadedClient) -> None:
+        for k in (ROOT, *client.links):
+            moments = client.dynamics(k)[2]
+            if (k == ROOT and not client.floating) or _possible(*sorted(moments)):
                 continue
             # A power of two, so that adding it costs as few digits as can be.
             s = 2.0 ** np.ceil(np.log2(2.0 * max(map(abs, moments))))
             loaded = [float(moment + times * s) for moment in moments]
-            world.ask(world.engine.changeDynamics, world.body, k, localInertiaDiagonal=loaded)
+            client.call(client.engine.changeDynamics, client.body, k, localInertiaDiagonal=loaded)
 
     return change
 
 
 def _possible(small: float, middle: float, large: float) -> bool:
-    """Whether these are the principal moments of a body, with room for the way Bullet rounds."""
+    """Whether a body can have these principal moments, with a margin for the rounding of Bullet."""
     return small >= 0.0 and small + middle >= large * (1.0 + 64.0 * float(np.finfo(float).eps))

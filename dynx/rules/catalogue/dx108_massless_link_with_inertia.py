@@ -1,22 +1,23 @@
 """DX108 massless-link-with-inertia: A link of mass zero has moments of inertia: Drake makes it 1 kg, MuJoCo
 drops or refuses it.
 
-Matter that has moments of inertia has mass. A file can say otherwise: a foot or a sensor whose mass was set
-to zero while its tensor stayed.
+A body with moments of inertia has mass. A file can contradict this: the mass of a foot or a sensor was set to
+zero and its tensor was kept.
 
 - Drake 1.51.1 makes the link weigh 1 kg, with a warning ("condition 'mass > 0' failed").
-- MuJoCo 4.0.0 drops the tensor where the link is welded to another (its default ``fusestatic``), and refuses
-  the file where a joint carries the link.
-- Pinocchio 4.1.0 and PyBullet 3.2.7 calculate with the numbers as they stand, and so does dynx.
+- MuJoCo 4.0.0 drops the tensor where the link is rigidly connected to another (its default ``fusestatic``),
+  and refuses the file where a joint carries the link.
+- Pinocchio 4.1.0 and PyBullet 3.2.7 use the numbers unchanged, as dynx does.
 
 The effect: in Drake torques up to 23 times too large (bolt, whose feet these are), in MuJoCo as much as the
 tensor contributes (1e-4 on bolt).
 
 What to do: give the link its mass.
 
-``dynx doctor --fix`` adds the tensor to that of a link with mass that this one is welded to, its parent
+``dynx doctor --fix`` adds the tensor to that of a link with mass that is rigidly connected to it, its parent
 first; the massless link gets a zero tensor. That is the same rigid body. Where there is no such link, the
-link gets a mass of 2e-15 kg, which every engine takes for mass and no result shows.
+link gets a mass of 2e-15 kg, which every engine accepts as mass and which is too little to show in any
+result.
 """
 
 from collections.abc import Iterable, Sequence
@@ -24,41 +25,36 @@ from dataclasses import replace
 
 import numpy as np
 
-from dynx.rules import Case, Detection, Remedy, Rule, measured_on
+from dynx.rules import Case, Detection, Remedy, Rule, links_of, measured_on
 from dynx.rules.inertia.edits import with_inertials
-from dynx.rules.inertia.merging import lumped_into
-from dynx.rules.inertia.physical import SMALLEST_MASS
-from dynx.rules.inertia.rigid_groups import rigid_groups
+from dynx.rules.inertia.merging import merged_inertials
+from dynx.rules.inertia.physical import MIN_MASS
+from dynx.rules.inertia.rigid_groups import inertials_in_groups, rigid_groups
 
 
 class MasslessLinkWithInertia(Rule):
     engines = measured_on("drake", "mujoco")
-    advice = "Give the link its mass, or move the tensor into the link it is welded to."
+    advice = "Give the link its mass, or move the tensor into the link that it is rigidly connected to."
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
         """Links that can move, of mass zero, with a tensor that is not zero."""
-        groups = rigid_groups(case)
-        for link in case.model.links:
-            inertial = link.inertial
-            if inertial is None or inertial.mass != 0.0 or groups[link.name].static:
-                continue
+        for name, inertial, group in inertials_in_groups(case):
             largest = float(np.max(np.abs(inertial.tensor)))
-            if largest > 0.0:
+            if inertial.mass == 0.0 and largest > 0.0 and not group.static:
                 message = f"the mass is zero, and the largest entry of the tensor {largest:.6g}"
-                yield Detection(link.name, None, inertial.line, message)
+                yield Detection(name, None, inertial.line, message)
 
     def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy:
         """The tensors put where there is mass."""
-        for name in (detection.link for detection in detections):
-            inertial = None if name is None else case.inertials[name]
-            if name is None or inertial is None:
-                continue
-            group = rigid_groups(case)[name]
+        for name in links_of(detections):
+            inertial, group = case.model.inertial(name), rigid_groups(case)[name]
             parent = group.parents.get(name)
             near = [*([parent] if parent else []), *group.children(name), *group.links]
             heavy = [each for each in near if (body := case.inertials[each]) is not None and body.mass > 0.0]
             if heavy:
-                case = with_inertials(case, lumped_into(case, group, (heavy[0], name), heavy[0]))
+                case = with_inertials(case, merged_inertials(case, group, (heavy[0], name), heavy[0]))
             else:
-                case = with_inertials(case, {name: replace(inertial, mass=2.0 * SMALLEST_MASS)})
-        return Remedy(case, "added tensors of links without mass to links with mass that they are welded to")
+                case = with_inertials(case, {name: replace(inertial, mass=2.0 * MIN_MASS)})
+        return Remedy(
+            case, "added tensors of links without mass to links with mass rigidly connected to them"
+        )

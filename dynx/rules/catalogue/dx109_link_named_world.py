@@ -1,23 +1,22 @@
-"""DX109 link-named-world: A link that is not the ground is named world, which engines take for the ground.
+"""DX109 link-named-world: A link that is not the ground is named world, which engines mistake for the ground.
 
-URDF gives the name ``world`` no meaning. Engines do. As the root of a robot whose base is fixed it is what
-they expect and harmless. Elsewhere:
+URDF gives the name ``world`` no meaning, but engines do. It is harmless as the root of a robot with a fixed
+base. Elsewhere:
 
-- As the root with the base free: Drake 1.51.1 takes the link for the world itself and welds the robot to it.
-  PyBullet 3.2.7 takes the link's mass for zero if it has no ``<inertial>``, and then nails it to the world
-  (any other name would weigh 1 kg). MuJoCo 4.0.0 takes it for its world body, which
-  cannot have a free joint.
-- On a link that is not the root: Drake refuses the file ("form one or more loops"), and MuJoCo drops the
-  mass and the tensor of that link without a word.
-- Pinocchio 4.1.0 does not care.
+- As the root with a floating base: Drake 1.51.1 mistakes the link for the world itself and fixes the robot to
+  it. PyBullet 3.2.7 gives the link no mass if it has no ``<inertial>``, and then fixes it to the world (any
+  other name would weigh 1 kg). MuJoCo 4.0.0 mistakes it for its world body, which cannot have a free joint.
+- On a link that is not the root: Drake refuses the file ("form one or more loops"), and MuJoCo drops the mass
+  and the tensor of that link without a warning.
+- Pinocchio 4.1.0 gives the name no meaning.
 
 The effect: a robot that cannot move its base, or (MuJoCo) a mass matrix without that link.
 
-What to do: keep the name ``world`` for the root of a robot that is fixed, and call other links otherwise. If
-the link stands for the ground, load the robot with the base fixed.
+What to do: keep the name ``world`` for the root of a robot that is fixed, and give other links other names.
+If the link stands for the ground, load the robot with a fixed base.
 
 ``dynx doctor --fix`` renames the link to ``world_link``, in the joints that name it and in ``<gazebo
-reference>`` too. Programs may ask for it by its old name: choose ``--choose DX109=keep`` to leave it.
+reference>`` too. Programs may look the link up by its old name: ``--choose DX109=keep`` keeps it.
 """
 
 from collections.abc import Iterable, Sequence
@@ -30,10 +29,10 @@ _WORLD = "world"
 
 class LinkNamedWorld(Rule):
     engines = measured_on("drake", "mujoco")
-    advice = "Give the link another name, or load the robot with the base fixed."
+    advice = "Give the link another name, or load the robot with a fixed base."
     choices = {
         "rename": "give the link another name, wherever the document names it",
-        "keep": "leave the name; Drake and MuJoCo then do otherwise",
+        "keep": "keep the name; Drake and MuJoCo then read another robot",
     }
     trap_base = "floating"
 
@@ -43,7 +42,7 @@ class LinkNamedWorld(Rule):
         root = case.model.root
         if element is None or (root == _WORLD and case.base == "fixed"):
             return []
-        what = "the root, though the base is free," if root == _WORLD else f"a link below the root {root}"
+        what = "the root, although the base floats," if root == _WORLD else f"a link below the root {root}"
         return [Detection(_WORLD, None, element.line, f"{what} is named world")]
 
     def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy | None:

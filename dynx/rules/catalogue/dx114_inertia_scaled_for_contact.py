@@ -1,20 +1,20 @@
 """DX114 inertia-scaled-for-contact: A link has inertia_scaling, by which PyBullet alone multiplies its
 inertia.
 
-``<contact><inertia_scaling value="3.0"/></contact>`` is an extension of PyBullet's, meant to make contacts of
-light links steadier. Many files that come with PyBullet, and files copied from them, have it.
+``<contact><inertia_scaling value="3.0"/></contact>`` is an extension of PyBullet's, intended to stabilise
+contacts of light links. Many files that come with PyBullet, and files copied from them, have it.
 
 - PyBullet 3.2.7 multiplies the moments of inertia of the link by the value, also with
   ``URDF_USE_INERTIA_FROM_FILE``, and in ``calculateInverseDynamics`` and ``calculateMassMatrix`` too. The
   mass stays.
-- Pinocchio 4.1, MuJoCo 4.0 and Drake 1.51 do not know the tag. Neither does dynx: it is no property of the
-  robot.
+- Pinocchio 4.1, MuJoCo 4.0 and Drake 1.51 do not know the tag. Neither does dynx: the value is no property of
+  the robot.
 
 The effect is that of a wrong tensor: a few per cent of the mass matrix at a scale of 3, more for light links
 with reflected inertia.
 
-What to do: take the tag away wherever the dynamics matters. ``dynx doctor --fix`` does so and leaves the rest
-of ``<contact>`` in place.
+What to do: remove the tag wherever the dynamics matters. ``dynx doctor --fix`` does so and leaves the rest of
+``<contact>`` in place.
 """
 
 from collections.abc import Iterable
@@ -25,9 +25,9 @@ from dynx.rules.text.attributes import number_or_none
 
 
 class InertiaScaledForContact(EditingRule):
-    advice = "Take <inertia_scaling> away."
+    advice = "Remove <inertia_scaling>."
     engines = measured_on("pybullet")
-    changed = "took <inertia_scaling> away"
+    changed = "removed <inertia_scaling>"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
         """Scales other than 1."""

@@ -1,12 +1,12 @@
 """DX201 axis-not-unit: The axis of a joint is not a unit vector.
 
-URDF says that ``<axis xyz="..."/>`` should have length 1. A wrong length says nothing about the direction,
-and most readers scale it away. Typical are axes such as ``0 0 -2`` or ``1 1 0``, and axes that were rounded
+URDF says that ``<axis xyz="..."/>`` should have length 1. A wrong length does not change the direction, and
+most readers normalise the axis. Typical are axes such as ``0 0 -2`` or ``1 1 0``, and axes that were rounded
 to six digits, ``0.577350 0.577350 0.577350``, whose length is off by 1e-6.
 
-- PyBullet 3.2.7 keeps the axis as it is. A prismatic joint then moves by length times its coordinate, and
-  the positions of all links behind it are wrong in proportion. The simulation (``stepSimulation``) uses the
-  long axis for every type of joint: accelerations are wrong in proportion. ``calculateInverseDynamics``,
+- PyBullet 3.2.7 keeps the length. A prismatic joint then moves by length times its coordinate, and the
+  positions of all links behind it are wrong in proportion. The simulation (``stepSimulation``) uses the long
+  axis for every type of joint: accelerations are wrong in proportion. ``calculateInverseDynamics``,
   ``calculateMassMatrix`` and ``calculateJacobian`` scale it to 1, with a warning on stdout, so PyBullet
   contradicts itself.
 - Pinocchio 4.1, MuJoCo 4.0 and Drake 1.51 scale it to 1. So does dynx.

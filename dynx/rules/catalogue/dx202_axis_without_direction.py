@@ -1,17 +1,17 @@
 """DX202 axis-without-direction: The axis of a joint that moves is zero or empty.
 
-``<axis xyz="0 0 0"/>`` and ``<axis/>`` give no direction to turn about or to slide along. Exporters write the
-first for fixed joints, where nobody looks at it; once the type is changed to ``revolute`` it matters. A joint
-without any ``<axis>`` is fine: URDF's default (1, 0, 0) is used by all engines alike.
+``<axis xyz="0 0 0"/>`` and ``<axis/>`` define no direction of motion. Exporters write the first for fixed
+joints, where it is ignored; once the type is changed to ``revolute`` it matters. A joint without any
+``<axis>`` is fine: URDF's default (1, 0, 0) is used by all engines alike.
 
-- Pinocchio 4.1 loads it. The joint has a coordinate that moves nothing: its row and column of the mass
-  matrix are zero, and forward dynamics gives NaN.
+- Pinocchio 4.1 loads it. The joint has a coordinate that moves nothing: its row and column of the mass matrix
+  are zero, and forward dynamics gives NaN.
 - PyBullet 3.2.7 loads it. Positions behind the joint are NaN, inverse dynamics and mass matrix fail.
 - MuJoCo 4.0 refuses the file.
 - Drake 1.51 refuses the zero axis, and reads ``<axis/>`` as (1, 0, 0).
 
-What to do: write the direction. The file does not have it, so ``dynx doctor --fix`` takes URDF's default,
-(1, 0, 0). If the joint was never meant to move, ``--choose DX202=fixed`` makes it a fixed joint.
+What to do: write the direction. The file does not contain it, so ``dynx doctor --fix`` writes URDF's default,
+(1, 0, 0). If the joint should not move, ``--choose DX202=fixed`` makes it a fixed joint.
 """
 
 from collections.abc import Iterable

@@ -1,16 +1,16 @@
 """DX203 joint-without-limit: A revolute or prismatic joint has no limit.
 
-URDF demands one: a joint that can turn for ever is called ``continuous``.
+URDF requires a ``<limit>``; the type of a joint that can rotate without limit is ``continuous``.
 
 - Pinocchio 4.1 and PyBullet 3.2.7 refuse the file.
 - MuJoCo 4.0 and Drake 1.51 read a joint without limits.
 
 A tag spelled wrongly, such as ``<Limit>``, has the same effect: readers do not know it.
 
-What to do: write the limits of the joint. They are not in the file, so ``dynx doctor --fix`` leaves the joint
-without any: a revolute joint becomes ``continuous``, a prismatic one gets the largest double for its limits.
-``--choose DX203=zero`` writes ``lower="0" upper="0"`` instead, the numbers that URDF has for a ``<limit>``
-in which they are not given; the joint then must not move in simulations that keep to limits.
+What to do: write the limits of the joint. The file does not contain them, so ``dynx doctor --fix`` leaves the
+joint unlimited: a revolute joint becomes ``continuous``, a prismatic one gets the largest double for its
+limits. ``--choose DX203=zero`` writes ``lower="0" upper="0"`` instead, the numbers that URDF has for a
+``<limit>`` in which they are not given; the joint then must not move in simulations that keep to limits.
 """
 
 from collections.abc import Iterable

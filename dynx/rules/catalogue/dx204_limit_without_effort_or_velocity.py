@@ -1,16 +1,15 @@
-"""DX204 limit-without-effort-or-velocity: A limit does not say the largest effort or speed.
+"""DX204 limit-without-effort-or-velocity: A limit does not state the largest effort or velocity.
 
-URDF demands both, though neither enters any equation of motion.
+URDF requires both, although neither enters any equation of motion.
 
 - Pinocchio 4.1 refuses the file: "limit has no effort". It does so for every type of joint, fixed ones
   included.
 - PyBullet 3.2.7, MuJoCo 4.0 and Drake 1.51 read the file. So does dynx: what is not given is unlimited.
 
-Files with such limits are common, because nobody but urdfdom, the reader behind Pinocchio and ROS, looks at
-them.
+Files with such limits are common, because only urdfdom, the reader of Pinocchio and ROS, checks them.
 
-What to do: write both. They are not in the file, so ``dynx doctor --fix`` writes the largest double, which
-every engine reads and which dynx takes for "no limit".
+What to do: write both. The file does not contain them, so ``dynx doctor --fix`` writes the largest double,
+which every engine reads and which dynx reads as "no limit".
 """
 
 from collections.abc import Iterable

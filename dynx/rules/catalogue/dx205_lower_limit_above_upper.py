@@ -2,15 +2,15 @@
 
 The two ends were exchanged, or the sign of one was lost.
 
-- Drake 1.51 refuses the file, whose author gets to see a failed condition in Drake's C++ sources. It does
-  so for continuous joints too, whose limits mean nothing.
-- MuJoCo 4.0 and PyBullet 3.2.7 take such limits for no limits at all.
+- Drake 1.51 refuses the file, with a message that shows a failed condition in Drake's C++ sources. It does so
+  for continuous joints too, whose limits have no meaning.
+- MuJoCo 4.0 and PyBullet 3.2.7 treat the joint as unlimited.
 - Pinocchio 4.1 stores them as they are: random configurations and clamping then misbehave.
 
-The equations of motion do not depend on limits. dynx takes the smaller number for the lower limit.
+The equations of motion do not depend on limits. dynx uses the smaller number as the lower limit.
 
-What to do: put the limits right. ``dynx doctor --fix`` exchanges them. ``--choose DX205=unlimited`` writes
-the largest double in place of both, which is what MuJoCo and PyBullet make of them.
+What to do: correct the limits. ``dynx doctor --fix`` exchanges them. ``--choose DX205=unlimited`` writes the
+largest double for both, as MuJoCo and PyBullet treat them.
 """
 
 from collections.abc import Iterable
@@ -29,7 +29,7 @@ class LowerLimitAboveUpper(EditingRule):
         "exchange": "exchange a lower limit above the upper with it",
         "unlimited": "write the largest double for both limits where the lower is above the upper",
     }
-    changed = "put limits in order whose lower was above the upper"
+    changed = "exchanged lower and upper limits that were in the wrong order"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
         """Limits of joints that move."""

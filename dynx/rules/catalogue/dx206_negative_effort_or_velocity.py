@@ -1,16 +1,16 @@
 """DX206 negative-effort-or-velocity: The largest effort or speed of a joint is negative.
 
-``-1`` for "no limit" is a habit from other formats; else a sign slipped in.
+Other formats use ``-1`` for "no limit"; otherwise the sign is a mistake.
 
 - Pinocchio 4.1 refuses the file: "Some components of min_effort are greater than max_effort".
-- Drake 1.51 refuses a negative velocity with a failed condition in its C++ sources. A negative effort means
-  nothing to it, unless a ``<transmission>`` gives the joint an actuator: then it refuses the file too, "which
-  has a negative effort limit".
-- PyBullet 3.2.7 reads both as they stand. MuJoCo 4.0 reads no velocity, and takes the sign off an effort.
+- Drake 1.51 refuses a negative velocity with a failed condition in its C++ sources. It ignores a negative
+  effort unless a ``<transmission>`` gives the joint an actuator: then it refuses the file too, "which has a
+  negative effort limit".
+- PyBullet 3.2.7 reads both unchanged. MuJoCo 4.0 reads no velocity, and drops the sign of an effort.
 
 The equations of motion do not depend on these limits. dynx reads the number with a note.
 
-What to do: write what was meant. ``dynx doctor --fix`` takes the sign away. Where ``-1`` stands for "no
+What to do: write the intended limits. ``dynx doctor --fix`` removes the sign. Where ``-1`` stands for "no
 limit", ``--choose DX206=unlimited`` writes the largest double instead.
 """
 
@@ -27,7 +27,7 @@ class NegativeEffortOrVelocity(EditingRule):
     advice = "Write a limit of at least 0."
     engines = measured_on("pinocchio", "drake")
     choices = {
-        "absolute": "take the sign of negative efforts and velocities away",
+        "absolute": "remove the sign of negative efforts and velocities",
         "unlimited": "write the largest double for negative efforts and velocities",
     }
     changed = "made the largest efforts and velocities of joints positive"
@@ -37,12 +37,12 @@ class NegativeEffortOrVelocity(EditingRule):
         for _, limit in elements_in_joints(case, "limit", SINGLE):
             below = [name for name in ("effort", "velocity") if (number_or_none(limit, name) or 0.0) < 0.0]
             if below:
-                said = " and ".join(f"{name}={limit.attributes[name].strip()}" for name in below)
+                listed = " and ".join(f"{name}={limit.attributes[name].strip()}" for name in below)
                 edits = tuple(
                     case.source.setting(limit, name, self._instead(case, limit.attributes[name]))
                     for name in below
                 )
-                yield correction(limit, f"<limit> has {said}", *edits)
+                yield correction(limit, f"<limit> has {listed}", *edits)
 
     def _instead(self, case: Case, written: str) -> str:
         return LARGEST if self.chosen(case) == "unlimited" else written.strip().removeprefix("-")

@@ -1,13 +1,13 @@
 """DX207 safety-controller-without-gain: A safety controller has no k_velocity.
 
-The element belongs to the PR2's controllers and to ROS; no engine simulates it. URDF demands its attribute
-``k_velocity`` and makes the others optional.
+The element belongs to the PR2's controllers and to ROS; no engine simulates it. URDF requires its attribute
+``k_velocity``; the others are optional.
 
 - Pinocchio 4.1 refuses the file: "joint safety: no k_velocity".
-- PyBullet 3.2.7 and MuJoCo 4.0 do not look at it; Drake 1.51 says that it ignores it.
+- PyBullet 3.2.7 and MuJoCo 4.0 ignore it; Drake 1.51 warns that it ignores it.
 
-What to do: take the element away unless a program of yours reads it, or complete it. ``dynx doctor --fix``
-adds ``k_velocity="0"``, with which the controller it describes does nothing.
+What to do: remove the element unless one of your programs reads it, or complete it. ``dynx doctor --fix``
+adds ``k_velocity="0"``, with which the described controller has no effect.
 """
 
 from collections.abc import Iterable
@@ -18,7 +18,7 @@ from dynx.rules.joints.elements import elements_in_joints
 
 class SafetyControllerWithoutGain(EditingRule):
     stage = "reading"
-    advice = "Write k_velocity, or take the <safety_controller> away."
+    advice = "Write k_velocity, or remove the <safety_controller>."
     engines = measured_on("pinocchio")
     changed = "gave safety controllers without k_velocity one of 0"
 

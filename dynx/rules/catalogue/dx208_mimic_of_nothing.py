@@ -1,17 +1,17 @@
 """DX208 mimic-of-nothing: A mimic joint has nothing to follow.
 
-It names no joint, a joint that is not there, or its own; or it belongs to a fixed joint.
+It names no joint, a missing joint or its own joint; or it belongs to a fixed joint.
 
 - Drake 1.51 refuses the file in all these cases, with the line.
-- Pinocchio 4.1 refuses a ``<mimic>`` without the attribute ``joint``, MuJoCo 4.0 that and a joint that
-  mimics itself.
+- Pinocchio 4.1 refuses a ``<mimic>`` without the attribute ``joint``, MuJoCo 4.0 that and a joint that mimics
+  itself.
 - Otherwise MuJoCo warns and lets the joint move freely, as Pinocchio and PyBullet 3.2.7 do with every mimic
-  joint unless they are told otherwise.
+  joint by default.
 
-dynx reads a joint that follows one which is not there as moving freely, and refuses one that follows itself.
+dynx reads a joint that follows a missing joint as moving freely, and refuses a joint that follows itself.
 
-What to do: name the joint to follow, or take the tag away. ``dynx doctor --fix`` takes it away, so that the
-joint moves freely, as in the engines that load the file.
+What to do: name the joint to follow, or remove the tag. ``dynx doctor --fix`` removes it, so that the joint
+moves freely, as in the engines that load the file.
 """
 
 from collections.abc import Iterable
@@ -24,9 +24,9 @@ from dynx.rules.joints.elements import SINGLE, elements_in_joints
 
 class MimicOfNothing(EditingRule):
     stage = "reading"
-    advice = "Name the joint to follow, or take <mimic> away."
+    advice = "Name the joint to follow, or remove <mimic>."
     engines = measured_on("pinocchio", "mujoco", "drake")
-    changed = "took <mimic> away from joints that had nothing to follow"
+    changed = "removed <mimic> from joints that had nothing to follow"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
         """The first ``<mimic>`` of every joint."""

@@ -1,18 +1,18 @@
 """DX209 mimic-of-fixed-joint: A mimic joint follows a joint that cannot move.
 
-The joint it follows was made fixed (a gripper that is not used, say) and the followers were forgotten. By
-what ``<mimic>`` means they cannot move either: their value is the offset.
+The joint it follows was made fixed (a gripper that is not used, say) and the followers were forgotten. By the
+definition of ``<mimic>`` they cannot move either: their value is the offset.
 
 - Drake 1.51 refuses the file: a joint of one coordinate cannot mimic one of none.
 - MuJoCo 4.0 warns and lets the joint move freely.
-- Pinocchio 4.1 and PyBullet 3.2.7 let every mimic joint move freely unless they are told otherwise, and
-  Pinocchio told otherwise (``mimic=True``) refuses the file.
+- Pinocchio 4.1 and PyBullet 3.2.7 let every mimic joint move freely by default, and Pinocchio with
+  ``mimic=True`` refuses the file.
 
-dynx reads the joint as fixed at its offset. The effect of the freedom that the other engines see is one
-coordinate more in every vector and matrix.
+dynx reads the joint as fixed at its offset. The effect in the other engines is one coordinate more in every
+vector and matrix.
 
 What to do: make the joint fixed. ``dynx doctor --fix`` does so, and moves its origin by the offset. If it was
-meant to move by itself, ``--choose DX209=free`` takes ``<mimic>`` away instead.
+meant to move by itself, ``--choose DX209=free`` removes ``<mimic>`` instead.
 """
 
 from collections.abc import Iterable
@@ -32,7 +32,7 @@ class MimicOfFixedJoint(EditingRule):
         "fixed": "make a joint that mimics a fixed one fixed at its offset",
         "free": "let a joint that mimics a fixed one move freely",
     }
-    changed = "settled joints that mimic a fixed one"
+    changed = "made joints that mimic a fixed one fixed or free"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
         """Joints that move by their type and have a ``<mimic>``, and are fixed to dynx."""

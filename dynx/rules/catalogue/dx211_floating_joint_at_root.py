@@ -1,10 +1,10 @@
-"""DX211 floating-joint-at-root: A floating joint below an empty root says that the base moves freely.
+"""DX211 floating-joint-at-root: A floating joint below an empty root specifies a floating base in the file.
 
-Some files say in this way that the robot moves freely: a link ``world`` without inertia, a joint of type
-``floating``, and the robot below it. Whether the base is fixed or free is then said twice, in the file and
-in the call that loads it.
+Some files describe a floating robot in this way: a link ``world`` without inertia, a joint of type
+``floating``, and the robot below it. The base is then specified twice, in the file and in the call that loads
+it.
 
-- PyBullet 3.2.7 makes the joint fixed, with a line on stdout. Then ``useFixedBase`` decides.
+- PyBullet 3.2.7 makes the joint fixed, and prints one line on stdout. Then ``useFixedBase`` decides.
 - Pinocchio 4.1 gives the joint seven coordinates; ``JointModelFreeFlyer`` as a root joint gives seven more.
   The other joints are right as long as the seven are held.
 - MuJoCo 4.0 makes it a free joint whatever is below.
@@ -12,7 +12,7 @@ in the call that loads it.
 
 dynx reads the joint as fixed and leaves the decision to ``base=``.
 
-What to do: say it in one place. ``dynx doctor --fix`` makes the joint fixed.
+What to do: specify the base in one place. ``dynx doctor --fix`` makes the joint fixed.
 """
 
 from collections.abc import Iterable
@@ -22,9 +22,9 @@ from dynx.rules.joints.elements import joints_of_type
 
 
 class FloatingJointAtRoot(EditingRule):
-    advice = "Make the joint fixed, and say in the loading call whether the base is free."
+    advice = "Make the joint fixed, and specify in the loading call whether the base floats."
     engines = measured_on("mujoco", "drake")
-    changed = "made the floating joint below the root fixed: the loading call says whether the base is free"
+    changed = "made the floating joint below the root fixed: the loading call says whether the base floats"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
         """The joint, of which there is at most one that dynx can read."""

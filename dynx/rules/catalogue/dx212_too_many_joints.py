@@ -1,17 +1,18 @@
-"""DX212 too-many-joints: The robot has more joints than PyBullet can tell the state of.
+"""DX212 too-many-joints: The robot has more joints than PyBullet supports.
 
 PyBullet 3.2.7 has room for 127 joints, and counts fixed ones. From the 128th on ``getJointState`` and
 ``getLinkState`` fail, so there are no positions; above 128 coordinates ``calculateInverseDynamics``,
-``calculateMassMatrix`` and ``calculateJacobian`` answer wrongly and say nothing (20 % at 129). Hands with
-sensors and robots with many named frames get there: ``tiago_dual`` of example-robot-data has 129 joints.
+``calculateMassMatrix`` and ``calculateJacobian`` return wrong results without a warning (20 % at 129). Hands
+with sensors and robots with many named frames exceed this: ``tiago_dual`` of example-robot-data has 129
+joints.
 
-Pinocchio 4.1, MuJoCo 4.0 and Drake 1.51 have no such bound.
+Pinocchio 4.1, MuJoCo 4.0 and Drake 1.51 have no such limit.
 
-What to do: drop what PyBullet does not need. ``dynx doctor --fix`` takes links away that have no mass,
-nothing attached to them and a fixed joint: frames, in other words. It takes as few as are needed, those
-without shapes and at the end of the file first. The dynamics stays; programs that ask for these frames need
-the original file. ``--choose DX212=keep`` leaves them in, and PyBullet out. Where there are not enough of
-them, or too many joints move, nothing mends it.
+What to do: drop frames that PyBullet does not need. ``dynx doctor --fix`` removes links that have no mass,
+nothing attached to them and a fixed joint: that is, frames. It removes as few as are needed, those without
+shapes and at the end of the file first. The dynamics is unchanged; programs that use these frames need the
+original file. ``--choose DX212=keep`` keeps them, and PyBullet cannot load the robot. Where there are not
+enough of them, or too many joints move, there is no remedy.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -26,7 +27,7 @@ class TooManyJoints(Rule):
     advice = "Drop links that are mere frames from the file for PyBullet."
     engines = measured_on("pybullet")
     choices = {
-        "drop": "take frames without mass at the ends of the robot away until 127 joints are left",
+        "drop": "remove frames without mass at the ends of the robot until 127 joints are left",
         "keep": "keep all links; PyBullet then cannot hold the robot",
     }
 
@@ -52,7 +53,7 @@ class TooManyJoints(Rule):
             edits += [source.removing(case.links[name]), source.removing(case.joints[carriers[name]])]
         return Remedy(
             case.with_source(source.edited(*edits)),
-            f"took {len(dropped)} links away that are mere frames",
+            f"took {len(dropped)} links that are mere frames",
             self.decision(case),
         )
 

@@ -1,19 +1,18 @@
 """DX213 joint-named-universe: A fixed joint is named universe, which is Pinocchio's name for the world.
 
 Pinocchio 4.1 keeps a list of frames that begins with an entry ``universe``, which is the world. A fixed joint
-becomes a frame of its name, and is looked up by that name when the link behind it is attached: found is
-the world. The file loads without a word, and the robot has lost the mass behind the joint. The mass matrix
-was off by 40 % for a tool at the end of an arm.
+becomes a frame of its name, and is looked up by that name when its child link is attached, which finds the
+world. The file loads without a warning, and the robot lacks the mass beyond the joint. The mass matrix was
+off by 40 % for a tool at the end of an arm.
 
-A joint of that name that moves does no harm to the model, but ``model.getJointId("universe")`` is the world
-and not that joint.
+A moving joint of that name does not change the model, but ``model.getJointId("universe")`` is the world and
+not that joint.
 
-PyBullet 3.2.7, MuJoCo 4.0 and Drake 1.51 read the file as it is meant. A link named ``universe`` is fine in
+PyBullet 3.2.7, MuJoCo 4.0 and Drake 1.51 read the file as intended. A link named ``universe`` is harmless in
 all four.
 
 What to do: give the joint another name. ``dynx doctor --fix`` calls it ``universe_joint``, in mimic joints,
-transmissions and Gazebo references too; programs that look the joint up by its name must be changed
-with it.
+transmissions and Gazebo references too; programs that look the joint up by its name must be changed with it.
 """
 
 from collections.abc import Iterable

@@ -1,14 +1,13 @@
-"""DX214 transmission-of-nothing: A transmission lacks a part, or is about a joint that is not there.
+"""DX214 transmission-of-nothing: A transmission lacks a part or names a missing joint.
 
-Transmissions belong to ROS and its controllers. Of the engines only Drake looks at them, and it is strict:
+Transmissions belong to ROS and its controllers. Of the engines only Drake reads them:
 
 - Drake 1.51 refuses the file where a transmission has no type, no ``<joint>`` or no ``<actuator>`` with a
-  name, or names a joint that the file does not have. It passes over types other than
-  ``SimpleTransmission``.
-- Pinocchio 4.1, PyBullet 3.2.7 and MuJoCo 4.0 pass transmissions over.
+  name, or names a joint that the file does not have. It ignores types other than ``SimpleTransmission``.
+- Pinocchio 4.1, PyBullet 3.2.7 and MuJoCo 4.0 ignore transmissions.
 
-What to do: complete the transmission or take it away. ``dynx doctor --fix`` takes it away; nothing in the
-dynamics depends on it. ROS controllers that were meant to use it need it completed instead.
+What to do: complete the transmission or remove it. ``dynx doctor --fix`` removes it; nothing in the dynamics
+depends on it. If ROS controllers should use it, complete it instead.
 """
 
 from collections.abc import Iterable
@@ -21,9 +20,9 @@ from dynx.rules.joints.transmissions import transmissions_drake_reads, type_of
 
 class TransmissionOfNothing(EditingRule):
     stage = "reading"
-    advice = "Complete the <transmission>, or take it away."
+    advice = "Complete the <transmission>, or remove it."
     engines = measured_on("drake")
-    changed = "took transmissions away that lack a part or a joint"
+    changed = "removed transmissions that lack a part or a joint"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
         """Such transmissions, of those that Drake reads."""

@@ -1,17 +1,17 @@
 """DX215 actuator-named-twice: The actuators of two transmissions have the same name.
 
-Transmissions belong to ROS, where each stands by itself. Drake 1.51 reads them and makes an actuator of each,
-and its actuators need names of their own: it refuses the file, "already contains a joint actuator named".
+Transmissions belong to ROS, where each is independent. Drake 1.51 reads them and makes an actuator of each,
+whose names must be unique: it refuses the file, "already contains a joint actuator named".
 
-Pinocchio 4.1, PyBullet 3.2.7 and MuJoCo 4.0 pass transmissions over.
+Pinocchio 4.1, PyBullet 3.2.7 and MuJoCo 4.0 ignore transmissions.
 
 Transmissions of fixed joints, of joints with an effort limit of 0, and of other types than
-``SimpleTransmission`` do not count.
+``SimpleTransmission`` are ignored.
 
-Copying a transmission and changing its joint alone is enough; ``xarm6_robot.urdf``, which comes with
+A copied transmission of which only the joint was changed causes this; ``xarm6_robot.urdf``, which comes with
 PyBullet, has two actuators ``motor3``.
 
-What to do: give each actuator a name of its own. ``dynx doctor --fix`` adds a number to the later ones.
+What to do: give each actuator its own name. ``dynx doctor --fix`` adds a number to the later ones.
 """
 
 from collections.abc import Iterable, Iterator
@@ -25,7 +25,7 @@ from dynx.rules.joints.transmissions import moves_by_actuator, transmissions_dra
 
 class ActuatorNamedTwice(EditingRule):
     stage = "reading"
-    advice = "Give each actuator a name of its own."
+    advice = "Give each actuator its own name."
     engines = measured_on("drake")
     changed = "gave actuators of the same name different ones"
 

@@ -1,24 +1,24 @@
 """DX216 upper-limit-missing: A limit has a lower end of -1 or less and no upper end, which PyBullet reads as
 -1.
 
-URDF reads an end that is not given as 0, so ``<limit lower="-2" .../>`` is the range -2 to 0. Hardly anybody
-who leaves an end away means that.
+In URDF a missing end of the range is 0, so ``<limit lower="-2" .../>`` is the range -2 to 0. This is rarely
+intended.
 
 - PyBullet 3.2.7 reads a missing ``upper`` as -1. The range is -2 to -1, and a joint between -1 and 0 is
-  beyond it: in ``stepSimulation`` it can turn towards -1 and not the other way, as at any stop.
-  ``calculateInverseDynamics`` knows of no limit.
+  beyond it: in ``stepSimulation`` it can move towards -1 but not away from it, as at a stop.
+  ``calculateInverseDynamics`` has no limits.
 - Pinocchio 4.1 has the range -2 to 0. So has dynx, with a note.
-- Drake 1.51 has a lower limit of -2 and no upper one; MuJoCo 4.0 takes half a limit for none.
+- Drake 1.51 has a lower limit of -2 and no upper one; MuJoCo 4.0 ignores a limit with one end.
 
-Only PyBullet's range shows in a motion that the file allows. Where ``lower`` is above -1, it is above what
-PyBullet has for ``upper``, and PyBullet then takes both for none, as it does where neither is given (DX508).
-A missing ``lower`` is 0 in PyBullet and in Pinocchio, and again no limit in Drake and MuJoCo.
+Only PyBullet's range affects a motion that the file allows. Where ``lower`` is above -1, it is above
+PyBullet's ``upper``, and PyBullet then ignores both, as it does where neither is given (DX508). A missing
+``lower`` is 0 in PyBullet and in Pinocchio, and again no limit in Drake and MuJoCo.
 
-The effect is a joint that does not move: all of its acceleration, in PyBullet's simulation and in the part of
-the range above -1 alone.
+The effect is a joint that does not move: in PyBullet's simulation, and only in the part of the range above
+-1, its whole acceleration is lost.
 
-What to do: write the end that is meant. It is not in the file, so ``dynx doctor --fix`` writes ``upper="0"``,
-which is what URDF, Pinocchio and dynx read; the other three engines then have that range too.
+What to do: write the intended end. The file does not contain it, so ``dynx doctor --fix`` writes
+``upper="0"``, as URDF, Pinocchio and dynx read it; the other three engines then have that range too.
 """
 
 from collections.abc import Iterable

@@ -1,20 +1,20 @@
 """DX301 damping-in-inverse-dynamics: A joint has damping, which some engines add to the torque and others do
 not.
 
-``<dynamics damping="0.5"/>`` resists the speed of a joint. Whether inverse dynamics contains it is a
-convention, and there are two:
+``<dynamics damping="0.5"/>`` resists the velocity of a joint. There are two conventions on whether inverse
+dynamics includes it:
 
-- Pinocchio 4.1 (``rnea``) and PyBullet 3.2.7 (``calculateInverseDynamics``): rigid bodies alone.
+- Pinocchio 4.1 (``rnea``) and PyBullet 3.2.7 (``calculateInverseDynamics``): rigid bodies only.
 - MuJoCo 4.0 (``mj_inverse``): damping times velocity is added.
 - Drake 1.51 (``CalcInverseDynamics`` with the plant's force elements): likewise.
 - Forward dynamics: PyBullet's ``stepSimulation``, MuJoCo and Drake damp, Pinocchio's ``aba`` does not.
 
 The effect is damping times velocity, often a few per cent of the torque, and all of it at low inertia.
 
-What to do: decide which one you want, and add ``damping * v`` to Pinocchio's torque or switch it off in the
-others. The file is right, so ``dynx doctor --fix`` does not change it. dynx gives the rigid-body answer
-unless asked for ``joint_dynamics=True``; doctor compares that, and prints the calls that make each engine
-leave damping out.
+What to do: decide which convention you want, and add ``damping * v`` to Pinocchio's torque or switch damping
+off in the others. The file is correct, so ``dynx doctor --fix`` does not change it. dynx returns the
+rigid-body torque unless called with ``joint_dynamics=True``; doctor compares the former and prints the calls
+that switch damping off in each engine.
 """
 
 from collections.abc import Iterable
@@ -25,7 +25,7 @@ from dynx.rules.text.attributes import number_or_none
 
 
 class DampingInInverseDynamics(CallingRule):
-    advice = "Decide whether torques include damping, and tell each engine."
+    advice = "Decide whether torques include damping, and configure each engine accordingly."
     engines = measured_on("pybullet", "mujoco", "drake")
     calls = ("pybullet.no_damping", "mujoco.no_damping", "drake.no_damping")
     changed = "compared without joint damping"

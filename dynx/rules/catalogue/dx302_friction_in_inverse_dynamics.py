@@ -1,18 +1,18 @@
 """DX302 friction-in-inverse-dynamics: A joint has dry friction, which MuJoCo adds to the torque and others do
 not.
 
-``<dynamics friction="0.2"/>`` is a force against the motion, whatever the speed.
+``<dynamics friction="0.2"/>`` is a force that opposes the motion at any speed.
 
-- MuJoCo 4.0 reads it as ``frictionloss``, a constraint. ``mj_inverse`` adds what the constraint takes, up to
-  the friction times the sign of the velocity; at low speed, where the constraint can hold the joint, less.
-- Pinocchio 4.1 stores it and leaves it to the user. PyBullet 3.2.7 does not use it in inverse dynamics.
-  Drake 1.51 warns that it has no dry friction.
+- MuJoCo 4.0 reads it as ``frictionloss``, a constraint. ``mj_inverse`` adds the force of the constraint: the
+  friction times the sign of the velocity, or less at low speed, where the constraint can hold the joint.
+- Pinocchio 4.1 stores it and does not use it. PyBullet 3.2.7 does not use it in inverse dynamics. Drake 1.51
+  warns that it does not support it.
 
 The effect is the friction itself, a few per cent of the torque for a geared arm.
 
-What to do: decide which one you want. The file is right, so ``dynx doctor --fix`` does not change it. dynx
-gives the rigid-body answer unless asked for ``joint_dynamics=True``; doctor compares that, and prints the
-call that makes MuJoCo leave friction out.
+What to do: decide which convention you want. The file is correct, so ``dynx doctor --fix`` does not change
+it. dynx returns the rigid-body torque unless called with ``joint_dynamics=True``; doctor compares the former
+and prints the call that switches friction off in MuJoCo.
 """
 
 from collections.abc import Iterable
@@ -23,7 +23,7 @@ from dynx.rules.text.attributes import number_or_none
 
 
 class FrictionInInverseDynamics(CallingRule):
-    advice = "Decide whether torques include friction, and tell MuJoCo."
+    advice = "Decide whether torques include friction, and configure MuJoCo accordingly."
     engines = measured_on("mujoco")
     calls = ("mujoco.no_friction",)
     changed = "compared without dry friction"

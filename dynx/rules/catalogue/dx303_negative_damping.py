@@ -1,13 +1,13 @@
 """DX303 negative-damping: The damping of a joint is negative.
 
 - Drake 1.51 refuses the file: "joint damping must be nonnegative".
-- MuJoCo 4.0 and PyBullet 3.2.7 simulate a joint that is faster the faster it is.
+- MuJoCo 4.0 and PyBullet 3.2.7 simulate a joint that accelerates itself.
 - Pinocchio 4.1 stores the number and does not use it.
 
-Nothing in the rigid-body dynamics depends on it; with ``joint_dynamics=True`` dynx uses the number as it
-stands, with a note.
+Nothing in the rigid-body dynamics depends on it; with ``joint_dynamics=True`` dynx uses the number unchanged,
+with a note.
 
-What to do: correct the sign. ``dynx doctor --fix`` takes it away. ``--choose DX303=zero`` writes 0 instead.
+What to do: correct the sign. ``dynx doctor --fix`` removes it. ``--choose DX303=zero`` writes 0 instead.
 """
 
 from collections.abc import Iterable
@@ -22,7 +22,7 @@ class NegativeDamping(EditingRule):
     advice = "Write a damping of at least 0."
     engines = measured_on("drake")
     choices = {
-        "absolute": "take the sign of a negative damping away",
+        "absolute": "remove the sign of a negative damping",
         "zero": "make a negative damping zero",
     }
     changed = "made the damping of joints positive or zero"

@@ -1,14 +1,14 @@
 """DX305 empty-dynamics: A dynamics element has neither damping nor friction.
 
 ``<dynamics/>``, or one that holds only an extension such as ``armature="0.01"``. URDF makes both attributes
-optional and says what they default to, but not that one must be there.
+optional and defines their defaults; it does not require one of them.
 
 - Pinocchio 4.1 and PyBullet 3.2.7 refuse the file: "joint dynamics element specified with no damping and no
   friction". They do so for every type of joint, fixed ones included.
 - MuJoCo 4.0 and Drake 1.51 read it.
 
-What to do: write ``damping="0"``, or take the element away. ``dynx doctor --fix`` adds ``damping="0"``, which
-keeps what else is there.
+What to do: write ``damping="0"``, or remove the element. ``dynx doctor --fix`` adds ``damping="0"``, which
+keeps other attributes.
 """
 
 from collections.abc import Iterable
@@ -19,7 +19,7 @@ from dynx.rules.joints.elements import elements_in_joints
 
 class EmptyDynamics(EditingRule):
     stage = "reading"
-    advice = 'Write damping="0", or take the element away.'
+    advice = 'Write damping="0", or remove the element.'
     engines = measured_on("pinocchio", "pybullet")
     changed = "wrote a damping of 0 into <dynamics> without damping and friction"
 

@@ -1,22 +1,22 @@
-"""DX306 limits-as-forces: A joint has equal limits, to which some engines push it back.
+"""DX306 limits-as-forces: A joint has equal limits, to which some engines pull the joint.
 
-``<limit lower="-2" upper="2"/>`` says where a joint can be. What happens beyond is not in URDF, and a joint
-whose limits are equal is beyond them everywhere else.
+``<limit lower="-2" upper="2"/>`` defines the range of a joint. URDF does not define what happens beyond, and
+a joint with equal limits violates them at every other position.
 
-- Pinocchio 4.1 and Drake 1.51: nothing. Inverse and forward dynamics know of no limit (Drake's discrete
+- Pinocchio 4.1 and Drake 1.51: no effect. Inverse and forward dynamics have no limits (Drake's discrete
   simulation does).
 - MuJoCo 4.0: a joint beyond its limit is pushed back by a constraint force, and ``mj_inverse`` adds that
-  force to the torque. It is not small: a hundred times the torque was measured.
-  MuJoCo takes equal limits for none, with a warning.
+  force to the torque. Forces of a hundred times the torque were measured. MuJoCo ignores equal limits, with a
+  warning.
 - PyBullet 3.2.7: ``stepSimulation`` pushes the joint back to the limit, equal ones included;
-  ``calculateInverseDynamics`` knows of none. A limit of ``lower="0"`` without ``upper``, for which URDF has
-  0, is none (see DX216 for other limits without ``upper``).
+  ``calculateInverseDynamics`` has none. It ignores a limit of ``lower="0"`` without ``upper`` (see DX216 for
+  other limits without ``upper``).
 
-Within limits that leave a joint some room all engines agree, and doctor compares there. A joint with equal
-limits is compared anywhere, because the equations of motion have no limits.
+Within limits all engines agree, and doctor compares there. A joint with equal limits is compared at any
+position, because the equations of motion have no limits.
 
-What to do: write the range of the joint, or ``type="fixed"`` (see DX508). Which of the two is not in the
-file, so ``dynx doctor --fix`` does not change it; doctor prints the calls that switch limits off.
+What to do: write the range of the joint, or ``type="fixed"`` (see DX508). The file does not say which, so
+``dynx doctor --fix`` does not change it; doctor prints the calls that switch limits off.
 """
 
 from collections.abc import Iterable

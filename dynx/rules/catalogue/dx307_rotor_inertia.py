@@ -1,8 +1,8 @@
-"""DX307 rotor-inertia: An actuator has a rotor inertia, which Drake alone adds to its joint.
+"""DX307 rotor-inertia: An actuator has a rotor inertia, which only Drake adds to its joint.
 
 ``<drake:rotor_inertia value="0.001"/>`` and ``<drake:gear_ratio value="10"/>`` in the ``<actuator>`` of a
-``<transmission>`` are an extension of Drake's. A rotor behind a gear of ratio n resists the joint with n^2
-times its own inertia.
+``<transmission>`` are an extension of Drake. A rotor behind a gear of ratio n adds n^2 times its own inertia
+to the joint.
 
 - Drake 1.51 adds that to the diagonal of the mass matrix and to inverse dynamics.
 - Pinocchio 4.1, PyBullet 3.2.7 and MuJoCo 4.0 do not know the tags. Neither does dynx.
@@ -10,8 +10,8 @@ times its own inertia.
 The effect is the reflected inertia: for a geared arm often as large as that of the links.
 
 What to do: decide whether the rotors belong to your robot. Pinocchio has ``model.armature`` for them, MuJoCo
-``dof_armature``, dynx ``<dynamics armature="...">``. The file is right, so ``dynx doctor --fix`` does not
-change it; doctor compares the links alone and prints the call that makes Drake leave rotors out.
+``dof_armature``, dynx ``<dynamics armature="...">``. The file is correct, so ``dynx doctor --fix`` does not
+change it; doctor compares without rotors and prints the call that switches them off in Drake.
 """
 
 from collections.abc import Iterable
@@ -24,7 +24,7 @@ _TAG = "drake:rotor_inertia"
 
 
 class RotorInertia(CallingRule):
-    advice = "Decide whether rotors belong to the robot, and tell each engine."
+    advice = "Decide whether rotors belong to the robot, and configure each engine accordingly."
     engines = measured_on("drake")
     calls = ("drake.no_rotors",)
     changed = "compared without rotors"

@@ -1,17 +1,17 @@
 """DX308 contacts-as-forces: Links have collision shapes, whose contacts MuJoCo adds to the torque.
 
-``<collision>`` says which shape a link has for contacts. Two links that touch, or overlap because their
+``<collision>`` defines the shape of a link for contacts. Two links that touch, or overlap because their
 shapes are larger than the links, push each other apart in a simulation.
 
 - MuJoCo 4.0: ``mj_inverse`` finds the contacts of the configuration and adds their forces to the torque.
-  Shapes of a link and its parent are left out, those of other pairs are not. Where shapes overlap by
-  design, the torque is off by any amount.
-- Pinocchio 4.1 (``rnea``) and PyBullet 3.2.7 (``calculateInverseDynamics``) know of no contacts; PyBullet
-  simulates contacts of a robot with itself only when asked to by a flag. Drake 1.51 has them where a
-  scene graph is connected, and not in inverse dynamics.
+  Contacts between a link and its parent are left out, those of other pairs are not. Where shapes overlap by
+  design, the error of the torque is unbounded.
+- Pinocchio 4.1 (``rnea``) and PyBullet 3.2.7 (``calculateInverseDynamics``) have no contacts; PyBullet
+  simulates contacts of a robot with itself only with a flag. Drake 1.51 has them where a scene graph is
+  connected, and not in inverse dynamics.
 
-What to do: know whether your torques contain contacts. The file is right, so ``dynx doctor --fix`` does not
-change it; doctor compares without contacts and prints the call that makes MuJoCo leave them out.
+What to do: know whether your torques include contacts. The file is correct, so ``dynx doctor --fix`` does not
+change it; doctor compares without contacts and prints the call that switches them off in MuJoCo.
 """
 
 from collections.abc import Iterable
@@ -21,7 +21,7 @@ from dynx.rules import CallingRule, Case, Detection, measured_on
 
 
 class ContactsAsForces(CallingRule):
-    advice = "Switch contacts off where the rigid-body answer is wanted."
+    advice = "Switch contacts off where you need rigid-body torques."
     engines = measured_on("mujoco")
     depends_on_state = True
     calls = ("mujoco.no_contacts",)

@@ -1,26 +1,26 @@
-"""DX401 decimal-comma: A number is written with a comma in place of a decimal point.
+"""DX401 decimal-comma: A number is written with a comma instead of a decimal point.
 
-URDF writes decimals with a point whatever the language of the computer, and so does XML Schema. Programs
-that print numbers by the locale in force (a CAD exporter on a German or French computer) write a comma.
+URDF writes decimals with a point in every language, as XML Schema does. Programs that print numbers by the
+current locale (a CAD exporter on a German or French computer) write a comma.
 
-No two engines do the same with it:
+Each engine reads it differently:
 
 - Pinocchio 4.1: with such a ``<mass>`` or ``<origin>`` of an ``<inertial>`` the whole inertial is dropped, so
   the link weighs nothing; with such an ``<inertia>`` the tensor alone is, so the link is a point mass. A line
   on stderr says so. In a ``<joint>`` the file is refused.
-- PyBullet 3.2.7 reads up to the comma: ``2,5`` is 2, ``0,03`` is 0. It says nothing. In a vector it
-  does so with each of the three numbers.
+- PyBullet 3.2.7 reads up to the comma: ``2,5`` is 2, ``0,03`` is 0. It prints no warning. In a vector it does
+  so with each of the three numbers.
 - MuJoCo 4.0 refuses the file and names the line.
 - Drake 1.51 reads up to the comma in a single number, as PyBullet does, and refuses a vector.
 
-The effect is as large as the digits behind the comma: a mass of 2 in place of 2.5 kg, an inertia of 0 in
-place of 0.03.
+The effect is as large as the digits behind the comma: a mass of 2 instead of 2.5 kg, an inertia of 0 instead
+of 0.03.
 
 What to do: write a point. ``dynx doctor --fix`` does so in every number of links and joints.
 
-The file can be meant otherwise in one way: ``1,250`` may be one thousand two hundred and fifty, written
-with a comma between thousands. dynx takes the comma for a decimal point unless it is told
-``--choose DX401=thousands``. A number with commas and a point, ``1,250.5``, leaves no choice.
+There is one other reading: ``1,250`` may be one thousand two hundred and fifty, written with a comma between
+thousands. dynx reads the comma as a decimal point unless the user chooses ``--choose DX401=thousands``. A
+number with commas and a point, ``1,250.5``, is unambiguous.
 """
 
 from dynx.rules import EVERY_ENGINE, Case
@@ -35,9 +35,9 @@ class DecimalComma(MisspelledNumberRule):
         "decimal": "read a comma in a number as its decimal point",
         "thousands": "read a comma in a number as standing between thousands",
     }
-    changed = "wrote decimal points in place of commas"
+    changed = "wrote decimal points instead of commas"
     fault = "comma"
-    description = "with a comma where {meant} takes a point"
+    description = "with a comma where {meant} needs a point"
 
     def text_for(self, case: Case, misspelling: Misspelling) -> str:
         """By the user's choice."""

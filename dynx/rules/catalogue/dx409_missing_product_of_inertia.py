@@ -1,17 +1,17 @@
-"""DX409 missing-product-of-inertia: A tensor of inertia is written without its zero products.
+"""DX409 missing-product-of-inertia: An inertia tensor is written without its zero products.
 
-Whoever writes a tensor by hand leaves out the products of inertia that are zero. URDF wants all six numbers,
-and what engines do without them ranges from nothing to refusing the file.
+Tensors written by hand often omit the products of inertia that are zero. URDF requires all six numbers; some
+engines accept fewer, some refuse the file.
 
-- Pinocchio 4.1 says on stderr that ``ixy`` is missing and drops the whole tensor: the link is a point mass.
+- Pinocchio 4.1 prints on stderr that ``ixy`` is missing and drops the whole tensor: the link is a point mass.
 - MuJoCo 4.0 refuses the file and names the line.
 - PyBullet 3.2.7 and Drake 1.51 read zero.
 
 The effect is a link without moments of inertia in Pinocchio: of order 0.01 to 1 in the mass matrix.
 
-What to do: write the products that are zero as ``0``. ``dynx doctor --fix`` does so; that a product which is
-not there was meant to be zero is the one reading that two engines share. A missing moment (``ixx``, ``iyy``,
-``izz``) is not mended: nobody has a zero moment, and the number is not in the file.
+What to do: write the products that are zero as ``0``. ``dynx doctor --fix`` does so; two engines read a
+missing product as zero. A missing moment (``ixx``, ``iyy``, ``izz``) is not corrected: no body has a zero
+moment, and the file does not contain the number.
 """
 
 from collections.abc import Iterable

@@ -1,19 +1,19 @@
-"""DX410 incomplete-inertial: An inertial has no mass or no tensor of inertia.
+"""DX410 incomplete-inertial: An inertial has no mass or no inertia tensor.
 
 ``<inertial>`` needs both ``<mass value="..."/>`` and ``<inertia .../>``. Often ``<mass>2.5</mass>`` was
-written, which looks right and is not read by anybody.
+written, which looks right but which no engine reads.
 
-- Pinocchio 4.1 says so on stderr. Without a mass it drops the whole inertial, so the link weighs nothing;
-  without a tensor the link is a point mass.
+- Pinocchio 4.1 reports that on stderr. Without a mass it drops the whole inertial, so the link weighs
+  nothing; without a tensor the link is a point mass.
 - PyBullet 3.2.7 and MuJoCo 4.0 refuse the file.
-- Drake 1.51 takes what is missing for zero: a link with a mass and no tensor is a point mass. One with a
-  tensor and no mass is a body that cannot be; Drake warns and makes something else of it.
+- Drake 1.51 reads missing parts as zero: a link with a mass and no tensor is a point mass. One with a tensor
+  and no mass is impossible; Drake warns and replaces it.
 
 The effect is a file that does not load, or a link without its mass: of order 0.01 to 1 in the mass matrix.
 
-What to do: complete it. ``dynx doctor --fix`` can only guess, and says so: a number between the tags,
-``<mass>2.5</mass>``, is the mass; a tensor without mass is dropped, so that the link weighs nothing; a mass
-without tensor stays as a point mass at the origin of the inertial, as in Pinocchio and Drake.
+What to do: complete it. ``dynx doctor --fix`` can only guess, and the report says so: a number between the
+tags, ``<mass>2.5</mass>``, is the mass; a tensor without mass is dropped, so that the link weighs nothing; a
+mass without tensor stays as a point mass at the origin of the inertial, as in Pinocchio and Drake.
 ``--choose DX410=weightless`` drops that mass too.
 """
 

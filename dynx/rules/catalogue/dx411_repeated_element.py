@@ -1,16 +1,16 @@
-"""DX411 repeated-element: An element that can be there once is there several times.
+"""DX411 repeated-element: An element that is allowed once is repeated.
 
-It happens when files are merged or templates expanded. Readers that ask for "the" origin of a joint find
-the first one.
+It happens when files are merged or templates expanded. Readers that look for the origin of a joint find the
+first one.
 
 - MuJoCo 4.0 refuses the file: "repeated element", with the line.
-- Pinocchio 4.1, PyBullet 3.2.7 and Drake 1.51 use the first and pass over the others without a word. So
-  does dynx, with a note.
+- Pinocchio 4.1, PyBullet 3.2.7 and Drake 1.51 use the first and ignore the others without a warning. So does
+  dynx, with a note.
 
-The engines that read the file agree, but whoever edits the second of two elements edits nothing.
+The engines that read the file agree, but an edit of the second of two elements has no effect.
 
-What to do: find out which one was meant and take the other away. ``dynx doctor --fix`` keeps the first, which
-is what the engines use.
+What to do: find out which one is right and remove the other. ``dynx doctor --fix`` keeps the first, which the
+engines use.
 """
 
 from collections.abc import Iterable
@@ -27,9 +27,9 @@ _ONCE = {
 
 class RepeatedElement(EditingRule):
     stage = "reading"
-    advice = "Keep the one that is meant; engines use the first."
+    advice = "Keep the right one; engines use the first."
     engines = measured_on("mujoco")
-    changed = "took away further elements of a kind of which engines use the first"
+    changed = "removed repeated elements, of which engines use the first"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
         """Every element after the first of its kind."""

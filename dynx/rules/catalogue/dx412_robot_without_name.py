@@ -1,14 +1,14 @@
 """DX412 robot-without-name: The robot has no name.
 
-URDF wants ``<robot name="...">``. Nothing in the dynamics depends on it, and still it decides whether the
-file loads.
+URDF requires ``<robot name="...">``. Nothing in the dynamics depends on it, but it decides whether the file
+loads.
 
-- Pinocchio 4.1 and PyBullet 3.2.7 refuse a robot without the attribute; an empty name is fine with both.
+- Pinocchio 4.1 and PyBullet 3.2.7 refuse a robot without the attribute; both accept an empty name.
 - Drake 1.51 refuses both.
 - MuJoCo 4.0 reads both. So does dynx, which then names the robot after its file.
 
 What to do: give the robot a name. ``dynx doctor --fix`` writes the name of the file, or ``robot`` for a text
-that came from none.
+without a file.
 """
 
 from collections.abc import Iterable

@@ -1,8 +1,8 @@
 """DX413 line-too-long: PyBullet cuts a line of more than 8191 bytes, and the cut falls into an element.
 
 PyBullet 3.2.7 reads a file line by line into 8192 bytes, and puts a line break where a line does not fit.
-Between elements that does no harm. Inside an element it can: where the cut falls into ``value="2.5"``, what
-PyBullet reads is ``value="2<line break>.5"``, and the mass is 2. It says nothing. Inside the name of an
+Between elements that has no effect. Inside an element it can: where the cut falls into ``value="2.5"``,
+PyBullet reads ``value="2<line break>.5"``, and the mass is 2. It prints no warning. Inside the name of an
 attribute or a tag the file is refused.
 
 Files of one long line are written by programs that save white space: minified XML, or the output of
@@ -13,8 +13,8 @@ Pinocchio 4.1, MuJoCo 4.0 and Drake 1.51 read lines of any length.
 The effect depends on which byte is the 8191st, so it comes and goes with every edit of the file: a mass off
 by its decimals, an offset that is zero, or nothing.
 
-What to do: write one element per line. ``dynx doctor --fix`` breaks the lines concerned in front of each
-element and changes nothing else.
+What to do: write one element per line. ``dynx doctor --fix`` breaks such lines in front of each element and
+changes nothing else.
 """
 
 from collections.abc import Iterable, Iterator

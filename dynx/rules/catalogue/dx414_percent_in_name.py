@@ -1,15 +1,15 @@
-"""DX414 percent-in-name: A name has a % in it, which PyBullet takes for a printf format.
+"""DX414 percent-in-name: A name has a % in it, which PyBullet uses as a printf format.
 
 PyBullet 3.2.7 puts names into the messages it prints, and uses some of them as the format of ``printf``:
-``%p`` prints what is in memory, ``%s`` and ``%n`` read or write it and can end the process. Whether that
-happens depends on which message is printed (one about a link without ``<inertial>``, say), so a file can
-load for years and crash on another day. dynx does not give such a file to PyBullet at all.
+``%p`` prints memory contents, ``%s`` and ``%n`` read or write it and can end the process. Whether that
+happens depends on which message is printed (one about a link without ``<inertial>``, say), so a file can load
+for years and crash one day. dynx does not give such a file to PyBullet.
 
-Pinocchio 4.1, MuJoCo 4.0 and Drake 1.51 have no such trouble.
+Pinocchio 4.1, MuJoCo 4.0 and Drake 1.51 are not affected.
 
-What to do: use letters, digits and ``_`` in names. ``dynx doctor --fix`` writes ``_`` in place of ``%``
-in the name and wherever the document mentions it (ends of joints, mimic joints, Gazebo references); programs
-that look links or joints up by the old name must be changed with it.
+What to do: use letters, digits and ``_`` in names. ``dynx doctor --fix`` writes ``_`` for ``%`` in the name
+and wherever the document mentions it (ends of joints, mimic joints, Gazebo references); programs that look
+links or joints up by the old name must be changed with it.
 """
 
 from collections.abc import Iterable
@@ -23,7 +23,7 @@ class PercentInName(EditingRule):
     stage = "reading"
     advice = "Use letters, digits and _ in names."
     engines = measured_on("pybullet")
-    changed = "wrote _ in place of % in names"
+    changed = "wrote _ for % in names"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
         """Robot, links and joints of such a name."""

@@ -1,14 +1,14 @@
 """DX415 material-defined-twice: Two materials of the robot have the same name.
 
-Materials are colours. Still a second definition of one decides whether the file loads:
+Materials are only colours, but a second definition decides whether the file loads:
 
 - Pinocchio 4.1 ("material is not unique") and Drake 1.51 ("was previously defined") refuse the file.
-- PyBullet 3.2.7 warns; MuJoCo 4.0 does not look.
+- PyBullet 3.2.7 warns; MuJoCo 4.0 does not check.
 
-It happens when the files of an arm and of a hand are put together.
+This happens when the files of an arm and of a hand are combined.
 
-What to do: keep one. ``dynx doctor --fix`` keeps the first and takes the others away, whatever their colour.
-Materials inside ``<visual>`` are another matter and are left alone.
+What to do: keep one. ``dynx doctor --fix`` keeps the first and removes the others, whatever their colour.
+Materials inside ``<visual>`` are not changed.
 """
 
 from collections.abc import Iterable
@@ -21,7 +21,7 @@ class MaterialDefinedTwice(EditingRule):
     stage = "reading"
     advice = "Define each material once."
     engines = measured_on("pinocchio", "drake")
-    changed = "took further definitions of materials away"
+    changed = "removed further definitions of materials"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
         """Materials directly in the robot whose name was there before."""

@@ -1,13 +1,13 @@
-"""DX416 unknown-urdf-version: The robot states a version that URDF does not have.
+"""DX416 unknown-urdf-version: The version of the robot is not a version of URDF.
 
-``<robot name="..." version="2.0">``: somebody counts his own revisions. The attribute is URDF's, and means
-the version of the format.
+``<robot name="..." version="2.0">``: the author counts revisions of the file. In URDF the attribute is the
+version of the format.
 
-- Pinocchio 4.1 refuses what is not of the form x.y or not between 1.0 and 1.2.
-- PyBullet 3.2.7, MuJoCo 4.0 and Drake 1.51 do not look at it.
+- Pinocchio 4.1 refuses a version that is not of the form x.y or not between 1.0 and 1.2.
+- PyBullet 3.2.7, MuJoCo 4.0 and Drake 1.51 ignore it.
 
-What to do: take the attribute away, or write ``version="1.0"``. ``dynx doctor --fix`` takes it away; without
-it a file counts as version 1.0.
+What to do: remove the attribute, or write ``version="1.0"``. ``dynx doctor --fix`` removes it; without it a
+file counts as version 1.0.
 """
 
 from collections.abc import Iterable
@@ -20,9 +20,9 @@ _KNOWN = ("1.0", "1.1", "1.2")
 
 class UnknownUrdfVersion(EditingRule):
     stage = "reading"
-    advice = "Take the attribute version away, or write 1.0."
+    advice = "Remove the attribute version, or write 1.0."
     engines = measured_on("pinocchio")
-    changed = "took the version of the robot away"
+    changed = "removed the version of the robot"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
         """The root element."""

@@ -4,13 +4,13 @@
 (and capsule in later versions).
 
 - MuJoCo 4.0 refuses the file: "visual geometry specification not found", also for a collision.
-- Pinocchio 4.1 drops the shape with a line on stderr; Drake 1.51 warns or passes it over.
+- Pinocchio 4.1 drops the shape with a line on stderr; Drake 1.51 warns about it or ignores it.
 - PyBullet 3.2.7 reads it.
 
 The dynamics of a link that states its inertia does not depend on shapes; whether the file loads does.
 
-What to do: write the shape as a box or a mesh where you need it in other engines. ``dynx doctor --fix`` takes
-the ``<collision>`` away. ``--choose DX417=keep`` leaves it, and MuJoCo out.
+What to do: write the shape as a box or a mesh where you need it in other engines. ``dynx doctor --fix``
+removes the ``<collision>``. ``--choose DX417=keep`` keeps it, and MuJoCo refuses the file.
 """
 
 from collections.abc import Iterable
@@ -25,10 +25,10 @@ class UnknownCollisionShape(EditingRule):
     advice = "Write the shape as a box, sphere, cylinder or mesh."
     engines = measured_on("mujoco")
     choices = {
-        "remove": "take collisions of a shape that not every engine knows away",
+        "remove": "remove collisions of a shape that not every engine knows",
         "keep": "keep them; MuJoCo then refuses the file",
     }
-    changed = "took collisions of unknown shape away"
+    changed = "removed collisions of unknown shape"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
         """Collisions whose first geometry holds no known shape."""

@@ -1,19 +1,19 @@
 """DX501 inertia-beyond-geometry: A moment of inertia is larger than any body of the link's shape and mass can
 have.
 
-A body of mass m that reaches at most R from an axis has a moment of inertia about that axis of at most
-m R^2, which it has if all of its mass sits at the far end; real parts have a third of that or less. The
-rule takes the principal axes of the tensor through the centre of mass, the reach of all shapes of the
-link and of links welded to it, and reports the moments that no distribution of the mass could have.
-Shapes are rounded up, never down: a mesh counts as the box that holds it.
+A body of mass m that reaches at most R from an axis has a moment of inertia about that axis of at most m R^2,
+reached only if all mass is at the farthest point; real parts have a third of that or less. The rule uses the
+principal axes of the tensor through the centre of mass, the reach of all shapes of the link and of links
+rigidly connected to it, and reports moments that no distribution of the mass can have. Shapes are enlarged,
+never reduced: a mesh counts as its bounding box.
 
-The usual reasons: the tensor is in kg mm^2 or g mm^2 where URDF wants kg m^2; it was taken about the link
+Usual causes: the tensor is in kg mm^2 or g mm^2 where URDF requires kg m^2; it was taken about the link
 frame, not the centre of mass; the mesh is scaled by 0.001 and the tensor is not; a placeholder.
 
-All engines use the numbers as they stand, so they agree with one another, and on a motion that the real
-robot does not make: torques are too large, and controllers tuned on them too stiff.
+All engines use the numbers unchanged, so they agree with each other, but not with the real robot: torques are
+too large, and controllers tuned on them too stiff.
 
-Nothing in the file says what the true tensor is, so there is no remedy by edit.
+The file does not contain the true tensor, so no edit removes the cause.
 """
 
 from collections.abc import Iterable, Iterator
@@ -22,10 +22,10 @@ import numpy as np
 
 from dynx.model.elements import Inertial
 from dynx.rules import Case, Detection, Rule
-from dynx.rules.geometry import Extent, welded_extents
+from dynx.rules.geometry import Extent, group_extents
 
 _ROUNDING = 1e-9
-"""Of a sphere's shell on a sphere's shape the bound is reached exactly; this is beyond any rounding."""
+"""Relative margin for rounding: a spherical shell on a sphere reaches the bound exactly."""
 
 
 class InertiaBeyondGeometry(Rule):
@@ -34,7 +34,7 @@ class InertiaBeyondGeometry(Rule):
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
         """Links with such a moment, one detection each, for the moment furthest beyond."""
-        for link, extent in welded_extents(case):
+        for link, extent in group_extents(case):
             assert link.inertial is not None
             excess, moment, bound = max(_against_bounds(link.inertial, extent))
             if excess > 1.0 + _ROUNDING:

@@ -1,16 +1,15 @@
-"""DX502 inertia-below-geometry: The inertia is that of a speck of matter, a hundred times smaller than the
-link's shape.
+"""DX502 inertia-below-geometry: The inertia is that of a body a hundred times smaller than the link's shape.
 
-A uniform body has a radius of gyration k = sqrt(I / m) of a fifth to a half of its size (a rod l/3.5, a
-ball d/3.2). Where even the largest k is below a hundredth of the diagonal of the link's own shape, the mass
-would have to sit in a speck within it. The usual reasons: the tensor is in kg m^2 times 1e-6 or 1e-9 (a
-CAD program that works in metres was told millimetres), it was written with too few digits (``1e-06``
-everywhere), or it was set to zero because an importer asked for the element.
+A uniform body has a radius of gyration k = sqrt(I / m) of a fifth to a half of its size (a rod l/3.5, a ball
+d/3.2). Where even the largest k is below a hundredth of the diagonal of the link's own shape, the mass would
+have to be concentrated in a speck. Usual causes: the tensor is in kg m^2 times 1e-6 or 1e-9 (wrong units in
+the CAD program), it was written with too few digits (``1e-06`` everywhere), or it was set to zero because an
+importer required the element.
 
-All engines that load such a tensor use it. Torques come out too small, forward dynamics is badly
-conditioned, and simulators with a fixed step may shake or explode at such joints.
+All engines that load such a tensor use it. Torques come out too small, forward dynamics is badly conditioned,
+and simulators with a fixed step may oscillate or diverge at such joints.
 
-Nothing in the file says what the true tensor is, so there is no remedy by edit.
+The file does not contain the true tensor, so no edit removes the cause.
 """
 
 import math
@@ -22,7 +21,7 @@ from dynx.rules import Case, Detection, Rule
 from dynx.rules.geometry.shapes import link_extent
 
 _SPECK = 0.01
-"""Share of the shape's diagonal; all but 1 % of the mass is then within a tenth of it (Chebyshev)."""
+"""Ratio to the shape's diagonal; all but 1 % of the mass is then within a tenth of it (Chebyshev)."""
 
 
 class InertiaBelowGeometry(Rule):

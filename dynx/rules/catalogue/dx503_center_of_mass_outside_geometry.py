@@ -1,16 +1,17 @@
-"""DX503 center-of-mass-outside-geometry: The centre of mass lies outside the box that holds the link's shape.
+"""DX503 center-of-mass-outside-geometry: The centre of mass lies outside the bounding box of the link's
+shape.
 
-Mass cannot be negative, so the centre of mass of a body lies within its convex hull, and so within any box
-that holds it. The rule takes the box, along the axes of the link frame, about all shapes of the link and
-of links welded to it, widened by a hundredth of its diagonal for shapes that are drawn a little small.
+Mass cannot be negative, so the centre of mass of a body lies within its convex hull, and so within its
+bounding box. The rule uses the box, along the axes of the link frame, of all shapes of the link and of links
+rigidly connected to it, widened by a hundredth of its diagonal for shapes that are slightly too small.
 
-The usual reasons: the ``<origin>`` of ``<inertial>`` is in millimetres; it is given in the frame of the CAD
+Usual causes: the ``<origin>`` of ``<inertial>`` is in millimetres; it is given in the frame of the CAD
 assembly or of the parent, not of the link; it was mirrored for the other side and lost a sign; the mesh was
 moved by the ``<origin>`` of ``<visual>`` and the inertial was not.
 
-All engines use the numbers as they stand: gravity torques are wrong alike in each of them.
+All engines use the numbers unchanged: gravity torques are equally wrong in all of them.
 
-Nothing in the file says where the centre truly is, so there is no remedy by edit.
+The file does not contain the true centre of mass, so no edit removes the cause.
 """
 
 from collections.abc import Iterable
@@ -18,10 +19,10 @@ from collections.abc import Iterable
 import numpy as np
 
 from dynx.rules import Case, Detection, Rule
-from dynx.rules.geometry import welded_extents
+from dynx.rules.geometry import group_extents
 
 _MARGIN = 0.01
-"""Share of the diagonal by which the box is widened."""
+"""Ratio of the margin of the box to its diagonal."""
 
 
 class CenterOfMassOutsideGeometry(Rule):
@@ -30,7 +31,7 @@ class CenterOfMassOutsideGeometry(Rule):
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
         """Links whose centre of mass is outside, and by how much."""
-        for link, extent in welded_extents(case):
+        for link, extent in group_extents(case):
             assert link.inertial is not None
             low, high = extent.box()
             center = link.inertial.origin.matrix[:3, 3]

@@ -1,16 +1,16 @@
 """DX504 placeholder-inertia: The inertia is a placeholder: the unit matrix, or one tensor for links of
 different mass.
 
-Two patterns are reported. A tensor that is exactly the unit matrix: 1 kg m^2 about every axis is the
-inertia of a steel ball of 0.15 m radius and 111 kg, and of hardly any link that has it in its file. And
-one tensor with three equal moments (0.001 in many tutorials) that at least three links share although
-their masses differ: balls of different mass have different sizes or different inertias.
+Two patterns are reported. A tensor that is exactly the unit matrix: 1 kg m^2 about every axis is the inertia
+of a steel ball of 0.15 m radius and 111 kg, and not of a usual link. And one tensor with three equal moments
+(0.001 in many tutorials) that at least three links share although their masses differ: their inertias would
+differ.
 
-All engines use the numbers as they stand. With an identity tensor on a link of a few hundred grams the
-inertia of the whole arm is that of the placeholder: torques and the gains tuned on them mean nothing.
+All engines use the numbers unchanged. With an identity tensor on a link of a few hundred grams the inertia of
+the whole arm is that of the placeholder: torques and gains tuned on them are useless.
 
-Nothing in the file says what the true tensor is, so there is no remedy by edit. Inertias from the shapes,
-with mass spread evenly, are a better guess than any placeholder.
+The file does not contain the true tensor, so no edit removes the cause. Inertias from the shapes, with mass
+spread evenly, are a better guess than any placeholder.
 """
 
 from collections import defaultdict
@@ -20,7 +20,7 @@ from dynx.model import Inertial
 from dynx.rules import Case, Detection, Rule
 
 _LINKS = 3
-"""How many links must share a tensor with equal moments."""
+"""Smallest number of links that share a tensor with equal moments."""
 
 
 class PlaceholderInertia(Rule):
@@ -28,7 +28,7 @@ class PlaceholderInertia(Rule):
     advice = "Compute the inertia from the CAD model or from the link's shape and mass."
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
-        """Links with mass whose tensor is the unit matrix, or shared as said above."""
+        """Links with mass whose tensor is the unit matrix, or shared by links of different mass."""
         masses = defaultdict(list)
         for link in case.model.links:
             if link.inertial is not None and (moment := _equal_moments(link.inertial)):

@@ -1,17 +1,17 @@
 """DX505 mass-ratio-extreme: Two bodies that a joint connects differ in mass by a factor of a million or more.
 
-Links that fixed joints hold together count as one body; a body without any mass is another matter and not
-reported here. A sum in double precision carries 16 digits; where a joint connects bodies a million apart,
-six of them go to the difference of scale. The worst case is a light body that carries a heavy one.
+Links that fixed joints hold together count as one body; a body without mass is not reported here. A sum in
+double precision carries 16 digits; where a joint connects bodies a million apart, six of them are lost to the
+difference of scale. The worst case is a light body that carries a heavy one.
 
-What suffers: simulators that solve joints as constraints between free bodies (ODE in Gazebo, contacts in
-Bullet and MuJoCo) converge slowly or not at all, joints drift apart and shake; forward dynamics loses
-digits with every engine, since the condition number of the mass matrix is of the order of the ratio.
-Inverse dynamics does not suffer, and engines agree on it.
+Affected are simulators that solve joints as constraints between free bodies (ODE in Gazebo, contacts in
+Bullet and MuJoCo) which converge slowly or not at all while joints drift apart and oscillate. Forward
+dynamics loses digits with every engine, since the condition number of the mass matrix is of the order of the
+ratio. Inverse dynamics is not affected, and engines agree on it.
 
-The usual reasons: a mass in grams or tonnes beside others in kilograms, or ``mass value="1e-06"`` for a
-sensor frame because an importer refused links without mass. Only the first can be told from the
-second by who made the file, so there is no remedy by edit.
+Usual causes: a mass in grams or tonnes beside others in kilograms, or ``mass value="1e-06"`` for a sensor
+frame because an importer refused links without mass. Only the author of the file knows which, so no edit
+removes the cause.
 """
 
 from collections.abc import Iterable
@@ -24,7 +24,7 @@ _RATIO = 1e6
 
 class MassRatioExtreme(Rule):
     kind = "practice"
-    advice = "Weld a frame that has no body of its own by a fixed joint, and give every mass in kilograms."
+    advice = "Attach frames without a body by fixed joints, and give every mass in kilograms."
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
         """Moving joints between such bodies; the link named heads the lighter one."""

@@ -1,12 +1,13 @@
-"""DX507 velocity-limit-zero: The velocity limit of a joint is zero, which says that it must stand still.
+"""DX507 velocity-limit-zero: The velocity limit of a joint is zero, so it must not move.
 
-``velocity="0"`` is mostly written because URDF wants the attribute. It says that the joint must stand still.
+``velocity="0"`` is mostly written because URDF requires the attribute. It states that the joint must not
+move.
 
 Planners that time a path (MoveIt, TOPP-RA, Ruckig) divide by it or report that there is no trajectory.
 Pinocchio and Drake store the zero, PyBullet stores it as ``maxVelocity`` and does not apply it, MuJoCo does
 not read it. Dynamics is the same with all.
 
-The true limit is not in the file, so there is no remedy by edit.
+The file does not contain the true limit, so no edit removes the cause.
 """
 
 from collections.abc import Iterable
@@ -20,8 +21,7 @@ class VelocityLimitZero(Rule):
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
         """Moving joints with a coordinate of their own and a velocity limit of exactly zero."""
-        return [
-            Detection(None, joint.name, joint.line, "the velocity limit is 0, so the joint must stand still")
-            for joint in case.model.coordinate_joints
-            if joint.limits.velocity == 0.0
-        ]
+        message = "the velocity limit is 0, so the joint must not move"
+        for joint in case.model.coordinate_joints:
+            if joint.limits.velocity == 0.0:
+                yield Detection(None, joint.name, joint.line, message)

@@ -1,15 +1,16 @@
 """DX508 range-of-zero-width: The lower and upper limit of a joint are equal or absent, so it has no range to
 move in.
 
-A ``<limit>`` without ``lower`` and ``upper`` means 0 and 0: URDF's default for both is zero, not "none".
-So the joint has a coordinate and cannot move.
+A ``<limit>`` without ``lower`` and ``upper`` means 0 and 0: URDF's default for both is zero, not "none". So
+the joint has a coordinate and cannot move.
 
-Engines do not agree on what to do with it. Where the attributes are absent, Pinocchio has the range 0 to
-0, and PyBullet, MuJoCo and Drake have none, so there the joint turns freely. Where two equal numbers are
-written, Pinocchio and Drake keep them as limits, PyBullet's stepper holds the joint still, and MuJoCo warns
-and drops them. The equations of motion are the same with all.
+Engines interpret it differently. Where the attributes are absent, Pinocchio has the range 0 to 0, and
+PyBullet, MuJoCo and Drake have none, so there the joint moves freely. Where two equal numbers are written,
+Pinocchio and Drake keep them as limits, PyBullet's stepper holds the joint still, and MuJoCo warns and
+ignores them. The equations of motion are the same with all.
 
-Whether ``fixed``, ``continuous`` or a range was meant is not in the file, so there is no remedy by edit.
+Whether ``fixed``, ``continuous`` or a range was meant is not known from the file, so no edit removes the
+cause.
 """
 
 from collections.abc import Iterable

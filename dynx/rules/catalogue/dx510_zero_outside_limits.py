@@ -1,12 +1,12 @@
 """DX510 zero-outside-limits: Zero lies outside the range of a joint, and nearly every tool starts there.
 
 Nearly every tool starts at zero: PyBullet after loadURDF, RViz, MuJoCo's ``qpos0``, ``pinocchio.neutral``,
-Drake's default context. Where zero is outside the range of a joint, the first step of a simulation begins
-with a push back into it, planners call the start state invalid, and a check of self-collision at "home"
-looks at a pose that the robot cannot take.
+Drake's default context. Where zero is outside the range of a joint, a simulation begins with a force that
+pushes the joint back, planners call the start state invalid, and a check of self-collision at "home" checks a
+pose that the robot cannot reach.
 
-It is legal and sometimes wanted (an elbow that cannot be stretched), so this is only told, not mended: moving
-the zero means other numbers in every program that uses the robot.
+It is legal and sometimes wanted (an elbow that cannot be stretched), so it is reported and not corrected:
+another zero would change the numbers in every program that uses the robot.
 """
 
 from collections.abc import Iterable

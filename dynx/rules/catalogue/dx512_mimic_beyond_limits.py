@@ -1,14 +1,14 @@
 """DX512 mimic-beyond-limits: A mimic joint leaves its own limits while the joint it follows stays within its
 own.
 
-The leader has a range, the follower goes where multiplier and offset put it, and the follower's own
-``<limit>`` says that it may not go all the way. One of the four numbers is wrong.
+The leader has a range, multiplier and offset map it to a range of the follower, and the follower's own
+``<limit>`` is smaller. One of the four numbers is wrong.
 
 An engine that keeps the limits and the coupling as constraints (MuJoCo, Drake in discrete time) stops the
-leader short of its own limit, with the two constraints pushing against each other; one that only computes
-dynamics goes on. The equations of motion are the same with all.
+leader short of its own limit, where the two constraints oppose each other; one that only computes dynamics
+has no stop. The equations of motion are the same with all.
 
-Which of the numbers is wrong is not in the file, so there is no remedy by edit.
+The file does not say which of the numbers is wrong, so no edit removes the cause.
 """
 
 import math
@@ -17,7 +17,7 @@ from collections.abc import Iterable
 from dynx.rules import Case, Detection, Rule
 
 _ROUNDING = 1e-3
-"""Of the range it goes through: limits are often written with three digits."""
+"""Tolerance relative to the follower's range, since limits are often written with three digits."""
 
 
 class MimicBeyondLimits(Rule):
@@ -25,7 +25,7 @@ class MimicBeyondLimits(Rule):
     advice = "Give the follower the range that multiplier and offset make of the leader's."
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
-        """Followers with limits that the leader's range, where it has one, does not respect."""
+        """Followers with limits that the leader's range violates."""
         for joint in case.model.joints:
             if joint.mimic is None or joint.type == "continuous":
                 continue

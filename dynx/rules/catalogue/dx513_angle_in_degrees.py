@@ -1,14 +1,14 @@
 """DX513 angle-in-degrees: An angle seems to be written in degrees, where URDF reads radians.
 
-Two patterns are reported. An ``rpy`` angle beyond two turns, 12.57 rad: nobody writes an orientation so,
-while 45, 90 and 180 are what one writes in degrees. And the limits of a revolute joint that are both whole
-multiples of 5 between -360 and 360, at least one of them 30 or more: 30 rad are five turns, and 30
-degrees a usual stop. Limits of -100 and 100 are left alone, for they are often written for "none".
+Two patterns are reported. An ``rpy`` angle beyond two turns, 12.57 rad: no orientation is written so, while
+45, 90 and 180 are usual in degrees. And the limits of a revolute joint that are both whole multiples of 5
+between -360 and 360, at least one of them 30 or more: 30 rad are five turns, and 30 degrees is a usual range.
+Limits of -100 and 100 are not reported, because they often stand for "unlimited".
 
-All engines read radians: 90 is 14.3 turns. They agree, on a robot that is put together
-wrongly, or whose joint runs through its stops.
+All engines read radians: 90 is 14.3 turns. They agree, but on a robot with wrong poses or joints without
+effective stops.
 
-That it is degrees is a guess, if a good one, so there is no remedy by edit; the message has the radians.
+That the unit is degrees is a guess, so no edit removes the cause; the message gives the value in radians.
 """
 
 import math
@@ -21,7 +21,7 @@ from dynx.rules.text.attributes import origin_of
 
 _TWO_TURNS = 4.0 * math.pi
 _STEP, _SMALLEST, _LARGEST = 5.0, 30.0, 360.0
-_MEANING_NONE = (-100.0, 100.0)
+_UNLIMITED = (-100.0, 100.0)
 
 
 class AngleInDegrees(Rule):
@@ -49,7 +49,7 @@ def _origins(case: Case) -> Iterator[Detection]:
 def _limits(case: Case) -> Iterator[Detection]:
     for joint in case.model.joints:
         ends = (joint.limits.lower, joint.limits.upper)
-        if joint.type != "revolute" or tuple(sorted(ends)) == _MEANING_NONE:
+        if joint.type != "revolute" or tuple(sorted(ends)) == _UNLIMITED:
             continue
         degrees = all(abs(end) <= _LARGEST and end % _STEP == 0.0 for end in ends)
         if degrees and max(map(abs, ends)) >= _SMALLEST:

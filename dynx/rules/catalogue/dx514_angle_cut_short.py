@@ -1,15 +1,16 @@
 """DX514 angle-cut-short: An angle is a multiple of pi/4 with only two or three decimals, such as 1.57.
 
-``1.57`` is 0.0008 rad short of pi/2 and ``3.14`` 0.0016 rad short of pi: at the end of a one metre arm that
-is 0.8 and 1.6 mm, more than the repeatability of the robot. Axes that are parallel in the CAD model are not
-parallel in the file, so closed-form inverse kinematics (IKFast, the formulas for a spherical wrist) finds
-no solution or a wrong one. Reported are angles in the ``<origin>`` of a joint that are a multiple of pi/4,
-up to a full turn, rounded or cut to two or three decimals.
+``1.57`` is 0.0008 rad short of pi/2 and ``3.14`` 0.0016 rad short of pi: at the end of a one metre arm the
+error is 0.8 and 1.6 mm, more than the repeatability of the robot. Axes that are parallel in the CAD model are
+not parallel in the file, so closed-form inverse kinematics (IKFast, the formulas for a spherical wrist) finds
+no solution or a wrong one. Reported are angles in the ``<origin>`` of a joint that are a multiple of pi/4, up
+to a full turn, rounded or cut to two or three decimals.
 
-All engines read the number as it stands.
+All engines read the number unchanged.
 
 What to do: write the angles in full, unless they were calibrated. ``dynx doctor --fix`` does so with
-``--choose DX514=full``, which moves the links behind the joint by that little, and by default keeps them.
+``--choose DX514=full``, which moves the links beyond the joint by that error, and by default keeps the
+angles.
 """
 
 import math
@@ -43,7 +44,7 @@ class AngleCutShort(OptionalEditingRule):
 
 
 def _meant(word: str) -> float | None:
-    """The multiple of pi/4 that `word` has two or three decimals of; None for every other word."""
+    """The multiple of pi/4 of which `word` gives two or three decimals; None for other words."""
     digits = word.lstrip("+-")
     whole, point, decimals = digits.rstrip("0").partition(".")
     if not point or not (whole + decimals).isdigit() or not 2 <= len(digits.partition(".")[2]) <= 3:

@@ -1,15 +1,14 @@
-"""DX515 misspelled-word: An element or attribute is spelled so that every reader skips it.
+"""DX515 misspelled-word: An element or attribute is misspelled, so every reader ignores it.
 
-URDF readers skip what they do not know, mostly in silence: with ``<intertial>`` the link has no mass, with
-``<limit uper="1">`` the range ends at 0, with ``<dynamics dampng="1">`` nothing is damped. Reported are
+URDF readers ignore unknown names, mostly without a warning: with ``<intertial>`` the link has no mass, with
+``<limit uper="1">`` the range ends at 0, with ``<dynamics dampng="1">`` there is no damping. Reported are
 elements of ``<robot>``, ``<link>``, ``<joint>`` and ``<inertial>``, and attributes of elements that matter
-for dynamics, that are unknown and close to a known name which is not there.
+for dynamics, that are unknown and close to a missing known name.
 
-Extensions with names of their own (``<gazebo>``, ``<sensor>``, anything with a prefix) are near none of
-them.
+Extensions (``<gazebo>``, ``<sensor>``, names with a prefix) are not close to any of them.
 
-All engines skip the same words. Mending the word changes the robot, and whether its author then likes the
-numbers is not in the file, so there is no remedy by edit.
+All engines ignore the same names. Correcting a name changes the robot, possibly against the author's
+intention, so no edit removes the cause.
 """
 
 import difflib
@@ -44,7 +43,7 @@ _CLOSE = 0.8
 
 class MisspelledWord(Rule):
     kind = "practice"
-    advice = "Spell the word as URDF does, and look at what it then says."
+    advice = "Correct the spelling, and check the resulting robot."
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
         """Every such word."""
@@ -55,7 +54,7 @@ class MisspelledWord(Rule):
 def _misspelled(part: SourceElement, root: SourceElement) -> Iterator[tuple[SourceElement, str]]:
     meant = _meant(part.tag, _ELEMENTS["robot"], ())
     if root.tag == "robot" and meant is not None:
-        yield part, f"<{part.tag}> is skipped; <{meant}> was meant"
+        yield part, f"<{part.tag}> is ignored; <{meant}> was meant"
     if part.tag not in ("link", "joint"):
         return
     for element in _that_matter(part):
@@ -63,12 +62,12 @@ def _misspelled(part: SourceElement, root: SourceElement) -> Iterator[tuple[Sour
         for attribute in element.attributes:
             meant = _meant(attribute, known, element.attributes)
             if meant is not None:
-                yield element, f"{attribute} of <{element.tag}> is skipped; {meant} was meant"
+                yield element, f"{attribute} of <{element.tag}> is ignored; {meant} was meant"
         for child in element.children:
             present = {other.tag for other in element.children}
             meant = _meant(child.tag, _ELEMENTS.get(element.tag, ()), present)
             if meant is not None:
-                yield child, f"<{child.tag}> in <{element.tag}> is skipped; <{meant}> was meant"
+                yield child, f"<{child.tag}> in <{element.tag}> is ignored; <{meant}> was meant"
 
 
 def _that_matter(part: SourceElement) -> Iterator[SourceElement]:
@@ -81,7 +80,7 @@ def _that_matter(part: SourceElement) -> Iterator[SourceElement]:
 
 
 def _meant(word: str, known: Sequence[str], present: Collection[str]) -> str | None:
-    """The known word next to an unknown one, if it is not there besides."""
+    """The known name closest to an unknown one, if it is absent."""
     if word in known or ":" in word:
         return None
     absent = [other for other in known if other not in present]

@@ -1,7 +1,7 @@
-"""How far the shapes of a link reach: what rules compare masses and inertias with."""
+"""Extents of the shapes of links, with which rules compare masses and inertias."""
 
 from dynx.rules.geometry.extent import Extent
 from dynx.rules.geometry.mesh_files import MeshNotFoundError, find_mesh
-from dynx.rules.geometry.rigid_shapes import welded_extents
+from dynx.rules.geometry.rigid_shapes import group_extents
 
-__all__ = ["Extent", "MeshNotFoundError", "find_mesh", "welded_extents"]
+__all__ = ["Extent", "MeshNotFoundError", "find_mesh", "group_extents"]

@@ -1,9 +1,9 @@
 """Points of a COLLADA file, placed as its scene places them.
 
-COLLADA 1.4.1: <unit> scales, <node>s nest with <matrix>, <translate>, <rotate> and <scale> applied in
-the order in which they stand, <instance_geometry> puts a mesh there. Some loaders turn a file whose
-<up_axis> is not z and some do not, so its points are taken both ways. A file with anything else that
-moves points (skins, <lookat>, <skew>, nodes of other files) is not read, so that no box comes out too small.
+COLLADA 1.4.1: <unit> scales; <node>s nest, with <matrix>, <translate>, <rotate> and <scale> applied in
+document order; <instance_geometry> places a mesh. Some loaders rotate a file whose <up_axis> is not z and
+some do not, so the points of both readings are returned. A file with other elements that move points (skins,
+<lookat>, <skew>, nodes of other files) is not read, so that no box is too small.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ _UNREADABLE = ("lookat", "skew", "instance_controller")
 
 
 def collada_points(data: bytes) -> Floats | None:
-    """All points of the scene (n, 3) [m]; None where the file holds what this reader does not follow."""
-    # Entities are what a small file grows by without bound; no mesh needs one.
+    """All points of the scene (n, 3) [m]; None where the file has elements that are not supported."""
+    # By entities a small file can grow without bound, and no mesh needs one.
     if b"<!DOCTYPE" in data or b"<!ENTITY" in data:
         return None
     try:
@@ -38,7 +38,7 @@ def collada_points(data: bytes) -> Floats | None:
     scene = _Scene(root)
     try:
         found = [points @ T[:3, :3].T + T[:3, 3] for points, T in scene.placed()]
-    except (_NotFollowed, KeyError):
+    except (_NotSupported, KeyError):
         return None
     if not found:
         return None
@@ -47,8 +47,8 @@ def collada_points(data: bytes) -> Floats | None:
     return points if turned is None else np.concatenate([points, points @ np.array(turned).T])
 
 
-class _NotFollowed(Exception):
-    """Something that this reader does not follow."""
+class _NotSupported(Exception):
+    """An element that is not supported."""
 
 
 class _Scene:
@@ -60,14 +60,14 @@ class _Scene:
         self._by_id = {key: element for element in root.iter() if (key := element.get("id"))}
 
     def placed(self) -> Iterator[tuple[Floats, Floats]]:
-        """The points of each mesh, and the pose (4, 4), scale included, at which the scene has it."""
+        """The points of each mesh, and its pose (4, 4) in the scene, scale included."""
         for scene in self._root.findall("library_visual_scenes/visual_scene"):
             for node in scene.findall("node"):
                 yield from self._of_node(node, np.eye(4), 0)
 
     def _of_node(self, node: ElementTree.Element, T: Floats, depth: int) -> Iterator[tuple[Floats, Floats]]:
         if depth > _DEEPEST or any(node.find(tag) is not None for tag in _UNREADABLE):
-            raise _NotFollowed
+            raise _NotSupported
         for child in node:
             T = T @ _transform(child)
         for instance in node.findall("instance_geometry"):
@@ -85,26 +85,26 @@ class _Scene:
             source = self._target(semantic, "source")
             array, accessor = source.find("float_array"), source.find("technique_common/accessor")
             if array is None or accessor is None:
-                raise _NotFollowed
+                raise _NotSupported
             numbers = np.array((array.text or "").split(), dtype=np.float64)
             stride, offset = int(accessor.get("stride", "1")), int(accessor.get("offset", "0"))
             if stride < 3:
-                raise _NotFollowed
+                raise _NotSupported
             rows = (len(numbers) - offset) // stride
             found.append(numbers[offset : offset + rows * stride].reshape(rows, stride)[:, :3])
         if not found:
-            raise _NotFollowed
+            raise _NotSupported
         return np.concatenate(found)
 
     def _target(self, element: ElementTree.Element, attribute: str) -> ElementTree.Element:
         reference = element.get(attribute, "")
         if not reference.startswith("#"):
-            raise _NotFollowed
+            raise _NotSupported
         return self._by_id[reference[1:]]
 
 
 def _transform(element: ElementTree.Element) -> Floats:
-    """The matrix (4, 4) of one element of a node; the identity for those that move nothing."""
+    """The matrix (4, 4) of one element of a node; the identity for elements that move nothing."""
     T = np.eye(4)
     if element.tag not in ("matrix", "translate", "rotate", "scale"):
         return T

@@ -1,4 +1,4 @@
-"""A region of space as a union of balls that is sure to hold a body."""
+"""Bounds of a body in space, as the convex hull of balls."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from dynx.spatial.scalar import Floats
 class Extent:
     """The convex hull of balls: centres `points` (n, 3) [m] with `radii` (n,) [m], in some frame.
 
-    It may be larger than the body it was made for, never smaller: what lies outside cannot be of it.
+    It may be larger than the body, never smaller: no point outside belongs to the body.
     """
 
     points: Floats
@@ -28,7 +28,7 @@ class Extent:
 
     @classmethod
     def union(cls, parts: Iterable[Extent]) -> Extent:
-        """All parts together; they must be in one frame."""
+        """The union of the parts, which must be in one frame."""
         found = list(parts)
         return cls(
             np.concatenate([np.zeros((0, 3)), *(part.points for part in found)]),
@@ -41,11 +41,11 @@ class Extent:
         return len(self.points) == 0
 
     def transform(self, T: Floats) -> Extent:
-        """The same region in frame A, where T (4, 4) is the pose of this frame in A."""
+        """The region in frame A, where T (4, 4) is the pose of this frame in A."""
         return Extent(self.points @ T[:3, :3].T + T[:3, 3], self.radii)
 
     def box(self) -> tuple[Floats, Floats]:
-        """Lowest and highest corner, (3,) each, of the box along the axes of the frame that holds it."""
+        """Lowest and highest corner, (3,) each, of its bounding box along the axes of the frame."""
         radii = self.radii[:, None]
         return (self.points - radii).min(axis=0), (self.points + radii).max(axis=0)
 

@@ -1,4 +1,4 @@
-"""From the ``filename`` of a ``<mesh>`` to a file, as ROS and the engines look for it."""
+"""Search for the file of a ``<mesh>``, as ROS and the engines search for it."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ _SEARCH_PATHS = (("ROS_PACKAGE_PATH", ""), ("AMENT_PREFIX_PATH", "share"))
 
 
 class MeshNotFoundError(Exception):
-    """The place where a mesh must lie is known, and it is not there."""
+    """The folder of a mesh is known, and the mesh is not in it."""
 
 
 def find_mesh(filename: str, source: str) -> Path | None:
-    """The file of a mesh named in the description `source` (a path), or None where nobody can say.
+    """The file of a mesh named in the description `source` (a path), or None where its folder is unknown.
 
-    ``package://NAME/FILE`` is looked for in the folders above the description and in ROS_PACKAGE_PATH
-    and AMENT_PREFIX_PATH; a package that none of them has may still be installed elsewhere, so that is
-    None. A relative path starts from the description's folder. Raises MeshNotFoundError where the
-    folder is known and the file is not in it.
+    ``package://NAME/FILE`` is searched in the folders above the description and in ROS_PACKAGE_PATH and
+    AMENT_PREFIX_PATH; a package in none of them may be installed elsewhere, so the result is None. A relative
+    path starts from the description's folder. Raises MeshNotFoundError where the folder is known and the
+    file is not in it.
     """
     if not os.path.isfile(source):
         return None
@@ -76,7 +76,7 @@ def _is_file(path: Path) -> bool:
 
 
 def _similar(path: Path) -> str:
-    """A clause with the nearest name that the folder has."""
+    """A clause with the nearest name in the folder; empty where no name is near."""
     try:
         names = sorted(os.listdir(path.parent))
     except (OSError, ValueError):

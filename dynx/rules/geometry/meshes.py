@@ -1,4 +1,4 @@
-"""The box that holds a mesh: STL, OBJ and COLLADA, read for their corners alone."""
+"""Bounding boxes of meshes in STL, OBJ and COLLADA files, of which only the vertices are read."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def mesh_box(path: Path) -> Box | None:
     return _box(path, status.st_mtime_ns, status.st_size)
 
 
-# Detection runs again after every remedy; the meshes of a robot stay as they are.
+# Detection runs again after every remedy, and remedies change no mesh.
 @lru_cache(maxsize=4096)
 def _box(path: Path, changed: int, size: int) -> Box | None:
     reader = {".stl": _stl_points, ".obj": _obj_points, ".dae": collada_points}.get(path.suffix.lower())
@@ -46,7 +46,7 @@ def _box(path: Path, changed: int, size: int) -> Box | None:
 
 
 def _stl_points(data: bytes) -> Floats | None:
-    """Corners of the facets. A binary file is known by its length: some begin with "solid" as well."""
+    """Corners of the facets. A binary file is known by its length, since some begin with "solid" too."""
     if len(data) >= _STL_HEAD:
         count = int.from_bytes(data[80:84], "little")
         if len(data) == _STL_HEAD + _STL_FACET * count:

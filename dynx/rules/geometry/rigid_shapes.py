@@ -1,4 +1,4 @@
-"""The shapes that the inertia of a link may stand for: its own, and those of links welded to it."""
+"""Extents of rigid groups: the shapes over which the mass of a link may be spread."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous, inverse
 
 
-def welded_extents(case: Case) -> Iterator[tuple[Link, Extent]]:
-    """Each link with mass, and all that its mass may be spread over, in its link frame.
+def group_extents(case: Case) -> Iterator[tuple[Link, Extent]]:
+    """Each link with mass, and the extent of all shapes of its rigid group, in its link frame.
 
-    Descriptions put the shape of a part in one link and its mass in another that a fixed joint holds,
-    so every shape of the rigid group counts. A link is left out where its group has no shape, or one
-    whose size cannot be known (a mesh that is not there).
+    Descriptions often put the shape of a part in one link and its mass in another on a fixed joint, so every
+    shape of the group counts. A link is left out where its group has no shape, or a shape of unknown size
+    (a missing mesh).
     """
     groups = rigid_groups(case)
     known: dict[str, Extent | None] = {}
@@ -36,7 +36,7 @@ def welded_extents(case: Case) -> Iterator[tuple[Link, Extent]]:
 
 
 def _group_extent(case: Case, group: RigidGroup) -> Extent | None:
-    """All shapes of the group in the frame of its head; None where one cannot be known."""
+    """The extent of all shapes of the group in the frame of its head; None where a size is unknown."""
     parts = []
     for name in group.links:
         extent = link_extent(case.links[name], case.source.source)

@@ -17,13 +17,13 @@ from dynx.rules.text.attributes import number_of, origin_of, vector_of
 from dynx.spatial.scalar import Floats
 
 _SIDES = 32
-"""A cylinder is held by a prism with so many sides about it; it is too large by 0.5 % of its radius."""
+"""Number of sides of the prism about a cylinder; it is too large by 0.5 % of the radius."""
 
 
 def link_extent(link: SourceElement, source: str) -> Extent | None:
-    """All shapes of a link together, in the link frame; None where one of them cannot be known.
+    """The extent of all shapes of a link, in the link frame; None where a size is unknown.
 
-    `source` is the path of the description, from which meshes are looked for.
+    `source` is the path of the description, relative to which meshes are searched.
     """
     parts = []
     for shape in (child for child in link.children if child.tag in ("visual", "collision")):

@@ -1,7 +1,7 @@
-"""The inertia of a link in extended precision: lumped, turned to its principal axes, written down again.
+"""The inertia of a link in extended precision: sums, principal axes, and conversion to an element.
 
-Everything is about the centre of mass, so that nothing is lost to the difference of two large numbers,
-and in NumPy's long double, so that what is written is right to the last digit of float64.
+All tensors are about the centre of mass, so that no two large numbers are subtracted, and in NumPy's long
+double, so that the numbers of an element are right to the last digit of float64.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ class CentralInertia:
 
     @classmethod
     def of(cls, inertial: Inertial) -> CentralInertia:
-        """What an ``<inertial>`` says, in the frame of its link."""
+        """The inertia that an ``<inertial>`` states, in the frame of its link."""
         R = rotation_from_rpy(longdouble(inertial.origin.rpy))
         tensor = longdouble(inertial.tensor)
         return cls(longdouble(inertial.mass), longdouble(inertial.origin.xyz), R @ tensor @ R.T)
@@ -37,7 +37,7 @@ class CentralInertia:
         return CentralInertia(self.mass, R @ self.center + p, R @ self.tensor @ R.T)
 
     def __add__(self, other: CentralInertia) -> CentralInertia:
-        """Two bodies welded together, in the same frame (theorem of Huygens and Steiner)."""
+        """The sum of two rigidly connected bodies in the same frame (parallel axis theorem)."""
         mass = self.mass + other.mass
         if mass == 0:
             return CentralInertia(mass, self.center, self.tensor + other.tensor)
@@ -58,31 +58,31 @@ class CentralInertia:
     def principal(self, near: Vector = (0.0, 0.0, 0.0)) -> tuple[Array, Array]:
         """Principal moments (3,) and axes (3, 3), the columns of a rotation, in the axes of the frame.
 
-        Of the ways to order and to point the axes the one nearest to the attitude `near` (rpy) is taken.
+        Order and directions of the axes are those nearest to the attitude `near` (rpy).
         """
         values, axes = jacobi_eigen(self.tensor)
         order, R = _nearest_axes(axes, rotation_from_rpy(longdouble(near)))
         return values[order], R
 
     def inertial(self, near: Vector = (0.0, 0.0, 0.0)) -> Inertial:
-        """An ``<inertial>`` in principal form: no products of inertia, the axes in its rpy."""
+        """The ``<inertial>`` in principal form: no products of inertia, the axes in its rpy."""
         return self.about(*self.principal(near))
 
     def about(self, moments: Array, axes: Array) -> Inertial:
-        """An ``<inertial>`` with other moments (3,), about the columns of a rotation (3, 3)."""
+        """The ``<inertial>`` with other moments (3,), about the columns of a rotation (3, 3)."""
         x, y, z = (float(value) for value in moments)
         origin = Pose(_vector(self.center), _vector(rpy_from_rotation(axes)))
         return Inertial(float(self.mass), origin, ixx=x, iyy=y, izz=z)
 
     def aligned(self) -> Inertial:
-        """An ``<inertial>`` in the axes of the link, with its products of inertia."""
+        """The ``<inertial>`` in the axes of the link, with its products of inertia."""
         t = [[float(x) for x in row] for row in self.tensor]
         origin = Pose(_vector(self.center))
         return Inertial(float(self.mass), origin, t[0][0], t[0][1], t[0][2], t[1][1], t[1][2], t[2][2])
 
 
 def _nearest_axes(axes: Array, wanted: Array) -> tuple[list[int], Array]:
-    """An order and directions of the columns of `axes` that make the rotation nearest to `wanted`."""
+    """Order and directions of the columns of `axes` that make the rotation nearest to `wanted`."""
     overlap = wanted.T @ axes
     best: tuple[float, list[int], Array] | None = None
     for chosen in permutations(range(3)):

@@ -1,4 +1,4 @@
-"""What the rules on tensors of no body share: the ways to deal with one."""
+"""The common part of the rules on inertia tensors that no body can have: detection and remedies."""
 
 from __future__ import annotations
 
@@ -12,32 +12,32 @@ from dynx.rules.case import Case
 from dynx.rules.engine_versions import measured_on
 from dynx.rules.inertia.central import CentralInertia
 from dynx.rules.inertia.edits import line_of, with_inertials
-from dynx.rules.inertia.merging import lumped_into
+from dynx.rules.inertia.merging import merged_inertials
 from dynx.rules.inertia.physical import (
-    ENOUGH,
+    ACCEPTED_MOMENT,
     Fault,
-    clear_fault,
-    lifted,
+    fault_beyond_rounding,
+    is_borderline,
     nearest_moments,
-    on_the_edge,
     principal_moments,
+    with_raised_moments,
 )
 from dynx.rules.inertia.rigid_groups import RigidGroup, rigid_groups
-from dynx.rules.rule import Detection, Remedy, Rule
+from dynx.rules.rule import Detection, Remedy, Rule, links_of
 
 NUMBERS_OF_THE_FILE = ("pybullet.set_inertias", "pybullet.extrapolate_inertias", "drake.set_inertias")
-"""The calls at run time that make engines calculate with the numbers of the file."""
+"""The engine settings with which engines use the numbers of the file."""
 
 
 class ImpossibleInertia(Rule):
-    """A tensor that no body can have, by more than rounding."""
+    """A rule about tensors that no body can have, by more than rounding."""
 
     fault: ClassVar[Fault]
     engines: ClassVar[Mapping[str, str]] = measured_on("pybullet", "mujoco", "drake")
     advice = "Take the tensor from the CAD model again; in the meantime use the nearest that a body can have."
     choices: ClassVar[Mapping[str, str]] = {
-        "fuse": "lump the link with links welded to it where that makes a body, which changes no equation "
-        "of motion; else as nearest",
+        "fuse": "merge the link with links rigidly connected to it where that makes a body, which changes no "
+        "equation of motion; else as nearest",
         "nearest": "put the nearest tensor that a body can have in its place",
         "keep": "leave the numbers and give them to PyBullet and Drake after loading; MuJoCo cannot follow",
     }
@@ -48,7 +48,7 @@ class ImpossibleInertia(Rule):
         groups = rigid_groups(case)
         for link in case.model.links:
             inertial = link.inertial
-            if inertial is None or clear_fault(inertial) != self.fault:
+            if inertial is None or fault_beyond_rounding(inertial) != self.fault:
                 continue
             if kept and (groups[link.name].static or _has_largest_on_y(inertial)):
                 continue
@@ -58,30 +58,32 @@ class ImpossibleInertia(Rule):
             yield Detection(link.name, None, line_of(case, link.name, "inertia"), message)
 
     def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy | None:
-        """Lump, replace or keep, as chosen; the default lumps where that is enough."""
-        names = [detection.link for detection in detections if detection.link is not None]
+        """Merge, replace or keep, as chosen; the default merges where that is enough."""
+        names = links_of(detections)
         decision, chosen = self.decision(case), self.chosen(case)
         if chosen == "keep":
             moving = [name for name in names if not rigid_groups(case)[name].static]
             turned = {name: _with_largest_on_y(found) for name in moving if (found := case.inertials[name])}
             mended = with_inertials(case, turned).with_calls(*NUMBERS_OF_THE_FILE)
             return Remedy(mended, "gave PyBullet and Drake the numbers of the file after loading", decision)
-        fused: list[str] = []
+        merged: list[str] = []
         if chosen == "fuse":
             for name in names:
-                bodies = _fused(case, rigid_groups(case)[name], name)
+                bodies = _merged(case, rigid_groups(case)[name], name)
                 if bodies is not None:
                     case = with_inertials(case, bodies)
-                    fused.append(name)
+                    merged.append(name)
         replaced: dict[str, Inertial] = {}
         for name in names:
             inertial = case.inertials[name]
-            if inertial is not None and clear_fault(inertial) == self.fault:
+            if inertial is not None and fault_beyond_rounding(inertial) == self.fault:
                 replaced[name] = _nearest(case, inertial, name)
         case = with_inertials(case, replaced)
         parts = []
-        if fused:
-            parts.append(f"lumped the inertia of {_listed(fused)} with that of links welded to it")
+        if merged:
+            parts.append(
+                f"merged the inertia of {_listed(merged)} with that of links rigidly connected to it"
+            )
         if replaced:
             parts.append(f"put the nearest that a body can have for the tensor of {_listed(replaced)}")
         return Remedy(case, " and ".join(parts), decision, changes_physics=bool(replaced))
@@ -93,27 +95,27 @@ class ImpossibleInertia(Rule):
         return f"the principal moment {large:.6g} exceeds the sum of the others, {small:.6g} and {middle:.6g}"
 
 
-def _fused(case: Case, group: RigidGroup, name: str) -> dict[str, Inertial] | None:
-    """The link lumped with its parent, with what hangs on it, or with its whole group: the first that
+def _merged(case: Case, group: RigidGroup, name: str) -> dict[str, Inertial] | None:
+    """The link merged with its parent, with its descendants, or with its whole group: the first of them that
     makes a body; None where none does."""
-    ways: list[tuple[tuple[str, ...], str]] = []
+    attempts: list[tuple[tuple[str, ...], str]] = []
     if name in group.parents:
         parent = group.parents[name]
-        ways.append(((parent, name), parent))
+        attempts.append(((parent, name), parent))
     if below := group.below(name):
-        ways.append(((name, *below), name))
+        attempts.append(((name, *below), name))
     if len(group.links) > 1:
-        ways.append((group.links, group.head))
-    for links, into in ways:
-        # A link without mass is another rule's matter, which must not vanish under the hands of this one.
+        attempts.append((group.links, group.head))
+    for links, into in attempts:
+        # Another rule is about links without mass, and must still find them.
         if not case.model.inertial(into).mass > 0.0:
             continue
-        bodies = lumped_into(case, group, links, into)
+        bodies = merged_inertials(case, group, links, into)
         new = bodies[into]
-        if new.mass > 0.0 and clear_fault(new) is None:
+        if new.mass > 0.0 and fault_beyond_rounding(new) is None:
             root = into == case.model.root
-            if on_the_edge(new, root=root, welded=into in group.parents):
-                bodies[into] = lifted(new)
+            if is_borderline(new, root=root, on_fixed_joint=into in group.parents):
+                bodies[into] = with_raised_moments(new)
             return bodies
     return None
 
@@ -124,12 +126,12 @@ def _nearest(case: Case, inertial: Inertial, name: str) -> Inertial:
     near = body.about(nearest_moments(moments), axes)
     if case.base == "fixed" and name == case.model.root:
         near = CentralInertia.of(near).aligned()
-    return lifted(near, ENOUGH)
+    return with_raised_moments(near, ACCEPTED_MOMENT)
 
 
 def _with_largest_on_y(inertial: Inertial) -> Inertial:
-    """The same tensor in principal form, as Bullet's tree of inverse dynamics may still take it: that the
-    moment about y is at most the sum of the others is the one thing it does not ask."""
+    """The tensor in principal form with the largest moment about y, of which alone Bullet's inverse dynamics
+    does not check that it is at most the sum of the others."""
     body = CentralInertia.of(inertial)
     moments, axes = body.principal(inertial.origin.rpy)
     largest = int(np.argmax(moments))

@@ -1,4 +1,4 @@
-"""Moving inertia between links welded together, which is the same rigid body."""
+"""Inertia moved between rigidly connected links, which leaves the rigid body unchanged."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from dynx.rules.inertia.central import CentralInertia
 from dynx.rules.inertia.rigid_groups import RigidGroup
 
 
-def written(case: Case, link: str, body: CentralInertia, old: Inertial | None = None) -> Inertial:
-    """A body as the ``<inertial>`` of a link: in principal form, but for the root on the fixed base.
+def as_inertial(case: Case, link: str, body: CentralInertia, old: Inertial | None = None) -> Inertial:
+    """The ``<inertial>`` of a link with this body, in principal form unless the link is a fixed root.
 
-    There PyBullet takes the attitude of the inertial frame for that of the base (DX106).
+    There PyBullet mistakes the attitude of the inertial frame for that of the base (DX106).
     """
     if case.base == "fixed" and link == case.model.root:
         return body.aligned()
     return body.inertial(near=(0.0, 0.0, 0.0) if old is None else old.origin.rpy)
 
 
-def lumped_into(case: Case, group: RigidGroup, links: Sequence[str], into: str) -> dict[str, Inertial]:
-    """New inertials for some links of a group: all in the link `into`, nothing in the others."""
-    body = _lumped(case, group, links, into)
-    bodies = {into: written(case, into, body, case.inertials[into])}
+def merged_inertials(case: Case, group: RigidGroup, links: Sequence[str], into: str) -> dict[str, Inertial]:
+    """New inertials for some links of a group: the sum in the link `into`, zero in the others."""
+    body = _sum(case, group, links, into)
+    bodies = {into: as_inertial(case, into, body, case.inertials[into])}
     for name in links:
         inertial = case.inertials[name]
         if name != into and inertial is not None:
@@ -32,14 +32,14 @@ def lumped_into(case: Case, group: RigidGroup, links: Sequence[str], into: str) 
 
 
 def _without_mass(inertial: Inertial) -> Inertial:
-    """The same element with a mass and moments of zero; its origin stays."""
+    """The inertial with mass and moments of zero; its origin is kept."""
     return Inertial(0.0, inertial.origin)
 
 
-def _lumped(case: Case, group: RigidGroup, links: Iterable[str], into: str) -> CentralInertia:
-    """The inertia of links of a group together, in the frame of the link `into`."""
+def _sum(case: Case, group: RigidGroup, links: Iterable[str], into: str) -> CentralInertia:
+    """The inertia of some links of a group together, in the frame of the link `into`."""
     total: CentralInertia | None = None
-    # The link itself first: where nothing has mass its centre stays.
+    # The link itself first, so that its centre of mass is kept where no link has mass.
     for name in sorted(links, key=lambda name: name != into):
         inertial = case.inertials[name]
         if inertial is not None:

@@ -1,4 +1,4 @@
-"""Which inertia tensors a rigid body can have, how far engines look, and the nearest one that they take.
+"""Physical consistency of inertia tensors, the checks of engines, and the nearest consistent tensor.
 
 The principal moments are sums of two of three non-negative second moments of mass, so none is negative
 and none exceeds the sum of the other two (Wensing, Kim and Slotine 2018, section II). Engines check this
@@ -14,45 +14,45 @@ from typing import Literal
 
 import numpy as np
 
-from dynx.engines.pybullet.inertia_checks import MANY, read_by_bullet, tree_may_refuse
+from dynx.engines.pybullet.inertia_checks import CACHE_SIZE, bullet_reading, tree_may_reject
 from dynx.model.elements import Inertial
 from dynx.rules.inertia.central import CentralInertia
 from dynx.spatial.extended import FLOAT64_EPS, longdouble
 from dynx.spatial.scalar import Array
 
-SMALLEST_MOMENT = 1e-14
-"""[kg m^2] MuJoCo takes no smaller principal moment, unless the whole tensor is zero."""
+MIN_MOMENT = 1e-14
+"""Smallest principal moment [kg m^2] that MuJoCo accepts, unless the whole tensor is zero."""
 
-ENOUGH = 1.5 * SMALLEST_MOMENT
-"""[kg m^2] What MuJoCo takes for a moment, with room for its rounding."""
+ACCEPTED_MOMENT = 1.5 * MIN_MOMENT
+"""Principal moment [kg m^2] that MuJoCo accepts whatever its rounding."""
 
-SMALLEST_MASS = 1e-15
-"""[kg] MuJoCo takes no moving body that is lighter, and takes a smaller moment for none (mjMINVAL)."""
+MIN_MASS = 1e-15
+"""Smallest mass [kg] of a moving body that MuJoCo accepts (mjMINVAL)."""
 
 ROUNDING = 16.0 * FLOAT64_EPS
-"""What rounding can do to a tensor, as a share of its largest moment; `dynx.load` draws the same line."""
+"""Bound on the rounding of a tensor relative to its largest moment; `dynx.load` uses the same bound."""
 
 _EDGE = 4.0 * FLOAT64_EPS
-"""Turning a tensor by an angle rounds its moments by about this; MuJoCo was seen to refuse at 0 to 2 eps."""
+"""Relative rounding of the moments of a rotated tensor; MuJoCo was seen to refuse at 0 to 2 eps."""
 
 _MARGIN = 16.0 * FLOAT64_EPS
-"""How far inside the edge a body is put."""
+"""Relative distance from the bound at which corrected moments are placed."""
 
 Fault = Literal["negative", "triangle"]
-"""Of principal moments: one is negative, or exceeds the sum of the others."""
+"""Fault of principal moments: one is negative, or one exceeds the sum of the others."""
 
 
-@lru_cache(maxsize=MANY)
+@lru_cache(maxsize=CACHE_SIZE)
 def principal_moments(inertial: Inertial) -> Array:
-    """The principal moments (3,), smallest first, in long double; not to be written into."""
+    """The principal moments (3,), smallest first, in long double; the array must not be changed."""
     return CentralInertia.of(inertial).moments()
 
 
-@lru_cache(maxsize=MANY)
-def clear_fault(inertial: Inertial) -> Fault | None:
-    """What no body can have, by more than rounding; None also for what is too small to matter."""
+@lru_cache(maxsize=CACHE_SIZE)
+def fault_beyond_rounding(inertial: Inertial) -> Fault | None:
+    """The fault of an inertial by more than rounding; None also where the tensor is too small to matter."""
     size = float(np.max(np.abs(inertial.tensor)))
-    if inertial.mass == 0.0 or size < SMALLEST_MOMENT:
+    if inertial.mass == 0.0 or size < MIN_MOMENT:
         return None
     small, middle, large = principal_moments(inertial)
     rounding = ROUNDING * max(abs(small), abs(large))
@@ -61,32 +61,34 @@ def clear_fault(inertial: Inertial) -> Fault | None:
     return "triangle" if small + middle < large - rounding else None
 
 
-@lru_cache(maxsize=MANY)
-def on_the_edge(inertial: Inertial, *, root: bool, welded: bool) -> bool:
-    """Whether a body that rounding alone makes doubtful is, or may be, refused by an engine.
+@lru_cache(maxsize=CACHE_SIZE)
+def is_borderline(inertial: Inertial, *, root: bool, on_fixed_joint: bool) -> bool:
+    """Whether an engine may refuse the inertial because of rounding alone.
 
-    `root` says that no joint carries the link, `welded` that a fixed one does.
+    `root` says that no joint carries the link, `on_fixed_joint` that a fixed one does.
     """
     size = float(np.max(np.abs(inertial.tensor)))
-    if inertial.mass == 0.0 or (size < SMALLEST_MOMENT and size > 0.0) or clear_fault(inertial) is not None:
+    if (
+        inertial.mass == 0.0
+        or (size < MIN_MOMENT and size > 0.0)
+        or fault_beyond_rounding(inertial) is not None
+    ):
         return False
     small, middle, large = principal_moments(inertial)
-    if small < SMALLEST_MOMENT and read_by_bullet(inertial).moments.any():
-        # MuJoCo takes offence at something else (DX111).
-        return read_by_bullet(inertial).zeroed or (not root and tree_may_refuse(inertial, welded=welded))
-    turned = any(inertial.origin.rpy) or bool(inertial.ixy or inertial.ixz or inertial.iyz)
-    if turned and small + middle - large < _EDGE * large and size > 0.0:
+    too_small_for_mujoco = small < MIN_MOMENT and bullet_reading(inertial).moments.any()  # DX111
+    rotated = any(inertial.origin.rpy) or bool(inertial.ixy or inertial.ixz or inertial.iyz)
+    if rotated and small + middle - large < _EDGE * large and size > 0.0 and not too_small_for_mujoco:
         return True
-    if read_by_bullet(inertial).zeroed:
+    if bullet_reading(inertial).zeroed:
         return True
-    return not root and tree_may_refuse(inertial, welded=welded)
+    return not root and tree_may_reject(inertial, on_fixed_joint=on_fixed_joint)
 
 
-def lift_inside(inertial: Inertial, floor: float = 0.0) -> float:
-    """What to add to all three moments, so that no check fails by rounding [kg m^2].
+def moment_increase(inertial: Inertial, floor: float = 0.0) -> float:
+    """The amount [kg m^2] to add to all three moments so that no check fails by rounding.
 
-    A few units in the last place of the largest moment about the link's origin, which is below what the
-    equations of motion can show; more where a moment would be below `floor`.
+    It is a few units in the last place of the largest moment about the link's origin, too little to show in
+    the equations of motion, or more where a moment would be below `floor` [kg m^2].
     """
     body = CentralInertia.of(inertial)
     size = max(float(np.max(np.abs(body.tensor))), float(np.max(np.diagonal(body.about_origin()))))
@@ -95,19 +97,19 @@ def lift_inside(inertial: Inertial, floor: float = 0.0) -> float:
     return max(added, floor - small)
 
 
-def lifted(inertial: Inertial, floor: float = 0.0) -> Inertial:
-    """The inertial with all moments raised to where no check fails by rounding, and to `floor` at least."""
-    added = lift_inside(inertial, floor)
+def with_raised_moments(inertial: Inertial, floor: float = 0.0) -> Inertial:
+    """The inertial with all moments raised by `moment_increase`."""
+    added = moment_increase(inertial, floor)
     return replace(inertial, ixx=inertial.ixx + added, iyy=inertial.iyy + added, izz=inertial.izz + added)
 
 
 def nearest_moments(moments: Array) -> Array:
     """The physical principal moments (3,) nearest to these, in the least-squares sense, in the same order.
 
-    Moments of a body are G s with second moments of mass s >= 0 and G = [[0,1,1],[1,0,1],[1,1,0]]. Of the
-    least squares over s >= 0 some s are zero, and it is told by its optimality: y = G s is the answer if no
-    column of G has a positive product with x - y (Karush, Kuhn and Tucker). All eight sets of zeros are
-    tried. For the tensor it is the nearest in the Frobenius norm.
+    The moments of a body are G s with second moments of mass s >= 0 and G = [[0,1,1],[1,0,1],[1,1,0]]. In the
+    least-squares solution over s >= 0 some s are zero. All eight sets of zeros are tried; y = G s is the
+    solution if no column of G has a positive product with x - y (Karush, Kuhn and Tucker). The tensor with
+    these moments is the nearest in the Frobenius norm.
     """
     wanted = np.asarray(moments, dtype=float)
     G = np.ones((3, 3)) - np.eye(3)

@@ -1,14 +1,15 @@
-"""Links that fixed joints weld together, and where each sits in the others."""
+"""Groups of links that fixed joints connect rigidly, and the pose of each link in its group."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from types import MappingProxyType
 
 import numpy as np
 
+from dynx.model.elements import Inertial
 from dynx.model.mechanism import pose_arrays
 from dynx.rules.case import Case, end_of
 from dynx.spatial.extended import longdouble
@@ -17,10 +18,10 @@ from dynx.spatial.scalar import Array
 
 @dataclass(frozen=True, eq=False)
 class RigidGroup:
-    """Links welded together; `head` is nearest to the root, and `static` says that the world holds it.
+    """Rigidly connected links; `head` is nearest to the root, `static` says that the group cannot move.
 
     `links` are in depth-first order, the head first; `poses` has (R, p) of each in the head's frame, in
-    long double; `parents` names the link that each but the head is welded to.
+    long double; `parents` maps each link but the head to its parent.
     """
 
     head: str
@@ -36,11 +37,11 @@ class RigidGroup:
         return R_frame.T @ R_link, R_frame.T @ (p_link - p_frame)
 
     def children(self, link: str) -> tuple[str, ...]:
-        """The links that are welded to one from below, in document order."""
+        """The child links of one link within the group, in document order."""
         return tuple(child for child in self.links if self.parents.get(child) == link)
 
     def below(self, link: str) -> tuple[str, ...]:
-        """All links of the group that hang on one, in depth-first order."""
+        """All descendants of one link within the group, in depth-first order."""
         found = {link}
         for each in self.links:
             if self.parents.get(each) in found:
@@ -48,24 +49,24 @@ class RigidGroup:
         return tuple(each for each in self.links if each in found and each != link)
 
 
-# All rules ask it of one case before the first remedy makes another.
+# All rules use the groups of one case before the first remedy makes another.
 @lru_cache(maxsize=8)
 def rigid_groups(case: Case) -> Mapping[str, RigidGroup]:
     """The group of every link that dynx reads, by the link's name.
 
-    Welded is what the document calls ``fixed``: engines know nothing of joints that dynx holds still for
-    other reasons, such as one that follows a fixed joint.
+    Joints that the document calls ``fixed`` connect rigidly. Joints that dynx holds still for other reasons,
+    such as one that follows a fixed joint, move in other engines.
     """
     model = case.model
     heads = {model.root: model.root}
-    poses = {model.root: _nowhere()}
+    poses = {model.root: _identity()}
     parents: dict[str, str] = {}
     for joint in model.joints:
         element = case.joints.get(joint.name)
-        welded = joint.type == "fixed" and (element is None or element.attributes.get("type") == "fixed")
-        if not welded:
+        fixed = joint.type == "fixed" and (element is None or element.attributes.get("type") == "fixed")
+        if not fixed:
             heads[joint.child] = joint.child
-            poses[joint.child] = _nowhere()
+            poses[joint.child] = _identity()
             continue
         R_parent, p_parent = poses[joint.parent]
         R, p = pose_arrays(joint.origin, longdouble)
@@ -88,18 +89,26 @@ def rigid_groups(case: Case) -> Mapping[str, RigidGroup]:
     return MappingProxyType(groups)
 
 
-def static_links(case: Case) -> frozenset[str]:
-    """Names of the links that the world holds still: on the fixed base the root and what is welded to it.
+def inertials_in_groups(case: Case) -> Iterator[tuple[str, Inertial, RigidGroup]]:
+    """Each link with an ``<inertial>``: its name, the inertial as dynx reads it, and its group."""
+    groups = rigid_groups(case)
+    for name, inertial in case.inertials.items():
+        if inertial is not None:
+            yield name, inertial, groups[name]
 
-    Taken from the document, so links that dynx reads as frames are among them.
+
+def static_links(case: Case) -> frozenset[str]:
+    """Names of the links that cannot move: on the fixed base the root and links rigidly connected to it.
+
+    They are taken from the document, so links that dynx reads as frames are included.
     """
     if case.base != "fixed":
         return frozenset()
     ends = [(end_of(joint, "parent"), end_of(joint, "child"), joint) for joint in case.joints.values()]
-    welded: dict[str, list[str]] = {}
+    children: dict[str, list[str]] = {}
     for parent, child, joint in ends:
         if joint.attributes.get("type") == "fixed":
-            welded.setdefault(parent, []).append(child)
+            children.setdefault(parent, []).append(child)
     below = {child for _, child, _ in ends}
     waiting = [name for name in case.links if name not in below]
     found: set[str] = set()
@@ -107,9 +116,9 @@ def static_links(case: Case) -> frozenset[str]:
         name = waiting.pop()
         if name not in found:
             found.add(name)
-            waiting += welded.get(name, [])
+            waiting += children.get(name, [])
     return frozenset(found)
 
 
-def _nowhere() -> tuple[Array, Array]:
+def _identity() -> tuple[Array, Array]:
     return longdouble(np.eye(3)), longdouble(np.zeros(3))

@@ -1,4 +1,4 @@
-"""What the ``<joint>`` elements of a document say, for rules that must not ask for the model."""
+"""The ``<joint>`` elements of a document, for rules that must not use the model."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ def elements_in_joints(
             yield joint, element
 
 
-def putting_axis(source: XmlSource, joint: SourceElement, xyz: str) -> Edit:
-    """Give a joint that axis, whether it has one or not."""
+def setting_axis(source: XmlSource, joint: SourceElement, xyz: str) -> Edit:
+    """The edit that sets the axis of a joint, whether it has one or not."""
     axis = joint.first("axis")
     if axis is None:
         return source.inserting(joint, f'<axis xyz="{xyz}"/>')

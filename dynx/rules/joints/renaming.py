@@ -1,4 +1,4 @@
-"""Giving a link or a joint another name, wherever a document mentions it."""
+"""Edits that rename a link or a joint wherever a document names it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dynx.model.xml.source import Edit, SourceElement, XmlSource
 
 
 def fresh_name(wanted: str, taken: Collection[str]) -> str:
-    """`wanted`, with a number behind it where that name is taken."""
+    """The name `wanted`, with a number appended where it is taken."""
     name, number = wanted, 1
     while name in taken:
         number += 1
@@ -17,7 +17,7 @@ def fresh_name(wanted: str, taken: Collection[str]) -> str:
 
 
 def renaming_link(source: XmlSource, old: str, new: str) -> list[Edit]:
-    """Edits of the link, of the ends of joints, and of what other programs attach to it."""
+    """Edits that rename a link in its element, in joints and in Gazebo references."""
     edits = []
     for element in source.root.walk():
         if element.tag == "link" and element.parent is source.root:
@@ -30,7 +30,7 @@ def renaming_link(source: XmlSource, old: str, new: str) -> list[Edit]:
 
 
 def renaming_joint(source: XmlSource, old: str, new: str) -> list[Edit]:
-    """Edits of the joint, of joints that mimic it, and of its transmissions."""
+    """Edits that rename a joint in its element, in mimic joints, transmissions and Gazebo references."""
     links = {link.attributes.get("name") for link in source.root.all("link")}
     edits = []
     for element in source.root.walk():

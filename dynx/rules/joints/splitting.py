@@ -1,8 +1,9 @@
-"""A joint of several freedoms as a chain of joints of one, with the least of links between them.
+"""A joint of several degrees of freedom split into a chain of joints with one, with light links between them.
 
-A spherical joint is three turns about x, y and z, a planar one two slides in the plane and a turn about its
-normal, a floating one three slides and three turns. The chain reaches the same poses; its coordinates
-are angles (roll, pitch, yaw of the moving axes), which are singular at a pitch of 90 degrees.
+A spherical joint becomes three rotations about x, y and z, a planar one two translations in the plane and a
+rotation about its normal, a floating one three translations and three rotations. The chain reaches the same
+poses; its coordinates are angles (roll, pitch, yaw of the moving axes), which are singular at a pitch of 90
+degrees.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import numpy as np
 from dynx.model.xml.source import Edit, SourceElement, XmlSource
 from dynx.rules.case import end_of
 from dynx.rules.inertia.massless_links import least_inertial
-from dynx.rules.joints.elements import UNLIMITED, putting_axis
+from dynx.rules.joints.elements import UNLIMITED, setting_axis
 from dynx.rules.joints.renaming import fresh_name
 from dynx.rules.text.number_text import decimal, is_number
 
@@ -27,7 +28,7 @@ _X, _Y, _Z = "1 0 0", "0 1 0", "0 0 1"
 
 @dataclass(frozen=True)
 class Freedom:
-    """One joint of the chain: the end of its name, its type and its axis as text."""
+    """One joint of the chain: the suffix of its name, its type and its axis as text."""
 
     suffix: str
     type: str
@@ -54,7 +55,7 @@ def freedoms(joint: SourceElement) -> list[Freedom]:
 
 
 def splitting(source: XmlSource, joint: SourceElement) -> Iterator[Edit]:
-    """Edits that put the chain in the place of the joint."""
+    """Edits that replace the joint by the chain."""
     first, *rest = freedoms(joint)
     taken = {part.attributes.get("name", "") for part in source.root.children}
     name, child = joint.attributes["name"], end_of(joint, "child")
@@ -62,7 +63,7 @@ def splitting(source: XmlSource, joint: SourceElement) -> Iterator[Edit]:
     links = [fresh_name(f"{own}_link", taken) for own in names[:-1]]
     yield source.setting(joint, "name", names[0])
     yield source.setting(joint, "type", first.type)
-    yield putting_axis(source, joint, first.axis)
+    yield setting_axis(source, joint, first.axis)
     child_element = joint.first("child")
     if child_element is not None:
         yield source.setting(child_element, "link", links[0])

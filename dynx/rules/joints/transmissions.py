@@ -22,7 +22,7 @@ def type_of(case: Case, transmission: SourceElement) -> str | None:
 
 
 def transmissions_drake_reads(case: Case) -> Iterator[SourceElement]:
-    """Those of the one type that it knows, whatever is in front of it, and those without a type."""
+    """Transmissions of the one type that Drake knows, with any prefix, and those without a type."""
     for transmission in case.source.root.all("transmission"):
         kind = type_of(case, transmission)
         if kind is None or _SIMPLE in kind:
@@ -30,7 +30,7 @@ def transmissions_drake_reads(case: Case) -> Iterator[SourceElement]:
 
 
 def moves_by_actuator(case: Case, transmission: SourceElement) -> bool:
-    """Whether Drake makes an actuator of it: not for a fixed joint, nor for an effort limit of 0."""
+    """Whether Drake makes an actuator: not for a fixed joint, nor for an effort limit of 0."""
     named = transmission.first("joint")
     joint = None if named is None else case.joints.get(named.attributes.get("name", ""))
     if joint is None or joint.attributes.get("type") == "fixed":

@@ -1,4 +1,4 @@
-"""Values of attributes of a source element, read by the rules by which `dynx.load` reads them."""
+"""Values of attributes of a source element, read as `dynx.load` reads them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from dynx.rules.text.number_text import is_number
 def number_of(element: SourceElement, attribute: str) -> float | None:
     """The finite number that an attribute holds; None where it is absent.
 
-    Raises DescriptionError for anything else, as `vector_of` and `origin_of` do.
+    Raises DescriptionError for any other text, as `vector_of` and `origin_of` do.
     """
     if attribute not in element.attributes:
         return None
@@ -33,7 +33,7 @@ def vector_of(element: SourceElement, attribute: str) -> Vector | None:
 
 
 def origin_of(parent: SourceElement) -> Pose:
-    """The pose in the ``<origin>`` of an element; what is absent or empty is zero."""
+    """The pose in the ``<origin>`` of an element; absent and empty attributes are zero."""
     origins = [_plain(child) for child in parent.all("origin")]
     return Reading("<string>").origin(Element(parent.tag, {}, parent.line, origins), "this file")
 

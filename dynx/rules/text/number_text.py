@@ -1,7 +1,7 @@
-"""Numbers as people write them into a URDF though no engine, or not every engine, reads them so.
+"""Numbers as people write them into a URDF although not every engine reads them so.
 
-A text is *plain* where it is what the format wants: one decimal number, or three with blanks between
-them. Anything else that can be understood has one fault, and the plain text that was meant.
+A text is *plain* where it has the form of the format: one decimal number, or three with blanks between them.
+Any other text that can be understood has one fault, and a plain text that was probably meant.
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 LARGEST = "1.7976931348623157e+308"
-"""The largest double: a number that every engine can read, and that stands for "no limit"."""
+"""The largest double, which every engine can read and which stands for "no limit"."""
 
 Fault = Literal["comma", "separator", "rest", "count", "blank", "tab", "infinite", "empty"]
-"""``comma`` for a decimal point, ``separator`` between the numbers of a vector, ``rest`` behind a number,
-a wrong ``count``, a ``blank`` behind a single number, a ``tab`` or line break in a vector, an
+"""Fault of a text: a decimal ``comma``, a ``separator`` other than blanks in a vector, a ``rest`` behind a
+number, a wrong ``count``, a ``blank`` behind a single number, a ``tab`` or line break in a vector, an
 ``infinite`` number, an ``empty`` vector."""
 
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
@@ -26,14 +26,14 @@ _INFINITE = re.compile(r"([+-]?)inf(?:inity)?", re.IGNORECASE)
 _FORTRAN = re.compile(r"([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))[dD]([+-]?[0-9]+)")
 _HEXADECIMAL = re.compile(r"[+-]?0[xX][0-9a-fA-F]+")
 _BLANKS = " \t\r\n"
-"""The white space of XML, over which every engine passes in front of a number and not every one behind it."""
+"""The white space of XML, which every engine skips in front of a number and not every one behind it."""
 
 _UNEXPANDED = ("${", "$(")
 
 
 @dataclass(frozen=True)
 class Misspelling:
-    """A text with a fault: `meant` in plain text, `otherwise` where it can be understood differently."""
+    """A text with a fault: `meant` is the probable plain text, `otherwise` another one that is possible."""
 
     fault: Fault
     meant: str
@@ -41,7 +41,7 @@ class Misspelling:
 
 
 def is_number(text: str) -> bool:
-    """Whether every engine reads the text as one finite number, blanks around it apart."""
+    """Whether every engine reads the text, without blanks around it, as one finite number."""
     word = text.strip()
     return _NUMBER.fullmatch(word) is not None and math.isfinite(float(word))
 
@@ -52,7 +52,7 @@ def decimal(value: float) -> str:
 
 
 def misspelled_number(text: str) -> Misspelling | None:
-    """The fault of a text that should be one number; None where it is plain or beyond understanding."""
+    """The fault of a text that should be one number; None where it is plain or incomprehensible."""
     word = text.strip()
     if is_number(word):
         return None if text.lstrip(_BLANKS) == word else Misspelling("blank", word)
@@ -62,7 +62,7 @@ def misspelled_number(text: str) -> Misspelling | None:
 
 
 def misspelled_vector(text: str) -> Misspelling | None:
-    """The fault of a text that should be three numbers; None as above."""
+    """The fault of a text that should be three numbers; None where it is plain or incomprehensible."""
     words = text.split()
     if not words:
         return Misspelling("empty", "")
@@ -75,7 +75,7 @@ def misspelled_vector(text: str) -> Misspelling | None:
         return Misspelling("tab", " ".join(words)) if odd else None
     if "," in text or ";" in text:
         return _with_commas(words, text)
-    parts = [_mended(word) for word in words]
+    parts = [_word_fault(word) for word in words]
     if len(words) != 3 or None in parts:
         return None
     return Misspelling("rest", " ".join(part.meant for part in parts if part is not None))
@@ -99,13 +99,13 @@ def _misspelled_word(word: str) -> Misspelling | None:
     return Misspelling("rest", front.group())
 
 
-def _mended(word: str) -> Misspelling | None:
-    """A word of a vector: as it stands where it is plain."""
+def _word_fault(word: str) -> Misspelling | None:
+    """A word of a vector, itself where it is plain."""
     return Misspelling("rest", word) if is_number(word) else _misspelled_word(word)
 
 
 def _with_commas(words: list[str], text: str) -> Misspelling | None:
-    """A vector with commas in it: they are decimal where that leaves three numbers, one or more with one."""
+    """The fault of a vector with commas, which are decimal points where that leaves three numbers."""
     bare = [word.rstrip(",;") for word in words]
     if len(bare) == 3 and all(is_number(word) or _COMMA.fullmatch(word) for word in bare):
         if all(map(is_number, bare)):
@@ -122,7 +122,7 @@ def _with_commas(words: list[str], text: str) -> Misspelling | None:
 
 
 def _overflowing(word: str) -> str:
-    """The sign of an infinity, written out or by its size; empty for anything else."""
+    """The sign of an infinite number, written out or too large for a double; empty for any other text."""
     if found := _INFINITE.fullmatch(word):
         return found.group(1) or "+"
     if _NUMBER.fullmatch(word):

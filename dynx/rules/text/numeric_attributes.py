@@ -1,4 +1,4 @@
-"""Where numbers stand in a URDF."""
+"""The attributes of a URDF that hold numbers."""
 
 from __future__ import annotations
 
@@ -46,20 +46,20 @@ class NumericAttribute:
     count: int
 
     def text_in(self, source: XmlSource) -> str:
-        """What is written there. An XML reader gives tabs and line breaks as blanks; engines do not."""
+        """The text as written, in which tabs and line breaks are not yet replaced by blanks."""
         place = self.element.places[self.name]
         written = source.data[place.start : place.end].decode("utf-8").partition("=")[2].strip()[1:-1]
         return self.element.attributes[self.name] if "&" in written else written
 
 
 def numeric_attributes(source: XmlSource) -> Iterator[NumericAttribute]:
-    """All that are there, in links and joints, in document order."""
+    """All numeric attributes of links and joints, in document order."""
     for part in source.root.children:
         if part.tag == "link":
             yield from _of_link(part)
         elif part.tag == "joint":
             yield from _below(part, _IN_JOINT)
-            # The axis of a joint that has none is read by no engine.
+            # No engine reads the axis of these joints.
             if part.attributes.get("type") not in _WITHOUT_AXIS:
                 yield from _below(part, {"axis": {"xyz": 3}})
 

@@ -57,7 +57,7 @@ def test_what_it_holds_comes_link_by_link(base: Base) -> None:
     model = forked(base)
     held = held_as_in_the_file(LoadedDrake, model)
     assert list(held.links) == [link.name for link in model.links]
-    assert all(link.mass == BODY.mass and link.fused == () for link in held.links.values())
+    assert all(link.mass == BODY.mass and link.merged == () for link in held.links.values())
     # Drake has no effort limit of a joint, and no losses are in this file.
     assert (held.joints["z_joint"].effort, held.joints["z_joint"].damping) == (None, 0.0)
 
@@ -230,7 +230,7 @@ def test_a_root_named_world_is_the_world(base: Base) -> None:
 def test_another_link_named_world_is_refused(base: Base) -> None:
     text = forked(base).to_urdf().replace('"tool"', '"world"')
     model = dynx.load(text, base=base)
-    with pytest.raises(EngineError, match="hangs from there"):
+    with pytest.raises(EngineError, match="attached there"):
         loaded(LoadedDrake, model, text).__enter__()
 
 

@@ -127,7 +127,7 @@ def test_real_robots(name: str, base: Base) -> None:
     model = load(name, base=base, gravity=TILTED)
     model = replace(model, joints=tuple(replace(joint, mimic=None) for joint in model.joints))
     if base == "floating" and model.root == "world":
-        with pytest.raises(EngineError, match="a root named 'world' is the world to MuJoCo"):
+        with pytest.raises(EngineError, match="MuJoCo mistakes a root named 'world' for the world"):
             worst(model)
         return
     assert worst(model, calls=CALLS) <= BAR
@@ -140,7 +140,7 @@ def test_links_that_are_fused_have_no_frame(base: Base) -> None:
         held = robot.describe()
         gone = {"tool"} if base == "floating" else {"trunk", "tool"}
         assert set(held.missing_links) == gone
-        assert held.links["z"].fused == ("tool",)
+        assert held.links["z"].merged == ("tool",)
         poses = robot.link_poses(model.neutral())
         for link, T in zip(model.links, poses, strict=True):
             assert np.isnan(T).all() == (link.name in gone)

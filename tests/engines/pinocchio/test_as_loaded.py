@@ -59,7 +59,7 @@ def test_joints_are_in_the_order_of_dynx(base: Base) -> None:
 def test_what_it_holds_comes_link_by_link(base: Base) -> None:
     held = held_as_in_the_file(LoadedPinocchio, forked(base, LOSSES))
     assert held.links["tool"].mass == BODY.mass
-    assert held.links["z"].fused == ("tool",)
+    assert held.links["z"].merged == ("tool",)
     assert held.links["z"].mass == 2 * BODY.mass
     joint = held.joints["z_joint"]
     assert (joint.effort, joint.damping, joint.friction) == (40.0, 0.5, 0.25)

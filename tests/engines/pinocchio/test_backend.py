@@ -286,7 +286,7 @@ def test_several_bodies_too_light_to_be_added_are_refused(first: str, moving: bo
     elif first == "nothing":
         PinocchioBackend(model)
         return
-    with pytest.raises(EngineLimitError, match=r"joined at '(second|turn)' weigh [12]e-20 kg together"):
+    with pytest.raises(EngineLimitError, match=r"merged at '(second|turn)' have [12]e-20 kg together"):
         PinocchioBackend(model)
 
 

@@ -71,7 +71,7 @@ def test_what_it_holds_comes_in_the_frames_of_the_file(base: Base) -> None:
         held = robot.describe()
     assert [row.part for row in model_difference(model, [held])] == ["gravity"]
     assert held.links["tool"].mass == BODY.mass
-    assert held.links["tool"].fused == ()
+    assert held.links["tool"].merged == ()
     assert (held.joints["a_joint"].type, held.joints["z_joint"].type) == ("prismatic", "continuous")
     assert held.joints["a_joint"].limits == (-0.3, 0.7)
     assert (held.joints["a_joint"].velocity, held.joints["a_joint"].effort) == (2.0, 9.0)
@@ -161,7 +161,7 @@ def test_clients_are_given_back() -> None:
     model = forked("floating")
     with loaded(LoadedPyBullet, model) as robot:
         assert isinstance(robot, LoadedPyBullet)
-        clients = [world._client for world in robot._worlds]
+        clients = [each._client for each in robot._clients]
         assert all(bullet.isConnected(client) for client in clients)
     assert not any(bullet.isConnected(client) for client in clients)
     with pytest.raises(EngineError, match="failed in"):

@@ -115,7 +115,7 @@ def test_a_full_tensor_is_diagonalised_to_a_millionth() -> None:
 
 def test_a_root_without_mass_is_nailed_to_the_world() -> None:
     with (
-        pytest.raises(EngineError, match="nails arm to the world: there its root 'root' has no mass"),
+        pytest.raises(EngineError, match="fixes arm to the world: there its root 'root' has no mass"),
         loaded(LoadedPyBullet, arm(root=NOTHING)),
     ):
         pass

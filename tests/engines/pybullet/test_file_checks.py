@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from dynx.engines.pybullet.as_loaded import LoadedPyBullet
-from dynx.engines.pybullet.file_checks import LONGEST_NAME, MAX_JOINTS, require_harmless
+from dynx.engines.pybullet.file_checks import MAX_JOINTS, MAX_NAME_LENGTH, require_harmless
 from dynx.errors import EngineError
 from dynx.model import Joint, Link, Model
 from tests.backends.robots import chain
@@ -23,7 +23,7 @@ CHANGES: dict[str, Callable[[str], str]] = {
     "'%n', has a %": lambda text: text.replace("link2", "%n"),
     "'a%sb', has a %": lambda text: text.replace("joint1", "a%sb"),
     "'100%', has a %": lambda text: text.replace('"chain"', '"100%"'),
-    f"has {LONGEST_NAME + 1} characters": lambda text: text.replace("joint1", "j" * (LONGEST_NAME + 1)),
+    f"has {MAX_NAME_LENGTH + 1} characters": lambda text: text.replace("joint1", "j" * (MAX_NAME_LENGTH + 1)),
     "has 600 characters": lambda text: text.replace("link1", "ü" * 600),
     "joint 'joint1' has no type": lambda text: text.replace('name="joint1" type="revolute"', 'name="joint1"'),
     "its <joint> elements are not those": lambda text: text.replace("joint1", "joint0"),
@@ -58,7 +58,7 @@ def test_what_is_no_file_is_not_handed_over(tmp_path: Path) -> None:
 
 
 def test_names_at_the_bound_are_loaded() -> None:
-    first, second, joint = "a" * LONGEST_NAME, "b" * LONGEST_NAME, "j" * LONGEST_NAME
+    first, second, joint = "a" * MAX_NAME_LENGTH, "b" * MAX_NAME_LENGTH, "j" * MAX_NAME_LENGTH
     model = Model.build("long", [Link(first), Link(second)], [Joint(joint, "revolute", first, second)])
     with loaded(LoadedPyBullet, model) as robot:
         assert robot.describe().links.keys() == {first, second}

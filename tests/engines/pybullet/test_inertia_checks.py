@@ -10,7 +10,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from dynx.engines.pybullet.inertia_checks import diagonalisation_error, read_by_bullet, tree_may_refuse
+from dynx.engines.pybullet.inertia_checks import bullet_reading, diagonalisation_error, tree_may_reject
 from dynx.engines.pybullet.library import bullet
 from dynx.engines.silence import silence
 from dynx.model.elements import Inertial, Pose
@@ -70,7 +70,7 @@ def engine(tmp_path_factory: pytest.TempPathFactory) -> Any:
 
 @given(inertial=bodies)
 def test_the_loader_is_replayed_to_the_last_bit(engine: Bullet, inertial: Inertial) -> None:
-    expected = read_by_bullet(inertial)
+    expected = bullet_reading(inertial)
     held = engine.moments(arm(inertial))
     assert list(held) == ([0.0] * 3 if expected.zeroed else expected.moments.tolist())
 
@@ -82,14 +82,14 @@ def test_what_the_tree_refuses_was_foreseen(
     # A point or a rod: the inertia about the origin has a moment of zero, or a sum of equal sides.
     inertial = Inertial(mass, Pose(center), ixx=moment, iyy=moment)
     if engine.refuses(arm(inertial)):
-        assert tree_may_refuse(inertial, welded=False)
+        assert tree_may_reject(inertial, on_fixed_joint=False)
 
 
 @settings(suppress_health_check=[HealthCheck.filter_too_much])
 @given(inertials("solid").map(lambda inertial: inertial or Inertial()))
 def test_a_solid_body_gives_no_cause(inertial: Inertial) -> None:
-    assert not read_by_bullet(inertial).zeroed
-    assert not tree_may_refuse(inertial, welded=False)
+    assert not bullet_reading(inertial).zeroed
+    assert not tree_may_reject(inertial, on_fixed_joint=False)
 
 
 def test_the_diagonalisation_is_roughest_where_moments_are_nearly_equal() -> None:

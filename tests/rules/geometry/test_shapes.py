@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dynx.model.elements import Pose
-from dynx.rules.geometry import welded_extents
+from dynx.rules.geometry import group_extents
 from dynx.rules.geometry.shapes import link_extent
 from dynx.spatial.scalar import Floats
 from tests.rules.documents import case_of, joint, link, visual
@@ -120,7 +120,7 @@ def test_the_shape_of_a_welded_link_counts_in_the_frame_of_the_link_with_the_mas
         joint("turn", "base", "arm"),
         joint("weld", "arm", "shell", '<origin xyz="0 0 2"/>', type="fixed"),
     )
-    ((found, extent),) = welded_extents(case)
+    ((found, extent),) = group_extents(case)
     assert found.name == "arm"
     low, high = extent.box()
     assert (low.tolist(), high.tolist()) == ([-0.5, -0.5, 1.5], [0.5, 0.5, 2.5])
@@ -132,4 +132,4 @@ def test_a_group_with_a_shape_that_cannot_be_known_is_left_out() -> None:
         SHELL.format(visual('<mesh filename="shell.stl"/>')),
         joint("weld", "base", "shell", type="fixed"),
     )
-    assert list(welded_extents(case)) == []
+    assert list(group_extents(case)) == []

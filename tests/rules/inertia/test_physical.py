@@ -9,7 +9,13 @@ from hypothesis import strategies as st
 
 from dynx.model.elements import Inertial, Pose
 from dynx.rules.inertia.central import CentralInertia
-from dynx.rules.inertia.physical import ENOUGH, clear_fault, lifted, nearest_moments, on_the_edge
+from dynx.rules.inertia.physical import (
+    ACCEPTED_MOMENT,
+    fault_beyond_rounding,
+    is_borderline,
+    nearest_moments,
+    with_raised_moments,
+)
 from dynx.testing.strategies import inertials
 
 EPS = float(np.finfo(float).eps)
@@ -31,8 +37,8 @@ def test_the_nearest_moments_are_the_projection_on_the_cone_of_bodies(wanted: np
 
 @given(inertials("solid").map(lambda inertial: inertial or Inertial()))
 def test_a_solid_body_has_no_fault_and_is_its_own_nearest(inertial: Inertial) -> None:
-    assert clear_fault(inertial) is None
-    assert not on_the_edge(inertial, root=False, welded=False)
+    assert fault_beyond_rounding(inertial) is None
+    assert not is_borderline(inertial, root=False, on_fixed_joint=False)
     moments = CentralInertia.of(inertial).moments()
     rounding = 16 * EPS * float(moments[2])
     np.testing.assert_allclose(nearest_moments(moments), moments, rtol=0, atol=rounding)
@@ -53,26 +59,26 @@ def test_only_what_is_more_than_rounding_is_a_fault(
     moments: tuple[float, float, float], fault: str | None
 ) -> None:
     x, y, z = moments
-    assert clear_fault(Inertial(1.0, ixx=x, iyy=y, izz=z)) == fault
-    assert clear_fault(Inertial(1.0, ixx=z, iyy=x, izz=y)) == fault
+    assert fault_beyond_rounding(Inertial(1.0, ixx=x, iyy=y, izz=z)) == fault
+    assert fault_beyond_rounding(Inertial(1.0, ixx=z, iyy=x, izz=y)) == fault
 
 
 def test_all_entries_alike_break_the_triangle_and_are_not_negative() -> None:
-    assert clear_fault(Inertial(1.0, Pose(), 1e-6, 1e-6, 1e-6, 1e-6, 1e-6, 1e-6)) == "triangle"
+    assert fault_beyond_rounding(Inertial(1.0, Pose(), 1e-6, 1e-6, 1e-6, 1e-6, 1e-6, 1e-6)) == "triangle"
 
 
 @given(inertials("physical").map(lambda inertial: inertial or Inertial()))
 def test_what_was_lifted_is_off_the_edge_and_less_than_can_be_seen_away(inertial: Inertial) -> None:
-    if not on_the_edge(inertial, root=False, welded=False):
+    if not is_borderline(inertial, root=False, on_fixed_joint=False):
         return
-    raised = lifted(inertial)
-    assert not on_the_edge(raised, root=False, welded=False)
+    raised = with_raised_moments(inertial)
+    assert not is_borderline(raised, root=False, on_fixed_joint=False)
     size = float(np.max(np.diagonal(CentralInertia.of(inertial).about_origin())))
     assert 0.0 < raised.ixx - inertial.ixx <= 64 * EPS * max(size, float(np.max(np.abs(inertial.tensor))))
 
 
 def test_a_floor_is_kept() -> None:
     rod = Inertial(1.0, ixx=0.1, iyy=0.1)
-    raised = lifted(rod, ENOUGH)
-    assert raised.izz >= ENOUGH
+    raised = with_raised_moments(rod, ACCEPTED_MOMENT)
+    assert raised.izz >= ACCEPTED_MOMENT
     assert raised.ixx - raised.iyy == 0.0
