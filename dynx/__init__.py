@@ -1,15 +1,15 @@
-"""dynx: one interface over several rigid-body engines, proven to give one answer.
+"""dynx: one interface over several rigid-body dynamics engines, with tests that they agree.
 
     import dynx
 
     model = dynx.load("ur5")                        # a path, URDF text, or a name (`dynx robots`)
     engine = dynx.backend("pinocchio", model)       # "pybullet", "mujoco", "drake", "reference"
     tau = engine.inverse_dynamics(q, v, a)
-    report = dynx.agree(model)                      # do all engines give the same answers?
-    report = dynx.diagnose("my.urdf")               # why do they differ when they load it themselves?
+    report = dynx.agree(model)                      # do all engines return the same numbers?
+    report = dynx.diagnose("my.urdf")               # why do they differ when they load the file themselves?
     rollout = dynx.simulate(model, controller, reference, plant="pybullet")
 
-Importing dynx imports no engine; each name below is imported when it is first used.
+Importing dynx imports no engine; each name is imported when it is first used.
 """
 
 from __future__ import annotations

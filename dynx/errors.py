@@ -1,32 +1,32 @@
-"""Every exception dynx raises, and how each one finds the nearest right name.
+"""Every exception that dynx raises, and the text of its messages.
 
     DynxError
     |- ModelError                   the robot description cannot be used
     |  |- DescriptionError          malformed or contradictory file (source and line)
     |  |- UnsupportedFeatureError   legal, but a feature dynx refuses by name
     |  `- RobotNotFoundError        no such file or library name
-    |- ArgumentError                a call that cannot be answered
+    |- ArgumentError                an argument cannot be used
     |  |- ShapeError                wrong shape
     |  |- DTypeError                not real numbers
-    |  |- NotFiniteError            NaN or infinity where a number is needed
+    |  |- NotFiniteError            NaN or infinity where a finite number is needed
     |  |- UnknownNameError          no such frame, joint, reference, ...
-    |  `- GainError                 gains that are no gains (negative, of the wrong length)
+    |  `- GainError                 invalid gains (negative, of the wrong length)
     |- BackendError                 an engine cannot be used
     |  |- UnknownBackendError       no backend of that name is registered
-    |  |- NotInstalledError         a package is missing (says which extra brings it)
+    |  |- NotInstalledError         a package is missing (names the extra that installs it)
     |  |- EngineLimitError          the model is larger than the engine can hold
     |  |- EngineError               the engine failed; its own exception is ``__cause__``
     |  `- ClosedError               the backend was closed
-    |- TrajectoryError              no such motion exists (where along it)
-    |  `- LimitError                a motion breaks limits of the model (each of them)
-    |- SimulationError              a rollout ended early (time, step, state, what was computed)
-    |  |- DivergedError             the state grew beyond all bounds
-    |  `- ControlError              a controller gave no torque that can be applied
-    |- SingularMassMatrixError      forward dynamics has no unique answer
-    `- CompileError                 the SIMD compiler cannot do what it was asked
-       `- TraceError                traced code asks for a value that is not known yet
+    |- TrajectoryError              the motion does not exist (and where along it)
+    |  `- LimitError                a motion violates limits of the model (lists each)
+    |- SimulationError              a rollout ended early (time, step, state, results so far)
+    |  |- DivergedError             the state is not finite, or too fast to be meaningful
+    |  `- ControlError              a controller returned an invalid torque
+    |- SingularMassMatrixError      forward dynamics has no unique solution
+    `- CompileError                 the SIMD compiler cannot compile a program
+       `- TraceError                traced code branches on or converts a symbol
 
-No other exception reaches a caller because of his input; anything else is a defect of dynx.
+Input of a caller never raises another exception; any other is a defect of dynx.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ class NotFiniteError(ArgumentError):
 
 
 class UnknownNameError(ArgumentError, LookupError):
-    """A name that is not there; the message offers the nearest that is."""
+    """A name that does not exist; the message offers the nearest one."""
 
 
 class GainError(ArgumentError):
@@ -102,11 +102,11 @@ class UnknownBackendError(BackendError, LookupError):
 
 
 class NotInstalledError(BackendError, ImportError):
-    """A package is missing; the message says which extra of dynx brings it."""
+    """A package is missing; the message names the extra of dynx that installs it."""
 
 
 class EngineLimitError(BackendError):
-    """The model is larger than the engine can hold without a wrong answer or a crash."""
+    """The model is larger than the engine supports without a wrong result or a crash."""
 
 
 class EngineError(BackendError):
@@ -118,7 +118,7 @@ class ClosedError(BackendError):
 
 
 class TrajectoryError(DynxError, ValueError):
-    """No motion does what was asked; `at` is how far along the path it fails (0 to 1), where known."""
+    """The motion does not exist; `at` is where along the path it fails (0 to 1), or None."""
 
     def __init__(self, message: str, *, at: float | None = None) -> None:
         self.message = message
@@ -130,7 +130,7 @@ class TrajectoryError(DynxError, ValueError):
 
 
 class LimitViolation(NamedTuple):
-    """A limit that a motion breaks: which, when it does so most, the value then, and what is allowed."""
+    """A limit that a motion violates: the time [s] of its largest excess, the value there, and the limit."""
 
     joint: str
     quantity: Literal["position", "velocity", "effort"]
@@ -146,7 +146,7 @@ class LimitViolation(NamedTuple):
 
 
 class LimitError(TrajectoryError):
-    """A motion breaks limits of the model; `violations` has every one, by joint."""
+    """A motion violates limits of the model; `violations` has one entry per joint and quantity."""
 
     def __init__(self, message: str, violations: Iterable[LimitViolation] = ()) -> None:
         self.violations = tuple(violations)
@@ -159,7 +159,7 @@ class LimitError(TrajectoryError):
 class SimulationError(DynxError, RuntimeError):
     """A rollout ended at `time` [s], after `step` steps, in `state` (q, v).
 
-    `rollout` holds what was computed until then (a `dynx.Rollout`; None after unpickling).
+    `rollout` has the results so far (a `dynx.Rollout`; None after unpickling).
     """
 
     def __init__(
@@ -177,11 +177,11 @@ class SimulationError(DynxError, RuntimeError):
 
 
 class DivergedError(SimulationError, ArithmeticError):
-    """The state is no longer finite, or so fast that nothing can be learnt from it."""
+    """The state is no longer finite, or too fast to be meaningful."""
 
 
 class ControlError(SimulationError):
-    """A controller gave a torque that is not finite, or not of the robot's size."""
+    """A controller returned a torque that is not finite, or has not one entry for each coordinate of v."""
 
 
 class SingularMassMatrixError(DynxError, ArithmeticError):
@@ -189,34 +189,34 @@ class SingularMassMatrixError(DynxError, ArithmeticError):
 
 
 class CompileError(DynxError, RuntimeError):
-    """The SIMD compiler cannot do what it was asked."""
+    """The SIMD compiler cannot compile a program."""
 
 
 class TraceError(CompileError, TypeError):
-    """Traced code asks for the value of a symbol (by a branch, a comparison or a conversion)."""
+    """Traced code needs the value of a symbol (in a branch, a comparison or a conversion)."""
 
 
 def located(message: str, source: str | None, line: int | None) -> str:
-    """Prefix `message` with ``source:line`` as compilers do."""
+    """Prefix `message` with ``source:line``, as compilers do."""
     if source is None:
         return message if line is None else f"line {line}: {message}"
     return f"{source}: {message}" if line is None else f"{source}:{line}: {message}"
 
 
 def shown(text: object, limit: int = 80) -> str:
-    """`text` quoted, control characters escaped and long text cut, for use in a message."""
+    """Quote `text` for a message, with control characters escaped and at most `limit` characters."""
     quoted = repr(str(text))
     return quoted if len(quoted) <= limit else f"{quoted[: limit - 20]}...' ({len(str(text))} characters)"
 
 
 def escaped(text: object, limit: int = 80) -> str:
-    """As `shown`, without the quotes: for a tag in angle brackets, or somebody else's sentence."""
+    """Escape and shorten `text` as `shown` does, without quotes: for a tag, or a message of an engine."""
     inside = repr(str(text))[1:-1]
     return inside if len(inside) <= limit else f"{inside[: limit - 20]}... ({len(str(text))} characters)"
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
-    """A clause such as ``; did you mean 'tool0'?`` or, for a short list, all that is known."""
+    """Make a clause such as ``; did you mean 'tool0'?`` or, without a near name, the known names."""
     names = list(known)
     if len(name) <= 200:
         lowered = {known_name.lower(): known_name for known_name in reversed(names)}
@@ -247,9 +247,9 @@ def _rebuild_simulation_error(
 
 
 TRACEBACK_VARIABLE = "DYNX_TRACEBACK"
-"""Set to anything but 0 or nothing, this environment variable shows where an error was raised."""
+"""Environment variable that prints the traceback of errors, unless it is empty or 0."""
 
 
 def traceback_wanted() -> bool:
-    """Whether `TRACEBACK_VARIABLE` asks for tracebacks."""
+    """Whether `TRACEBACK_VARIABLE` turns tracebacks on."""
     return os.environ.get(TRACEBACK_VARIABLE, "0") not in ("", "0")
