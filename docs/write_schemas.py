@@ -18,6 +18,7 @@ from dynx.cli.sim.document_types import SimDocument, TutorialDocument
 from dynx.doctor.formats.baseline import BaselineDocument
 from dynx.doctor.report import DoctorDocument
 from dynx.files.documents import json_schema
+from dynx.sim.scenario.document_type import ScenarioDocument
 
 FOLDER = Path(__file__).with_name("schemas")
 
@@ -29,6 +30,7 @@ def schemas() -> dict[str, dict[str, Any]]:
         "baseline": json_schema(BaselineDocument, "dynx doctor --write-baseline", omits_defaults=True),
         "bench": json_schema(BenchDocument, "dynx bench --json"),
         "doctor": json_schema(DoctorDocument, "dynx doctor --json"),
+        "scenario": json_schema(ScenarioDocument, "dynx.Scenario.to_json"),
         "sim": json_schema(SimDocument, "dynx sim --json"),
         "tutorial": json_schema(TutorialDocument, "dynx sim --tutorial --json"),
     }

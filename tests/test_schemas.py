@@ -8,6 +8,7 @@ import runpy
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 from jsonschema import Draft202012Validator
@@ -15,10 +16,14 @@ from jsonschema import Draft202012Validator
 from dynx import agree, diagnose, load
 from dynx.agreement import refused_report, results_document
 from dynx.cli.shell.main import cli
+from dynx.control import PD
 from dynx.doctor import results_document as doctor_document
 from dynx.doctor.formats.baseline import baseline_document
 from dynx.errors import DescriptionError
 from dynx.files.documents import json_text
+from dynx.sim import Noise, Payload, Push
+from dynx.sim.scenario.scenario import Scenario
+from dynx.trajectory import cycloidal
 from tests.doctor.formats.reports import alike, differing, hostile, refused
 
 DOCS = Path(__file__).parents[1] / "docs"
@@ -93,6 +98,31 @@ def test_documents_of_commands_keep_their_schema(name: str, arguments: list[str]
     result = CliRunner().invoke(cli, [*arguments, "--json"])
     assert result.exit_code == code, result.output
     assert errors(name, json.loads(result.stdout)) == []
+
+
+def test_documents_of_scenarios_keep_their_schema() -> None:
+    model = load("double_pendulum")
+    tip = model.links[-1].name
+    rest = np.zeros(model.nv)
+    scenarios = [
+        Scenario(model),
+        Scenario(
+            model,
+            PD(model, kp=1.0, kd=0.1),
+            cycloidal(rest, rest + 1.0, duration=1.0),
+            q0=rest,
+            noise=Noise(q=1e-3),
+            damping=True,
+            armature=[0.1, 0.2],
+            friction=0.5,
+            payload=Payload(tip, 2.0),
+            mass_scale={tip: 1.1},
+            pushes=[Push(tip, rest.tolist() * 3, start=0.1, duration=0.1)],
+        ),
+    ]
+    for scenario in scenarios:
+        assert errors("scenario", json.loads(scenario.to_json())) == []
+        assert set(SCHEMAS["scenario"]["$defs"]["ScenarioDocument"]["properties"]) == set(scenario.to_dict())
 
 
 def test_a_key_too_few_or_too_many_is_an_error_wherever_it_is() -> None:
