@@ -78,7 +78,7 @@ class Evaluation:
         self, hook: Callable[..., Any], shape: tuple[int, ...], samples: list[Floats], args: tuple[Any, ...]
     ) -> Floats:
         batch = samples[0].shape[:-1]
-        flat = [np.ascontiguousarray(x).reshape(prod(batch), x.shape[-1]) for x in samples]
+        flat = [batch_rows(np.ascontiguousarray(x), batch) for x in samples]
         result = np.empty((prod(batch), *shape[len(batch) :]))
         for k, sample in enumerate(zip(*flat, strict=True)):
             result[k] = hook(*sample, *args)
@@ -95,3 +95,13 @@ def common_batch(q: Floats, *others: Floats) -> tuple[int, ...]:
     except ValueError:
         shapes = ", ".join(str(array.shape) for array in (q, *others))
         raise ShapeError(f"the leading axes of {shapes} do not broadcast") from None
+
+
+def batch_rows(array: Floats, batch: tuple[int, ...]) -> Floats:
+    """The rows (n, size) of an array (..., size) broadcast to a batch of n, as a view where there is one."""
+    if array.shape[:-1] == batch:
+        return array.reshape(prod(batch), array.shape[-1])
+    if array.ndim == 1:
+        # One sample for the whole batch is not copied.
+        return np.broadcast_to(array, (prod(batch), *array.shape))
+    return np.broadcast_to(array, (*batch, array.shape[-1])).reshape(prod(batch), array.shape[-1])

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from dynx.backends.quantities import QUANTITIES
-from dynx.compiled.kernels import compiles, evaluated, tidied
+from dynx.compiled.kernels import compiles, evaluate_quantity
+from dynx.compiled.simplification import simplify_mechanism
 from dynx.model import Model
 from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED
 from dynx.simd.program import Program
@@ -62,7 +63,7 @@ def program_of(model: Model, quantity: str, frame: str) -> Program | None:
 
     None where that backend evaluates the quantity by NumPy, since its code would be too long.
     """
-    mechanism, number = tidied(model.mechanism), model.frame_index(frame)
+    mechanism, number = simplify_mechanism(model.mechanism), model.frame_index(frame)
     described = QUANTITIES[quantity]
     name, details = quantity, described.implied_details(model)
     if described.of_frame:
@@ -74,4 +75,4 @@ def program_of(model: Model, quantity: str, frame: str) -> Program | None:
     inputs: dict[str, tuple[int, ...]] = {
         argument: (model.nq if argument == "q" else model.nv,) for argument in described.arguments
     }
-    return trace(lambda **arguments: evaluated(mechanism, name, details, *arguments.values()), inputs)
+    return trace(lambda **arguments: evaluate_quantity(mechanism, name, details, *arguments.values()), inputs)

@@ -1,8 +1,8 @@
 """Checks of batches without temporary arrays.
 
-The base looks at every entry several times and makes arrays of what it sees, which costs more than a
-kernel does. The largest and the smallest entry say of all at once that they are finite and not too
-large; only if they are not does the base look, and say which one.
+The checks of the base make several passes and temporary arrays, which takes longer than a kernel. Here the
+largest and the smallest entry show at once whether all are finite and not too large; only if they do not are
+the checks of the base made, which name the wrong entry.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from dynx.errors import ClosedError
 from dynx.model.configuration import MAX_MAGNITUDE, UNIT_NORM_TOLERANCE
 from dynx.spatial.scalar import Floats
 
-_SHORT = 64
-"""Numbers that Python's own loop over a list adds faster than NumPy."""
+_MAX_LIST_SIZE = 64
+"""Size up to which a C loop over a Python list is faster than NumPy."""
 
-_FINITE = 1e300
-"""No acceleration of a robot is larger; the base decides about one that is."""
+_MAX_ACCELERATION = 1e300
+"""Bound above which the base checks accelerations one by one."""
 
 
 class BatchArguments(Arguments):
-    """`Arguments` for a backend that is asked for batches."""
+    """`Arguments` with fast checks of batches."""
 
     def refuse_closed(self) -> None:
         """Raise ClosedError if the backend was closed."""
@@ -53,8 +53,8 @@ class BatchArguments(Arguments):
         return super().v(v, name)
 
     def finite_acceleration(self, a: Floats) -> Floats:
-        """What forward dynamics found, unless the mass matrix was singular there."""
-        if _below(a, _FINITE):
+        """The result of forward dynamics; raises SingularMassMatrixError where it is not finite."""
+        if _below(a, _MAX_ACCELERATION):
             return a
         return super().finite_acceleration(a)
 
@@ -70,8 +70,8 @@ def _is_batch(array: Any, shape: tuple[int]) -> bool:
 
 
 def _below(array: Floats, bound: float) -> bool:
-    """Whether every entry is a number below `bound` in size."""
-    if array.size < _SHORT:
+    """Whether every entry is a number of magnitude below `bound`."""
+    if array.size < _MAX_LIST_SIZE:
         return hypot(*array.reshape(-1).tolist()) < bound
-    # NaN is the largest as well as the smallest, and below nothing.
+    # With a NaN both are NaN, and both comparisons are false.
     return bool(np.max(array) < bound and np.min(array) > -bound)

@@ -1,9 +1,9 @@
 """The backend `compiled`: `dynx.rbd` traced for one robot and compiled for this processor.
 
-Every quantity becomes a kernel when it is first asked for, with the robot's constants folded in
+Every quantity becomes a kernel when it is first needed, with the robot's constants folded in
 (`dynx.compiled.kernels`; one kernel serves many frames, see `dynx.compiled.frames`).
-Batches are evaluated several samples at a time and on several threads. What was compiled once is found
-in a cache afterwards (`dynx.simd.cache`).
+Batches are evaluated several samples at a time and on several threads. Compiled kernels are
+kept in a cache (`dynx.simd.cache`).
 
 Safe to use from several threads, which may share one backend and its kernels.
 """
@@ -21,17 +21,16 @@ from dynx.backends.base import Backend
 from dynx.backends.quantities import QUANTITIES, Quantity
 from dynx.backends.quantity_calls import Forces
 from dynx.compiled.arguments import BatchArguments
-from dynx.compiled.call import KernelCall, NumericCall, into
+from dynx.compiled.call import KernelCall, NumericCall, write_into
 from dynx.compiled.frames import chain_of, place_of
 from dynx.compiled.kernels import (
     ON_CHAINS,
     chain_kernel,
     compiles,
-    is_physical,
     kernel_quantity,
     quantity_kernel,
-    tidied,
 )
+from dynx.compiled.simplification import has_physical_inertias, simplify_mechanism
 from dynx.model import Model
 from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED
 from dynx.simd.image import COMPILE_LOCK
@@ -50,7 +49,7 @@ class CompiledBackend(Backend):
     are the same bit for bit whatever their number.
 
     `forward_kinematics`, `jacobian`, `inverse_dynamics`, `forward_dynamics` and `mass_matrix` take
-    `out`, a C-contiguous float64 array of the answer's shape, which they fill and return; what it
+    `out`, a C-contiguous float64 array of the shape of the result, which they fill and return; what it
     holds after an error is not defined.
     """
 
@@ -60,18 +59,18 @@ class CompiledBackend(Backend):
     _arguments: BatchArguments
 
     def __init__(self, model: Model, *, threads: int | None = None, validate: bool = True) -> None:
-        """Raises ArgumentError for a number of threads that is none."""
+        """Raises ArgumentError for an invalid number of threads."""
         super().__init__(model, validate=validate)
         self._options["threads"] = threads
         self._threads = checked_threads(threads)
         self._arguments = BatchArguments(model)
-        self._tidy = tidied(self._mechanism)
+        self._simplified = simplify_mechanism(self._mechanism)
         self._all_frames = tuple(range(len(self._frame_index)))
-        self._eliminates = self._straight or is_physical(self._mechanism)
+        self._eliminates = self._straight or has_physical_inertias(self._mechanism)
         self._calls: dict[object, Call] = {}
-        self._chains: dict[object, Kernel] = {}
-        # The same by what the caller says: names, before they are looked up and checked.
-        self._asked: dict[object, Call] = {}
+        self._chain_kernels: dict[object, Kernel] = {}
+        # The same by the arguments of public methods, names that are not looked up again.
+        self._public_calls: dict[object, Call] = {}
 
     @property
     def engine_version(self) -> str:
@@ -81,7 +80,7 @@ class CompiledBackend(Backend):
     def _release(self) -> None:
         # Calls that other threads are in keep their kernel until they end.
         with COMPILE_LOCK:
-            self._asked, self._calls, self._chains = {}, {}, {}
+            self._public_calls, self._calls, self._chain_kernels = {}, {}, {}
 
     # -- with `out` ---------------------------------------------------------------------------
 
@@ -91,17 +90,17 @@ class CompiledBackend(Backend):
         """T_world_frame (..., 4, 4); for several frames, or None for all, (..., n, 4, 4)."""
         if frame is not None and not isinstance(frame, str):
             names = self._arguments.frames(frame)
-            # Picked from all, as lists are many and a kernel for each would round in its own way.
+            # Taken from all frames: a kernel for each of many possible lists would round differently.
             of_all = self._call_for("frame_placements", self._all_frames)
-            return into(out, of_all(q)[..., [self._index(name) for name in names], :, :])
-        call = self._asked.get(("forward_kinematics", frame))
+            return write_into(out, of_all(q)[..., [self._index(name) for name in names], :, :])
+        call = self._public_calls.get(("forward_kinematics", frame))
         if call is None:
             self._arguments.refuse_closed()
             key = ("forward_kinematics", frame)
             if frame is None:
-                call = self._kept(key, "frame_placements", self._all_frames)
+                call = self._store_call(key, "frame_placements", self._all_frames)
             else:
-                call = self._kept(key, "frame_placement", (self._index(frame),))
+                call = self._store_call(key, "frame_placement", (self._index(frame),))
         return call(q, out=out)
 
     def jacobian(
@@ -115,13 +114,13 @@ class CompiledBackend(Backend):
     ) -> Floats:
         """J (..., 6, nv) with J v the velocity of `frame`, linear [m/s] then angular [rad/s]."""
         if point is not None:
-            return into(out, super().jacobian(q, frame, reference=reference, point=point))
+            return write_into(out, super().jacobian(q, frame, reference=reference, point=point))
         try:
-            call = self._asked["jacobian", frame, reference]
+            call = self._public_calls["jacobian", frame, reference]
         except (KeyError, TypeError):
             self._arguments.refuse_closed()
             axes = self._arguments.reference(reference)
-            call = self._kept(("jacobian", frame, reference), "jacobian", (self._index(frame), axes))
+            call = self._store_call(("jacobian", frame, reference), "jacobian", (self._index(frame), axes))
         return call(q, out=out)
 
     def inverse_dynamics(
@@ -137,9 +136,9 @@ class CompiledBackend(Backend):
     ) -> Floats:
         """The torque tau (..., nv) that gives acceleration `a`: M a + bias - J' external forces."""
         if external_forces is None and not joint_dynamics:
-            call = self._asked.get("inverse_dynamics")
+            call = self._public_calls.get("inverse_dynamics")
             if call is None:
-                call = self._named("inverse_dynamics")
+                call = self._call_by_name("inverse_dynamics")
             return call(q, v, a, out)
         tau = super().inverse_dynamics(
             q,
@@ -149,7 +148,7 @@ class CompiledBackend(Backend):
             force_reference=force_reference,
             joint_dynamics=joint_dynamics,
         )
-        return into(out, tau)
+        return write_into(out, tau)
 
     def forward_dynamics(
         self,
@@ -167,11 +166,11 @@ class CompiledBackend(Backend):
         Raises SingularMassMatrixError, which names the joints, where a joint moves no inertia.
         """
         if external_forces is None and not joint_dynamics and self._eliminates:
-            call = self._asked.get("forward_dynamics")
+            call = self._public_calls.get("forward_dynamics")
             if call is None:
                 self._arguments.refuse_closed()
                 self._solvability.refuse_singular(joint_dynamics)
-                call = self._named("forward_dynamics")
+                call = self._call_by_name("forward_dynamics")
             return call(q, v, tau, out)
         a = super().forward_dynamics(
             q,
@@ -181,13 +180,13 @@ class CompiledBackend(Backend):
             force_reference=force_reference,
             joint_dynamics=joint_dynamics,
         )
-        return into(out, a)
+        return write_into(out, a)
 
     def mass_matrix(self, q: ArrayLike, *, joint_dynamics: bool = False, out: Floats | None = None) -> Floats:
         """M (..., nv, nv), symmetric."""
-        call = self._asked.get("mass_matrix")
+        call = self._public_calls.get("mass_matrix")
         if call is None:
-            call = self._named("mass_matrix")
+            call = self._call_by_name("mass_matrix")
         M = call(q, out=out)
         if joint_dynamics:
             M += self._joint_terms.rotors
@@ -199,53 +198,56 @@ class CompiledBackend(Backend):
         """By a kernel in model coordinates, into which mimic joints are compiled."""
         return self._call_for(name, details or QUANTITIES[name].implied_details(self.model))(q, *rates)
 
-    def _named(self, quantity: str) -> Call:
-        """A quantity without details, kept under its name."""
+    def _call_by_name(self, quantity: str) -> Call:
+        """The call of a quantity without details, stored under its name."""
         self._arguments.refuse_closed()
-        return self._kept(quantity, quantity)
+        return self._store_call(quantity, quantity)
 
-    def _kept(self, key: object, quantity: str, details: tuple[Any, ...] = ()) -> Call:
-        """How a quantity is answered, to be found under `key` the next time."""
+    def _store_call(self, key: object, quantity: str, details: tuple[Any, ...] = ()) -> Call:
+        """The call of a quantity, stored under `key`."""
         call = self._call_for(quantity, details)
         with COMPILE_LOCK:
             self._arguments.refuse_closed()
-            self._asked[key] = call
+            self._public_calls[key] = call
         return call
 
     def _call_for(self, quantity: str, details: tuple[Any, ...] = (), *, tree: bool = False) -> Call:
-        """How a quantity is answered, compiled if it was not asked for before."""
+        """The call of a quantity, whose kernel is compiled the first time."""
         tree = tree and not self._straight
         key = (quantity, details, tree)
         call = self._calls.get(key)
         if call is None:
-            # The lock that a fork waits for: a child must not find it taken.
+            # A fork waits for this lock, so that a child does not find it taken.
             with COMPILE_LOCK:
                 self._arguments.refuse_closed()
                 call = self._calls.get(key)
                 if call is None:
-                    call = self._calls[key] = self._made(quantity, details, tree)
+                    call = self._calls[key] = self._make_call(quantity, details, tree)
         return call
 
-    def _made(self, quantity: str, details: tuple[Any, ...], tree: bool) -> Call:
+    def _make_call(self, quantity: str, details: tuple[Any, ...], tree: bool) -> Call:
         described = kernel_quantity(quantity)
         checks = tuple(self._check(argument, tree) for argument in described.arguments)
-        refuse = self._arguments.finite_acceleration if described.solves and not tree else None
-        if not compiles(self._tidy, quantity):
-            return NumericCall(self._tidy, quantity, details, checks, tree=tree, refuse=refuse).answer
+        check_result = self._arguments.finite_acceleration if described.solves and not tree else None
+        if not compiles(self._simplified, quantity):
+            numeric = NumericCall(
+                self._simplified, quantity, details, checks, tree=tree, check_result=check_result
+            )
+            return numeric.evaluate
         options: dict[str, Any] = {
             "threads": self._threads,
             "validate": self._validate and not tree,
-            "refuse": refuse,
+            "check_result": check_result,
         }
         if quantity not in ON_CHAINS:
-            kernel = quantity_kernel(self._tidy, quantity, details, tree=tree)
-            return KernelCall(kernel, checks, **options).answer
-        chain = chain_of(self._tidy, quantity, *details)
+            kernel = quantity_kernel(self._simplified, quantity, details, tree=tree)
+            return KernelCall(kernel, checks, **options).evaluate
+        chain = chain_of(self._simplified, quantity, *details)
         key = (quantity, chain, tree)
-        if key not in self._chains:
-            self._chains[key] = chain_kernel(self._tidy, quantity, chain, tree=tree)
-        place = place_of(self._tidy, chain, *details)
-        return KernelCall(self._chains[key], checks, place=place, **options).answer
+        if key not in self._chain_kernels:
+            self._chain_kernels[key] = chain_kernel(self._simplified, quantity, chain, tree=tree)
+        place = place_of(self._simplified, chain, *details)
+        return KernelCall(self._chain_kernels[key], checks, place=place, **options).evaluate
 
     def _check(self, argument: str, tree: bool) -> Callable[[Any], Floats]:
         if tree:

@@ -1,4 +1,4 @@
-"""From arguments with any leading axes to a kernel, and its answer back in their shape.
+"""Calls of kernels with arguments of any leading axes, whose results have the same leading axes.
 
 One sample is copied into a workspace, evaluated and copied out, which together costs about a
 microsecond. A batch is read where it lies.
@@ -12,54 +12,54 @@ from typing import Any
 
 import numpy as np
 
-from dynx.backends.evaluation import common_batch
-from dynx.compiled.kernels import MAX_DEFECT, evaluated, kernel_quantity
+from dynx.backends.evaluation import batch_rows, common_batch
+from dynx.compiled.kernels import MAX_DEFECT, evaluate_quantity, kernel_quantity
 from dynx.errors import ArgumentError, DTypeError, ShapeError
 from dynx.model import Mechanism
 from dynx.simd.kernel import Kernel, Workspace
 from dynx.spatial.scalar import Floats
 
 Check = Callable[..., Floats]
-"""Turns what a user passed into a float64 array (..., size) or raises: slow, and says what is wrong."""
+"""Converts an argument to a float64 array (..., size), or raises an error that says what is wrong with it."""
 
-FEW = 256
-"""Most samples that are copied rather than read where they lie, which saves looking up addresses."""
+MAX_COPIED_SAMPLES = 256
+"""Largest batch that is copied to the workspace; for more, looking up the addresses of arrays is faster."""
 
-FEW_NUMBERS = 16384
-"""Most numbers in one array of such samples."""
+MAX_COPIED_SIZE = 16384
+"""Largest size of one array of such a batch."""
 
 _FLOAT64 = np.dtype(np.float64)
 _ABSENT = object()
 
-_ODD = (TypeError, ValueError, NotImplementedError, BufferError)
-"""What a memory view raises for something that is not one sample of float64."""
+_NOT_ONE_SAMPLE = (TypeError, ValueError, NotImplementedError, BufferError)
+"""Exceptions of a memory view for anything but one sample of float64."""
 
 
 class KernelCall:
-    """A quantity of one robot, asked with arguments of any leading axes.
+    """A quantity of one robot, evaluated by its kernel.
 
-    `checks` are those of the arguments, in their order. The kernel says whether arguments are sound;
-    only if they are not, or no float64 arrays, do the checks look at them. `place`, if given, is what
-    the kernel takes after the arguments, for all samples alike. `refuse` raises for answers that are
-    none; it is asked where the kernel found something and arguments are not to blame.
+    `checks` are those of the arguments, in their order. They are called only for arguments that are no
+    float64 arrays, or whose defect shows an invalid sample. `place`, if given, is a last input of the kernel,
+    the same for all samples. `check_result` raises for results that are not finite; it is called where the
+    defect is too large although the arguments are valid.
     """
 
     __slots__ = (
+        "_check_result",
         "_checks",
         "_defect",
-        "_few",
         "_first",
         "_kernel",
+        "_max_rows",
         "_place",
-        "_refuse",
-        "_rooms",
         "_second",
         "_shape",
         "_sizes",
         "_third",
         "_threads",
-        "_trusting",
+        "_unchecked",
         "_validate",
+        "_workspaces",
     )
 
     def __init__(
@@ -70,80 +70,80 @@ class KernelCall:
         threads: int,
         validate: bool,
         place: Floats | None = None,
-        refuse: Check | None = None,
+        check_result: Check | None = None,
     ) -> None:
         self._kernel, self._checks, self._threads, self._validate = kernel, checks, threads, validate
-        self._place, self._refuse = place, refuse
-        self._trusting = not validate and refuse is None
+        self._place, self._check_result = place, check_result
+        self._unchecked = not validate and check_result is None
         self._sizes = [port.size for port in kernel.inputs[: len(checks)]]
         self._shape = kernel.outputs[0].shape
         largest = max(port.size for port in (*kernel.inputs, *kernel.outputs))
-        self._few = min(FEW, max(1, FEW_NUMBERS // largest))
-        room = self._room()
-        self._first, self._second, self._third = (*room.input_slices, slice(0), slice(0))[:3]
-        self._defect = room.output_slices[1].start
-        # Taken and given back, rather than one for each thread: also safe where a signal handler or a
-        # destructor calls in the middle of a call.
-        self._rooms = [room]
+        self._max_rows = min(MAX_COPIED_SAMPLES, max(1, MAX_COPIED_SIZE // largest))
+        workspace = self._workspace()
+        self._first, self._second, self._third = (*workspace.input_slices, slice(0), slice(0))[:3]
+        self._defect = workspace.output_slices[1].start
+        # A list that calls pop from and append to, rather than one workspace for each thread: this is safe
+        # even where a signal handler or a destructor calls in the middle of a call.
+        self._workspaces = [workspace]
 
-    def answer(self, q: Any, v: Any = _ABSENT, a: Any = _ABSENT, out: Floats | None = None) -> Floats:
-        """The answer (..., *shape), in `out` if that is given.
+    def evaluate(self, q: Any, v: Any = _ABSENT, a: Any = _ABSENT, out: Floats | None = None) -> Floats:
+        """The result (..., *shape), in `out` if that is given.
 
-        `out` is a C-contiguous float64 array of the answer's shape; what it holds after an error is
+        `out` is a C-contiguous float64 array of the shape of the result; what it holds after an error is
         not defined. Raises ShapeError, DTypeError or ArgumentError.
         """
         try:
-            room = self._rooms.pop()
+            workspace = self._workspaces.pop()
         except IndexError:
-            room = self._room()
-        numbers = room.inputs
+            workspace = self._workspace()
+        numbers = workspace.inputs
         try:
             numbers[self._first] = q
             if v is not _ABSENT:
                 numbers[self._second] = v
             if a is not _ABSENT:
                 numbers[self._third] = a
-        except _ODD:
-            return self._rows_answered(room, tuple(x for x in (q, v, a) if x is not _ABSENT), out)
-        room.run()
-        if room.output_values[self._defect] < MAX_DEFECT or self._trusting:
+        except _NOT_ONE_SAMPLE:
+            return self._evaluate_rows(workspace, tuple(x for x in (q, v, a) if x is not _ABSENT), out)
+        workspace.run()
+        if workspace.output_values[self._defect] < MAX_DEFECT or self._unchecked:
             if out is None:
-                out = room.results[0].copy()
+                out = workspace.results[0].copy()
             else:
-                _checked_out(out, self._shape)[...] = room.results[0]
-            self._rooms.append(room)
+                _checked_out(out, self._shape)[...] = workspace.results[0]
+            self._workspaces.append(workspace)
             return out
-        self._rooms.append(room)
+        self._workspaces.append(workspace)
         return self._batch(tuple(x for x in (q, v, a) if x is not _ABSENT), out)
 
-    def _rows_answered(self, room: Workspace, arguments: tuple[Any, ...], out: Floats | None) -> Floats:
-        """A batch (n, size), by way of the workspace if it is small."""
+    def _evaluate_rows(self, workspace: Workspace, arguments: tuple[Any, ...], out: Floats | None) -> Floats:
+        """The results of a batch (n, size), copied to the workspace if it is small."""
         n = len(arguments[0]) if _is_float64(arguments[0], self._sizes[0]) else 0
-        few = 0 < n <= self._few
-        if few:
-            for rows, array, size in zip(room.input_rows, arguments, self._sizes, strict=False):
+        fits = 0 < n <= self._max_rows
+        if fits:
+            for rows, array, size in zip(workspace.input_rows, arguments, self._sizes, strict=False):
                 if not _is_float64(array, size) or array.shape != (n, size):
-                    few = False
+                    fits = False
                     break
                 rows[:n] = array
-        if few:
-            room.run_rows(n)
+        if fits:
+            workspace.run_rows(n)
             # Not negative, so that the sum is below the bound only if each is, and none is NaN.
-            if sum(room.output_rows[1][:n, 0].tolist()) < MAX_DEFECT or self._trusting:
+            if sum(workspace.output_rows[1][:n, 0].tolist()) < MAX_DEFECT or self._unchecked:
                 if out is None:
-                    out = room.output_rows[0][:n].copy()
+                    out = workspace.output_rows[0][:n].copy()
                 else:
-                    _checked_out(out, (n, *self._shape))[...] = room.output_rows[0][:n]
-                self._rooms.append(room)
+                    _checked_out(out, (n, *self._shape))[...] = workspace.output_rows[0][:n]
+                self._workspaces.append(workspace)
                 return out
-        self._rooms.append(room)
+        self._workspaces.append(workspace)
         return self._batch(arguments, out)
 
-    def _room(self) -> Workspace:
-        room = self._kernel.workspace(self._few)
+    def _workspace(self) -> Workspace:
+        workspace = self._kernel.workspace(self._max_rows)
         if self._place is not None:
-            room.input_rows[-1][...] = self._place
-        return room
+            workspace.input_rows[-1][...] = self._place
+        return workspace
 
     def _batch(self, arguments: tuple[Any, ...], out: Floats | None) -> Floats:
         arrays = [
@@ -152,40 +152,41 @@ class KernelCall:
         ]
         batch = common_batch(*arrays)
         shape = (*batch, *self._shape)
-        answer = np.empty(shape) if out is None else _checked_out(out, shape)
+        result = np.empty(shape) if out is None else _checked_out(out, shape)
         if out is not None and any(np.may_share_memory(out, array) for array in arrays):
-            # The arguments may be needed once more.
-            answer = np.empty(shape)
-        defect = self._evaluate(arrays, batch, answer)
-        if not self._trusting and not defect.max(initial=0.0) < MAX_DEFECT:
+            # The arguments are needed once more if they have to be checked.
+            result = np.empty(shape)
+        defect = self._evaluate(arrays, batch, result)
+        if not self._unchecked and not defect.max(initial=0.0) < MAX_DEFECT:
             if self._validate:
                 checked = [check(array) for array, check in zip(arrays, self._checks, strict=True)]
                 if any(new is not old for new, old in zip(checked, arrays, strict=True)):
-                    self._evaluate(checked, batch, answer)
-            # Unchecked numbers that are none give answers that are none, in their rows alone.
-            if self._refuse is not None and (self._validate or all(np.isfinite(x).all() for x in arrays)):
-                self._refuse(answer)
-        if out is None or answer is out:
-            return answer
-        out[...] = answer
+                    self._evaluate(checked, batch, result)
+            # Without validation an argument that is not finite spoils the results of its own sample only.
+            valid = self._validate or all(np.isfinite(x).all() for x in arrays)
+            if self._check_result is not None and valid:
+                self._check_result(result)
+        if out is None or result is out:
+            return result
+        out[...] = result
         return out
 
-    def _evaluate(self, arrays: list[Floats], batch: tuple[int, ...], answer: Floats) -> Floats:
+    def _evaluate(self, arrays: list[Floats], batch: tuple[int, ...], result: Floats) -> Floats:
         n = prod(batch)
         defect = np.empty((n, 1))
-        rows = [_rows(array, batch, n) for array in arrays]
+        rows = [batch_rows(array, batch) for array in arrays]
         if self._place is not None:
             rows.append(np.broadcast_to(self._place, (n, len(self._place))))
         self._kernel(
             rows,
-            [answer.reshape(n, prod(self._shape)), defect],
+            [result.reshape(n, prod(self._shape)), defect],
             threads=self._threads,
         )
         return defect
 
 
 class NumericCall:
-    """The same for a quantity that is not worth compiling: NumPy evaluates what would be traced."""
+    """A quantity that is not worth compiling, evaluated by NumPy; it has the interface of `KernelCall`."""
 
     def __init__(
         self,
@@ -195,35 +196,37 @@ class NumericCall:
         checks: tuple[Check, ...],
         *,
         tree: bool,
-        refuse: Check | None = None,
+        check_result: Check | None = None,
     ) -> None:
         self._mechanism, self._quantity, self._details = mechanism, quantity, details
-        self._checks, self._tree, self._refuse = checks, tree, refuse
+        self._checks, self._tree, self._check_result = checks, tree, check_result
 
-    def answer(self, q: Any, v: Any = _ABSENT, a: Any = _ABSENT, out: Floats | None = None) -> Floats:
-        """As `KernelCall.answer` does."""
+    def evaluate(self, q: Any, v: Any = _ABSENT, a: Any = _ABSENT, out: Floats | None = None) -> Floats:
+        """As `KernelCall.evaluate` does."""
         arguments = (x for x in (q, v, a) if x is not _ABSENT)
         arrays = [check(argument) for check, argument in zip(self._checks, arguments, strict=True)]
         batch = common_batch(*arrays)
         spread = [np.broadcast_to(array, (*batch, array.shape[-1])) for array in arrays]
-        # A configuration without an acceleration divides by zero; the caller sees it in the result.
+        # A singular mass matrix divides by zero; the result is then checked.
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            found = evaluated(self._mechanism, self._quantity, self._details, *spread, tree=self._tree)
-        # What no coordinate moves comes without the batch.
+            found = evaluate_quantity(
+                self._mechanism, self._quantity, self._details, *spread, tree=self._tree
+            )
+        # A result that no coordinate moves lacks the batch axes.
         own = len(kernel_quantity(self._quantity).shape)
         shape = (*batch, *found.shape[found.ndim - own :])
         whole = found.shape == shape and found.flags.c_contiguous and found.flags.writeable
-        answer = found if whole else np.array(np.broadcast_to(found, shape))
-        if self._refuse is not None:
-            self._refuse(answer)
-        return into(out, answer)
+        result = found if whole else np.array(np.broadcast_to(found, shape))
+        if self._check_result is not None:
+            self._check_result(result)
+        return write_into(out, result)
 
 
-def into(out: Floats | None, answer: Floats) -> Floats:
-    """`answer`, or `out` filled with it if that is given."""
+def write_into(out: Floats | None, result: Floats) -> Floats:
+    """`result`, or `out` filled with it if that is given."""
     if out is None:
-        return answer
-    _checked_out(out, answer.shape)[...] = answer
+        return result
+    _checked_out(out, result.shape)[...] = result
     return out
 
 
@@ -234,15 +237,6 @@ def _is_float64(argument: Any, size: int) -> bool:
         and argument.ndim > 0
         and argument.shape[-1] == size
     )
-
-
-def _rows(array: Floats, batch: tuple[int, ...], n: int) -> Floats:
-    """(n, size), a view wherever there is one: a sample for the whole batch is not copied."""
-    if array.shape[:-1] == batch:
-        return array.reshape(n, array.shape[-1])
-    if array.ndim == 1:
-        return np.broadcast_to(array, (n, *array.shape))
-    return np.broadcast_to(array, (*batch, array.shape[-1])).reshape(n, array.shape[-1])
 
 
 def _checked_out(out: Any, shape: tuple[int, ...]) -> Floats:

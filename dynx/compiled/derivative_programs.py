@@ -1,16 +1,15 @@
-"""Programs of derivatives: the graph of an algorithm of `dynx.rbd`, differentiated, for one mechanism."""
+"""Programs of derivatives for one mechanism: differentiated graphs of the algorithms of `dynx.rbd`."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from dynx.compiled.mass_factors import factors_of, filled_entries, solved
-from dynx.compiled.robot_kernel import argument_shapes, model_torque, tree_coordinates
+from dynx.compiled.kernels import evaluate_quantity
+from dynx.compiled.mass_factors import factorize_mass_matrix, filled_entries, solve_with_factors
+from dynx.compiled.model_coordinates import argument_shapes, reduce_columns, tree_coordinates
 from dynx.model import Mechanism
-from dynx.rbd import aba, kinematics, rnea
+from dynx.rbd import kinematics, rnea
 from dynx.rbd.base_parameters import regroup_inertias
-from dynx.rbd.crba import mass_matrix
-from dynx.rbd.linear import solve_positive_definite
 from dynx.simd.differentiate import differentiate
 from dynx.simd.inlining import inline
 from dynx.simd.program import Program
@@ -21,69 +20,63 @@ from dynx.spatial.se3 import homogeneous
 
 
 def inverse_dynamics_derivatives(mechanism: Mechanism) -> Program:
-    """Of q, v and a, with the outputs dtau_dq, dtau_dv and dtau_da, each (nv, nv)."""
+    """Program of q, v and a, with the outputs dtau_dq, dtau_dv and dtau_da, each (nv, nv)."""
     program = _differentiated_torque(mechanism)
-    return trace(lambda q, v, a: _torque_derivatives(program, q, v, a), argument_shapes(mechanism, "a"))
+    return trace(lambda q, v, a: _torque_derivatives(program, q, v, a), argument_shapes(mechanism, "qva"))
 
 
 def forward_dynamics_derivatives(mechanism: Mechanism) -> Program:
-    """Of q, v and tau, with the outputs da_dq, da_dv and da_dtau, each (nv, nv)."""
+    """Program of q, v and tau, with the outputs da_dq, da_dv and da_dtau, each (nv, nv)."""
     program = _differentiated_torque(mechanism)
 
-    def by_implicit_functions(q: Array, v: Array, tau: Array) -> dict[str, Array]:
+    def by_implicit_function_theorem(q: Array, v: Array, tau: Array) -> dict[str, Array]:
         # M does not depend on the acceleration, which is needed before the rest.
         still = np.zeros(len(v))
-        L, D = factors_of(mechanism, _torque_derivatives(program, q, v, still)["dtau_da"])
-        a = solved(L, D, tau - _torque(mechanism, q, v, still))
+        L, D = factorize_mass_matrix(mechanism, _torque_derivatives(program, q, v, still)["dtau_da"])
+        a = solve_with_factors(L, D, tau - _torque(mechanism, q, v, still))
         found = _torque_derivatives(program, q, v, a)
         by = {"da_dq": -found["dtau_dq"], "da_dv": -found["dtau_dv"], "da_dtau": np.eye(len(v), dtype=int)}
-        return {name: solved(L, D, side.T).T for name, side in by.items()}
+        return {name: solve_with_factors(L, D, side.T).T for name, side in by.items()}
 
-    return trace(by_implicit_functions, argument_shapes(mechanism, "tau"))
+    return trace(by_implicit_function_theorem, argument_shapes(mechanism, ("q", "v", "tau")))
 
 
 def factors_of_mass(mechanism: Mechanism) -> Program:
-    """Of M (nv, nv), with one output: what is not zero in the factors L and D of M."""
+    """Program of M (nv, nv), whose output are the entries of the factors L and D that are not zero."""
     nv, filled = filled_entries(mechanism)
 
     def factors(M: Array) -> Array:
-        L, D = factors_of(mechanism, M)
+        L, D = factorize_mass_matrix(mechanism, M)
         return np.array([np.asarray(x)[()] for x in (*(L[i][j] for i, j in filled), *D)], dtype=object)
 
     return trace(factors, {"M": (nv, nv)})
 
 
 def solution_by_factors(mechanism: Mechanism) -> Program:
-    """Of the output of `factors_of_mass` and of b (nv,), with the output M^-1 b."""
+    """Program of the output of `factors_of_mass` and of b (nv,), with the output M^-1 b."""
     nv, filled = filled_entries(mechanism)
 
     def solution(factors: Array, b: Array) -> Array:
         L = [[np.asarray(0.0)] * i for i in range(nv)]
         for (i, j), entry in zip(filled, factors, strict=False):
             L[i][j] = entry
-        return solved(L, list(factors[len(filled) :]), b)
+        return solve_with_factors(L, list(factors[len(filled) :]), b)
 
     return trace(solution, {"factors": (len(filled) + nv,), "b": (nv,)})
 
 
 def acceleration(mechanism: Mechanism) -> Program:
-    """Of q, v and tau, with the output a (nv,)."""
+    """Program of q, v and tau, with the output a (nv,)."""
 
     def found(q: Array, v: Array, tau: Array) -> Array:
-        coupling = mechanism.coupling
-        if coupling is None:
-            return aba.forward_dynamics(mechanism, q, v, tau)
-        # The inertia that the drivers feel is not that of a tree.
-        S = coupling.matrix()
-        M = S.T @ mass_matrix(mechanism, *tree_coordinates(mechanism, q)) @ S
-        return solve_positive_definite(M, tau - _torque(mechanism, q, v, np.zeros(len(v))))
+        return evaluate_quantity(mechanism, "forward_dynamics", (), q, v, tau)
 
-    return trace(found, argument_shapes(mechanism, "tau"))
+    return trace(found, argument_shapes(mechanism, ("q", "v", "tau")))
 
 
 def pose_derivative(mechanism: Mechanism, frame: int) -> Program:
-    """Of q, with the output dT_dq (4, 4, nv) for frame number `frame`."""
-    shapes = argument_shapes(mechanism, "a")
+    """Program of q, with the output dT_dq (4, 4, nv) for frame number `frame`."""
+    shapes = argument_shapes(mechanism, "qv")
 
     def pose(q: Array, d: Array) -> dict[str, Array]:
         (tree,) = tree_coordinates(mechanism, displace(q, d, floating=mechanism.floating))
@@ -97,25 +90,25 @@ def pose_derivative(mechanism: Mechanism, frame: int) -> Program:
 
 def _torque(mechanism: Mechanism, q: Array, v: Array, a: Array) -> Array:
     tau = rnea.inverse_dynamics(regroup_inertias(mechanism), *tree_coordinates(mechanism, q, v, a))
-    return model_torque(mechanism, tau)
+    return reduce_columns(mechanism, tau)
 
 
 def _differentiated_torque(mechanism: Mechanism) -> Program:
-    """Of q, a displacement d of it, v and a.
+    """Derivatives of the torque by a displacement d of q, by v and by a.
 
-    In reverse order, since every torque depends on more than there are torques.
+    In reverse mode, since there are more arguments than torques.
     """
 
     def torque(q: Array, d: Array, v: Array, a: Array) -> dict[str, Array]:
         return {"tau": _torque(mechanism, displace(q, d, floating=mechanism.floating), v, a)}
 
-    shapes = argument_shapes(mechanism, "a")
+    shapes = argument_shapes(mechanism, "qva")
     moved = {"q": shapes["q"], "d": shapes["v"], "v": shapes["v"], "a": shapes["a"]}
     return differentiate(trace(torque, moved), [("tau", x) for x in ("d", "v", "a")], order="reverse")
 
 
 def _torque_derivatives(program: Program, q: Array, v: Array, a: Array) -> dict[str, Array]:
-    """The outputs of `_differentiated_torque` at d = 0; M is computed once on either side."""
+    """The outputs of `_differentiated_torque` at d = 0; M is computed on one side of its diagonal only."""
     found = inline(program, {"q": q, "d": np.zeros(len(v)), "v": v, "a": a})
     M = np.array(found["dtau_da"])
     for i, j in zip(*np.triu_indices(len(M), 1), strict=True):

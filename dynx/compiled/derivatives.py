@@ -1,8 +1,8 @@
 """Derivatives of the dynamics and of poses, exact, compiled for one robot.
 
-They come from differentiating the graph of the algorithm itself (`dynx.simd.differentiate`), so there is
-no step to choose and no second text that could differ from the first. With mimic joints the derivative
-is that of the reduced robot.
+The graph of the algorithm itself is differentiated (`dynx.simd.differentiate`), so there is no step to choose
+and no second source that could differ from the first. With mimic joints the derivative is that of the reduced
+robot.
 
 Forward dynamics is differentiated by the implicit function theorem: at a = FD(q, v, tau) the torque
 ID(q, v, a) stays tau, so
@@ -26,25 +26,25 @@ from dynx.backends.arguments import Arguments
 from dynx.backends.registry import refuse_other_than_model
 from dynx.backends.solvability import Solvability
 from dynx.compiled import derivative_programs as programs
-from dynx.compiled.kernels import tidied
-from dynx.compiled.robot_kernel import evaluated, robot_kernel
+from dynx.compiled.robot_kernel import evaluate_kernel, robot_kernel
+from dynx.compiled.simplification import simplify_mechanism
 from dynx.model import Mechanism, Model
 from dynx.simd.kernel import Kernel
 from dynx.simd.program import Program
 from dynx.simd.threads import checked_threads
 from dynx.spatial.scalar import Floats
 
-SOLVED_AT_ONCE = 12
-"""Degrees of freedom up to which one kernel does all of forward dynamics' derivatives; its code grows
-with their cube. Beyond, systems of equations are solved one side after the other."""
+MAX_NV_OF_ONE_KERNEL = 12
+"""Degrees of freedom up to which one kernel computes all derivatives of forward dynamics; its code grows with
+their cube. Above, systems of equations are solved one right-hand side after the other."""
 
-MANY = 64
-"""Samples from which on systems of equations are solved column by column for all samples at once, rather
-than sample by sample for all columns."""
+MIN_SAMPLES_BY_COLUMN = 64
+"""Smallest number of samples at which systems of equations are solved column by column for all samples at
+once, rather than sample by sample for all columns."""
 
 
 class InverseDynamicsDerivatives(NamedTuple):
-    """Of the torque, each (..., nv, nv): row i belongs to tau[i], column j to what it is derived by."""
+    """Derivatives of the torque, each (..., nv, nv): rows count the torques, columns the variables."""
 
     dtau_dq: Floats
     dtau_dv: Floats
@@ -52,7 +52,7 @@ class InverseDynamicsDerivatives(NamedTuple):
 
 
 class ForwardDynamicsDerivatives(NamedTuple):
-    """Of the acceleration, each (..., nv, nv): row i belongs to a[i]."""
+    """Derivatives of the acceleration, each (..., nv, nv): rows count the accelerations."""
 
     da_dq: Floats
     da_dv: Floats
@@ -67,7 +67,7 @@ class Derivatives:
     base these are translation and rotation in the axes of the base; without one, plain partial
     derivatives. Units are those of the one over those of the other.
 
-    Rigid bodies alone: damping, friction, armature and external forces have no part in it.
+    Damping, friction, armature and external forces are not included.
 
     `threads` bounds how many threads a batch is split over; None stands for all processors. Kernels are
     compiled when they are first asked for and kept in the cache of `dynx.simd.cache`. Safe to use from
@@ -75,7 +75,7 @@ class Derivatives:
     """
 
     def __init__(self, model: Model, *, threads: int | None = None) -> None:
-        """Raises ArgumentError for what is no model, or a number of threads that is none."""
+        """Raises ArgumentError for an argument that is not a Model, and for an invalid number of threads."""
         refuse_other_than_model(model)
         self.model = model
         self._option = threads
@@ -88,52 +88,54 @@ class Derivatives:
     def inverse_dynamics_derivatives(
         self, q: ArrayLike, v: ArrayLike, a: ArrayLike
     ) -> InverseDynamicsDerivatives:
-        """Of tau = M a + bias by q, v and a; the last is the mass matrix."""
+        """Derivatives of tau = M a + bias by q, v and a; the last is the mass matrix."""
         kernel = self._kernel("inverse_dynamics", programs.inverse_dynamics_derivatives)
-        return InverseDynamicsDerivatives(*evaluated(kernel, self._checked(q, v, a, "a"), self._threads))
+        return InverseDynamicsDerivatives(
+            *evaluate_kernel(kernel, self._checked(q, v, a, "a"), self._threads)
+        )
 
     def forward_dynamics_derivatives(
         self, q: ArrayLike, v: ArrayLike, tau: ArrayLike
     ) -> ForwardDynamicsDerivatives:
-        """Of a = M^-1 (tau - bias) by q, v and tau; the last is the inverse of the mass matrix.
+        """Derivatives of a = M^-1 (tau - bias) by q, v and tau; the last is the inverse of the mass matrix.
 
         Raises SingularMassMatrixError, which names the joints, where a joint moves no inertia.
         """
         arrays = self._checked(q, v, tau, "tau")
         self._solvability.refuse_singular(joint_dynamics=False)
-        if self.model.nv <= SOLVED_AT_ONCE:
+        if self.model.nv <= MAX_NV_OF_ONE_KERNEL:
             kernel = self._kernel("forward_dynamics", programs.forward_dynamics_derivatives)
-            found = evaluated(kernel, arrays, self._threads)
+            found = evaluate_kernel(kernel, arrays, self._threads)
             return ForwardDynamicsDerivatives(*map(self._arguments.finite_acceleration, found))
-        (a,) = evaluated(self._kernel("acceleration", programs.acceleration), arrays, self._threads)
+        (a,) = evaluate_kernel(self._kernel("acceleration", programs.acceleration), arrays, self._threads)
         self._arguments.finite_acceleration(a)
         dtau_dq, dtau_dv, M = self.inverse_dynamics_derivatives(arrays[0], arrays[1], a)
         nv = self.model.nv
-        (factors,) = evaluated(
+        (factors,) = evaluate_kernel(
             self._kernel("factors", programs.factors_of_mass),
             [M.reshape(*a.shape[:-1], nv * nv)],
             self._threads,
         )
         return ForwardDynamicsDerivatives(
-            self._solved(factors, -dtau_dq),
-            self._solved(factors, -dtau_dv),
-            self._solved(factors, np.broadcast_to(np.eye(nv), M.shape)),
+            self._solve(factors, -dtau_dq),
+            self._solve(factors, -dtau_dv),
+            self._solve(factors, np.broadcast_to(np.eye(nv), M.shape)),
         )
 
     def forward_kinematics_derivative(self, q: ArrayLike, frame: str) -> Floats:
-        """Of T_world_frame by q: (..., 4, 4, nv), the last axis being what it is derived by."""
+        """Derivative of T_world_frame by q (..., 4, 4, nv); the last axis counts the coordinates of v."""
         index = self.model.frame_index(frame)
         kernel = self._kernel(("pose", index), lambda mechanism: programs.pose_derivative(mechanism, index))
-        (derivative,) = evaluated(kernel, [self._arguments.q(q)], self._threads)
+        (derivative,) = evaluate_kernel(kernel, [self._arguments.q(q)], self._threads)
         return derivative
 
-    def _solved(self, factors: Floats, b: Floats) -> Floats:
+    def _solve(self, factors: Floats, b: Floats) -> Floats:
         """M^-1 b for matrices b (..., nv, nv), from the factors of M."""
         kernel, (nv, columns) = self._kernel("solution", programs.solution_by_factors), b.shape[-2:]
         sides = np.ascontiguousarray(np.swapaxes(b, -1, -2)).reshape(-1, columns, nv)
         factors = factors.reshape(len(sides), factors.shape[-1])
         found = np.empty_like(sides)
-        if len(sides) < MANY:
+        if len(sides) < MIN_SAMPLES_BY_COLUMN:
             for k in range(len(sides)):
                 kernel([np.broadcast_to(factors[k], (columns, factors.shape[-1])), sides[k]], [found[k]])
         else:
@@ -144,15 +146,15 @@ class Derivatives:
     def _checked(self, q: ArrayLike, v: ArrayLike, x: ArrayLike, name: str) -> list[Floats]:
         return [self._arguments.q(q), self._arguments.v(v), self._arguments.v(x, name)]
 
-    def _kernel(self, question: object, program: Callable[[Mechanism], Program]) -> Kernel:
-        kernel = self._kernels.get(question)
+    def _kernel(self, purpose: object, program: Callable[[Mechanism], Program]) -> Kernel:
+        kernel = self._kernels.get(purpose)
         if kernel is None:
             with self._making:
-                kernel = self._kernels.get(question)
+                kernel = self._kernels.get(purpose)
                 if kernel is None:
-                    mechanism = tidied(self.model.mechanism)
-                    kernel = robot_kernel(self.model, ("derivatives", question), lambda: program(mechanism))
-                    self._kernels[question] = kernel
+                    mechanism = simplify_mechanism(self.model.mechanism)
+                    kernel = robot_kernel(self.model, ("derivatives", purpose), lambda: program(mechanism))
+                    self._kernels[purpose] = kernel
         return kernel
 
     def __reduce__(self) -> tuple[Callable[..., Derivatives], tuple[Model, int | None]]:

@@ -25,6 +25,8 @@ from typing import Any
 import numpy as np
 
 import dynx.backends.quantities
+import dynx.compiled.model_coordinates
+import dynx.compiled.simplification
 import dynx.model.configuration
 import dynx.model.mechanism
 import dynx.rbd
@@ -33,12 +35,16 @@ from dynx._version import __version__
 from dynx.backends.quantities import QUANTITIES, Growth, Quantity
 from dynx.compiled import frames as compiled_frames
 from dynx.compiled.frames import Chain, on_chain
+from dynx.compiled.model_coordinates import (
+    argument_shapes,
+    reduce_columns,
+    reduce_rows,
+    tree_coordinates,
+)
 from dynx.model import Mechanism
 from dynx.model.configuration import MAX_MAGNITUDE, UNIT_NORM_TOLERANCE
-from dynx.model.mechanism import Coupling
-from dynx.rbd import coriolis, crba, rnea
-from dynx.rbd.aba import inertia_matrix
-from dynx.rbd.base_parameters import align_frames, regroup_inertias
+from dynx.rbd import coriolis
+from dynx.rbd.base_parameters import regroup_inertias
 from dynx.rbd.kinematics import Poses, ancestry, frame_placement
 from dynx.rbd.linear import solve_positive_definite
 from dynx.simd.cache import load_kernel, source_hash
@@ -47,7 +53,7 @@ from dynx.simd.kernel import Kernel
 from dynx.simd.program import Program
 from dynx.simd.target import host
 from dynx.simd.trace import trace
-from dynx.spatial.scalar import Array, Floats
+from dynx.spatial.scalar import Array
 
 MAX_DEFECT = MAX_MAGNITUDE**2
 """Bound on the defect of a sample with valid arguments."""
@@ -106,7 +112,7 @@ def compiles(mechanism: Mechanism, name: str) -> bool:
     return _code_size(mechanism, kernel_quantity(name).growth) <= MAX_CODE_SIZE
 
 
-def evaluated(
+def evaluate_quantity(
     mechanism: Mechanism, name: str, details: tuple[Any, ...], q: Array, *rates: Array, tree: bool = False
 ) -> Array:
     """A quantity on arrays (..., nq) and (..., nv) of numbers or of symbols.
@@ -114,14 +120,15 @@ def evaluated(
     They are in the coordinates of the model or, with `tree`, of the mechanism itself.
     """
     quantity = kernel_quantity(name)
-    coupling = None if tree else mechanism.coupling
-    if quantity.solves and coupling is not None:
+    if tree:
+        mechanism = replace(mechanism, coupling=None)
+    if quantity.solves and mechanism.coupling is not None:
         # The inertia that the drivers feel is not that of a tree.
-        S, (v, tau) = coupling.matrix(), rates
-        q = coupling.expand_q(q)
-        M = S.T @ crba.mass_matrix(mechanism, q) @ S
-        bias = rnea.bias_torque(regroup_inertias(mechanism), q, v @ S.T)
-        return np.asarray(solve_positive_definite(M, tau - bias @ S))
+        v, tau = rates
+        M = evaluate_quantity(mechanism, "mass_matrix", (), q)
+        return np.asarray(
+            solve_positive_definite(M, tau - evaluate_quantity(mechanism, "bias_torque", (), q, v))
+        )
 
     def in_tree(q: Array, *rates: Array) -> Array:
         if name == "coriolis_matrix":
@@ -129,20 +136,17 @@ def evaluated(
         numbers = regroup_inertias(mechanism) if name in _WITH_BASE_PARAMETERS else mechanism
         return quantity.evaluate(numbers, q, *rates, *details)
 
-    return _reduced(coupling, quantity, in_tree, q, *rates)
+    return _reduced(mechanism, quantity, in_tree, q, *rates)
 
 
 def _reduced(
-    coupling: Coupling | None, quantity: Quantity, in_tree: Computation, q: Array, *rates: Array
+    mechanism: Mechanism, quantity: Quantity, in_tree: Computation, q: Array, *rates: Array
 ) -> Array:
     """`in_tree`, a quantity in tree coordinates, evaluated in those of the model."""
-    if coupling is None:
-        return in_tree(q, *rates)
-    S = coupling.matrix()
-    result = in_tree(coupling.expand_q(q), *(rate @ S.T for rate in rates))
+    result = in_tree(*tree_coordinates(mechanism, q, *rates))
     if quantity.reduces_columns:
-        result = result @ S
-    return np.asarray(S.T @ result if quantity.reduces_rows else result)
+        result = reduce_columns(mechanism, result)
+    return np.asarray(reduce_rows(mechanism, result) if quantity.reduces_rows else result)
 
 
 def quantity_kernel(
@@ -150,28 +154,28 @@ def quantity_kernel(
 ) -> Kernel:
     """The kernel of a quantity, from the cache if it was compiled before."""
 
-    def answer(q: Array, *rates: Array) -> Array:
-        return evaluated(mechanism, name, details, q, *rates, tree=tree)
+    def result(q: Array, *rates: Array) -> Array:
+        return evaluate_quantity(mechanism, name, details, q, *rates, tree=tree)
 
     recipe = _recipe(mechanism, name, details, tree)
     lanes = host().lanes
     cubic = kernel_quantity(name).growth == "cubic"
     settings = Settings(lanes, segment=SEGMENT_OF_CUBIC_CODE) if cubic else Settings(lanes)
-    return load_kernel(recipe, lambda: _program(mechanism, name, answer, tree=tree), settings=settings)
+    return load_kernel(recipe, lambda: _program(mechanism, name, result, tree=tree), settings=settings)
 
 
 def chain_kernel(mechanism: Mechanism, name: str, chain: Chain, *, tree: bool = False) -> Kernel:
     """The kernel of a quantity for the frames of a chain; its last input is the place of one."""
-    coupling = None if tree else mechanism.coupling
+    own = replace(mechanism, coupling=None) if tree else mechanism
 
-    def answer(q: Array, *rates_and_place: Array) -> Array:
+    def result(q: Array, *rates_and_place: Array) -> Array:
         *rates, place = rates_and_place
         in_tree = partial(on_chain, mechanism, name, chain, place)
-        return _reduced(coupling, kernel_quantity(name), in_tree, q, *rates)
+        return _reduced(own, kernel_quantity(name), in_tree, q, *rates)
 
     recipe = _recipe(mechanism, name, chain, tree)
     return load_kernel(
-        recipe, lambda: _program(mechanism, name, answer, tree=tree, place=(chain.place_size,))
+        recipe, lambda: _program(mechanism, name, result, tree=tree, place=(chain.place_size,))
     )
 
 
@@ -180,24 +184,19 @@ def _recipe(mechanism: Mechanism, name: str, details: object, tree: bool) -> byt
 
 
 def _program(
-    mechanism: Mechanism, name: str, answer: Computation, *, tree: bool, **more: tuple[int, ...]
+    mechanism: Mechanism, name: str, result: Computation, *, tree: bool, **more: tuple[int, ...]
 ) -> Program:
-    """The program of `answer`, of the quantity's arguments and inputs `more` that need no checking."""
+    """The program of `result`, of the quantity's arguments and inputs `more` that need no checking."""
     quantity = kernel_quantity(name)
-    coupled = mechanism.coupling if not tree else None
-    base_q, base_v = (7, 6) if mechanism.floating else (0, 0)
-    joints = len(mechanism.bodies) if coupled is None else coupled.n_joints
-    checked: tuple[str, ...] = quantity.arguments
 
-    def answer_and_defect(**inputs: Array) -> dict[str, Array]:
-        found = answer(*inputs.values())
-        defect = _defect(mechanism, *(inputs[argument] for argument in checked))
+    def result_and_defect(**inputs: Array) -> dict[str, Array]:
+        found = result(*inputs.values())
+        defect = _defect(mechanism, *(inputs[argument] for argument in quantity.arguments))
         if quantity.solves:
             defect = defect + np.sum(abs(found)) * (MAX_DEFECT / MAX_RESULT)
-        return {"answer": found, "defect": defect}
+        return {"result": found, "defect": defect}
 
-    shapes = {argument: (base_q + joints if argument == "q" else base_v + joints,) for argument in checked}
-    return trace(answer_and_defect, {**shapes, **more})
+    return trace(result_and_defect, {**argument_shapes(mechanism, quantity.arguments, tree=tree), **more})
 
 
 def _defect(mechanism: Mechanism, q: Array, *rates: Array) -> Array:
@@ -211,56 +210,27 @@ def _defect(mechanism: Mechanism, q: Array, *rates: Array) -> Array:
 
 
 def _sum_by_pairs(terms: list[Any]) -> Any:
-    """A sum in which few additions wait for one another, which a processor likes."""
+    """A sum in which few additions depend on one another, so that a processor does several at a time."""
     while len(terms) > 1:
         odd = terms[len(terms) // 2 * 2 :]
         terms = [a + b for a, b in zip(terms[::2], terms[1::2], strict=False)] + odd
     return terms[0] if terms else 0.0
 
 
-def tidied(mechanism: Mechanism) -> Mechanism:
-    """The mechanism with the fewest numbers: frames along the axes, no dust in rotation matrices.
-
-    A right angle in a file becomes cos(pi/2) = 6e-17 where 0 was meant. Entries below half the
-    spacing of doubles at 1 are smaller than the rounding of the entries of order 1 beside them, so to
-    leave them out changes a rotation by no more than it is uncertain anyway; but each would cost a
-    multiplication in all that it is part of.
-
-    Inverse dynamics takes the inertias by base parameters as well (`dynx.rbd.base_parameters`). Forward
-    dynamics does not: it would be a tenth faster and, on some robots, a hundred times less accurate.
-    """
-    return _without_dust(align_frames(_without_dust(mechanism)))
-
-
-def _without_dust(mechanism: Mechanism) -> Mechanism:
-    return replace(
-        mechanism,
-        bodies=tuple(replace(body, R=_undusted(body.R)) for body in mechanism.bodies),
-        frames=tuple(replace(frame, R=_undusted(frame.R)) for frame in mechanism.frames),
-    )
-
-
-def _undusted(R: Floats) -> Floats:
-    return np.where(np.abs(R) < 0.5 * np.finfo(np.float64).eps, 0.0, R)
-
-
-def is_physical(mechanism: Mechanism) -> bool:
-    """Whether every body's inertia is positive semidefinite; then every mass matrix is too.
-
-    Elimination without pivoting is then as accurate as the matrix allows.
-    """
-    inertias = [mechanism.root, *(body.inertia for body in mechanism.bodies)]
-    values = [np.linalg.eigvalsh(inertia_matrix(inertia)) for inertia in inertias]
-    return all(v[0] >= -8 * np.finfo(np.float64).eps * abs(v[-1]) for v in values)
-
-
 @cache
 def _algorithms() -> str:
-    """Hash of the text of all that a traced function runs through."""
+    """Hash of the source of everything that is traced."""
     folders = [Path(str(package.__file__)).parent for package in (dynx.rbd, dynx.spatial)]
-    modules = [dynx.model.configuration.__file__, dynx.model.mechanism.__file__]
-    modules += [dynx.backends.quantities.__file__, compiled_frames.__file__, __file__]
-    return f"{__version__} {np.__version__} {source_hash(*folders, *map(Path, modules))}"
+    modules = (
+        dynx.model.configuration,
+        dynx.model.mechanism,
+        dynx.backends.quantities,
+        dynx.compiled.model_coordinates,
+        dynx.compiled.simplification,
+        compiled_frames,
+    )
+    files = [Path(str(module.__file__)) for module in modules]
+    return f"{__version__} {np.__version__} {source_hash(*folders, *files, Path(__file__))}"
 
 
 def _fingerprint(mechanism: Mechanism) -> str:

@@ -1,4 +1,4 @@
-"""Solving with the mass matrix in a kernel: the sparsity of the tree's branches, kept by elimination."""
+"""Solution of equations with the mass matrix in a kernel, which keeps the sparsity of the tree's branches."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from dynx.rbd.linear import Factors, ldl_factors, solve_ldl
 from dynx.spatial.scalar import Array
 
 
-def factors_of(mechanism: Mechanism, M: Array) -> Factors:
-    """L and D of M, eliminated from the tips to the root.
+def factorize_mass_matrix(mechanism: Mechanism, M: Array) -> Factors:
+    """Factors L and D of M, eliminated from the tips to the root.
 
-    So entries stay zero where two joints are on different branches (Featherstone 2008, section 6.5), and
-    neither they nor zeros of M are computed with.
+    Entries stay zero where two joints are on different branches (Featherstone 2008, section 6.5), so that no
+    operation is spent on them.
     """
     nv, filled = filled_entries(mechanism)
     A = np.zeros((nv, nv), dtype=object)
@@ -23,13 +23,13 @@ def factors_of(mechanism: Mechanism, M: Array) -> Factors:
     return ldl_factors(A)
 
 
-def solved(L: list[list[Array]], D: list[Array], b: Array) -> Array:
-    """M^-1 b for sides b (..., nv), from those factors."""
+def solve_with_factors(L: list[list[Array]], D: list[Array], b: Array) -> Array:
+    """M^-1 b for right-hand sides b (..., nv), from the factors of M."""
     return solve_ldl(L, D, b[..., ::-1])[..., ::-1]
 
 
 def filled_entries(mechanism: Mechanism) -> tuple[int, list[tuple[int, int]]]:
-    """The size of M, and where its factor L, in the order of elimination, may differ from zero."""
+    """nv, and the positions at which the factor L, in the order of elimination, may differ from zero."""
     base = 6 if mechanism.floating else 0
     on_branch = np.zeros((mechanism.nv, mechanism.nv), dtype=bool)
     on_branch[:base] = True

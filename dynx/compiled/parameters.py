@@ -1,4 +1,4 @@
-"""Which parameters of a robot are arguments, what they are called, and where they enter the mechanism."""
+"""Selection of the parameters of a robot that are arguments, and their place in the mechanism."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Parameters:
     defaults: Floats
 
     def index(self, name: str) -> int:
-        """Where a parameter is on the last axis; UnknownNameError for a name that is none."""
+        """Index of a parameter on the last axis; raises UnknownNameError."""
         try:
             return self.names.index(name)
         except ValueError:
@@ -42,14 +42,14 @@ class Parameters:
 
 
 @dataclass(frozen=True)
-class Known:
-    """Parameters that were read: bodies to be added, by the frame that carries them, and joints (n, 3)."""
+class ParameterValues:
+    """Bodies to add to the mechanism, by the number of the frame that carries them, and joints (n, 3)."""
 
     bodies: tuple[tuple[int, RigidInertia], ...]
     joints: Array | None
 
     def added_to(self, mechanism: Mechanism) -> Mechanism:
-        """The mechanism with these bodies welded to it."""
+        """The mechanism with these bodies rigidly connected to it."""
         inertia = {ROOT: mechanism.root, **{k: body.inertia for k, body in enumerate(mechanism.bodies)}}
         for number, added in self.bodies:
             frame = mechanism.frames[number]
@@ -60,7 +60,7 @@ class Known:
 
 @dataclass(frozen=True)
 class Selection:
-    """What of `model` is an argument. Checked when it is made."""
+    """Parameters of `model` that are arguments; checked when it is constructed."""
 
     model: Model
     links: tuple[str, ...]
@@ -78,12 +78,12 @@ class Selection:
                 self.model.frame_index(frame)
 
     @property
-    def question(self) -> tuple[object, ...]:
-        """All but the model."""
+    def choices(self) -> tuple[object, ...]:
+        """All fields but the model."""
         return self.links, self.payload, self.point_payload, self.joint_dynamics
 
     def parameters(self) -> Parameters:
-        """Their names and defaults."""
+        """Names and defaults of the parameters."""
         names: list[str] = []
         defaults: list[Floats] = []
         for link in self.links:
@@ -112,8 +112,8 @@ class Selection:
         ]
         return build_mechanism(replace(self.model, links=tuple(links)))
 
-    def read(self, parameters: Array) -> Known:
-        """What an array (n,) of them says."""
+    def read(self, parameters: Array) -> ParameterValues:
+        """The values in an array (n,) of parameters."""
         values = iter(parameters)
         bodies = [
             (self.model.frame_index(link), inertia_from_parameters(_next(values, 10))) for link in self.links
@@ -124,9 +124,9 @@ class Selection:
             mass, *center = _next(values, len(POINT))
             bodies.append((self.model.frame_index(self.point_payload), _point_mass(mass, np.array(center))))
         if not self.joint_dynamics:
-            return Known(tuple(bodies), None)
+            return ParameterValues(tuple(bodies), None)
         moving = sum(joint.moves for joint in self.model.joints)
-        return Known(tuple(bodies), _next(values, len(JOINT) * moving).reshape(moving, len(JOINT)))
+        return ParameterValues(tuple(bodies), _next(values, len(JOINT) * moving).reshape(moving, len(JOINT)))
 
 
 def _next(values: Iterator[object], count: int) -> Array:

@@ -1,7 +1,7 @@
-"""Dynamics in which chosen parameters are arguments, one value for each sample, rather than constants.
+"""Dynamics whose chosen parameters are arguments, one set for each sample, rather than constants.
 
-For Monte Carlo studies, identification, and robots that pick something up: the kernel is compiled once,
-and every sample of a batch may have inertias, a payload or joint friction of its own.
+For Monte Carlo studies, identification, and robots that grasp objects: the kernel is compiled once, and every
+sample of a batch may have its own inertias, payload or joint friction.
 """
 
 from __future__ import annotations
@@ -14,17 +14,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.backends.arguments import Arguments
+from dynx.backends.quantities import QUANTITIES
 from dynx.backends.registry import refuse_other_than_model
-from dynx.compiled.kernels import tidied
-from dynx.compiled.mass_factors import factors_of, solved
+from dynx.compiled.mass_factors import factorize_mass_matrix, solve_with_factors
+from dynx.compiled.model_coordinates import argument_shapes, reduce_columns, reduce_rows, tree_coordinates
 from dynx.compiled.parameters import Parameters, Selection
-from dynx.compiled.robot_kernel import (
-    argument_shapes,
-    evaluated,
-    model_torque,
-    robot_kernel,
-    tree_coordinates,
-)
+from dynx.compiled.robot_kernel import evaluate_kernel, robot_kernel
+from dynx.compiled.simplification import simplify_mechanism
 from dynx.errors import ArgumentError, shown
 from dynx.model import Mechanism, Model
 from dynx.model.configuration import checked_array
@@ -68,15 +64,15 @@ class ParametricDynamics:
 
     Arrays are float64 with leading batch axes that broadcast: q (..., nq), v, a, tau (..., nv) and
     `parameters` (..., n) in the order of ``self.parameters.names``; without them the model's own are
-    used. Mass and inertia may take any values, also such as no body can have. Where joint dynamics are
-    parameters they are part of every answer: the torque is that of the rigid bodies, plus
+    used. Mass and inertia may take any values, even impossible ones. Where joint dynamics are
+    parameters they are part of every result: the torque is that of the rigid bodies, plus
     ``armature a + damping v + friction sign(v)`` of every joint, with sign(0) = 0.
 
     Safe to use from several threads; pickled by its recipe. Raises errors of `dynx.errors` only.
     """
 
     def __init__(self, selection: Selection, *, threads: int | None = None) -> None:
-        """As `parametric` makes it. Raises ArgumentError for a number of threads that is none."""
+        """As `parametric` makes it. Raises ArgumentError for an invalid number of threads."""
         self.model = selection.model
         self.parameters: Parameters = selection.parameters()
         self._selection = selection
@@ -91,7 +87,7 @@ class ParametricDynamics:
     ) -> Floats:
         """The torque (..., nv) that gives acceleration `a`."""
         arrays = [self._arguments.q(q), self._arguments.v(v), self._arguments.v(a, "a")]
-        return self._answer("inverse_dynamics", _inverse_dynamics, "a", arrays, parameters)
+        return self._evaluate("inverse_dynamics", _inverse_dynamics, arrays, parameters)
 
     def forward_dynamics(
         self, q: ArrayLike, v: ArrayLike, tau: ArrayLike, parameters: ArrayLike | None = None
@@ -101,33 +97,32 @@ class ParametricDynamics:
         Raises SingularMassMatrixError where that is singular.
         """
         arrays = [self._arguments.q(q), self._arguments.v(v), self._arguments.v(tau, "tau")]
-        a = self._answer("forward_dynamics", _forward_dynamics, "tau", arrays, parameters)
+        a = self._evaluate("forward_dynamics", _forward_dynamics, arrays, parameters)
         return self._arguments.finite_acceleration(a)
 
     def mass_matrix(self, q: ArrayLike, parameters: ArrayLike | None = None) -> Floats:
         """M (..., nv, nv), symmetric, armature included where it is a parameter."""
-        return self._answer("mass_matrix", _mass_matrix, None, [self._arguments.q(q)], parameters)
+        return self._evaluate("mass_matrix", _mass_matrix, [self._arguments.q(q)], parameters)
 
     def acceleration(
         self, parameters: Array, q: Array, v: Array, tau: Array, rotors: Array | None = None
     ) -> Array:
-        """The acceleration (nv,) of one sample, for arrays of symbols: to build on it in a trace.
+        """The acceleration (nv,) of one sample, for arrays of symbols in a trace.
 
-        `rotors` (nv,) are inertias of rotors, added to the diagonal of the mass matrix.
+        `rotors` (nv,) is the armature, added to the diagonal of the mass matrix.
         """
         known = self._selection.read(parameters)
-        mechanism = tidied(self._selection.remainder())
+        mechanism = simplify_mechanism(self._selection.remainder())
         return _forward_dynamics(known.added_to(mechanism), known.joints, q, v, tau, rotors)
 
     def root(self, parameters: Array) -> RigidInertia:
         """The inertia of the root with what is fixed to it, for an array of symbols."""
         return self._selection.read(parameters).added_to(self._selection.remainder()).root
 
-    def _answer(
+    def _evaluate(
         self,
-        question: str,
+        name: str,
         function: Callable[..., Array],
-        third: str | None,
         arrays: list[Floats],
         parameters: ArrayLike | None,
     ) -> Floats:
@@ -135,18 +130,19 @@ class ParametricDynamics:
             values = self.parameters.defaults
         else:
             values = checked_array("parameters", parameters, len(self.parameters.names))
-        kernel = self._kernel(question, lambda: _program(self._selection, function, third))
-        (answer,) = evaluated(kernel, [*arrays, values], self._threads)
-        return answer
+        (result,) = evaluate_kernel(self._kernel(name, function), [*arrays, values], self._threads)
+        return result
 
-    def _kernel(self, question: str, program: Callable[[], Program]) -> Kernel:
-        kernel = self._kernels.get(question)
+    def _kernel(self, name: str, function: Callable[..., Array]) -> Kernel:
+        kernel = self._kernels.get(name)
         if kernel is None:
             with self._making:
-                kernel = self._kernels.get(question)
+                kernel = self._kernels.get(name)
                 if kernel is None:
-                    key = ("parametric", question, self._selection.question)
-                    kernel = self._kernels[question] = robot_kernel(self.model, key, program)
+                    purpose = ("parametric", name, self._selection.choices)
+                    kernel = self._kernels[name] = robot_kernel(
+                        self.model, purpose, lambda: _program(self._selection, name, function)
+                    )
         return kernel
 
     def __reduce__(self) -> tuple[Callable[..., ParametricDynamics], tuple[Selection, int | None]]:
@@ -156,27 +152,22 @@ class ParametricDynamics:
         return f"<ParametricDynamics of {self.model.name}: {len(self.parameters.names)} parameters>"
 
 
-def _program(selection: Selection, function: Callable[..., Array], third: str | None) -> Program:
-    """Of q, v, a third argument and the parameters, or of q and the parameters alone."""
-    mechanism = tidied(selection.remainder())
-    shapes = argument_shapes(mechanism, third or "a")
-    if third is None:
-        shapes = {"q": shapes["q"]}
+def _program(selection: Selection, name: str, function: Callable[..., Array]) -> Program:
+    """Of the arguments of the quantity `name` and of the parameters."""
+    mechanism = simplify_mechanism(selection.remainder())
+    shapes = argument_shapes(mechanism, QUANTITIES[name].arguments)
 
-    def answer(parameters: Array, **state: Array) -> Array:
+    def result(parameters: Array, **state: Array) -> Array:
         known = selection.read(parameters)
         return function(known.added_to(mechanism), known.joints, *state.values())
 
-    return trace(
-        lambda **arguments: answer(arguments.pop("parameters"), **arguments),
-        {**shapes, "parameters": (len(selection.parameters().names),)},
-    )
+    return trace(result, {**shapes, "parameters": (len(selection.parameters().names),)})
 
 
 def _inverse_dynamics(mechanism: Mechanism, joints: Array | None, q: Array, v: Array, a: Array) -> Array:
     q, v, a = tree_coordinates(mechanism, q, v, a)
     tau = rnea.inverse_dynamics(mechanism, q, v, a)
-    return model_torque(mechanism, tau + _joint_torque(mechanism, joints, v, a))
+    return reduce_columns(mechanism, tau + _joint_torque(mechanism, joints, v, a))
 
 
 def _mass_matrix(mechanism: Mechanism, joints: Array | None, q: Array) -> Array:
@@ -186,10 +177,7 @@ def _mass_matrix(mechanism: Mechanism, joints: Array | None, q: Array) -> Array:
         base = 6 if mechanism.floating else 0
         for k in range(len(mechanism.bodies)):
             M[base + k, base + k] = M[base + k, base + k] + joints[k, 2]
-    if mechanism.coupling is None:
-        return M
-    S = mechanism.coupling.matrix()
-    return np.asarray(S.T @ M @ S)
+    return reduce_rows(mechanism, reduce_columns(mechanism, M))
 
 
 def _forward_dynamics(
@@ -202,8 +190,8 @@ def _forward_dynamics(
 ) -> Array:
     bias = _inverse_dynamics(mechanism, joints, q, v, np.zeros(len(v)))
     M = _mass_matrix(mechanism, joints, q)
-    L, D = factors_of(mechanism, M if rotors is None else M + np.diag(rotors))
-    return solved(L, D, tau - bias)
+    L, D = factorize_mass_matrix(mechanism, M if rotors is None else M + np.diag(rotors))
+    return solve_with_factors(L, D, tau - bias)
 
 
 def _joint_torque(mechanism: Mechanism, joints: Array | None, v: Array, a: Array) -> Array:

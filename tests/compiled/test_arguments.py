@@ -10,7 +10,7 @@ import pytest
 
 import dynx
 from dynx.compiled.backend import CompiledBackend
-from dynx.compiled.call import FEW
+from dynx.compiled.call import MAX_COPIED_SAMPLES
 from dynx.errors import ArgumentError, NotFiniteError, ShapeError, SingularMassMatrixError
 from dynx.model import Inertial, Joint, Link, Model, Pose
 from dynx.model.configuration import MAX_MAGNITUDE
@@ -24,7 +24,7 @@ def engine(request: pytest.FixtureRequest) -> CompiledBackend:
     return made(ROBOTS[request.param])
 
 
-@pytest.mark.parametrize("n", [None, 1, 9, FEW + 9])
+@pytest.mark.parametrize("n", [None, 1, 9, MAX_COPIED_SAMPLES + 9])
 @pytest.mark.parametrize("which", [0, 1, 2])
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, MAX_MAGNITUDE, -2 * MAX_MAGNITUDE, 1e300])
 def test_a_bad_number_anywhere(engine: CompiledBackend, n: int | None, which: int, value: float) -> None:
@@ -40,7 +40,7 @@ def test_large_numbers_that_are_allowed() -> None:
     model = chain(2)
     engine = made(model)
     v = np.full((3, 2), 0.9 * MAX_MAGNITUDE)
-    for rows in (v, v[0], np.tile(v, (FEW, 1))):
+    for rows in (v, v[0], np.tile(v, (MAX_COPIED_SAMPLES, 1))):
         tau = engine.inverse_dynamics(0 * rows, 0 * rows, rows)
         assert np.isfinite(tau).all()
 
@@ -48,7 +48,7 @@ def test_large_numbers_that_are_allowed() -> None:
 @pytest.mark.parametrize("robot", ["floating", "floating mimic"])
 def test_quaternions_are_scaled_or_refused(robot: str) -> None:
     engine = made(ROBOTS[robot])
-    for size in ((), (3,), (FEW + 3,)):
+    for size in ((), (3,), (MAX_COPIED_SAMPLES + 3,)):
         q, v, a = state(engine.model, size)
         wanted = engine.inverse_dynamics(q, v, a)
         off = q.copy()
@@ -68,7 +68,7 @@ def test_quaternions_are_scaled_or_refused(robot: str) -> None:
 def test_without_validation_nothing_is_refused() -> None:
     model = chain(2)
     engine = made(model, validate=False)
-    for size in ((), (3,), (FEW + 3,)):
+    for size in ((), (3,), (MAX_COPIED_SAMPLES + 3,)):
         q, v, a = state(model, size)
         v[..., 0] = np.nan
         assert np.isnan(engine.inverse_dynamics(q, v, a)[..., 0]).all()
@@ -93,7 +93,7 @@ def test_a_configuration_without_an_acceleration() -> None:
     ]
     model = Model.build("slides", links, joints)
     engine, ask = made(model), np.zeros(3)
-    for q in (np.zeros(3), np.zeros((4, 3)), np.zeros((FEW + 4, 3))):
+    for q in (np.zeros(3), np.zeros((4, 3)), np.zeros((MAX_COPIED_SAMPLES + 4, 3))):
         with pytest.raises(SingularMassMatrixError, match=r"at this configuration|at sample"):
             engine.forward_dynamics(q, ask, ask)
     assert np.isfinite(engine.forward_dynamics(np.array([0.0, 1.0, 0.0]), ask, ask)).all()
@@ -113,7 +113,7 @@ def test_which_sample_is_at_fault() -> None:
         heavy.forward_dynamics(np.zeros((10, 6)), np.zeros(6), np.zeros(6), parameters)
 
 
-@pytest.mark.parametrize("n", [5, FEW + 5])
+@pytest.mark.parametrize("n", [5, MAX_COPIED_SAMPLES + 5])
 def test_unchecked_numbers_that_are_none_spoil_their_own_sample_only(n: int) -> None:
     model = dynx.load("ur5")
     q = np.zeros((n, 6))

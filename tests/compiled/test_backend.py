@@ -16,8 +16,8 @@ from dynx.backends.derived import native_quantities
 from dynx.backends.quantities import QUANTITIES
 from dynx.compiled import kernels
 from dynx.compiled.backend import CompiledBackend
-from dynx.compiled.call import FEW, KernelCall, NumericCall
-from dynx.compiled.kernels import is_physical
+from dynx.compiled.call import MAX_COPIED_SAMPLES, KernelCall, NumericCall
+from dynx.compiled.simplification import has_physical_inertias
 from dynx.errors import ArgumentError, ClosedError
 from dynx.model import Inertial, Link, Mechanism, Model
 from dynx.simd.kernel import Kernel
@@ -137,8 +137,8 @@ def test_an_unphysical_robot_with_mimic_joints_is_solved_with_pivots() -> None:
     odd = replace(model.links[2].inertial or Inertial(1.0), ixx=-5.0)
     links = [replace(link, inertial=odd) if k == 2 else link for k, link in enumerate(model.links)]
     bad = Model.build("bad", links, model.joints)
-    assert is_physical(model.mechanism)
-    assert not is_physical(bad.mechanism)
+    assert has_physical_inertias(model.mechanism)
+    assert not has_physical_inertias(bad.mechanism)
     engine = made(bad)
     q, v, a = state(bad, (3,))
     found = engine.forward_dynamics(q, v, a)
@@ -177,7 +177,7 @@ def test_robots_without_joints() -> None:
     rock = Model.build("rock", [Link("rock", Inertial(2.0))], [])
     for model in (rock, rock.with_base("floating")):
         engine, reference = made(model), backend("reference", model)
-        for size in ((), (0,), (5,), (FEW + 1,)):
+        for size in ((), (0,), (5,), (MAX_COPIED_SAMPLES + 1,)):
             q, v, a = state(model, size)
             assert engine.mass_matrix(q).shape == (*size, model.nv, model.nv)
             for name in ("inverse_dynamics", "forward_kinematics", "kinetic_energy"):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dynx.compiled.backend import CompiledBackend
-from dynx.compiled.call import FEW
+from dynx.compiled.call import MAX_COPIED_SAMPLES
 from dynx.errors import ArgumentError, DTypeError, ShapeError
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
@@ -55,7 +55,7 @@ def engine(request: pytest.FixtureRequest) -> CompiledBackend:
     return made(ROBOTS[request.param])
 
 
-@pytest.mark.parametrize("size", [(), (0,), (1,), (2, 3), (FEW + 5,)])
+@pytest.mark.parametrize("size", [(), (0,), (1,), (2, 3), (MAX_COPIED_SAMPLES + 5,)])
 @pytest.mark.parametrize(("ask", "tail"), WITH_OUT.values(), ids=WITH_OUT)
 def test_out(
     engine: CompiledBackend, ask: Ask, tail: Callable[[Model], tuple[int, ...]], size: tuple[int, ...]
@@ -67,7 +67,7 @@ def test_out(
     np.testing.assert_array_equal(out, wanted)
 
 
-@pytest.mark.parametrize("size", [(), (3,), (FEW + 5,)])
+@pytest.mark.parametrize("size", [(), (3,), (MAX_COPIED_SAMPLES + 5,)])
 @pytest.mark.parametrize(("ask", "tail"), WITH_OUT.values(), ids=WITH_OUT)
 def test_out_that_does_not_fit(
     engine: CompiledBackend, ask: Ask, tail: Callable[[Model], tuple[int, ...]], size: tuple[int, ...]
@@ -88,7 +88,7 @@ def test_out_that_does_not_fit(
             ask(engine, *given, out=out)
 
 
-@pytest.mark.parametrize("size", [(), (3,), (FEW + 5,)])
+@pytest.mark.parametrize("size", [(), (3,), (MAX_COPIED_SAMPLES + 5,)])
 def test_out_over_an_argument(engine: CompiledBackend, size: tuple[int, ...]) -> None:
     """Also where the first look at the arguments finds a quaternion to be scaled."""
     q, v, a = state(engine.model, size)
@@ -99,7 +99,10 @@ def test_out_over_an_argument(engine: CompiledBackend, size: tuple[int, ...]) ->
     assert engine.inverse_dynamics(q, v, a, out=v) is v
 
 
-@pytest.mark.parametrize("n", [1, 2, 3, 8, FEW - 1, FEW, FEW + 1, 3 * FEW])
+@pytest.mark.parametrize(
+    "n",
+    [1, 2, 3, 8, MAX_COPIED_SAMPLES - 1, MAX_COPIED_SAMPLES, MAX_COPIED_SAMPLES + 1, 3 * MAX_COPIED_SAMPLES],
+)
 def test_every_way_gives_the_same_bits(engine: CompiledBackend, n: int) -> None:
     """One at a time, in the workspace, where the arrays lie, with strides, spread, by threads."""
     q, v, a = state(engine.model, (n,))

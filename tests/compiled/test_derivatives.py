@@ -18,7 +18,7 @@ from dynx.compiled.derivative_programs import (
     inverse_dynamics_derivatives,
     solution_by_factors,
 )
-from dynx.compiled.derivatives import SOLVED_AT_ONCE, Derivatives
+from dynx.compiled.derivatives import MAX_NV_OF_ONE_KERNEL, Derivatives
 from dynx.engines.pinocchio.backend import PinocchioBackend
 from dynx.engines.pinocchio.library import pin
 from dynx.errors import (
@@ -150,10 +150,10 @@ def test_forward_undoes_inverse(model: Model) -> None:
 def test_the_staged_way_gives_what_one_kernel_gives(model: Model, monkeypatch: pytest.MonkeyPatch) -> None:
     sizes = ((), (3,), (2, 40))
     samples_of = {size: motion(model, size=size) for size in sizes}
-    monkeypatch.setattr("dynx.compiled.derivatives.SOLVED_AT_ONCE", 100)
+    monkeypatch.setattr("dynx.compiled.derivatives.MAX_NV_OF_ONE_KERNEL", 100)
     whole = Derivatives(model, threads=1)
     at_once = {size: whole.forward_dynamics_derivatives(*state) for size, state in samples_of.items()}
-    monkeypatch.setattr("dynx.compiled.derivatives.SOLVED_AT_ONCE", 0)
+    monkeypatch.setattr("dynx.compiled.derivatives.MAX_NV_OF_ONE_KERNEL", 0)
     staged = Derivatives(model, threads=1)
     for size, state in samples_of.items():
         condition = float(np.max(np.linalg.cond(ReferenceBackend(model).mass_matrix(state[0]))))
@@ -197,7 +197,7 @@ def test_batches_broadcast_and_threads_change_nothing(model: Model) -> None:
 
 def test_the_implicit_way_is_smaller_than_differentiating_the_algorithm() -> None:
     mechanism = dynx.load("ur5").mechanism
-    assert mechanism.nv <= SOLVED_AT_ONCE
+    assert mechanism.nv <= MAX_NV_OF_ONE_KERNEL
     program = acceleration(mechanism)
     direct = differentiate(program, [("result", name) for name in ("q", "v", "tau")], order="reverse")
     assert 2 * len(forward_dynamics_derivatives(mechanism).nodes) < len(direct.nodes)

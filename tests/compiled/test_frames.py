@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from dynx.backends import backend
 from dynx.backends.quantities import QUANTITIES
 from dynx.compiled.backend import CompiledBackend
-from dynx.compiled.call import FEW
+from dynx.compiled.call import MAX_COPIED_SAMPLES
 from dynx.compiled.frames import chain_of, on_chain, place_of
-from dynx.compiled.kernels import ON_CHAINS, evaluated
+from dynx.compiled.kernels import ON_CHAINS, evaluate_quantity
 from dynx.model.mechanism import ROOT
 from dynx.rbd.jacobians import REFERENCES
 from dynx.rbd.kinematics import ancestry
@@ -58,14 +58,14 @@ def test_any_frame_of_any_robot(
     chain = chain_of(mechanism, quantity, frame, reference)
     place = place_of(mechanism, chain, frame, reference)
     got = on_chain(mechanism, quantity, chain, place, q, *rates).astype(float)
-    wanted = evaluated(mechanism, quantity, (frame, reference), q, *rates, tree=True)
+    wanted = evaluate_quantity(mechanism, quantity, (frame, reference), q, *rates, tree=True)
     if QUANTITIES[quantity].reduces_columns:
         got, wanted = got @ S, wanted @ S
     ErrorBounds(samples_at(model, drawn.q, drawn.v, drawn.a)).check(quantity, got, wanted)
 
 
 @each_quantity
-@pytest.mark.parametrize("size", [(), (3,), (FEW + 5,)])
+@pytest.mark.parametrize("size", [(), (3,), (MAX_COPIED_SAMPLES + 5,)])
 def test_kernels_answer_for_every_frame(
     engine: CompiledBackend, quantity: str, size: tuple[int, ...]
 ) -> None:
@@ -96,7 +96,7 @@ def test_no_order_of_questions_changes_an_answer(quantity: str) -> None:
 @pytest.mark.parametrize("reference", REFERENCES)
 def test_every_way_gives_the_same_bits(engine: CompiledBackend, quantity: str, reference: str) -> None:
     """One at a time, as a small batch, as a large one, with strides, into `out`."""
-    given = state(engine.model, (FEW + 5,))
+    given = state(engine.model, (MAX_COPIED_SAMPLES + 5,))
     whole = asked(engine, quantity, TIP, reference, *given)
     for n in (1, 2, 7):
         some = asked(engine, quantity, TIP, reference, *(x[:n] for x in given))
@@ -121,7 +121,7 @@ def test_few_kernels_are_made(robot: str) -> None:
             for reference in REFERENCES:
                 asked(engine, quantity, frame, reference, *given)
     ends = set(range(len(mechanism.bodies))) - {body.parent for body in mechanism.bodies}
-    assert len(engine._chains) == len(ON_CHAINS) * len(ends) + len(mechanism.bodies) + 1
+    assert len(engine._chain_kernels) == len(ON_CHAINS) * len(ends) + len(mechanism.bodies) + 1
 
 
 def test_a_chain_holds_the_body_of_its_frame() -> None:
@@ -139,6 +139,6 @@ def test_a_chain_holds_the_body_of_its_frame() -> None:
 def test_closing_lets_go_of_the_chains() -> None:
     engine = made(a_chain(1))
     engine.frame_velocity(np.zeros(1), np.zeros(1), "link1")
-    assert engine._chains
+    assert engine._chain_kernels
     engine.close()
-    assert not engine._chains
+    assert not engine._chain_kernels

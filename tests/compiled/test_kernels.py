@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from dynx.compiled import kernels as compiled_kernels
-from dynx.compiled.kernels import _fingerprint, _without_dust, compiles, tidied
+from dynx.compiled.kernels import _fingerprint, compiles
+from dynx.compiled.simplification import _zero_rounding_residue, simplify_mechanism
 from dynx.model import Inertial, Joint, Link, Mechanism, Model, Pose
 from dynx.model.mechanism import build_mechanism
 from tests.backends.robots import chain, mixed_robot
@@ -30,14 +31,14 @@ def test_dust_is_what_rounding_left() -> None:
     pose = Pose((0.1, 0.2, 0.3), (np.pi / 2, 0.0, -np.pi / 2))
     links = [Link("a"), Link("b", Inertial(1.0, Pose((0.1, 0.0, 0.0)), 0.1, 0.0, 0.0, 0.1, 0.0, 0.1))]
     model = Model.build("square", links, [Joint("j", "revolute", "a", "b", pose)]).with_frame("f", "b", pose)
-    before, after = model.mechanism, tidied(model.mechanism)
+    before, after = model.mechanism, simplify_mechanism(model.mechanism)
     assert np.count_nonzero(before.bodies[0].R) > 3
     for R in (after.bodies[0].R, after.frames[-1].R):
         assert np.count_nonzero(R) == 3
         np.testing.assert_array_equal(np.abs(R[R != 0.0]), 1.0)
-    np.testing.assert_array_equal(tidied(after).bodies[0].R, after.bodies[0].R)
+    np.testing.assert_array_equal(simplify_mechanism(after).bodies[0].R, after.bodies[0].R)
     oblique = mixed_robot().mechanism
-    for old, new in zip(oblique.bodies, _without_dust(oblique).bodies, strict=True):
+    for old, new in zip(oblique.bodies, _zero_rounding_residue(oblique).bodies, strict=True):
         np.testing.assert_array_equal(old.R, new.R)
 
 

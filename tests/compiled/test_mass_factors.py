@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import dynx
-from dynx.compiled.mass_factors import factors_of, filled_entries, solved
+from dynx.compiled.mass_factors import factorize_mass_matrix, filled_entries, solve_with_factors
 from dynx.model import Model
 from dynx.model.model import Base
 from tests.rules.documents import joint, link
@@ -28,7 +28,7 @@ def test_solving_by_factors(base: Base, mimic: bool) -> None:
     model = two_arms(base, mimic=mimic)
     M = dynx.backend("reference", model).mass_matrix(model.random(0))
     b = np.arange(1.0, model.nv + 1.0)
-    found = solved(*factors_of(model.mechanism, M), b)
+    found = solve_with_factors(*factorize_mass_matrix(model.mechanism, M), b)
     np.testing.assert_allclose(np.array(found, dtype=float), np.linalg.solve(M, b), rtol=1e-12)
 
 

@@ -40,8 +40,8 @@ SIMULATION_FAULTS = (
     Fault(
         "compiled_frame_placement_of_the_first_sample_only",
         "dynx.compiled.call",
-        right="room.input_rows[-1][...] = self._place",
-        wrong="room.input_rows[-1][:1] = self._place",
+        right="workspace.input_rows[-1][...] = self._place",
+        wrong="workspace.input_rows[-1][:1] = self._place",
         test_file="tests/compiled/test_frames.py",
         test="test_every_way_gives_the_same_bits",
     ),

@@ -13,9 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from dynx.compiled.kernels import evaluated, tidied
-from dynx.compiled.mass_factors import factors_of, solved
+from dynx.compiled.kernels import evaluate_quantity
+from dynx.compiled.mass_factors import factorize_mass_matrix, solve_with_factors
 from dynx.compiled.parametric import ParametricDynamics
+from dynx.compiled.simplification import simplify_mechanism
 from dynx.control.base import Controller, Measurement, chain_of, gains_of
 from dynx.control.content import content_of
 from dynx.errors import ArgumentError, DynxError, TraceError, UnsupportedFeatureError, shown
@@ -96,7 +97,7 @@ class StepOf:
         return own, content_of(traced_controller(self.controller, {})), self.plant
 
     def _traced(self, *, controlled: bool, pushed: bool) -> Kernel:
-        mechanism = tidied(self.model.mechanism)
+        mechanism = simplify_mechanism(self.model.mechanism)
         law = traced_controller(self.controller, {})
 
         def step(**given: Array) -> dict[str, Array]:
@@ -193,9 +194,11 @@ class StepOf:
         if self.plant is not None:
             return self.plant.acceleration(given["parameters"], q, v, tau, rotors)
         if rotors is None:
-            return evaluated(mechanism, "forward_dynamics", (), q, v, tau)
-        M = evaluated(mechanism, "mass_matrix", (), q) + np.diag(rotors)
-        return solved(*factors_of(mechanism, M), tau - evaluated(mechanism, "bias_torque", (), q, v))
+            return evaluate_quantity(mechanism, "forward_dynamics", (), q, v, tau)
+        M = evaluate_quantity(mechanism, "mass_matrix", (), q) + np.diag(rotors)
+        return solve_with_factors(
+            *factorize_mass_matrix(mechanism, M), tau - evaluate_quantity(mechanism, "bias_torque", (), q, v)
+        )
 
     def _moved(self, a: Array, given: Mapping[str, Array]) -> tuple[Array, Array]:
         """q and v at the end of the step."""

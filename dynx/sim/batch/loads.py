@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.backends.joint_dynamics import JointDynamicsTerms
-from dynx.compiled.kernels import evaluated
+from dynx.compiled.kernels import evaluate_quantity
 from dynx.control.friction import Coefficients, JointFriction
 from dynx.control.gains import checked_gain
 from dynx.errors import ArgumentError, GainError
@@ -102,7 +102,7 @@ class BatchLoads:
         if pushed:
             for push, wrench in zip(self.pushes, given["wrenches"].reshape(-1, WRENCH), strict=True):
                 details = (self.model.frame_index(push.frame), push.reference)
-                tau = tau + evaluated(mechanism, "jacobian", details, q).T @ wrench
+                tau = tau + evaluate_quantity(mechanism, "jacobian", details, q).T @ wrench
         return tau
 
     def rotors_of(self, given: Mapping[str, Array]) -> Array | None:

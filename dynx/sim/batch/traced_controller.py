@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from dynx.compiled.kernels import evaluated, tidied
+from dynx.compiled.kernels import evaluate_quantity
+from dynx.compiled.simplification import simplify_mechanism
 from dynx.control.base import Controller, chain_of, rebind
 from dynx.control.dynamics import Dynamics, Evaluation
 from dynx.model import Model
@@ -20,7 +21,7 @@ class ArrayDynamics(Dynamics):
     """Dynamics evaluated by the array code of `dynx.rbd`, for symbols as for numbers."""
 
     def __init__(self, model: Model) -> None:
-        self._mechanism = tidied(model.mechanism)
+        self._mechanism = simplify_mechanism(model.mechanism)
         super().__init__(model)
 
     def evaluation(self, quantity: str) -> Evaluation:
@@ -29,10 +30,10 @@ class ArrayDynamics(Dynamics):
 
         def evaluate(*arguments: Any, reference: str = LOCAL_WORLD_ALIGNED) -> Array:
             if not isinstance(arguments[-1], str):
-                return evaluated(mechanism, quantity, (), *arguments)
+                return evaluate_quantity(mechanism, quantity, (), *arguments)
             *arrays, frame = arguments
             details = (model.frame_index(frame), *(() if quantity == "forward_kinematics" else (reference,)))
-            return evaluated(mechanism, FRAME_FUNCTIONS.get(quantity, quantity), details, *arrays)
+            return evaluate_quantity(mechanism, FRAME_FUNCTIONS.get(quantity, quantity), details, *arrays)
 
         return evaluate
 

@@ -1,0 +1,41 @@
+"""Traced arrays in the coordinates of the model and in those of the tree, which mimic joints connect."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from dynx.model import Mechanism
+from dynx.spatial.scalar import Array
+
+
+def tree_coordinates(mechanism: Mechanism, q: Array, *rates: Array) -> tuple[Array, ...]:
+    """q and velocities (or accelerations) of the model in coordinates of the tree."""
+    coupling = mechanism.coupling
+    if coupling is None:
+        return (q, *rates)
+    S = coupling.matrix()
+    return (coupling.expand_q(q), *(rate @ S.T for rate in rates))
+
+
+def reduce_columns(mechanism: Mechanism, A: Array) -> Array:
+    """A S: a torque (nv,) or the columns of a matrix, in the coordinates of the model."""
+    coupling = mechanism.coupling
+    return A if coupling is None else np.asarray(A @ coupling.matrix())
+
+
+def reduce_rows(mechanism: Mechanism, A: Array) -> Array:
+    """S' A: the rows of a matrix, in the coordinates of the model."""
+    coupling = mechanism.coupling
+    return A if coupling is None else np.asarray(coupling.matrix().T @ A)
+
+
+def argument_shapes(
+    mechanism: Mechanism, arguments: Iterable[str], *, tree: bool = False
+) -> dict[str, tuple[int, ...]]:
+    """Shapes of arguments such as q, v and tau in the coordinates of the model or of the tree."""
+    coupling = None if tree else mechanism.coupling
+    n = len(mechanism.bodies) if coupling is None else coupling.n_joints
+    nq, nv = (n + 7, n + 6) if mechanism.floating else (n, n)
+    return {argument: (nq if argument == "q" else nv,) for argument in arguments}
