@@ -14,7 +14,9 @@ from pytest_benchmark.fixture import BenchmarkFixture
 from benchmarks.closed_loops import LOOPS, closed_loop
 from benchmarks.rollout_batches import BATCHES, FULL, QUICK, rollout_batch
 from benchmarks.simulator import Simulator, assert_right
+from dynx.control import ComputedTorque
 from dynx.errors import NotInstalledError
+from dynx.sim import Scenario, Simulation
 
 REPETITIONS, REPETITIONS_OF_BATCHES = 20, 5
 THREADS = (1, 2)
@@ -40,6 +42,24 @@ def test_batch_of_rollouts(benchmark: BenchmarkFixture, name: str, threads: int)
         pytest.skip(str(reason))
     benchmark.group = f"rollouts, UR5, threads {threads}"
     _time(benchmark, batch, REPETITIONS_OF_BATCHES)
+
+
+@pytest.mark.parametrize("plant", ["pinocchio", "pybullet"])
+def test_steps_of_the_caller(benchmark: BenchmarkFixture, plant: str) -> None:
+    """One `Simulation.step` at a time, beside `test_closed_loop`: at most 5 us more than there."""
+    task = (QUICK if benchmark.disabled else FULL).task
+    controller = ComputedTorque(task.model, kp=400, kd=40)
+    try:
+        simulation = Simulation(Scenario(task.model, controller, task.motion, plant=plant))
+    except NotInstalledError as reason:
+        pytest.skip(str(reason))
+    benchmark.group = "closed loop, UR5"
+    with simulation:
+        assert simulation.n_steps is not None
+        repeat: Any = benchmark.pedantic
+        repeat(simulation.step, rounds=simulation.n_steps)
+    if benchmark.stats is not None:
+        benchmark.extra_info.update(us=1e6 * float(benchmark.stats.stats.median))
 
 
 def _time(benchmark: BenchmarkFixture, simulator: Simulator, rounds: int) -> None:

@@ -102,6 +102,7 @@ class Simulation:
             substeps=scenario.substeps,
             options={"method": scenario.method, "rtol": scenario.rtol, "atol": scenario.atol},
         )
+        self._dt = clock.dt
         self._held: Held | None = None
         self._misplaced = self._closed = False
         self._executor: tuple[str, ...] = ()
@@ -127,7 +128,7 @@ class Simulation:
         it, and the controller is not evaluated. Raises DivergedError and ControlError, with the record so
         far in ``error.rollout``.
         """
-        if not isinstance(n, int | np.integer) or isinstance(n, bool) or n < 1:
+        if n != 1 and (not isinstance(n, int | np.integer) or n < 1):
             raise ArgumentError(f"n is {shown(n)}; wanted a number of steps, 1 or more")
         given = None
         if tau is not None:
@@ -135,8 +136,11 @@ class Simulation:
             if given.ndim != 1:
                 raise ArgumentError(f"tau has shape {given.shape}; wanted ({self._setup.model.nv},)")
             self._depart("torques of the caller")
-        self._advance(self._record.steps + int(n), given)
-        return self.state
+        if not self._executor:
+            self._executor = ("plain: stepped by the caller",)
+        end = self._record.steps + int(n)
+        held = self._advance(end, given)
+        return State(end * self._dt, held.q.copy(), held.v.copy())
 
     def run(self, until: float | None = None, *, real_time: bool = False) -> Rollout:
         """Step to the time `until` [s], by default the end of the scenario, and return the record.
@@ -177,25 +181,28 @@ class Simulation:
             if ahead > 0.0:
                 time.sleep(ahead)
 
-    def _advance(self, end: int, given: Floats | None, *, compiled: bool = False) -> None:
+    def _advance(self, end: int, given: Floats | None, *, compiled: bool = False) -> Held:
         if self._closed:
             raise ClosedError("the simulation is closed")
         record = self._record
         if end > len(record):
             self._extend(end)
             record = self._record
+        held = self._held
         try:
-            # A state that runs away is found by the loop, whose error says more than NumPy's warning.
+            if held is None:
+                held = self._held = self._loop.start(record)
+            elif self._misplaced:
+                self._plant.reset(held.q, held.v)
+            self._misplaced = False
+            if end == record.steps + 1 and not compiled:
+                self._loop.advance(record, held, end, given)
+                return held
+            # A state that runs away is found by the loop, whose error says more than NumPy's warnings. For
+            # a single step, silencing them would take longer than all else beside the step itself.
             with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-                if self._held is None:
-                    self._held = self._loop.start(record)
-                elif self._misplaced:
-                    self._plant.reset(record.q[record.steps].copy(), record.v[record.steps].copy())
-                self._misplaced, held = False, self._held
                 if compiled:
                     self._advance_staged(record, held, end)
-                elif not self._executor:
-                    self._executor = ("plain: stepped by the caller",)
                 self._loop.advance(record, held, end, given)
         except BaseException as error:
             # The plant may be in the middle of a step: it is placed anew before the next one.
@@ -203,6 +210,7 @@ class Simulation:
             if isinstance(error, SimulationError):
                 error.rollout = self.rollout
             raise
+        return held
 
     def _advance_staged(self, record: Record, held: Held, end: int) -> None:
         """Take as many steps to `end` as the staged executor can, and note which executor computed them."""
@@ -236,13 +244,13 @@ class Simulation:
     @property
     def time(self) -> float:
         """Simulated time [s]."""
-        return self._record.steps * self._loop.clock.dt
+        return self._record.steps * self._dt
 
     @property
     def state(self) -> State:
         """Time, configuration (nq,) and velocity (nv,) after the last step."""
         k = self._record.steps
-        return State(k * self._loop.clock.dt, self._record.q[k].copy(), self._record.v[k].copy())
+        return State(k * self._dt, self._record.q[k].copy(), self._record.v[k].copy())
 
     @property
     def rollout(self) -> Rollout:
@@ -299,9 +307,8 @@ class Simulation:
         changed = [] if theirs is ours else [each.field for each in theirs.differences(ours)]
         self._record.take(snapshot.record, n)
         self._executor, self._departures = snapshot.executor, snapshot.departures
-        q, v = self._record.q[n].copy(), self._record.v[n].copy()
-        self._plant.reset(q, v)
         held = replace(snapshot.held)
+        self._plant.reset(held.q, held.v)
         if any(name.partition(".")[0] == "controller" for name in changed):
             controller = self._setup.controller
             held.controller_state = None if controller is None else controller.initial_state()

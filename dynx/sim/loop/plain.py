@@ -38,8 +38,10 @@ DIVERGENCE_SPEED = 1e8
 
 @dataclass
 class Held:
-    """What a loop carries from step to step beside the state of the plant."""
+    """State of a loop between two steps; its arrays are replaced, never written to."""
 
+    q: Floats
+    v: Floats
     tau: Floats
     """Torque (nv,) of the last control step."""
     command: Any = None
@@ -63,15 +65,21 @@ class Loop:
     """Called now and then with the number of steps taken."""
 
     @cached_property
-    def _setpoint_rows(self) -> list[Setpoint]:
-        return list(map(Setpoint, *self.setpoints))
+    def _constants(self) -> tuple[Any, ...]:
+        """Local variables of `advance`, which takes one step in some microseconds."""
+        motors = self.controller if isinstance(self.controller, EngineMotor) else None
+        sensors = None if self.sensors.plain else self.sensors
+        setpoints = list(map(Setpoint, *self.setpoints))
+        nv = self.plant.model.nv
+        return self.clock.steps_per_control, self.clock.dt, sensors, motors, setpoints, (nv,)
 
     def start(self, record: Record) -> Held:
         """Place the plant at the last state of `record`, and recompute what the loop held there."""
         begin = record.steps
-        self.plant.reset(record.q[begin].copy(), record.v[begin].copy())
+        q, v = record.q[begin].copy(), record.v[begin].copy()
+        self.plant.reset(q, v)
         tau, command = self._last_command(record)
-        return Held(tau, command, self.recovered_state(record))
+        return Held(q, v, tau, command, self.recovered_state(record))
 
     def advance(self, record: Record, held: Held, end: int, given: Floats | None = None) -> None:
         """Step from the last state of `record` to step `end`, where the plant is placed at that state.
@@ -81,15 +89,12 @@ class Loop:
         they are after a Ctrl-C.
         """
         plant, controller = self.plant, self.controller
-        per_control, dt, limit = self.clock.steps_per_control, self.clock.dt, self.limit
+        per_control, dt, sensors, motors, setpoints, shape = self._constants
         Q, V, A, applied = record.q, record.v, record.a, record.tau
         begin = record.steps
-        q, v = Q[begin].copy(), V[begin].copy()
+        q, v = held.q, held.v
         tau, command, state = held.tau, held.command, held.controller_state
-        sensors = None if self.sensors.plain else self.sensors
-        motors = controller if isinstance(controller, EngineMotor) else None
-        setpoints = self._setpoint_rows
-        stops, shape = self.stops, (plant.model.nv,)
+        limit, stops = self.limit, self.stops
         step, progress, next_call = plant.step, self.progress, begin
         # The step of the next control step; none without a controller.
         due = -1 if controller is None or given is not None else -(-begin // per_control) * per_control
@@ -135,7 +140,7 @@ class Loop:
                 )
             applied[k], A[k], Q[k + 1], V[k + 1] = tau, a, q, v
             record.steps = k + 1
-            held.tau, held.command, held.controller_state = tau, command, state
+            held.q, held.v, held.tau, held.command, held.controller_state = q, v, tau, command, state
             if progress is not None and k >= next_call:
                 next_call = k + PROGRESS_STEPS
                 progress(k + 1)

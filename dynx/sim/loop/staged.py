@@ -122,7 +122,8 @@ class StagedLoop:
                 held.tau = record.tau[k - 1].copy()
                 if self._state_size:
                     held.controller_state = arrays["state"][k].copy()
-            self._plant.reset(record.q[k].copy(), record.v[k].copy())
+            held.q, held.v = record.q[k].copy(), record.v[k].copy()
+            self._plant.reset(held.q, held.v)
 
     def _step(self, questions: Questions, *, asked: bool) -> Glue:
         """One step of the plant, and of the law if it is `asked`."""
