@@ -38,16 +38,15 @@ class FrameCoordinates:
         self.columns: Columns = _as_slice([*range(offset), *(offset + k for k in joints)])
         """The columns of the Jacobian, in the order of the coordinates."""
         self.count = offset + len(joints)
-        """How many there are; 0 if nothing moves the frame."""
+        """Number of coordinates; 0 if nothing moves the frame."""
 
         self._low, self._high = model.lower[self._in_q], model.upper[self._in_q]
         drivers = {joint.mimic.joint for joint in model.joints if joint.mimic is not None}
         kinds = [model.coordinate_joints[k] for k in joints]
         # A joint that drives others is not periodic, since its followers keep moving.
-        turns = np.array([j.type != "prismatic" and j.name not in drivers for j in kinds], dtype=bool)
-        self._periodic = np.flatnonzero(
-            turns & (self._high - self._low >= FULL_TURN - _FULL_TURN_TOLERANCE)
-        ).tolist()
+        rotates = np.array([j.type != "prismatic" and j.name not in drivers for j in kinds], dtype=bool)
+        full_range = self._high - self._low >= FULL_TURN - _FULL_TURN_TOLERANCE
+        self._periodic = np.flatnonzero(rotates & full_range).tolist()
 
         lower, upper = self._low.tolist(), self._high.tolist()
         for k in self._periodic:
@@ -70,20 +69,18 @@ class FrameCoordinates:
             v[:6] = to[:6]
             q = self._model.integrate(q, v)
             to = to[6:]
-        moved: Floats = q.copy()
-        moved[self._in_q] = to
-        return moved
+        changed: Floats = q.copy()
+        changed[self._in_q] = to
+        return changed
 
     def random(self, q0: Floats, rng: np.random.Generator) -> Floats:
         """Return q0 with its joints drawn uniformly within their limits; the base does not move.
 
         A joint without limits is drawn from within pi [rad] or 1 m of its value in q0.
         """
-        here = q0[self._in_q]
-        low = np.where(np.isfinite(self._low), self._low, np.minimum(here, self._high) - self._default_range)
-        high = np.where(
-            np.isfinite(self._high), self._high, np.maximum(here, self._low) + self._default_range
-        )
+        current, default = q0[self._in_q], self._default_range
+        low = np.where(np.isfinite(self._low), self._low, np.minimum(current, self._high) - default)
+        high = np.where(np.isfinite(self._high), self._high, np.maximum(current, self._low) + default)
         drawn: Floats = q0.copy()
         drawn[self._in_q] = low + (high - low) * rng.random(len(low))
         return drawn
@@ -92,10 +89,10 @@ class FrameCoordinates:
         """Return q with its periodic angles shifted by full turns, within their limits and nearest to q0."""
         if not self._periodic:
             return q
-        values, wanted = q[self._in_q].tolist(), q0[self._in_q].tolist()
+        values, start = q[self._in_q].tolist(), q0[self._in_q].tolist()
         for k in self._periodic:
             low, high = float(self._low[k]), float(self._high[k])
-            value = wanted[k] + math.remainder(values[k] - wanted[k], FULL_TURN)
+            value = start[k] + math.remainder(values[k] - start[k], FULL_TURN)
             value += FULL_TURN if value < low else -FULL_TURN if value > high else 0.0
             values[k] = min(max(value, low), high)
         q = q.copy()

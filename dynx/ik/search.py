@@ -96,9 +96,7 @@ class Search:
         *,
         begin_at_q0: bool,
     ) -> Candidate:
-        """Reach the target from q0 (nq,) within limits, or from a random start; return the best
-        configuration.
-        """
+        """Reach the target from q0 (nq,) within limits, or from a random start; return the best result."""
         residual = Residual(position, rotation, self._point)
         if self._coordinates.count == 0:
             return self.evaluate(q0, residual)

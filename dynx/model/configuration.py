@@ -210,9 +210,7 @@ def clip(model: Model, q: ArrayLike) -> Floats:
 
 
 def _sampling_range(low: float, high: float, default_range: float) -> tuple[float, float]:
-    """Return the range to sample from: the limits, with a missing one `default_range` from 0 or 2 of it from
-    the other.
-    """
+    """Return the limits; a missing one is `default_range` from 0, or twice that from the other limit."""
     bounded_below, bounded_above = low > -MAX_MAGNITUDE, high < MAX_MAGNITUDE
     if bounded_below and bounded_above:
         return low, high

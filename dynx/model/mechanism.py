@@ -1,5 +1,4 @@
-"""Mechanism: the moving bodies of a model after fixed-joint merging, with merged inertias and attached
-frames.
+"""Mechanism: the moving bodies of a model after fixed-joint merging, with their inertias and frames.
 
 The algorithms of `dynx.rbd` work on it. It is generic in the scalar type: inertias are merged in float64 for
 the backend `reference` and in 50 digits for the referee.
@@ -32,9 +31,9 @@ ROOT = -1
 """Index of the root body: the world for a fixed base, the base link for a floating one."""
 
 
-def float64(convert: object) -> Array:
+def float64(numbers: object) -> Array:
     """Convert nested floats to a float64 array."""
-    return np.asarray(convert, dtype=np.float64)
+    return np.asarray(numbers, dtype=np.float64)
 
 
 @dataclass(frozen=True)

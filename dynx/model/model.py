@@ -287,9 +287,7 @@ class Model:
 
 
 def _missing_inertial_notes(links: Iterable[Link], joints: Iterable[Joint]) -> list[Note]:
-    """Return a note for each link without an inertial that a joint moves; some engines give it a mass of 1
-    kg.
-    """
+    """Return a note for each moving link without an inertial; some engines give it a mass of 1 kg."""
     moved = {joint.child: joint.name for joint in joints if joint.moves}
     return [
         Note(

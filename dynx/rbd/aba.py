@@ -25,8 +25,8 @@ from dynx.spatial.so3 import rotate, rotate_back, skew
 class ArticulatedInertia:
     """Apparent inertia of a body with all bodies outboard of it, whose joints move freely.
 
-    An acceleration of the body, proper d of its origin and angular alpha, takes the force and moment
-    f = M d + C alpha, n = C' d + J alpha about the origin of the body; M and J are symmetric.
+    To give the body the proper acceleration d of its origin and the angular acceleration alpha takes the
+    force f = M d + C alpha and the moment n = C' d + J alpha about that origin; M and J are symmetric.
     """
 
     M: Array
@@ -50,8 +50,7 @@ class ArticulatedInertia:
     def without_joint(self, U: SpatialVector, K: SpatialVector, mask: SpatialVector) -> ArticulatedInertia:
         """Return I - U K', the inertia felt through a joint, where U = I S and K = U / (S' U).
 
-        The result is exactly zero along the joint: `mask` is 0 there and 1 elsewhere, which saves the
-        subtraction.
+        The result is exactly zero along the joint: `mask` is 0 there and 1 elsewhere.
         """
         (f, n), (kf, kn), (mask_f, mask_n) = U, K, mask
         return ArticulatedInertia(
@@ -62,25 +61,21 @@ class ArticulatedInertia:
 
     def to_parent(self, placement: Placement) -> ArticulatedInertia:
         """Return this inertia about the origin of the parent, in its axes."""
-        shift = skew(placement.p)
-        M, C, J = (
-            placement.rotate_symmetric(self.M),
-            placement.rotate_tensor(self.C),
-            placement.rotate_symmetric(self.J),
-        )
-        moved = C - M @ shift
-        lever = shift @ C
-        return ArticulatedInertia(
-            M, moved, symmetric_from_upper(J + shift @ moved + np.swapaxes(lever, -1, -2))
-        )
+        P = skew(placement.p)
+        M = placement.rotate_symmetric(self.M)
+        C = placement.rotate_tensor(self.C)
+        J = placement.rotate_symmetric(self.J)
+        C_parent, PC = C - M @ P, P @ C
+        J_parent = J + P @ C_parent + np.swapaxes(PC, -1, -2)
+        return ArticulatedInertia(M, C_parent, symmetric_from_upper(J_parent))
 
     def matrix(self) -> Array:
         """Return the inertia as one matrix (..., 6, 6), linear rows and columns first."""
         # Blocks that depend on no joint position have no batch axes yet.
         M, C, J = np.broadcast_arrays(self.M, self.C, self.J)
         top = np.concatenate([M, C], axis=-1)
-        below = np.concatenate([np.swapaxes(C, -1, -2), J], axis=-1)
-        return np.concatenate([top, below], axis=-2)
+        bottom = np.concatenate([np.swapaxes(C, -1, -2), J], axis=-1)
+        return np.concatenate([top, bottom], axis=-2)
 
 
 def forward_dynamics(mechanism: Mechanism, q: Array, v: Array, tau: Array) -> Array:
@@ -131,19 +126,18 @@ def forward_dynamics(mechanism: Mechanism, q: Array, v: Array, tau: Array) -> Ar
         accelerations = [(root.proper_acceleration, root.alpha)]
     a: list[Array] = []
     for index, body in enumerate(bodies):
-        moved = placements[index].motion_to_child(*accelerations[body.parent + 1])
-        linear, angular = add_spatial(moved, velocity_products[index])
-        K, unloaded = joint_terms[index]
-        joint = unloaded - _dot(K, (linear, angular))
+        parent_motion = placements[index].motion_to_child(*accelerations[body.parent + 1])
+        linear, angular = add_spatial(parent_motion, velocity_products[index])
+        K, u_over_D = joint_terms[index]
+        joint = u_over_D - _dot(K, (linear, angular))
         a.append(joint)
         S = _motion_subspace(body.axis, body.revolute)
         accelerations.append((linear + S[0] * append_axis(joint), angular + S[1] * append_axis(joint)))
     if mechanism.floating:
         # `root` was computed with a = 0: its proper acceleration is omega x v minus gravity.
         linear, angular = accelerations[ROOT + 1]
-        return np.concatenate(
-            [linear - root.proper_acceleration, angular, *(append_axis(x) for x in a)], axis=-1
-        )
+        base_acceleration = linear - root.proper_acceleration
+        return np.concatenate([base_acceleration, angular, *(append_axis(x) for x in a)], axis=-1)
     return np.stack(a, axis=-1) if a else np.zeros(v.shape)
 
 

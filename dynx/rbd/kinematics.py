@@ -71,7 +71,7 @@ def frame_pose(mechanism: Mechanism, poses: Poses, frame: int) -> tuple[Array, A
 
 
 def frame_placement(mechanism: Mechanism, poses: Poses, frame: int) -> Array:
-    """T_world_frame (..., 4, 4) of frame number `frame`."""
+    """Return T_world_frame (..., 4, 4) of frame number `frame`."""
     return homogeneous(*frame_pose(mechanism, poses, frame))
 
 

@@ -66,12 +66,12 @@ class Placement:
 
     def inertia_to_parent(self, inertia: RigidInertia) -> RigidInertia:
         """Return the inertia about the parent's origin, in the parent's axes."""
-        turned = RigidInertia(
+        rotated = RigidInertia(
             inertia.mass,
             rotate(self.R, inertia.first_moment),
             self.rotate_symmetric(inertia.rotational_inertia),
         )
-        return turned.transform(np.eye(3, dtype=int), self.p)
+        return rotated.transform(np.eye(3, dtype=int), self.p)
 
 
 def _rotate_tensor_about_z(A: Array, c: Array, s: Array) -> Array:

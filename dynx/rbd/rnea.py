@@ -139,8 +139,8 @@ def child_motion(
 def body_wrench(inertia: RigidInertia, motion: Motion) -> SpatialVector:
     """Return the force and the moment about the body's origin that produce its motion (Newton and Euler)."""
     U, d, h = motion.acceleration_matrix, motion.proper_acceleration, inertia.first_moment
-    moment = cross(h, d) + _rotation_moment(inertia.second_moment_matrix, motion)
-    return d * inertia.mass + rotate(U, h), moment
+    force = d * inertia.mass + rotate(U, h)
+    return force, cross(h, d) + _rotation_moment(inertia.second_moment_matrix, motion)
 
 
 def add_spatial(a: SpatialVector, b: SpatialVector) -> SpatialVector:

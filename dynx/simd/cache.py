@@ -6,7 +6,7 @@ code is executed, so a folder that another user owns or may write to is not used
 
 The key of an image is the hash of its *recipe* and of everything that turns the recipe into machine code. A
 recipe is any text that determines the program. `program_recipe` derives one from a program; a caller who
-knows a shorter one saves the time of tracing. Each file carries a checksum and is written under a temporary
+knows a shorter one saves the time of tracing. Each file has a checksum and is written under a temporary
 name first, so that a truncated, altered or unfinished file is never used but compiled again and replaced.
 """
 

@@ -40,7 +40,7 @@ class Identifiability:
         # Bound of numpy.linalg.matrix_rank; identifiable combinations are many orders of magnitude above it.
         least = singular_values[0] * max(SAMPLES * model.nv, Y.shape[-1]) * np.finfo(np.float64).eps
         self.identifiable = int(np.sum(singular_values > least))
-        """How many combinations of parameters torques can show at all."""
+        """Number of identifiable combinations of parameters."""
         self._combinations = directions[: self.identifiable].T
 
     def condition_number(self, trajectory: Trajectory) -> float:

@@ -100,9 +100,7 @@ def line(
 def _refine(
     path: _Line, engine: Backend, deviation: float, rotation_deviation: float
 ) -> tuple[PiecewisePolynomial, int, float, float]:
-    """Return the spline within the bounds, its number of intervals, and its largest distance and angle
-    errors.
-    """
+    """Return the spline within the bounds, its number of intervals, and its distance and angle errors."""
     n = MIN_INTERVALS
     while True:
         try:
@@ -194,9 +192,7 @@ class _Line:
         return np.array(found)
 
     def deviations(self, engine: Backend, curve: PiecewisePolynomial) -> tuple[Floats, Floats, Floats]:
-        """Return s at and between the solutions, with the distance [m] and the angle [rad] from the line
-        there.
-        """
+        """Return s at and between the solutions, and the distance [m] and angle [rad] from the line."""
         n = len(curve.coefficients)
         s = np.linspace(0.0, 1.0, SAMPLES_PER_INTERVAL * n + 1)
         reached = engine.forward_kinematics(curve(s)[0], self.frame)

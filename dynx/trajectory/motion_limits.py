@@ -14,8 +14,7 @@ LIMIT_MARGIN = 64.0 * float(np.finfo(np.float64).eps)
 """Relative margin to its limits with which a motion is planned, so that rounding cannot violate them."""
 
 SCALAR_LIMIT_RANGE = 1e-100, 1e100
-"""Range to which limits of the path parameter s are clamped, so that no product of them under- or overflows.
-"""
+"""Range to which limits of the path parameter s are clamped, so that no product under- or overflows."""
 
 
 def checked_limit(name: str, bound: ArrayLike, nv: int) -> Floats:
@@ -44,11 +43,10 @@ def velocity_limits(bound: ArrayLike | None, ends: Ends) -> Floats:
 
 
 def scalar_limit(name: str, bound: Floats, ends: Ends) -> float:
-    """Return the limit of a path parameter s of which every coordinate is a multiple: min |limit /
-    displacement|.
+    """Return the limit of a path parameter s of which every coordinate is a multiple.
 
-    It is infinite if no moving coordinate has a limit. Raises TrajectoryError if a coordinate has to move but
-    its limit is 0.
+    It is the least of |limit / displacement|, infinite if no moving coordinate has a limit. Raises
+    TrajectoryError if a coordinate has to move but its limit is 0.
     """
     distance = np.abs(ends.displacement)
     moving = distance > 0.0

@@ -104,9 +104,7 @@ def _run_ruckig(
 
 
 def _phases(profile: Any, duration: float) -> Iterator[Phase]:
-    """Yield the phases of one joint: braking into the limits, the seven of the profile, and rest until the
-    end.
-    """
+    """Yield the phases of one joint: braking into the limits, the seven of the profile, and final rest."""
     passed = 0.0
     for part in (profile.brake, profile):
         states = zip(part.t, part.p, part.v, part.a, part.j, strict=False)

@@ -46,9 +46,7 @@ def end_setpoints(path: Curve, law: Trajectory, q0: Floats, q1: Floats) -> tuple
 
 
 def checked_law(law: Trajectory) -> Trajectory:
-    """Return `law`; raise an error unless it is a trajectory of one coordinate from 0 to 1 that stays
-    between.
-    """
+    """Return `law`; raise an error unless it is a trajectory of one coordinate from 0 to 1, within [0, 1]."""
     if not isinstance(law, Trajectory):
         raise ArgumentError(f"law is of type {type(law).__name__}; wanted a Trajectory from [0] to [1]")
     if (law.nq, law.nv) != (1, 1):

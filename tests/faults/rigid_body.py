@@ -114,8 +114,8 @@ RIGID_BODY_FAULTS = (
     Fault(
         "aba_base_acceleration_includes_gravity",
         "dynx.rbd.aba",
-        right="linear - root.proper_acceleration, angular,",
-        wrong="linear, angular,",
+        right="base_acceleration = linear - root.proper_acceleration",
+        wrong="base_acceleration = linear",
         test_file="tests/oracles/test_closed_forms.py",
         test="test_backend_matches_closed_form[free_body-reference]",
     ),

@@ -102,11 +102,11 @@ def _floating_base_joint(joints: list[Element], links: list[Link]) -> Element | 
         if parents and children:
             ends.append((joint, parents[0].attributes.get("link"), children[0].attributes.get("link")))
     below = {child for _, _, child in ends}
-    carried = Counter(parent for _, parent, _ in ends)
+    child_count = Counter(parent for _, parent, _ in ends)
     empty = {link.name for link in links if link.inertial is None or link.inertial.mass == 0.0}
     for joint, parent, _ in ends:
         if joint.attributes.get("type") != "floating" or parent in below or parent not in empty:
             continue
-        if carried[parent] == 1:
+        if child_count[parent] == 1:
             return joint
     return None

@@ -96,9 +96,7 @@ class Reading:
         return self.number(element, attribute, what)
 
     def vector(self, element: Element, attribute: str, what: str) -> Vector:
-        """Return a required attribute of three finite numbers separated by white space; raise an error
-        otherwise.
-        """
+        """Return a required attribute of three finite numbers; raise an error otherwise."""
         text = self.attribute(element, attribute, what)
         words = text.split()
         wanted = "three numbers separated by white space"

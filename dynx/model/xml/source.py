@@ -34,9 +34,7 @@ class Span:
 
 @dataclass(eq=False, repr=False)
 class SourceElement:
-    """An element with its position: the span of the element, and of each attribute with the white space
-    before it.
-    """
+    """An element with the span of all of it, and of each attribute with the white space before it."""
 
     tag: str
     attributes: dict[str, str]
@@ -175,9 +173,7 @@ class XmlSource:
         return Edit(start, end, "")
 
     def inserting(self, parent: SourceElement, text: str, *, first: bool = False) -> Edit:
-        """Return the edit that inserts lines of text as the last or, with `first`, the first child of an
-        element.
-        """
+        """Return the edit that inserts lines of text as the last (or `first`) child of an element."""
         indent = self.indent_of(parent) + self.unit
         lines = f"\n{indent}{self._indented(text, indent)}"
         if parent.empty:
