@@ -2,8 +2,9 @@
 
     python docs/survey.py [--only erd|pybullet] [--engines a,b] [--jobs N] [--mended FOLDER]
 
-Fixed and floating base each. What `dynx.diagnose` finds is written as a table, robot by cause by effect.
-`--mended FOLDER` keeps the files that it mended, with a list for `tests/doctor/raw_*.py` to check.
+Each file is examined on a fixed and on a floating base. The results of `dynx.diagnose` are written as tables
+of causes and effects by robot. `--mended FOLDER` keeps the corrected files, with a list that
+`tests/doctor/raw_*.py` check.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from dynx.doctor import diagnose
 from dynx.workers import Workers
 
 SMALL = 1e-6
-"""Differences below this are of rounding size; they are counted apart."""
+"""Relative difference below which robots are counted separately, as differences of rounding."""
 
 GROUPS = {"erd": "example-robot-data", "pybullet": "pybullet_data"}
 
@@ -37,7 +38,7 @@ class Task:
 
 
 def examine(task: Task) -> dict[str, Any]:
-    """The entry of the report, and where the mended file is."""
+    """The entry of the report, and the path of the corrected file."""
     report = diagnose(task.path, base=task.base, engines=task.engines, counterexamples=False)
     entry = report.to_dict()
     entry["group"], entry["path"] = task.group, task.path
@@ -98,7 +99,7 @@ def main() -> None:
 
 
 def summary(entries: Sequence[dict[str, Any]]) -> None:
-    """Counts, and everything that is not as it should be."""
+    """Counts, and all robots with remaining differences or errors."""
     for group in ("erd", "pybullet"):
         for base in ("fixed", "floating"):
             of = [entry for entry in entries if (entry["group"], entry["base"]) == (group, base)]
@@ -122,7 +123,7 @@ def counts(entries: Sequence[dict[str, Any]]) -> str:
 
 
 def remarks(entry: dict[str, Any]) -> Iterator[str]:
-    """What is not as it should be about one file."""
+    """The remaining differences and errors of one file."""
     if entry["error"]:
         yield f"refused: {entry['error']['message'].replace(entry['path'], label(entry))}"
     for each in entry["unexplained"]:
@@ -144,7 +145,7 @@ def differs(entry: dict[str, Any], above: float | None = None) -> bool:
 
 
 def page(entries: Sequence[dict[str, Any]]) -> str:
-    """The page: counts, then robot by cause by effect."""
+    """The page: counts, then a table of causes and effects by robot."""
     lines = [
         "# Real robots: why engines differ on them",
         "",

@@ -1,9 +1,9 @@
-"""Write docs/rules.md: every rule of the catalogue on one page, with an anchor for each.
+"""Write docs/rules.md: all rules of the catalogue on one page, with an anchor for each.
 
     python docs/write_rules.py
 
-The text is that of the rules' modules, which ``dynx explain`` prints; tests/test_docs.py holds the page
-current. ``docs/rules.md#dx101`` is the address of a rule, in reports and elsewhere.
+The text comes from the docstrings of the rules' modules, which ``dynx explain`` prints; tests/test_docs.py
+checks that the page is current. ``docs/rules.md#dx101`` is the address of a rule in reports.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ HEAD = """<!-- Written by docs/write_rules.py from the modules of dynx/rules/cat
 
 # Why engines differ on a file
 
-Every cause that `dynx doctor` knows. A rule of kind *difference* makes engines give different numbers, or
-makes one refuse the file; a rule of kind *practice* is bad practice or a matter of one engine alone, with no
-difference to measure. The versions of engines are those in which the rule was measured to hold; a
-test holds each against the engines installed. Each rule has a small robot in `models/traps` that shows it.
+All causes that `dynx doctor` detects. With a cause of kind *difference*, engines give different numbers or
+one refuses the file; a cause of kind *practice* is bad practice or concerns a single engine, without a
+difference that can be measured. The versions of engines are those in which the behaviour was measured; a test
+checks each against the installed engines. Each rule has a small robot in `models/traps` that shows its cause.
 """
 
 GROUPS = {

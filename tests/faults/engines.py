@@ -111,9 +111,9 @@ ENGINES_FAULTS = (
     ),
     Fault(
         "pybullet_joint_state_not_set",
-        "dynx.engines.pybullet.client",
-        right="        self._reset_joints(joints, None)\n        # Entries 0 and 1 only",
-        wrong="        # Entries 0 and 1 only",
+        "dynx.engines.pybullet.connection",
+        right="        self.reset_joints(joints)\n        if not self.links",
+        wrong="        if not self.links",
         test_file="tests/contract/test_lifecycle.py",
         test="test_no_order_of_calls_changes_an_answer[pybullet]",
     ),

@@ -145,7 +145,8 @@ class BulletConnection(ABC):
                     self._reset_base()
                 self.call(self.engine.resetBaseVelocity, self.body, v[3:6], v[:3])
                 self.push_base(tau[3:6], tau[:3], ORIGIN)
-            self.add_torques(tau[base:])
+            if joints:
+                self.control_motors(self.engine.TORQUE_CONTROL, forces=tau[base:])
             self.call(self.engine.stepSimulation)
             after = self._velocities()
             if base:

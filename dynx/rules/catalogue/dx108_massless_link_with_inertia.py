@@ -45,7 +45,7 @@ class MasslessLinkWithInertia(Rule):
                 yield Detection(name, None, inertial.line, message)
 
     def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy:
-        """The tensors put where there is mass."""
+        """The case with each tensor moved to a link with mass, or with the least mass added."""
         for name in links_of(detections):
             inertial, group = case.model.inertial(name), rigid_groups(case)[name]
             parent = group.parents.get(name)

@@ -5,7 +5,7 @@ The two ends were exchanged, or the sign of one was lost.
 - Drake 1.51 refuses the file, with a message that shows a failed condition in Drake's C++ sources. It does so
   for continuous joints too, whose limits have no meaning.
 - MuJoCo 4.0 and PyBullet 3.2.7 treat the joint as unlimited.
-- Pinocchio 4.1 stores them as they are: random configurations and clamping then misbehave.
+- Pinocchio 4.1 stores them unchanged, so random configurations and clamping go wrong.
 
 The equations of motion do not depend on limits. dynx uses the smaller number as the lower limit.
 

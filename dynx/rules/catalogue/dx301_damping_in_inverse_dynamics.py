@@ -9,7 +9,7 @@ dynamics includes it:
 - Drake 1.51 (``CalcInverseDynamics`` with the plant's force elements): likewise.
 - Forward dynamics: PyBullet's ``stepSimulation``, MuJoCo and Drake damp, Pinocchio's ``aba`` does not.
 
-The effect is damping times velocity, often a few per cent of the torque, and all of it at low inertia.
+The effect is damping times velocity, often a few per cent of the torque, and most of it at low inertia.
 
 What to do: decide which convention you want, and add ``damping * v`` to Pinocchio's torque or switch damping
 off in the others. The file is correct, so ``dynx doctor --fix`` does not change it. dynx returns the

@@ -9,8 +9,8 @@ a joint with equal limits violates them at every other position.
   force to the torque. Forces of a hundred times the torque were measured. MuJoCo ignores equal limits, with a
   warning.
 - PyBullet 3.2.7: ``stepSimulation`` pushes the joint back to the limit, equal ones included;
-  ``calculateInverseDynamics`` has none. It ignores a limit of ``lower="0"`` without ``upper`` (see DX216 for
-  other limits without ``upper``).
+  ``calculateInverseDynamics`` ignores limits. PyBullet ignores a limit of ``lower="0"`` without ``upper``
+  (see DX216 for other limits without ``upper``).
 
 Within limits all engines agree, and doctor compares there. A joint with equal limits is compared at any
 position, because the equations of motion have no limits.

@@ -5,7 +5,7 @@ double precision carries 16 digits; where a joint connects bodies a million apar
 difference of scale. The worst case is a light body that carries a heavy one.
 
 Affected are simulators that solve joints as constraints between free bodies (ODE in Gazebo, contacts in
-Bullet and MuJoCo) which converge slowly or not at all while joints drift apart and oscillate. Forward
+Bullet and MuJoCo), which converge slowly or not at all while joints drift apart and oscillate. Forward
 dynamics loses digits with every engine, since the condition number of the mass matrix is of the order of the
 ratio. Inverse dynamics is not affected, and engines agree on it.
 
