@@ -30,7 +30,7 @@ def document(
 
     Absent numbers (errors without a reference, unlimited efforts) are null.
     """
-    model, summary = prepared.model, _summary(rollout)
+    scenario, model, summary = prepared.scenario, prepared.scenario.model, _summary(rollout)
     return {
         "schema": SCHEMA,
         "dynx": __version__,
@@ -40,13 +40,13 @@ def document(
         "gravity": list(model.gravity),
         "nq": model.nq,
         "nv": model.nv,
-        **prepared.asked,
+        **prepared.header,
         "settings": _settings(prepared, rollout),
         "payload": [
-            {"frame": each.frame, "mass": each.mass, "center": list(each.center)}
-            for each in prepared.arguments["payload"]
+            {"frame": each.frame, "mass": each.mass, "center": np.asarray(each.center).tolist()}
+            for each in scenario.payloads
         ],
-        "mass_scale": prepared.arguments["mass_scale"],
+        "mass_scale": scenario.mass_scale,
         "total_mass": rollout.model.total_mass,
         "passive": _is_passive(prepared, rollout),
         "status": _status(ended),
@@ -118,12 +118,12 @@ def _units(model: Model) -> list[str]:
 
 def _settings(prepared: Prepared, rollout: Rollout) -> Entry:
     """Settings of the record, with objects in place of their Python text, and with the armature."""
-    given, kept = prepared.arguments, rollout.settings
+    scenario, kept = prepared.scenario, rollout.settings
     return {
         **kept,
         "joints": {**kept["joints"], "armature": np.diag(rollout.rotors).tolist()},
-        "noise": None if given["noise"] is None else _noise(given["noise"]),
-        "pushes": [_push(each) for each in given["pushes"]],
+        "noise": None if scenario.noise is None else _noise(scenario.noise),
+        "pushes": [_push(each) for each in scenario.pushes],
     }
 
 
@@ -145,8 +145,8 @@ def _push(push: Push) -> Entry:
 def _is_passive(prepared: Prepared, rollout: Rollout) -> bool:
     """Whether nothing does work on the robot, so that its energy is conserved."""
     joints = rollout.settings["joints"]
-    loads = any(joints["damping"]) or any(joints["friction"]) or prepared.arguments["pushes"]
-    return prepared.law is None and not loads and not prepared.arguments["position_limits"]
+    loads = any(joints["damping"]) or any(joints["friction"]) or prepared.scenario.pushes
+    return prepared.controller is None and not loads and not prepared.scenario.position_limits
 
 
 def _status(ended: SimulationError | KeyboardInterrupt | None) -> str:
@@ -161,7 +161,9 @@ def _overshoot(prepared: Prepared, ended: object) -> Entry | None:
     """Joint at which the damping is unstable for the step, where that can be the reason for divergence."""
     if not isinstance(ended, DivergedError):
         return None
-    found = largest_overshoot(prepared.law, prepared.arguments["q0"], prepared.clock.control_dt)
+    found = largest_overshoot(
+        prepared.controller, np.asarray(prepared.scenario.q0), prepared.clock.control_dt
+    )
     return None if found is None else found._asdict()
 
 

@@ -1,4 +1,4 @@
-"""From the words of ``dynx sim`` to the arguments of `dynx.simulate`."""
+"""Scenario of ``dynx sim``, made from the options of the command."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from dynx.errors import ArgumentError, UnsupportedFeatureError
 from dynx.model import Model
 from dynx.model.loading import load
 from dynx.model.model import Base
-from dynx.sim import Noise, Payload, Push, Rollout
+from dynx.sim import Noise, Payload, Push, Rollout, Scenario
 from dynx.sim.clock import Clock
 from dynx.sim.named_controllers import ControllerRequest, Gains, named_controller
 from dynx.simd.machine import MAX_MEMORY_SHARE, memory_size
 
 GAINS = ("kp", "kd", "ki", "natural_frequency", "damping_ratio", "posture_kp", "posture_kd")
 PASSED_ON = ("plant", "integrator", "dt", "substeps", "control_dt", "delay", "position_limits")
-"""Options that `dynx.simulate` has under the same name and with the same meaning."""
+"""Options that are fields of a `Scenario` under the same name."""
 
 ONLY_WITH = {
     "method": "--integrator adaptive",
@@ -36,28 +36,28 @@ ONLY_WITH = {
     "seed": "--noise-q or --noise-v",
     "resume_step": "--resume",
 }
-"""Options that mean nothing without another; left to their default where they are not given."""
+"""Options that have an effect only with another."""
 
 STEP_BYTES = 2000
-"""Memory of a step besides its numbers, about: setpoints, and what the summary takes in passing."""
+"""Approximate memory of a step besides its record: setpoints, and temporary arrays of the summary."""
 
 
 @dataclass(frozen=True)
 class Prepared:
-    """One simulation, ready to be run: everything that can be refused beforehand was looked at."""
+    """A scenario whose options are checked, with all that its document needs."""
 
-    model: Model
-    law: Controller[Any] | None
+    scenario: Scenario
+    controller: Controller[Any] | None
     motion: Motion
     clock: Clock
-    arguments: dict[str, Any]
-    """What `dynx.simulate` gets besides the robot, the law and the reference."""
-    asked: dict[str, Any]
-    """What was asked for that the record does not say, for the document."""
+    options: dict[str, Any]
+    """Options of `dynx.simulate` besides the scenario: the record to resume, and its step."""
+    header: dict[str, Any]
+    """Entries of the document that the record does not contain."""
 
 
 def prepare(given: dict[str, Any]) -> Prepared:
-    """The simulation that the options `given` mean, by the names that click has for them."""
+    """Make a scenario from the options `given` by parameter name. Raises ArgumentError for invalid ones."""
     base: Base = given["base"]
     model = load(given["robot"], base=base, lock=dict(given["lock"]), gravity=given["gravity"])
     for engine in (given["plant"], given["backend"]):
@@ -67,39 +67,42 @@ def prepare(given: dict[str, Any]) -> Prepared:
     motion = planned(model, MotionInput.of(given))
     clock = Clock.of(given["dt"], motion.duration, given["control_dt"], given["delay"])
     _require_memory(model, clock)
-    law = _law(model, given, motion, clock, losses)
+    controller = _controller(model, given, motion, clock, losses)
     limits: Coefficients | None = given["effort_limits"]
     q0 = motion.begin if given["q0"] is None else configuration(model, given["q0"], "--q0", motion.begin)
-    arguments: dict[str, Any] = {
+    fields: dict[str, Any] = {
         **{name: given[name] for name in PASSED_ON},
         **losses,
         **{name: given[name] for name in ("method", "rtol", "atol") if given[name] is not None},
         "duration": motion.duration,
         "q0": q0,
         "v0": velocity(model, given["v0"], "--v0") if given["v0"] is not None else None,
-        # The engine's own motors are told their limits instead (`_law`).
-        "effort_limits": False if limits is None or isinstance(law, EngineMotor) else limits,
+        # Motors of the engine have their own limits (`_controller`).
+        "effort_limits": False if limits is None or isinstance(controller, EngineMotor) else limits,
         "noise": _noise(given),
         "payload": [_payload(each) for each in given["payload"]],
         "mass_scale": _mass_scale(model, given["mass_scale"]),
         "pushes": [_push(each) for each in given["pushes"]],
         "check_reference": not given["ignore_limits"],
+    }
+    options = {
         "resume": None if given["resume"] is None else Rollout.load(given["resume"]),
         "step": given["resume_step"],
     }
-    asked = {
+    header = {
         "law": given["controller"],
-        "backend": given["backend"] if _computes(law) else None,
+        "backend": given["backend"] if _computes(controller) else None,
         "frame": motion.frame,
         "frame_given": given["frame"] is not None,
         "motion": motion.said,
-        "gains": _gains_of(law),
-        "motor_limits": _limits_of_motors(model, given["effort_limits"], law),
+        "gains": _gains_of(controller),
+        "motor_limits": _limits_of_motors(model, given["effort_limits"], controller),
     }
-    return Prepared(model, law, motion, clock, arguments, asked)
+    scenario = Scenario(model, controller, motion.reference, **fields)
+    return Prepared(scenario, controller, motion, clock, options, header)
 
 
-def _law(
+def _controller(
     model: Model, given: dict[str, Any], motion: Motion, clock: Clock, losses: dict[str, Any]
 ) -> Controller[Any] | None:
     gains = Gains(**{name: given[name] for name in GAINS})
@@ -107,7 +110,7 @@ def _law(
         if gains.given() or given["friction_compensation"]:
             raise ArgumentError("--controller none takes no gains and no --friction-compensation")
         return None
-    law = named_controller(
+    controller = named_controller(
         given["controller"],
         ControllerRequest(
             model,
@@ -120,8 +123,8 @@ def _law(
         ),
     )
     if not given["friction_compensation"]:
-        return law
-    if isinstance(law, EngineMotor):
+        return controller
+    if isinstance(controller, EngineMotor):
         raise UnsupportedFeatureError(
             f"{given['controller']} is a motor inside PyBullet; no torque can be added"
         )
@@ -130,20 +133,20 @@ def _law(
             "--friction-compensation needs joint losses: --damping, --friction or --joint-dynamics"
         )
     return FrictionCompensation(
-        law, damping=losses["damping"], friction=losses["friction"], slip=losses["friction_slip"]
+        controller, damping=losses["damping"], friction=losses["friction"], slip=losses["friction_slip"]
     )
 
 
 def _motor_limit(model: Model, limits: Coefficients | None) -> Any:
-    """The most that motors give: what is asked for, None where that is left to the law."""
+    """Effort limit of motors [N m or N]; None leaves it to the controller."""
     return model.effort_limit[6 if model.floating else 0 :] if limits is True else limits
 
 
 def _limits_of_motors(
-    model: Model, limits: Coefficients | None, law: Controller[Any] | None
+    model: Model, limits: Coefficients | None, controller: Controller[Any] | None
 ) -> list[float] | None:
-    """What the engine's own motors are held to; None for another law, or where that is left to the engine."""
-    if limits is None or not isinstance(law, EngineMotor):
+    """Effort limits of PyBullet's motors; None for another controller, or for the limits of the engine."""
+    if limits is None or not isinstance(controller, EngineMotor):
         return None
     base = 6 if model.floating else 0
     held: list[float] = checked_limit(model, _motor_limit(model, limits))[base:].tolist()
@@ -151,7 +154,7 @@ def _limits_of_motors(
 
 
 def _losses(given: dict[str, Any]) -> dict[str, Any]:
-    """Damping, friction and armature of the joints; one of its own outdoes ``--joint-dynamics``."""
+    """Damping, friction and armature of the joints; single options override ``--joint-dynamics``."""
     all_of_urdf: bool = given["joint_dynamics"]
     names = ("damping", "friction", "armature")
     losses = {name: all_of_urdf if given[name] is None else given[name] for name in names}
@@ -159,7 +162,7 @@ def _losses(given: dict[str, Any]) -> dict[str, Any]:
 
 
 def _refuse_idle(given: dict[str, Any], losses: dict[str, Any]) -> None:
-    """Raise ArgumentError for an option that nothing would come of: none is passed over in silence."""
+    """Raise ArgumentError for an option that would have no effect."""
     noisy = given["noise_q"] is not None or given["noise_v"] is not None
     has_use = {
         "--integrator adaptive": given["integrator"] == "adaptive",
@@ -178,20 +181,20 @@ def _noise(given: dict[str, Any]) -> Noise | None:
     return Noise(given["noise_q"] or 0.0, given["noise_v"] or 0.0, given["seed"] or 0)
 
 
-def _gains_of(law: Controller[Any] | None) -> dict[str, list[float]]:
-    """The gains that a law has, whether given or by default."""
-    inner = _innermost(law)
+def _gains_of(controller: Controller[Any] | None) -> dict[str, list[float]]:
+    """Gains of a controller, given or default."""
+    inner = _innermost(controller)
     kept = {name: getattr(inner, name, None) for name in ("kp", "ki", "kd", "stiffness", "damping")}
     return {name: gain.tolist() for name, gain in kept.items() if isinstance(gain, np.ndarray)}
 
 
-def _innermost(law: Controller[Any] | None) -> Controller[Any] | None:
-    return law.inner if isinstance(law, FrictionCompensation) else law
+def _innermost(controller: Controller[Any] | None) -> Controller[Any] | None:
+    return controller.inner if isinstance(controller, FrictionCompensation) else controller
 
 
-def _computes(law: Controller[Any] | None) -> bool:
-    """Whether the law asks an engine."""
-    return isinstance(_innermost(law), ModelBased)
+def _computes(controller: Controller[Any] | None) -> bool:
+    """Whether the controller evaluates its model with a backend."""
+    return isinstance(_innermost(controller), ModelBased)
 
 
 def _payload(given: PayloadInput) -> Payload:
@@ -204,7 +207,7 @@ def _push(given: PushInput) -> Push:
 
 
 def _mass_scale(model: Model, given: tuple[tuple[str | None, float], ...]) -> float | dict[str, float]:
-    """One factor for all links, then those of single links instead."""
+    """Factor of all links, or of each link where some have their own."""
     whole = [factor for link, factor in given if link is None]
     named = [link for link, _ in given if link is not None]
     if len(whole) > 1 or len(named) > len(set(named)):
@@ -217,7 +220,7 @@ def _mass_scale(model: Model, given: tuple[tuple[str | None, float], ...]) -> fl
 
 
 def _require_memory(model: Model, clock: Clock) -> None:
-    """Raise ArgumentError for a record that would not fit beside what else the machine does."""
+    """Raise ArgumentError for a record that would not fit into the memory of the machine."""
     needed = clock.n_steps * (STEP_BYTES + 8 * (3 * model.nq + 7 * model.nv))
     if needed > MAX_MEMORY_SHARE * memory_size():
         raise ArgumentError(

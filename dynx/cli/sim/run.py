@@ -58,7 +58,7 @@ def run_sim(prepared: Prepared, outputs: Outputs, *, as_json: bool) -> int:
             complain("interrupted before the first step")
             return interruption.code or INTERRUPTED
         except LimitError as error:
-            raise ArgumentError(limit_message(error, prepared.model.name, ignorable=True)) from error
+            raise ArgumentError(limit_message(error, prepared.scenario.model.name, ignorable=True)) from error
         seconds = time.perf_counter() - started
         interruption.finishing = True
         unwritten = _write(outputs, rollout)
@@ -83,10 +83,8 @@ def run_sim(prepared: Prepared, outputs: Outputs, *, as_json: bool) -> int:
 def _simulated(prepared: Prepared) -> Rollout:
     with progress_bar(prepared.clock.n_steps, words="simulating") as advance:
         return simulate(
-            prepared.model,
-            prepared.law,
-            prepared.motion.reference,
-            **prepared.arguments,
+            prepared.scenario,
+            **prepared.options,
             progress=lambda taken, wanted: advance(taken, "simulating"),
         )
 
