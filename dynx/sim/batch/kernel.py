@@ -1,8 +1,7 @@
-"""One step of a closed loop as one kernel: the law, the plant and the integrator, traced together.
+"""One step of a closed loop as one kernel: controller, plant and integrator, traced together.
 
-A controller is array code over a backend's answers. Here it is run on symbols, with `dynx.rbd` in the
-place of the backend, and what it computes is compiled with the dynamics of the plant: what both need,
-such as sines and cosines, is computed once.
+A controller is array code. Here it is run on symbols, with `dynx.rbd` in the place of its backend, and
+compiled with the dynamics of the plant: what both need, such as sines and cosines, is computed once.
 """
 
 from __future__ import annotations
@@ -32,26 +31,26 @@ from dynx.spatial.branchless import difference, integrate
 from dynx.spatial.scalar import Array, Floats, clamp, sign
 from dynx.trajectory.base import Setpoint
 
-REMEMBERED = 32
-"""Steps kept for the next batch in this process."""
+MAX_CACHED_KERNELS = 32
+"""Number of kernels kept for later batches in this process."""
 
 _made: dict[Hashable, Kernel] = {}
 
 
 @dataclass(frozen=True)
 class StepOf:
-    """What decides a step: checked, and not yet compiled."""
+    """The options that select a compiled step kernel."""
 
     model: Model
     """The robot that moves."""
     controller: Controller[Any]
     dt: float
     gains: tuple[str, ...]
-    """Attributes of the law that are given for each rollout."""
+    """Names of the gains that each rollout has of its own."""
     plant: ParametricDynamics | None
     noisy: bool
     delayed: bool
-    """Whether the law sees an earlier state."""
+    """Whether the controller measures an earlier state."""
     limit: Floats | None
     loads: BatchLoads
 
@@ -71,10 +70,10 @@ class StepOf:
             )
 
     def kernel(self, *, controlled: bool, pushed: bool) -> Kernel:
-        """The kernel of a step: `controlled`, with the law asked, or with `tau` held from before; with
-        or without what pushes.
+        """The kernel of a step: with the controller evaluated if `controlled`, otherwise with the last `tau`;
+        with the pushes if `pushed`.
 
-        Raises UnsupportedFeatureError for a law that branches on what it measures.
+        Raises UnsupportedFeatureError for a controller that branches on its measurement.
         """
         try:
             key = self._content(), controlled, pushed
@@ -83,12 +82,12 @@ class StepOf:
         kernel = _made.get(key)
         if kernel is None:
             kernel = _made[key] = self._traced(controlled=controlled, pushed=pushed)
-            for old in list(_made)[:-REMEMBERED]:
+            for old in list(_made)[:-MAX_CACHED_KERNELS]:
                 _made.pop(old, None)
         return kernel
 
     def _content(self) -> Hashable:
-        """Key of all that decides the step. Raises TypeError for a controller that is not declared pure."""
+        """Key of all that selects the kernel. Raises TypeError for a controller that is not declared pure."""
         if not all(each.is_pure for each in chain_of(self.controller)):
             raise TypeError(f"{self.controller.name} is not declared pure")
         # A plant is never changed, and the key holds on to it, so its identity is enough.
@@ -129,7 +128,7 @@ class StepOf:
         return load_kernel(program_recipe(program), lambda: program)
 
     def sizes(self, *, controlled: bool, pushed: bool) -> dict[str, tuple[int]]:
-        """The inputs of a step in their order, and their sizes."""
+        """Inputs of a step in their order, and their sizes."""
         nq, nv = self.model.nq, self.model.nv
         sizes = {"q": nq, "v": nv, "worst": nv, "squares": nv, "goal": nq}
         if not controlled:
@@ -155,7 +154,7 @@ class StepOf:
         return {name: (size,) for name, size in sizes.items()}
 
     def _commanded(self, law: Controller[Any], given: Mapping[str, Array]) -> dict[str, Array]:
-        """The torque of the law within the limits, what it remembers, and how long motors were at limits."""
+        """Torque within the limits, controller state, and number of steps with motors at their limits."""
         q, v = (given["q_seen"], given["v_seen"]) if self.delayed else (given["q"], given["v"])
         if self.noisy:
             off = given["noise_q"]
@@ -166,7 +165,7 @@ class StepOf:
         tau, state = own.torque(Measurement(given["t"][0], q, v), setpoint, given.get("state"))
         if watch.changed:
             raise UnsupportedFeatureError(
-                f"{watch.changed}, which a batch would do once for all: let it return its state"
+                f"{watch.changed}, which a batch would do only once: let it return its state"
             )
         if state is not None and "state" not in given:
             raise UnsupportedFeatureError(f"{own.name} returns a state, but its initial_state() returns None")

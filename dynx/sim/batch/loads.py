@@ -1,6 +1,6 @@
-"""What acts on the joints of many rollouts besides the motors: friction, rotors and pushes, on symbols.
+"""Friction, armature and pushes of many rollouts, on symbols.
 
-They mean what they mean to one rollout (`dynx.sim.plants.disturbances`). Coefficients of joints may differ
+They are those of one rollout (`dynx.sim.plants.disturbances`). Coefficients of joints may differ
 from rollout to rollout; those are inputs of the kernel, all others are constants in it.
 """
 
@@ -24,19 +24,19 @@ from dynx.sim.plants.disturbances import Push
 from dynx.spatial.scalar import Array, Floats
 
 WRENCH = 6
-"""Numbers of one push."""
+"""Size of the wrench of one push."""
 
 
 @dataclass(frozen=True)
 class BatchLoads:
-    """Friction, rotors and pushes of a plant."""
+    """Friction, armature and pushes of a plant."""
 
     model: Model
     losses: JointFriction
     rotors: Floats
-    """Inertia of the rotors (nv,), the diagonal of what is added to the mass matrix."""
+    """Armature (nv,) [kg m^2 or kg], added to the diagonal of the mass matrix."""
     varied: Mapping[str, Floats]
-    """Coefficients that each rollout has its own of, (n, joints), by name."""
+    """Coefficients (n, joints) that differ from rollout to rollout, by name."""
     pushes: tuple[Push, ...]
 
     @classmethod
@@ -55,14 +55,14 @@ class BatchLoads:
         varied = {
             name: _rows(name, values, joints) for name, values in given.items() if _is_varied(values, joints)
         }
-        # Ones in the places of coefficients that come later.
+        # Placeholders of 1 for coefficients that are inputs of the kernel.
         plain = {name: 1.0 if name in varied else values for name, values in given.items()}
         losses = JointFriction(model, plain["damping"], plain["friction"], slip)
         rotors = _rotors(model, plain["armature"], joints)
         return cls(model, losses, rotors, varied, tuple(push.checked(model) for push in pushes))
 
     def ambiguous(self, n: int, asked: Mapping[str, Coefficients]) -> str | None:
-        """Which of the coefficients `asked` for could be meant for n joints as well as for n rollouts."""
+        """Name of a coefficient in `asked` that fits n joints as well as n rollouts, if there is one."""
         joints = self.model.nv - (6 if self.model.floating else 0)
         if n != joints or n == 1:
             return None
@@ -70,12 +70,12 @@ class BatchLoads:
         return next((name for name in plain if np.ndim(asked[name]) == 1), None)
 
     def sizes(self, *, pushed: bool) -> dict[str, int]:
-        """The inputs that a kernel needs for them, and their sizes."""
+        """Inputs of the kernel for friction, armature and pushes, and their sizes."""
         sizes = {name: rows.shape[1] for name, rows in self.varied.items()}
         return sizes | ({"wrenches": WRENCH * len(self.pushes)} if pushed else {})
 
     def wrenches(self, clock: Clock) -> Floats:
-        """What pushes in each step (n_steps, 6 of each push), zeros where nothing does."""
+        """Wrenches of the pushes in each step (n_steps, 6 of each push), zero outside their time."""
         since = clock.times()[:-1, None] - np.array([[push.start for push in self.pushes]])
         since = since + WHOLE * clock.dt
         acting = (since >= 0.0) & (since < np.array([[push.duration for push in self.pushes]]))
@@ -92,7 +92,7 @@ class BatchLoads:
         *,
         pushed: bool,
     ) -> Array:
-        """The torque (nv,) of the motors, less what is lost, with what pushes."""
+        """The torque (nv,) of the motors, minus friction, plus that of the pushes."""
         if self.losses.present:
             damping, friction = (
                 self._in_place(name, constant, given)
@@ -106,11 +106,11 @@ class BatchLoads:
         return tau
 
     def rotors_of(self, given: Mapping[str, Array]) -> Array | None:
-        """Their inertia (nv,), None if there are none."""
+        """Armature (nv,), None without any."""
         return self._in_place("armature", self.rotors, given) if self.rotors.any() else None
 
     def _in_place(self, name: str, constant: Floats, given: Mapping[str, Array]) -> Array:
-        """Coefficients of the rollout in the places of the ones, or the constants."""
+        """Coefficients of the rollout in the places of their placeholders, or the constants."""
         if name not in self.varied:
             return constant
         found = np.zeros(len(constant), dtype=object)
@@ -140,7 +140,7 @@ def _rows(name: str, values: ArrayLike, joints: int) -> Floats:
 
 
 def _rotors(model: Model, armature: Coefficients, joints: int) -> Floats:
-    """The diagonal (nv,): a coordinate of a tree depends on one of the model's at most."""
+    """Diagonal of the armature (nv,): a joint of the tree depends on at most one coordinate."""
     if isinstance(armature, bool):
         return JointDynamicsTerms(model).rotors.diagonal().copy() if armature else np.zeros(model.nv)
     own = checked_gain("armature", armature, joints, per="one for each joint")

@@ -1,4 +1,4 @@
-"""Some rollouts of a batch, from beginning to end: a piece of work that any process can do."""
+"""Part of a batch: some of its rollouts from start to end, as work for any thread or process."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from dynx.simd.kernel import Kernel
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint
 
-CHECK = 100
-"""Steps after which rollouts are looked at: which of them still are where a robot can be."""
+STEPS_BETWEEN_CHECKS = 100
+"""Steps between two checks for rollouts that diverged."""
 
-BEYOND = 1e8
-"""A coordinate or speed [rad, m, per second] beyond which a rollout has diverged."""
+DIVERGENCE_BOUND = 1e8
+"""Coordinate [rad or m] or speed [rad/s or m/s] from which on a rollout has diverged."""
 
 
 class PartDone(NamedTuple):
@@ -47,59 +47,59 @@ class PartNoise(NamedTuple):
 
 
 KernelOf = dict[tuple[bool, bool], Kernel]
-"""Steps by whether the law is asked, and whether something pushes."""
+"""Kernels by whether the controller is evaluated, and whether a push acts."""
 
 
 def pushing(wrenches: Floats) -> list[bool]:
-    """Whether anything pushes in each step, of `Part.wrenches`."""
+    """Whether a push acts in each step, from `Part.wrenches`."""
     return [bool(found) for found in np.count_nonzero(wrenches, axis=1)]
 
 
 @dataclass(frozen=True)
 class Part:
-    """What a part needs: everything as arrays and machine code, so that it can be sent elsewhere."""
+    """Inputs of a part as arrays and machine code, so that it can be sent to another process."""
 
     kernels: KernelOf
     steps_per_control: int
     delay_steps: int
-    """How old the state is that the law sees; memory holds so many."""
+    """Delay of the measurements; so many states are kept."""
     n_steps: int
     dt: float
     start: dict[str, Floats]
-    """What a step takes and gives back, as it is at the beginning, arrays (count, size): q and v, the largest
-    error and the sum of squared errors of each coordinate (``worst``, ``squares``), what the law remembers
-    (``state``), and in how many steps a motor was at its limit (``cut``)."""
+    """State at the beginning, arrays (count, size): q and v, maximum error and sum of squared errors of each
+    coordinate (``worst``, ``squares``), the controller state (``state``), and the number of steps with the
+    motor at its limit (``cut``)."""
     fixed: dict[str, Floats]
-    """Inputs that stay the same: parameters and gains (count, size)."""
+    """Constant inputs: parameters and gains (count, size)."""
     setpoints: Setpoint
-    """Of each control step, (n_controls, nq) and (n_controls, nv) twice."""
+    """Setpoints of the control steps, (n_controls, nq) and (n_controls, nv) twice."""
     goals: Floats
-    """Where the robot should be after each step, (n_steps, nq)."""
+    """Reference configuration after each step (n_steps, nq)."""
     wrenches: Floats
-    """What pushes in each step, (n_steps, 6 of each push)."""
+    """Wrenches of the pushes in each step (n_steps, 6 of each push)."""
     noise: PartNoise | None
     record_every: int
 
     def __call__(self) -> PartDone:
-        """Do it."""
+        """Simulate the rollouts."""
         return _Run(self).done()
 
     @cached_property
     def count(self) -> int:
-        """Rollouts."""
+        """Number of rollouts."""
         return len(self.start["q"])
 
 
 class _Run:
-    """Buffers of a part that is under way: the state is read from one set and written to the next.
+    """Buffers of a part while it runs: the state is read from one set and written to the next.
 
-    As many sets take turns as the law sees back, so that nothing is copied for a late measurement. All
-    begin as the start: what the law sees of the time before.
+    The number of sets grows with the delay, so that nothing is copied for a late measurement. All sets begin
+    as the start, which is measured before the first step.
     """
 
     def __init__(self, part: Part) -> None:
         self._part = part
-        # A kernel wants a vector full of samples; what is too much repeats the last one.
+        # A kernel needs at least a full vector of samples; the last one is repeated.
         self._rows = max(part.count, *(kernel.image.lanes for kernel in part.kernels.values()))
         nv = int(part.start["v"].shape[1])
         self._tau = np.zeros((self._rows, nv))
@@ -132,7 +132,7 @@ class _Run:
         self._records: tuple[list[Floats], list[Floats], list[Floats]] = ([], [], [])
 
     def done(self) -> PartDone:
-        """All steps."""
+        """Run all steps."""
         part, n = self._part, self._part.count
         sets, common = len(self._sets), self._common
         for step in range(part.n_steps):
@@ -148,10 +148,10 @@ class _Run:
             if part.record_every and (step + 1) % part.record_every == 0:
                 for kept, array in zip(self._records, (now["q"], now["v"], self._tau), strict=True):
                     kept.append(array[:n].copy())
-            if (step + 1) % CHECK == 0:
-                self._look(step + 1, now)
+            if (step + 1) % STEPS_BETWEEN_CHECKS == 0:
+                self._check(step + 1, now)
         last = self._sets[part.n_steps % sets]
-        self._look(part.n_steps, last)
+        self._check(part.n_steps, last)
         q, v, tau = (
             np.stack(kept, axis=1) if kept else np.zeros((n, 0, array.shape[1]))
             for kept, array in zip(self._records, (last["q"], last["v"], self._tau), strict=True)
@@ -206,9 +206,9 @@ class _Run:
             [known[port.name] for port in kernel.inputs], [answers[port.name] for port in kernel.outputs]
         )
 
-    def _look(self, step: int, now: dict[str, Floats]) -> None:
+    def _check(self, step: int, now: dict[str, Floats]) -> None:
         state = np.maximum(np.abs(now["q"]).max(axis=1), np.abs(now["v"]).max(axis=1))
-        new = (self._diverged < 0) & ~(state < BEYOND)
+        new = (self._diverged < 0) & ~(state < DIVERGENCE_BOUND)
         self._diverged[new] = step
 
     def _padded(self, array: Floats) -> Floats:

@@ -1,4 +1,4 @@
-"""What many rollouts came to."""
+"""Outcome of a batch of rollouts."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from dynx.files.figures import new_figure, save_figure
 from dynx.spatial.scalar import Floats
 
 SCHEMA = "dynx.rollouts/1"
-"""What the file says it is."""
+"""Schema name of the file."""
 
 
 @dataclass(frozen=True, eq=False)
 class BatchRollouts:
-    """The outcome of n rollouts, one in each row; rows that were not done are NaN.
+    """The outcome of n rollouts, one in each row; rows that were not computed are NaN.
 
     Errors are those of the configuration at the ends of all steps, `model.difference` to the reference there.
     The record has the states after every `record_every` steps, and the torque that led there.
@@ -51,7 +51,7 @@ class BatchRollouts:
         return np.where(np.isnan(self.diverged), worst, np.where(self.done, np.inf, np.nan))
 
     def quantiles(self, levels: Sequence[float] = (0.05, 0.5, 0.95)) -> Floats:
-        """Of `worst`, over the rollouts that were done: (len(levels),). NaN if none was."""
+        """Quantiles (len(levels),) of `worst` over the rollouts that were computed; NaN if none was."""
         worst = self.worst[self.done]
         if not len(worst):
             return np.full(len(levels), np.nan)

@@ -1,7 +1,6 @@
-"""Parts that are done, kept in a folder, so that a run which was killed goes on where it was.
+"""Folder of finished parts, from which a run that was killed continues.
 
-A part is found again by the hash of all that decides it. Files are written under another name first
-and then renamed: what is there is whole.
+The file of a part is named by the hash of its inputs. Files are written atomically, so each is complete.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ from dynx.sim.batch.part import Part, PartDone
 
 
 class Store:
-    """A folder of outcomes; it may be shared by runs of different arguments."""
+    """Folder of outcomes; runs with different arguments may share it."""
 
     def __init__(self, folder: str | os.PathLike[str]) -> None:
         """Raises ArgumentError if it cannot be made."""
@@ -31,7 +30,7 @@ class Store:
             raise ArgumentError(f"keep is {shown(folder)}, where no folder can be made: {error}") from error
 
     def read(self, part: Part) -> PartDone | None:
-        """The outcome of a part, if it is there and whole."""
+        """The outcome of a part, if it is there and complete."""
         try:
             with np.load(self._path(part), allow_pickle=False) as file:
                 return PartDone(*(file[name] for name in PartDone._fields))

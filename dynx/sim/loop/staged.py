@@ -22,7 +22,7 @@ from dynx.errors import CompileError, TraceError
 from dynx.sim.loop.controller_checks import is_row
 from dynx.sim.loop.plain import DIVERGENCE_SPEED, Held, Loop
 from dynx.sim.loop.record import Record
-from dynx.sim.loop.stages import Ask, Glue, Questions, refuse_impure, traced_controller
+from dynx.sim.loop.stages import EngineCall, EngineCallTracer, StagedStep, refuse_impure, traced_controller
 from dynx.sim.plants.integrated import IntegratedPlant
 from dynx.simd.call_sequence import CallSequence, StridedRows, prepare_calls
 from dynx.simd.kernel import Kernel
@@ -96,8 +96,10 @@ class StagedLoop:
         self._state_size = 0 if self._start is None else self._start.size
         if self._state_size:
             sizes["state"] = self._state_size
-        self._asked = self._step(Questions(sizes), asked=True)
-        self._held = self._step(Questions(sizes), asked=False) if loop.clock.steps_per_control > 1 else None
+        self._asked = self._step(EngineCallTracer(sizes), asked=True)
+        self._held = (
+            self._step(EngineCallTracer(sizes), asked=False) if loop.clock.steps_per_control > 1 else None
+        )
         self.stopped = ""
         """Why it stopped before the end."""
 
@@ -125,9 +127,9 @@ class StagedLoop:
             held.q, held.v = record.q[k].copy(), record.v[k].copy()
             self._plant.reset(held.q, held.v)
 
-    def _step(self, questions: Questions, *, asked: bool) -> Glue:
+    def _step(self, tracer: EngineCallTracer, *, asked: bool) -> StagedStep:
         """One step of the plant, and of the law if it is `asked`."""
-        loop, given = self._loop, questions.given
+        loop, given = self._loop, tracer.given
         results: dict[str, Array] = {}
         unsound: Any = 0.0
         tau, state = given["held"], given.get("state", self._start)
@@ -138,13 +140,13 @@ class StagedLoop:
             if loop.sensors.noise is not None:
                 q, v = q + given["noise_q"], v + given["noise_v"]
             measurement = Measurement(given["t"][0], q, v)
-            law = traced_controller(loop.controller, questions)
+            law = traced_controller(loop.controller, tracer)
             try:
                 tau, state = law.torque(measurement, Setpoint(*(given[name] for name in SETPOINT)), state)
             except Exception as error:
                 # On symbols in the place of numbers a controller of somebody else's may raise anything.
                 raise TraceError(_untraceable(loop.controller.name, error)) from error
-            questions.refuse_rounded_otherwise()
+            tracer.refuse_inexact_rounding()
             if tau.shape != given["v"].shape:
                 raise TraceError(f"the torque has shape {tau.shape}")
             # The sum that the plain loop looks at: a torque beyond all numbers is none, though it is cut.
@@ -155,14 +157,14 @@ class StagedLoop:
         forward = self._plant.dynamics.bound_to_thread("forward_dynamics")
 
         def accelerate(q: Array, v: Array, tau: Array) -> Array:
-            return questions.ask(forward, v.shape, q, v, tau, guarded=True)
+            return tracer.record(forward, v.shape, q, v, tau, guarded=True)
 
         q, v, a = self._plant.advanced(accelerate, given["q"], given["v"], tau)
         results |= {"tau": tau, "a": a, "next_q": q, "next_v": v}
         if self._state_size and state is not None:
             results["next_state"] = state
         results["defect"] = np.array([v @ v + unsound], dtype=object)
-        return questions.glue(results)
+        return tracer.compile(results)
 
     def _arrays(self, record: Record, held: Held) -> dict[str, Floats]:
         """Inputs and outputs of the stages by the names of their ports, a row for each (control) step."""
@@ -212,12 +214,12 @@ class StagedLoop:
                 return False
         return True
 
-    def _ready(self, glue: Glue, walked: Mapping[str, StridedRows], record: Record) -> Take:
+    def _ready(self, step: StagedStep, walked: Mapping[str, StridedRows], record: Record) -> Take:
         """The next steps of the record, those of `walked`, as kernel and engine calls."""
         first = record.steps
         still = np.zeros(len(walked["q"].rows), dtype=np.int64)
-        places = {name: np.zeros((1, size)) for name, size in (*glue.sizes.items(), ("defect", 1))}
-        numbers = {name: value[None] for name, value in glue.numbers.items()}
+        places = {name: np.zeros((1, size)) for name, size in (*step.sizes.items(), ("defect", 1))}
+        numbers = {name: value[None] for name, value in step.numbers.items()}
         constant = {name: StridedRows(place, still) for name, place in {**places, **numbers}.items()}
         every = {**walked, **constant}
 
@@ -225,16 +227,16 @@ class StagedLoop:
             inputs = [every[port.name] for port in kernel.inputs]
             return prepare_calls(kernel, inputs, [every[port.name] for port in kernel.outputs])
 
-        stages: list[tuple[Callable[[int], None], range, Ask, list[Floats], Any, CallSequence]] = []
-        for cut in glue.cuts:
-            calls = walked_by(cut.kernel)
-            arguments = [places[name].reshape(shape) for name, shape in cut.arguments]
-            name, shape = cut.answer
+        stages: list[tuple[Callable[[int], None], range, EngineCall, list[Floats], Any, CallSequence]] = []
+        for stage in step.stages:
+            calls = walked_by(stage.kernel)
+            arguments = [places[name].reshape(shape) for name, shape in stage.arguments]
+            name, shape = stage.result
             found = places[name].reshape(shape)
             # A view of memory takes a row of numbers in a third of the time that an array does.
             room = found.data if found.ndim == 1 else found
-            stages.append((calls.run, calls.addresses, cut.ask, arguments, room, calls))
-        last = walked_by(glue.last)
+            stages.append((calls.run, calls.addresses, stage.call, arguments, room, calls))
+        last = walked_by(step.last)
         finish, finishing = last.run, last.addresses
         defect: Any = places["defect"].reshape(1).data
 
@@ -242,11 +244,11 @@ class StagedLoop:
             k = begin - first
             try:
                 for k in range(begin - first, end - first):
-                    for run, addresses, ask, arguments, answer, _ in stages:
+                    for run, addresses, call, arguments, result, _ in stages:
                         run(addresses[k])
                         if defect[0] != 0.0:
                             return False
-                        answer[:] = ask(*arguments)
+                        result[:] = call(*arguments)
                     finish(finishing[k])
                     if not defect[0] < DIVERGENCE_SPEED**2:
                         return False

@@ -1,10 +1,9 @@
-"""A step of a closed loop, cut where engines are asked, and compiled between the cuts.
+"""A step of a closed loop, compiled in stages between the engine calls.
 
-The arithmetic of a law and of an integrator is a handful of operations on a handful of numbers, for
-each of which NumPy takes half a microsecond: more than the dynamics themselves. Here the step is traced
-on symbols. A question to an engine ends a stage; its answer is an input of the next one. Stages are
-compiled without any licence (no contraction, no reordering), so that they give what NumPy gives, bit
-for bit: which of the two ran cannot be told from the record.
+A controller and an integrator take some ten operations on small arrays, for each of which NumPy needs half
+a microsecond: more than the dynamics themselves. Here the step is traced on symbols. An engine call ends a
+stage; its result is an input of the next one. Stages are compiled without fast-math (no contraction, no
+reordering), so that their results are those of NumPy, bit for bit.
 """
 
 from __future__ import annotations
@@ -32,70 +31,70 @@ Shape = tuple[int, ...]
 
 Nodes = tuple[int, ...]
 
-Ask = Callable[..., Floats]
-"""A question to an engine: arrays in, one array out."""
+EngineCall = Callable[..., Floats]
+"""Arrays in, one array out."""
 
-ROUNDED_ALIKE = frozenset(
+EXACTLY_ROUNDED = frozenset(
     {"input", "constant", "add", "sub", "mul", "div", "neg", "abs", "sqrt", "min", "max"}
 )
-"""Operations that give the same bits in NumPy and in a kernel: those that IEEE 754 rounds correctly."""
+"""Operations with the same bits in NumPy and in a kernel: those that IEEE 754 rounds correctly."""
 
-REMEMBERED = 128
-"""Stages kept for the next simulation in this process."""
+MAX_CACHED_STAGES = 128
+"""Number of kernels of stages kept for later simulations in this process."""
 
 _made: dict[bytes, Kernel] = {}
 
 
 @dataclass(frozen=True)
-class Cut:
-    """A stage that ends with a question."""
+class Stage:
+    """A stage of a step, which ends with an engine call."""
 
     kernel: Kernel
-    """Writes arguments and, if they are guarded, the defect: 0 if they are finite, otherwise NaN."""
-    ask: Ask
+    """Writes the arguments and, if they are guarded, the defect: 0 if they are finite, otherwise NaN."""
+    call: EngineCall
     arguments: tuple[tuple[str, Shape], ...]
-    """What the question is about: arrays that this stage or an earlier one wrote, and their shapes."""
-    answer: tuple[str, Shape]
+    """Arrays that this stage or an earlier one wrote, and their shapes."""
+    result: tuple[str, Shape]
 
 
 @dataclass(frozen=True)
-class Glue:
-    """All stages of a step."""
+class StagedStep:
+    """All stages of a step, compiled."""
 
-    cuts: tuple[Cut, ...]
+    stages: tuple[Stage, ...]
     last: Kernel
-    """Writes the results of the step, in the order in which the step gives them."""
+    """Kernel of the last stage, which writes the results of the step."""
     sizes: Mapping[str, int]
-    """Of what stages write for questions, and of answers."""
+    """Sizes of the arguments and results of the engine calls."""
     numbers: Mapping[str, Floats]
-    """Inputs that stay what they are."""
+    """Constant inputs."""
 
 
-class _Asked(NamedTuple):
-    question: Ask
+class _TracedCall(NamedTuple):
+    call: EngineCall
     fresh: dict[str, Nodes]
-    """Arguments that no earlier question was about."""
+    """Arguments that no earlier call had."""
     arguments: tuple[tuple[str, Shape], ...]
-    answer: tuple[str, Shape]
+    result: tuple[str, Shape]
     guarded: bool
 
 
-class Questions:
-    """Stands for engines while a step is traced, and remembers what they are asked."""
+class EngineCallTracer:
+    """Records the engine calls of a step while it is traced."""
 
     def __init__(self, inputs: Mapping[str, int]) -> None:
         self._graph = Graph(STRICT)
         self._ports: list[Port] = []
         self._slot = 0
-        self._asked: list[_Asked] = []
+        self._calls: list[_TracedCall] = []
         self._written: dict[Nodes, str] = {}
         self._numbers: dict[str, Floats] = {}
         self.given = {name: self._symbols(name, size) for name, size in inputs.items()}
 
-    def ask(self, question: Ask, shape: Shape, *arguments: Array, guarded: bool = False) -> Array:
-        """Symbols (of `shape`) for what `question(*arguments)` will answer.
+    def record(self, call: EngineCall, shape: Shape, *arguments: Array, guarded: bool = False) -> Array:
+        """Symbols (of `shape`) for the result of `call(*arguments)`.
 
-        If it is `guarded`, the step ends before it is asked about what is not finite.
+        If it is `guarded`, the step ends before a call with arguments that are not finite.
         """
         fresh: dict[str, Nodes] = {}
         named = []
@@ -106,35 +105,35 @@ class Questions:
                 name = self._written[nodes] = f"argument {len(self._written)}"
                 fresh[name] = nodes
             named.append((name, argument.shape))
-        answer = f"answer {len(self._asked)}"
-        self._asked.append(_Asked(question, fresh, tuple(named), (answer, shape), guarded))
-        return self._symbols(answer, int(np.prod(shape))).reshape(shape)
+        result = f"result {len(self._calls)}"
+        self._calls.append(_TracedCall(call, fresh, tuple(named), (result, shape), guarded))
+        return self._symbols(result, int(np.prod(shape))).reshape(shape)
 
     def number(self, value: Floats) -> Array:
-        """Symbols for numbers (n,) of a law, so that laws with other gains have the same stages."""
+        """Symbols for numbers (n,) of a controller: controllers with other gains have the same stages."""
         name = f"number {len(self._numbers)}"
         self._numbers[name] = value
         return self._symbols(name, value.size)
 
-    def refuse_rounded_otherwise(self) -> None:
+    def refuse_inexact_rounding(self) -> None:
         """Raise TraceError if what was traced so far is not rounded in a kernel as in NumPy."""
         for node in self._graph.nodes:
-            if node.op not in ROUNDED_ALIKE:
+            if node.op not in EXACTLY_ROUNDED:
                 raise TraceError(f"{node.op} is not rounded as NumPy rounds it")
 
-    def glue(self, results: Mapping[str, Array]) -> Glue:
-        """The stages, the last of which gives `results`."""
-        cuts = []
+    def compile(self, results: Mapping[str, Array]) -> StagedStep:
+        """The stages, the last of which writes `results`."""
+        stages = []
         sizes = {name: len(nodes) for nodes, name in self._written.items()}
-        for question, fresh, arguments, answer, guarded in self._asked:
+        for call, fresh, arguments, result, guarded in self._calls:
             wanted = dict(fresh)
             if guarded:
                 wanted["defect"] = (self._defect([node for nodes in fresh.values() for node in nodes]),)
             kernel = _kernel(self._program(wanted))
-            cuts.append(Cut(kernel, question, arguments, answer))
-            sizes[answer[0]] = int(np.prod(answer[1]))
+            stages.append(Stage(kernel, call, arguments, result))
+            sizes[result[0]] = int(np.prod(result[1]))
         last = _kernel(self._program({name: self._indices(array) for name, array in results.items()}))
-        return Glue(tuple(cuts), last, sizes, self._numbers)
+        return StagedStep(tuple(stages), last, sizes, self._numbers)
 
     def _symbols(self, name: str, size: int) -> Array:
         symbols = np.empty(size, dtype=object)
@@ -166,10 +165,10 @@ class Questions:
 class TracedEngineCalls(Dynamics):
     """Dynamics of a controller in a trace, where each evaluation becomes an engine call."""
 
-    def __init__(self, questions: Questions, dynamics: Dynamics) -> None:
+    def __init__(self, tracer: EngineCallTracer, dynamics: Dynamics) -> None:
         if not isinstance(dynamics, EngineDynamics):
             raise TraceError(f"{type(dynamics).__name__} is not evaluated by an engine")
-        self._questions, self._engine = questions, dynamics
+        self._tracer, self._engine = tracer, dynamics
         super().__init__(dynamics.model)
 
     def evaluation(self, quantity: str) -> Evaluation:
@@ -180,7 +179,7 @@ class TracedEngineCalls(Dynamics):
         def record(*arguments: Array) -> Array:
             if quantity not in QUANTITIES:
                 raise TraceError(f"{quantity} of a frame is no engine call of a compiled stage")
-            return self._questions.ask(self._engine.bound_to_thread(quantity), shape, *arguments)
+            return self._tracer.record(self._engine.bound_to_thread(quantity), shape, *arguments)
 
         return record
 
@@ -195,18 +194,18 @@ def refuse_impure(controller: Controller[Any]) -> None:
             raise TraceError(f"{each.name} is not declared pure")
 
 
-def traced_controller(controller: Controller[Any], questions: Questions) -> Controller[Any]:
+def traced_controller(controller: Controller[Any], tracer: EngineCallTracer) -> Controller[Any]:
     """The controller with engine calls for its dynamics, and symbols for its gains."""
 
     def symbols(each: Controller[Any]) -> dict[str, Array]:
         gains = gains_of(each).items()
-        return {name: questions.number(gain) for name, gain in gains if gain.ndim == 1}
+        return {name: tracer.number(gain) for name, gain in gains if gain.ndim == 1}
 
-    return rebind(controller, partial(TracedEngineCalls, questions), symbols)
+    return rebind(controller, partial(TracedEngineCalls, tracer), symbols)
 
 
 def _without_idle_inputs(program: Program) -> Program:
-    """The same with those inputs alone that it reads."""
+    """The program with only those inputs that it reads."""
     read = {node.slot for node in program.nodes if node.op == "input"}
     kept: list[Port] = []
     moved: dict[int, int] = {}
@@ -227,6 +226,6 @@ def _kernel(program: Program) -> Kernel:
     if kernel is None:
         strict = Settings(host().lanes, fast=False)
         kernel = _made[recipe] = load_kernel(recipe, lambda: program, settings=strict)
-        for old in list(_made)[:-REMEMBERED]:
+        for old in list(_made)[:-MAX_CACHED_STAGES]:
             _made.pop(old, None)
     return kernel

@@ -100,7 +100,7 @@ def test_the_next_batch_traces_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_only_so_many_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(fused, "_made", {})
-    monkeypatch.setattr(fused, "REMEMBERED", 2)
+    monkeypatch.setattr(fused, "MAX_CACHED_KERNELS", 2)
     for kp in (1.0, 2.0, 3.0):
         worst(PD(ARM, kp=kp, kd=1.0))
     assert len(fused._made) == 2
