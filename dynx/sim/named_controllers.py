@@ -106,7 +106,8 @@ class NamedController:
     takes: tuple[str, ...]
     """Names of the `Gains` that it takes."""
     make: Callable[[ControllerRequest], Controller[Any]]
-    wants: Literal["joints", "frame"] = "joints"
+    controls: Literal["joints", "frame"] = "joints"
+    """Whether it acts on the joints or on a frame."""
 
 
 def joint_inertia(model: Model, q: Floats) -> Floats:
@@ -135,7 +136,7 @@ def named_controller(name: str, request: ControllerRequest) -> Controller[Any]:
         if gain not in named.takes:
             takes = f"it takes {', '.join(named.takes)}" if named.takes else "it has no gains"
             raise GainError(f"{name} takes no {gain}; {takes}")
-    if named.wants == "frame" and request.frame is None:
+    if named.controls == "frame" and request.frame is None:
         raise UnknownNameError(f"{name} controls a frame, and none is given")
     return named.make(request)
 

@@ -2,7 +2,7 @@
 
 A six-axis arm goes along a cycloidal motion of 2 s in PyBullet, in steps of 1 ms, under a gravity of
 9.8 m/s^2: by the engine's position and velocity motors, by feed-forward torque, and by computed torque with
-the gains 400 and 40. The laws that lie between are added, and dynx's own plant beside PyBullet's stepper.
+the gains 400 and 40. Other controllers are added, and dynx's own plant beside PyBullet's stepper.
 """
 
 from __future__ import annotations
@@ -34,24 +34,24 @@ from dynx.trajectory import Trajectory, check, cycloidal
 
 ROBOT = "ur5"
 TO = (-1.5, -1.0, 1.0, -1.57, -1.57, -1.57)
-"""Where the motion of a six-axis arm ends [rad]; it begins at 0."""
+"""Goal of the motion of a six-axis arm [rad]; it begins at 0."""
 DURATION, DT, GRAVITY = 2.0, 1e-3, (0.0, 0.0, -9.8)
 BULLET, DYNX = PLANTS = ("pybullet", "pinocchio")
 """PyBullet's own stepper, and dynx's semi-implicit Euler over Pinocchio's forward dynamics."""
-MODES = tuple(name for name, law in BUILT_IN.items() if law.wants == "joints")
-"""All modes, from little knowledge of the robot to much."""
+MODES = tuple(name for name, law in BUILT_IN.items() if law.controls == "joints")
+"""All modes, those that know least of the robot first."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """One mode on one plant: its record, and what kept it from being made or from reaching its end."""
+    """One mode on one plant: its record, and the error that prevented or ended it."""
 
     rollout: Rollout | None = None
     problem: str | None = None
 
     @property
     def failed(self) -> bool:
-        """Whether a simulation was begun and ended early."""
+        """Whether a simulation ended early."""
         return self.rollout is not None and self.problem is not None
 
     @property
@@ -87,7 +87,7 @@ class Tutorial:
     backend: str = DYNX
 
     def rows(self) -> Iterator[Row]:
-        """Row by row, as it is done; a mode that cannot be had says why."""
+        """Simulate row by row; the outcome of a mode that is not available has the reason."""
         missing = {plant: _missing(plant) for plant in self.plants}
         for mode in MODES:
             yield Row(
@@ -129,9 +129,9 @@ def tutorial(
     """The tutorial's experiments; `model` is by default the UR5 in the tutorial's gravity.
 
     The cycloidal motion goes from `start` (neutral by default) to `to` (by default `TO`, for an arm of six
-    joints) in `duration` [s], in steps of `dt`, on `plants`; `backend` is what the laws compute with.
+    joints) in `duration` [s], in steps of `dt`, on `plants`; the controllers evaluate `backend`.
 
-    Raises ArgumentError for a motion that is none, LimitError for one outside the robot's limits of
+    Raises ArgumentError for an invalid motion, LimitError for one outside the robot's limits of
     position and velocity, UnsupportedFeatureError for a floating base, BackendError for a backend that
     cannot be used.
     """
@@ -155,7 +155,7 @@ def tutorial(
 
 
 def _missing(plant: str) -> str | None:
-    """Why no robot can be simulated on a plant, if none can."""
+    """Reason why a plant is not available, None if it is."""
     try:
         backend_class(plant).require_engine()
     except BackendError as error:

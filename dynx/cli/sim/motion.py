@@ -67,7 +67,7 @@ class MotionInput:
     def needs_frame(self) -> bool:
         """Whether the target or the controller refers to a frame."""
         law = CONTROLLERS.get(self.controller)
-        return self.to_pose is not None or (law is not None and law.wants == "frame")
+        return self.to_pose is not None or (law is not None and law.controls == "frame")
 
 
 @dataclass(frozen=True)

@@ -35,15 +35,15 @@ from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint, Trajectory
 
 PART = 1024
-"""Rollouts in one part: the state of so many stays in the caches, a call is long against its start, and
-some thousand rollouts are dealt to the threads in about equal shares."""
+"""Rollouts in one part: few enough that their state stays in the caches, and enough to outweigh the start of
+a call. Results do not depend on it."""
 
 Progress = Callable[[int, int], object]
-"""Called with the rollouts done and those asked for."""
+"""Called with the number of finished rollouts and that of all."""
 
 
 class BatchInterrupted(KeyboardInterrupt):
-    """Ctrl-C in a batch; `rollouts` has what was done until then."""
+    """Ctrl-C in a batch; `rollouts` has those that were finished."""
 
     def __init__(self, rollouts: BatchRollouts) -> None:
         super().__init__(f"interrupted with {int(np.sum(rollouts.done))} of {len(rollouts)} rollouts done")
@@ -81,21 +81,21 @@ def simulate_batch(
     keep: str | os.PathLike[str] | None = None,
     progress: Progress | None = None,
 ) -> BatchRollouts:
-    """Many rollouts of `model` under `controller` along `reference`: semi-implicit Euler, as `simulate`.
+    """Simulate many rollouts of `model` under `controller` along `reference`, by semi-implicit Euler.
 
-    Law, dynamics and integrator are compiled into one kernel, one rollout in each lane of a vector.
-    What may differ from rollout to rollout has one row for each:
+    Controller, dynamics and integrator are compiled into one kernel, with one rollout in each vector lane.
+    Arguments that differ from rollout to rollout have one row for each:
 
     - `parameters` (n, p) of `plant`, a `dynx.parametric` of the model: payloads, inertias, damping,
       dry friction (with the jump of ``sign(v)``) and armature that the controller does not know of
-    - `gains`: arrays (n,) or (n, size) by the name that the law has them under, as ``{"kp": ...}``
+    - `gains`: arrays (n,) or (n, size) by the name of a gain of the controller, as ``{"kp": ...}``
     - `damping`, `friction`, `armature` (n,), (n, 1) or (n, joints); a number, numbers (joints,) or True
       mean for all rollouts what they mean in `simulate`
     - `q0` (n, nq), `v0` (n, nv); one row is for all. By default the start of the reference, and at rest
       where `q0` is given
     - `noise` of the measurements: rollout k has that of ``simulate`` with ``Noise(..., rollout=k)``
 
-    `rollouts` is n, where none of these tells. Times [s], `delay`, `noise`, `friction_slip`,
+    `rollouts` is n, where no argument has n rows. Times [s], `delay`, `noise`, `friction_slip`,
     `effort_limits`, `payload`, `mass_scale` and `pushes` are those of `simulate`. A `plant` together with
     a payload or scaled masses is one of ``plant_model(model, payload, mass_scale)``. With `record_every`
     k every k-th state is kept.
@@ -103,14 +103,14 @@ def simulate_batch(
     Parts are done by `threads` threads (None: all processors) or by any `executor`, also one of
     processes or of a cluster; results are the same bit for bit. With `keep`, a folder, each part is
     stored there when it is done, and a run that is started again with the same arguments goes on from
-    there. Ctrl-C raises BatchInterrupted, which has what was done. `progress` is told after each part.
+    there. Ctrl-C raises BatchInterrupted, which has what was done. `progress` is called after each part.
 
     Raises ArgumentError, GainError, LimitError, SingularMassMatrixError as `simulate` does, and
-    UnsupportedFeatureError for laws that branch on what they measure. A rollout that diverges stops
-    nothing: `BatchRollouts.diverged` says when.
+    UnsupportedFeatureError for controllers that branch on their measurement. A rollout that diverges does
+    not stop the others: `BatchRollouts.diverged` has its time.
     """
     if not isinstance(controller, Controller):
-        raise ArgumentError(f"controller is of type {type(controller).__name__}; wanted a dynx.control law")
+        raise ArgumentError(f"controller is of type {type(controller).__name__}; wanted a Controller")
     moved = plant_model(model, payload, mass_scale)
     if plant is not None and plant.model != moved:
         scaled = "" if moved is model else ", with its payload and scaled masses (`plant_model`)"
@@ -203,7 +203,7 @@ def simulate_batch(
 
 
 def _kernels(step: StepOf, clock: Clock, wrenches: Floats) -> KernelOf:
-    """The steps that there are: those with a push take the time for it only while it lasts."""
+    """Kernels of the steps with and without controller and pushes, as far as they occur."""
     asked = np.arange(clock.n_steps) % clock.steps_per_control == 0
     kinds = set(zip(asked.tolist(), pushing(wrenches), strict=True))
     return {
@@ -213,7 +213,7 @@ def _kernels(step: StepOf, clock: Clock, wrenches: Floats) -> KernelOf:
 
 
 class _Rows:
-    """How many rollouts there are, from the arrays that have one row for each."""
+    """Number of rollouts, from the arrays that have one row for each."""
 
     def __init__(self, asked: int | None) -> None:
         if asked is not None and (isinstance(asked, bool) or not isinstance(asked, int) or asked < 1):
@@ -223,7 +223,7 @@ class _Rows:
 
     @property
     def count(self) -> int:
-        """The number; 1 where nothing says."""
+        """The number; 1 where no argument has several rows."""
         return 1 if self._asked is None else self._asked
 
     def of(self, name: str, values: ArrayLike, size: int, *, spread: bool = False) -> Floats:

@@ -55,12 +55,12 @@ class StepOf:
     loads: BatchLoads
 
     def __post_init__(self) -> None:
-        law = innermost(self.controller)
-        known = gains_of(law)
+        inner = innermost(self.controller)
+        known = gains_of(inner)
         for name in self.gains:
             if name not in known:
                 raise ArgumentError(
-                    f"{law.name} has no gain {shown(name)}; it has {', '.join(known) or 'none'}"
+                    f"{inner.name} has no gain {shown(name)}; it has {', '.join(known) or 'none'}"
                 )
         state = self.controller.initial_state()
         if state is not None and not is_row(state):
@@ -97,11 +97,11 @@ class StepOf:
 
     def _traced(self, *, controlled: bool, pushed: bool) -> Kernel:
         mechanism = simplify_mechanism(self.model.mechanism)
-        law = traced_controller(self.controller, {})
+        controller = traced_controller(self.controller, {})
 
         def step(**given: Array) -> dict[str, Array]:
             if controlled:
-                outcome = self._commanded(law, given)
+                outcome = self._commanded(controller, given)
             else:
                 outcome = {name: given[name] for name in ("state", "cut") if name in given}
             tau = outcome["tau"] if controlled else given["tau"]
@@ -116,7 +116,7 @@ class StepOf:
             program = trace(step, self.sizes(controlled=controlled, pushed=pushed))
         except TraceError as error:
             raise UnsupportedFeatureError(
-                f"{self.controller.name} cannot be fused with the plant, since it asks for values: {error}"
+                f"{self.controller.name} cannot be fused with the plant: it branches on a value: {error}"
             ) from error
         except DynxError:
             raise
@@ -139,8 +139,8 @@ class StepOf:
                 sizes |= {"q_seen": nq, "v_seen": nv}
             if self.noisy:
                 sizes |= {"noise_q": nv, "noise_v": nv}
-            law = innermost(self.controller)
-            sizes |= {f"gain_{name}": gains_of(law)[name].size for name in self.gains}
+            known = gains_of(innermost(self.controller))
+            sizes |= {f"gain_{name}": known[name].size for name in self.gains}
             if self.limit is not None:
                 sizes["held_for"] = 1
         state = self.controller.initial_state()
@@ -153,14 +153,14 @@ class StepOf:
         sizes |= self.loads.sizes(pushed=pushed)
         return {name: (size,) for name, size in sizes.items()}
 
-    def _commanded(self, law: Controller[Any], given: Mapping[str, Array]) -> dict[str, Array]:
+    def _commanded(self, controller: Controller[Any], given: Mapping[str, Array]) -> dict[str, Array]:
         """Torque within the limits, controller state, and number of steps with motors at their limits."""
         q, v = (given["q_seen"], given["v_seen"]) if self.delayed else (given["q"], given["v"])
         if self.noisy:
             off = given["noise_q"]
             q, v = integrate(q, off) if self.model.floating else q + off, v + given["noise_v"]
         setpoint = Setpoint(given["q_wanted"], given["v_wanted"], given["a_wanted"])
-        own = traced_controller(law, {name: given[f"gain_{name}"] for name in self.gains})
+        own = traced_controller(controller, {name: given[f"gain_{name}"] for name in self.gains})
         watch = Unchanged(own)
         tau, state = own.torque(Measurement(given["t"][0], q, v), setpoint, given.get("state"))
         if watch.changed:
@@ -179,7 +179,7 @@ class StepOf:
         tau = clamp(tau, self.limit)
         bounded = np.isfinite(self.limit)
         cut = np.array(given["cut"])
-        # Symbols also where a law gives plain numbers.
+        # Symbols also where a controller returns plain numbers.
         left = self.limit[bounded] - abs(tau[bounded] + 0.0 * cut[bounded])
         cut[bounded] = cut[bounded] + given["held_for"] * (1.0 - sign(left))
         return {"tau": tau, "cut": cut, **outcome}

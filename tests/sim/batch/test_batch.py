@@ -239,7 +239,7 @@ def test_what_cannot_be_a_batch_is_refused(arm: Model, reference: Trajectory) ->
     pd = PD(arm, kp=200, kd=20)
     plant = dynx.parametric(arm, point_payload="tool0")
     bad: list[tuple[type[Exception], str, Controller[Any], dict[str, Any]]] = [
-        (UnsupportedFeatureError, "asks for values", Branching(arm), {}),
+        (UnsupportedFeatureError, "branches on a value", Branching(arm), {}),
         (ArgumentError, "no gain", pd, {"gains": {"kpp": 1.0}}),
         (ArgumentError, "rollouts is", pd, {"rollouts": 0}),
         (ArgumentError, "2 rows", pd, {"rollouts": 3, "q0": np.zeros((2, 6))}),
