@@ -29,18 +29,18 @@ from dynx.cli.shell.options import choice_pair, name_list, run_options
     type=click.FloatRange(min=0.0),
     default=1e-12,
     show_default=True,
-    help="Relative error above which engines differ; 1e-6 ignores differences of rounding.",
+    help="Relative error above which engines differ; 1e-6 ignores rounding.",
 )
 @click.option(
     "--choose",
     type=choice_pair,
     multiple=True,
     metavar="RULE=CHOICE",
-    help="Choice of how to mend what can be read in two ways, such as DX103=keep (see `dynx explain`). "
-    "May be given several times.",
+    help="Choice for a rule that can mend a file in two ways, such as DX103=keep (see `dynx explain`); "
+    "may be given several times.",
 )
 @click.option("--fix", "fix", metavar="OUT", help="File for the mended URDF; for several robots a directory.")
-@click.option("--in-place", is_flag=True, help="Write each mended description over the file that was read.")
+@click.option("--in-place", is_flag=True, help="Mended descriptions in place of the files that were read.")
 @click.option(
     "--json", "json_path", metavar="FILE", help="File for the reports as JSON; - is standard output."
 )
