@@ -12,7 +12,7 @@ from dynx.agreement import tolerances
 from dynx.agreement.compared_quantities import compared_quantities
 from dynx.agreement.comparison import judge
 from dynx.agreement.magnitudes import Magnitudes
-from dynx.agreement.sampling import Kind, Samples, deal
+from dynx.agreement.sampling import Kind, Samples, assign_frames
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
 
@@ -40,7 +40,7 @@ def samples_at(
     def rows(x: ArrayLike | None, width: int) -> Floats:
         return np.array(np.broadcast_to(0.0 if x is None else np.asarray(x, dtype=float), (n, width)))
 
-    questions = deal(model.frame_names, n, each=n, references=references)
+    questions = assign_frames(model.frame_names, n, each=n, references=references)
     return Samples(
         model=model,
         index=np.arange(n),

@@ -1,4 +1,4 @@
-"""The comparison of a robot in several backends, from beginning to end."""
+"""Comparison of a robot in several backends."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from pathlib import Path
 
 import numpy as np
 
-from dynx.agreement.answers import DERIVED, EXACT, Answers
 from dynx.agreement.compared_quantities import compared_quantities
 from dynx.agreement.comparison import Comparison, compare
 from dynx.agreement.identities import IdentityCheck, check_identities
 from dynx.agreement.magnitudes import Magnitudes
 from dynx.agreement.referee import Referee
 from dynx.agreement.report import AgreementReport, refused_report
+from dynx.agreement.results import DERIVED, REFEREE, BackendResults
 from dynx.agreement.sampling import Samples, draw_samples
 from dynx.agreement.solutions import compare_forward_dynamics, compare_inverse_kinematics
 from dynx.agreement.suspects import find_suspects
@@ -37,10 +37,10 @@ DEFAULT_SAMPLES = 16
 DEFAULT_REFEREE_SAMPLES = 2
 
 DERIVED_SAMPLES = 2
-"""Samples at which native answers are compared with derived ones: a derived mass matrix costs an
+"""Samples at which native results are compared with derived ones: a derived mass matrix costs an
 evaluation per column."""
 
-CALM_SAMPLES = 4
+IDENTITY_SAMPLES = 4
 """Samples at which identities are tested: a derivative costs eight evaluations."""
 
 Progress = Callable[[str], None]
@@ -55,7 +55,7 @@ def agree(
     referee_samples: int = DEFAULT_REFEREE_SAMPLES,
     progress: Progress | None = None,
 ) -> AgreementReport:
-    """Whether backends give the same answers about a robot, and to how many digits.
+    """Compare the results of backends on a robot.
 
     `model` is a `Model` or whatever `dynx.load` takes. `backends` are names (default: all that are
     installed) or backends made of this very model, which are left open; one alone is compared with
@@ -76,12 +76,14 @@ def agree(
     except DynxError as error:
         took = time.perf_counter() - started
         return refused_report(_label(model), error, backends=names, seconds=took)
-    _refuse_strangers(loaded, chosen)
+    _require_same_model(loaded, chosen)
     try:
         # NaN and infinity from an engine are judged by their value, not announced by NumPy.
         with ExitStack() as opened, np.errstate(all="ignore"):
-            engines = [_opened(each, loaded, opened) for each in chosen]
-            return _compared(loaded, engines, samples, seed, referee_samples, progress or _silent, started)
+            engines = [_open(each, loaded, opened) for each in chosen]
+            return _compare_all(
+                loaded, engines, samples, seed, referee_samples, progress or _ignore_progress, started
+            )
     except DynxError as error:
         return refused_report(
             loaded.name,
@@ -93,7 +95,7 @@ def agree(
         )
 
 
-def _compared(
+def _compare_all(
     model: Model,
     engines: list[Backend],
     count: int,
@@ -105,28 +107,30 @@ def _compared(
     names = _distinct(engines)
     samples = draw_samples(model, count, seed)
     sizes = Magnitudes(samples)
-    all_answers = [Answers(name, engine, samples) for name, engine in zip(names, engines, strict=True)]
+    all_results = [BackendResults(name, engine, samples) for name, engine in zip(names, engines, strict=True)]
     rows: list[Comparison] = []
-    for first, second in combinations(all_answers, 2):
+    for first, second in combinations(all_results, 2):
         progress(f"{first.name}~{second.name}")
         rows += [compare(quantity, first, second, sizes) for quantity in compared_quantities()]
         rows.append(compare_forward_dynamics(first, second, sizes))
         if model.nv:
             rows.append(compare_inverse_kinematics(first, second, sizes))
     if referee_samples:
-        progress(EXACT)
-        rows += _refereed(samples.take(list(range(min(referee_samples, count))), 1), names, engines)
+        progress(REFEREE)
+        rows += _compare_with_referee(
+            samples.take(list(range(min(referee_samples, count))), 1), names, engines
+        )
     few = samples.take(list(range(min(DERIVED_SAMPLES, count))), 1)
     for name, engine in zip(names, engines, strict=True):
         progress(f"{name}~{DERIVED}")
-        rows += _self_compared(Magnitudes(few), name, engine)
+        rows += _compare_with_derived(Magnitudes(few), name, engine)
     identities: list[IdentityCheck] = []
-    calm = samples.calm(CALM_SAMPLES)
-    if calm and model.nv:
-        calm_sizes = Magnitudes(samples.take(calm, 1))
+    differentiable = samples.differentiable(IDENTITY_SAMPLES)
+    if differentiable and model.nv:
+        identity_sizes = Magnitudes(samples.take(differentiable, 1))
         for name, engine in zip(names, engines, strict=True):
             progress(f"identities of {name}")
-            identities += check_identities(name, engine, calm_sizes)
+            identities += check_identities(name, engine, identity_sizes)
     return AgreementReport(
         robot=model.name,
         source=model.source,
@@ -144,27 +148,27 @@ def _compared(
     )
 
 
-def _refereed(samples: Samples, names: list[str], engines: list[Backend]) -> list[Comparison]:
-    """Each backend's distance from the exact answer."""
+def _compare_with_referee(samples: Samples, names: list[str], engines: list[Backend]) -> list[Comparison]:
+    """Comparisons of each backend with the referee."""
     sizes = Magnitudes(samples)
-    exact = Answers(EXACT, Referee(samples.model), samples)
+    exact = BackendResults(REFEREE, Referee(samples.model), samples)
     rows = []
     for name, engine in zip(names, engines, strict=True):
-        answers = Answers(name, engine, samples)
+        results = BackendResults(name, engine, samples)
         rows += [
-            compare(quantity, answers, exact, sizes)
+            compare(quantity, results, exact, sizes)
             for quantity in compared_quantities()
             if quantity.refereed
         ]
-        rows.append(compare_forward_dynamics(answers, exact, sizes, both=False))
+        rows.append(compare_forward_dynamics(results, exact, sizes, both=False))
     return rows
 
 
-def _self_compared(sizes: Magnitudes, name: str, engine: Backend) -> list[Comparison]:
-    """What the engine answers itself beside what dynx derives from its poses and inverse dynamics."""
+def _compare_with_derived(sizes: Magnitudes, name: str, engine: Backend) -> list[Comparison]:
+    """Comparisons of native results with those that dynx derives from the engine's poses and torques."""
     native = native_quantities(engine)
-    own = Answers(name, engine, sizes.samples)
-    derived = Answers(DERIVED, DerivedBackend(engine), sizes.samples)
+    own = BackendResults(name, engine, sizes.samples)
+    derived = BackendResults(DERIVED, DerivedBackend(engine), sizes.samples)
     rows = [
         compare(quantity, own, derived, sizes)
         for quantity in compared_quantities()
@@ -209,13 +213,13 @@ def _checked(
     return chosen
 
 
-def _refuse_strangers(model: Model, chosen: list[str | Backend]) -> None:
+def _require_same_model(model: Model, chosen: list[str | Backend]) -> None:
     for each in chosen:
         if isinstance(each, Backend) and each.model != model:
             raise ArgumentError(f"{each!r} was made of another model than {model!r}")
 
 
-def _opened(chosen: str | Backend, model: Model, opened: ExitStack) -> Backend:
+def _open(chosen: str | Backend, model: Model, opened: ExitStack) -> Backend:
     if isinstance(chosen, str):
         return opened.enter_context(backend(chosen, model))
     return chosen
@@ -235,5 +239,5 @@ def _label(model: object) -> str:
     return text if len(text) <= 200 and "\n" not in text else "<string>"
 
 
-def _silent(step: str) -> None:
-    """No one wants to know."""
+def _ignore_progress(step: str) -> None:
+    """Ignore the name of a step."""

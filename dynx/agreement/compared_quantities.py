@@ -18,8 +18,8 @@ from dynx.agreement.natural_magnitudes import (
     Layout,
     NaturalMagnitude,
     Scale,
+    frame_samples,
     largest,
-    questions_of,
 )
 from dynx.agreement.sampling import Samples
 from dynx.backends.quantities import QUANTITIES, Quantity
@@ -83,7 +83,7 @@ def _evaluation(quantity: Quantity, magnitude: NaturalMagnitude) -> Evaluate:
     def at_frames(backend: Any, samples: Samples) -> Array:
         """Results (questions, samples, ...), one question after the other."""
         method, results = getattr(backend, quantity.name), []
-        for question in questions_of(magnitude.layout, samples):
+        for question in frame_samples(magnitude.layout, samples):
             state = [getattr(samples, argument)[question.samples] for argument in quantity.arguments]
             results.append(method(*state, question.frame, reference=question.reference))
         return np.asarray(np.stack(results))

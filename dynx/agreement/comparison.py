@@ -1,4 +1,4 @@
-"""Two sets of answers to one quantity, and how far apart they are."""
+"""Comparison of two results of one quantity."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dynx.agreement.answers import DERIVED, Answers, Refusal
 from dynx.agreement.compared_quantities import ComparedQuantity
 from dynx.agreement.magnitudes import Magnitudes
-from dynx.agreement.natural_magnitudes import Layout, questions_of
+from dynx.agreement.natural_magnitudes import Layout, frame_samples
+from dynx.agreement.results import DERIVED, BackendResults, Refusal
 from dynx.agreement.sampling import Samples
 from dynx.spatial.scalar import Array, Floats
 
 
 @dataclass(frozen=True)
 class WorstSample:
-    """Where the largest error was: all that is needed to see it again."""
+    """The sample of the largest error, with all that reproduces it."""
 
     index: int
     kind: str
@@ -31,11 +31,11 @@ class WorstSample:
 
 @dataclass(frozen=True)
 class Comparison:
-    """How far two answers to a quantity are apart; `pair` is two backends, or a backend and
+    """The difference of two results of a quantity; `pair` is two backends, or a backend and
     ``referee`` (50 digits) or ``derived`` (what dynx derives from that engine's own poses and inverse
     dynamics), joined by ``~``.
 
-    `max_rel_error` is the largest error over its natural size (`dynx.agreement.magnitudes`).
+    `max_rel_error` is the largest error over its natural magnitude (`dynx.agreement.natural_magnitudes`).
     """
 
     quantity: str
@@ -64,7 +64,7 @@ class Verdict:
 
 
 def judge(error: Array, scale: Floats) -> Verdict:
-    """The largest error over `scale`, which broadcasts; what is no number counts as infinite."""
+    """The largest error over `scale`, which broadcasts; NaN counts as infinite."""
     size = np.abs(error).astype(np.float64)
     if not size.size:
         return Verdict(0.0, 0.0, None)
@@ -75,20 +75,22 @@ def judge(error: Array, scale: Floats) -> Verdict:
     return Verdict(float(np.max(size)), float(relative[worst]), tuple(int(k) for k in worst))
 
 
-def compare(quantity: ComparedQuantity, first: Answers, second: Answers, sizes: Magnitudes) -> Comparison:
-    """The two answers to a quantity whose error is their difference."""
+def compare(
+    quantity: ComparedQuantity, first: BackendResults, second: BackendResults, sizes: Magnitudes
+) -> Comparison:
+    """Compare two results whose error is their difference."""
     samples = first.samples
     tolerance = quantity.tolerance(sizes)
-    answers = [each.of(quantity.name, quantity.evaluate) for each in (first, second)]
-    refused = refusals(quantity.name, first, second, answers, tolerance)
+    results = [each.of(quantity.name, quantity.evaluate) for each in (first, second)]
+    refused = refusals(quantity.name, first, second, results, tolerance)
     if refused is not None:
         return refused
-    one, other = answers
+    one, other = results
     assert not isinstance(one, Refusal)
     assert not isinstance(other, Refusal)
     if one.shape != other.shape:
         note = f"{first.name} gives shape {one.shape}, {second.name} {other.shape}"
-        return unequal(quantity.name, first, second, tolerance, note)
+        return failed_comparison(quantity.name, first, second, tolerance, note)
     derived = second.name == DERIVED and quantity.derived_scale is not None
     scale = quantity.derived_scale(sizes) if derived and quantity.derived_scale else quantity.scale(sizes)
     verdict = judge(_difference(one, other), scale)
@@ -100,42 +102,48 @@ def compare(quantity: ComparedQuantity, first: Answers, second: Answers, sizes: 
         tolerance,
         verdict.relative <= tolerance,
         locate(verdict.position, quantity.layout, samples),
-        note=no_numbers((first, one), (second, other)),
+        note=not_finite_note((first, one), (second, other)),
     )
 
 
-def no_numbers(*answers: tuple[Answers, Array]) -> str | None:
-    """Who answers NaN or infinity, if anybody does."""
-    wild = [by.name for by, answer in answers if not np.isfinite(answer.astype(np.float64)).all()]
+def not_finite_note(*results: tuple[BackendResults, Array]) -> str | None:
+    """A note that names the backends whose results contain NaN or infinity, or None."""
+    wild = [by.name for by, answer in results if not np.isfinite(answer.astype(np.float64)).all()]
     return f"{' and '.join(wild)}: NaN or infinity in the answer" if wild else None
 
 
-def pair_name(first: Answers, second: Answers) -> str:
+def pair_name(first: BackendResults, second: BackendResults) -> str:
     """Such as ``pinocchio~pybullet``."""
     return f"{first.name}~{second.name}"
 
 
 def refusals(
-    name: str, first: Answers, second: Answers, answers: Sequence[Array | Refusal], tolerance: float
+    name: str,
+    first: BackendResults,
+    second: BackendResults,
+    results: Sequence[Array | Refusal],
+    tolerance: float,
 ) -> Comparison | None:
-    """What an error as an answer means: alike from both is agreement, from one it is a difference."""
-    refused = [answer for answer in answers if isinstance(answer, Refusal)]
+    """The comparison of errors in place of results: the same error from both is agreement."""
+    refused = [answer for answer in results if isinstance(answer, Refusal)]
     if not refused:
         return None
-    alike = len(refused) == len(answers) and all(answer.singular for answer in refused)
+    alike = len(refused) == len(results) and all(answer.singular for answer in refused)
     if alike:
         note = f"refused alike: {refused[0].error}"
         return Comparison(name, pair_name(first, second), 0.0, 0.0, tolerance, True, note=note)
     note = "; ".join(
         f"{each.name} refuses: {answer}"
-        for each, answer in zip((first, second), answers, strict=False)
+        for each, answer in zip((first, second), results, strict=False)
         if isinstance(answer, Refusal)
     )
-    return unequal(name, first, second, tolerance, note)
+    return failed_comparison(name, first, second, tolerance, note)
 
 
-def unequal(name: str, first: Answers, second: Answers, tolerance: float, note: str) -> Comparison:
-    """A difference that has no size."""
+def failed_comparison(
+    name: str, first: BackendResults, second: BackendResults, tolerance: float, note: str
+) -> Comparison:
+    """A comparison that fails without a finite error."""
     return Comparison(name, pair_name(first, second), np.inf, np.inf, tolerance, False, note=note)
 
 
@@ -154,14 +162,14 @@ def state(samples: Samples, k: int, frame: str | None = None, reference: str | N
 
 
 def locate(position: tuple[int, ...] | None, layout: Layout, samples: Samples) -> WorstSample | None:
-    """The sample (and frame) behind a position in an answer."""
+    """The sample (and frame) of a position in a result."""
     if position is None:
         return None
     if layout == "samples":
         return state(samples, position[0])
     if layout == "frames":
         return state(samples, position[0], samples.model.frame_names[position[1]])
-    question = questions_of(layout, samples)[position[0]]
+    question = frame_samples(layout, samples)[position[0]]
     return state(samples, int(question.samples[position[1]]), question.frame, question.reference)
 
 

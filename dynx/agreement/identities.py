@@ -1,4 +1,4 @@
-"""What must hold of one engine by itself, whatever the others say: the laws of mechanics.
+"""Identities of mechanics that the results of one engine must satisfy by themselves.
 
 Each identity is an equation between quantities of a single backend. When two backends differ, the
 one that breaks an identity is the one that is wrong. Derivatives in time are numerical
@@ -13,14 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from dynx.agreement import tolerances
-from dynx.agreement.answers import Answers
 from dynx.agreement.comparison import WorstSample, judge, state
 from dynx.agreement.differentiation import time_derivative
 from dynx.agreement.magnitudes import Magnitudes
 from dynx.agreement.natural_magnitudes import coriolis_scale, largest, mass_scale
+from dynx.agreement.results import BackendResults
 from dynx.agreement.sampling import Samples
 from dynx.agreement.solutions import compare_forward_dynamics
-from dynx.agreement.symmetry import turned
+from dynx.agreement.symmetry import rotate_world
 from dynx.backends import Backend
 from dynx.backends.hooks import apply_matrix
 from dynx.errors import shown
@@ -31,7 +31,7 @@ from dynx.spatial.so3 import cross, rotate, skew
 
 @dataclass(frozen=True)
 class IdentityCheck:
-    """How well one backend keeps one identity; errors are relative to their natural size."""
+    """How well one backend keeps one identity; errors are relative to natural magnitudes."""
 
     identity: str
     backend: str
@@ -46,7 +46,7 @@ class IdentityCheck:
 class Identity:
     """An identity; `residual` gives (what should be zero (n, ...), its natural size).
 
-    `applies` says of a model why the identity cannot be asked of it, or None.
+    `applies` returns why the identity does not apply to a model, or None.
     """
 
     name: str
@@ -56,7 +56,7 @@ class Identity:
 
 
 def check_identities(name: str, backend: Backend, sizes: Magnitudes) -> list[IdentityCheck]:
-    """All identities of one backend at the samples of `sizes`, which must be calm."""
+    """All identities of one backend at the samples of `sizes`, which must be `Samples.differentiable`."""
     samples, checks = sizes.samples, []
     for identity in IDENTITIES:
         tolerance = identity.tolerance(sizes)
@@ -81,8 +81,8 @@ def check_identities(name: str, backend: Backend, sizes: Magnitudes) -> list[Ide
 
 def _inverse_of_inverse(name: str, backend: Backend, sizes: Magnitudes) -> IdentityCheck:
     """Inverse dynamics of the acceleration that forward dynamics finds is the torque put in."""
-    answers = Answers(name, backend, sizes.samples)
-    found = compare_forward_dynamics(answers, answers, sizes, both=False)
+    results = BackendResults(name, backend, sizes.samples)
+    found = compare_forward_dynamics(results, results, sizes, both=False)
     return IdentityCheck(
         "inverse dynamics of forward dynamics",
         name,
@@ -207,7 +207,7 @@ def _passivity(backend: Backend, samples: Samples, sizes: Magnitudes) -> tuple[F
 
 def _turned_world(backend: Backend, samples: Samples, sizes: Magnitudes) -> tuple[Floats, Floats]:
     """Turning robot, world and gravity together changes no torque and no inertia."""
-    model, configurations = turned(samples.model)
+    model, configurations = rotate_world(samples.model)
     q = configurations(samples.q)
     with type(backend)(model) as other:
         tau = other.inverse_dynamics(q, samples.v, samples.a)
@@ -234,12 +234,12 @@ def _physical(model: Model) -> str | None:
             continue
         least = np.linalg.eigvalsh(link.inertial.tensor)[0]
         if link.inertial.mass < 0.0 or least < 0.0:
-            return f"not asked: no body has the inertia of link {shown(link.name)}; it is used as it stands"
+            return f"not checked: no body has the inertia of link {shown(link.name)}; it is used as it stands"
     return None
 
 
 def _only_floating(model: Model) -> str | None:
-    return None if model.floating else "asked of a floating base only"
+    return None if model.floating else "applies to a floating base only"
 
 
 def _derivative(sizes: Magnitudes) -> float:

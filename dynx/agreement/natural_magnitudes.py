@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 
 from dynx.agreement.magnitudes import Magnitudes
-from dynx.agreement.sampling import FrameQuestion, Samples
+from dynx.agreement.sampling import FrameSamples, Samples
 from dynx.spatial.scalar import Floats
 
 Layout = Literal["samples", "frames", "every_frame", "derivatives"]
@@ -36,7 +36,7 @@ class NaturalMagnitude:
     derived_scale: Scale | None = None
 
 
-def questions_of(layout: Layout, samples: Samples) -> tuple[FrameQuestion, ...]:
+def frame_samples(layout: Layout, samples: Samples) -> tuple[FrameSamples, ...]:
     """The frames and samples that the first axis of such a layout counts."""
     return samples.every_frame if layout == "every_frame" else samples.derivatives
 
@@ -105,7 +105,7 @@ def _twist(layout: Layout, linear: Scale, angular: Scale) -> NaturalMagnitude:
 
     def scale(sizes: Magnitudes) -> Floats:
         rows = np.stack([linear(sizes)] * 3 + [angular(sizes)] * 3, axis=1)
-        questions = questions_of(layout, sizes.samples)
+        questions = frame_samples(layout, sizes.samples)
         return np.asarray(np.stack([rows[question.samples] for question in questions]))
 
     return NaturalMagnitude(scale, layout)

@@ -18,7 +18,7 @@ import mpmath
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dynx.agreement.answers import EXACT
+from dynx.agreement.results import REFEREE
 from dynx.backends.quantities import QUANTITIES, Quantity
 from dynx.model import Model
 from dynx.model.mechanism import Mechanism, build_mechanism
@@ -41,7 +41,7 @@ class Referee:
     mpmath numbers is used as it stands.
     """
 
-    name = EXACT
+    name = REFEREE
 
     def __init__(self, model: Model) -> None:
         self.model = model

@@ -50,7 +50,7 @@ class Failure:
 class AgreementReport:
     """How well backends agree about one robot; true in a condition if they do.
 
-    `quantities` compares answers, `identities` tests each backend alone, `suspects` says who is
+    `quantities` compares results, `identities` tests each backend alone, `suspects` says who is
     wrong where something differs. `error` is set, and nothing compared, where the robot was refused.
     """
 

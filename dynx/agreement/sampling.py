@@ -1,4 +1,4 @@
-"""The states at which backends are compared: the same for every backend, made from a seed alone.
+"""The states at which backends are compared: the same for every backend, drawn from a seed.
 
 Kinds take turns, so that few samples still see each: ``within`` the limits, ``anywhere`` in
 (-pi, pi) (robots whose limits have no width move too), ``straight`` (every joint at a multiple of a
@@ -26,17 +26,17 @@ Indices = NDArray[np.intp]
 
 KINDS: tuple[Kind, ...] = ("within", "anywhere", "within", "straight", "within", "anywhere", "limit", "turns")
 
-FEW_TURNS = 50
-"""Samples of many turns reach this many turns to either side."""
+MAX_TURNS = 50
+"""Number of turns to either side of zero that samples of kind ``turns`` reach."""
 
-CALM = 2.0 * np.pi
-"""Positions up to this size [rad or m] are differentiated along a motion: the rounding of q itself
-must stay below that of what is computed from it."""
+MAX_DIFFERENTIATED_POSITION = 2.0 * np.pi
+"""Bound on the positions [rad or m] at which quantities are differentiated along a motion: the rounding of q
+itself must stay below that of the quantities."""
 
 
 @dataclass(frozen=True)
-class FrameQuestion:
-    """One frame in one reference, at the samples of these numbers."""
+class FrameSamples:
+    """A frame and a reference, and the numbers of the samples at which they are evaluated."""
 
     frame: str
     reference: str
@@ -47,9 +47,9 @@ class FrameQuestion:
 class Samples:
     """n states of one model: q (n, nq), v, a, tau (n, nv) and a wrench (n, 6) for one frame.
 
-    `every_frame` asks for each frame in each reference at some samples; `derivatives` does so for
-    the dearer quantities and, of robots with very many frames, asks in fewer references of each.
-    All questions of one list are about equally many samples.
+    `every_frame` has each frame in each reference at some samples; `derivatives` is for quantities that take
+    longer and has, for robots with very many frames, fewer references of each. All entries of one list have
+    equally many samples.
     """
 
     model: Model
@@ -61,16 +61,16 @@ class Samples:
     tau: Floats
     wrench: Floats
     wrench_frame: str
-    every_frame: tuple[FrameQuestion, ...]
-    derivatives: tuple[FrameQuestion, ...]
+    every_frame: tuple[FrameSamples, ...]
+    derivatives: tuple[FrameSamples, ...]
 
     def __len__(self) -> int:
         return len(self.q)
 
     def take(self, chosen: list[int], frame_share: int) -> Samples:
-        """Some of the samples; each frame is asked once, in one reference in `frame_share`-th turn."""
+        """Some of the samples, with each frame in `frame_share` references at one sample each."""
         pick = np.array(chosen, dtype=np.intp)
-        questions = deal(self.model.frame_names, len(pick), each=1, references=frame_share)
+        entries = assign_frames(self.model.frame_names, len(pick), each=1, references=frame_share)
         return replace(
             self,
             index=self.index[pick],
@@ -80,16 +80,16 @@ class Samples:
             a=self.a[pick],
             tau=self.tau[pick],
             wrench=self.wrench[pick],
-            every_frame=questions,
-            derivatives=questions,
+            every_frame=entries,
+            derivatives=entries,
         )
 
-    def calm(self, count: int) -> list[int]:
-        """Numbers of up to `count` samples near zero and in motion, for differentiation."""
+    def differentiable(self, count: int) -> list[int]:
+        """Numbers of up to `count` samples near zero and in motion, to differentiate quantities at."""
         joints = self.q[:, 7 if self.model.floating else 0 :]
-        calm = np.max(np.abs(joints), axis=-1, initial=0.0) <= CALM
-        calm &= np.any(self.v != 0.0, axis=-1) & (np.array(self.kinds) != "limit")
-        return [int(k) for k in np.flatnonzero(calm)[:count]]
+        near = np.max(np.abs(joints), axis=-1, initial=0.0) <= MAX_DIFFERENTIATED_POSITION
+        near &= np.any(self.v != 0.0, axis=-1) & (np.array(self.kinds) != "limit")
+        return [int(k) for k in np.flatnonzero(near)[:count]]
 
 
 def draw_samples(model: Model, count: int, seed: int) -> Samples:
@@ -119,8 +119,8 @@ def draw_samples(model: Model, count: int, seed: int) -> Samples:
         tau=tau,
         wrench=rng.uniform(-5.0, 5.0, (count, 6)),
         wrench_frame=carried[int(rng.integers(len(carried)))],
-        every_frame=deal(names, count, each=_share(256, n_questions, count), references=3),
-        derivatives=deal(
+        every_frame=assign_frames(names, count, each=_share(256, n_questions, count), references=3),
+        derivatives=assign_frames(
             names,
             count,
             each=_share(64, n_questions, count),
@@ -129,19 +129,21 @@ def draw_samples(model: Model, count: int, seed: int) -> Samples:
     )
 
 
-def deal(frames: tuple[str, ...], count: int, *, each: int, references: int) -> tuple[FrameQuestion, ...]:
-    """Deal samples round to frames: `references` references of each frame, `each` samples of those.
+def assign_frames(
+    frames: tuple[str, ...], count: int, *, each: int, references: int
+) -> tuple[FrameSamples, ...]:
+    """Assign samples to frames in turn: `references` references of each frame, `each` samples of those.
 
-    Successive questions take successive samples, so that together they see all of them.
+    Successive entries take successive samples, so that together they have all of them.
     """
     names = tuple(REFERENCES)
-    questions, turn = [], 0
+    entries, turn = [], 0
     for number, frame in enumerate(frames):
         for k in range(references):
             chosen = (turn + np.arange(each)) % count
-            questions.append(FrameQuestion(frame, names[(number + k) % len(names)], chosen.astype(np.intp)))
+            entries.append(FrameSamples(frame, names[(number + k) % len(names)], chosen.astype(np.intp)))
             turn += each
-    return tuple(questions)
+    return tuple(entries)
 
 
 def _carried_frames(model: Model) -> list[str]:
@@ -151,8 +153,9 @@ def _carried_frames(model: Model) -> list[str]:
 
 
 def _narrowed(lower: Floats, upper: Floats) -> tuple[Floats, Floats]:
-    """Limits within `CALM` of zero, where they leave room there; some files have limits of 1e16."""
-    low, high = np.maximum(lower, -CALM), np.minimum(upper, CALM)
+    """Limits narrowed to positions that are differentiated, where possible; files may have limits of 1e16."""
+    bound = MAX_DIFFERENTIATED_POSITION
+    low, high = np.maximum(lower, -bound), np.minimum(upper, bound)
     room = low <= high
     return np.where(room, low, lower), np.where(room, high, upper)
 
@@ -180,7 +183,7 @@ def _configuration(model: Model, kind: Kind, rng: np.random.Generator) -> Floats
         ends = np.where(rng.integers(0, 2, n) == 0, lower, upper)
         q[base:] = np.where(np.isfinite(ends), ends, q[base:])
     elif kind == "turns":
-        many = 2.0 * np.pi * FEW_TURNS
+        many = 2.0 * np.pi * MAX_TURNS
         q[base:] = np.where(turning, rng.uniform(-many, many, n), rng.uniform(-1.0, 1.0, n))
     # Half of the attitudes have the scalar of the quaternion negative; one kind turns by exactly pi.
     if model.floating and kind == "straight":

@@ -1,7 +1,7 @@
-"""Quantities whose answers solve something: each engine's solution is put to the other engine.
+"""Quantities that solve equations: the solution of each engine is verified by the other engine.
 
-Two accelerations, or two configurations that reach one target, may differ while both are right. What
-must hold is that the other engine finds the equation solved.
+Two accelerations, or two configurations that reach one target, may differ while both are right. The other
+engine must find that the equation is solved.
 """
 
 from __future__ import annotations
@@ -12,18 +12,18 @@ from typing import Any
 import numpy as np
 
 from dynx.agreement import tolerances
-from dynx.agreement.answers import Answers, Refusal
 from dynx.agreement.comparison import (
     Comparison,
     Verdict,
+    failed_comparison,
     judge,
-    no_numbers,
+    not_finite_note,
     pair_name,
     refusals,
     state,
-    unequal,
 )
 from dynx.agreement.magnitudes import Magnitudes
+from dynx.agreement.results import BackendResults, Refusal
 from dynx.agreement.sampling import Samples
 from dynx.model import Model
 from dynx.rbd.kinematics import ancestry
@@ -45,10 +45,10 @@ def regular_samples(sizes: Magnitudes) -> list[int]:
 
 
 def compare_forward_dynamics(
-    solver: Answers, verifier: Answers, sizes: Magnitudes, *, both: bool = True
+    solver: BackendResults, verifier: BackendResults, sizes: Magnitudes, *, both: bool = True
 ) -> Comparison:
     """The backward error: an acceleration found by one, put into the inverse dynamics of the other,
-    must take the torque asked for. With `both` it is done both ways round.
+    must take the given torque. With `both`, each verifies the other.
     """
     name, samples = "forward_dynamics", solver.samples
     tolerance = tolerances.solving()
@@ -57,8 +57,8 @@ def compare_forward_dynamics(
     def solve(backend: Any, samples: Samples) -> Array:
         return np.asarray(backend.forward_dynamics(samples.q[chosen], samples.v[chosen], samples.tau[chosen]))
 
-    ways = [(solver, verifier), (verifier, solver)] if both else [(solver, verifier)]
-    solutions = [each.of(name, solve) for each, _ in ways]
+    pairs = [(solver, verifier), (verifier, solver)] if both else [(solver, verifier)]
+    solutions = [each.of(name, solve) for each, _ in pairs]
     refused = refusals(name, solver, verifier, solutions, tolerance)
     if refused is not None:
         return refused
@@ -67,12 +67,12 @@ def compare_forward_dynamics(
     notes = []
     if left_out:
         notes.append(f"without {left_out} of {len(samples)} samples, where the mass matrix is singular")
-    for (solving, judging), a in zip(ways, solutions, strict=True):
+    for (solving, judging), a in zip(pairs, solutions, strict=True):
         assert not isinstance(a, Refusal)
         tau = judging.attempt(partial(_torque_taken, a=a, chosen=chosen))
         if isinstance(tau, Refusal):
-            return unequal(name, solver, verifier, tolerance, f"{judging.name} refuses: {tau}")
-        wild = no_numbers((solving, a), (judging, tau))
+            return failed_comparison(name, solver, verifier, tolerance, f"{judging.name} refuses: {tau}")
+        wild = not_finite_note((solving, a), (judging, tau))
         notes += [wild] if wild else []
         verdict = _backward_error(a, tau, chosen, sizes)
         if verdict.relative > worst.relative or worst.position is None:
@@ -90,7 +90,7 @@ def compare_forward_dynamics(
 
 
 def _torque_taken(backend: Any, samples: Samples, *, a: Array, chosen: list[int]) -> Array:
-    """The torque that the accelerations found really take; NaN for what is no acceleration."""
+    """The torque that the accelerations take; NaN where they are not finite."""
     if a.shape != (len(chosen), samples.model.nv) or not np.isfinite(a).all():
         return np.full((len(chosen), samples.model.nv), np.nan)
     return np.asarray(backend.inverse_dynamics(samples.q[chosen], samples.v[chosen], a))
@@ -105,7 +105,9 @@ def _backward_error(a: Array, tau: Array, chosen: list[int], sizes: Magnitudes) 
     return judge(tau - samples.tau[chosen], sizes.solved_torque(everywhere)[chosen, None])
 
 
-def compare_inverse_kinematics(first: Answers, second: Answers, sizes: Magnitudes) -> Comparison:
+def compare_inverse_kinematics(
+    first: BackendResults, second: BackendResults, sizes: Magnitudes
+) -> Comparison:
     """A configuration that one engine calls a solution must reach the target by the other's poses.
 
     Targets are poses that the deepest frame takes within limits, searched for from nearby. A search
@@ -132,7 +134,7 @@ def compare_inverse_kinematics(first: Answers, second: Answers, sizes: Magnitude
         found = np.isfinite(q).all(axis=-1)
         reached = verifier.attempt(partial(_poses, q=q[found], frame=frame))
         if isinstance(reached, Refusal):
-            return unequal(name, first, second, tolerance, f"{verifier.name} refuses: {reached}")
+            return failed_comparison(name, first, second, tolerance, f"{verifier.name} refuses: {reached}")
         errors.append(_distance(target[found], reached))
     searches = 2 * len(q_target)
     missed = searches - sum(len(error) for error in errors)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from dynx.agreement.answers import DERIVED, EXACT
 from dynx.agreement.comparison import Comparison
 from dynx.agreement.identities import IdentityCheck
+from dynx.agreement.results import DERIVED, REFEREE
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ def _evidence(
     against = [c for c in rows if name in c.names and not c.agree]
     for row in against:
         other = row.names[1] if row.names[0] == name else row.names[0]
-        if other == EXACT:
+        if other == REFEREE:
             weight = 3
             figures = _figures(row.max_rel_error, row.tolerance)
             reasons.append(f"is off the 50-digit answer by {figures}")

@@ -1,4 +1,4 @@
-"""The same robot in a world that is turned together with gravity."""
+"""A robot in a world that is rotated together with gravity."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import quat_exp, quat_product, rotate, rotation_from_quat, rpy_from_rotation
 
 ROTATION_VECTOR = (0.7, -1.1, 0.4)
-"""The turn [rad]; it is along no axis, so that no exchange of axes goes unseen."""
+"""Rotation of the world [rad], about an oblique axis so that exchanged axes show."""
 
 
-def turned(model: Model) -> tuple[Model, Callable[[Floats], Floats]]:
-    """A model in the turned world, and the map from configurations (..., nq) of `model` to its own.
+def rotate_world(model: Model) -> tuple[Model, Callable[[Floats], Floats]]:
+    """A model in the rotated world, and the map from configurations (..., nq) of `model` to its own.
 
-    A floating base is turned by its configuration; a fixed one is welded to a new root.
+    A floating base is rotated by its configuration; a fixed one is rigidly connected to a new root.
     """
     quat = quat_exp(np.array(ROTATION_VECTOR))
     R = rotation_from_quat(quat)

@@ -14,7 +14,7 @@ from dynx.agreement import tolerances
 from dynx.agreement.comparison import judge
 from dynx.agreement.magnitudes import Magnitudes
 from dynx.agreement.natural_magnitudes import NATURAL_MAGNITUDES
-from dynx.agreement.sampling import FrameQuestion, Kind, Samples
+from dynx.agreement.sampling import FrameSamples, Kind, Samples
 from dynx.backends.quantities import QUANTITIES, Quantity
 from dynx.bench.cases import Batch
 from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED
@@ -92,7 +92,7 @@ class Judge:
 def _as_agreement_samples(batch: Batch) -> Samples:
     n = len(batch)
     kind: Kind = "within"
-    questions = (FrameQuestion(batch.frame, LOCAL_WORLD_ALIGNED, np.arange(n)),)
+    questions = (FrameSamples(batch.frame, LOCAL_WORLD_ALIGNED, np.arange(n)),)
     return Samples(
         model=batch.model,
         index=np.arange(n),

@@ -3,10 +3,10 @@ from __future__ import annotations
 import mpmath
 import numpy as np
 
-from dynx.agreement.answers import Answers
 from dynx.agreement.compared_quantities import compared_quantities
 from dynx.agreement.comparison import compare, judge
 from dynx.agreement.magnitudes import Magnitudes
+from dynx.agreement.results import BackendResults
 from dynx.agreement.sampling import draw_samples
 from dynx.errors import EngineError
 from dynx.reference.backend import ReferenceBackend
@@ -42,11 +42,11 @@ def test_numbers_of_many_digits_are_subtracted_exactly() -> None:
     assert judge(error, np.ones(1)).absolute == 1e-40
 
 
-def pair(defect: type[Broken]) -> tuple[Answers, Answers, Magnitudes]:
+def pair(defect: type[Broken]) -> tuple[BackendResults, BackendResults, Magnitudes]:
     samples = draw_samples(arm(), 2, 0)
     one, other = ReferenceBackend(arm()), defect(arm())
-    answers = Answers("reference", one, samples), Answers("broken", other, samples)
-    return *answers, Magnitudes(samples)
+    results = BackendResults("reference", one, samples), BackendResults("broken", other, samples)
+    return *results, Magnitudes(samples)
 
 
 class Misshapen(Broken):

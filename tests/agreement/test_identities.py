@@ -18,7 +18,7 @@ from tests.agreement.robots import BODY, Broken, GravityUpsideDown, TransposedRo
 
 def checked(backend: Backend) -> dict[str, IdentityCheck]:
     samples = draw_samples(backend.model, 8, 0)
-    sizes = Magnitudes(samples.take(samples.calm(4), 1))
+    sizes = Magnitudes(samples.take(samples.differentiable(4), 1))
     return {check.identity: check for check in check_identities(backend.name, backend, sizes)}
 
 

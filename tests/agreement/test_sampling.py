@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dynx.agreement.sampling import CALM, KINDS, deal, draw_samples
+from dynx.agreement.sampling import KINDS, MAX_DIFFERENTIATED_POSITION, assign_frames, draw_samples
 from dynx.errors import ArgumentError
 from dynx.model import Joint, Limits, Link, Model
 from dynx.rbd.jacobians import REFERENCES
@@ -42,9 +42,9 @@ def test_a_joint_whose_limits_have_no_width_moves_all_the_same() -> None:
 def test_limits_beyond_all_reason_are_narrowed_where_something_is_differentiated() -> None:
     joint = Joint("rotor", "revolute", "a", "b", limits=Limits(-1e16, 1e16))
     samples = draw_samples(Model.build("rotor", [Link("a"), Link("b")], [joint]), 16, 0)
-    calm = samples.calm(4)
+    calm = samples.differentiable(4)
     assert len(calm) == 4
-    assert np.all(np.abs(samples.q[calm]) <= CALM)
+    assert np.all(np.abs(samples.q[calm]) <= MAX_DIFFERENTIATED_POSITION)
 
 
 @given(st.integers(1, 40), st.integers(1, 20), st.integers(1, 4), st.integers(1, 3))
@@ -53,7 +53,7 @@ def test_every_frame_is_asked_for_and_together_they_see_every_sample(
 ) -> None:
     frames = tuple(f"frame{k}" for k in range(n_frames))
     each = min(each, count)
-    questions = deal(frames, count, each=each, references=references)
+    questions = assign_frames(frames, count, each=each, references=references)
     asked = {(question.frame, question.reference) for question in questions}
     assert len(asked) == n_frames * references
     assert {frame for frame, _ in asked} == set(frames)

@@ -33,7 +33,7 @@ CHECKS_FAULTS = (
     Fault(
         "agreement_with_one_refusal",
         "dynx.agreement.comparison",
-        right="alike = len(refused) == len(answers) and all(answer.singular for answer in refused)",
+        right="alike = len(refused) == len(results) and all(answer.singular for answer in refused)",
         wrong="alike = bool(refused)",
         test_file="tests/agreement/test_comparison.py",
         test="test_a_refusal_by_one_is_a_difference_that_names_it",
@@ -41,8 +41,8 @@ CHECKS_FAULTS = (
     Fault(
         "agreement_compares_a_result_with_itself",
         "dynx.agreement.comparison",
-        right="answers = [each.of(quantity.name, quantity.evaluate) for each in (first, second)]",
-        wrong="answers = [each.of(quantity.name, quantity.evaluate) for each in (first, first)]",
+        right="results = [each.of(quantity.name, quantity.evaluate) for each in (first, second)]",
+        wrong="results = [each.of(quantity.name, quantity.evaluate) for each in (first, first)]",
         test_file="tests/agreement/test_agreement.py",
         test="test_a_defect_is_seen_and_its_backend_is_named",
     ),

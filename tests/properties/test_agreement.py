@@ -12,10 +12,10 @@ import pytest
 from hypothesis import given, note, settings
 from hypothesis import strategies as st
 
-from dynx.agreement.answers import Answers
 from dynx.agreement.compared_quantities import compared_quantities
 from dynx.agreement.comparison import Comparison, compare
 from dynx.agreement.magnitudes import Magnitudes
+from dynx.agreement.results import BackendResults
 from dynx.agreement.sampling import Samples, draw_samples
 from dynx.agreement.solutions import compare_forward_dynamics
 from dynx.backends import Backend, backend, installed_backends
@@ -54,8 +54,8 @@ takes it half a second, so it meets fewer of them (`test_compiled_random_robots`
 def assert_agree(engines: list[Backend], states: Samples) -> None:
     """Every quantity, every pair of backends, every frame in every reference."""
     sizes = Magnitudes(states)
-    answers = [Answers(engine.name, engine, states) for engine in engines]
-    for pair in combinations(answers, 2):
+    results = [BackendResults(engine.name, engine, states) for engine in engines]
+    for pair in combinations(results, 2):
         for quantity in compared_quantities():
             assert_agreement(compare(quantity, *pair, sizes))
         assert_agreement(compare_forward_dynamics(*pair, sizes))
@@ -131,8 +131,8 @@ def test_derived_answers_are_the_native_ones(base: Base, data: st.DataObject) ->
     sizes = Magnitudes(states)
     with backends_of(model, INTERPRETED) as engines:
         for engine in engines:
-            native = Answers(engine.name, engine, states)
-            derived = Answers("derived", DerivedBackend(engine), states)
+            native = BackendResults(engine.name, engine, states)
+            derived = BackendResults("derived", DerivedBackend(engine), states)
             for quantity in compared_quantities():
                 if quantity.native in native_quantities(engine):
                     assert_agreement(compare(quantity, native, derived, sizes))

@@ -1,4 +1,4 @@
-"""What one backend (or the referee) answers to each quantity at one set of samples, asked once."""
+"""Results of one backend (or the referee) at one set of samples, each quantity evaluated once."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from dynx.agreement.sampling import Samples
 from dynx.errors import DynxError, EngineError, SingularMassMatrixError
 from dynx.spatial.scalar import Array
 
-EXACT = "referee"
-"""Name of the answers in 50 digits."""
+REFEREE = "referee"
+"""Name of the results in 50 digits."""
 
 DERIVED = "derived"
-"""Name of the answers that follow from an engine's own poses and inverse dynamics."""
+"""Name of the results that are derived from an engine's own poses and inverse dynamics."""
 
 
 @dataclass(frozen=True)
 class Refusal:
-    """An answer that is an error of `dynx.errors`."""
+    """An error of `dynx.errors` in place of a result."""
 
     error: DynxError
 
@@ -34,25 +34,25 @@ class Refusal:
         return f"{type(self.error).__name__}: {self.error}"
 
 
-class Answers:
-    """Asks `answerer` and remembers; an error of dynx is an answer too."""
+class BackendResults:
+    """Results of `backend`, kept by name; an error of dynx is kept as a result too."""
 
-    def __init__(self, name: str, answerer: Any, samples: Samples) -> None:
+    def __init__(self, name: str, backend: Any, samples: Samples) -> None:
         self.name = name
-        self.answerer = answerer
+        self.backend = backend
         self.samples = samples
         self._known: dict[str, Array | Refusal] = {}
 
     def of(self, name: str, evaluate: Callable[[Any, Samples], Array]) -> Array | Refusal:
-        """The answer to the quantity `name`."""
+        """The result of the quantity `name`."""
         if name not in self._known:
             self._known[name] = self.attempt(evaluate)
         return self._known[name]
 
     def attempt(self, evaluate: Callable[[Any, Samples], Array]) -> Array | Refusal:
-        """An answer that is not remembered."""
+        """A result that is not kept."""
         try:
-            return np.asarray(evaluate(self.answerer, self.samples))
+            return np.asarray(evaluate(self.backend, self.samples))
         except DynxError as error:
             return Refusal(error)
         except Exception as error:
