@@ -6,7 +6,7 @@ from hypothesis import given
 import dynx
 from dynx.agreement import tolerances
 from dynx.agreement.compared_quantities import compared_quantities
-from dynx.agreement.magnitudes import Magnitudes
+from dynx.agreement.magnitudes import SLENDER, Magnitudes
 from dynx.agreement.sampling import draw_samples
 from dynx.model import Model
 from dynx.reference.backend import ReferenceBackend
@@ -66,6 +66,15 @@ def test_a_tensor_that_breaks_the_triangle_inequality_counts_as_a_whole() -> Non
     sizes = Magnitudes(draw_samples(spindle, 2, 0))
     np.testing.assert_allclose(sizes.root_inertia[:, 3:] ** 2, 0.125)
     assert dynx.agree(spindle, ["reference", "pinocchio"], samples=2).agree
+
+
+def test_a_tensor_at_the_triangle_inequality_counts_by_a_small_share() -> None:
+    """A rod about its axis: its own moment is zero, and the tensor counts by `SLENDER` only."""
+    text = """<robot name="rod"><link name="only"><inertial><mass value="1"/>
+        <inertia ixx="0.125" ixy="0" ixz="0" iyy="0.125" iyz="0" izz="0"/></inertial></link></robot>"""
+    sizes = Magnitudes(draw_samples(dynx.load(text, base="floating"), 2, 0))
+    np.testing.assert_allclose(sizes.root_inertia[:, 3:5] ** 2, 0.125)
+    np.testing.assert_allclose(sizes.root_inertia[:, 5] ** 2, SLENDER * 0.125)
 
 
 def test_so_it_does_where_an_acceleration_is_put_back() -> None:

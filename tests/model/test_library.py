@@ -131,3 +131,9 @@ def test_the_data_is_found_under_a_prefix_too(tmp_path: Path, monkeypatch: pytes
         assert find("zed") == robot
     finally:
         robots.cache_clear()
+
+
+def test_robots_of_example_robot_data_come_first_each_group_by_name() -> None:
+    assert list(robots()) == sorted(EXAMPLES, key=lambda entry: entry.name) + sorted(
+        OWN, key=lambda entry: entry.name
+    )

@@ -177,3 +177,9 @@ def test_rotations_work_on_fifty_digit_numbers() -> None:
         axis = np.array([mpmath.mpf(2) / 3, mpmath.mpf(-1) / 3, mpmath.mpf(2) / 3], dtype=object)
         Q = rotation_about(axis, np.array(mpmath.mpf(1) / 7, dtype=object))
         assert max(abs(entry) for entry in (Q @ axis - axis).ravel()) < mpmath.mpf(10) ** -48
+
+
+def test_half_a_turn_has_a_logarithm() -> None:
+    """The scalar part is exactly zero, by which a formula for small angles would divide."""
+    for axis in np.eye(3):
+        assert_same_to_rounding(quat_log(np.append(axis, 0.0)), math.pi * axis, 2)

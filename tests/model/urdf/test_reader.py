@@ -118,6 +118,7 @@ def test_elements_of_other_programs_are_skipped() -> None:
         '<collision/><contact><lateral_friction value="1"/></contact></link>'
         '<transmission><joint name="x"/></transmission><gazebo reference="a"><link name="y"/></gazebo>'
         '<material name="red"/><ros2_control><joint name="z"/></ros2_control>'
+        '<plugin filename="x.so"/><static>true</static>'
     )
     model = load(robot(inside))
     assert (len(model.links), len(model.joints), model.notes) == (1, 0, ())

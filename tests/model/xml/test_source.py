@@ -150,6 +150,11 @@ def test_a_declared_encoding_is_kept() -> None:
     )
 
 
+def test_text_is_written_in_the_encoding_that_it_declares() -> None:
+    text = '<?xml version="1.0" encoding="iso-8859-1"?><r n="é€"/>'
+    assert XmlSource(text).to_bytes() == text.replace("€", "&#8364;").encode("latin-1")
+
+
 def test_malformed_xml_raises_with_file_and_line() -> None:
     with pytest.raises(DescriptionError, match=r"arm\.urdf:2"):
         XmlSource("<r>\n<a></r>", "arm.urdf")
