@@ -17,6 +17,7 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import ExitStack
 from dataclasses import asdict
+from hashlib import sha256
 from pathlib import Path
 from queue import SimpleQueue
 
@@ -44,7 +45,9 @@ def main() -> None:
         return
     if not coverage.durations:
         raise SystemExit("no coverage is recorded yet: python -m tests.mutation --record")
-    mutants, total = sample(ROOT, folders, arguments.seed, arguments.count)
+    mutants, total = cached_sample(
+        folders, arguments.seed, arguments.count, arguments.results / "sample.json"
+    )
     mutants = [mutant for mutant in mutants if mutant.path.split("/")[1] in arguments.rooms]
     kept = arguments.results / "outcomes.json"
     outcomes = load(kept)
@@ -92,6 +95,22 @@ def parser() -> argparse.ArgumentParser:
         help="record what tests execute (all of the packages, or those of these arguments), and end",
     )
     return made
+
+
+def cached_sample(folders: list[str], seed: int, count: int, kept: Path) -> tuple[list[Mutant], int]:
+    """Return the sample: from the file `kept`, if that was made of the same sources, or made anew."""
+    digest = sha256(f"{seed} {count}".encode())
+    for folder in folders:
+        for file in sorted((ROOT / folder).rglob("*.py")):
+            digest.update(file.read_bytes())
+    if kept.exists():
+        document = json.loads(kept.read_text(encoding="utf-8"))
+        if document["of"] == digest.hexdigest():
+            return [Mutant(**each) for each in document["mutants"]], document["places"]
+    mutants, places = sample(ROOT, folders, seed, count)
+    document = {"of": digest.hexdigest(), "places": places, "mutants": [asdict(each) for each in mutants]}
+    kept.write_text(json.dumps(document), encoding="utf-8")
+    return mutants, places
 
 
 def attempts(mutants: list[Mutant], coverage: CoverageMap, jobs: int) -> Iterator[Outcome]:

@@ -10,7 +10,7 @@ from tests.faults.warm import TIMED_OUT, Change, Runner
 from tests.mutation.coverage_map import CoverageMap
 from tests.mutation.population import Mutant
 
-STAGES = ((30, 10.0), (150, 40.0))
+STAGES = ((30, 8.0), (80, 15.0))
 """Tests to run, at most, and the time that they take without a mutant [s]; the next stage if none fails."""
 START = 20
 """Time that the import of dynx and the collection of tests may take [s]."""
@@ -85,7 +85,13 @@ def attempt(mutant: Mutant, coverage: CoverageMap, runner: Runner) -> Outcome:
             break
         tests, waiting = waiting[:chosen], waiting[chosen:]
         timeout = int(START + SLOWER * spent)
-        code, output = runner.run(tests, Change(mutant.module, mutant.source), timeout)
+        change = Change(mutant.module, mutant.source)
+        code, output = runner.run(tests, change, timeout)
+        gone = set(re.findall(r"^ERROR: not found: .*?(tests/.+)$", output, re.MULTILINE))
+        if code == 4 and gone:
+            # Tests that were renamed since the coverage was recorded.
+            tests = [test for test in tests if test not in gone]
+            code, output = runner.run(tests, change, timeout) if tests else (0, "")
         outcome.tests += len(tests)
         outcome.status, outcome.caught_by = verdict(code, output)
         if outcome.status != SURVIVED:
