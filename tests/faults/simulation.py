@@ -182,6 +182,14 @@ SIMULATION_FAULTS = (
         test="test_all_options_together",
     ),
     Fault(
+        "batch_noise_numbered_within_its_part",
+        "dynx.sim.batch.batch",
+        right="PartNoise(noise.seed, noise.rollout + first, *deviations)",
+        wrong="PartNoise(noise.seed, noise.rollout, *deviations)",
+        test_file="tests/sim/batch/test_partitions.py",
+        test="test_processes_give_the_same_bits",
+    ),
+    Fault(
         "batch_noise_displaces_the_base_in_world_axes",
         "dynx.sim.batch.kernel",
         right="integrate(q, off) if self.model.floating",

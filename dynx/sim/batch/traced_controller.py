@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cached_property
 from typing import Any
 
 from dynx.compiled.kernels import evaluate_quantity
 from dynx.compiled.simplification import simplify_mechanism
 from dynx.control.base import Controller, chain_of, rebind
 from dynx.control.dynamics import Dynamics, Evaluation
-from dynx.model import Model
+from dynx.model import Mechanism
 from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED
 from dynx.spatial.scalar import Array
 
@@ -20,20 +21,23 @@ FRAME_FUNCTIONS = {"forward_kinematics": "frame_placement"}
 class ArrayDynamics(Dynamics):
     """Dynamics evaluated by the array code of `dynx.rbd`, for symbols as for numbers."""
 
-    def __init__(self, model: Model) -> None:
-        self._mechanism = simplify_mechanism(model.mechanism)
-        super().__init__(model)
+    @cached_property
+    def _mechanism(self) -> Mechanism:
+        # Many batches find their kernels in the cache and evaluate nothing.
+        return simplify_mechanism(self.model.mechanism)
 
     def evaluation(self, quantity: str) -> Evaluation:
         """Function of `dynx.rbd` for the quantity."""
-        mechanism, model = self._mechanism, self.model
+        model = self.model
 
         def evaluate(*arguments: Any, reference: str = LOCAL_WORLD_ALIGNED) -> Array:
             if not isinstance(arguments[-1], str):
-                return evaluate_quantity(mechanism, quantity, (), *arguments)
+                return evaluate_quantity(self._mechanism, quantity, (), *arguments)
             *arrays, frame = arguments
             details = (model.frame_index(frame), *(() if quantity == "forward_kinematics" else (reference,)))
-            return evaluate_quantity(mechanism, FRAME_FUNCTIONS.get(quantity, quantity), details, *arrays)
+            return evaluate_quantity(
+                self._mechanism, FRAME_FUNCTIONS.get(quantity, quantity), details, *arrays
+            )
 
         return evaluate
 

@@ -64,6 +64,7 @@ def batch(rows: slice = slice(None), *, noise: Noise = NOISE, **options: Any) ->
 
 @cache
 def whole() -> BatchRollouts:
+    """The whole batch in one part; computed before a test changes the size of parts."""
     return batch(threads=1)
 
 
@@ -88,6 +89,7 @@ def test_rows_of_a_batch_do_not_depend_on_its_partition(
     first: int, count: int, part: int, threads: int, lanes: int
 ) -> None:
     rows = slice(first, min(first + count, ROLLOUTS))
+    whole()
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(batch_module, "PART", part)
         patch.setattr(kernel_module, "_made", {})
@@ -98,6 +100,7 @@ def test_rows_of_a_batch_do_not_depend_on_its_partition(
 
 
 def test_processes_give_the_same_bits(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole()
     monkeypatch.setattr(batch_module, "PART", 7)
     with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn")) as pool:
         assert_rows(batch(executor=pool), slice(None))
