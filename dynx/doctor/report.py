@@ -54,7 +54,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class EngineResult:
-    """How one engine loads the file, and its relative errors `before` and `after` mending, by quantity.
+    """Load call of one engine, and its relative errors `before` and `after` mending, by quantity.
 
     Errors are against the reference values that dynx computes from the file. `refused` is the message with
     which the engine refuses the file, `refused_after` that for the mended file.
@@ -216,7 +216,7 @@ class DoctorEntry:
 
 @dataclass(frozen=True)
 class DoctorSummary:
-    """How many robots were examined, and how many of them have each verdict."""
+    """Number of robots examined, and of those with each verdict."""
 
     robots: int
     alike: int

@@ -20,13 +20,13 @@ from dynx.rules import Case
 from dynx.spatial.scalar import Floats
 
 NAME = "pybullet"
-"""What it is called: a name by which rules know an engine."""
+"""Name of an engine in the rules."""
 
 SECRET = "secret"
 """It refuses a file that holds this word."""
 
 HEAVY = Inertial(1.0, ixx=1.0, iyy=1.0, izz=1.0)
-"""What a link without ``<inertial>`` weighs to it, as to PyBullet (DX101)."""
+"""Inertial of a link without ``<inertial>``, as in PyBullet (DX101)."""
 
 
 class FaultyEngine(LoadedRobot):
@@ -58,23 +58,23 @@ class FaultyEngine(LoadedRobot):
         return LoadedModel(NAME, {}, {}, np.eye(4), np.array([0.0, 0.0, -9.80665]))
 
     def link_poses(self, q: Floats) -> Floats:
-        """Of the reference."""
+        """Return the value of the reference backend."""
         return self.right.forward_kinematics(q)[: len(self.model.links)]
 
     def jacobian(self, q: Floats, link: str) -> Floats:
-        """Of the reference."""
+        """Return the value of the reference backend."""
         return self.right.jacobian(q, link)
 
     def mass_matrix(self, q: Floats) -> Floats:
-        """Of the reference."""
+        """Return the value of the reference backend."""
         return self.right.mass_matrix(q)
 
     def inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
-        """Of the reference."""
+        """Return the value of the reference backend."""
         return self.right.inverse_dynamics(q, v, a)
 
     def forward_dynamics(self, q: Floats, v: Floats, tau: Floats) -> Floats:
-        """Of the reference."""
+        """Return the value of the reference backend."""
         return self.right.forward_dynamics(q, v, tau)
 
     def close(self) -> None:

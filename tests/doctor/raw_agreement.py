@@ -45,7 +45,7 @@ def beside(original: Path, data: bytes, folder: Path) -> Path:
 
 
 def task(path: Path, base: Base, samples: int = 3, seed: int = 1) -> dict[str, Any]:
-    """What the scripts are asked about a file: names and states, from dynx's reading of it."""
+    """Make the task of the scripts for a file: names and states, as dynx reads it."""
     model = model_without_mimics(XmlSource(path.read_bytes(), str(path)), base)
     states = draw_states(model, samples, seed)
     start = 7 if model.floating else 0
@@ -68,7 +68,7 @@ def task(path: Path, base: Base, samples: int = 3, seed: int = 1) -> dict[str, A
 
 
 def answers(engine: str, tasks: Sequence[dict[str, Any]], folder: Path) -> list[Any]:
-    """What one engine says, in a process without dynx."""
+    """Run one engine in a process without dynx."""
     questions, found = folder / f"{engine}_tasks.json", folder / f"{engine}_answers.json"
     questions.write_text(json.dumps(list(tasks)), encoding="utf-8")
     subprocess.run(
@@ -92,7 +92,7 @@ def difference(one: Any, other: Any) -> float:
 
 
 def checked(entries: Sequence[dict[str, Any]], folder: Path, shapes: bool) -> list[tuple[float, str]]:
-    """How far the engines are apart on each mended file, and what they said where one refused it."""
+    """Measure the differences of the engines on each mended file, or the message where one refuses it."""
     tasks = []
     for entry in entries:
         source = XmlSource(Path(entry["mended"]).read_bytes(), entry["path"])

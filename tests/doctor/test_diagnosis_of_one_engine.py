@@ -26,7 +26,7 @@ FRAMES = case_of(
 
 
 def diagnosed(monkeypatch: pytest.MonkeyPatch, engine: type[LoadedRobot], text: str) -> DoctorReport:
-    """What the doctor says of a file and that engine alone."""
+    """Diagnose a file with that engine alone."""
     for module in ("examine.examination", "report_assembly"):
         monkeypatch.setattr(f"dynx.doctor.{module}.loader_class", lambda name: engine)
     return diagnose(text, engines=[NAME], counterexamples=False)

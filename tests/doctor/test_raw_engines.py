@@ -1,4 +1,4 @@
-"""What the doctor mends, raw engines load alike: each in a process of its own that knows nothing of dynx.
+"""Raw engines load mended files alike: each in a process of its own without dynx.
 
 Robots that show each of the causes of PyBullet's and Pinocchio's differences on real files; all of
 them are checked by ``python docs/survey.py``.

@@ -1,4 +1,4 @@
-"""What a report says of itself: alike, explained, or neither."""
+"""Verdicts of reports: alike, explained, or neither."""
 
 from __future__ import annotations
 

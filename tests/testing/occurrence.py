@@ -1,4 +1,4 @@
-"""That a strategy draws examples of some sort, and which is the simplest."""
+"""Checks that a strategy draws examples of some kind, and which is the simplest."""
 
 from __future__ import annotations
 

@@ -44,7 +44,7 @@ class PytestRun:
 
     @property
     def outcome(self) -> dict[str, int]:
-        """How many passed, failed, ... as the last line says."""
+        """Read the number of tests passed, failed, ... from the last line."""
         last = self.stdout.strip().splitlines()[-1]
         return {
             word: int(number) for number, word in re.findall(r"(\d+) (passed|failed|skipped|error)", last)
@@ -84,7 +84,7 @@ def run_started(arguments: tuple[str, ...], folder: Path, path: list[str]) -> Py
 
 
 def run_forked(arguments: tuple[str, ...], folder: Path, path: list[str]) -> PytestRun:
-    """The same in a process forked from a warm one."""
+    """Run in a process forked from a warm one."""
     with tempfile.TemporaryDirectory() as kept:
         stdout, stderr = Path(kept) / "stdout", Path(kept) / "stderr"
         stdout.touch()

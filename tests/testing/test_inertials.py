@@ -15,7 +15,7 @@ from dynx.testing.strategies import inertials
 from tests.testing.occurrence import assert_occurs, simplest
 
 ROUNDING = 32 * EPS
-"""Of a tensor that was turned (two products of 3 x 3 matrices) and whose moments were found again."""
+"""Rounding of a tensor that was rotated (two products of 3 x 3 matrices) with its moments recomputed."""
 
 
 def moments_of(inertial: Inertial) -> np.ndarray:

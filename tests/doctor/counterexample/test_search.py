@@ -1,4 +1,4 @@
-"""Differences are cut down to the smallest robot and the simplest state that show them."""
+"""Differences are reduced to the smallest robot and the simplest state that show them."""
 
 from __future__ import annotations
 

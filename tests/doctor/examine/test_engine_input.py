@@ -1,4 +1,4 @@
-"""What engines are given of a file: all that dynamics needs, in the encoding of the user."""
+"""Engines load all of a file that dynamics needs, in the encoding of the user."""
 
 from __future__ import annotations
 

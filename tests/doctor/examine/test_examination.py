@@ -1,4 +1,4 @@
-"""What counts as a difference: engines that are wrong by a known amount are found wrong by that amount."""
+"""Engines with an error of known magnitude are found to have that error."""
 
 from __future__ import annotations
 

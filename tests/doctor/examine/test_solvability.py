@@ -1,4 +1,4 @@
-"""Whether forward dynamics is compared: not where the errors that engines are allowed decide the answer."""
+"""Forward dynamics is not compared where errors that engines are allowed decide its solution."""
 
 from __future__ import annotations
 

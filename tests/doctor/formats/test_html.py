@@ -29,7 +29,7 @@ ALLOWED = {
 
 
 class Page(HTMLParser):
-    """What is on a page: its elements, its text, and whether every element is closed."""
+    """Elements and text of a page, in which every element must be closed."""
 
     def __init__(self, text: str) -> None:
         super().__init__(convert_charrefs=True)

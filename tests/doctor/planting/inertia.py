@@ -217,7 +217,7 @@ def scaled(site: Site) -> Planted:
 
 
 def not_new(site: Site, name: str) -> bool:
-    """Whether a link of the name is there already, in the clean robot or the text."""
+    """Check for a link of that name in the clean robot or the text."""
     here = [each.attributes.get("name") for each in site.source.root.all("link")]
     return name in here or any(each.name == name for each in site.model.links)
 

@@ -214,17 +214,17 @@ def transmission(name: str, inside: str) -> str:
 
 
 def moving(joint: Joint) -> bool:
-    """Whether it has a coordinate."""
+    """Check that the joint has a coordinate."""
     return joint.type in SINGLE and joint.moves
 
 
 def driven(joint: Joint) -> bool:
-    """Whether a motor can move it: Drake makes no actuator for an effort limit of 0."""
+    """Check that a motor can move it: Drake makes no actuator for an effort limit of 0."""
     return moving(joint) and joint.limits.effort > 0.0
 
 
 def limited(joint: Joint) -> bool:
-    """Whether URDF demands a limit."""
+    """Check that URDF requires a limit."""
     return joint.type in ("revolute", "prismatic")
 
 

@@ -1,4 +1,4 @@
-"""What the doctor says of a planted robot, held against what was planted."""
+"""Reports on planted robots, compared with what was planted."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def work(task: Trial | tuple[str, Base]) -> Verdict | str | None:
 
 
 def _about(report: DoctorReport, defect: Planted) -> str | None:
-    """What is wrong with how the report names the defect; None if nothing is."""
+    """Describe the error in how the report names the defect; None without one."""
     here = [finding for finding in report.findings if _place(finding) == defect.place]
     lines = (report.text or "").splitlines()
     here = [each for each in here if each.line is not None and defect.sign in lines[each.line - 1]]

@@ -47,7 +47,7 @@ OWN = (
     "seven_axis_arm",
     "six_axis_arm",
 )
-"""Of the models that come with dynx those with a joint."""
+"""Models shipped with dynx that have a joint."""
 
 ROBOTS = (*REAL, *OWN)
 
@@ -71,7 +71,7 @@ def clean_text(name: str, base: Base) -> str:
 
 @cache
 def clean_skeleton(name: str, base: Base) -> Skeleton:
-    """What dynx reads in it, and how it hangs together."""
+    """Read the robot without defects, and its skeleton."""
     return Skeleton.of(read_model(clean_text(name, base), name, base=base))
 
 

@@ -65,7 +65,7 @@ class Site:
         return self.rng.choice(candidates)
 
     def free(self, *names: str) -> bool:
-        """Whether nothing was planted there yet, and the text still has them by these names."""
+        """Check that nothing was planted there yet, and that the text still has these names."""
         here = {part.attributes.get("name") for part in self.source.root.children}
         return not self.taken.intersection(names) and here.issuperset(names)
 

@@ -1,4 +1,4 @@
-"""How a robot hangs together: what is welded to what, what moves, and what carries what.
+"""Skeleton of a robot: rigidly connected links, moving links, and which link carries which.
 
 Written afresh, from the model alone: planters must not see robots by the eyes of the rules they test.
 """
@@ -45,7 +45,7 @@ class Skeleton:
         return Skeleton(model, heads, ranks)
 
     def inertial(self, link: str) -> Inertial | None:
-        """What the file says of the link."""
+        """Inertial of the link in the file."""
         return next(each.inertial for each in self.model.links if each.name == link)
 
     def mass(self, link: str) -> float:
@@ -54,7 +54,7 @@ class Skeleton:
         return 0.0 if inertial is None else inertial.mass
 
     def solid(self, link: str) -> bool:
-        """Whether the link has a mass and three moments worth the name."""
+        """Check that the link has a mass and three moments above rounding."""
         inertial = self.inertial(link)
         if inertial is None or inertial.mass < 1e-6:
             return False
@@ -73,7 +73,7 @@ class Skeleton:
             return float(np.max(np.abs(reference.mass_matrix(model.random(0))), initial=0.0))
 
     def moves(self, link: str) -> bool:
-        """Whether anything moves it."""
+        """Check that some joint moves the link."""
         return self.model.floating or self.heads[link] != self.model.root
 
     def welded(self, link: str) -> list[str]:
@@ -85,7 +85,7 @@ class Skeleton:
         return [joint.child for joint in self.model.joints if joint.parent == link]
 
     def alone(self, link: str) -> bool:
-        """Whether a joint carries the link, and nothing welded to it has mass."""
+        """Check that the link has a parent joint, and nothing rigidly connected to it has mass."""
         carried = self.heads[link] == link and link != self.model.root
         return carried and all(self.mass(each) < 1e-6 for each in self.welded(link) if each != link)
 

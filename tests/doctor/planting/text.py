@@ -27,12 +27,12 @@ class Number:
 
     @property
     def text(self) -> str:
-        """What stands there."""
+        """Text at the place."""
         return self.element.attributes[self.name]
 
     @property
     def unit(self) -> str:
-        """What somebody may have written behind it."""
+        """Unit that may follow the number."""
         return {"mass": "kg", "limit": "rad"}.get(self.element.tag, "m")
 
 
@@ -83,7 +83,7 @@ def tab_in_vector(site: Site) -> Planted:
 
 
 def infinite(site: Site) -> Planted:
-    """What C prints for no limit."""
+    """Write infinity as C prints it."""
     number = _pick(site, [each for each in _limits(site) if each.name != "lower"])
     return _rewritten(site, "DX407", number, site.rng.choice(["inf", "Infinity", "1e999"]))
 

@@ -57,7 +57,7 @@ def attributed(
     engine: type[LoadedRobot] = FaultyEngine,
     tolerance: float = BAR,
 ) -> list[Attribution]:
-    """What is proved in a case by rules."""
+    """Attributions in a case by rules."""
     made = examiner(engine)
     before, after = made.examine(case), made.examine(mend(case, rules).case)
     attributor = Attributor(made, case, rules, before, after, tolerance, lambda step: None)

@@ -1,4 +1,4 @@
-"""A cause put back into a mended text: its lines as they were given, the rest as mended."""
+"""Reinsertion of a cause into a mended text: its lines as they were given, the rest as mended."""
 
 from __future__ import annotations
 
