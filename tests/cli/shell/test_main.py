@@ -38,10 +38,13 @@ def test_the_default_of_samples_is_that_of_agree() -> None:
     assert f"(default: {DEFAULT_SAMPLES}; with --as-loaded {DEFAULT_STATES})" in text
 
 
-def test_starting_imports_nothing_slow() -> None:
+def test_help_imports_nothing_slow() -> None:
+    """Neither the group nor the declaration of any command imports more of dynx than the options need."""
     script = (
-        "import sys, dynx.cli.shell.main; "
-        "print([n for n in ('numpy', 'rich', 'mpmath', 'pinocchio', 'pybullet') if n in sys.modules])"
+        "import click, sys; from dynx.cli.shell.main import COMMANDS, cli; context = click.Context(cli); "
+        "[cli.get_command(context, name).get_help(context) for name in COMMANDS]; cli.get_help(context); "
+        "slow = ('numpy', 'rich', 'mpmath', 'pinocchio', 'pybullet', 'dynx.model'); "
+        "print([name for name in slow if name in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
