@@ -1,7 +1,7 @@
 """Pinocchio itself as a peer: its C++ batches, its binding in a loop, and the C++ within the binding.
 
 The engine's model is the one of the backend `pinocchio` (the same links and joints, see
-`dynx.engines.pinocchio.backend.engine_model`). To the engine a mimic joint is one more coordinate, so a robot
+`dynx.engines.pinocchio.engine_model`). To the engine a mimic joint is one more coordinate, so a robot
 that has some is given to it with those joints set free, at the same states.
 """
 
@@ -16,7 +16,7 @@ import numpy as np
 from dynx.bench.cases import BENCHMARK_QUANTITIES, Batch, BenchmarkCase
 from dynx.bench.implementations import Implementation, PreparedCall, Role
 from dynx.bench.timing import Call
-from dynx.engines.pinocchio.backend import engine_model
+from dynx.engines.pinocchio.engine_model import engine_model
 from dynx.engines.pinocchio.library import pin
 from dynx.model import Model
 from dynx.spatial.scalar import Floats

@@ -55,7 +55,7 @@ ENGINES_FAULTS = (
     ),
     Fault(
         "pinocchio_chain_of_fixed_joints_forgotten",
-        "dynx.engines.pinocchio.backend",
+        "dynx.engines.pinocchio.engine_model",
         right="T_carrier_joint = T_carrier_parent * _placement(joint.origin)",
         wrong="T_carrier_joint = _placement(joint.origin)",
         test_file="tests/contract/test_coordinates.py",

@@ -14,8 +14,8 @@ is symmetric: the binding fills the triangle that CRBA leaves out.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from functools import cached_property, lru_cache, partial
+from collections.abc import Callable
+from functools import cached_property, partial
 from threading import local
 from typing import Any, ClassVar
 
@@ -23,32 +23,18 @@ import numpy as np
 
 from dynx.backends.base import Backend
 from dynx.backends.engine_errors import engine_errors
+from dynx.engines.pinocchio.engine_model import (
+    WORLD,
+    engine_model,
+    error_message,
+    joint_parameters_of_links,
+)
 from dynx.engines.pinocchio.library import pin
-from dynx.errors import DynxError, EngineError, EngineLimitError, shown
 from dynx.model import Model
-from dynx.model.elements import Inertial, Joint, Pose
 from dynx.rbd.jacobians import Reference
-from dynx.rbd.regressor import inertia_from_parameters, parameters_from_inertia
 from dynx.spatial.scalar import Floats
 
-MAX_NV = 200
-"""Largest number of tree velocities (mimic joints included); see the module docstring."""
-
-MIN_MERGED_MASS = float(np.finfo(float).eps)
-"""Smallest total mass [kg] of several merged bodies, unless it is zero."""
-
-WORLD = 0
-"""Pinocchio's joint 0, the universe, which carries a fixed base."""
-
-
-def _message(error: BaseException) -> str:
-    """The engine's message, without the C++ signatures before and after it."""
-    _, _, message = str(error).rpartition("message:\n")
-    lines = [line.strip() for line in message.splitlines() if line.strip()]
-    return f"{type(error).__name__}: {lines[0] if lines else 'no message'}"
-
-
-_mapped = engine_errors("pinocchio", _message)
+_mapped = engine_errors("pinocchio", error_message)
 
 
 _FUNCTIONS: dict[str, Callable[..., Floats]] = {
@@ -106,7 +92,7 @@ class PinocchioBackend(Backend):
     @cached_property
     def _link_parameters(self) -> tuple[list[int], Floats]:
         """Computed for the first regressor, because it takes as long as the rest of the constructor."""
-        return _joint_parameters_of_links(self._engine, self._frame_ids[: len(self.model.links)])
+        return joint_parameters_of_links(self._engine, self._frame_ids[: len(self.model.links)])
 
     def _release(self) -> None:
         # Calls that other threads are in keep their own reference until they end.
@@ -255,138 +241,3 @@ class PinocchioBackend(Backend):
     def _potential_energy(self, q: Floats) -> Floats:
         moving = pin.computePotentialEnergy(self._engine, self._workspace.data, q)
         return np.asarray(moving + self._rest_energy)
-
-
-@lru_cache(maxsize=16)
-def engine_model(model: Model) -> tuple[Any, tuple[int, ...]]:
-    """Pinocchio's own model of `model`, and the number it gave to each frame of `model.frame_names`.
-
-    It is made once for all backends of a model, which never change it. Its coordinates are those of the tree,
-    mimic joints included. Raises EngineLimitError for a model that the engine would hold wrongly or that is
-    too large, EngineError where the engine refuses it.
-    """
-    nv = model.mechanism.nv
-    if nv > MAX_NV:
-        raise EngineLimitError(
-            f"{model.name} has {nv} degrees of freedom; the backend 'pinocchio' "
-            f"takes at most {MAX_NV}, for the engine's memory grows with their cube"
-        )
-    try:
-        return _build(model)
-    except DynxError:
-        raise
-    except Exception as error:
-        raise EngineError(f"pinocchio cannot hold {model.name}: {_message(error)}") from error
-
-
-def _build(model: Model) -> tuple[Any, tuple[int, ...]]:
-    engine = pin.Model()
-    engine.name = model.name
-    engine.gravity.linear = np.array(model.gravity)
-    carrier = WORLD
-    if model.floating:
-        carrier = engine.addJoint(WORLD, pin.JointModelFreeFlyer(), pin.SE3.Identity(), ":base")
-    # For each link, the engine's joint that carries it, and its pose in that joint's frame.
-    placements = {model.root: (carrier, pin.SE3.Identity())}
-    for index, joint in enumerate(model.joints):
-        carrier, T_carrier_parent = placements[joint.parent]
-        T_carrier_joint = T_carrier_parent * _placement(joint.origin)
-        if joint.moves:
-            # Numbered, so that no name clashes with one of the engine's own.
-            name = f"{index}:{joint.name}"
-            number = engine.addJoint(carrier, _joint_model(joint), T_carrier_joint, name)
-            placements[joint.child] = (number, pin.SE3.Identity())
-        else:
-            placements[joint.child] = (carrier, T_carrier_joint)
-    for link in model.links:
-        if link.inertial is not None:
-            _add_inertia(engine, *placements[link.name], link.inertial, link.name)
-    _refuse_light_groups(engine)
-    frame_ids = []
-    for index, frame in enumerate(model.frames):
-        carrier, T_carrier_link = placements[frame.link]
-        T_carrier_frame = T_carrier_link * _placement(frame.placement)
-        made = pin.Frame(f"{index}:{frame.name}", carrier, 0, T_carrier_frame, pin.FrameType.OP_FRAME)
-        frame_ids.append(int(engine.addFrame(made, False)))
-    return engine, tuple(frame_ids)
-
-
-def _joint_parameters_of_links(engine: Any, links: Sequence[int]) -> tuple[list[int], Floats]:
-    """The map from inertial parameters of links to those of the joints that carry them.
-
-    For each link it has the number of its joint, not counting the universe, and the matrix (10, 10) from its
-    parameters in dynx's order to those of the joint in the engine's; zeros for links on the universe.
-    """
-    theirs = [0, 1, 2, 3, 4, 5, 7, 6, 8, 9]  # the tensor goes down the columns of its upper triangle
-    joints, matrices = [], []
-    for link in links:
-        frame = engine.frames[link]
-        R, p = np.array(frame.placement.rotation), np.array(frame.placement.translation)
-        moved = [
-            parameters_from_inertia(inertia_from_parameters(unit).transform(R, p)) for unit in np.eye(10)
-        ]
-        matrix = np.stack(moved, axis=-1)[theirs]
-        joints.append(max(int(frame.parentJoint) - 1, 0))
-        matrices.append(0.0 * matrix if frame.parentJoint == WORLD else matrix)
-    return joints, np.stack(matrices)
-
-
-def _placement(pose: Pose) -> Any:
-    return pin.SE3(pin.rpy.rpyToMatrix(np.array(pose.rpy)), np.array(pose.xyz))
-
-
-def _joint_model(joint: Joint) -> Any:
-    """The engine's joint; for axes along a basis vector the engine has faster code."""
-    prismatic = joint.type == "prismatic"
-    if joint.axis == (1.0, 0.0, 0.0):
-        return pin.JointModelPX() if prismatic else pin.JointModelRX()
-    if joint.axis == (0.0, 1.0, 0.0):
-        return pin.JointModelPY() if prismatic else pin.JointModelRY()
-    if joint.axis == (0.0, 0.0, 1.0):
-        return pin.JointModelPZ() if prismatic else pin.JointModelRZ()
-    axis = np.array(joint.axis)
-    return pin.JointModelPrismaticUnaligned(axis) if prismatic else pin.JointModelRevoluteUnaligned(axis)
-
-
-def _add_inertia(engine: Any, carrier: int, T_carrier_link: Any, inertial: Inertial, link: str) -> None:
-    """Add a link's inertia to the joint that carries it."""
-    if inertial.mass < 0.0:
-        raise EngineLimitError(
-            f"link {shown(link)} has mass {inertial.mass}; the backend 'pinocchio' cannot hold a negative one"
-        )
-    # The constructor refuses a tensor that no body can have; the attributes accept it.
-    own = pin.Inertia.Zero()
-    own.mass, own.inertia = inertial.mass, inertial.tensor
-    placed = (T_carrier_link * _placement(inertial.origin)).act(own)
-    before = engine.inertias[carrier]
-    if _is_zero(placed):
-        return
-    if _is_zero(before):
-        engine.inertias[carrier] = placed
-        return
-    _refuse_light_sum(before.mass + placed.mass, link)
-    engine.appendBodyToJoint(carrier, placed, pin.SE3.Identity())
-
-
-def _is_zero(inertia: Any) -> bool:
-    return not inertia.mass and not inertia.inertia.any()
-
-
-def _refuse_light_groups(engine: Any) -> None:
-    """Raise EngineLimitError for a joint that carries several bodies with a negligible total mass."""
-    own = [float(inertia.mass) for inertia in engine.inertias]
-    carried = list(own)
-    for joint in range(len(own) - 1, WORLD, -1):
-        if carried[joint] != own[joint]:
-            _refuse_light_sum(carried[joint], engine.names[joint].partition(":")[2])
-        carried[engine.parents[joint]] += carried[joint]
-
-
-def _refuse_light_sum(mass: float, carrier: str) -> None:
-    # Where the engine adds two inertias it divides by max(mass, eps): below eps the centre of mass
-    # of the sum, and with it the mass matrix, would be silently wrong.
-    if 0.0 < mass < MIN_MERGED_MASS:
-        raise EngineLimitError(
-            f"the bodies merged at {shown(carrier)} have {mass:.3g} kg together; the backend 'pinocchio' "
-            f"adds inertias correctly only from {MIN_MERGED_MASS:.2g} kg up, or without any mass"
-        )

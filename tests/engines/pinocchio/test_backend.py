@@ -16,7 +16,8 @@ from hypothesis import strategies as st
 from dynx.agreement.tolerances import BAR
 from dynx.backends import DerivedBackend, backend, backend_class, installed_backends, native_quantities
 from dynx.backends.quantities import QUANTITIES
-from dynx.engines.pinocchio.backend import MAX_NV, PinocchioBackend, engine_model
+from dynx.engines.pinocchio.backend import PinocchioBackend
+from dynx.engines.pinocchio.engine_model import MAX_NV, engine_model
 from dynx.errors import ClosedError, EngineError, EngineLimitError, NotInstalledError
 from dynx.model import Joint, Link, Model
 from dynx.model.elements import Inertial, Pose
