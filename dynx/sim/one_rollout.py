@@ -9,12 +9,13 @@ from numpy.typing import ArrayLike
 
 from dynx.control.base import Controller
 from dynx.control.friction import SLIP, Coefficients
-from dynx.errors import ArgumentError, shown
+from dynx.errors import ArgumentError
 from dynx.model import Model
 from dynx.sim.loop.noise import Noise
 from dynx.sim.plants.disturbances import Push
 from dynx.sim.plants.model_error import MassScale, Payload
 from dynx.sim.record.rollout import Rollout
+from dynx.sim.scenario.keywords import scenario_of
 from dynx.sim.scenario.scenario import Scenario
 from dynx.sim.setup import require_duration
 from dynx.sim.simulation import Progress, Simulation
@@ -118,30 +119,3 @@ def simulate(
             return simulation.run()
         except KeyboardInterrupt:
             raise RolloutInterrupted(simulation.rollout, simulation.n_steps or 0) from None
-
-
-def scenario_of(model: Model | Scenario, controller_backend: str | None, given: dict[str, Any]) -> Scenario:
-    """The scenario of keyword arguments, or the one given instead of a model.
-
-    Raises ArgumentError for arguments beside a scenario that are fields of it.
-    """
-    if isinstance(model, Scenario):
-        beside = [name for name, value in given.items() if not _is_default(name, value)]
-        if controller_backend is not None:
-            beside.append("controller_backend")
-        if beside:
-            raise ArgumentError(
-                f"{beside[0]} is given beside a scenario, which has its own: change it by dataclasses.replace"
-            )
-        return model
-    controller = given["controller"]
-    if controller_backend is not None and isinstance(controller, Controller):
-        given = {**given, "controller": controller.on(controller_backend)}
-    if not isinstance(model, Model):
-        raise ArgumentError(f"model is {shown(model)}; wanted a Model or a Scenario")
-    return Scenario(model, **given)
-
-
-def _is_default(name: str, value: Any) -> bool:
-    default = Scenario.__dataclass_fields__[name].default
-    return value is default or (isinstance(value, str | float | int | tuple) and value == default)

@@ -17,11 +17,12 @@ from dynx.control.friction import SLIP, Coefficients
 from dynx.control.saturation import checked_limit
 from dynx.errors import ArgumentError, shown
 from dynx.model import Model
-from dynx.model.configuration import checked_array, checked_q
+from dynx.model.configuration import checked_q
 from dynx.sim.batch.kernel import StepOf
 from dynx.sim.batch.loads import BatchLoads, refuse_ambiguous
 from dynx.sim.batch.part import KernelOf, Part, PartDone, PartNoise, pushing
 from dynx.sim.batch.rollouts import BatchRollouts
+from dynx.sim.batch.rows import RolloutRows, columns_of
 from dynx.sim.batch.store import Store
 from dynx.sim.batch.traced_controller import innermost
 from dynx.sim.clock import Clock
@@ -30,6 +31,9 @@ from dynx.sim.loop.noise import Noise
 from dynx.sim.loop.references import checked_reference
 from dynx.sim.plants.disturbances import Push
 from dynx.sim.plants.model_error import MassScale, Payload, plant_model
+from dynx.sim.scenario.keywords import refuse_beside_scenario
+from dynx.sim.scenario.scenario import Scenario
+from dynx.sim.setup import known_controller, require_duration
 from dynx.simd.threads import checked_threads
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint, Trajectory
@@ -37,6 +41,9 @@ from dynx.trajectory.base import Setpoint, Trajectory
 PART = 1024
 """Rollouts in one part: few enough that their state stays in the caches, and enough to outweigh the start of
 a call. Results do not depend on it."""
+
+PLANT = "compiled"
+"""The plant of `dynx.simulate` that a batch runs on."""
 
 Progress = Callable[[int, int], object]
 """Called with the number of finished rollouts and that of all."""
@@ -51,12 +58,13 @@ class BatchInterrupted(KeyboardInterrupt):
 
 
 def simulate_batch(
-    model: Model,
-    controller: Controller[Any],
-    reference: Trajectory | ArrayLike,
+    model: Model | Scenario,
+    controller: Controller[Any] | None = None,
+    reference: Trajectory | ArrayLike | None = None,
     *,
     rollouts: int | None = None,
-    plant: ParametricDynamics | None = None,
+    plant: str = PLANT,
+    parametric: ParametricDynamics | None = None,
     parameters: ArrayLike | None = None,
     gains: Mapping[str, ArrayLike] | None = None,
     q0: ArrayLike | None = None,
@@ -86,7 +94,7 @@ def simulate_batch(
     Controller, dynamics and integrator are compiled into one kernel, with one rollout in each vector lane.
     Arguments that differ from rollout to rollout have one row for each:
 
-    - `parameters` (n, p) of `plant`, a `dynx.parametric` of the model: payloads, inertias, damping,
+    - `parameters` (n, p) of `parametric`, a `dynx.parametric` of the model: payloads, inertias, damping,
       dry friction (with the jump of ``sign(v)``) and armature that the controller does not know of
     - `gains`: arrays (n,) or (n, size) by the name of a gain of the controller, as ``{"kp": ...}``
     - `damping`, `friction`, `armature` (n,), (n, 1) or (n, joints); a number, numbers (joints,) or True
@@ -96,9 +104,12 @@ def simulate_batch(
     - `noise` of the measurements: rollout k has that of ``simulate`` with ``Noise(..., rollout=k)``
 
     `rollouts` is n, where no argument has n rows. Times [s], `delay`, `noise`, `friction_slip`,
-    `effort_limits`, `payload`, `mass_scale` and `pushes` are those of `simulate`. A `plant` together with
+    `effort_limits`, `payload`, `mass_scale` and `pushes` are those of `simulate`. A `parametric` beside
     a payload or scaled masses is one of ``plant_model(model, payload, mass_scale)``. With `record_every`
     k every k-th state is kept.
+
+    The first argument may also be a `Scenario` on the plant ``compiled``, beside which only what may differ
+    from rollout to rollout is given.
 
     Parts are done by `threads` threads (None: all processors) or by any `executor`, also one of
     processes or of a cluster; results are the same bit for bit. With `keep`, a folder, each part is
@@ -109,16 +120,56 @@ def simulate_batch(
     UnsupportedFeatureError for controllers that branch on their measurement. A rollout that diverges does
     not stop the others: `BatchRollouts.diverged` has its time.
     """
+    if isinstance(model, Scenario):
+        fixed_in_scenario = {
+            "controller": controller,
+            "reference": reference,
+            "dt": dt,
+            "duration": duration,
+            "control_dt": control_dt,
+            "delay": delay,
+            "noise": noise,
+            "friction_slip": friction_slip,
+            "effort_limits": effort_limits,
+            "payload": payload,
+            "mass_scale": mass_scale,
+            "pushes": pushes,
+            "check_reference": check_reference,
+        }
+        refuse_beside_scenario(fixed_in_scenario)
+        refuse_uncompiled(model)
+        return simulate_batch(
+            model.model,
+            known_controller(model),
+            **{name: getattr(model, name) for name in fixed_in_scenario if name != "controller"},
+            plant=model.plant,
+            q0=model.q0 if q0 is None else q0,
+            v0=model.v0 if v0 is None else v0,
+            damping=model.damping if damping is False else damping,
+            friction=model.friction if friction is False else friction,
+            armature=model.armature if armature is False else armature,
+            rollouts=rollouts,
+            parametric=parametric,
+            parameters=parameters,
+            gains=gains,
+            record_every=record_every,
+            threads=threads,
+            executor=executor,
+            keep=keep,
+            progress=progress,
+        )
+    if plant != PLANT:
+        raise ArgumentError(f"plant is {shown(plant)}; a batch runs on the plant {PLANT!r}")
     if not isinstance(controller, Controller):
         raise ArgumentError(f"controller is of type {type(controller).__name__}; wanted a Controller")
     moved = plant_model(model, payload, mass_scale)
-    if plant is not None and plant.model != moved:
+    if parametric is not None and parametric.model != moved:
         scaled = "" if moved is model else ", with its payload and scaled masses (`plant_model`)"
         raise ArgumentError(
-            f"plant is one of {plant.model.name}; wanted dynx.parametric of {model.name}{scaled}"
+            f"parametric is one of {parametric.model.name}; wanted dynx.parametric of {model.name}{scaled}"
         )
-    if parameters is not None and plant is None:
-        raise ArgumentError("parameters were given without the plant that they are of: dynx.parametric(...)")
+    if parameters is not None and parametric is None:
+        raise ArgumentError("parameters were given without the model that they are of: dynx.parametric(...)")
     span = reference.duration if duration is None and isinstance(reference, Trajectory) else duration
     if span is None:
         raise ArgumentError("duration is not given, and the reference is no trajectory that has one")
@@ -130,16 +181,16 @@ def simulate_batch(
     if effort_limits is not False:
         limit = checked_limit(model, None if effort_limits is True else effort_limits)
     loads = BatchLoads.of(moved, damping, friction, friction_slip, armature, pushes)
-    if plant is None and not loads.rotors.any():
+    if parametric is None and not loads.rotors.any():
         Solvability(moved).refuse_singular(False)
     delayed = clock.delay_steps > 0
     step = StepOf(
-        moved, controller, clock.dt, tuple(gains or ()), plant, noise is not None, delayed, limit, loads
+        moved, controller, clock.dt, tuple(gains or ()), parametric, noise is not None, delayed, limit, loads
     )
     setpoint_of = checked_reference(model, reference, within_limits=check_reference)
     assert setpoint_of is not None
     beginning = setpoint_of(np.zeros(1))
-    rows = _Rows(rollouts)
+    rows = RolloutRows(rollouts)
     at_rest = np.zeros(model.nv) if q0 is not None else beginning.v[0]
     start = {
         "q": rows.of("q0", beginning.q[0] if q0 is None else checked_q(model, q0, "q0"), model.nq),
@@ -148,12 +199,12 @@ def simulate_batch(
     fixed: dict[str, Floats] = {
         name: rows.of(name, values, values.shape[1]) for name, values in loads.varied.items()
     }
-    if plant is not None:
-        given = plant.parameters.defaults if parameters is None else parameters
-        fixed["parameters"] = rows.of("parameters", given, len(plant.parameters.names))
+    if parametric is not None:
+        given = parametric.parameters.defaults if parameters is None else parameters
+        fixed["parameters"] = rows.of("parameters", given, len(parametric.parameters.names))
     law = innermost(controller)
     for name, values in (gains or {}).items():
-        fixed[f"gain_{name}"] = rows.of(name, _columns(values), gains_of(law)[name].size, spread=True)
+        fixed[f"gain_{name}"] = rows.of(name, columns_of(values), gains_of(law)[name].size, spread=True)
     n = rows.count
     refuse_ambiguous(loads, n, {"damping": damping, "friction": friction, "armature": armature})
     start = {name: rows.spread(array) for name, array in start.items()}
@@ -202,6 +253,19 @@ def simulate_batch(
     return outcome()
 
 
+def refuse_uncompiled(scenario: Scenario) -> None:
+    """Raise ArgumentError for a scenario with an option that a batch does not have."""
+    integrator = scenario.with_defaults().integrator
+    for name, value, wanted in (
+        ("integrator", integrator, "semi_implicit"),
+        ("substeps", scenario.substeps, 1),
+        ("position_limits", scenario.position_limits, False),
+    ):
+        if value != wanted:
+            raise ArgumentError(f"{name} is {shown(value)}; in a batch it is {wanted}")
+    require_duration(scenario)
+
+
 def _kernels(step: StepOf, clock: Clock, wrenches: Floats) -> KernelOf:
     """Kernels of the steps with and without controller and pushes, as far as they occur."""
     asked = np.arange(clock.n_steps) % clock.steps_per_control == 0
@@ -210,47 +274,6 @@ def _kernels(step: StepOf, clock: Clock, wrenches: Floats) -> KernelOf:
         (controlled, pushed): step.kernel(controlled=controlled, pushed=pushed)
         for controlled, pushed in sorted(kinds)
     }
-
-
-class _Rows:
-    """Number of rollouts, from the arrays that have one row for each."""
-
-    def __init__(self, asked: int | None) -> None:
-        if asked is not None and (isinstance(asked, bool) or not isinstance(asked, int) or asked < 1):
-            raise ArgumentError(f"rollouts is {shown(asked)}; wanted a whole number above 0")
-        self._asked = asked
-        self._by = "rollouts"
-
-    @property
-    def count(self) -> int:
-        """The number; 1 where no argument has several rows."""
-        return 1 if self._asked is None else self._asked
-
-    def of(self, name: str, values: ArrayLike, size: int, *, spread: bool = False) -> Floats:
-        """`values` as (size,) or (n, size), finite; `spread` lets a last axis of 1 stand for all."""
-        array = np.asarray(values, dtype=np.float64) if spread else checked_array(name, values, size)
-        if spread and array.ndim and array.shape[-1] == 1:
-            array = np.broadcast_to(array, (*array.shape[:-1], size))
-        array = checked_array(name, array, size)
-        if array.ndim > 2:
-            raise ArgumentError(f"{name} has shape {array.shape}; wanted ({size},) or one such row a rollout")
-        if array.ndim == 2:
-            if self._asked is not None and len(array) != self._asked:
-                raise ArgumentError(f"{name} has {len(array)} rows, {self._by} says {self._asked}")
-            self._asked, self._by = len(array), name
-            if not len(array):
-                raise ArgumentError(f"{name} has no rows: there would be no rollouts")
-        return array
-
-    def spread(self, array: Floats) -> Floats:
-        """(n, size)."""
-        return np.array(np.broadcast_to(array, (self.count, array.shape[-1])))
-
-
-def _columns(values: ArrayLike) -> Floats:
-    """(n,) as (n, 1), (n, size) as it is."""
-    array = np.asarray(values, dtype=np.float64)
-    return array[:, None] if array.ndim == 1 else array
 
 
 def _work(

@@ -39,7 +39,7 @@ def batch(executor: Executor | None, **options: Any) -> BatchRollouts:
         arm,
         ComputedTorque(arm, kp=400, kd=40),
         trajectory.cycloidal(np.zeros(6), np.full(6, 0.3), duration=0.4),
-        plant=dynx.parametric(arm, point_payload="tool0"),
+        parametric=dynx.parametric(arm, point_payload="tool0"),
         parameters=rng.uniform(0.0, 0.2, (ROLLOUTS, 4)),
         gains={"kp": rng.uniform(200.0, 600.0, ROLLOUTS)},
         noise=Noise(1e-5, 1e-3, seed=5),

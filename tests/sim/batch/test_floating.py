@@ -104,7 +104,7 @@ def test_each_rollout_has_a_base_gains_and_a_payload_of_its_own(solo: Model) -> 
         q0=[start["q0"] for start in starts],
         v0=[start["v0"] for start in starts],
         gains={"kp": gains},
-        plant=dynx.parametric(solo, point_payload="base_link"),
+        parametric=dynx.parametric(solo, point_payload="base_link"),
         parameters=np.column_stack([masses, np.full((3, 3), 0.1)]),
         record_every=1,
         check_reference=False,

@@ -154,7 +154,7 @@ def test_parameters_of_a_plant_with_a_payload_scaled_masses_and_rotors(arm: Mode
         arm,
         law,
         POSTURE,
-        plant=dynx.parametric(loaded, point_payload="forearm_link"),
+        parametric=dynx.parametric(loaded, point_payload="forearm_link"),
         parameters=np.column_stack([masses, np.full((2, 3), 0.1)]),
         payload=TOOL,
         record_every=1,
@@ -165,7 +165,7 @@ def test_parameters_of_a_plant_with_a_payload_scaled_masses_and_rotors(arm: Mode
         payload = [TOOL, Payload("forearm_link", mass, (0.1, 0.1, 0.1))]
         assert_same(many, row, simulate(arm, law, POSTURE, plant="compiled", payload=payload, **options))
     with pytest.raises(ArgumentError, match="payload and scaled masses"):
-        simulate_batch(arm, law, POSTURE, plant=dynx.parametric(arm, point_payload="tool0"), **options)
+        simulate_batch(arm, law, POSTURE, parametric=dynx.parametric(arm, point_payload="tool0"), **options)
 
 
 def test_friction_is_compensated(arm: Model) -> None:

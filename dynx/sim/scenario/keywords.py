@@ -1,0 +1,38 @@
+"""Scenarios from the keyword arguments of `dynx.simulate` and `dynx.simulate_batch`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from dynx.control.base import Controller
+from dynx.errors import ArgumentError, shown
+from dynx.model import Model
+from dynx.sim.scenario.scenario import Scenario
+
+
+def scenario_of(model: Model | Scenario, controller_backend: str | None, given: dict[str, Any]) -> Scenario:
+    """The scenario of keyword arguments, or the one given instead of a model.
+
+    Raises ArgumentError for arguments beside a scenario that are fields of it.
+    """
+    if isinstance(model, Scenario):
+        refuse_beside_scenario({**given, "controller_backend": controller_backend})
+        return model
+    controller = given["controller"]
+    if controller_backend is not None and isinstance(controller, Controller):
+        given = {**given, "controller": controller.on(controller_backend)}
+    if not isinstance(model, Model):
+        raise ArgumentError(f"model is {shown(model)}; wanted a Model or a Scenario")
+    return Scenario(model, **given)
+
+
+def refuse_beside_scenario(given: Mapping[str, Any]) -> None:
+    """Raise ArgumentError for an argument that is given though a scenario has a field of that name."""
+    for name, value in given.items():
+        known = Scenario.__dataclass_fields__.get(name)
+        default = None if known is None else known.default
+        if value is not default and not (isinstance(value, str | float | int | tuple) and value == default):
+            raise ArgumentError(
+                f"{name} is given beside a scenario, which has its own: change it by dataclasses.replace"
+            )
