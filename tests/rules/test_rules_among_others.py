@@ -9,6 +9,7 @@ import pytest
 from dynx.model.xml.source import XmlSource
 from dynx.rules import Case, find_rule
 from dynx.rules.traps import trap_case
+from tests.rules.documents import case_of, joint, link
 
 
 def changed(rule: str, old: str, new: str, count: int = 1) -> Case:
@@ -68,3 +69,16 @@ def test_a_tensor_of_dust_is_raised_unless_the_whole_robot_is_dust() -> None:
         if remedy is not None:
             assert remedy.changes_physics
             assert not rule.detect(remedy.case)
+
+
+def test_a_point_mass_on_a_link_without_inertial_is_merged_with_it_beside_another_point_mass() -> None:
+    point = (0.0, 0.0, 0.0)
+    case = case_of(
+        *(link("base"), '<link name="empty"/>', link("tip", moments=point), link("end", moments=point)),
+        *(joint("a", "base", "empty"), joint("b", "empty", "tip", type="fixed"), joint("c", "tip", "end")),
+    )
+    rule = find_rule("DX111")
+    assert [each.link for each in rule.detect(case)] == ["empty", "end"]
+    remedy = rule.remedy(case, rule.detect(case))
+    assert remedy is not None
+    assert not rule.detect(remedy.case)

@@ -82,7 +82,7 @@ class InertiaTooSmall(Rule):
                 continue
             heavy = [each for each in group.links if case.model.inertial(each).mass > 0.0]
             into = group.head
-            if name != into or (len(heavy) > 1 and not group.static):
+            if name != into or (heavy and heavy != [into] and not group.static):
                 links = (into, name) if group.static else tuple(dict.fromkeys((into, *heavy)))
                 bodies = merged_inertials(case, group, links, into)
                 case = with_inertials(case, bodies)
