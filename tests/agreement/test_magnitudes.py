@@ -11,6 +11,7 @@ from dynx.agreement.sampling import draw_samples
 from dynx.model import Model
 from dynx.reference.backend import ReferenceBackend
 from dynx.testing.strategies import models
+from tests.agreement.robots import arm
 
 BOUNDS = {
     "forward_kinematics",
@@ -91,3 +92,21 @@ def test_so_it_does_where_an_acceleration_is_put_back() -> None:
     a[:, 6] = 4e7
     assert (Magnitudes(samples).solved_torque(a) >= 0.125 * 4e7).all()
     assert dynx.agree(blade, ["reference", "pinocchio"], samples=6).agree
+
+
+def test_a_mimic_joint_moves_with_the_joint_that_it_follows() -> None:
+    model = arm()
+    sizes = Magnitudes(draw_samples(model, 2, 0))
+    assert model.nv < len(model.mechanism.bodies)
+    for quantity in compared_quantities():
+        assert np.isfinite(quantity.scale(sizes)).all()
+
+
+def test_the_step_of_derivatives_balances_truncation_against_rounding() -> None:
+    """Half and twice that step would give no error that is much smaller."""
+    truncation = tolerances.STEP**tolerances.ORDER * tolerances.TRUNCATION
+    for depth in (0, 6, 30):
+        rounding = tolerances.derivative(depth) - truncation
+        for factor in (0.5, 2.0):
+            other = truncation * factor**tolerances.ORDER + rounding / factor
+            assert tolerances.derivative(depth) < 1.5 * other

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 
@@ -90,3 +91,9 @@ def test_an_error_without_a_size_is_null() -> None:
 
 def test_a_refused_robot_does_not_agree() -> None:
     assert not refused_report("x", DescriptionError("bad"))
+
+
+def test_reports_are_equal_however_long_they_took() -> None:
+    report = agree(arm(), ["reference"], samples=1)
+    assert replace(report, seconds=report.seconds + 1.0) == report
+    assert replace(report, seed=report.samples) != report
