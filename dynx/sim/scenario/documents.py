@@ -105,7 +105,7 @@ def decode(document: Document, model: Model | None = None) -> Any:
     """
     try:
         return _decoded(document, model)
-    except (TypeError, ValueError, KeyError, AttributeError, ModelError) as error:
+    except (TypeError, ValueError, KeyError, AttributeError, ImportError, ModelError) as error:
         text = shown(json.dumps(document))
         raise ArgumentError(f"a part of the scenario cannot be read: {error}; it is {text}") from error
 
