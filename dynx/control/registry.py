@@ -7,6 +7,10 @@ entry points in the group ``dynx.controllers`` (`dynx.registry`).
 from __future__ import annotations
 
 from collections.abc import Mapping
+from importlib import import_module
+from inspect import isabstract
+from pathlib import Path
+from pkgutil import iter_modules
 from typing import Any
 
 import numpy as np
@@ -21,25 +25,16 @@ from dynx.registry import ClassRegistry
 GROUP = "dynx.controllers"
 """The entry-point group: ``name = "package.module:ControllerClass"``."""
 
-BUILT_IN = {
-    name: f"dynx.control.{module}:{name}"
-    for module, names in {
-        "computed_torque": ("ComputedTorque",),
-        "discrete_computed_torque": ("DiscreteComputedTorque",),
-        "engine_motors": ("PDMotor", "PositionMotor", "TorqueMotor", "VelocityMotor"),
-        "feed_forward": ("FeedForward",),
-        "friction_compensation": ("FrictionCompensation",),
-        "gravity_compensation": ("GravityCompensatedPD",),
-        "impedance": ("Impedance",),
-        "open_loop": ("OpenLoop",),
-        "operational_space": ("OperationalSpace",),
-        "pd": ("PD",),
-        "pid": ("PID",),
-        "saturation": ("Saturated",),
-        "velocity": ("Velocity",),
-    }.items()
-    for name in names
-}
+
+def _own_controllers() -> dict[str, str]:
+    """Entries of the controllers in the modules beside this one."""
+    modules = (name for _, name, _ in iter_modules([str(Path(__file__).parent)]) if name != "registry")
+    members = (each for name in modules for each in vars(import_module(f"dynx.control.{name}")).values())
+    kinds = [each for each in members if isinstance(each, type) and issubclass(each, Controller)]
+    return {kind.__name__: f"{kind.__module__}:{kind.__name__}" for kind in kinds if not isabstract(kind)}
+
+
+BUILT_IN = _own_controllers()
 """Controllers of dynx itself."""
 
 _classes: ClassRegistry[Controller[Any]] = ClassRegistry(
