@@ -58,7 +58,7 @@ class EditingRule(Rule):
         edits = [edit for each in self.corrections(case) if each.detection in wanted for edit in each.edits]
         if not edits:
             return None
-        mended = case.with_source(case.source.edited(*edits))
+        mended = case.with_source(case.source.apply(*edits))
         return Remedy(mended, self.changed, self.decision(case), self.changes_physics)
 
 

@@ -41,7 +41,7 @@ class UnweighedLink(EditingRule):
         """Links below the root without one."""
         for name, link in case.links.items():
             if name != case.model.root and link.first("inertial") is None:
-                yield correction(link, "no <inertial>", case.source.inserting(link, ZERO, first=True))
+                yield correction(link, "no <inertial>", case.source.insertion(link, ZERO, first=True))
 '''
 
 Install = Callable[..., None]

@@ -30,7 +30,7 @@ def made_clean(case: Case) -> Case:
     edits: list[Edit] = []
     for each in case.model.links:
         edits += inertial_edits(case.source, case.links[each.name], each.inertial, SOLID)
-    return case.with_source(case.source.edited(*edits))
+    return case.with_source(case.source.apply(*edits))
 
 
 def robot(name: str, base: Base) -> Case:
@@ -45,7 +45,7 @@ def findings(case: Case) -> list[tuple[str, str | None, int | None]]:
 def without_inertial(case: Case, name: str) -> Case:
     element = case.links[name].first("inertial")
     assert element is not None
-    return case.with_source(case.source.edited(case.source.removing(element)))
+    return case.with_source(case.source.apply(case.source.removal(element)))
 
 
 PLANTS: dict[str, Inertial] = {

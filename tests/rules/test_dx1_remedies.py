@@ -231,4 +231,4 @@ def planted(case: Case, name: str, inertial: Inertial) -> Case:
     element = case.links[name]
     old = {each.name: each.inertial for each in case.model.links}[name]
     assert old is not None
-    return case.with_source(case.source.edited(*inertial_edits(case.source, element, old, inertial)))
+    return case.with_source(case.source.apply(*inertial_edits(case.source, element, old, inertial)))

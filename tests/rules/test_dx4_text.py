@@ -85,7 +85,7 @@ def test_a_planted_fault_is_found_where_it_is(robot: str, data: st.DataObject) -
     source = XmlSource(find(robot).read_text(encoding="utf-8"))
     place = data.draw(st.sampled_from(list(numeric_attributes(source))))
     rule_id, written = data.draw(st.sampled_from(list(_faults(place, place.text_in(source)))))
-    planted = source.edited(source.setting(place.element, place.name, written))
+    planted = source.apply(source.attribute_edit(place.element, place.name, written))
     case = Case(planted)
     found, remedy = mended(rule_id, case)
     part = place.element

@@ -29,7 +29,7 @@ def fewer_extras(source: XmlSource) -> Reductions:
     for tag, dynamic in _DYNAMIC.items():
         for part in source.root.all(tag):
             extras += [element for element in part.children if element.tag not in dynamic]
-    return Reductions(extras, lambda chosen: source.edited(*_removing(source, chosen)))
+    return Reductions(extras, lambda chosen: source.apply(*_removals(source, chosen)))
 
 
 def fewer_elements(source: XmlSource) -> Reductions:
@@ -37,7 +37,7 @@ def fewer_elements(source: XmlSource) -> Reductions:
     parts = [part for tag in _DYNAMIC for part in source.root.all(tag)]
     inside = [element for part in parts for element in part.walk() if element is not part]
     droppable = [element for element in inside if element.tag not in ("parent", "child")]
-    return Reductions(droppable, lambda chosen: source.edited(*_removing(source, chosen)))
+    return Reductions(droppable, lambda chosen: source.apply(*_removals(source, chosen)))
 
 
 def fewer_attributes(source: XmlSource) -> Reductions:
@@ -50,7 +50,7 @@ def fewer_attributes(source: XmlSource) -> Reductions:
     ]
     return Reductions(
         found,
-        lambda chosen: source.edited(*(source.removing_attribute(*each) for each in chosen)),
+        lambda chosen: source.apply(*(source.attribute_removal(*each) for each in chosen)),
     )
 
 
@@ -72,7 +72,7 @@ def frame_axes(source: XmlSource) -> Reductions:
         changed = any(complexity(new) < complexity(words[k]) for k, new in nearest.items())
         if element.tag == "axis" and changed:
             changes.append(_Rounding(element, attribute, nearest))
-    return Reductions(changes, lambda chosen: source.edited(*_rewriting(source, chosen)))
+    return Reductions(changes, lambda chosen: source.apply(*_rewrites(source, chosen)))
 
 
 def plain_numbers(source: XmlSource) -> Reductions:
@@ -130,7 +130,7 @@ def _formatted_value(value: str) -> str:
     return " ".join(shortest(word) for word in value.split(" "))
 
 
-def _removing(source: XmlSource, chosen: Sequence[SourceElement]) -> Iterator[Edit]:
+def _removals(source: XmlSource, chosen: Sequence[SourceElement]) -> Iterator[Edit]:
     """Remove elements; an element inside another removed one needs no edit."""
     going = {id(element) for element in chosen}
     for element in chosen:
@@ -138,7 +138,7 @@ def _removing(source: XmlSource, chosen: Sequence[SourceElement]) -> Iterator[Ed
         while above is not None and id(above) not in going:
             above = above.parent
         if above is None:
-            yield source.removing(element)
+            yield source.removal(element)
 
 
 def _roundings(source: XmlSource, simpler: Simpler) -> Reductions:
@@ -149,7 +149,7 @@ def _roundings(source: XmlSource, simpler: Simpler) -> Reductions:
         found = {k: new for k, new in found.items() if complexity(new) < complexity(words[k])}
         if element.tag != "axis":
             changes += [_Rounding(element, attribute, {k: new}) for k, new in found.items()]
-    return Reductions(changes, lambda chosen: source.edited(*_rewriting(source, chosen)))
+    return Reductions(changes, lambda chosen: source.apply(*_rewrites(source, chosen)))
 
 
 def _numbers(source: XmlSource) -> Iterator[tuple[SourceElement, str, list[str]]]:
@@ -161,7 +161,7 @@ def _numbers(source: XmlSource) -> Iterator[tuple[SourceElement, str, list[str]]
                 yield element, attribute, words
 
 
-def _rewriting(source: XmlSource, chosen: Sequence[_Rounding]) -> Iterator[Edit]:
+def _rewrites(source: XmlSource, chosen: Sequence[_Rounding]) -> Iterator[Edit]:
     together: dict[tuple[int, str], list[_Rounding]] = {}
     for change in chosen:
         together.setdefault((id(change.element), change.attribute), []).append(change)
@@ -171,7 +171,7 @@ def _rewriting(source: XmlSource, chosen: Sequence[_Rounding]) -> Iterator[Edit]
         for change in changes:
             for k, word in change.words.items():
                 words[k] = word
-        yield source.setting(element, attribute, " ".join(words))
+        yield source.attribute_edit(element, attribute, " ".join(words))
 
 
 def _unit(word: str) -> str:

@@ -67,7 +67,7 @@ class ReducibleState:
         for k, name in enumerate(model.joint_names):
             values = (q[k + model.nq - len(model.joint_names)], v[nb + k], a[nb + k])
             parts.update({(name, number): (float(x),) for number, x in enumerate(values)})
-        return cls({}).having(parts)
+        return cls({}).with_parts(parts)
 
     def on(self, model: Model) -> tuple[Floats, Floats, Floats]:
         """Return (q, v, a) of `model`; parts that only one of the two has are left out or at rest."""
@@ -87,7 +87,7 @@ class ReducibleState:
         known = {*model.joint_names, *([""] if model.floating else [])}
         return ReducibleState({slot: value for slot, value in self.parts.items() if slot[0] in known})
 
-    def having(self, changed: Mapping[Slot, Value]) -> ReducibleState:
+    def with_parts(self, changed: Mapping[Slot, Value]) -> ReducibleState:
         """Change some parts; those at rest are not kept."""
         parts = {**self.parts, **changed}
         return ReducibleState({slot: value for slot, value in parts.items() if value != rest(slot)})
@@ -121,12 +121,12 @@ def simplest_state(state: ReducibleState, holds: Holds, seed: int) -> ReducibleS
 def _greedily_reduced(state: ReducibleState, holds: Holds) -> ReducibleState:
     slots = sorted(state.parts)
     resting = maximal_changes(
-        slots, lambda chosen: holds(state.having({slot: rest(slot) for slot in chosen}))
+        slots, lambda chosen: holds(state.with_parts({slot: rest(slot) for slot in chosen}))
     )
-    state = state.having({slot: rest(slot) for slot in resting})
+    state = state.with_parts({slot: rest(slot) for slot in resting})
     for slot in sorted(state.parts):
         for value in _simpler_values(slot, state.parts[slot]):
-            simpler = state.having({slot: value})
+            simpler = state.with_parts({slot: value})
             if holds(simpler):
                 state = simpler
                 break
@@ -159,13 +159,13 @@ def _searched(state: ReducibleState, holds: Holds, seed: int) -> ReducibleState:
     try:
         parts = find(
             fixed_dictionaries(ladders),
-            lambda parts: holds(state.having(parts)),
+            lambda parts: holds(state.with_parts(parts)),
             settings=profile,
             random=Random(seed),
         )
     except (NoSuchExample, Unsatisfiable):
         return state
-    return min(state, state.having(parts), key=lambda each: each.complexity)
+    return min(state, state.with_parts(parts), key=lambda each: each.complexity)
 
 
 def _simpler_values(slot: Slot, value: Value) -> list[Value]:

@@ -38,7 +38,7 @@ def fewer_moving_joints(source: XmlSource) -> Reductions:
     moving = [joint for joint in source.root.all("joint") if joint.attributes.get("type") != "fixed"]
     return Reductions(
         moving,
-        lambda chosen: source.edited(*(source.setting(joint, "type", "fixed") for joint in chosen)),
+        lambda chosen: source.apply(*(source.attribute_edit(joint, "type", "fixed") for joint in chosen)),
     )
 
 
@@ -88,13 +88,13 @@ class _Tree:
         edits: list[Edit] = []
         for k, joint in enumerate(self._joints):
             if k in self._gone_joints:
-                edits.append(source.removing(joint))
+                edits.append(source.removal(joint))
                 continue
             for role, name in zip(("parent", "child"), self._ends[k], strict=True):
                 if name != end_of(joint, role):
                     element = joint.first(role)
                     assert element is not None
-                    edits.append(source.setting(element, "link", name))
+                    edits.append(source.attribute_edit(element, "link", name))
         links = source.root.all("link")
         gone = [link for link in links if link.attributes.get("name") in self._gone_links]
-        return source.edited(*edits, *(source.removing(link) for link in gone))
+        return source.apply(*edits, *(source.removal(link) for link in gone))

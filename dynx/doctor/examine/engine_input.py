@@ -19,7 +19,7 @@ from dynx.model.xml.source import SourceElement, XmlSource
 def without_meshes(source: XmlSource) -> XmlSource:
     """Remove visual shapes, and collision shapes that are meshes."""
     links = source.root.all("link")
-    return source.edited(*(source.removing(shape) for link in links for shape in _mesh_shapes(link)))
+    return source.apply(*(source.removal(shape) for link in links for shape in _mesh_shapes(link)))
 
 
 @contextmanager

@@ -88,7 +88,7 @@ def model_without_mimics(source: XmlSource, base: Base) -> Model:
     """Read the robot of a document in the coordinates of all its moving joints, in tilted gravity."""
     joints = source.root.all("joint")
     followers = [mimic for joint in joints for mimic in joint.all("mimic")]
-    free = source.edited(*(source.removing(mimic) for mimic in followers)) if followers else source
+    free = source.apply(*(source.removal(mimic) for mimic in followers)) if followers else source
     return read_model(free.text, source.source, base=base, gravity=TILTED_GRAVITY)
 
 

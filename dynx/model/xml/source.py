@@ -126,7 +126,7 @@ class XmlSource:
         """The root element."""
         return _SourceParser(self.data, self._lines_before).root()
 
-    def edited(self, *edits: Edit) -> XmlSource:
+    def apply(self, *edits: Edit) -> XmlSource:
         """Return the document with the edits applied."""
         parts, at = [], 0
         for edit in sorted(edits, key=lambda edit: (edit.start, edit.end)):
@@ -139,7 +139,7 @@ class XmlSource:
 
     # -- edits --------------------------------------------------------------------------------
 
-    def setting(self, element: SourceElement, name: str, value: str) -> Edit:
+    def attribute_edit(self, element: SourceElement, name: str, value: str) -> Edit:
         """Return the edit that sets an attribute, at its position or at the end of the start tag."""
         written = f" {name}={quoteattr(value)}"
         place = element.places.get(name)
@@ -153,16 +153,16 @@ class XmlSource:
         )
         return Edit(at, at, written)
 
-    def removing_attribute(self, element: SourceElement, name: str) -> Edit:
+    def attribute_removal(self, element: SourceElement, name: str) -> Edit:
         """Return the edit that removes an attribute and the white space before it."""
         place = element.places[name]
         return Edit(place.start, place.end, "")
 
-    def replacing(self, element: SourceElement, text: str) -> Edit:
+    def replacement(self, element: SourceElement, text: str) -> Edit:
         """Return the edit that replaces an element by text, with further lines indented like the first."""
         return Edit(element.span.start, element.span.end, self._indented(text, self.indent_of(element)))
 
-    def removing(self, element: SourceElement) -> Edit:
+    def removal(self, element: SourceElement) -> Edit:
         """Return the edit that removes an element, and its line if nothing else is on it."""
         start, end = element.span.start, element.span.end
         before = self.data.rfind(b"\n", 0, start) + 1
@@ -172,7 +172,7 @@ class XmlSource:
             return Edit(max(before - 1, 0), after, "")
         return Edit(start, end, "")
 
-    def inserting(self, parent: SourceElement, text: str, *, first: bool = False) -> Edit:
+    def insertion(self, parent: SourceElement, text: str, *, first: bool = False) -> Edit:
         """Return the edit that inserts lines of text as the last (or `first`) child of an element."""
         indent = self.indent_of(parent) + self.unit
         lines = f"\n{indent}{self._indented(text, indent)}"
@@ -186,7 +186,7 @@ class XmlSource:
         at = parent.children[-1].span.end
         return Edit(at, at, lines)
 
-    def inserting_after(self, element: SourceElement, text: str) -> Edit:
+    def insertion_after(self, element: SourceElement, text: str) -> Edit:
         """Return the edit that inserts lines of text after an element, on lines of their own."""
         indent = self.indent_of(element)
         return Edit(element.span.end, element.span.end, f"\n{indent}{self._indented(text, indent)}")

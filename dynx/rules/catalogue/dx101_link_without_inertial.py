@@ -64,5 +64,5 @@ class LinkWithoutInertial(Rule):
             done = f"gave the root {root} the <inertial> of {body}, which is rigidly connected to it"
             done += f", and {len(names)} other links without <inertial> one of zero" if names else ""
         source = case.source
-        edits = [source.inserting(case.links[name], zero_inertial(), first=True) for name in names]
-        return Remedy(case.with_source(source.edited(*edits)), done)
+        edits = [source.insertion(case.links[name], zero_inertial(), first=True) for name in names]
+        return Remedy(case.with_source(source.apply(*edits)), done)

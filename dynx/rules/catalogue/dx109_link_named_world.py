@@ -22,7 +22,7 @@ reference>`` too. Programs may look the link up by its old name: ``--choose DX10
 from collections.abc import Iterable, Sequence
 
 from dynx.rules import Case, Detection, Remedy, Rule, measured_on
-from dynx.rules.joints.renaming import fresh_name, renaming_link
+from dynx.rules.joints.renaming import fresh_name, link_rename
 
 _WORLD = "world"
 
@@ -50,6 +50,6 @@ class LinkNamedWorld(Rule):
         if self.chosen(case) == "keep":
             return None
         name = fresh_name(f"{_WORLD}_link", case.links)
-        source = case.source.edited(*renaming_link(case.source, _WORLD, name))
+        source = case.source.apply(*link_rename(case.source, _WORLD, name))
         done = f"renamed the link {_WORLD} to {name}"
         return Remedy(case.with_source(source), done, self.decision(case))

@@ -37,7 +37,7 @@ class InertiaScaledForContact(EditingRule):
                     scale = _scale(scaling)
                     if scale != 1.0:
                         message = f"PyBullet multiplies the moments of inertia of the link by {scale:g}"
-                        yield correction(scaling, message, case.source.removing(scaling))
+                        yield correction(scaling, message, case.source.removal(scaling))
 
 
 def _scale(scaling: SourceElement) -> float:

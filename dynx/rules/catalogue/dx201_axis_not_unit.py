@@ -46,5 +46,5 @@ class AxisNotUnit(EditingRule):
             if abs(length - 1.0) > _ROUNDING:
                 message = f"the axis {axis.attributes['xyz']} has length {length:.9g}"
                 unit = case.model.joint(joint.attributes["name"]).axis
-                edit = case.source.setting(axis, "xyz", " ".join(map(decimal, unit)))
+                edit = case.source.attribute_edit(axis, "xyz", " ".join(map(decimal, unit)))
                 yield correction(axis, message, edit)

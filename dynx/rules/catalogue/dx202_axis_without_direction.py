@@ -38,8 +38,8 @@ class AxisWithoutDirection(EditingRule):
             if any(not is_number(word) or float(word) != 0.0 for word in words):
                 continue
             if self.chosen(case) == "fixed":
-                edit = case.source.setting(joint, "type", "fixed")
+                edit = case.source.attribute_edit(joint, "type", "fixed")
             else:
-                edit = case.source.setting(axis, "xyz", "1 0 0")
+                edit = case.source.attribute_edit(axis, "xyz", "1 0 0")
             what = "is zero" if words else "has no numbers"
             yield correction(axis, f"the axis of a {joint.attributes['type']} joint {what}", edit)

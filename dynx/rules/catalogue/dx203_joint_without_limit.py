@@ -42,7 +42,7 @@ class JointWithoutLimit(EditingRule):
 
     def _mended(self, case: Case, joint: SourceElement) -> Edit:
         if self.chosen(case) == "zero":
-            return case.source.inserting(joint, _ZERO)
+            return case.source.insertion(joint, _ZERO)
         if joint.attributes["type"] == "revolute":
-            return case.source.setting(joint, "type", "continuous")
-        return case.source.inserting(joint, UNLIMITED)
+            return case.source.attribute_edit(joint, "type", "continuous")
+        return case.source.insertion(joint, UNLIMITED)

@@ -30,5 +30,5 @@ class LimitWithoutEffortOrVelocity(EditingRule):
         for _, limit in elements_in_joints(case, "limit"):
             missing = [name for name in ("effort", "velocity") if name not in limit.attributes]
             if missing:
-                edits = tuple(case.source.setting(limit, name, LARGEST) for name in missing)
+                edits = tuple(case.source.attribute_edit(limit, name, LARGEST) for name in missing)
                 yield correction(limit, f"<limit> has no {' and no '.join(missing)}", *edits)

@@ -41,6 +41,6 @@ class LowerLimitAboveUpper(EditingRule):
                 written = (f"-{LARGEST}", LARGEST)
             else:
                 written = (limit.attributes["upper"], limit.attributes["lower"])
-            setting = case.source.setting
-            edits = tuple(setting(limit, *each) for each in zip(("lower", "upper"), written, strict=True))
+            edit = case.source.attribute_edit
+            edits = tuple(edit(limit, *each) for each in zip(("lower", "upper"), written, strict=True))
             yield correction(limit, f"the lower limit {lower:g} is above the upper {upper:g}", *edits)

@@ -39,7 +39,7 @@ class NegativeEffortOrVelocity(EditingRule):
             if below:
                 listed = " and ".join(f"{name}={limit.attributes[name].strip()}" for name in below)
                 edits = tuple(
-                    case.source.setting(limit, name, self._instead(case, limit.attributes[name]))
+                    case.source.attribute_edit(limit, name, self._instead(case, limit.attributes[name]))
                     for name in below
                 )
                 yield correction(limit, f"<limit> has {listed}", *edits)

@@ -26,5 +26,5 @@ class SafetyControllerWithoutGain(EditingRule):
         """The first safety controller of every joint."""
         for _, controller in elements_in_joints(case, "safety_controller"):
             if "k_velocity" not in controller.attributes:
-                edit = case.source.setting(controller, "k_velocity", "0")
+                edit = case.source.attribute_edit(controller, "k_velocity", "0")
                 yield correction(controller, "<safety_controller> has no k_velocity", edit)

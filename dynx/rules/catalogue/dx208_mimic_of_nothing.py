@@ -33,7 +33,7 @@ class MimicOfNothing(EditingRule):
         for joint, mimic in elements_in_joints(case, "mimic"):
             message = _why_nothing(case, joint, mimic)
             if message is not None:
-                edits = tuple(case.source.removing(each) for each in joint.all("mimic"))
+                edits = tuple(case.source.removal(each) for each in joint.all("mimic"))
                 yield correction(mimic, message, *edits)
 
 

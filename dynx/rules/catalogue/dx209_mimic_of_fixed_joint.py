@@ -46,17 +46,17 @@ class MimicOfFixedJoint(EditingRule):
     def _edits(self, case: Case, element: SourceElement, joint: Joint) -> Iterable[Edit]:
         source = case.source
         for mimic in element.all("mimic"):
-            yield source.removing(mimic)
+            yield source.removal(mimic)
         if self.chosen(case) == "free":
             return
-        yield source.setting(element, "type", "fixed")
+        yield source.attribute_edit(element, "type", "fixed")
         if not joint.locked_at:
             return
         texts = {name: " ".join(map(decimal, getattr(joint.origin, name))) for name in ("xyz", "rpy")}
         origin = element.first("origin")
         if origin is None:
             words = " ".join(f'{name}="{text}"' for name, text in texts.items())
-            yield source.inserting(element, f"<origin {words}/>", first=True)
+            yield source.insertion(element, f"<origin {words}/>", first=True)
         else:
             for name, text in texts.items():
-                yield source.setting(origin, name, text)
+                yield source.attribute_edit(origin, name, text)

@@ -26,7 +26,7 @@ from dynx.model.xml.source import Edit, SourceElement
 from dynx.rules import Case, Correction, EditingRule, correction, measured_on
 from dynx.rules.case import end_of
 from dynx.rules.joints.elements import joints_of_type
-from dynx.rules.joints.splitting import TYPES, splitting
+from dynx.rules.joints.splitting import TYPES, joint_split
 from dynx.rules.text.attributes import number_or_none
 
 
@@ -47,9 +47,9 @@ class JointOfSeveralFreedoms(EditingRule):
             if not joint.attributes.get("name") or (kind == "floating" and _is_the_base(case, joint)):
                 continue
             if self.chosen(case) == "fixed":
-                edits: tuple[Edit, ...] = (case.source.setting(joint, "type", "fixed"),)
+                edits: tuple[Edit, ...] = (case.source.attribute_edit(joint, "type", "fixed"),)
             else:
-                edits = tuple(splitting(case.source, joint))
+                edits = tuple(joint_split(case.source, joint))
             yield correction(joint, f"the joint is {kind}", *edits)
 
 

@@ -29,5 +29,5 @@ class FloatingJointAtRoot(EditingRule):
     def corrections(self, case: Case) -> Iterable[Correction]:
         """The joint, of which there is at most one that dynx can read."""
         for joint in joints_of_type(case, ("floating",)):
-            edit = case.source.setting(joint, "type", "fixed")
+            edit = case.source.attribute_edit(joint, "type", "fixed")
             yield correction(joint, "the joint below the root is floating", edit)

@@ -50,9 +50,9 @@ class TooManyJoints(Rule):
         source, carriers = case.source, {joint.child: joint.name for joint in case.model.joints}
         edits = []
         for name in dropped:
-            edits += [source.removing(case.links[name]), source.removing(case.joints[carriers[name]])]
+            edits += [source.removal(case.links[name]), source.removal(case.joints[carriers[name]])]
         return Remedy(
-            case.with_source(source.edited(*edits)),
+            case.with_source(source.apply(*edits)),
             f"took {len(dropped)} links that are mere frames",
             self.decision(case),
         )

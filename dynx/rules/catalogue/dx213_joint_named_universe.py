@@ -18,7 +18,7 @@ transmissions and Gazebo references too; programs that look the joint up by its 
 from collections.abc import Iterable
 
 from dynx.rules import Case, Correction, EditingRule, correction, measured_on
-from dynx.rules.joints.renaming import fresh_name, renaming_joint
+from dynx.rules.joints.renaming import fresh_name, joint_rename
 
 _RESERVED = "universe"
 
@@ -34,5 +34,5 @@ class JointNamedUniverse(EditingRule):
         if joint is None or joint.attributes.get("type") != "fixed":
             return
         new = fresh_name(f"{_RESERVED}_joint", case.joints)
-        edits = tuple(renaming_joint(case.source, _RESERVED, new))
+        edits = tuple(joint_rename(case.source, _RESERVED, new))
         yield correction(joint, "the joint has the name of Pinocchio's world", *edits)

@@ -29,7 +29,7 @@ class TransmissionOfNothing(EditingRule):
         for transmission in transmissions_drake_reads(case):
             message = _fault(case, transmission)
             if message is not None:
-                yield correction(transmission, message, case.source.removing(transmission))
+                yield correction(transmission, message, case.source.removal(transmission))
 
 
 def _fault(case: Case, transmission: SourceElement) -> str | None:

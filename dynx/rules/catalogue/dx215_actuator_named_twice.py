@@ -39,7 +39,7 @@ class ActuatorNamedTwice(EditingRule):
             if name in seen:
                 new = fresh_name(name, taken)
                 taken.add(new)
-                edit = case.source.setting(actuator, "name", new)
+                edit = case.source.attribute_edit(actuator, "name", new)
                 yield correction(actuator, f"a further actuator has the name {shown(name)}", edit)
             seen.add(name)
 

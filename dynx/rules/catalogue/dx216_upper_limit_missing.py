@@ -44,4 +44,4 @@ class UpperLimitMissing(EditingRule):
             if "upper" in limit.attributes or lower is None or lower > _UPPER_OF_PYBULLET:
                 continue
             message = f"lower is {lower:g} and upper is not given, which is 0 in URDF and -1 in PyBullet"
-            yield correction(limit, message, case.source.setting(limit, "upper", "0"))
+            yield correction(limit, message, case.source.attribute_edit(limit, "upper", "0"))

@@ -20,7 +20,7 @@ users who load it in the usual way get no warning.
 from collections.abc import Iterable
 
 from dynx.rules import Case, Correction, EditingRule, correction, measured_on
-from dynx.rules.joints.renaming import fresh_name, renaming_joint
+from dynx.rules.joints.renaming import fresh_name, joint_rename
 
 _RESERVED = "root_joint"
 
@@ -37,5 +37,5 @@ class JointNamedRootJoint(EditingRule):
         if case.base != "floating" or joint is None or joint.attributes.get("type") == "fixed":
             return
         new = fresh_name(f"{_RESERVED}_1", case.joints)
-        edits = tuple(renaming_joint(case.source, _RESERVED, new))
+        edits = tuple(joint_rename(case.source, _RESERVED, new))
         yield correction(joint, "the joint has the name of Pinocchio's joint of a floating base", *edits)

@@ -34,5 +34,5 @@ class NegativeDamping(EditingRule):
                 continue
             written = dynamics.attributes["damping"].strip()
             instead = "0" if self.chosen(case) == "zero" else written.removeprefix("-")
-            edit = case.source.setting(dynamics, "damping", instead)
+            edit = case.source.attribute_edit(dynamics, "damping", instead)
             yield correction(dynamics, f"the joint has damping {written}", edit)

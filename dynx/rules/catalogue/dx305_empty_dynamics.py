@@ -27,5 +27,5 @@ class EmptyDynamics(EditingRule):
         """The first ``<dynamics>`` of every joint, moving or not."""
         for _, dynamics in elements_in_joints(case, "dynamics"):
             if not {"damping", "friction"} & set(dynamics.attributes):
-                edit = case.source.setting(dynamics, "damping", "0")
+                edit = case.source.attribute_edit(dynamics, "damping", "0")
                 yield correction(dynamics, "<dynamics> has neither damping nor friction", edit)

@@ -41,5 +41,5 @@ class VectorOfWrongLength(MisspelledNumberRule):
         if self.chosen(case) == "first":
             return super().edit(case, attribute, misspelling)
         if attribute.element.tag == "axis":
-            return case.source.removing(attribute.element)
-        return case.source.removing_attribute(attribute.element, attribute.name)
+            return case.source.removal(attribute.element)
+        return case.source.attribute_removal(attribute.element, attribute.name)

@@ -30,4 +30,4 @@ class EmptyVector(MisspelledNumberRule):
 
     def edit(self, case: Case, attribute: NumericAttribute, misspelling: Misspelling) -> Edit:
         """Without the attribute."""
-        return case.source.removing_attribute(attribute.element, attribute.name)
+        return case.source.attribute_removal(attribute.element, attribute.name)

@@ -36,5 +36,5 @@ class MissingProductOfInertia(EditingRule):
                     missing = [name for name in _PRODUCTS if name not in tensor.attributes]
                     if missing and all(name in tensor.attributes for name in _MOMENTS):
                         message = f"<inertia> has no {' and no '.join(missing)}"
-                        edits = tuple(case.source.setting(tensor, name, "0") for name in missing)
+                        edits = tuple(case.source.attribute_edit(tensor, name, "0") for name in missing)
                         yield correction(tensor, message, *edits)

@@ -54,12 +54,12 @@ class IncompleteInertial(EditingRule):
         inside = "" if mass is None else text_in(case.source, mass)
         if mass is None or not is_number(inside):
             message = "<inertial> has no <mass>" if mass is None else "<mass> has no value"
-            yield correction(inertial, message, case.source.replacing(inertial, zero_inertial()))
+            yield correction(inertial, message, case.source.replacement(inertial, zero_inertial()))
         else:
-            edit = case.source.replacing(mass, f'<mass value="{inside}"/>')
+            edit = case.source.replacement(mass, f'<mass value="{inside}"/>')
             yield correction(mass, f"<mass> has {inside} between its tags and no value", edit)
 
     def _without_tensor(self, case: Case, inertial: SourceElement) -> tuple[Edit, ...]:
         if self.chosen(case) == "weightless":
-            return (case.source.replacing(inertial, zero_inertial()),)
-        return (case.source.inserting(inertial, ZERO_TENSOR),)
+            return (case.source.replacement(inertial, zero_inertial()),)
+        return (case.source.insertion(inertial, ZERO_TENSOR),)

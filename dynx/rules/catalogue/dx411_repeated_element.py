@@ -43,7 +43,7 @@ def _in(case: Case, part: SourceElement) -> Iterable[Correction]:
     for child in part.children:
         if child.tag in seen and child.tag in _ONCE[part.tag]:
             message = f"a further <{child.tag}> in the same <{part.tag}>; engines use the first"
-            yield correction(child, message, case.source.removing(child))
+            yield correction(child, message, case.source.removal(child))
         elif child.tag == "inertial":
             yield from _in(case, child)
         seen.add(child.tag)

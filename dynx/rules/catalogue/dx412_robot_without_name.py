@@ -31,4 +31,6 @@ class RobotWithoutName(EditingRule):
         what = "an empty name" if "name" in root.attributes else "no name"
         source = PurePath(case.source.source)
         name = source.name.split(".")[0] if source.suffix in (".urdf", ".xacro", ".xml") else ""
-        yield correction(root, f"<robot> has {what}", case.source.setting(root, "name", name or "robot"))
+        yield correction(
+            root, f"<robot> has {what}", case.source.attribute_edit(root, "name", name or "robot")
+        )

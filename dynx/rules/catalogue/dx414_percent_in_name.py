@@ -16,7 +16,7 @@ from collections.abc import Iterable
 
 from dynx.errors import shown
 from dynx.rules import Case, Correction, EditingRule, correction, measured_on
-from dynx.rules.joints.renaming import fresh_name, renaming_joint, renaming_link
+from dynx.rules.joints.renaming import fresh_name, joint_rename, link_rename
 
 
 class PercentInName(EditingRule):
@@ -31,11 +31,11 @@ class PercentInName(EditingRule):
         root = source.root
         if "%" in root.attributes.get("name", ""):
             name = root.attributes["name"]
-            edit = source.setting(root, "name", name.replace("%", "_"))
+            edit = source.attribute_edit(root, "name", name.replace("%", "_"))
             yield correction(root, _message("robot", name), edit)
         for kind, named, rename in (
-            ("link", case.links, renaming_link),
-            ("joint", case.joints, renaming_joint),
+            ("link", case.links, link_rename),
+            ("joint", case.joints, joint_rename),
         ):
             taken = set(named)
             for name, element in named.items():

@@ -30,5 +30,5 @@ class MaterialDefinedTwice(EditingRule):
             name = material.attributes.get("name", "")
             if name in seen:
                 message = f"material {shown(name)} is defined a further time"
-                yield correction(material, message, case.source.removing(material))
+                yield correction(material, message, case.source.removal(material))
             seen.add(name)

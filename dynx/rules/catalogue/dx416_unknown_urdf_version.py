@@ -29,5 +29,5 @@ class UnknownUrdfVersion(EditingRule):
         root = case.source.root
         version = root.attributes.get("version")
         if root.tag == "robot" and version is not None and version not in _KNOWN:
-            edit = case.source.removing_attribute(root, "version")
+            edit = case.source.attribute_removal(root, "version")
             yield correction(root, f"<robot> has version {shown(version)}", edit)

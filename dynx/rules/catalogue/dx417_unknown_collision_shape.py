@@ -38,5 +38,5 @@ class UnknownCollisionShape(EditingRule):
                 if geometry is None or any(child.tag in _KNOWN for child in geometry.children):
                     continue
                 shapes = ", ".join(f"<{child.tag}>" for child in geometry.children) or "nothing"
-                edits = () if self.chosen(case) == "keep" else (case.source.removing(collision),)
+                edits = () if self.chosen(case) == "keep" else (case.source.removal(collision),)
                 yield correction(collision, f"the geometry of <collision> is {shapes}", *edits)

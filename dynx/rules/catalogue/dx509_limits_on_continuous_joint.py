@@ -33,5 +33,5 @@ class LimitsOnContinuousJoint(OptionalEditingRule):
             written = [end for end in _RANGE if end in limit.attributes]
             if written:
                 listed = " and ".join(f'{end}="{limit.attributes[end]}"' for end in written)
-                edits = tuple(case.source.removing_attribute(limit, end) for end in written)
+                edits = tuple(case.source.attribute_removal(limit, end) for end in written)
                 yield correction(limit, f"{listed} on a joint that rotates without limit", *edits)

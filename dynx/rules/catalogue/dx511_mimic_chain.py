@@ -35,8 +35,8 @@ class MimicChain(OptionalEditingRule):
             if leader != resolved.joint:
                 message = f"follows {leader}, which follows {resolved.joint} in the end"
                 edits = (
-                    case.source.setting(mimic, "joint", resolved.joint),
-                    case.source.setting(mimic, "multiplier", decimal(resolved.multiplier)),
-                    case.source.setting(mimic, "offset", decimal(resolved.offset)),
+                    case.source.attribute_edit(mimic, "joint", resolved.joint),
+                    case.source.attribute_edit(mimic, "multiplier", decimal(resolved.multiplier)),
+                    case.source.attribute_edit(mimic, "offset", decimal(resolved.offset)),
                 )
                 yield correction(mimic, message, *edits)

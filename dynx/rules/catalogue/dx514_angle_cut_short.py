@@ -39,7 +39,7 @@ class AngleCutShort(OptionalEditingRule):
                 off = abs(float(word) - angle)
                 message = f"rpy holds {word}, {off:.2g} rad from {angle!r}: {1e3 * off:.2g} mm at one metre"
                 full = [word if (angle := _meant(word)) is None else repr(angle) for word in words]
-                edit = case.source.setting(origin, "rpy", " ".join(full))
+                edit = case.source.attribute_edit(origin, "rpy", " ".join(full))
                 yield correction(origin, message, edit)
 
 

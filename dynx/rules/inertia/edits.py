@@ -20,7 +20,7 @@ def inertial_edits(source: XmlSource, link: SourceElement, old: Inertial | None,
     """Edits that replace the inertial `old` of a link by `new`; unchanged numbers keep their spelling."""
     element = link.first("inertial")
     if old is None or element is None:
-        return [source.inserting(link, _inertial_text(new), first=True)]
+        return [source.insertion(link, _inertial_text(new), first=True)]
     edits = []
     origin = element.first("origin")
     for name in ("xyz", "rpy"):
@@ -29,15 +29,15 @@ def inertial_edits(source: XmlSource, link: SourceElement, old: Inertial | None,
             continue
         text = " ".join(map(decimal, wanted))
         if origin is not None:
-            edits.append(source.setting(origin, name, text))
+            edits.append(source.attribute_edit(origin, name, text))
     if origin is None and new.origin != old.origin:
-        edits.append(source.inserting(element, _origin_text(new), first=True))
+        edits.append(source.insertion(element, _origin_text(new), first=True))
     mass, tensor = element.first("mass"), element.first("inertia")
     if mass is not None and new.mass != old.mass:
-        edits.append(source.setting(mass, "value", decimal(new.mass)))
+        edits.append(source.attribute_edit(mass, "value", decimal(new.mass)))
     if tensor is not None:
         changed = [name for name in MOMENTS if getattr(new, name) != getattr(old, name)]
-        edits += [source.setting(tensor, name, decimal(getattr(new, name))) for name in changed]
+        edits += [source.attribute_edit(tensor, name, decimal(getattr(new, name))) for name in changed]
     return edits
 
 
@@ -46,7 +46,7 @@ def with_inertials(case: Case, inertials: dict[str, Inertial]) -> Case:
     edits: list[Edit] = []
     for name, inertial in inertials.items():
         edits += inertial_edits(case.source, case.links[name], case.inertials[name], inertial)
-    return case.with_source(case.source.edited(*edits))
+    return case.with_source(case.source.apply(*edits))
 
 
 def line_of(case: Case, link: str, tag: str) -> int:

@@ -32,9 +32,9 @@ def elements_in_joints(
             yield joint, element
 
 
-def setting_axis(source: XmlSource, joint: SourceElement, xyz: str) -> Edit:
+def axis_edit(source: XmlSource, joint: SourceElement, xyz: str) -> Edit:
     """The edit that sets the axis of a joint, whether it has one or not."""
     axis = joint.first("axis")
     if axis is None:
-        return source.inserting(joint, f'<axis xyz="{xyz}"/>')
-    return source.setting(axis, "xyz", xyz)
+        return source.insertion(joint, f'<axis xyz="{xyz}"/>')
+    return source.attribute_edit(axis, "xyz", xyz)

@@ -17,7 +17,7 @@ import numpy as np
 from dynx.model.xml.source import Edit, SourceElement, XmlSource
 from dynx.rules.case import end_of
 from dynx.rules.inertia.massless_links import least_inertial
-from dynx.rules.joints.elements import UNLIMITED, setting_axis
+from dynx.rules.joints.elements import UNLIMITED, axis_edit
 from dynx.rules.joints.renaming import fresh_name
 from dynx.rules.text.number_text import decimal, is_number
 
@@ -54,26 +54,26 @@ def freedoms(joint: SourceElement) -> list[Freedom]:
     return slides + turns if kind == "floating" else turns
 
 
-def splitting(source: XmlSource, joint: SourceElement) -> Iterator[Edit]:
+def joint_split(source: XmlSource, joint: SourceElement) -> Iterator[Edit]:
     """Edits that replace the joint by the chain."""
     first, *rest = freedoms(joint)
     taken = {part.attributes.get("name", "") for part in source.root.children}
     name, child = joint.attributes["name"], end_of(joint, "child")
     names = [fresh_name(f"{name}_{each.suffix}", taken) for each in (first, *rest)]
     links = [fresh_name(f"{own}_link", taken) for own in names[:-1]]
-    yield source.setting(joint, "name", names[0])
-    yield source.setting(joint, "type", first.type)
-    yield setting_axis(source, joint, first.axis)
+    yield source.attribute_edit(joint, "name", names[0])
+    yield source.attribute_edit(joint, "type", first.type)
+    yield axis_edit(source, joint, first.axis)
     child_element = joint.first("child")
     if child_element is not None:
-        yield source.setting(child_element, "link", links[0])
+        yield source.attribute_edit(child_element, "link", links[0])
     limit = joint.first("limit")
     if limit is not None and first.type == "prismatic":
-        yield source.replacing(limit, UNLIMITED)
+        yield source.replacement(limit, UNLIMITED)
     elif limit is not None:
-        yield source.removing(limit)
+        yield source.removal(limit)
     elif first.type == "prismatic":
-        yield source.inserting(joint, UNLIMITED)
+        yield source.insertion(joint, UNLIMITED)
     lines = []
     for own, each, parent, below in zip(names[1:], rest, links, [*links[1:], child], strict=True):
         least = "\n".join(f"{source.unit}{line}" for line in least_inertial().split("\n"))
@@ -84,7 +84,7 @@ def splitting(source: XmlSource, joint: SourceElement) -> Iterator[Edit]:
             inside.append(UNLIMITED)
         body = "\n".join(f"{source.unit}{line}" for line in inside)
         lines.append(f'<joint name={quoteattr(own)} type="{each.type}">\n{body}\n</joint>')
-    yield source.inserting_after(joint, "\n".join(lines))
+    yield source.insertion_after(joint, "\n".join(lines))
 
 
 def _plane(joint: SourceElement) -> tuple[str, str, str]:

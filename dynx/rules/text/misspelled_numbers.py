@@ -37,7 +37,7 @@ class MisspelledNumberRule(EditingRule):
 
     def edit(self, case: Case, attribute: NumericAttribute, misspelling: Misspelling) -> Edit:
         """The edit that corrects the attribute."""
-        return case.source.setting(attribute.element, attribute.name, self.text_for(case, misspelling))
+        return case.source.attribute_edit(attribute.element, attribute.name, self.text_for(case, misspelling))
 
     def corrections(self, case: Case) -> Iterable[Correction]:
         """Every attribute with the fault."""

@@ -28,14 +28,14 @@ def mimic(site: Site) -> Planted:
     multiplier = site.rng.choice(["1", "-1", "0.5"])
     text = f'<mimic joint="{followed.name}" multiplier="{multiplier}" offset="0"/>'
     return site.planted(
-        "DX304", site.source.inserting(element, text), joint=joint.name, touched=[followed.name]
+        "DX304", site.source.insertion(element, text), joint=joint.name, touched=[followed.name]
     )
 
 
 def empty_dynamics(site: Site) -> Planted:
     """The element of a template whose numbers were not known."""
     joint, element = site.pick_joint(lambda each: each.type in SINGLE, "joint that moves")
-    edit = site.source.inserting(element, "<dynamics/>")
+    edit = site.source.insertion(element, "<dynamics/>")
     return site.planted("DX305", edit, joint=joint.name)
 
 
@@ -43,7 +43,7 @@ def no_room(site: Site) -> Planted:
     """A range of zero width; PyBullet takes one without an upper end for none."""
     joint, element = site.pick_joint(limited, "joint with a limit")
     value = site.rng.choice(["0", "0.0", "0.3"])
-    edits = site.setting_in(element, "limit", lower=value, upper=value)
+    edits = site.part_edits(element, "limit", lower=value, upper=value)
     return site.planted("DX306", *edits, joint=joint.name)
 
 
@@ -55,7 +55,7 @@ def rotor(site: Site) -> Planted:
         '    <drake:rotor_inertia value="0.0003"/>\n    <drake:gear_ratio value="50"/>\n  </actuator>'
     )
     text = transmission(f"gear_of_{joint.name}", inside)
-    return site.planted("DX307", site.source.inserting(site.source.root, text), joint=joint.name)
+    return site.planted("DX307", site.source.insertion(site.source.root, text), joint=joint.name)
 
 
 def contacts(site: Site) -> Planted:
@@ -76,7 +76,7 @@ def contacts(site: Site) -> Planted:
     first, second = site.pick(pairs, "links with two joints between them")
     place, sphere = '<origin xyz="0.3 0.2 -0.1"/>', '<sphere radius="1.5"/>'
     shape = f"<collision>\n  {place}\n  <geometry>\n    {sphere}\n  </geometry>\n</collision>"
-    edits = [site.source.inserting(site.element("link", name), shape) for name in (first, second)]
+    edits = [site.source.insertion(site.element("link", name), shape) for name in (first, second)]
     return site.planted("DX308", *edits, touched=[first, second], sign="<collision>")
 
 
@@ -84,7 +84,7 @@ def _dynamics(site: Site, rule: str, also: tuple[str, ...] | list[str] = (), **w
     joint, element = site.pick_joint(moving, "joint that moves")
     if element.first("dynamics") is not None:
         raise NotHere("the joint has dynamics")
-    return site.planted(rule, *site.setting_in(element, "dynamics", **words), joint=joint.name, also=also)
+    return site.planted(rule, *site.part_edits(element, "dynamics", **words), joint=joint.name, also=also)
 
 
 PLANTERS = (

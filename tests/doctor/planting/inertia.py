@@ -108,9 +108,9 @@ def root_rotated(site: Site) -> Planted:
     rpy = site.rng.choice(["0 1.5708 0", "1.5708 0 0", "0.3 -0.2 0.1", "-0.785398 0.52 1.1"])
     origin = inertial.first("origin")
     if origin is None:
-        edit = site.source.inserting(inertial, f'<origin xyz="0 0 0" rpy="{rpy}"/>', first=True)
+        edit = site.source.insertion(inertial, f'<origin xyz="0 0 0" rpy="{rpy}"/>', first=True)
     else:
-        edit = site.source.setting(origin, "rpy", rpy)
+        edit = site.source.attribute_edit(origin, "rpy", rpy)
     return site.planted("DX106", edit, link=root)
 
 
@@ -130,7 +130,7 @@ def massless_root(site: Site) -> Planted:
         f'  <origin xyz="0 0 0.1" rpy="0 0 0"/>\n'
         f'  <parent link="{name}"/>\n  <child link="{root}"/>\n</joint>'
     )
-    edit = site.source.inserting(site.source.root, text, first=True)
+    edit = site.source.insertion(site.source.root, text, first=True)
     return site.planted("DX107", edit, link=name, touched=[root])
 
 
@@ -151,7 +151,7 @@ def named_world(site: Site) -> Planted:
     name, _ = site.pick_link(
         lambda each: site.model.floating or (each != root and site.skeleton.moves(each)), "link to rename"
     )
-    edits = site.renaming("link", name, "world")
+    edits = site.rename_edits("link", name, "world")
     return site.planted("DX109", *edits, link="world", touched=[name])
 
 
@@ -206,10 +206,10 @@ def scaled(site: Site) -> Planted:
     contact = link.first("contact")
     scaling = f'<inertia_scaling value="{value}"/>'
     if contact is not None:
-        edit = site.source.inserting(contact, scaling)
+        edit = site.source.insertion(contact, scaling)
     else:
         text = f'<contact>\n  <lateral_friction value="1.0"/>\n  {scaling}\n</contact>'
-        edit = site.source.inserting(link, text)
+        edit = site.source.insertion(link, text)
     return site.planted("DX114", edit, link=name)
 
 
@@ -247,7 +247,7 @@ def tensor(site: Site, link: SourceElement, **words: str) -> list[Edit]:
     element = None if inertial is None else inertial.first("inertia")
     if element is None:
         raise NotHere("the link has no tensor")
-    return [site.source.setting(element, name, value) for name, value in words.items()]
+    return [site.source.attribute_edit(element, name, value) for name, value in words.items()]
 
 
 def mass(site: Site, link: SourceElement, value: str) -> list[Edit]:
@@ -256,7 +256,7 @@ def mass(site: Site, link: SourceElement, value: str) -> list[Edit]:
     element = None if inertial is None else inertial.first("mass")
     if element is None:
         raise NotHere("the link has no mass")
-    return [site.source.setting(element, "value", value)]
+    return [site.source.attribute_edit(element, "value", value)]
 
 
 def weightless(site: Site, link: SourceElement) -> list[Edit]:

@@ -15,14 +15,14 @@ def axis_not_unit(site: Site) -> Planted:
     joint, element = site.pick_joint(moving, "joint that moves")
     factor = site.rng.choice([2.0, -1.5, 10.0, 0.5, 1.000001, 0.999998])
     words = " ".join(f"{factor * value + 0.0:.9g}" for value in joint.axis)
-    return site.planted("DX201", *site.setting_in(element, "axis", xyz=words), joint=joint.name)
+    return site.planted("DX201", *site.part_edits(element, "axis", xyz=words), joint=joint.name)
 
 
 def axis_without_direction(site: Site) -> Planted:
     """The zero axis that exporters write for fixed joints."""
     joint, element = site.pick_joint(moving, "joint that moves")
     words = site.rng.choice(["0 0 0", "0.0 0.0 0.0", ""])
-    return site.planted("DX202", *site.setting_in(element, "axis", xyz=words), joint=joint.name)
+    return site.planted("DX202", *site.part_edits(element, "axis", xyz=words), joint=joint.name)
 
 
 def without_limit(site: Site) -> Planted:
@@ -32,7 +32,7 @@ def without_limit(site: Site) -> Planted:
     assert limit is not None
     text = site.source.data[limit.span.start : limit.span.end].decode()
     plain = site.rng.random() < 0.5 or "--" in text
-    edit = site.source.removing(limit) if plain else site.source.replacing(limit, f"<!-- {text} -->")
+    edit = site.source.removal(limit) if plain else site.source.replacement(limit, f"<!-- {text} -->")
     return site.planted("DX203", edit, joint=joint.name)
 
 
@@ -43,7 +43,7 @@ def without_effort(site: Site) -> Planted:
     assert limit is not None
     names = [name for name in ("effort", "velocity") if name in limit.attributes]
     gone = names if site.rng.random() < 0.5 else [site.pick(names, "effort or velocity")]
-    edits = [site.source.removing_attribute(limit, name) for name in gone]
+    edits = [site.source.attribute_removal(limit, name) for name in gone]
     return site.planted("DX204", *edits, joint=joint.name)
 
 
@@ -55,7 +55,7 @@ def limits_exchanged(site: Site) -> Planted:
     limit = element.first("limit")
     assert limit is not None
     lower, upper = (limit.attributes.get(name, "0") for name in ("lower", "upper"))
-    edits = site.setting_in(element, "limit", lower=upper, upper=lower)
+    edits = site.part_edits(element, "limit", lower=upper, upper=lower)
     return site.planted("DX205", *edits, joint=joint.name)
 
 
@@ -67,14 +67,14 @@ def negative_effort(site: Site) -> Planted:
     name = site.rng.choice(["effort", "velocity"])
     old = limit.attributes.get(name, "0").strip()
     wanted = "-1" if float(old) == 0.0 or site.rng.random() < 0.5 else f"-{old}"
-    return site.planted("DX206", *site.setting_in(element, "limit", **{name: wanted}), joint=joint.name)
+    return site.planted("DX206", *site.part_edits(element, "limit", **{name: wanted}), joint=joint.name)
 
 
 def safety_without_gain(site: Site) -> Planted:
     """Soft limits copied without the gain that URDF demands."""
     joint, element = site.pick_joint(moving, "joint that moves")
     text = '<safety_controller soft_lower_limit="-1.5" soft_upper_limit="1.5" k_position="15"/>'
-    return site.planted("DX207", site.source.inserting(element, text), joint=joint.name)
+    return site.planted("DX207", site.source.insertion(element, text), joint=joint.name)
 
 
 def mimic_of_nothing(site: Site) -> Planted:
@@ -82,7 +82,7 @@ def mimic_of_nothing(site: Site) -> Planted:
     joint, element = site.pick_joint(moving, "joint that moves")
     words = site.rng.choice([f'joint="{joint.name}_left"', 'joint="gripper_finger"', f'joint="{joint.name}"'])
     text = f'<mimic {words} multiplier="1" offset="0"/>'
-    return site.planted("DX208", site.source.inserting(element, text), joint=joint.name)
+    return site.planted("DX208", site.source.insertion(element, text), joint=joint.name)
 
 
 def mimic_of_fixed(site: Site) -> Planted:
@@ -92,7 +92,7 @@ def mimic_of_fixed(site: Site) -> Planted:
     offset = site.rng.choice(["0", "0.1"])
     text = f'<mimic joint="{followed.name}" multiplier="1" offset="{offset}"/>'
     return site.planted(
-        "DX209", site.source.inserting(element, text), joint=joint.name, touched=[followed.name]
+        "DX209", site.source.insertion(element, text), joint=joint.name, touched=[followed.name]
     )
 
 
@@ -102,7 +102,7 @@ def several_freedoms(site: Site) -> Planted:
     below_mount = joint.parent == site.model.root and site.skeleton.mass(joint.parent) == 0.0
     kind = site.rng.choice(["spherical", "planar", *([] if below_mount else ["floating"])])
     return site.planted(
-        "DX210", site.source.setting(element, "type", kind), joint=joint.name, touched=[joint.child]
+        "DX210", site.source.attribute_edit(element, "type", kind), joint=joint.name, touched=[joint.child]
     )
 
 
@@ -120,7 +120,7 @@ def floating_at_root(site: Site) -> Planted:
     name = site.rng.choice(["odom", "map", "ground"])
     if not_new(site, name):
         raise NotHere(f"has a link {name}")
-    edit = site.source.inserting(
+    edit = site.source.insertion(
         site.source.root,
         f'<link name="{name}">\n{ZERO}</link>\n<joint name="free_joint" type="floating">\n'
         f'  <parent link="{name}"/>\n  <child link="{root}"/>\n</joint>',
@@ -139,7 +139,7 @@ def too_many(site: Site) -> Planted:
         f'  <parent link="{parent}"/>\n  <child link="taxel_{k}"/>\n</joint>'
         for k in range(missing)
     ]
-    edit = site.source.inserting(site.source.root, "\n".join(parts))
+    edit = site.source.insertion(site.source.root, "\n".join(parts))
     return site.planted("DX212", edit, touched=[parent], sign="taxel_")
 
 
@@ -171,7 +171,7 @@ def transmission_of_nothing(site: Site) -> Planted:
     else:
         inside = f'  <joint name="{joint.name}_old"/>\n  <actuator name="motor_of_{joint.name}"/>'
     text = transmission(f"drive_of_{joint.name}", inside)
-    edit = site.source.inserting(site.source.root, text)
+    edit = site.source.insertion(site.source.root, text)
     return site.planted("DX214", edit, touched=[joint.name], sign=f"drive_of_{joint.name}")
 
 
@@ -183,7 +183,7 @@ def actuator_twice(site: Site) -> Planted:
         transmission(f"twin_{k}", f'  <joint name="{joint.name}"/>\n  <actuator name="twin_motor"/>')
         for k, joint in enumerate((first, second))
     )
-    edit = site.source.inserting(site.source.root, text)
+    edit = site.source.insertion(site.source.root, text)
     return site.planted("DX215", edit, touched=[first.name, second.name], sign="twin_motor")
 
 
@@ -191,10 +191,10 @@ def upper_missing(site: Site) -> Planted:
     """Half a range: little of it is within what PyBullet makes of it, so that any few states show it."""
     joint, element = site.pick_joint(lambda each: limited(each) and each.moves, "joint with a limit")
     lower = site.rng.choice(["-1", "-1.0", "-1.05", "-1.1"])
-    edits = site.setting_in(element, "limit", lower=lower)
+    edits = site.part_edits(element, "limit", lower=lower)
     limit = element.first("limit")
     if limit is not None and "upper" in limit.attributes:
-        edits.append(site.source.removing_attribute(limit, "upper"))
+        edits.append(site.source.attribute_removal(limit, "upper"))
     return site.planted("DX216", *edits, joint=joint.name)
 
 
@@ -203,7 +203,7 @@ def named_root_joint(site: Site) -> Planted:
     joint, _ = site.pick_joint(moving, "joint that moves")
     if any(each.name == "root_joint" for each in site.model.joints):
         raise NotHere("has a root_joint")
-    edits = site.renaming("joint", joint.name, "root_joint")
+    edits = site.rename_edits("joint", joint.name, "root_joint")
     return site.planted("DX217", *edits, joint="root_joint", touched=[joint.name, joint.child])
 
 

@@ -84,18 +84,18 @@ def _has_free_body(name: str) -> bool:
 def _stripped(name: str) -> XmlSource:
     path = find(name)
     source = XmlSource(path.read_bytes(), path.name)
-    return source.edited(*(edit for part in source.root.children for edit in _stripping(source, part)))
+    return source.apply(*(edit for part in source.root.children for edit in _strip_edits(source, part)))
 
 
-def _stripping(source: XmlSource, part: SourceElement) -> list[Edit]:
+def _strip_edits(source: XmlSource, part: SourceElement) -> list[Edit]:
     if part.tag == "link":
-        return [source.removing(each) for each in part.all("collision") if not _is_mesh(each)]
+        return [source.removal(each) for each in part.all("collision") if not _is_mesh(each)]
     if part.tag != "joint":
         return []
-    edits = [source.removing(each) for each in part.children if each.tag in _STRIPPED]
+    edits = [source.removal(each) for each in part.children if each.tag in _STRIPPED]
     limit = part.first("limit")
     if limit is not None and part.attributes.get("type") == "revolute" and _without_room(limit):
-        edits.append(source.setting(part, "type", "continuous"))
+        edits.append(source.attribute_edit(part, "type", "continuous"))
     return edits
 
 

@@ -102,7 +102,7 @@ class Site:
         """The text with the edits; `also` are ids of rules about the very same words of the same place."""
         own = [name for name in (link, joint) if name is not None]
         return Planted(
-            self.source.edited(*edits),
+            self.source.apply(*edits),
             (rule, link, joint),
             self.taken | {*own, *touched},
             sign,
@@ -118,17 +118,17 @@ class Site:
             f'  <origin xyz="{x} {y} {z}" rpy="0 0 0"/>\n'
             f'  <parent link="{parent}"/>\n  <child link="{name}"/>\n</joint>'
         )
-        return self.source.inserting(self.source.root, text)
+        return self.source.insertion(self.source.root, text)
 
-    def setting_in(self, part: SourceElement, tag: str, **attributes: str) -> list[Edit]:
+    def part_edits(self, part: SourceElement, tag: str, **attributes: str) -> list[Edit]:
         """Attributes of the first element `tag` of a part, which is made where there is none."""
         element = part.first(tag)
         if element is not None:
-            return [self.source.setting(element, name, value) for name, value in attributes.items()]
+            return [self.source.attribute_edit(element, name, value) for name, value in attributes.items()]
         words = " ".join(f'{name}="{value}"' for name, value in attributes.items())
-        return [self.source.inserting(part, f"<{tag} {words}/>")]
+        return [self.source.insertion(part, f"<{tag} {words}/>")]
 
-    def renaming(self, tag: str, old: str, new: str) -> list[Edit]:
+    def rename_edits(self, tag: str, old: str, new: str) -> list[Edit]:
         """Another name for a link or joint, wherever the document mentions it."""
         mentions = {"link": {"parent": "link", "child": "link"}, "joint": {"mimic": "joint", "joint": "name"}}
         edits = []
@@ -136,10 +136,10 @@ class Site:
             name = "name" if element.tag == tag else mentions[tag].get(element.tag)
             name = "reference" if element.tag == "gazebo" else name
             if name is not None and element.attributes.get(name) == old:
-                edits.append(self.source.setting(element, name, new))
+                edits.append(self.source.attribute_edit(element, name, new))
         return edits
 
-    def writing(self, element: SourceElement, name: str, text: str) -> Edit:
+    def text_edit(self, element: SourceElement, name: str, text: str) -> Edit:
         """The text of an attribute as it stands, tabs and line breaks too."""
         place = element.places[name]
         old = self.source.data[place.start : place.end].decode("utf-8")

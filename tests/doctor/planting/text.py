@@ -106,7 +106,7 @@ def missing_product(site: Site) -> Planted:
     if not zero:
         raise NotHere("no product is zero")
     gone = zero if site.rng.random() < 0.5 else [site.rng.choice(zero)]
-    return site.planted("DX409", *(site.source.removing_attribute(element, each) for each in gone), link=name)
+    return site.planted("DX409", *(site.source.attribute_removal(element, each) for each in gone), link=name)
 
 
 def incomplete(site: Site) -> Planted:
@@ -116,7 +116,7 @@ def incomplete(site: Site) -> Planted:
     element = None if inertial is None else inertial.first("mass")
     if element is None:
         raise NotHere("the link has no mass")
-    edit = site.source.replacing(element, f"<mass>{element.attributes['value'].strip()}</mass>")
+    edit = site.source.replacement(element, f"<mass>{element.attributes['value'].strip()}</mass>")
     return site.planted("DX410", edit, link=name)
 
 
@@ -128,14 +128,14 @@ def repeated(site: Site) -> Planted:
         assert inertial is not None
         text = '<inertial>\n  <mass value="1.0"/>\n  <inertia '
         text += " ".join(f'{each}="0.01"' for each in MOMENTS) + ' ixy="0" ixz="0" iyz="0"/>\n</inertial>'
-        return site.planted("DX411", site.source.inserting_after(inertial, text), link=name)
+        return site.planted("DX411", site.source.insertion_after(inertial, text), link=name)
     joint, element = site.pick_joint(moving, "joint that moves")
     old = {"origin": '<origin xyz="0 0 0.1" rpy="0 0 0"/>', "axis": '<axis xyz="1 0 0"/>'}
     tags = [tag for tag in old if element.first(tag) is not None]
     tag = site.pick(tags, "origin or axis")
     first = element.first(tag)
     assert first is not None
-    return site.planted("DX411", site.source.inserting_after(first, old[tag]), joint=joint.name)
+    return site.planted("DX411", site.source.insertion_after(first, old[tag]), joint=joint.name)
 
 
 def without_name(site: Site) -> Planted:
@@ -144,7 +144,9 @@ def without_name(site: Site) -> Planted:
     if not root.attributes.get("name"):
         raise NotHere("the robot has no name")
     empty = site.rng.random() < 0.5
-    edit = site.source.setting(root, "name", "") if empty else site.source.removing_attribute(root, "name")
+    edit = (
+        site.source.attribute_edit(root, "name", "") if empty else site.source.attribute_removal(root, "name")
+    )
     return site.planted("DX412", edit, sign="<robot")
 
 
@@ -187,31 +189,33 @@ def percent(site: Site) -> Planted:
     if tag == "link":
         old, _ = site.pick_link(lambda each: True, "link")
         new = f"{old}_50%"
-        return site.planted("DX414", *site.renaming(tag, old, new), link=new, touched=[old])
+        return site.planted("DX414", *site.rename_edits(tag, old, new), link=new, touched=[old])
     joint, _ = site.pick_joint(lambda each: True, "joint")
     new = f"{joint.name}_100%d"
-    return site.planted("DX414", *site.renaming(tag, joint.name, new), joint=new, touched=[joint.name])
+    return site.planted("DX414", *site.rename_edits(tag, joint.name, new), joint=new, touched=[joint.name])
 
 
 def material_twice(site: Site) -> Planted:
     """The colours of an arm and of a hand."""
     colours = ['<color rgba="0.5 0.5 0.5 1"/>', '<color rgba="0.2 0.2 0.2 1"/>']
     text = "\n".join(f'<material name="hand_grey">\n  {colour}\n</material>' for colour in colours)
-    edit = site.source.inserting(site.source.root, text, first=site.rng.random() < 0.5)
+    edit = site.source.insertion(site.source.root, text, first=site.rng.random() < 0.5)
     return site.planted("DX415", edit, sign="hand_grey")
 
 
 def unknown_version(site: Site) -> Planted:
     """Somebody counts his own revisions."""
     version = site.rng.choice(["2.0", "1.4.2", "3"])
-    return site.planted("DX416", site.source.setting(site.source.root, "version", version), sign="<robot")
+    return site.planted(
+        "DX416", site.source.attribute_edit(site.source.root, "version", version), sign="<robot"
+    )
 
 
 def unknown_shape(site: Site) -> Planted:
     """PyBullet's plane."""
     name, link = site.pick_link(lambda each: True, "link")
     shape = '<collision>\n  <geometry>\n    <plane normal="0 0 1"/>\n  </geometry>\n</collision>'
-    return site.planted("DX417", site.source.inserting(link, shape), link=name)
+    return site.planted("DX417", site.source.insertion(link, shape), link=name)
 
 
 # -- where numbers stand -------------------------------------------------------------------------
@@ -295,7 +299,7 @@ def _pick(site: Site, numbers: list[Number], fits: Callable[[str], bool] = bool)
 
 
 def _rewritten(site: Site, rule: str, number: Number, text: str) -> Planted:
-    edit = site.writing(number.element, number.name, text)
+    edit = site.text_edit(number.element, number.name, text)
     return site.planted(rule, edit, link=number.link, joint=number.joint)
 
 

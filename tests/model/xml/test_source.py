@@ -63,7 +63,7 @@ def test_an_attribute_is_set_and_all_else_stays(text: str, data: st.DataObject) 
     value = data.draw(st.text(st.characters(codec="utf-8", exclude_categories=("Cc", "Cs")), max_size=8))
     if any(character in "\ufffe\uffff" for character in value):
         return
-    edited = source.edited(source.setting(element, name, value))
+    edited = source.apply(source.attribute_edit(element, name, value))
     again = next(each for each in edited.root.walk() if each.span.start == element.span.start)
     assert again.attributes == {**element.attributes, name: value}
     place = element.places.get(name)
@@ -77,9 +77,9 @@ def test_an_attribute_is_set_and_all_else_stays(text: str, data: st.DataObject) 
 def test_removing_an_inserted_element_restores_the_text(text: str, data: st.DataObject) -> None:
     source = XmlSource(text)
     parent = data.draw(st.sampled_from([each for each in source.root.walk() if not each.empty]))
-    edited = source.edited(source.inserting(parent, "<new/>", first=data.draw(st.booleans())))
+    edited = source.apply(source.insertion(parent, "<new/>", first=data.draw(st.booleans())))
     new = next(each for each in edited.root.walk() if each.tag == "new")
-    left = edited.edited(edited.removing(new)).text
+    left = edited.apply(edited.removal(new)).text
     assert "".join(left.split()) == "".join(source.text.split())
 
 
@@ -87,12 +87,12 @@ def test_edits_keep_comments_quotes_and_indentation() -> None:
     source = XmlSource(ARM)
     base, hand = source.root.all("link")
     (joint,) = source.root.all("joint")
-    edited = source.edited(
-        source.inserting(base, '<inertial>\n    <mass value="0"/>\n</inertial>'),
-        source.setting(hand.children[0].children[0], "value", "2"),
-        source.setting(joint, "foo", 'a & "b"'),
-        source.removing_attribute(joint, "type"),
-        source.removing(joint.children[0]),
+    edited = source.apply(
+        source.insertion(base, '<inertial>\n    <mass value="0"/>\n</inertial>'),
+        source.attribute_edit(hand.children[0].children[0], "value", "2"),
+        source.attribute_edit(joint, "foo", 'a & "b"'),
+        source.attribute_removal(joint, "type"),
+        source.removal(joint.children[0]),
     )
     assert edited.text == (
         ARM.replace(
@@ -109,22 +109,22 @@ def test_edits_keep_comments_quotes_and_indentation() -> None:
 
 def test_an_element_alone_on_its_line_is_removed_with_the_line() -> None:
     source = XmlSource("<r>\n  <a/>\n  <b/>\n</r>")
-    assert source.edited(source.removing(source.root.children[0])).text == "<r>\n  <b/>\n</r>"
+    assert source.apply(source.removal(source.root.children[0])).text == "<r>\n  <b/>\n</r>"
 
 
 def test_text_behind_an_element_is_preserved() -> None:
     source = XmlSource("<r>\n  <a/> <!-- why -->\n  <b/><c/>\n</r>")
     a, b, c = source.root.children
-    assert source.edited(source.removing(a)).text == "<r>\n   <!-- why -->\n  <b/><c/>\n</r>"
-    assert source.edited(source.removing(b)).text == "<r>\n  <a/> <!-- why -->\n  <c/>\n</r>"
-    assert source.edited(source.removing(c)).text == "<r>\n  <a/> <!-- why -->\n  <b/>\n</r>"
+    assert source.apply(source.removal(a)).text == "<r>\n   <!-- why -->\n  <b/><c/>\n</r>"
+    assert source.apply(source.removal(b)).text == "<r>\n  <a/> <!-- why -->\n  <c/>\n</r>"
+    assert source.apply(source.removal(c)).text == "<r>\n  <a/> <!-- why -->\n  <b/>\n</r>"
 
 
 @pytest.mark.parametrize("end", ["\n", "\r\n"])
 def test_line_ends_are_kept(end: str) -> None:
     source = XmlSource(end.join(["<r>", "  <a/>", "</r>"]))
     (a,) = source.root.children
-    edited = source.edited(source.inserting(a, "<b>\n  <c/>\n</b>"))
+    edited = source.apply(source.insertion(a, "<b>\n  <c/>\n</b>"))
     lines = ["<r>", "  <a>", "    <b>", "      <c/>", "    </b>", "  </a>", "</r>"]
     assert edited.text == end.join(lines)
 
@@ -132,7 +132,7 @@ def test_line_ends_are_kept(end: str) -> None:
 def test_overlapping_edits_raise() -> None:
     source = XmlSource("<r><a/></r>")
     with pytest.raises(ValueError, match="overlap"):
-        source.edited(Edit(3, 7, ""), Edit(4, 5, "x"))
+        source.apply(Edit(3, 7, ""), Edit(4, 5, "x"))
 
 
 def test_line_numbers_include_text_before_the_first_element() -> None:
@@ -144,7 +144,7 @@ def test_line_numbers_include_text_before_the_first_element() -> None:
 def test_a_declared_encoding_is_kept() -> None:
     data = '<?xml version="1.0" encoding="iso-8859-1"?><r n="é"/>'.encode("latin-1")
     source = XmlSource(data)
-    edited = source.edited(source.setting(source.root, "m", "é€"))
+    edited = source.apply(source.attribute_edit(source.root, "m", "é€"))
     assert edited.to_bytes() == (
         '<?xml version="1.0" encoding="iso-8859-1"?><r n="é" m="é&#8364;"/>'.encode("latin-1")
     )
