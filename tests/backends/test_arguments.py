@@ -99,6 +99,13 @@ def test_a_quaternion_must_have_length_one(quaternion: tuple[float, ...]) -> Non
             FLOATING.gravity_torque(wrong)
 
 
+def test_the_quaternion_of_a_batch_that_is_wrong_is_named_by_its_place() -> None:
+    q = np.tile(FLOATING.model.neutral(), (2, 3, 1))
+    q[1, 2, 3:7] = 0.5, 0.0, 0.0, 0.0
+    with pytest.raises(ArgumentError, match=r"q\[1, 2, 3:7\] is a quaternion .* of length 0\.5;"):
+        FLOATING.gravity_torque(q)
+
+
 def test_numbers_below_the_bound_are_taken_though_their_norm_is_above() -> None:
     tau = np.full(3, 0.9 * MAX_MAGNITUDE)
     assert np.linalg.norm(tau) > MAX_MAGNITUDE

@@ -14,6 +14,7 @@ from dynx.control import (
     PD,
     PID,
     ComputedTorque,
+    FrictionCompensation,
     GravityCompensatedPD,
     Impedance,
     JointFriction,
@@ -151,6 +152,15 @@ def test_coefficients_given_are_those_of_coordinates() -> None:
     with_dry = JointFriction(robot, 2.0, True, slip=0.0)
     dry = JointFriction(robot, False, True, slip=0.0)
     np.testing.assert_allclose(with_dry(v), 2.0 * v + dry(v), rtol=1e-14)
+
+
+def test_friction_compensation_has_the_coefficients_of_the_description() -> None:
+    robot = mixed_robot()
+    joints = [joint.dynamics for joint in robot.joints if joint.moves]
+    law = FrictionCompensation(PD(robot, kp=1.0, kd=1.0))
+    np.testing.assert_array_equal(law.losses.damping, [joint.damping for joint in joints])
+    np.testing.assert_array_equal(law.losses.friction, [joint.friction for joint in joints])
+    assert law.losses.friction.any()
 
 
 @pytest.mark.parametrize("base", ["fixed", "floating"])

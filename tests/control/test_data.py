@@ -9,7 +9,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dynx.control import PD, ComputedTorque, Controller, Measurement, PositionMotor, Saturated, TorqueMotor
+from dynx.control import (
+    PD,
+    ComputedTorque,
+    Controller,
+    Impedance,
+    Measurement,
+    OperationalSpace,
+    PositionMotor,
+    Saturated,
+    TorqueMotor,
+)
 from dynx.control.base import gain, gains_of
 from dynx.control.open_loop import OpenLoop
 from dynx.model import Model
@@ -75,6 +85,21 @@ def test_the_engine_counts_in_a_comparison() -> None:
     assert law != law.on("reference")
     assert law.on("reference") == ComputedTorque(ARM, kp=400, kd=40, backend="reference")
     assert Saturated(law) != Saturated(law.on("reference"))
+
+
+def test_another_engine_is_passed_on_to_the_inner_controller() -> None:
+    law = ComputedTorque(ARM, kp=400, kd=40)
+    assert Saturated(law).on("reference") == Saturated(law.on("reference"))
+    plain = Saturated(PD(ARM, kp=1.0, kd=1.0))
+    assert plain.on("reference") == plain
+
+
+def test_controllers_of_a_frame_use_the_engine_that_they_are_given() -> None:
+    for law in (
+        Impedance(ARM, "tool0", stiffness=1.0, damping=1.0, backend="reference"),
+        OperationalSpace(ARM, "tool0", kp=1.0, kd=1.0, backend="reference"),
+    ):
+        assert "backend reference" in repr(law)
 
 
 def test_a_controller_prints_its_gains_with_units() -> None:

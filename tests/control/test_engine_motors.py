@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dynx.backends import installed_backends
-from dynx.control import PD, ComputedTorque, PDMotor, PositionMotor, TorqueMotor, VelocityMotor
+from dynx.control import PD, ComputedTorque, Measurement, PDMotor, PositionMotor, TorqueMotor, VelocityMotor
 from dynx.control.engine_motors import MotorCommand
 from dynx.engines.pybullet.canonical_urdf import bullet_tree
 from dynx.engines.pybullet.inertia import ballast_for
@@ -39,6 +39,18 @@ def test_position_and_velocity_motors_follow_a_motion() -> None:
     assert np.abs(position.error).max() < 2e-2
     # Positions drift under a law that does not look at them.
     assert np.abs(position.error[-1]).max() < np.abs(velocity.error[-1]).max()
+
+
+def test_a_motor_tells_the_engine_the_most_that_it_gives() -> None:
+    robot, motion = tutorial_robot(), tutorial_motion()
+    measurement, setpoint = Measurement(0.0, motion.start.q, motion.start.v), motion.start
+    for kind in (PositionMotor, VelocityMotor):
+        assert kind(robot).command(measurement, setpoint).forces is None
+        limits = [10.0, 20.0, 30.0, 4.0, 5.0, np.inf]
+        forces = kind(robot, force=limits).command(measurement, setpoint).forces
+        assert forces is not None
+        assert forces[:5] == limits[:5]
+        assert np.isfinite(forces[5])
 
 
 def test_a_pd_motor_is_the_pd_law() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import pickle
 from typing import Any, cast
 
@@ -29,7 +30,7 @@ from dynx.errors import (
 )
 from dynx.model import Inertial, Joint, Link, Model
 from dynx.model.loading import load
-from dynx.sim import Noise, Payload, Push, simulate
+from dynx.sim import Noise, Payload, Push, simulate, simulate_batch
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint
 from tests.sim.bars import tutorial_motion, tutorial_robot
@@ -202,3 +203,9 @@ def test_a_law_of_inverse_dynamics_that_overflows_is_the_law_s_fault() -> None:
     law = ComputedTorque(ARM, kp=1e308, kd=0.0)
     with pytest.raises(ControlError, match="not finite"):
         simulate(ARM, law, REST, q0=REST + 3.0, duration=0.01)
+
+
+def test_a_batch_has_the_defaults_of_one_rollout() -> None:
+    one, batch = (inspect.signature(function).parameters for function in (simulate, simulate_batch))
+    for name in (one.keys() & batch.keys()) - {"plant"}:
+        assert one[name].default == batch[name].default, name

@@ -124,6 +124,17 @@ def test_elements_of_other_programs_are_skipped() -> None:
     assert (len(model.links), len(model.joints), model.notes) == (1, 0, ())
 
 
+WITHOUT_DYNAMICS = (
+    *("visual", "surface", "sensor", "gazebo", "gravity", "kinematic"),
+    *("self_collide", "self_filter", "collision_checking"),
+)
+
+
+@pytest.mark.parametrize("tag", WITHOUT_DYNAMICS)
+def test_elements_of_a_link_without_dynamics_are_passed_over(tag: str) -> None:
+    assert load(robot(f'<link name="a"><{tag}>1</{tag}></link>')).notes == ()
+
+
 def test_an_unknown_element_is_noted_once_for_all_its_occurrences() -> None:
     model = load(robot('<odd/>\n<odd/><link name="a"><strange/></link>'))
     assert [str(note) for note in model.notes] == [
