@@ -1,4 +1,4 @@
-"""Why engines differ on a robot's file: the causes, the proof of each, and the file mended."""
+"""Diagnosis of a robot's file that engines read differently: causes, their proofs, and the mended file."""
 
 from dynx.doctor.diagnosis import compare_as_loaded, diagnose
 from dynx.doctor.report import DoctorReport, Finding, results_document

@@ -43,8 +43,8 @@ from dynx.rules.choices import checked_choices
 DEFAULT_SAMPLES = 5
 
 NEGLIGIBLE_SHARE = 0.1
-"""Share of the tolerance that places without an effect of their own may reach together in a mended file:
-at other states their sum may be larger."""
+"""Largest error of a mended file from places left as they are because none has an effect alone, as a share of
+the tolerance: their sum may be larger at other states."""
 
 COUNTEREXAMPLE_SECONDS = 20.0
 """Time limit [s] of the search for one smallest counterexample."""
@@ -65,13 +65,13 @@ def diagnose(
     counterexamples: bool = True,
     progress: Progress | None = None,
 ) -> DoctorReport:
-    """Find out why engines differ when they load this robot's file themselves, prove it, and mend the file.
+    """Find and prove the causes for which engines that load this robot's file differ, and mend the file.
 
-    `robot` is whatever `dynx.load` takes. `engines` are names of `dynx.loaded.ENGINES` (default: all that
+    `robot` is any argument of `dynx.load`. `engines` are names of `dynx.loaded.ENGINES` (default: all that
     are installed). Each loads the file by its documented call and is compared with reference values at
     `samples` random states that follow from `seed`, in tilted gravity; a relative error above `tolerance`
-    is a difference. `choose` maps rule ids to one of the rule's `choices`. `counterexamples` says whether
-    to search for the smallest robot that shows a difference which no rule explains. `progress` is called
+    is a difference. `choose` maps rule ids to one of the rule's `choices`. `counterexamples` selects
+    the search for the smallest robot that shows a difference which no rule explains. `progress` is called
     with the name of each step.
 
     A robot that cannot be read gives a report with `error` set. Raises ArgumentError,
@@ -145,7 +145,7 @@ def _diagnosis_of(
     progress("mending")
     full = mend(case, rules)
     after = examiner.examine(full.case)
-    proofs = _proved_causes(case, rules, examiner, before, after, tolerance, progress)
+    proofs = _prove_causes(case, rules, examiner, before, after, tolerance, progress)
     mended, last = _smallest_mending(case, rules, full, after, proofs, examiner, tolerance)
     unexplained = _unexplained(last, tolerance, _engines_without_remedy(mended.case, rules))
     if unexplained and counterexamples:
@@ -172,7 +172,7 @@ def _rules_for(examiner: Examiner) -> list[Rule]:
     return [rule for rule in all_rules() if rule.kind == "practice" or rule.holds_for(versions)]
 
 
-def _proved_causes(
+def _prove_causes(
     case: Case,
     rules: Sequence[Rule],
     examiner: Examiner,
@@ -184,7 +184,7 @@ def _proved_causes(
     """Measure the effect of every rule about differences at every place.
 
     The causes of rules about the text are removed from the text as it is, those of rules about the robot from
-    the text made readable. Shapes that engines do not load here are left out from the start.
+    the text made readable. Meshes are removed from both texts first.
     """
     slim = case.with_source(without_meshes(case.source))
     sound = readable(slim).case
@@ -209,12 +209,12 @@ def _smallest_mending(
     examiner: Examiner,
     tolerance: float,
 ) -> tuple[Mending, Examination]:
-    """Apply only the remedies that matter, where they have the effect of all together.
+    """Apply only the remedies that matter, if they reduce the errors as far as all remedies do.
 
-    First the places that have an effect of their own, then all places of the rules that have one
-    somewhere: effects too small to be measured alone may add up. Causes that show only at some states are
-    always removed, and so are those that concern an engine that refuses even the mended file, because
-    their effect on it cannot be measured.
+    The first attempt takes the places that have an effect of their own, the second all places of the rules
+    that have one somewhere: effects too small to be measured alone may add up. Causes that show only at some
+    states are always removed, and so are those that concern an engine that refuses even the mended file,
+    because their effect on it cannot be measured.
     """
     unmeasured = {engine for engine in examiner.engines if after.outputs[engine].refused is not None}
     idle: set[Place] = {

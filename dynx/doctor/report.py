@@ -112,11 +112,11 @@ class RunTimeCall:
 
 @dataclass(frozen=True, repr=False)
 class DoctorReport:
-    """Why engines differ on a file, with proof; true in a condition if they do not differ.
+    """Causes of the differences between engines on a file, with proofs; truthy if they do not differ.
 
     `residual` is the largest relative error that remains after mending, `referee` that of the reference
     values themselves (mass matrix and inverse dynamics at one state) against 50 digits. `choices` are
-    sentences: what was decided where the file is ambiguous, and what changed the physics of the robot.
+    sentences on the decisions where the file is ambiguous and on the changes to the physics of the robot.
     `model_difference` lists the values of engines that the file does not state.
     """
 

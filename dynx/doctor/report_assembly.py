@@ -45,7 +45,7 @@ def with_after(report: DoctorReport, after: Examination) -> DoctorReport:
 
 
 def _residual(examination: Examination) -> float:
-    """Largest error of the engines that load the file."""
+    """Return the largest error of the engines that load the file."""
     errors = [examination.errors(engine) for engine in examination.outputs]
     return max((error for of_engine in errors for error in of_engine.values()), default=0.0)
 

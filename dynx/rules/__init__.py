@@ -1,4 +1,4 @@
-"""Why engines differ on a file: a catalogue of causes, each with its detection and its remedy.
+"""Catalogue of the causes for which engines differ on a file, each with its detection and its remedy.
 
 One module of `dynx.rules.catalogue` is one rule; its docstring is the page that ``dynx explain`` prints.
 Other packages offer rules of their own in the entry-point group ``dynx.rules``.

@@ -63,20 +63,20 @@ class Case:
         return {link.name: link.inertial for link in self.model.links}
 
     def choice(self, rule: str, default: str) -> str:
-        """The user's choice for a rule, or the default."""
+        """Return the user's choice for a rule, or the default."""
         return (self.choices or {}).get(rule, default)
 
     def with_source(self, source: XmlSource) -> Case:
-        """The case with another text."""
+        """Return the case with another text."""
         return replace(self, source=source)
 
     def with_calls(self, *calls: str) -> Case:
-        """The case with further engine settings."""
+        """Return the case with further engine settings."""
         return replace(self, calls=self.calls | set(calls))
 
 
 def end_of(joint: SourceElement, role: str) -> str:
-    """The link that a ``<joint>`` names as its ``parent`` or ``child``; empty where it names none."""
+    """Return the link that a ``<joint>`` names as its ``parent`` or ``child``; empty where it names none."""
     element = joint.first(role)
     return "" if element is None else element.attributes.get("link", "")
 

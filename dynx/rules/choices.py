@@ -9,7 +9,7 @@ from dynx.rules.registry import find_rule
 
 
 def checked_choices(given: Iterable[tuple[str, str]]) -> dict[str, str]:
-    """The choices by rule id, from pairs of a rule's id or name and one of its `choices`.
+    """Return the choices by rule id, from pairs of a rule's id or name and one of its `choices`.
 
     Raises UnknownNameError for an unknown rule or choice, ArgumentError for a rule that has no choices or is
     given twice with different ones.

@@ -21,7 +21,7 @@ class Correction:
 
 
 def found_at(element: SourceElement, message: str) -> Detection:
-    """The detection in `element`: its line, and the link or joint of the robot that it belongs to."""
+    """Return the detection in `element`: its line, and the link or joint of the robot that it belongs to."""
     part = element
     while part.parent is not None and part.parent.parent is not None:
         part = part.parent
@@ -32,7 +32,7 @@ def found_at(element: SourceElement, message: str) -> Detection:
 
 
 def correction(element: SourceElement, message: str, *edits: Edit) -> Correction:
-    """The correction of `element` by these edits."""
+    """Return the correction of `element` by these edits."""
     return Correction(found_at(element, message), edits)
 
 
@@ -46,14 +46,14 @@ class EditingRule(Rule):
 
     @abstractmethod
     def corrections(self, case: Case) -> Iterable[Correction]:
-        """One for every place where the rule applies, in document order."""
+        """Yield one for every place where the rule applies, in document order."""
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
-        """The places of the corrections."""
+        """Yield the places of the corrections."""
         return (each.detection for each in self.corrections(case))
 
     def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy | None:
-        """The edits of these places."""
+        """Return the edits of these places."""
         wanted = set(detections)
         edits = [edit for each in self.corrections(case) if each.detection in wanted for edit in each.edits]
         if not edits:
@@ -69,5 +69,5 @@ class OptionalEditingRule(EditingRule):
     kind: ClassVar[Kind] = "practice"
 
     def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy | None:
-        """The edits of these places, if they were chosen."""
+        """Return the edits of these places, if they were chosen."""
         return None if self.chosen(case) == "keep" else super().remedy(case, detections)

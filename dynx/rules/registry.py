@@ -22,7 +22,7 @@ OTHERS: ClassRegistry[Rule] = ClassRegistry(
 
 @cache
 def all_rules() -> tuple[Rule, ...]:
-    """One instance of each rule in the order of application: dynx's own by number, then all others by id.
+    """List one instance of each rule in the order of application: dynx's own by number, then others by id.
 
     Raises DynxError for an entry point that cannot be loaded, that is no rule, or whose id or name is taken.
     """
@@ -43,7 +43,7 @@ def all_rules() -> tuple[Rule, ...]:
 
 
 def find_rule(name: str) -> Rule:
-    """The rule of that id or name, in any case; raises UnknownNameError with the nearest name."""
+    """Return the rule of that id or name, in any case; raises UnknownNameError with the nearest name."""
     for rule in all_rules():
         if name.lower() in (rule.id.lower(), rule.name):
             return rule

@@ -1,4 +1,4 @@
-"""A rule: a cause of disagreement between engines that is detected in a file and, mostly, removed from it."""
+"""Rules: a rule is a cause of disagreement between engines that is detected in a file and mostly removed."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Detection:
 
 
 def links_of(detections: Sequence[Detection]) -> list[str]:
-    """The names of the links in which something was detected."""
+    """Return the names of the links in which something was detected."""
     return [detection.link for detection in detections if detection.link is not None]
 
 
@@ -104,22 +104,22 @@ class Rule(ABC):
 
     @abstractmethod
     def occurrences(self, case: Case) -> Iterable[Detection]:
-        """Every place in the file where the cause is present, in document order."""
+        """Yield every place in the file where the cause is present, in document order."""
 
     def detect(self, case: Case) -> Sequence[Detection]:
-        """Every place that still has to be remedied, in document order."""
+        """Return every place that still has to be remedied, in document order."""
         return list(self.occurrences(case))
 
     def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy | None:
-        """The case without the cause in these places; None where nothing can remove it."""
+        """Return the case without the cause in these places; None where nothing can remove it."""
         return None
 
     def chosen(self, case: Case) -> str:
-        """The user's choice among `choices`, or the first of them."""
+        """Return the user's choice among `choices`, or the first of them."""
         return case.choice(self.id, next(iter(self.choices)))
 
     def decision(self, case: Case) -> str | None:
-        """A sentence on what was chosen and how to choose otherwise; None where there is no choice."""
+        """Return a sentence on what was chosen and how to choose otherwise; None where there is no choice."""
         if not self.choices:
             return None
         chosen = self.chosen(case)
@@ -128,7 +128,7 @@ class Rule(ABC):
 
     @classmethod
     def holds_for(cls, versions: Mapping[str, str]) -> bool:
-        """Whether the rule holds for any of these engines in these versions."""
+        """Check whether the rule holds for any of these engines in these versions."""
         return any(
             SpecifierSet(stated).contains(versions[engine], prereleases=True)
             for engine, stated in cls.engines.items()
@@ -137,7 +137,7 @@ class Rule(ABC):
 
     @classmethod
     def page(cls) -> str:
-        """The page of the rule: the docstring of its module."""
+        """Return the page of the rule: the docstring of its module."""
         return inspect.cleandoc(getattr(sys.modules.get(cls.__module__), "__doc__", None) or "")
 
     @classmethod
@@ -156,9 +156,9 @@ class CallingRule(Rule):
     """What was done, as in `Remedy.changed`."""
 
     def detect(self, case: Case) -> Sequence[Detection]:
-        """The occurrences; none once the calls are made."""
+        """Return the occurrences; none once the calls are made."""
         return [] if case.calls.issuperset(self.calls) else super().detect(case)
 
     def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy | None:
-        """The case with the calls, which act on the whole robot."""
+        """Return the case with the calls, which act on the whole robot."""
         return Remedy(case.with_calls(*self.calls), self.changed)

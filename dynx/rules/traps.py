@@ -14,7 +14,7 @@ from dynx.rules.rule import Rule
 
 
 def find_trap(rule: Rule | str) -> Path:
-    """The trap of a rule, or of its id or name: beside dynx's own models, or beside the rule's module.
+    """Return the trap of a rule, or of its id or name: beside dynx's own models, or beside the rule's module.
 
     Raises UnknownNameError where there is no such rule, RobotNotFoundError where its trap is missing.
     """
@@ -30,7 +30,7 @@ def find_trap(rule: Rule | str) -> Path:
 
 
 def trap_case(rule: Rule | str) -> Case:
-    """The trap of a rule as the rule sees it, on the base on which it shows the cause."""
+    """Return the trap of a rule as the rule sees it, on the base on which it shows the cause."""
     found = find_rule(rule) if isinstance(rule, str) else rule
     path = find_trap(found)
     return Case(XmlSource(path.read_bytes(), str(path)), base=found.trap_base)

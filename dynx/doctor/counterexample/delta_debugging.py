@@ -22,14 +22,14 @@ def maximal_changes(changes: Sequence[Change], holds: Callable[[Sequence[Change]
     made: set[int] = set()
     size = len(changes)
     while size:
-        found = _tried(changes, holds, made, size)
+        found = _try_chunks(changes, holds, made, size)
         # A change may become possible only by another one, so single ones are tried until none is.
         if not (size == 1 and found):
             size //= 2
-    return _chosen(changes, made)
+    return _select(changes, made)
 
 
-def _tried(
+def _try_chunks(
     changes: Sequence[Change], holds: Callable[[Sequence[Change]], bool], made: set[int], size: int
 ) -> bool:
     """Try the changes not made yet in chunks of `size`; return whether any could be made."""
@@ -37,11 +37,11 @@ def _tried(
     found = False
     for start in range(0, len(waiting), size):
         chunk = waiting[start : start + size]
-        if holds(_chosen(changes, made.union(chunk))):
+        if holds(_select(changes, made.union(chunk))):
             made.update(chunk)
             found = True
     return found
 
 
-def _chosen(changes: Sequence[Change], numbers: set[int]) -> list[Change]:
+def _select(changes: Sequence[Change], numbers: set[int]) -> list[Change]:
     return [changes[k] for k in sorted(numbers)]

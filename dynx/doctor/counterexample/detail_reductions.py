@@ -1,4 +1,4 @@
-"""Reductions of what is left of a robot: elements and attributes removed, numbers rounded."""
+"""Reductions of the details of a small robot: elements and attributes removed, numbers rounded."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ def shortest(word: str) -> str:
     return repr(int(value)) if value == int(value) and abs(value) < 1e6 else repr(value)
 
 
-def formatted(source: XmlSource, *, numbers: bool) -> str:
+def format_document(source: XmlSource, *, numbers: bool) -> str:
     """Format the document with two blanks of indentation and without comments, one element to a line, with
     numbers as short as possible if `numbers`."""
     return "\n".join(_lines(source.root, "", numbers)) + "\n"
@@ -114,7 +114,7 @@ def formatted(source: XmlSource, *, numbers: bool) -> str:
 
 def _lines(element: SourceElement, indent: str, numbers: bool) -> Iterator[str]:
     written = "".join(
-        f" {name}={quoteattr(_formatted_value(value) if numbers and name not in _NAMING else value)}"
+        f" {name}={quoteattr(_format_value(value) if numbers and name not in _NAMING else value)}"
         for name, value in element.attributes.items()
     )
     if not element.children:
@@ -126,16 +126,16 @@ def _lines(element: SourceElement, indent: str, numbers: bool) -> Iterator[str]:
     yield f"{indent}</{element.tag}>"
 
 
-def _formatted_value(value: str) -> str:
+def _format_value(value: str) -> str:
     return " ".join(shortest(word) for word in value.split(" "))
 
 
 def _removals(source: XmlSource, chosen: Sequence[SourceElement]) -> Iterator[Edit]:
     """Remove elements; an element inside another removed one needs no edit."""
-    going = {id(element) for element in chosen}
+    removed = {id(element) for element in chosen}
     for element in chosen:
         above = element.parent
-        while above is not None and id(above) not in going:
+        while above is not None and id(above) not in removed:
             above = above.parent
         if above is None:
             yield source.removal(element)

@@ -3,7 +3,7 @@
 The robot is reduced while the difference stays: shapes and simulators' elements are removed, then links,
 then moving joints become fixed; then elements, attributes and digits. Between these the state is simplified.
 All of it is repeated until nothing more can be removed or the budget is spent. The reductions edit the text
-in place, so that a difference in how engines read the text is not lost by writing it anew.
+in place, so that a difference caused by the text itself is not lost.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from dynx.doctor.counterexample.detail_reductions import (
     fewer_attributes,
     fewer_elements,
     fewer_extras,
-    formatted,
+    format_document,
     frame_axes,
     plain_numbers,
     round_numbers,
@@ -75,7 +75,7 @@ def smallest_counterexample(
     `budget` bounds the time [s] after which no new robot is tried; None leaves `trials.MAX_TRIALS`.
     Equal arguments give equal results unless the time runs out.
 
-    Returns None where dynx cannot read the case, or `FIRST_STATES` random states, which follow from
+    Returns None where dynx cannot read the case, or `INITIAL_STATES` random states, which follow from
     `seed`, show no error above `tolerance`.
     """
     trials = Trials(difference, case, budget)
@@ -84,14 +84,14 @@ def smallest_counterexample(
         return None
     for _ in range(MAX_ROUNDS):
         before = case.source.data, state.key
-        case = _reduced(case, state, trials, TREE_REDUCTIONS)
+        case = _reduce(case, state, trials, TREE_REDUCTIONS)
         if trials.spent:
             break
         state = simplest_state(state, partial(trials.holds, case), seed)
-        case = _reduced(case, state, trials, DETAIL_REDUCTIONS)
+        case = _reduce(case, state, trials, DETAIL_REDUCTIONS)
         if (case.source.data, state.key) == before or trials.spent:
             break
-    return _result(_formatted(case, state, trials), state, trials)
+    return _result(_format_case(case, state, trials), state, trials)
 
 
 def _first_state(case: Case, trials: Trials, tolerance: float, seed: int) -> ReducibleState | None:
@@ -109,7 +109,7 @@ def _first_state(case: Case, trials: Trials, tolerance: float, seed: int) -> Red
     return states[errors.index(largest)]
 
 
-def _reduced(
+def _reduce(
     case: Case,
     state: ReducibleState,
     trials: Trials,
@@ -135,10 +135,10 @@ def _reduced(
     return case
 
 
-def _formatted(case: Case, state: ReducibleState, trials: Trials) -> Case:
+def _format_case(case: Case, state: ReducibleState, trials: Trials) -> Case:
     """Format the text of the case, if the formatted text shows the difference too."""
     for numbers in (True, False):
-        text = formatted(case.source, numbers=numbers)
+        text = format_document(case.source, numbers=numbers)
         candidate = case.with_source(XmlSource(text, case.source.source))
         if trials.holds(candidate, state):
             return candidate

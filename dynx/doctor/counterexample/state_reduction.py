@@ -4,8 +4,8 @@ The state goes by the names of the joints, so that it fits a robot from which jo
 reduction has two steps. The greedy one starts from a state that shows the difference, puts as many parts as
 it can at rest, then rounds the others one by one; it always ends with a state that shows the difference.
 Hypothesis (the extra ``testing``) then searches all combinations of simple values of the parts that are left:
-it finds what needs two parts to change at once. It cannot start from a given state and would not succeed
-among all coordinates, so it comes second; where it is not installed, the greedy result stands.
+it finds what needs two parts to change at once. It cannot start from a given state, and the
+combinations of all coordinates are too many, so it comes second; without it the greedy result stands.
 """
 
 from __future__ import annotations
@@ -114,11 +114,11 @@ def rest(slot: Slot) -> Value:
 
 
 def simplest_state(state: ReducibleState, holds: Holds, seed: int) -> ReducibleState:
-    """Find a state as simple as possible that holds, from `state`, which holds; no part is added."""
-    return _searched(_greedily_reduced(state, holds), holds, seed)
+    """Find the simplest state that `holds`, starting from `state`, which does; no part is added."""
+    return _search(_reduce_greedily(state, holds), holds, seed)
 
 
-def _greedily_reduced(state: ReducibleState, holds: Holds) -> ReducibleState:
+def _reduce_greedily(state: ReducibleState, holds: Holds) -> ReducibleState:
     slots = sorted(state.parts)
     resting = maximal_changes(
         slots, lambda chosen: holds(state.with_parts({slot: rest(slot) for slot in chosen}))
@@ -133,7 +133,7 @@ def _greedily_reduced(state: ReducibleState, holds: Holds) -> ReducibleState:
     return state
 
 
-def _searched(state: ReducibleState, holds: Holds, seed: int) -> ReducibleState:
+def _search(state: ReducibleState, holds: Holds, seed: int) -> ReducibleState:
     """Let Hypothesis search for a simpler state; `state` itself where it finds none."""
     try:
         from hypothesis import HealthCheck, Phase, currently_in_test_context, find, settings
@@ -169,7 +169,7 @@ def _searched(state: ReducibleState, holds: Holds, seed: int) -> ReducibleState:
 
 
 def _simpler_values(slot: Slot, value: Value) -> list[Value]:
-    """Values simpler than `value`, the simplest first; rest excepted."""
+    """List values simpler than `value`, the simplest first; rest excepted."""
     if slot == ATTITUDE:
         return [] if value in QUARTER_TURNS else list(QUARTER_TURNS)
     number = value[0]

@@ -54,36 +54,36 @@ class _Tree:
 
     def below_root(self) -> list[int]:
         """List the joints depth first: joint k stands for its child link."""
-        carried: dict[str, list[int]] = {}
+        children_of: dict[str, list[int]] = {}
         for k, (parent, _) in enumerate(self._ends):
-            carried.setdefault(parent, []).append(k)
-        children = {child for _, child in self._ends}
+            children_of.setdefault(parent, []).append(k)
+        child_links = {child for _, child in self._ends}
         order: list[int] = []
-        waiting = [k for root in carried if root not in children for k in reversed(carried[root])]
+        waiting = [k for root in children_of if root not in child_links for k in reversed(children_of[root])]
         while waiting:
             k = waiting.pop()
             order.append(k)
-            waiting += reversed(carried.get(self._ends[k][1], []))
+            waiting += reversed(children_of.get(self._ends[k][1], []))
         return order
 
     def without_children(self, joints: Sequence[int]) -> XmlSource:
         for k in joints:
             parent, child = self._ends[k]
-            self._leave_out(k, child, parent)
-        return self._edited()
+            self._drop(k, child, parent)
+        return self._document()
 
     def without_parents(self, joints: Sequence[int]) -> XmlSource:
         for k in joints:
             parent, child = self._ends[k]
-            self._leave_out(k, parent, child)
-        return self._edited()
+            self._drop(k, parent, child)
+        return self._document()
 
-    def _leave_out(self, k: int, link: str, other: str) -> None:
+    def _drop(self, k: int, link: str, other: str) -> None:
         self._gone_joints.add(k)
         self._gone_links.add(link)
         self._ends = [[other if end == link else end for end in ends] for ends in self._ends]
 
-    def _edited(self) -> XmlSource:
+    def _document(self) -> XmlSource:
         source = self._source
         edits: list[Edit] = []
         for k, joint in enumerate(self._joints):

@@ -28,8 +28,8 @@ MAX_TRIALS = 1500
 class Trials:
     """Evaluates `difference`, stores its values, and stops when the budget [s] is spent.
 
-    A robot counts only if it has no cause of the catalogue that the `original` does not have: a link that
-    loses its ``<inertial>``, for example, would show that difference instead. A state counts only within the
+    A robot is tried only if it has no cause of the catalogue that the `original` does not have: a link
+    without ``<inertial>``, for example, would show that difference instead. A state is tried only within the
     limits of the joints, outside which some engines apply a force; joints of the original whose limits leave
     no range are excepted.
     """
@@ -52,11 +52,11 @@ class Trials:
         return self._count >= MAX_TRIALS or perf_counter() >= self._until
 
     def holds(self, case: Case, state: ReducibleState) -> bool:
-        """Check that the error is above the threshold; False for what was not tried within the budget."""
+        """Check that the error is above the threshold; False if it was not tried within the budget."""
         return self.error(case, state) > self.threshold and self._adds_no_cause(case)
 
     def error(self, case: Case, state: ReducibleState) -> float:
-        """Relative error, infinite for NaN; 0 for what does not count or exceeds the budget."""
+        """Relative error, infinite for NaN; 0 where nothing was tried."""
         model = self.model(case)
         if model is None:
             return 0.0

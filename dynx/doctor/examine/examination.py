@@ -1,4 +1,4 @@
-"""One file in several engines: what each computes, and its error against the reference values."""
+"""Examination of one file in several engines: their quantities, and the errors against reference values."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ from dynx.spatial.scalar import Floats
 KINEMATICS, JACOBIAN = "forward_kinematics", "jacobian"
 MASS, TORQUE, ACCELERATION = "mass_matrix", "inverse_dynamics", "forward_dynamics"
 LOADING = "loading"
-"""Stands for a quantity where an engine refuses the file."""
+"""Quantity of the effect on an engine that refuses the file."""
 
 QUANTITIES = (KINEMATICS, JACOBIAN, MASS, TORQUE, ACCELERATION)
-"""Quantities that are compared; forward dynamics by the torque that the found acceleration requires."""
+"""Quantities that are compared; forward dynamics by the torque that the computed acceleration requires."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,19 +76,19 @@ class Examination:
         if quantity == ACCELERATION:
             return 1.0
         reference = self.reference
-        right = {
+        expected = {
             KINEMATICS: reference.poses,
             JACOBIAN: np.stack(list(reference.jacobians.values())) if reference.jacobians else np.zeros(1),
             MASS: reference.mass_matrix,
             TORQUE: reference.torque,
         }[quantity]
-        largest = float(np.max(np.abs(right), initial=0.0))
+        largest = float(np.max(np.abs(expected), initial=0.0))
         if largest > 0.0:
             return largest
         return _largest(self.outputs[engine].deviation.get(quantity, {})) or 1.0
 
     def error(self, engine: str, quantity: str) -> float:
-        """Largest deviation over its scale; infinite where the engine computed nothing."""
+        """Return the largest deviation over its scale; infinite where the engine computed nothing."""
         output = self.outputs[engine]
         if output.refused is not None or quantity in output.failed:
             return float("inf")
@@ -103,7 +103,7 @@ class Examination:
         return {quantity: self.error(engine, quantity) for quantity in examined}
 
     def max_error(self, engine: str) -> float:
-        """The largest of `errors`, infinite where the file was refused."""
+        """Return the largest of `errors`, infinite where the file was refused."""
         if self.outputs[engine].refused is not None:
             return float("inf")
         return max(self.errors(engine).values(), default=0.0)
@@ -155,10 +155,10 @@ class Examiner:
         reference = reference or self.reference(case)
         chosen = [name for name in self.engines if engines is None or name in engines]
         with temporary_urdf(without_meshes(case.source)) as path:
-            outputs = {name: self._evaluated(name, path, case, reference, describe) for name in chosen}
+            outputs = {name: self._evaluate(name, path, case, reference, describe) for name in chosen}
         return Examination(reference, outputs)
 
-    def _evaluated(
+    def _evaluate(
         self, engine: str, path: Path, case: Case, reference: ReferenceValues, describe: bool
     ) -> EngineOutput:
         try:
@@ -188,10 +188,12 @@ def _outputs_of(engine: str, robot: LoadedRobot, reference: ReferenceValues, des
     record(KINEMATICS, lambda: _pose_deviation(robot, reference))
     if reference.model.nv:
         record(JACOBIAN, lambda: _jacobian_deviation(robot, reference))
-        record(MASS, lambda: {"": _each(robot.mass_matrix, states.q) - reference.mass_matrix})
+        record(MASS, lambda: {"": _evaluate_samples(robot.mass_matrix, states.q) - reference.mass_matrix})
         record(
             TORQUE,
-            lambda: {"": _each(robot.inverse_dynamics, states.q, states.v, states.a) - reference.torque},
+            lambda: {
+                "": _evaluate_samples(robot.inverse_dynamics, states.q, states.v, states.a) - reference.torque
+            },
         )
         if reference.solvable:
             record(ACCELERATION, lambda: {"": _acceleration_deviation(robot, reference)})
@@ -199,21 +201,21 @@ def _outputs_of(engine: str, robot: LoadedRobot, reference: ReferenceValues, des
     return EngineOutput(engine, None, deviation, failed, description)
 
 
-def _each(compute: Callable[..., Floats], *columns: Floats) -> Floats:
+def _evaluate_samples(compute: Callable[..., Floats], *columns: Floats) -> Floats:
     return np.stack([compute(*sample) for sample in zip(*columns, strict=True)])
 
 
 def _pose_deviation(robot: LoadedRobot, reference: ReferenceValues) -> dict[str, Floats]:
-    gap = _each(robot.link_poses, reference.states.q) - reference.poses
+    gap = _evaluate_samples(robot.link_poses, reference.states.q) - reference.poses
     names = [link.name for link in reference.model.links]
-    # A link that the engine does not have is all NaN; one that it cannot place is so in part.
+    # Poses of a link that the engine does not have are all NaN; one pose is NaN where it cannot be computed.
     return {name: gap[:, k] for k, name in enumerate(names) if not np.isnan(gap[:, k]).all()}
 
 
 def _jacobian_deviation(robot: LoadedRobot, reference: ReferenceValues) -> dict[str, Floats]:
     gaps = {}
     for link, expected in reference.jacobians.items():
-        found = _each(lambda q, link=link: robot.jacobian(q, link), reference.states.q)
+        found = _evaluate_samples(lambda q, link=link: robot.jacobian(q, link), reference.states.q)
         if not np.isnan(found).all():
             gaps[link] = found - expected
     return gaps
@@ -231,7 +233,7 @@ def _acceleration_deviation(robot: LoadedRobot, reference: ReferenceValues) -> F
 
 def _backward_error(robot: LoadedRobot, reference: ReferenceValues, tau: Floats) -> Floats:
     states = reference.states
-    found = _each(robot.forward_dynamics, states.q, states.v, tau)
+    found = _evaluate_samples(robot.forward_dynamics, states.q, states.v, tau)
     required = reference.required_torque(found)
     terms = np.einsum("nij,nj->ni", np.abs(reference.mass_matrix), np.abs(found))
     terms = terms + np.abs(reference.bias) + np.abs(tau)
@@ -239,7 +241,7 @@ def _backward_error(robot: LoadedRobot, reference: ReferenceValues, tau: Floats)
 
 
 def max_change(before: Mapping[str, Floats], after: Mapping[str, Floats]) -> float:
-    """Largest difference between two sets of deviations, where both have the same parts.
+    """Return the largest difference between two sets of deviations, where both have the same parts.
 
     Infinite where their shapes differ: the robots do not have the same coordinates.
     """
@@ -252,7 +254,7 @@ def max_change(before: Mapping[str, Floats], after: Mapping[str, Floats]) -> flo
 
 
 def coordinate_names(reference: ReferenceValues) -> tuple[str, ...]:
-    """Names of the entries of v."""
+    """Return the names of the entries of v."""
     base = ("base x", "base y", "base z", "base roll", "base pitch", "base yaw")
     return (base if reference.model.floating else ()) + reference.model.joint_names
 

@@ -1,7 +1,7 @@
 """Reference values for a file: the robot as dynx reads it, evaluated by the algorithms of `dynx.rbd`.
 
-Coordinates are those of all moving joints, mimic joints included, because engines load them so: the
-``<mimic>`` tags are set aside. Gravity is tilted, so that a value in the wrong frame shows. ``dynx agree``
+Coordinates are those of all moving joints, mimic joints included, as engines load them: the ``<mimic>`` tags
+are removed. Gravity is tilted, so that a value in the wrong frame shows. ``dynx agree``
 compares the backend `reference`, which evaluates here, with a 50-digit referee.
 """
 
@@ -31,7 +31,7 @@ MAX_TIPS = 4
 
 MAX_LIMIT_DISTANCE = 100.0
 """Distance from zero [rad or m] beyond which limits are ignored and states are drawn near zero: so far away
-the rounding of the coordinate would be what is compared."""
+rounding of the coordinate would dominate the errors."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,8 +93,9 @@ def model_without_mimics(source: XmlSource, base: Base) -> Model:
 
 
 def draw_states(model: Model, count: int, seed: int) -> States:
-    """Draw random states: the middle four fifths of the range that limits allow, else any angle and lengths
-    up to 1 m, or as far from the limit nearest to zero; velocities and accelerations up to 2.
+    """Draw random states: positions in the middle four fifths of the range of each joint, which extends to
+    its limits, or to pi [rad] or 1 [m] from zero (or from the limit nearest to zero) if these are closer;
+    velocities and accelerations up to 2.
 
     Engines that step resist a limit with a force, so no limit may be reached within a step. A range without
     width has no middle: there a joint may be anywhere.
@@ -117,7 +118,7 @@ def draw_states(model: Model, count: int, seed: int) -> States:
 
 
 def reference_values(model: Model, states: States) -> ReferenceValues:
-    """Compute the reference values; torques of the magnitude of `torque` drive forward dynamics."""
+    """Compute the reference values; forward dynamics gets the `torque` of the previous state."""
     # A file without any mass gives NaN here, which is compared and needs no warning of NumPy.
     with np.errstate(all="ignore"), ReferenceBackend(model) as reference:
         # Frames of links come first; engines do not know those that dynx adds.

@@ -1,7 +1,7 @@
-"""Heat maps: an error is a number on a colour, by steps of its logarithm.
+"""Heat maps: each error is a number on a colour, which follows the logarithm of the error in steps.
 
-Each colour comes with the colour of the number on it, for light and for dark pages; a test holds every
-pair to the contrast that WCAG 2.1 asks of text (4.5). Nothing is said by colour alone.
+Each colour comes with the colour of the number on it, for light and for dark pages; a test checks
+the contrast that WCAG 2.1 requires of text (4.5). No information is in the colour alone.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ ALL_STEPS = (SAME, *STEPS, NONE)
 
 @dataclass(frozen=True)
 class HeatMap:
-    """Errors by row and column; a head is shown in several lines, an error that is None as an empty cell."""
+    """Errors by row and column; a column head has several lines, and a missing error is an empty cell."""
 
     corner: str
     heads: tuple[tuple[str, ...], ...] = ()

@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from jinja2 import Environment
 
 LIMITS = {"SHOWN_RULES": 6, "OPEN_PLACES": 2, "SHOWN_PLACES": 40, "OPEN_VALUES": 25, "OPEN_LINES": 80}
-"""Rules in the row of one robot among many; places of a cause that are open, and shown at all; values that
-engines hold and changed lines up to which a table is open."""
+"""Largest numbers: of rules in a robot's row of the overview, of places of a cause that are expanded and
+that are listed, of engine values and of changed lines in an expanded table."""
 
 LOWEST_BAR = -16
 """Power of ten at which the bar of an error starts: the last digit of a double; it is full at 100 %."""
@@ -36,7 +36,7 @@ LOWEST_BAR = -16
 def html_page(
     reports: Sequence[DoctorReport], *, command: str | None = None, baseline: Baseline | None = None
 ) -> str:
-    """Make the page, in ASCII. `command` is the command line that the page gives for the same result."""
+    """Make the page, in ASCII, with the `command` line that gives the same result."""
     entries = {cause.rule: cause.entry for report in reports for cause in causes(report) if cause.entry}
     page = template_environment().get_template("page.html.j2")
     text = page.render(
@@ -54,7 +54,7 @@ def html_page(
 
 @cache
 def template_environment() -> Environment:
-    """Return the templates with the functions that they use. Only this function uses Jinja2."""
+    """Return the templates with the functions that they use. Only this function imports Jinja2."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(

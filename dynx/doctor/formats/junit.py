@@ -17,7 +17,7 @@ from dynx.doctor.report import DoctorReport, Finding
 
 Element = ElementTree.Element
 
-_PLACES = 50
+_SHOWN_PLACES = 50
 """Largest number of places of one rule that are listed; SARIF and JSON have all."""
 
 KNOWN = "known: in the baseline"
@@ -84,9 +84,9 @@ def _quantities(report: DoctorReport, *, accepted: bool) -> Iterator[tuple[str, 
 
 
 def _cause(cause: Cause, report: DoctorReport, *, known: bool) -> Element:
-    lines = [cause.title, *(_place(each, report) for each in cause.findings[:_PLACES])]
-    if len(cause.findings) > _PLACES:
-        lines.append(f"and {len(cause.findings) - _PLACES} more")
+    lines = [cause.title, *(_place(each, report) for each in cause.findings[:_SHOWN_PLACES])]
+    if len(cause.findings) > _SHOWN_PLACES:
+        lines.append(f"and {len(cause.findings) - _SHOWN_PLACES} more")
     if cause.advice:
         lines.append(f"what to do: {cause.advice}")
     text = "\n".join(lines)

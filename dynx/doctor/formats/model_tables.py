@@ -29,11 +29,11 @@ _COMPONENTS = {
 
 @dataclass(frozen=True)
 class Row:
-    """One number of the file and, by engine, the values that differ from it."""
+    """One number of the file and, by engine, the values that differ from it, as text."""
 
     title: str
     file: str
-    held: Mapping[str, str]
+    engine_values: Mapping[str, str]
 
 
 @dataclass(frozen=True)
@@ -72,9 +72,9 @@ def _table(deviations: Sequence[Deviation], engines: Iterable[str]) -> ModelTabl
     return ModelTable(tuple(engines), tuple(owners), max(count - SHOWN_ROWS, 0), len(deviations))
 
 
-def _row(title: str, file: Any, held: Mapping[str, Any]) -> Row:
-    texts = wording.values([file, *held.values()])
-    return Row(title, texts[0], dict(zip(held, texts[1:], strict=True)))
+def _row(title: str, file: Any, engine_values: Mapping[str, Any]) -> Row:
+    texts = wording.values([file, *engine_values.values()])
+    return Row(title, texts[0], dict(zip(engine_values, texts[1:], strict=True)))
 
 
 def _components(each: Deviation) -> Iterator[tuple[str, Any, Any]]:

@@ -55,7 +55,7 @@ def is_right(engine: EngineResult, report: DoctorReport) -> bool:
 
 
 def largest_error(report: DoctorReport) -> float:
-    """Largest error of any engine that loads the file as it is."""
+    """Return the largest error of any engine that loads the file as it is."""
     found = [largest_quantity_error(each) for each in report.engines]
     return max((error for _, error in filter(None, found)), default=0.0)
 

@@ -1,4 +1,4 @@
-"""Proof of a cause by ablation: it alone is removed, or everything else, and the engines are measured again.
+"""Proof of a cause by ablation: it is removed alone, or all others are, and the engines are measured again.
 
 For every place where a rule applies, its cause is removed there and nowhere else, and each engine that the
 rule names loads the file again. The change in the engine's deviation from the reference values is the
@@ -125,37 +125,39 @@ class Attributor:
         source = reinserted_text(self.case.source, remedy.case.source, mended.source)
         if source is None:
             return {}
-        with_it = self.examiner.examine(mended.with_source(source), engines, reference=self.after.reference)
-        return self._effects(engines, with_it, self.after)
+        with_cause = self.examiner.examine(
+            mended.with_source(source), engines, reference=self.after.reference
+        )
+        return self._effects(engines, with_cause, self.after)
 
     def _has_error(self, engine: str) -> bool:
         return self.before.max_error(engine) > self.tolerance
 
     def _effects(
-        self, engines: Iterable[str], with_it: Examination, without: Examination
+        self, engines: Iterable[str], with_cause: Examination, without: Examination
     ) -> dict[str, Effect]:
         """Effects above the tolerance."""
-        found = {name: self._effect(name, with_it, without) for name in engines}
+        found = {name: self._effect(name, with_cause, without) for name in engines}
         return {name: effect for name, effect in found.items() if effect is not NO_EFFECT}
 
-    def _effect(self, engine: str, with_it: Examination, without: Examination) -> Effect:
+    def _effect(self, engine: str, with_cause: Examination, without: Examination) -> Effect:
         """Change of the engine's output, in the quantity in which it is largest."""
-        one, other = with_it.outputs[engine], without.outputs[engine]
+        one, other = with_cause.outputs[engine], without.outputs[engine]
         if other.refused is not None:
             return NO_EFFECT
         if one.refused is not None:
             return Effect(LOADING, float("inf"))
-        worst = NO_EFFECT
+        largest = NO_EFFECT
         for quantity in QUANTITIES:
             if quantity in other.failed:
                 continue
             if quantity in one.failed:
                 return Effect(quantity, float("inf"))
             gap = max_change(one.deviation.get(quantity, {}), other.deviation.get(quantity, {}))
-            size = gap / without.scale(quantity, engine)
-            if size > max(worst.relative_error, self.tolerance):
-                worst = Effect(quantity, size)
-        return worst
+            error = gap / without.scale(quantity, engine)
+            if error > max(largest.relative_error, self.tolerance):
+                largest = Effect(quantity, error)
+        return largest
 
     def _attribution(self, rule: Rule, each: Detection, effects: Mapping[str, Effect]) -> Attribution:
         right = all(self.after.max_error(engine) <= self.tolerance for engine in effects)

@@ -26,7 +26,7 @@ class Mending:
 
     @property
     def choices(self) -> tuple[str, ...]:
-        """Sentences: what was decided, and which remedies changed the physics of the robot."""
+        """Sentences on the decisions taken and on the remedies that changed the physics of the robot."""
         sentences = [remedy.choice for _, remedy in self.applied if remedy.choice]
         sentences += [
             f"{rule.id} changed the physics of the robot: {remedy.changed}"
@@ -68,7 +68,7 @@ def mend(case: Case, rules: Sequence[Rule] | None = None, wanted: DetectionFilte
     one: those about the text first, in the order of their numbers, until none is left to apply.
 
     `rules` are those to choose from (default: the whole catalogue; text that dynx cannot read otherwise
-    is mended by any rule), `wanted` says which detections to act on (default: all).
+    is mended by any rule), `wanted` selects the detections to act on (default: all).
     """
     chosen_rules = all_rules() if rules is None else rules
     ordered = [rule for stage in ("reading", "model") for rule in chosen_rules if rule.stage == stage]

@@ -1,7 +1,7 @@
-"""Reinsertion of a cause into a mended file: mended of everything else, though dynx cannot read it so.
+"""Reinsertion of one cause into a mended file that dynx cannot read with that cause.
 
-The remedies about the robot need a file that can be read. Where one cause keeps dynx itself from reading
-it, the file is mended of all causes, and the lines of that cause are restored.
+Remedies about the robot need a file that dynx reads. Where one cause prevents that, all causes are removed
+from the file, and then the lines of that cause are restored.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dynx.errors import DescriptionError
 from dynx.model.xml.source import XmlSource
 
 Lines = tuple[int, int, int, int]
-"""First and end in one text, first and end in another, where the same lines stand."""
+"""Range of equal lines: first and end in one text, first and end in the other."""
 
 
 def reinserted_text(given: XmlSource, without: XmlSource, mended: XmlSource) -> XmlSource | None:

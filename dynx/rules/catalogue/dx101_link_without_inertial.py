@@ -39,7 +39,7 @@ class LinkWithoutInertial(Rule):
     advice = "Write an <inertial>: the true one, or one of zero where the link is a mere frame."
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
-        """Links that can move and have no ``<inertial>``."""
+        """Yield the links that can move and have no ``<inertial>``."""
         static = static_links(case)
         message = "no <inertial>: 1 kg and 1 kg m^2 in PyBullet, nothing in Pinocchio and Drake"
         for name, element in case.links.items():

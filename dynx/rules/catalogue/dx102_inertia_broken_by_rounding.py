@@ -38,7 +38,7 @@ class InertiaBrokenByRounding(Rule):
     advice = "Raise the moments by a few units in the last place."
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
-        """Links whose moments meet the triangle inequality with equality, to rounding, and fail a check."""
+        """Yield the links that a check refuses because of rounding at the triangle inequality."""
         for name, inertial, group in inertials_in_groups(case):
             # Inverse dynamics checks no link that cannot move.
             root = group.static or name == case.model.root

@@ -38,7 +38,7 @@ class InertiaNotDiagonal(Rule):
     advice = "Give the principal moments, with the axes in the rpy of the inertial."
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
-        """Links that can move and whose tensor PyBullet's diagonalisation does not reproduce."""
+        """Yield the links that can move and whose tensor PyBullet's diagonalisation does not reproduce."""
         for name, inertial, group in inertials_in_groups(case):
             if group.static or bullet_reading(inertial).zeroed:
                 continue
@@ -48,7 +48,7 @@ class InertiaNotDiagonal(Rule):
                 yield Detection(name, None, line_of(case, name, "inertia"), message)
 
     def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy:
-        """The same tensors in principal form."""
+        """Return the same tensors in principal form."""
         found = set(links_of(detections))
         new = {}
         for name, inertial, group in inertials_in_groups(case):

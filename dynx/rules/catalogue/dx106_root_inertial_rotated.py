@@ -35,7 +35,7 @@ class RootInertialRotated(Rule):
     advice = "Give the root's tensor in the axes of its link, with rpy zero."
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
-        """The root, on the fixed base, where its inertial frame is rotated."""
+        """Yield the root, on the fixed base, where its inertial frame is rotated."""
         model = case.model
         inertial = case.inertials[model.root]
         if case.base != "fixed" or inertial is None:
@@ -48,7 +48,7 @@ class RootInertialRotated(Rule):
         return [Detection(model.root, None, line_of(case, model.root, "origin"), message)]
 
     def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy:
-        """The tensor in the axes of the link."""
+        """Return the tensor in the axes of the link."""
         found = {name: case.inertials[name] for name in links_of(detections)}
         new = {name: CentralInertia.of(inertial).aligned() for name, inertial in found.items() if inertial}
         done = "gave the tensor of the root in the axes of its link, with rpy zero"

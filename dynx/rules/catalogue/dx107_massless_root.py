@@ -39,7 +39,7 @@ class MasslessRoot(Rule):
     trap_base = "floating"
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
-        """The root, on the floating base, where the file says that its mass is zero."""
+        """Yield the root, on the floating base, where the file says that its mass is zero."""
         model = case.model
         inertial = case.inertials[model.root]
         # Without an <inertial> PyBullet gives the root 1 kg (DX101), unless it is named world.
@@ -53,7 +53,7 @@ class MasslessRoot(Rule):
         return [Detection(model.root, None, line, f"the root has no mass; {where}")]
 
     def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy | None:
-        """The case with the heaviest link rigidly connected to the root merged into it."""
+        """Return the case with the heaviest link rigidly connected to the root merged into it."""
         root, body = case.model.root, heaviest_in_root_group(case)
         if self.chosen(case) == "keep":
             return None

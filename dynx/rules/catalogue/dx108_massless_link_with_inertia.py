@@ -37,7 +37,7 @@ class MasslessLinkWithInertia(Rule):
     advice = "Give the link its mass, or move the tensor into the link that it is rigidly connected to."
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
-        """Links that can move, of mass zero, with a tensor that is not zero."""
+        """Yield the links that can move, of mass zero, with a tensor that is not zero."""
         for name, inertial, group in inertials_in_groups(case):
             largest = float(np.max(np.abs(inertial.tensor)))
             if inertial.mass == 0.0 and largest > 0.0 and not group.static:
@@ -45,7 +45,7 @@ class MasslessLinkWithInertia(Rule):
                 yield Detection(name, None, inertial.line, message)
 
     def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy:
-        """The case with each tensor moved to a link with mass, or with the least mass added."""
+        """Return the case with each tensor moved to a link with mass, or with the least mass added."""
         for name in links_of(detections):
             inertial, group = case.model.inertial(name), rigid_groups(case)[name]
             parent = group.parents.get(name)

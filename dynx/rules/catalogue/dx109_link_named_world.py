@@ -37,7 +37,7 @@ class LinkNamedWorld(Rule):
     trap_base = "floating"
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
-        """A link of that name, unless it is the root on the fixed base."""
+        """Yield a link of that name, unless it is the root on the fixed base."""
         element = case.links.get(_WORLD)
         root = case.model.root
         if element is None or (root == _WORLD and case.base == "fixed"):

@@ -32,14 +32,14 @@ class MasslessMovingLink(Rule):
     }
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
-        """Links that a joint moves, that have neither mass nor tensor, and that carry something with mass."""
+        """Yield the moving links without mass and tensor that carry a link with mass or tensor."""
         message = "a joint carries the link, which has neither mass nor inertia"
         for name, bare in massless_links(case).items():
             if not bare:
                 yield Detection(name, None, case.links[name].line, message)
 
     def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy | None:
-        """The case with the least mass and moments that MuJoCo accepts."""
+        """Return the case with the least mass and moments that MuJoCo accepts."""
         if self.chosen(case) == "keep":
             return None
         return Remedy(*with_least_inertia(case, links_of(detections)), self.decision(case))

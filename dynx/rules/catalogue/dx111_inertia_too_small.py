@@ -44,8 +44,8 @@ from dynx.rules.inertia.physical import (
 )
 from dynx.rules.inertia.rigid_groups import RigidGroup, rigid_groups
 
-_NEGLIGIBLE = 1e-3
-"""Share of the robot's largest inertia that may be added to a body of it."""
+_MAX_ADDED_SHARE = 1e-3
+"""Largest addition to the moments of a body, as a share of the robot's largest moment of inertia."""
 
 
 class InertiaTooSmall(Rule):
@@ -53,17 +53,17 @@ class InertiaTooSmall(Rule):
     advice = "Raise the moment to 1e-14 kg m^2, or change the unit for a robot that is really so small."
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
-        """Links with such a tensor, and moving links that are points or rods with their rigid group."""
+        """Yield the links with such a tensor, and moving links whose rigid group is a point or a rod."""
         groups = rigid_groups(case)
         inertials, found = case.inertials, {}
         for name, inertial in inertials.items():
-            if inertial is not None and _small(inertial, static=groups[name].static):
+            if inertial is not None and _is_too_small(inertial, static=groups[name].static):
                 smallest = float(principal_moments(inertial)[0])
                 found[name] = f"the principal moment {smallest:.3g} is below {MIN_MOMENT:g} kg m^2"
         for group in dict.fromkeys(groups.values()):
             if group.static or any(name in found for name in group.links):
                 continue
-            if (what := _thin(group, inertials)) is not None:
+            if (what := _group_defect(group, inertials)) is not None:
                 found[group.head] = what
         for name in inertials:
             if name in found:
@@ -89,14 +89,14 @@ class InertiaTooSmall(Rule):
                 merged += 1
             held = case.inertials[into]
             if held is None or not (
-                _small(held, static=group.static) or (_is_point(held) and not group.static)
+                _is_too_small(held, static=group.static) or (_is_point(held) and not group.static)
             ):
                 continue
             central = CentralInertia.of(held)
             moments, axes = central.principal(held.origin.rpy)
             near = central.about(nearest_moments(moments), axes)
             if (
-                moment_increase(near, ACCEPTED_MOMENT) > _NEGLIGIBLE * _largest_inertia(before)
+                moment_increase(near, ACCEPTED_MOMENT) > _MAX_ADDED_SHARE * _largest_inertia(before)
                 and not group.static
             ):
                 continue
@@ -112,8 +112,8 @@ class InertiaTooSmall(Rule):
         return Remedy(case, " and ".join(parts), changes_physics=changes_physics)
 
 
-def _small(inertial: Inertial, *, static: bool) -> bool:
-    """Whether MuJoCo refuses the tensor by itself; DX108 is about moving links without mass."""
+def _is_too_small(inertial: Inertial, *, static: bool) -> bool:
+    """Check whether MuJoCo refuses the tensor by itself; DX108 is about moving links without mass."""
     if inertial.mass == 0.0 and not static:
         return False
     if not inertial.tensor.any() or fault_beyond_rounding(inertial) is not None:
@@ -125,8 +125,8 @@ def _is_point(inertial: Inertial) -> bool:
     return inertial.mass >= MIN_MASS and not inertial.tensor.any()
 
 
-def _thin(group: RigidGroup, inertials: Mapping[str, Inertial | None]) -> str | None:
-    """What is too thin in a moving group when its links are added from the head on; None if nothing is."""
+def _group_defect(group: RigidGroup, inertials: Mapping[str, Inertial | None]) -> str | None:
+    """Explain why a moving group has no inertia about an axis, adding its links from the head on; or None."""
     total: CentralInertia | None = None
     for count, name in enumerate(n for n in group.links if (i := inertials[n]) is not None and i.mass > 0.0):
         inertial = inertials[name]

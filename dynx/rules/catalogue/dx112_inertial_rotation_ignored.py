@@ -33,7 +33,7 @@ class InertialRotationIgnored(Rule):
     advice = "Use MuJoCo 4."
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
-        """Links that can move and whose tensor changes where the rotation is left out."""
+        """Yield the links that can move and whose tensor changes where the rotation is left out."""
         for name, inertial, group in inertials_in_groups(case):
             if group.static or not any(inertial.origin.rpy):
                 continue

@@ -37,14 +37,14 @@ class MassMatrixSingular(Rule):
     }
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
-        """Links that a joint moves where neither they nor anything beyond them has mass or a tensor."""
+        """Yield the moving links where neither they nor any link beyond them has mass or a tensor."""
         message = "neither the link nor anything beyond its joint has mass: the mass matrix is singular"
         for name, bare in massless_links(case).items():
             if bare:
                 yield Detection(name, None, case.links[name].line, message)
 
     def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy | None:
-        """The least that all engines take, unless the user keeps the file."""
+        """Return the least that all engines take, unless the user keeps the file."""
         if self.chosen(case) == "keep":
             return None
         return Remedy(

@@ -26,7 +26,7 @@ class LimitWithoutEffortOrVelocity(EditingRule):
     changed = "wrote the largest double for efforts and velocities that were not given"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
-        """The first limit of every joint, moving or not."""
+        """Yield the first limit of every joint, moving or not."""
         for _, limit in elements_in_joints(case, "limit"):
             missing = [name for name in ("effort", "velocity") if name not in limit.attributes]
             if missing:

@@ -23,7 +23,7 @@ class SafetyControllerWithoutGain(EditingRule):
     changed = "gave safety controllers without k_velocity one of 0"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
-        """The first safety controller of every joint."""
+        """Yield the first safety controller of every joint."""
         for _, controller in elements_in_joints(case, "safety_controller"):
             if "k_velocity" not in controller.attributes:
                 edit = case.source.attribute_edit(controller, "k_velocity", "0")

@@ -29,7 +29,7 @@ class MimicOfNothing(EditingRule):
     changed = "removed <mimic> from joints that had nothing to follow"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
-        """The first ``<mimic>`` of every joint."""
+        """Yield the first ``<mimic>`` of every joint."""
         for joint, mimic in elements_in_joints(case, "mimic"):
             message = _why_nothing(case, joint, mimic)
             if message is not None:

@@ -54,7 +54,7 @@ class JointOfSeveralFreedoms(EditingRule):
 
 
 def _is_the_base(case: Case, joint: SourceElement) -> bool:
-    """Whether a floating joint carries the robot on an empty root, which may be so in a file that dynx
+    """Check whether a floating joint carries the robot on an empty root, which may be so in a file that dynx
     refuses for another reason."""
     parent = end_of(joint, "parent")
     ends = [(end_of(each, "parent"), end_of(each, "child")) for each in case.source.root.all("joint")]

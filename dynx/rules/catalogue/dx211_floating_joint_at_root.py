@@ -27,7 +27,7 @@ class FloatingJointAtRoot(EditingRule):
     changed = "made the floating joint below the root fixed: the loading call says whether the base floats"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
-        """The joint, of which there is at most one that dynx can read."""
+        """Yield the joint, of which there is at most one that dynx can read."""
         for joint in joints_of_type(case, ("floating",)):
             edit = case.source.attribute_edit(joint, "type", "fixed")
             yield correction(joint, "the joint below the root is floating", edit)

@@ -32,7 +32,7 @@ class TooManyJoints(Rule):
     }
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
-        """The first joint too many, in document order."""
+        """Yield the first joint too many, in document order."""
         joints = case.source.root.all("joint")
         if len(joints) <= MAX_JOINTS:
             return []
@@ -40,7 +40,7 @@ class TooManyJoints(Rule):
         return [Detection(None, None, joints[MAX_JOINTS].line, message)]
 
     def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy | None:
-        """Without as many frames as it has joints too many."""
+        """Remove as many links without mass as there are joints too many."""
         excess = len(case.joints) - MAX_JOINTS
         if self.chosen(case) == "keep" or excess <= 0:
             return None
@@ -59,8 +59,8 @@ class TooManyJoints(Rule):
 
 
 def _frames(case: Case) -> list[str]:
-    """Links that can go, a link before the one that carries it; those without shapes first, then from the
-    end of the document."""
+    """List the links that can be removed, each before its parent: those without shapes first, the last of the
+    document before others."""
     plain: list[str] = []
     shaped: list[str] = []
     for name in _massless_ends(case.model):

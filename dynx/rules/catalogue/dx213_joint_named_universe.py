@@ -29,7 +29,7 @@ class JointNamedUniverse(EditingRule):
     changed = "gave the joint named universe another name"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
-        """The fixed joint of that name."""
+        """Yield the fixed joint of that name."""
         joint = case.joints.get(_RESERVED)
         if joint is None or joint.attributes.get("type") != "fixed":
             return

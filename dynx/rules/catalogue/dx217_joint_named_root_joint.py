@@ -32,7 +32,7 @@ class JointNamedRootJoint(EditingRule):
     changed = "gave the joint named root_joint another name"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
-        """The joint of that name, where the base floats."""
+        """Yield the joint of that name, where the base floats."""
         joint = case.joints.get(_RESERVED)
         if case.base != "floating" or joint is None or joint.attributes.get("type") == "fixed":
             return

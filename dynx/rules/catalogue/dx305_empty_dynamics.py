@@ -24,7 +24,7 @@ class EmptyDynamics(EditingRule):
     changed = "wrote a damping of 0 into <dynamics> without damping and friction"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
-        """The first ``<dynamics>`` of every joint, moving or not."""
+        """Yield the first ``<dynamics>`` of every joint, moving or not."""
         for _, dynamics in elements_in_joints(case, "dynamics"):
             if not {"damping", "friction"} & set(dynamics.attributes):
                 edit = case.source.attribute_edit(dynamics, "damping", "0")

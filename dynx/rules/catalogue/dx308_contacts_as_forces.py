@@ -28,7 +28,7 @@ class ContactsAsForces(CallingRule):
     changed = "compared without contacts"
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
-        """The robot, where two of its links have shapes."""
+        """Yield the robot, where two of its links have shapes."""
         shaped = [link for link in case.source.root.all("link") if _shape(link) is not None]
         first = _shape(shaped[0]) if len(shaped) > 1 else None
         if first is not None:
@@ -37,7 +37,7 @@ class ContactsAsForces(CallingRule):
 
 
 def _shape(link: SourceElement) -> SourceElement | None:
-    """The first collision of a link that is no mesh; doctor compares without meshes."""
+    """Return the first collision of a link that is no mesh; doctor compares without meshes."""
     for collision in link.all("collision"):
         if not any(element.tag == "mesh" for element in collision.walk()):
             return collision

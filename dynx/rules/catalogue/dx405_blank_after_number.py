@@ -33,5 +33,5 @@ class BlankAfterNumber(MisspelledNumberRule):
     description = "with white space that not every engine skips"
 
     def applies(self, attribute: NumericAttribute) -> bool:
-        """Whether the attribute is no size of a shape, which all engines read alike."""
+        """Check whether the attribute is no size of a shape, which all engines read alike."""
         return attribute.element.tag not in _READ_ALIKE

@@ -37,7 +37,7 @@ class IncompleteInertial(EditingRule):
     changed = "completed inertials that had no mass or no tensor"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
-        """The first inertial of each link, where it lacks something."""
+        """Yield the first inertial of each link, where it lacks something."""
         for link in case.source.root.all("link"):
             inertial = link.first("inertial")
             if inertial is not None:

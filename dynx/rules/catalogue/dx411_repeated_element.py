@@ -32,7 +32,7 @@ class RepeatedElement(EditingRule):
     changed = "removed repeated elements, of which engines use the first"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
-        """Every element after the first of its kind."""
+        """Yield every element after the first of its kind."""
         for part in case.source.root.children:
             if part.tag in ("link", "joint"):
                 yield from _in(case, part)

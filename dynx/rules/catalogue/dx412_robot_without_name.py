@@ -24,7 +24,7 @@ class RobotWithoutName(EditingRule):
     changed = "gave the robot a name"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
-        """The root element."""
+        """Yield the root element."""
         root = case.source.root
         if root.tag != "robot" or root.attributes.get("name"):
             return

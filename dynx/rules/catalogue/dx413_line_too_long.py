@@ -33,7 +33,7 @@ class LineTooLong(EditingRule):
     changed = "broke lines of more than 8191 bytes in front of their elements"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
-        """Every element of which a tag is cut."""
+        """Yield every element of which a tag is cut."""
         long_lines = list(_long_lines(case.source.data))
         if not long_lines:
             return
@@ -64,7 +64,7 @@ def _long_lines(data: bytes) -> Iterator[Span]:
 
 
 def _cut(data: bytes, element: SourceElement, line: Span) -> int | None:
-    """The byte of a line before which a cut falls into the element's start or end tag."""
+    """Return the byte of a line before which a cut falls into the element's start or end tag."""
     tags = [element.start_tag]
     if not element.empty:
         tags.append(Span(data.rindex(b"</", 0, element.span.end), element.span.end))

@@ -25,7 +25,7 @@ class UnknownUrdfVersion(EditingRule):
     changed = "removed the version of the robot"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
-        """The root element."""
+        """Yield the root element."""
         root = case.source.root
         version = root.attributes.get("version")
         if root.tag == "robot" and version is not None and version not in _KNOWN:

@@ -33,7 +33,7 @@ class InertiaBeyondGeometry(Rule):
     advice = "Export the tensor again, in kg m^2 and about the centre of mass."
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
-        """Links with such a moment, one detection each, for the moment furthest beyond."""
+        """Yield the links with such a moment, one detection each, for the moment furthest beyond."""
         for link, extent in group_extents(case):
             assert link.inertial is not None
             excess, moment, bound = max(_against_bounds(link.inertial, extent))
@@ -46,7 +46,7 @@ class InertiaBeyondGeometry(Rule):
 
 
 def _against_bounds(inertial: Inertial, extent: Extent) -> Iterator[tuple[float, float, float]]:
-    """Each principal moment: how many times its bound it is, itself, and the bound [kg m^2]."""
+    """Yield each principal moment: how many times its bound it is, itself, and the bound [kg m^2]."""
     T_link_inertial = inertial.origin.matrix
     moments, axes = np.linalg.eigh(inertial.tensor)
     directions = (T_link_inertial[:3, :3] @ axes).T

@@ -29,7 +29,7 @@ class InertiaBelowGeometry(Rule):
     advice = "Export the tensor again, in kg m^2 and with enough digits."
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
-        """Links with mass whose largest radius of gyration is below a hundredth of their own shape."""
+        """Yield the links with mass whose largest radius of gyration is below 1 % of their own shape."""
         for link in case.model.links:
             if link.inertial is None or link.inertial.mass == 0.0:
                 continue

@@ -30,7 +30,7 @@ class CenterOfMassOutsideGeometry(Rule):
     advice = "Give the origin of the inertial in metres and in the frame of its own link."
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
-        """Links whose centre of mass is outside, and by how much."""
+        """Yield the links whose centre of mass is outside, and by how much."""
         for link, extent in group_extents(case):
             assert link.inertial is not None
             low, high = extent.box()

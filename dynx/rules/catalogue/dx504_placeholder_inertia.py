@@ -28,7 +28,7 @@ class PlaceholderInertia(Rule):
     advice = "Compute the inertia from the CAD model or from the link's shape and mass."
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
-        """Links with mass whose tensor is the unit matrix, or shared by links of different mass."""
+        """Yield the links with mass whose tensor is the unit matrix, or shared by links of different mass."""
         masses = defaultdict(list)
         for link in case.model.links:
             if link.inertial is not None and (moment := _equal_moments(link.inertial)):
@@ -50,7 +50,7 @@ class PlaceholderInertia(Rule):
 
 
 def _equal_moments(inertial: Inertial) -> float | None:
-    """The one moment of a diagonal tensor with three equal moments on a link with mass."""
+    """Return the one moment of a diagonal tensor with three equal moments on a link with mass."""
     off_diagonal = (inertial.ixy, inertial.ixz, inertial.iyz)
     if inertial.mass == 0.0 or any(off_diagonal) or not inertial.ixx == inertial.iyy == inertial.izz:
         return None

@@ -44,7 +44,7 @@ class AngleCutShort(OptionalEditingRule):
 
 
 def _meant(word: str) -> float | None:
-    """The multiple of pi/4 of which `word` gives two or three decimals; None for other words."""
+    """Return the multiple of pi/4 of which `word` gives two or three decimals; None for other words."""
     digits = word.lstrip("+-")
     whole, point, decimals = digits.rstrip("0").partition(".")
     if not point or not (whole + decimals).isdigit() or not 2 <= len(digits.partition(".")[2]) <= 3:

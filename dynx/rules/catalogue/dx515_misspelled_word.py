@@ -46,7 +46,7 @@ class MisspelledWord(Rule):
     advice = "Correct the spelling, and check the resulting robot."
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
-        """Every such word."""
+        """Yield every such word."""
         root = case.source.root
         return [found_at(*each) for part in root.children for each in _misspelled(part, root)]
 
@@ -71,7 +71,7 @@ def _misspelled(part: SourceElement, root: SourceElement) -> Iterator[tuple[Sour
 
 
 def _that_matter(part: SourceElement) -> Iterator[SourceElement]:
-    """A link or joint and what it holds for dynamics; shapes have words of their own."""
+    """Yield a link or joint and what it holds for dynamics; shapes have words of their own."""
     yield part
     for child in part.children:
         if child.tag in _ATTRIBUTES or child.tag == "inertial":
@@ -80,7 +80,7 @@ def _that_matter(part: SourceElement) -> Iterator[SourceElement]:
 
 
 def _meant(word: str, known: Sequence[str], present: Collection[str]) -> str | None:
-    """The known name closest to an unknown one, if it is absent."""
+    """Return the known name closest to an unknown one, if it is absent."""
     if word in known or ":" in word:
         return None
     absent = [other for other in known if other not in present]

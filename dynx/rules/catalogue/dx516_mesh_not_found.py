@@ -26,7 +26,7 @@ class MeshNotFound(Rule):
     advice = "Put the mesh there, or correct the path, capitals included."
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
-        """The first reference to each missing mesh."""
+        """Yield the first reference to each missing mesh."""
         seen = set()
         for name, link in case.links.items():
             for element in geometry_elements(link):

@@ -25,7 +25,7 @@ _UNREADABLE = ("lookat", "skew", "instance_controller")
 
 
 def collada_points(data: bytes) -> Floats | None:
-    """All points of the scene (n, 3) [m]; None where the file has elements that are not supported."""
+    """Return all points of the scene (n, 3) [m]; None where the file has elements that are not supported."""
     # By entities a small file can grow without bound, and no mesh needs one.
     if b"<!DOCTYPE" in data or b"<!ENTITY" in data:
         return None
@@ -60,7 +60,7 @@ class _Scene:
         self._by_id = {key: element for element in root.iter() if (key := element.get("id"))}
 
     def placed(self) -> Iterator[tuple[Floats, Floats]]:
-        """The points of each mesh, and its pose (4, 4) in the scene, scale included."""
+        """Yield the points of each mesh, and its pose (4, 4) in the scene, scale included."""
         for scene in self._root.findall("library_visual_scenes/visual_scene"):
             for node in scene.findall("node"):
                 yield from self._of_node(node, np.eye(4), 0)
@@ -104,7 +104,7 @@ class _Scene:
 
 
 def _transform(element: ElementTree.Element) -> Floats:
-    """The matrix (4, 4) of one element of a node; the identity for elements that move nothing."""
+    """Return the matrix (4, 4) of one element of a node; the identity for elements that move nothing."""
     T = np.eye(4)
     if element.tag not in ("matrix", "translate", "rotate", "scale"):
         return T

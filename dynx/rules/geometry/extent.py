@@ -28,7 +28,7 @@ class Extent:
 
     @classmethod
     def union(cls, parts: Iterable[Extent]) -> Extent:
-        """The union of the parts, which must be in one frame."""
+        """Return the union of the parts, which must be in one frame."""
         found = list(parts)
         return cls(
             np.concatenate([np.zeros((0, 3)), *(part.points for part in found)]),
@@ -41,11 +41,11 @@ class Extent:
         return len(self.points) == 0
 
     def transform(self, T: Floats) -> Extent:
-        """The region in frame A, where T (4, 4) is the pose of this frame in A."""
+        """Return the region in frame A, where T (4, 4) is the pose of this frame in A."""
         return Extent(self.points @ T[:3, :3].T + T[:3, 3], self.radii)
 
     def box(self) -> tuple[Floats, Floats]:
-        """Lowest and highest corner, (3,) each, of its bounding box along the axes of the frame."""
+        """Return the lowest and highest corner, (3,) each, of the bounding box along the frame's axes."""
         radii = self.radii[:, None]
         return (self.points - radii).min(axis=0), (self.points + radii).max(axis=0)
 
@@ -55,8 +55,8 @@ class Extent:
         return float(np.linalg.norm(high - low))
 
     def reach_from_axis(self, origin: Floats, direction: Floats) -> float:
-        """The largest distance [m] of a point of the region from the line through `origin` (3,) along the
-        unit vector `direction` (3,). Distance from a line is convex, so a ball decides it."""
+        """Return the largest distance [m] of a point of the region from the line through `origin` (3,) along
+        the unit vector `direction` (3,). Distance from a line is convex, so it is largest on a ball."""
         offset = self.points - origin
         across = offset - np.outer(offset @ direction, direction)
         return float(np.max(np.linalg.norm(across, axis=1) + self.radii))

@@ -19,7 +19,7 @@ class MeshNotFoundError(Exception):
 
 
 def find_mesh(filename: str, source: str) -> Path | None:
-    """The file of a mesh named in the description `source` (a path), or None where its folder is unknown.
+    """Find the file of a mesh named in the description `source` (a path); None where its folder is unknown.
 
     ``package://NAME/FILE`` is searched in the folders above the description and in ROS_PACKAGE_PATH and
     AMENT_PREFIX_PATH; a package in none of them may be installed elsewhere, so the result is None. A relative
@@ -76,7 +76,7 @@ def _is_file(path: Path) -> bool:
 
 
 def _similar(path: Path) -> str:
-    """A clause with the nearest name in the folder; empty where no name is near."""
+    """Return a clause with the nearest name in the folder; empty where no name is near."""
     try:
         names = sorted(os.listdir(path.parent))
     except (OSError, ValueError):

@@ -21,7 +21,7 @@ _OBJ_VERTEX = re.compile(rb"^[ \t]*v[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)", re.MULTI
 
 
 def mesh_box(path: Path) -> Box | None:
-    """Lowest and highest corner of a mesh in its own frame, unscaled; None where it cannot be read."""
+    """Return the lowest and highest corner of a mesh in its own frame, unscaled; None if it is unreadable."""
     try:
         status = path.stat()
     except OSError:

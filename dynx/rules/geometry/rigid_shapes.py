@@ -16,7 +16,7 @@ from dynx.spatial.se3 import homogeneous, inverse
 
 
 def group_extents(case: Case) -> Iterator[tuple[Link, Extent]]:
-    """Each link with mass, and the extent of all shapes of its rigid group, in its link frame.
+    """Yield each link with mass, and the extent of all shapes of its rigid group, in its link frame.
 
     Descriptions often put the shape of a part in one link and its mass in another on a fixed joint, so every
     shape of the group counts. A link is left out where its group has no shape, or a shape of unknown size
@@ -36,7 +36,7 @@ def group_extents(case: Case) -> Iterator[tuple[Link, Extent]]:
 
 
 def _group_extent(case: Case, group: RigidGroup) -> Extent | None:
-    """The extent of all shapes of the group in the frame of its head; None where a size is unknown."""
+    """Return the extent of all shapes of the group in the frame of its head; None where a size is unknown."""
     parts = []
     for name in group.links:
         extent = link_extent(case.links[name], case.source.source)

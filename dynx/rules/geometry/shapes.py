@@ -21,7 +21,7 @@ _SIDES = 32
 
 
 def link_extent(link: SourceElement, source: str) -> Extent | None:
-    """The extent of all shapes of a link, in the link frame; None where a size is unknown.
+    """Return the extent of all shapes of a link, in the link frame; None where a size is unknown.
 
     `source` is the path of the description, relative to which meshes are searched.
     """
@@ -35,7 +35,7 @@ def link_extent(link: SourceElement, source: str) -> Extent | None:
 
 
 def geometry_elements(link: SourceElement) -> Iterator[SourceElement]:
-    """The shape elements (``<box>``, ``<mesh>``, ...) of a link, in document order."""
+    """Yield the shape elements (``<box>``, ``<mesh>``, ...) of a link, in document order."""
     for shape in link.children:
         if shape.tag in ("visual", "collision"):
             for geometry in shape.all("geometry"):

@@ -27,17 +27,17 @@ class CentralInertia:
 
     @classmethod
     def of(cls, inertial: Inertial) -> CentralInertia:
-        """The inertia that an ``<inertial>`` states, in the frame of its link."""
+        """Return the inertia that an ``<inertial>`` states, in the frame of its link."""
         R = rotation_from_rpy(longdouble(inertial.origin.rpy))
         tensor = longdouble(inertial.tensor)
         return cls(longdouble(inertial.mass), longdouble(inertial.origin.xyz), R @ tensor @ R.T)
 
     def transform(self, R: Array, p: Array) -> CentralInertia:
-        """The same body in frame A, where (R, p) is the pose of this frame in A."""
+        """Return the same body in frame A, where (R, p) is the pose of this frame in A."""
         return CentralInertia(self.mass, R @ self.center + p, R @ self.tensor @ R.T)
 
     def __add__(self, other: CentralInertia) -> CentralInertia:
-        """The sum of two rigidly connected bodies in the same frame (parallel axis theorem)."""
+        """Return the sum of two rigidly connected bodies in the same frame (parallel axis theorem)."""
         mass = self.mass + other.mass
         if mass == 0:
             return CentralInertia(mass, self.center, self.tensor + other.tensor)
@@ -47,12 +47,12 @@ class CentralInertia:
         return CentralInertia(mass, center, self.tensor + other.tensor + steiner)
 
     def about_origin(self) -> Array:
-        """The inertia about the origin of the frame (3, 3)."""
+        """Return the inertia about the origin of the frame (3, 3)."""
         c = self.center
         return np.asarray(self.tensor + self.mass * (c @ c * np.eye(3) - np.outer(c, c)))
 
     def moments(self) -> Array:
-        """The principal moments (3,), smallest first."""
+        """Return the principal moments (3,), smallest first."""
         return np.sort(jacobi_eigen(self.tensor)[0])
 
     def principal(self, near: Vector = (0.0, 0.0, 0.0)) -> tuple[Array, Array]:
@@ -65,17 +65,17 @@ class CentralInertia:
         return values[order], R
 
     def inertial(self, near: Vector = (0.0, 0.0, 0.0)) -> Inertial:
-        """The ``<inertial>`` in principal form: no products of inertia, the axes in its rpy."""
+        """Return the ``<inertial>`` in principal form: no products of inertia, the axes in its rpy."""
         return self.about(*self.principal(near))
 
     def about(self, moments: Array, axes: Array) -> Inertial:
-        """The ``<inertial>`` with other moments (3,), about the columns of a rotation (3, 3)."""
+        """Return the ``<inertial>`` with other moments (3,), about the columns of a rotation (3, 3)."""
         x, y, z = (float(value) for value in moments)
         origin = Pose(_vector(self.center), _vector(rpy_from_rotation(axes)))
         return Inertial(float(self.mass), origin, ixx=x, iyy=y, izz=z)
 
     def aligned(self) -> Inertial:
-        """The ``<inertial>`` in the axes of the link, with its products of inertia."""
+        """Return the ``<inertial>`` in the axes of the link, with its products of inertia."""
         t = [[float(x) for x in row] for row in self.tensor]
         origin = Pose(_vector(self.center))
         return Inertial(float(self.mass), origin, t[0][0], t[0][1], t[0][2], t[1][1], t[1][2], t[2][2])

@@ -12,12 +12,12 @@ ZERO_TENSOR = "<inertia {}/>".format(" ".join(f'{name}="0"' for name in MOMENTS)
 
 
 def zero_inertial() -> str:
-    """The text of an ``<inertial>`` without mass and moments."""
+    """Return the text of an ``<inertial>`` without mass and moments."""
     return f'<inertial>\n  <mass value="0"/>\n  {ZERO_TENSOR}\n</inertial>'
 
 
 def inertial_edits(source: XmlSource, link: SourceElement, old: Inertial | None, new: Inertial) -> list[Edit]:
-    """Edits that replace the inertial `old` of a link by `new`; unchanged numbers keep their spelling."""
+    """Replace the inertial `old` of a link by `new`; unchanged numbers keep their spelling."""
     element = link.first("inertial")
     if old is None or element is None:
         return [source.insertion(link, _inertial_text(new), first=True)]
@@ -42,7 +42,7 @@ def inertial_edits(source: XmlSource, link: SourceElement, old: Inertial | None,
 
 
 def with_inertials(case: Case, inertials: dict[str, Inertial]) -> Case:
-    """The case with these inertials, by link name."""
+    """Return the case with these inertials, by link name."""
     edits: list[Edit] = []
     for name, inertial in inertials.items():
         edits += inertial_edits(case.source, case.links[name], case.inertials[name], inertial)
@@ -50,7 +50,7 @@ def with_inertials(case: Case, inertials: dict[str, Inertial]) -> Case:
 
 
 def line_of(case: Case, link: str, tag: str) -> int:
-    """The line of an element inside the ``<inertial>`` of a link, or of the nearest element around it."""
+    """Find the line of an element inside the ``<inertial>`` of a link, or of the nearest one around it."""
     element = case.links[link]
     for inner in ("inertial", tag):
         element = element.first(inner) or element

@@ -43,7 +43,7 @@ class ImpossibleInertia(Rule):
     }
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
-        """Links whose tensor has the fault, static ones too: MuJoCo refuses the file for them."""
+        """Yield the links whose tensor has the fault, static ones too: MuJoCo refuses the file for them."""
         kept = self.chosen(case) == "keep" and case.calls.issuperset(NUMBERS_OF_THE_FILE)
         groups = rigid_groups(case)
         for link in case.model.links:
@@ -63,13 +63,13 @@ class ImpossibleInertia(Rule):
         decision, chosen = self.decision(case), self.chosen(case)
         if chosen == "keep":
             moving = [name for name in names if not rigid_groups(case)[name].static]
-            turned = {name: _with_largest_on_y(found) for name in moving if (found := case.inertials[name])}
-            mended = with_inertials(case, turned).with_calls(*NUMBERS_OF_THE_FILE)
+            rotated = {name: _with_largest_on_y(found) for name in moving if (found := case.inertials[name])}
+            mended = with_inertials(case, rotated).with_calls(*NUMBERS_OF_THE_FILE)
             return Remedy(mended, "gave PyBullet and Drake the numbers of the file after loading", decision)
         merged: list[str] = []
         if chosen == "fuse":
             for name in names:
-                bodies = _merged(case, rigid_groups(case)[name], name)
+                bodies = _merge_link(case, rigid_groups(case)[name], name)
                 if bodies is not None:
                     case = with_inertials(case, bodies)
                     merged.append(name)
@@ -77,7 +77,7 @@ class ImpossibleInertia(Rule):
         for name in names:
             inertial = case.inertials[name]
             if inertial is not None and fault_beyond_rounding(inertial) == self.fault:
-                replaced[name] = _nearest(case, inertial, name)
+                replaced[name] = _nearest_inertial(case, inertial, name)
         case = with_inertials(case, replaced)
         parts = []
         if merged:
@@ -95,9 +95,9 @@ class ImpossibleInertia(Rule):
         return f"the principal moment {large:.6g} exceeds the sum of the others, {small:.6g} and {middle:.6g}"
 
 
-def _merged(case: Case, group: RigidGroup, name: str) -> dict[str, Inertial] | None:
-    """The link merged with its parent, with its descendants, or with its whole group: the first of them that
-    makes a body; None where none does."""
+def _merge_link(case: Case, group: RigidGroup, name: str) -> dict[str, Inertial] | None:
+    """Merge the link with its parent, its descendants, or its whole group: the first that gives a physical
+    inertia; None where none does."""
     attempts: list[tuple[tuple[str, ...], str]] = []
     if name in group.parents:
         parent = group.parents[name]
@@ -120,7 +120,7 @@ def _merged(case: Case, group: RigidGroup, name: str) -> dict[str, Inertial] | N
     return None
 
 
-def _nearest(case: Case, inertial: Inertial, name: str) -> Inertial:
+def _nearest_inertial(case: Case, inertial: Inertial, name: str) -> Inertial:
     body = CentralInertia.of(inertial)
     moments, axes = body.principal(inertial.origin.rpy)
     near = body.about(nearest_moments(moments), axes)
@@ -130,8 +130,8 @@ def _nearest(case: Case, inertial: Inertial, name: str) -> Inertial:
 
 
 def _with_largest_on_y(inertial: Inertial) -> Inertial:
-    """The tensor in principal form with the largest moment about y, of which alone Bullet's inverse dynamics
-    does not check that it is at most the sum of the others."""
+    """Return the tensor in principal form with the largest moment about y: the only one that Bullet's inverse
+    dynamics does not compare with the sum of the others."""
     body = CentralInertia.of(inertial)
     moments, axes = body.principal(inertial.origin.rpy)
     largest = int(np.argmax(moments))

@@ -16,7 +16,7 @@ _MASS = 2.0 * MIN_MASS
 
 
 def massless_links(case: Case) -> dict[str, bool]:
-    """The first link of each moving rigid group without mass and moments.
+    """Return the first link of each moving rigid group without mass and moments.
 
     The value is True where no link beyond it has mass or moments either.
     """
@@ -39,7 +39,7 @@ def massless_links(case: Case) -> dict[str, bool]:
 
 
 def with_least_inertia(case: Case, names: Sequence[str]) -> tuple[Case, str]:
-    """The case with the least mass and moments that MuJoCo accepts in these links; and the change in words.
+    """Give these links the least mass and moments that MuJoCo accepts; also return the change in words.
 
     A tensor that is not zero is kept.
     """
@@ -52,20 +52,19 @@ def with_least_inertia(case: Case, names: Sequence[str]) -> tuple[Case, str]:
         else:
             new[name] = Inertial(_MASS, origin, ixx=ACCEPTED_MOMENT, iyy=ACCEPTED_MOMENT, izz=ACCEPTED_MOMENT)
     many = "a link without mass" if len(new) == 1 else f"{len(new)} links without mass"
-    return with_inertials(
-        case, new
-    ), f"gave {many} {_MASS:g} kg and {ACCEPTED_MOMENT:g} kg m^2 about every axis"
+    changed = f"gave {many} {_MASS:g} kg and {ACCEPTED_MOMENT:g} kg m^2 about every axis"
+    return with_inertials(case, new), changed
 
 
 def least_inertial() -> str:
-    """The text of an ``<inertial>`` with the least mass and moments that every engine accepts."""
+    """Return the text of an ``<inertial>`` with the least mass and moments that every engine accepts."""
     moments = " ".join(f'i{axis}{axis}="{decimal(ACCEPTED_MOMENT)}"' for axis in "xyz")
     products = " ".join(f'{name}="0"' for name in ("ixy", "ixz", "iyz"))
     return f'<inertial>\n  <mass value="{decimal(_MASS)}"/>\n  <inertia {moments} {products}/>\n</inertial>'
 
 
 def heaviest_in_root_group(case: Case) -> str | None:
-    """The heaviest link that is rigidly connected to the root, itself included; None where none has mass."""
+    """Return the heaviest link rigidly connected to the root, itself included; None where none has mass."""
     model = case.model
     group = rigid_groups(case)[model.root].links
     masses = {name: mass for name in group if (mass := model.inertial(name).mass) > 0.0}

@@ -11,7 +11,7 @@ from dynx.rules.inertia.rigid_groups import RigidGroup
 
 
 def as_inertial(case: Case, link: str, body: CentralInertia, old: Inertial | None = None) -> Inertial:
-    """The ``<inertial>`` of a link with this body, in principal form unless the link is a fixed root.
+    """Return the ``<inertial>`` of a link with this body, in principal form unless the link is a fixed root.
 
     There PyBullet mistakes the attitude of the inertial frame for that of the base (DX106).
     """
@@ -32,12 +32,12 @@ def merged_inertials(case: Case, group: RigidGroup, links: Sequence[str], into: 
 
 
 def _without_mass(inertial: Inertial) -> Inertial:
-    """The inertial with mass and moments of zero; its origin is kept."""
+    """Return the inertial with mass and moments of zero; its origin is kept."""
     return Inertial(0.0, inertial.origin)
 
 
 def _sum(case: Case, group: RigidGroup, links: Iterable[str], into: str) -> CentralInertia:
-    """The inertia of some links of a group together, in the frame of the link `into`."""
+    """Return the inertia of some links of a group together, in the frame of the link `into`."""
     total: CentralInertia | None = None
     # The link itself first, so that its centre of mass is kept where no link has mass.
     for name in sorted(links, key=lambda name: name != into):

@@ -32,8 +32,8 @@ MIN_MASS = 1e-15
 ROUNDING = 16.0 * FLOAT64_EPS
 """Bound on the rounding of a tensor relative to its largest moment; `dynx.load` uses the same bound."""
 
-_EDGE = 4.0 * FLOAT64_EPS
-"""Relative rounding of the moments of a rotated tensor; MuJoCo was seen to refuse at 0 to 2 eps."""
+_ROTATION_ROUNDING = 4.0 * FLOAT64_EPS
+"""Relative rounding of the moments of a rotated tensor; MuJoCo refused tensors at 0 to 2 eps."""
 
 _MARGIN = 16.0 * FLOAT64_EPS
 """Relative distance from the bound at which corrected moments are placed."""
@@ -44,13 +44,13 @@ Fault = Literal["negative", "triangle"]
 
 @lru_cache(maxsize=CACHE_SIZE)
 def principal_moments(inertial: Inertial) -> Array:
-    """The principal moments (3,), smallest first, in long double; the array must not be changed."""
+    """Return the principal moments (3,), smallest first, in long double; the array must not be changed."""
     return CentralInertia.of(inertial).moments()
 
 
 @lru_cache(maxsize=CACHE_SIZE)
 def fault_beyond_rounding(inertial: Inertial) -> Fault | None:
-    """The fault of an inertial by more than rounding; None also where the tensor is too small to matter."""
+    """Find the fault of an inertial by more than rounding; None also for a tensor too small to matter."""
     size = float(np.max(np.abs(inertial.tensor)))
     if inertial.mass == 0.0 or size < MIN_MOMENT:
         return None
@@ -63,7 +63,7 @@ def fault_beyond_rounding(inertial: Inertial) -> Fault | None:
 
 @lru_cache(maxsize=CACHE_SIZE)
 def is_borderline(inertial: Inertial, *, root: bool, on_fixed_joint: bool) -> bool:
-    """Whether an engine may refuse the inertial because of rounding alone.
+    """Check whether an engine may refuse the inertial because of rounding alone.
 
     `root` says that no joint carries the link, `on_fixed_joint` that a fixed one does.
     """
@@ -77,7 +77,12 @@ def is_borderline(inertial: Inertial, *, root: bool, on_fixed_joint: bool) -> bo
     small, middle, large = principal_moments(inertial)
     too_small_for_mujoco = small < MIN_MOMENT and bullet_reading(inertial).moments.any()  # DX111
     rotated = any(inertial.origin.rpy) or bool(inertial.ixy or inertial.ixz or inertial.iyz)
-    if rotated and small + middle - large < _EDGE * large and size > 0.0 and not too_small_for_mujoco:
+    if (
+        rotated
+        and small + middle - large < _ROTATION_ROUNDING * large
+        and size > 0.0
+        and not too_small_for_mujoco
+    ):
         return True
     if bullet_reading(inertial).zeroed:
         return True
@@ -85,7 +90,7 @@ def is_borderline(inertial: Inertial, *, root: bool, on_fixed_joint: bool) -> bo
 
 
 def moment_increase(inertial: Inertial, floor: float = 0.0) -> float:
-    """The amount [kg m^2] to add to all three moments so that no check fails by rounding.
+    """Return the amount [kg m^2] to add to all three moments so that no check fails by rounding.
 
     It is a few units in the last place of the largest moment about the link's origin, too little to show in
     the equations of motion, or more where a moment would be below `floor` [kg m^2].
@@ -98,13 +103,13 @@ def moment_increase(inertial: Inertial, floor: float = 0.0) -> float:
 
 
 def with_raised_moments(inertial: Inertial, floor: float = 0.0) -> Inertial:
-    """The inertial with all moments raised by `moment_increase`."""
+    """Return the inertial with all moments raised by `moment_increase`."""
     added = moment_increase(inertial, floor)
     return replace(inertial, ixx=inertial.ixx + added, iyy=inertial.iyy + added, izz=inertial.izz + added)
 
 
 def nearest_moments(moments: Array) -> Array:
-    """The physical principal moments (3,) nearest to these, in the least-squares sense, in the same order.
+    """Find the physical principal moments (3,) nearest to these by least squares, in the same order.
 
     The moments of a body are G s with second moments of mass s >= 0 and G = [[0,1,1],[1,0,1],[1,1,0]]. In the
     least-squares solution over s >= 0 some s are zero. All eight sets of zeros are tried; y = G s is the

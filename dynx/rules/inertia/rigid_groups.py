@@ -37,11 +37,11 @@ class RigidGroup:
         return R_frame.T @ R_link, R_frame.T @ (p_link - p_frame)
 
     def children(self, link: str) -> tuple[str, ...]:
-        """The child links of one link within the group, in document order."""
+        """Return the child links of one link within the group, in document order."""
         return tuple(child for child in self.links if self.parents.get(child) == link)
 
     def below(self, link: str) -> tuple[str, ...]:
-        """All descendants of one link within the group, in depth-first order."""
+        """Return all descendants of one link within the group, in depth-first order."""
         found = {link}
         for each in self.links:
             if self.parents.get(each) in found:
@@ -52,7 +52,7 @@ class RigidGroup:
 # All rules use the groups of one case before the first remedy makes another.
 @lru_cache(maxsize=8)
 def rigid_groups(case: Case) -> Mapping[str, RigidGroup]:
-    """The group of every link that dynx reads, by the link's name.
+    """Return the group of every link that dynx reads, by the link's name.
 
     Joints that the document calls ``fixed`` connect rigidly. Joints that dynx holds still for other reasons,
     such as one that follows a fixed joint, move in other engines.
@@ -90,7 +90,7 @@ def rigid_groups(case: Case) -> Mapping[str, RigidGroup]:
 
 
 def inertials_in_groups(case: Case) -> Iterator[tuple[str, Inertial, RigidGroup]]:
-    """Each link with an ``<inertial>``: its name, the inertial as dynx reads it, and its group."""
+    """Yield each link with an ``<inertial>``: its name, the inertial as dynx reads it, and its group."""
     groups = rigid_groups(case)
     for name, inertial in case.inertials.items():
         if inertial is not None:
@@ -98,7 +98,7 @@ def inertials_in_groups(case: Case) -> Iterator[tuple[str, Inertial, RigidGroup]
 
 
 def static_links(case: Case) -> frozenset[str]:
-    """Names of the links that cannot move: on the fixed base the root and links rigidly connected to it.
+    """Name the links that cannot move: on the fixed base the root and links rigidly connected to it.
 
     They are taken from the document, so links that dynx reads as frames are included.
     """

@@ -16,7 +16,7 @@ UNLIMITED = f'<limit lower="-{LARGEST}" upper="{LARGEST}" effort="{LARGEST}" vel
 
 
 def joints_of_type(case: Case, types: Collection[str]) -> Iterator[SourceElement]:
-    """The joints of these types, in document order."""
+    """Yield the joints of these types, in document order."""
     for joint in case.source.root.all("joint"):
         if joint.attributes.get("type") in types:
             yield joint
@@ -25,7 +25,7 @@ def joints_of_type(case: Case, types: Collection[str]) -> Iterator[SourceElement
 def elements_in_joints(
     case: Case, tag: str, types: Collection[str] | None = None
 ) -> Iterator[tuple[SourceElement, SourceElement]]:
-    """Each joint of these types (default: of any) that has such an element, with the first of them."""
+    """Yield each joint of these types (default: of any) that has such an element, with the first of them."""
     for joint in case.source.root.all("joint"):
         element = joint.first(tag)
         if element is not None and (types is None or joint.attributes.get("type") in types):
@@ -33,7 +33,7 @@ def elements_in_joints(
 
 
 def axis_edit(source: XmlSource, joint: SourceElement, xyz: str) -> Edit:
-    """The edit that sets the axis of a joint, whether it has one or not."""
+    """Return the edit that sets the axis of a joint, whether it has one or not."""
     axis = joint.first("axis")
     if axis is None:
         return source.insertion(joint, f'<axis xyz="{xyz}"/>')

@@ -1,4 +1,4 @@
-"""Return the edits that rename a link or a joint wherever a document names it."""
+"""Edits that rename a link or a joint wherever a document names it."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ class Freedom:
 
 
 def freedoms(joint: SourceElement) -> list[Freedom]:
-    """The chain for a joint of one of `TYPES`."""
+    """Return the chain for a joint of one of `TYPES`."""
     kind = joint.attributes["type"]
     slides = [
         Freedom(f"slide_{name}", "prismatic", axis) for name, axis in zip("xyz", (_X, _Y, _Z), strict=True)
@@ -55,7 +55,7 @@ def freedoms(joint: SourceElement) -> list[Freedom]:
 
 
 def joint_split(source: XmlSource, joint: SourceElement) -> Iterator[Edit]:
-    """Edits that replace the joint by the chain."""
+    """Yield the edits that replace the joint by the chain."""
     first, *rest = freedoms(joint)
     taken = {part.attributes.get("name", "") for part in source.root.children}
     name, child = joint.attributes["name"], end_of(joint, "child")
@@ -88,7 +88,7 @@ def joint_split(source: XmlSource, joint: SourceElement) -> Iterator[Edit]:
 
 
 def _plane(joint: SourceElement) -> tuple[str, str, str]:
-    """Two unit vectors in the plane and its unit normal, right-handed; the axis is the normal."""
+    """Return two unit vectors in the plane and its unit normal, right-handed; the axis is the normal."""
     axis = joint.first("axis")
     words = [] if axis is None else axis.attributes.get("xyz", "").split()
     normal = np.array([1.0, 0.0, 0.0])

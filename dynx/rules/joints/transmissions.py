@@ -13,7 +13,7 @@ _SIMPLE = "SimpleTransmission"
 
 
 def type_of(case: Case, transmission: SourceElement) -> str | None:
-    """The type, which is an attribute or an element; None where there is neither, or no text
+    """Return the type, which is an attribute or an element; None where there is neither, or no text
     in the element."""
     element = transmission.first("type")
     if "type" in transmission.attributes:
@@ -30,7 +30,7 @@ def transmissions_drake_reads(case: Case) -> Iterator[SourceElement]:
 
 
 def moves_by_actuator(case: Case, transmission: SourceElement) -> bool:
-    """Whether Drake makes an actuator: not for a fixed joint, nor for an effort limit of 0."""
+    """Check whether Drake makes an actuator: not for a fixed joint, nor for an effort limit of 0."""
     named = transmission.first("joint")
     joint = None if named is None else case.joints.get(named.attributes.get("name", ""))
     if joint is None or joint.attributes.get("type") == "fixed":

@@ -10,7 +10,7 @@ from dynx.rules.text.number_text import is_number
 
 
 def number_of(element: SourceElement, attribute: str) -> float | None:
-    """The finite number that an attribute holds; None where it is absent.
+    """Return the finite number that an attribute holds; None where it is absent.
 
     Raises DescriptionError for any other text, as `vector_of` and `origin_of` do.
     """
@@ -20,20 +20,20 @@ def number_of(element: SourceElement, attribute: str) -> float | None:
 
 
 def number_or_none(element: SourceElement, attribute: str) -> float | None:
-    """The number that an attribute holds; None where it is absent or no finite number."""
+    """Return the number that an attribute holds; None where it is absent or no finite number."""
     text = element.attributes.get(attribute, "")
     return float(text) if is_number(text) else None
 
 
 def vector_of(element: SourceElement, attribute: str) -> Vector | None:
-    """The three finite numbers that an attribute holds; None where it is absent."""
+    """Return the three finite numbers that an attribute holds; None where it is absent."""
     if attribute not in element.attributes:
         return None
     return Reading("<string>").vector(_plain(element), attribute, "this file")
 
 
 def origin_of(parent: SourceElement) -> Pose:
-    """The pose in the ``<origin>`` of an element; absent and empty attributes are zero."""
+    """Return the pose in the ``<origin>`` of an element; absent and empty attributes are zero."""
     origins = [_plain(child) for child in parent.all("origin")]
     return Reading("<string>").origin(Element(parent.tag, {}, parent.line, origins), "this file")
 

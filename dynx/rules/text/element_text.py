@@ -1,4 +1,4 @@
-"""What stands between the tags of an element."""
+"""Text between the tags of an element."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dynx.model.xml.source import SourceElement, XmlSource
 
 
 def text_in(source: XmlSource, element: SourceElement) -> str:
-    """The text of an element that holds no other; empty for any other element."""
+    """Return the text of an element that holds no other; empty for any other element."""
     if element.empty or element.children:
         return ""
     inside = source.data[element.start_tag.end : element.span.end]

@@ -1,4 +1,4 @@
-"""Rules about one way of writing numbers that engines read differently."""
+"""Base of the rules about numbers written in a form that engines read differently."""
 
 from __future__ import annotations
 
@@ -28,19 +28,19 @@ class MisspelledNumberRule(EditingRule):
     """Tags of the elements in whose attributes the fault matters; None for all."""
 
     def applies(self, attribute: NumericAttribute) -> bool:
-        """Whether the fault matters in this attribute."""
+        """Check whether the fault matters in this attribute."""
         return self.elements is None or attribute.element.tag in self.elements
 
     def text_for(self, case: Case, misspelling: Misspelling) -> str:
-        """The corrected text."""
+        """Return the corrected text."""
         return misspelling.meant
 
     def edit(self, case: Case, attribute: NumericAttribute, misspelling: Misspelling) -> Edit:
-        """The edit that corrects the attribute."""
+        """Return the edit that corrects the attribute."""
         return case.source.attribute_edit(attribute.element, attribute.name, self.text_for(case, misspelling))
 
     def corrections(self, case: Case) -> Iterable[Correction]:
-        """Every attribute with the fault."""
+        """Yield every attribute with the fault."""
         for attribute in numeric_attributes(case.source):
             find = misspelled_number if attribute.count == 1 else misspelled_vector
             text = attribute.text_in(case.source)

@@ -41,28 +41,28 @@ class Misspelling:
 
 
 def is_number(text: str) -> bool:
-    """Whether every engine reads the text, without blanks around it, as one finite number."""
+    """Check whether every engine reads the text, without blanks around it, as one finite number."""
     word = text.strip()
     return _NUMBER.fullmatch(word) is not None and math.isfinite(float(word))
 
 
 def decimal(value: float) -> str:
-    """The shortest decimal that reads back as the same double; engines read no ``-0``."""
+    """Return the shortest decimal that reads back as the same double; engines read no ``-0``."""
     return repr(float(value) + 0.0)
 
 
 def misspelled_number(text: str) -> Misspelling | None:
-    """The fault of a text that should be one number; None where it is plain or incomprehensible."""
+    """Return the fault of a text that should be one number; None where it is plain or incomprehensible."""
     word = text.strip()
     if is_number(word):
         return None if text.lstrip(_BLANKS) == word else Misspelling("blank", word)
-    if sign := _overflowing(word):
+    if sign := _infinite_sign(word):
         return Misspelling("infinite", sign.removeprefix("+") + LARGEST)
     return _misspelled_word(word)
 
 
 def misspelled_vector(text: str) -> Misspelling | None:
-    """The fault of a text that should be three numbers; None where it is plain or incomprehensible."""
+    """Return the fault of a text that should be three numbers; None where it is plain or incomprehensible."""
     words = text.split()
     if not words:
         return Misspelling("empty", "")
@@ -100,12 +100,12 @@ def _misspelled_word(word: str) -> Misspelling | None:
 
 
 def _word_fault(word: str) -> Misspelling | None:
-    """A word of a vector, itself where it is plain."""
+    """Return the misspelling of a word of a vector; a plain number stands for itself."""
     return Misspelling("rest", word) if is_number(word) else _misspelled_word(word)
 
 
 def _with_commas(words: list[str], text: str) -> Misspelling | None:
-    """The fault of a vector with commas, which are decimal points where that leaves three numbers."""
+    """Return the fault of a vector with commas, which are decimal points where that leaves three numbers."""
     bare = [word.rstrip(",;") for word in words]
     if len(bare) == 3 and all(is_number(word) or _COMMA.fullmatch(word) for word in bare):
         if all(map(is_number, bare)):
@@ -121,8 +121,8 @@ def _with_commas(words: list[str], text: str) -> Misspelling | None:
     return None
 
 
-def _overflowing(word: str) -> str:
-    """The sign of an infinite number, written out or too large for a double; empty for any other text."""
+def _infinite_sign(word: str) -> str:
+    """Return the sign of an infinite number, written out or too large for a double; else an empty text."""
     if found := _INFINITE.fullmatch(word):
         return found.group(1) or "+"
     if _NUMBER.fullmatch(word):

@@ -46,14 +46,14 @@ class NumericAttribute:
     count: int
 
     def text_in(self, source: XmlSource) -> str:
-        """The text as written, in which tabs and line breaks are not yet replaced by blanks."""
+        """Return the text as written, in which tabs and line breaks are not yet replaced by blanks."""
         place = self.element.places[self.name]
         written = source.data[place.start : place.end].decode("utf-8").partition("=")[2].strip()[1:-1]
         return self.element.attributes[self.name] if "&" in written else written
 
 
 def numeric_attributes(source: XmlSource) -> Iterator[NumericAttribute]:
-    """All numeric attributes of links and joints, in document order."""
+    """Yield all numeric attributes of links and joints, in document order."""
     for part in source.root.children:
         if part.tag == "link":
             yield from _of_link(part)

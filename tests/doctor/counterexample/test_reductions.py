@@ -12,7 +12,7 @@ from dynx import load
 from dynx.doctor.counterexample.detail_reductions import (
     complexity,
     fewer_extras,
-    formatted,
+    format_document,
     frame_axes,
     plain_numbers,
     round_numbers,
@@ -82,9 +82,9 @@ def test_what_says_nothing_about_dynamics_goes(robot: str) -> None:
 @given(ROBOTS, st.booleans())
 def test_tidy_text_says_the_same(model: Model, numbers: bool) -> None:
     source = XmlSource(model.to_urdf())
-    tidied = formatted(source, numbers=numbers)
-    assert load(tidied) == load(source.text)
-    assert formatted(XmlSource(tidied), numbers=numbers) == tidied
+    text = format_document(source, numbers=numbers)
+    assert load(text) == load(source.text)
+    assert format_document(XmlSource(text), numbers=numbers) == text
 
 
 @pytest.mark.parametrize(
