@@ -40,7 +40,7 @@ def samples_at(
     def rows(x: ArrayLike | None, width: int) -> Floats:
         return np.array(np.broadcast_to(0.0 if x is None else np.asarray(x, dtype=float), (n, width)))
 
-    questions = assign_frames(model.frame_names, n, each=n, references=references)
+    frame_samples = assign_frames(model.frame_names, n, each=n, references=references)
     return Samples(
         model=model,
         index=np.arange(n),
@@ -51,8 +51,8 @@ def samples_at(
         tau=rows(tau, model.nv),
         wrench=rows(wrench, 6),
         wrench_frame=frame or model.frame_names[-1],
-        every_frame=questions,
-        derivatives=questions,
+        every_frame=frame_samples,
+        derivatives=frame_samples,
     )
 
 
@@ -61,38 +61,38 @@ class ErrorBounds:
 
     def __init__(self, samples: Samples) -> None:
         self.samples = samples
-        self.sizes = Magnitudes(samples)
+        self.magnitudes = Magnitudes(samples)
 
     def check(self, quantity: str, got: ArrayLike, wanted: ArrayLike) -> None:
         """Assert that two results of `quantity` (for frames: of one frame) are equal within its tolerance."""
         got, wanted = np.asarray(got), np.asarray(wanted)
         assert got.shape == wanted.shape, f"{quantity}: shape {got.shape}, wanted {wanted.shape}"
-        asked = BY_NAME[quantity]
-        tolerance = asked.tolerance(self.sizes)
+        compared = BY_NAME[quantity]
+        tolerance = compared.tolerance(self.magnitudes)
         self._assert_small(quantity, got - wanted, self._scale(quantity), tolerance, got, wanted)
 
     def check_rate(self, quantity: str, got: ArrayLike, wanted: ArrayLike) -> None:
         """Assert that a rate of `quantity` equals its numerical derivative along the motion."""
         got, wanted = np.asarray(got), np.asarray(wanted)
         scale = self._scale(quantity)
-        rate = scale * self.sizes.frequency.reshape(-1, *([1] * (scale.ndim - 1)))
-        tolerance = tolerances.derivative(self.sizes.depth)
+        rate = scale * self.magnitudes.frequency.reshape(-1, *([1] * (scale.ndim - 1)))
+        tolerance = tolerances.derivative(self.magnitudes.depth)
         self._assert_small(f"rate of {quantity}", got - wanted, rate, tolerance, got, wanted)
 
     def check_solves(self, a: ArrayLike, tau_of_a: ArrayLike, tau: ArrayLike) -> None:
         """Assert that the acceleration `a` takes the torque `tau` that caused it (backward error)."""
         a, tau_of_a, tau = np.atleast_2d(a), np.atleast_2d(tau_of_a), np.atleast_2d(tau)
-        scale = self.sizes.solved_torque(a)[:, None]
+        scale = self.magnitudes.solved_torque(a)[:, None]
         tolerance = tolerances.solving()
         self._assert_small("forward_dynamics", tau_of_a - tau, scale, tolerance, tau_of_a, tau)
 
     def _scale(self, quantity: str) -> Floats:
         """Return the magnitude of the quantity at each sample, for one frame."""
-        asked = BY_NAME[quantity]
-        scale = np.asarray(asked.scale(self.sizes))
-        if asked.layout == "frames":
+        compared = BY_NAME[quantity]
+        scale = np.asarray(compared.scale(self.magnitudes))
+        if compared.layout == "frames":
             return np.asarray(scale[:, 0])
-        return scale if asked.layout == "samples" else np.asarray(scale[0])
+        return scale if compared.layout == "samples" else np.asarray(scale[0])
 
     def _assert_small(
         self,

@@ -1,4 +1,4 @@
-"""Whether backends agree: compared pairwise, with a 50-digit referee, and with the laws of mechanics."""
+"""Agreement of backends: pairwise, with a 50-digit referee, and with identities of mechanics."""
 
 from __future__ import annotations
 

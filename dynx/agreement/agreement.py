@@ -60,25 +60,25 @@ def agree(
     `model` is a `Model` or whatever `dynx.load` takes. `backends` are names (default: all that are
     installed) or backends made of this very model, which are left open; one alone is compared with
     the referee and with itself. Every quantity is compared pairwise at `samples` states that follow
-    from `seed`, with the 50-digit referee at `referee_samples` of them, and where an engine answers
-    natively, with what dynx derives; each backend is tested against the identities of mechanics.
+    from `seed`, and with the 50-digit referee at `referee_samples` of them; native results of an engine are
+    compared with derived ones; each backend is tested against the identities of mechanics.
     `progress` is called with the name of each step.
 
     A robot that cannot be read, or that a backend refuses, gives a report with `error` set. Raises
-    ArgumentError for arguments that could be right for no robot, UnknownBackendError and
-    NotInstalledError for a backend that is not there.
+    ArgumentError for arguments that are invalid for every robot, UnknownBackendError and
+    NotInstalledError for a backend that is unknown or whose engine is missing.
     """
     started = time.perf_counter()
-    chosen = _checked(backends, samples, seed, referee_samples)
+    chosen = _check_arguments(backends, samples, seed, referee_samples)
     names = [each if isinstance(each, str) else each.name for each in chosen]
     try:
         loaded = load(model)
     except DynxError as error:
-        took = time.perf_counter() - started
-        return refused_report(_label(model), error, backends=names, seconds=took)
+        seconds = time.perf_counter() - started
+        return refused_report(_label(model), error, backends=names, seconds=seconds)
     _require_same_model(loaded, chosen)
     try:
-        # NaN and infinity from an engine are judged by their value, not announced by NumPy.
+        # NaN and infinity from an engine appear in the report; NumPy need not warn of them.
         with ExitStack() as opened, np.errstate(all="ignore"):
             engines = [_open(each, loaded, opened) for each in chosen]
             return _compare_all(
@@ -104,33 +104,33 @@ def _compare_all(
     progress: Progress,
     started: float,
 ) -> AgreementReport:
-    names = _distinct(engines)
+    names = _distinct_names(engines)
     samples = draw_samples(model, count, seed)
-    sizes = Magnitudes(samples)
+    magnitudes = Magnitudes(samples)
     all_results = [BackendResults(name, engine, samples) for name, engine in zip(names, engines, strict=True)]
     rows: list[Comparison] = []
     for first, second in combinations(all_results, 2):
         progress(f"{first.name}~{second.name}")
-        rows += [compare(quantity, first, second, sizes) for quantity in compared_quantities()]
-        rows.append(compare_forward_dynamics(first, second, sizes))
+        rows += [compare(quantity, first, second, magnitudes) for quantity in compared_quantities()]
+        rows.append(compare_forward_dynamics(first, second, magnitudes))
         if model.nv:
-            rows.append(compare_inverse_kinematics(first, second, sizes))
+            rows.append(compare_inverse_kinematics(first, second, magnitudes))
     if referee_samples:
         progress(REFEREE)
         rows += _compare_with_referee(
             samples.take(list(range(min(referee_samples, count))), 1), names, engines
         )
-    few = samples.take(list(range(min(DERIVED_SAMPLES, count))), 1)
+    derived_samples = samples.take(list(range(min(DERIVED_SAMPLES, count))), 1)
     for name, engine in zip(names, engines, strict=True):
         progress(f"{name}~{DERIVED}")
-        rows += _compare_with_derived(Magnitudes(few), name, engine)
+        rows += _compare_with_derived(Magnitudes(derived_samples), name, engine)
     identities: list[IdentityCheck] = []
     differentiable = samples.differentiable(IDENTITY_SAMPLES)
     if differentiable and model.nv:
-        identity_sizes = Magnitudes(samples.take(differentiable, 1))
+        identity_magnitudes = Magnitudes(samples.take(differentiable, 1))
         for name, engine in zip(names, engines, strict=True):
             progress(f"identities of {name}")
-            identities += check_identities(name, engine, identity_sizes)
+            identities += check_identities(name, engine, identity_magnitudes)
     return AgreementReport(
         robot=model.name,
         source=model.source,
@@ -150,32 +150,32 @@ def _compare_all(
 
 def _compare_with_referee(samples: Samples, names: list[str], engines: list[Backend]) -> list[Comparison]:
     """Comparisons of each backend with the referee."""
-    sizes = Magnitudes(samples)
+    magnitudes = Magnitudes(samples)
     exact = BackendResults(REFEREE, Referee(samples.model), samples)
     rows = []
     for name, engine in zip(names, engines, strict=True):
         results = BackendResults(name, engine, samples)
         rows += [
-            compare(quantity, results, exact, sizes)
+            compare(quantity, results, exact, magnitudes)
             for quantity in compared_quantities()
             if quantity.refereed
         ]
-        rows.append(compare_forward_dynamics(results, exact, sizes, both=False))
+        rows.append(compare_forward_dynamics(results, exact, magnitudes, both=False))
     return rows
 
 
-def _compare_with_derived(sizes: Magnitudes, name: str, engine: Backend) -> list[Comparison]:
+def _compare_with_derived(magnitudes: Magnitudes, name: str, engine: Backend) -> list[Comparison]:
     """Comparisons of native results with those that dynx derives from the engine's poses and torques."""
     native = native_quantities(engine)
-    own = BackendResults(name, engine, sizes.samples)
-    derived = BackendResults(DERIVED, DerivedBackend(engine), sizes.samples)
+    own = BackendResults(name, engine, magnitudes.samples)
+    derived = BackendResults(DERIVED, DerivedBackend(engine), magnitudes.samples)
     rows = [
-        compare(quantity, own, derived, sizes)
+        compare(quantity, own, derived, magnitudes)
         for quantity in compared_quantities()
         if quantity.native in native
     ]
     if "forward_dynamics" in native:
-        rows.append(compare_forward_dynamics(own, derived, sizes, both=False))
+        rows.append(compare_forward_dynamics(own, derived, magnitudes, both=False))
     return rows
 
 
@@ -186,14 +186,14 @@ def _notes(model: Model, names: list[str]) -> tuple[str, ...]:
         listed = ", ".join(singular[:6]) + (" ..." if len(singular) > 6 else "")
         notes.append(
             f"the mass matrix is singular (nothing that {listed} moves has inertia): "
-            "forward dynamics has no answer, and each backend must refuse it"
+            "forward dynamics has no solution, and each backend must refuse it"
         )
     if len(names) == 1:
-        notes.append("one backend alone: compared with the referee and with itself only")
+        notes.append("a single backend: compared with the referee and with itself only")
     return tuple(notes)
 
 
-def _checked(
+def _check_arguments(
     backends: Sequence[str | Backend] | None, samples: int, seed: int, referee_samples: int
 ) -> list[str | Backend]:
     numbers = (("samples", samples, 1), ("seed", seed, 0), ("referee_samples", referee_samples, 0))
@@ -225,8 +225,8 @@ def _open(chosen: str | Backend, model: Model, opened: ExitStack) -> Backend:
     return chosen
 
 
-def _distinct(engines: list[Backend]) -> list[str]:
-    """Their names; a repeated one is numbered."""
+def _distinct_names(engines: list[Backend]) -> list[str]:
+    """The names of the engines, repeated ones numbered."""
     names: list[str] = []
     for engine in engines:
         again = sum(name.partition("#")[0] == engine.name for name in names)

@@ -1,6 +1,6 @@
-"""The quantities that are compared: those of the table, and variants of some that share their code.
+"""The quantities that are compared: those of the table, and variants of some with other options.
 
-A quantity is evaluated by anything that has the methods of `Backend`, the 50-digit referee included.
+They can be evaluated on any object that has the methods of `Backend`, such as the 50-digit referee.
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ Evaluate = Callable[[Any, Samples], Array]
 class ComparedQuantity:
     """One line of the report.
 
-    `evaluate` gives the results of a backend, `scale` broadcasts against them, and `tolerance` bounds
-    their difference over scale. `native` is the quantity of the backend whose derivation is compared with
-    it, `refereed` whether the referee computes it, and `derived_scale` the scale of derived results.
+    `evaluate` returns the results of a backend, `scale` broadcasts against them, and `tolerance` bounds
+    their difference over scale. `native` is the quantity whose native results are compared with derived ones
+    (None: not compared), `derived_scale` their scale, and `refereed` whether the referee computes it.
     """
 
     name: str
@@ -51,7 +51,7 @@ class ComparedQuantity:
 
 
 def compared_quantities() -> tuple[ComparedQuantity, ...]:
-    """All but quantities that solve equations, whose errors are not differences, and inverse kinematics
+    """Lines for all quantities but those that solve equations, whose errors are not differences
     (`dynx.agreement.solutions`)."""
     lines: list[ComparedQuantity] = []
     for quantity in QUANTITIES.values():
@@ -68,7 +68,7 @@ def _of_table(quantity: Quantity) -> ComparedQuantity:
         magnitude.scale,
         _rounding,
         magnitude.layout,
-        # All derivations start from these two.
+        # All other quantities are derived from these two.
         None if quantity.name in ("forward_kinematics", "inverse_dynamics") else quantity.name,
         quantity.refereed,
         magnitude.derived_scale,
@@ -81,28 +81,28 @@ def _evaluation(quantity: Quantity, magnitude: NaturalMagnitude) -> Evaluate:
         return np.asarray(getattr(backend, quantity.name)(*arguments))
 
     def at_frames(backend: Any, samples: Samples) -> Array:
-        """Results (questions, samples, ...), one question after the other."""
+        """Results (entries, samples, ...) for each entry of `frame_samples`."""
         method, results = getattr(backend, quantity.name), []
-        for question in frame_samples(magnitude.layout, samples):
-            state = [getattr(samples, argument)[question.samples] for argument in quantity.arguments]
-            results.append(method(*state, question.frame, reference=question.reference))
+        for entry in frame_samples(magnitude.layout, samples):
+            state = [getattr(samples, argument)[entry.samples] for argument in quantity.arguments]
+            results.append(method(*state, entry.frame, reference=entry.reference))
         return np.asarray(np.stack(results))
 
     return at_frames if magnitude.layout in ("every_frame", "derivatives") else at_samples
 
 
-def _rounding(sizes: Magnitudes) -> float:
-    return tolerances.rounding(sizes.depth)
+def _rounding(magnitudes: Magnitudes) -> float:
+    return tolerances.rounding(magnitudes.depth)
 
 
-def _component(sizes: Magnitudes) -> float:
-    return tolerances.component(sizes.depth)
+def _component(magnitudes: Magnitudes) -> float:
+    return tolerances.component(magnitudes.depth)
 
 
-def _component_scale(sizes: Magnitudes) -> Floats:
-    """(n, nv): no torque can be more exact than one rounding of the largest (a joint that carries a
-    point mass on its own axis takes none, but what is summed to none is as large as the others)."""
-    return np.maximum(sizes.torque, largest(sizes.torque) * (EPS / _component(sizes)))
+def _component_scale(magnitudes: Magnitudes) -> Floats:
+    """(n, nv): the magnitude of each torque, at least such that one rounding of the largest torque is within
+    tolerance (a joint with a point mass on its axis has torque zero as a sum of terms that large)."""
+    return np.maximum(magnitudes.torque, largest(magnitudes.torque) * (EPS / _component(magnitudes)))
 
 
 def _at_point(backend: Any, samples: Samples) -> Array:
@@ -114,9 +114,9 @@ def _at_point(backend: Any, samples: Samples) -> Array:
     return np.concatenate(by_reference, axis=-2)
 
 
-def _at_point_scale(sizes: Magnitudes) -> Floats:
-    linear = sizes.linear_column + np.linalg.norm(POINT) * sizes.angular_column
-    return np.stack((([linear] * 3) + [sizes.angular_column] * 3) * 2, axis=1)
+def _at_point_scale(magnitudes: Magnitudes) -> Floats:
+    linear = magnitudes.linear_column + np.linalg.norm(POINT) * magnitudes.angular_column
+    return np.stack((([linear] * 3) + [magnitudes.angular_column] * 3) * 2, axis=1)
 
 
 def _with_forces(backend: Any, samples: Samples) -> Array:
@@ -134,15 +134,15 @@ def _with_joint_dynamics(backend: Any, samples: Samples) -> Array:
     return np.asarray(backend.inverse_dynamics(samples.q, samples.v, samples.a, joint_dynamics=True))
 
 
-def _joint_dynamics_scale(sizes: Magnitudes) -> Floats:
-    model = sizes.samples.model
-    total = np.zeros(len(sizes.samples))
-    fastest = np.max(np.abs(sizes.samples.v) + np.abs(sizes.samples.a), axis=-1, initial=0.0)
+def _joint_dynamics_scale(magnitudes: Magnitudes) -> Floats:
+    model = magnitudes.samples.model
+    total = np.zeros(len(magnitudes.samples))
+    fastest = np.max(np.abs(magnitudes.samples.v) + np.abs(magnitudes.samples.a), axis=-1, initial=0.0)
     for joint in model.joints:
         gain = 1.0 if joint.mimic is None else max(abs(joint.mimic.multiplier), joint.mimic.multiplier**2)
         own = joint.dynamics
         total = total + gain * ((own.damping + own.armature) * fastest + own.friction)
-    return largest(sizes.torque) + np.abs(total)[:, None]
+    return largest(magnitudes.torque) + np.abs(total)[:, None]
 
 
 def _inverse_dynamics(backend: Any, samples: Samples) -> Array:

@@ -31,11 +31,11 @@ class WorstSample:
 
 @dataclass(frozen=True)
 class Comparison:
-    """The difference of two results of a quantity; `pair` is two backends, or a backend and
-    ``referee`` (50 digits) or ``derived`` (what dynx derives from that engine's own poses and inverse
-    dynamics), joined by ``~``.
+    """The difference of two results of a quantity.
 
-    `max_rel_error` is the largest error over its natural magnitude (`dynx.agreement.natural_magnitudes`).
+    `pair` joins two names by ``~``: two backends, or a backend and ``referee`` (50 digits) or ``derived``
+    (results that dynx derives from that engine's own poses and inverse dynamics). `max_rel_error` is the
+    largest error over its natural magnitude (`dynx.agreement.natural_magnitudes`).
     """
 
     quantity: str
@@ -49,7 +49,7 @@ class Comparison:
 
     @property
     def names(self) -> tuple[str, str]:
-        """The two that were compared."""
+        """The two names of `pair`."""
         first, _, second = self.pair.partition("~")
         return first, second
 
@@ -65,26 +65,26 @@ class Verdict:
 
 def judge(error: Array, scale: Floats) -> Verdict:
     """The largest error over `scale`, which broadcasts; NaN counts as infinite."""
-    size = np.abs(error).astype(np.float64)
-    if not size.size:
+    absolute = np.abs(error).astype(np.float64)
+    if not absolute.size:
         return Verdict(0.0, 0.0, None)
-    size = np.where(np.isfinite(size), size, np.inf)
-    relative = np.where(size == 0.0, 0.0, np.inf)
-    np.divide(size, np.broadcast_to(scale, size.shape), out=relative, where=scale > 0.0)
+    absolute = np.where(np.isfinite(absolute), absolute, np.inf)
+    relative = np.where(absolute == 0.0, 0.0, np.inf)
+    np.divide(absolute, np.broadcast_to(scale, absolute.shape), out=relative, where=scale > 0.0)
     worst = np.unravel_index(int(np.argmax(relative)), relative.shape)
-    return Verdict(float(np.max(size)), float(relative[worst]), tuple(int(k) for k in worst))
+    return Verdict(float(np.max(absolute)), float(relative[worst]), tuple(int(k) for k in worst))
 
 
 def compare(
-    quantity: ComparedQuantity, first: BackendResults, second: BackendResults, sizes: Magnitudes
+    quantity: ComparedQuantity, first: BackendResults, second: BackendResults, magnitudes: Magnitudes
 ) -> Comparison:
-    """Compare two results whose error is their difference."""
+    """Compare the results of two backends by their difference."""
     samples = first.samples
-    tolerance = quantity.tolerance(sizes)
+    tolerance = quantity.tolerance(magnitudes)
     results = [each.of(quantity.name, quantity.evaluate) for each in (first, second)]
-    refused = refusals(quantity.name, first, second, results, tolerance)
-    if refused is not None:
-        return refused
+    refusal = compare_refusals(quantity.name, first, second, results, tolerance)
+    if refusal is not None:
+        return refusal
     one, other = results
     assert not isinstance(one, Refusal)
     assert not isinstance(other, Refusal)
@@ -92,7 +92,11 @@ def compare(
         note = f"{first.name} gives shape {one.shape}, {second.name} {other.shape}"
         return failed_comparison(quantity.name, first, second, tolerance, note)
     derived = second.name == DERIVED and quantity.derived_scale is not None
-    scale = quantity.derived_scale(sizes) if derived and quantity.derived_scale else quantity.scale(sizes)
+    scale = (
+        quantity.derived_scale(magnitudes)
+        if derived and quantity.derived_scale
+        else quantity.scale(magnitudes)
+    )
     verdict = judge(_difference(one, other), scale)
     return Comparison(
         quantity.name,
@@ -108,34 +112,36 @@ def compare(
 
 def not_finite_note(*results: tuple[BackendResults, Array]) -> str | None:
     """A note that names the backends whose results contain NaN or infinity, or None."""
-    wild = [by.name for by, answer in results if not np.isfinite(answer.astype(np.float64)).all()]
-    return f"{' and '.join(wild)}: NaN or infinity in the answer" if wild else None
+    names = [by.name for by, result in results if not np.isfinite(result.astype(np.float64)).all()]
+    return f"{' and '.join(names)}: NaN or infinity in the result" if names else None
 
 
 def pair_name(first: BackendResults, second: BackendResults) -> str:
-    """Such as ``pinocchio~pybullet``."""
+    """The name of a pair, such as ``pinocchio~pybullet``."""
     return f"{first.name}~{second.name}"
 
 
-def refusals(
+def compare_refusals(
     name: str,
     first: BackendResults,
     second: BackendResults,
     results: Sequence[Array | Refusal],
     tolerance: float,
 ) -> Comparison | None:
-    """The comparison of errors in place of results: the same error from both is agreement."""
-    refused = [answer for answer in results if isinstance(answer, Refusal)]
+    """Compare backends of which some raised an error; None if all have results.
+
+    They agree if all report a singular mass matrix.
+    """
+    refused = [result for result in results if isinstance(result, Refusal)]
     if not refused:
         return None
-    alike = len(refused) == len(results) and all(answer.singular for answer in refused)
-    if alike:
+    if len(refused) == len(results) and all(result.singular for result in refused):
         note = f"refused alike: {refused[0].error}"
         return Comparison(name, pair_name(first, second), 0.0, 0.0, tolerance, True, note=note)
     note = "; ".join(
-        f"{each.name} refuses: {answer}"
-        for each, answer in zip((first, second), results, strict=False)
-        if isinstance(answer, Refusal)
+        f"{each.name} refuses: {result}"
+        for each, result in zip((first, second), results, strict=False)
+        if isinstance(result, Refusal)
     )
     return failed_comparison(name, first, second, tolerance, note)
 
@@ -148,7 +154,7 @@ def failed_comparison(
 
 
 def state(samples: Samples, k: int, frame: str | None = None, reference: str | None = None) -> WorstSample:
-    """Sample number k (of those in `samples`) as a record."""
+    """Sample number k of `samples` as a record."""
     return WorstSample(
         index=int(samples.index[k]),
         kind=samples.kinds[k],
@@ -169,12 +175,12 @@ def locate(position: tuple[int, ...] | None, layout: Layout, samples: Samples) -
         return state(samples, position[0])
     if layout == "frames":
         return state(samples, position[0], samples.model.frame_names[position[1]])
-    question = frame_samples(layout, samples)[position[0]]
-    return state(samples, int(question.samples[position[1]]), question.frame, question.reference)
+    entry = frame_samples(layout, samples)[position[0]]
+    return state(samples, int(entry.samples[position[1]]), entry.frame, entry.reference)
 
 
 def _difference(one: Array, other: Array) -> Array:
-    """Exact where one holds 50-digit numbers, since doubles are exact in those."""
+    """One minus other; exact where one of them holds 50-digit numbers, since doubles are exact in those."""
     if one.dtype == object or other.dtype == object:
         return np.asarray(one.astype(object) - other.astype(object))
     with np.errstate(invalid="ignore"):

@@ -2,8 +2,8 @@
 
 A pose, and anything made of poses, is band-limited along a motion at constant velocity: a sum of
 sines and cosines whose frequency is at most W. Bernstein's inequality then bounds every derivative
-by size times power of W, so the central difference of order 8 with step ``STEP / W`` has a known
-error (`tolerances.derivative`).
+by the largest value times a power of W, so the central difference of order 8 with step ``STEP / W`` has a
+known error (`tolerances.derivative`).
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from dynx.spatial.scalar import Floats
 WEIGHTS = {1: 4.0 / 5.0, 2: -1.0 / 5.0, 3: 4.0 / 105.0, 4: -1.0 / 280.0}
 """Weight of f(k h) - f(-k h), to be divided by h."""
 
-REST = 1e-100
-"""Frequencies up to this count as rest [rad/s]; their step would overflow."""
+MAX_REST_FREQUENCY = 1e-100
+"""Frequency [rad/s] up to which a robot counts as at rest: the step would overflow."""
 
 
 def time_derivative(function: Callable[[Floats], Floats], frequency: Floats) -> Floats:
@@ -28,7 +28,7 @@ def time_derivative(function: Callable[[Floats], Floats], frequency: Floats) -> 
     `frequency` (n,) is each motion's highest angular frequency [rad/s]. `function` takes times
     (m, n), m at a time, and returns (m, n, ...); the derivative is (n, ...).
     """
-    step = STEP / np.where(frequency > REST, frequency, 1.0)
+    step = STEP / np.where(frequency > MAX_REST_FREQUENCY, frequency, 1.0)
     multiples = [k for order in WEIGHTS for k in (order, -order)]
     values = function(np.array(multiples)[:, None] * step)
     total = sum(

@@ -16,8 +16,8 @@ from dynx.agreement.sampling import FrameSamples, Samples
 from dynx.spatial.scalar import Floats
 
 Layout = Literal["samples", "frames", "every_frame", "derivatives"]
-"""Leading axes of an array of results: samples; samples, then frames; or one of the two lists of frames of
-`Samples`, then the samples of each."""
+"""Leading axes of an array of results: samples; samples, then frames; or the entries of one of the two lists
+of `FrameSamples`, then the samples of each."""
 
 Scale = Callable[[Magnitudes], Floats]
 
@@ -27,7 +27,7 @@ class NaturalMagnitude:
     """Bounds at every sample.
 
     `scale` broadcasts against the results, whose leading axes are those of `layout`. `derived_scale`
-    holds for results that dynx derives, where derivation loses digits: columns of a derived mass matrix are
+    is for results that dynx derives, if the derivation loses digits: columns of a derived mass matrix are
     differences of torques that contain gravity.
     """
 
@@ -37,7 +37,7 @@ class NaturalMagnitude:
 
 
 def frame_samples(layout: Layout, samples: Samples) -> tuple[FrameSamples, ...]:
-    """The frames and samples that the first axis of such a layout counts."""
+    """The entries along the first axis of layout ``every_frame`` or ``derivatives``."""
     return samples.every_frame if layout == "every_frame" else samples.derivatives
 
 
@@ -46,83 +46,88 @@ def largest(scale: Floats) -> Floats:
     return np.asarray(np.max(scale, axis=-1, initial=0.0, keepdims=True))
 
 
-def pose_scale(sizes: Magnitudes) -> Floats:
+def pose_scale(magnitudes: Magnitudes) -> Floats:
     """(n, 1, 4, 4): 1 for rotations, the length of the robot for positions."""
-    scale = np.ones((len(sizes.samples), 1, 4, 4))
-    scale[:, :, :3, 3] = sizes.length[:, None, None]
+    scale = np.ones((len(magnitudes.samples), 1, 4, 4))
+    scale[:, :, :3, 3] = magnitudes.length[:, None, None]
     return scale
 
 
-def mass_scale(sizes: Magnitudes) -> Floats:
+def mass_scale(magnitudes: Magnitudes) -> Floats:
     """(n, nv, nv): sqrt(M_ii M_jj)."""
-    return np.asarray(sizes.root_inertia[:, :, None] * sizes.root_inertia[:, None, :])
+    return np.asarray(magnitudes.sqrt_diagonal[:, :, None] * magnitudes.sqrt_diagonal[:, None, :])
 
 
-def _derived_mass_scale(sizes: Magnitudes) -> Floats:
-    gravity = sizes.gravity_torque
-    return mass_scale(sizes) + gravity[:, :, None] + gravity[:, None, :]
+def _derived_mass_scale(magnitudes: Magnitudes) -> Floats:
+    gravity = magnitudes.gravity_torque
+    return mass_scale(magnitudes) + gravity[:, :, None] + gravity[:, None, :]
 
 
-def coriolis_scale(sizes: Magnitudes) -> Floats:
-    """(n, nv, nv): m Jp' dJp + Jr' I dJr, either factor the one that changes, each by its bound.
+def coriolis_scale(magnitudes: Magnitudes) -> Floats:
+    """(n, nv, nv): bound on m (Jp' dJp + dJp' Jp) + Jr' I dJr, from bounds on each factor.
 
-    Not the bound on M times a rate of turning: a robot that slides without turning has levers that grow
-    and shrink by its speed, which cancel (a point mass on the axis of a joint of a sliding base).
+    The bound on M times an angular speed would not do: the lever arms of a robot that slides without
+    rotating change with its speed, and these terms cancel (a point mass on the axis of a joint on a
+    sliding base).
     """
-    L, rate, A = sizes.linear_column, sizes.linear_column_rate, sizes.angular_column
-    linear = sizes.mass * (L[:, :, None] * rate[:, None, :] + rate[:, :, None] * L[:, None, :])
-    turned = sizes.turning_inertia * _angular_speed(sizes)[:, None, None] * A[:, :, None] * A[:, None, :]
-    return np.asarray(linear + turned)
+    L, rate, A = magnitudes.linear_column, magnitudes.linear_column_rate, magnitudes.angular_column
+    linear = magnitudes.mass * (L[:, :, None] * rate[:, None, :] + rate[:, :, None] * L[:, None, :])
+    angular = (
+        magnitudes.rotational_inertia
+        * _angular_velocity(magnitudes)[:, None, None]
+        * A[:, :, None]
+        * A[:, None, :]
+    )
+    return np.asarray(linear + angular)
 
 
-def _regressor_scale(sizes: Magnitudes) -> Floats:
-    """(n, nv, 10 n_links): what a unit of a parameter, anywhere on the robot, can take.
+def _regressor_scale(magnitudes: Magnitudes) -> Floats:
+    """(n, nv, 10 n_links): bound on the torque of a unit of each parameter, anywhere on the robot.
 
-    A mass takes its acceleration, gravity included, at the end of a lever; a first moment takes the
-    same about an axis, or the second derivative of turning at the end of a lever; a second moment takes
-    the latter about an axis.
+    With lever arm L, proper acceleration p and angular terms w = |alpha| + omega^2, a mass requires L p, a
+    first moment L w + p, and a second moment w.
     """
-    L, A = sizes.linear_column, sizes.angular_column
-    moving = (_linear_acceleration(sizes) + sizes.gravity)[:, None]
-    turning = (_angular_acceleration(sizes) + _angular_speed(sizes) ** 2)[:, None]
-    ten = [L * moving] + [L * turning + A * moving] * 3 + [A * turning] * 6
-    return np.tile(np.stack(ten, axis=-1), len(sizes.samples.model.links))
+    L, A = magnitudes.linear_column, magnitudes.angular_column
+    p = (_linear_acceleration(magnitudes) + magnitudes.gravity)[:, None]
+    w = (_angular_acceleration(magnitudes) + _angular_velocity(magnitudes) ** 2)[:, None]
+    ten = [L * p] + [L * w + A * p] * 3 + [A * w] * 6
+    return np.tile(np.stack(ten, axis=-1), len(magnitudes.samples.model.links))
 
 
-def _derived_energy_scale(sizes: Magnitudes) -> Floats:
-    v = np.abs(sizes.samples.v)
-    return np.asarray(0.5 * np.einsum("ni,nij,nj->n", v, _derived_mass_scale(sizes), v))
+def _derived_energy_scale(magnitudes: Magnitudes) -> Floats:
+    v = np.abs(magnitudes.samples.v)
+    return np.asarray(0.5 * np.einsum("ni,nij,nj->n", v, _derived_mass_scale(magnitudes), v))
 
 
-def _momentum_scale(sizes: Magnitudes) -> Floats:
-    linear = sizes.mass * sizes.speed
-    angular = linear * sizes.length + sizes.turning_inertia * _angular_speed(sizes)
+def _momentum_scale(magnitudes: Magnitudes) -> Floats:
+    linear = magnitudes.mass * magnitudes.speed
+    angular = linear * magnitudes.length + magnitudes.rotational_inertia * _angular_velocity(magnitudes)
     return np.stack([linear] * 3 + [angular] * 3, axis=-1)
 
 
 def _twist(layout: Layout, linear: Scale, angular: Scale) -> NaturalMagnitude:
-    """Bounds (questions, samples, 6 [, nv]) from bounds (n [, nv]) of linear and angular rows."""
+    """Bounds (entries, samples, 6 [, nv]) from bounds (n [, nv]) of linear and angular rows."""
 
-    def scale(sizes: Magnitudes) -> Floats:
-        rows = np.stack([linear(sizes)] * 3 + [angular(sizes)] * 3, axis=1)
-        questions = frame_samples(layout, sizes.samples)
-        return np.asarray(np.stack([rows[question.samples] for question in questions]))
+    def scale(magnitudes: Magnitudes) -> Floats:
+        rows = np.stack([linear(magnitudes)] * 3 + [angular(magnitudes)] * 3, axis=1)
+        entries = frame_samples(layout, magnitudes.samples)
+        return np.asarray(np.stack([rows[entry.samples] for entry in entries]))
 
     return NaturalMagnitude(scale, layout)
 
 
-def _linear_acceleration(sizes: Magnitudes) -> Floats:
-    a, v = np.abs(sizes.samples.a), np.abs(sizes.samples.v)
-    return np.asarray(np.sum(sizes.linear_column * a + sizes.linear_column_rate * v, axis=-1))
+def _linear_acceleration(magnitudes: Magnitudes) -> Floats:
+    a, v = np.abs(magnitudes.samples.a), np.abs(magnitudes.samples.v)
+    return np.asarray(np.sum(magnitudes.linear_column * a + magnitudes.linear_column_rate * v, axis=-1))
 
 
-def _angular_acceleration(sizes: Magnitudes) -> Floats:
-    a, v = np.abs(sizes.samples.a), np.abs(sizes.samples.v)
-    return np.asarray(np.sum(sizes.angular_column * a + sizes.angular_column_rate * v, axis=-1))
+def _angular_acceleration(magnitudes: Magnitudes) -> Floats:
+    a, v = np.abs(magnitudes.samples.a), np.abs(magnitudes.samples.v)
+    return np.asarray(np.sum(magnitudes.angular_column * a + magnitudes.angular_column_rate * v, axis=-1))
 
 
-def _angular_speed(sizes: Magnitudes) -> Floats:
-    return np.asarray(np.sum(sizes.angular_column * np.abs(sizes.samples.v), axis=-1))
+def _angular_velocity(magnitudes: Magnitudes) -> Floats:
+    return np.asarray(np.sum(magnitudes.angular_column * np.abs(magnitudes.samples.v), axis=-1))
 
 
 NATURAL_MAGNITUDES: dict[str, NaturalMagnitude] = {
@@ -131,7 +136,7 @@ NATURAL_MAGNITUDES: dict[str, NaturalMagnitude] = {
     "jacobian": _twist("every_frame", lambda s: s.linear_column, lambda s: s.angular_column),
     "linear jacobian": NaturalMagnitude(lambda s: s.linear_column[:, None, :]),
     "jacobian rate": _twist("derivatives", lambda s: s.linear_column_rate, lambda s: s.angular_column_rate),
-    "velocity": _twist("every_frame", lambda s: s.speed, _angular_speed),
+    "velocity": _twist("every_frame", lambda s: s.speed, _angular_velocity),
     "acceleration": _twist("derivatives", _linear_acceleration, _angular_acceleration),
     "torque": NaturalMagnitude(lambda s: largest(s.torque)),
     "bias torque": NaturalMagnitude(lambda s: largest(s.bias_torque)),

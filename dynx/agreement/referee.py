@@ -30,15 +30,14 @@ DIGITS = 50
 
 
 def exactly(numbers: object) -> Array:
-    """The same numbers as mpmath's, without rounding: every double is exact in them."""
+    """Convert doubles to mpmath numbers, which represent them exactly."""
     return np.asarray(np.frompyfunc(mpmath.mpf, 1, 1)(np.asarray(numbers, dtype=np.float64)), dtype=object)
 
 
 class Referee:
     """Quantities of one model in 50 digits, with the methods and shapes of `Backend`.
 
-    Arguments are doubles with any leading axes, taken as exact; an argument that already holds
-    mpmath numbers is used as it stands.
+    Arguments are doubles, taken as exact, or mpmath numbers, with any leading axes.
     """
 
     name = REFEREE

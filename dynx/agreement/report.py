@@ -9,7 +9,7 @@ One entry of ``results`` per robot:
 
     robot, source, base      its name, where it was read from, "fixed" or "floating"
     backends                 names of the backends compared
-    nq, nv, samples, seed    sizes (null for a robot that was refused)
+    nq, nv, samples, seed    numbers (null for a robot that was refused)
     agree                    whether every quantity and every identity is within tolerance
     error                    null, or {"type", "message"}: why the robot could not be used
     seconds                  wall-clock time
@@ -19,7 +19,7 @@ One entry of ``results`` per robot:
     suspects                 [{backend, quantity, evidence}] where something differs
     notes                    sentences about the description and the comparison
 
-An error that has no size (a refusal, a NaN, a wrong shape) is null, and `note` says what it was.
+An error without a finite value (a refusal, a NaN, a wrong shape) is null, and `note` describes it.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ SCHEMA = 1
 
 @dataclass(frozen=True)
 class Failure:
-    """Why a robot, or a backend for it, could not be used."""
+    """The error for which a robot, or a backend for it, could not be used."""
 
     type: str
     message: str
@@ -48,10 +48,11 @@ class Failure:
 
 @dataclass(frozen=True, repr=False)
 class AgreementReport:
-    """How well backends agree about one robot; true in a condition if they do.
+    """The agreement of backends on one robot; true in a condition if they agree.
 
-    `quantities` compares results, `identities` tests each backend alone, `suspects` says who is
-    wrong where something differs. `error` is set, and nothing compared, where the robot was refused.
+    `quantities` are comparisons of results, `identities` checks of each backend alone, and `suspects` the
+    backends that are probably wrong where results differ. Where the robot was refused, `error` is set and
+    nothing is compared.
     """
 
     robot: str
@@ -71,7 +72,7 @@ class AgreementReport:
 
     @property
     def agree(self) -> bool:
-        """Whether the robot was used and everything is within tolerance."""
+        """Whether the robot was compared and everything is within tolerance."""
         rows: list[Comparison | IdentityCheck] = [*self.quantities, *self.identities]
         return self.error is None and all(row.agree for row in rows)
 
@@ -124,7 +125,7 @@ class AgreementReport:
 
 @dataclass(frozen=True)
 class AgreementEntry:
-    """One robot in the JSON document of ``dynx agree``; sizes are null for a robot that was refused."""
+    """One robot in the JSON document of ``dynx agree``; numbers are null for a robot that was refused."""
 
     robot: str
     source: str | None
@@ -145,7 +146,7 @@ class AgreementEntry:
 
 @dataclass(frozen=True)
 class AgreementSummary:
-    """How many robots have an entry, and how many of them have each verdict."""
+    """Numbers of robots: of those with an entry, of each verdict, and of those not done."""
 
     robots: int
     agree: int

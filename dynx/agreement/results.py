@@ -27,7 +27,7 @@ class Refusal:
 
     @property
     def singular(self) -> bool:
-        """Whether it says that no unique acceleration exists."""
+        """Whether no unique acceleration exists."""
         return isinstance(self.error, SingularMassMatrixError)
 
     def __str__(self) -> str:
@@ -35,7 +35,7 @@ class Refusal:
 
 
 class BackendResults:
-    """Results of `backend`, kept by name; an error of dynx is kept as a result too."""
+    """Results of `backend` by name, each evaluated once; errors are results too."""
 
     def __init__(self, name: str, backend: Any, samples: Samples) -> None:
         self.name = name
@@ -50,13 +50,13 @@ class BackendResults:
         return self._known[name]
 
     def attempt(self, evaluate: Callable[[Any, Samples], Array]) -> Array | Refusal:
-        """A result that is not kept."""
+        """The result of `evaluate`, not stored, or the error that it raised."""
         try:
             return np.asarray(evaluate(self.backend, self.samples))
         except DynxError as error:
             return Refusal(error)
         except Exception as error:
-            # A backend from elsewhere may break any promise; it must not end the comparison.
+            # A backend of another package may raise anything; the comparison must go on.
             broken = EngineError(f"{self.name} failed with {type(error).__name__}: {error}")
             broken.__cause__ = error
             return Refusal(broken)

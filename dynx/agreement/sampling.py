@@ -1,9 +1,9 @@
 """The states at which backends are compared: the same for every backend, drawn from a seed.
 
-Kinds take turns, so that few samples still see each: ``within`` the limits, ``anywhere`` in
-(-pi, pi) (robots whose limits have no width move too), ``straight`` (every joint at a multiple of a
+Kinds alternate, so that few samples include each: ``within`` the limits, ``anywhere`` in
+(-pi, pi) (so that joints whose limits have no width move too), ``straight`` (every joint at a multiple of a
 quarter turn, where arms are singular), ``limit`` (each joint at one of its limits) and ``turns``
-(angles of many turns). Half of the samples are within limits. A floating base takes any attitude.
+(angles of many turns). Half of the samples are within limits. The attitude of a floating base is random.
 """
 
 from __future__ import annotations
@@ -47,9 +47,9 @@ class FrameSamples:
 class Samples:
     """n states of one model: q (n, nq), v, a, tau (n, nv) and a wrench (n, 6) for one frame.
 
-    `every_frame` has each frame in each reference at some samples; `derivatives` is for quantities that take
-    longer and has, for robots with very many frames, fewer references of each. All entries of one list have
-    equally many samples.
+    `every_frame` has each frame in each reference at some samples; `derivatives` is for quantities that are
+    slower to evaluate and has fewer references of each frame for robots with very many. All entries of one
+    list have equally many samples.
     """
 
     model: Model
@@ -67,10 +67,10 @@ class Samples:
     def __len__(self) -> int:
         return len(self.q)
 
-    def take(self, chosen: list[int], frame_share: int) -> Samples:
-        """Some of the samples, with each frame in `frame_share` references at one sample each."""
+    def take(self, chosen: list[int], references: int) -> Samples:
+        """Some of the samples, with each frame in that many references at one sample each."""
         pick = np.array(chosen, dtype=np.intp)
-        entries = assign_frames(self.model.frame_names, len(pick), each=1, references=frame_share)
+        entries = assign_frames(self.model.frame_names, len(pick), each=1, references=references)
         return replace(
             self,
             index=self.index[pick],
@@ -101,14 +101,14 @@ def draw_samples(model: Model, count: int, seed: int) -> Samples:
     rng = np.random.default_rng(seed)
     kinds = tuple(KINDS[k % len(KINDS)] for k in range(count))
     q = np.stack([_configuration(model, kind, rng) for kind in kinds])
-    v, a, wanted = (rng.uniform(-2.0, 2.0, (count, model.nv)) for _ in range(3))
+    v, a, other_a = (rng.uniform(-2.0, 2.0, (count, model.nv)) for _ in range(3))
     # One sample at rest: there dry friction and every velocity product must vanish.
     if count >= len(KINDS):
         v[KINDS.index("straight")] = 0.0
     with ReferenceBackend(model) as reference:
-        tau = reference.inverse_dynamics(q, v, wanted)
+        tau = reference.inverse_dynamics(q, v, other_a)
     names, carried = model.frame_names, _carried_frames(model)
-    n_questions = len(names) * len(REFERENCES)
+    n_pairs = len(names) * len(REFERENCES)
     return Samples(
         model=model,
         index=np.arange(count),
@@ -119,11 +119,11 @@ def draw_samples(model: Model, count: int, seed: int) -> Samples:
         tau=tau,
         wrench=rng.uniform(-5.0, 5.0, (count, 6)),
         wrench_frame=carried[int(rng.integers(len(carried)))],
-        every_frame=assign_frames(names, count, each=_share(256, n_questions, count), references=3),
+        every_frame=assign_frames(names, count, each=_share(256, n_pairs, count), references=3),
         derivatives=assign_frames(
             names,
             count,
-            each=_share(64, n_questions, count),
+            each=_share(64, n_pairs, count),
             references=_share(192, len(names), len(REFERENCES)),
         ),
     )
@@ -160,8 +160,8 @@ def _narrowed(lower: Floats, upper: Floats) -> tuple[Floats, Floats]:
     return np.where(room, low, lower), np.where(room, high, upper)
 
 
-def _share(budget: int, among: int, most: int) -> int:
-    return min(max(budget // among, 1), most)
+def _share(budget: int, count: int, limit: int) -> int:
+    return min(max(budget // count, 1), limit)
 
 
 def _configuration(model: Model, kind: Kind, rng: np.random.Generator) -> Floats:
@@ -185,7 +185,7 @@ def _configuration(model: Model, kind: Kind, rng: np.random.Generator) -> Floats
     elif kind == "turns":
         many = 2.0 * np.pi * MAX_TURNS
         q[base:] = np.where(turning, rng.uniform(-many, many, n), rng.uniform(-1.0, 1.0, n))
-    # Half of the attitudes have the scalar of the quaternion negative; one kind turns by exactly pi.
+    # Half of the quaternions have a negative scalar; those of kind ``straight`` rotate by exactly pi.
     if model.floating and kind == "straight":
         q[3:7] = np.eye(4)[int(rng.integers(3))]
     return q

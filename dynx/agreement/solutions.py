@@ -15,11 +15,11 @@ from dynx.agreement import tolerances
 from dynx.agreement.comparison import (
     Comparison,
     Verdict,
+    compare_refusals,
     failed_comparison,
     judge,
     not_finite_note,
     pair_name,
-    refusals,
     state,
 )
 from dynx.agreement.magnitudes import Magnitudes
@@ -34,32 +34,31 @@ TARGETS = 2
 """Targets of inverse kinematics; each costs hundreds of evaluations."""
 
 
-def regular_samples(sizes: Magnitudes) -> list[int]:
-    """Samples whose mass matrix is positive definite to double precision; the first if none is.
+def regular_samples(magnitudes: Magnitudes) -> list[int]:
+    """Numbers of the samples whose mass matrix is positive definite to double precision; 0 if none is.
 
-    Where it is singular (wrists of point masses, stretched out) no unique acceleration exists, and
-    whether an engine notices is rounding.
+    Where it is singular (stretched wrists of point masses) no unique acceleration exists, and rounding
+    decides whether an engine detects that.
     """
-    least = tolerances.singular(sizes.samples.model.nv)
-    return np.flatnonzero(sizes.lowest_eigenvalue > least).tolist() or [0]
+    least = tolerances.singular(magnitudes.samples.model.nv)
+    return np.flatnonzero(magnitudes.lowest_eigenvalue > least).tolist() or [0]
 
 
 def compare_forward_dynamics(
-    solver: BackendResults, verifier: BackendResults, sizes: Magnitudes, *, both: bool = True
+    solver: BackendResults, verifier: BackendResults, magnitudes: Magnitudes, *, both: bool = True
 ) -> Comparison:
-    """The backward error: an acceleration found by one, put into the inverse dynamics of the other,
-    must take the given torque. With `both`, each verifies the other.
-    """
+    """Compare backward errors: the acceleration of the solver, put into the inverse dynamics of the
+    verifier, must require the given torque. With `both`, each verifies the other."""
     name, samples = "forward_dynamics", solver.samples
     tolerance = tolerances.solving()
-    chosen = regular_samples(sizes)
+    chosen = regular_samples(magnitudes)
 
     def solve(backend: Any, samples: Samples) -> Array:
         return np.asarray(backend.forward_dynamics(samples.q[chosen], samples.v[chosen], samples.tau[chosen]))
 
     pairs = [(solver, verifier), (verifier, solver)] if both else [(solver, verifier)]
     solutions = [each.of(name, solve) for each, _ in pairs]
-    refused = refusals(name, solver, verifier, solutions, tolerance)
+    refused = compare_refusals(name, solver, verifier, solutions, tolerance)
     if refused is not None:
         return refused
     worst = Verdict(0.0, 0.0, None)
@@ -67,14 +66,14 @@ def compare_forward_dynamics(
     notes = []
     if left_out:
         notes.append(f"without {left_out} of {len(samples)} samples, where the mass matrix is singular")
-    for (solving, judging), a in zip(pairs, solutions, strict=True):
+    for (one, other), a in zip(pairs, solutions, strict=True):
         assert not isinstance(a, Refusal)
-        tau = judging.attempt(partial(_torque_taken, a=a, chosen=chosen))
+        tau = other.attempt(partial(_required_torque, a=a, chosen=chosen))
         if isinstance(tau, Refusal):
-            return failed_comparison(name, solver, verifier, tolerance, f"{judging.name} refuses: {tau}")
-        wild = not_finite_note((solving, a), (judging, tau))
-        notes += [wild] if wild else []
-        verdict = _backward_error(a, tau, chosen, sizes)
+            return failed_comparison(name, solver, verifier, tolerance, f"{other.name} refuses: {tau}")
+        not_finite = not_finite_note((one, a), (other, tau))
+        notes += [not_finite] if not_finite else []
+        verdict = _backward_error(a, tau, chosen, magnitudes)
         if verdict.relative > worst.relative or worst.position is None:
             worst = verdict
     return Comparison(
@@ -89,32 +88,32 @@ def compare_forward_dynamics(
     )
 
 
-def _torque_taken(backend: Any, samples: Samples, *, a: Array, chosen: list[int]) -> Array:
-    """The torque that the accelerations take; NaN where they are not finite."""
+def _required_torque(backend: Any, samples: Samples, *, a: Array, chosen: list[int]) -> Array:
+    """The torque that the accelerations require; NaN where they are not finite."""
     if a.shape != (len(chosen), samples.model.nv) or not np.isfinite(a).all():
         return np.full((len(chosen), samples.model.nv), np.nan)
     return np.asarray(backend.inverse_dynamics(samples.q[chosen], samples.v[chosen], a))
 
 
-def _backward_error(a: Array, tau: Array, chosen: list[int], sizes: Magnitudes) -> Verdict:
-    samples = sizes.samples
+def _backward_error(a: Array, tau: Array, chosen: list[int], magnitudes: Magnitudes) -> Verdict:
+    samples = magnitudes.samples
     if tau.shape != a.shape or not np.isfinite(tau.astype(np.float64)).all():
         return Verdict(np.inf, np.inf, (0,))
     everywhere = np.zeros_like(samples.tau)
     everywhere[chosen] = a
-    return judge(tau - samples.tau[chosen], sizes.solved_torque(everywhere)[chosen, None])
+    return judge(tau - samples.tau[chosen], magnitudes.solved_torque(everywhere)[chosen, None])
 
 
 def compare_inverse_kinematics(
-    first: BackendResults, second: BackendResults, sizes: Magnitudes
+    first: BackendResults, second: BackendResults, magnitudes: Magnitudes
 ) -> Comparison:
-    """A configuration that one engine calls a solution must reach the target by the other's poses.
+    """Compare the poses of the second engine at the first one's solutions with the targets, and vice versa.
 
-    Targets are poses that the deepest frame takes within limits, searched for from nearby. A search
-    that ends without a solution and says so is no disagreement; the note counts them.
+    Targets are poses of the deepest frame within limits, and searches start nearby. A search that reports
+    no success is no disagreement; the note counts them.
     """
     name, samples, frame = "inverse_kinematics", first.samples, deepest_frame(first.samples.model)
-    tolerance = tolerances.reached(sizes.depth, float(np.max(sizes.length)))
+    tolerance = tolerances.target_distance(magnitudes.depth, float(np.max(magnitudes.length)))
     q_target, q_start = _targets(samples)
 
     def solve(backend: Any, samples: Samples) -> Array:
@@ -124,13 +123,13 @@ def compare_inverse_kinematics(
         return np.concatenate([q, target.reshape(len(q), 16)], axis=-1)
 
     solutions = [each.of(name, solve) for each in (first, second)]
-    refused = refusals(name, first, second, solutions, tolerance)
+    refused = compare_refusals(name, first, second, solutions, tolerance)
     if refused is not None:
         return refused
     errors = []
-    for answer, verifier in zip(solutions, (second, first), strict=True):
-        assert not isinstance(answer, Refusal)
-        q, target = answer[:, : samples.model.nq], answer[:, samples.model.nq :].reshape(-1, 4, 4)
+    for solution, verifier in zip(solutions, (second, first), strict=True):
+        assert not isinstance(solution, Refusal)
+        q, target = solution[:, : samples.model.nq], solution[:, samples.model.nq :].reshape(-1, 4, 4)
         found = np.isfinite(q).all(axis=-1)
         reached = verifier.attempt(partial(_poses, q=q[found], frame=frame))
         if isinstance(reached, Refusal):
@@ -147,7 +146,7 @@ def compare_inverse_kinematics(
         tolerance,
         verdict.relative <= tolerance,
         None,
-        f"{missed} of {searches} searches ended without a solution, and said so" if missed else None,
+        f"{missed} of {searches} searches reported no solution" if missed else None,
     )
 
 

@@ -1,4 +1,4 @@
-"""When two backends differ: which one is wrong, and how we know."""
+"""Backends that are probably wrong where results differ, and the evidence against them."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ class Suspect:
 def find_suspects(
     quantities: Sequence[Comparison], identities: Sequence[IdentityCheck], backends: Sequence[str]
 ) -> tuple[Suspect, ...]:
-    """For each quantity in dispute, the backends that evidence speaks against; strongest kind first.
+    """Name, for each quantity whose results differ, the backends with the strongest evidence against them.
 
-    A distance from the 50-digit referee convicts. Failing that, the backend that differs from all
-    others while they agree among themselves is named, then one that contradicts itself: its own
-    derivation, or an identity of mechanics. Without any evidence all parties are named.
+    The strongest evidence is an error against the 50-digit referee; then that a backend differs from all
+    others while they agree; then that it differs from its own derivation or breaks an identity of
+    mechanics. Without any evidence all backends that differ are named.
     """
     suspects = []
     for quantity in dict.fromkeys(comparison.quantity for comparison in quantities):
@@ -35,13 +35,13 @@ def find_suspects(
             continue
         rows = [c for c in quantities if c.quantity == quantity]
         evidence = {name: _evidence(name, rows, identities, backends) for name in backends}
-        parties = [name for name in backends if any(name in c.names for c in failed)]
-        strength = max(strongest for strongest, _ in (evidence[name] for name in parties))
-        for name in parties:
+        differing = [name for name in backends if any(name in c.names for c in failed)]
+        max_weight = max(evidence[name][0] for name in differing)
+        for name in differing:
             weight, reasons = evidence[name]
-            if weight == strength:
-                nothing = ("differs, and nothing shows which side is wrong",)
-                suspects.append(Suspect(name, quantity, tuple(reasons) or nothing))
+            if weight == max_weight:
+                no_evidence = ("differs, and nothing shows which side is wrong",)
+                suspects.append(Suspect(name, quantity, tuple(reasons) or no_evidence))
     named = {suspect.backend for suspect in suspects}
     for check in identities:
         if not check.agree and check.backend not in named:
@@ -56,7 +56,10 @@ def _evidence(
     identities: Sequence[IdentityCheck],
     backends: Sequence[str],
 ) -> tuple[int, list[str]]:
-    """How much speaks against a backend in one quantity: 3 referee, 2 majority, 1 itself, 0 nothing."""
+    """Weight of the evidence against a backend in one quantity, and its sentences.
+
+    The weight is 3 with the referee against it, 2 with all others, 1 with its own results, 0 without any.
+    """
     weight, reasons = 0, []
     against = [c for c in rows if name in c.names and not c.agree]
     for row in against:
@@ -64,7 +67,7 @@ def _evidence(
         if other == REFEREE:
             weight = 3
             figures = _figures(row.max_rel_error, row.tolerance)
-            reasons.append(f"is off the 50-digit answer by {figures}")
+            reasons.append(f"differs from the 50-digit result by {figures}")
         elif other == DERIVED:
             weight = max(weight, 1)
             reasons.append("differs from what follows from its own poses and inverse dynamics")

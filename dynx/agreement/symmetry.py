@@ -25,15 +25,15 @@ def rotate_world(model: Model) -> tuple[Model, Callable[[Floats], Floats]]:
     x, y, z = rotate(R, np.array(model.gravity)).tolist()
     if model.floating:
 
-        def turn(q: Floats) -> Floats:
+        def rotate_base(q: Floats) -> Floats:
             attitude = quat_product(np.broadcast_to(quat, (*q.shape[:-1], 4)), q[..., 3:7])
             return np.concatenate([rotate(R, q[..., :3]), attitude, q[..., 7:]], axis=-1)
 
-        return model.with_gravity((x, y, z)), turn
+        return model.with_gravity((x, y, z)), rotate_base
     roll, pitch, yaw = rpy_from_rotation(R).tolist()
-    link = Link(_free_name("turned_world", {link.name for link in model.links}))
+    link = Link(_free_name("rotated_world", {link.name for link in model.links}))
     joint = Joint(
-        _free_name("turned_mount", {joint.name for joint in model.joints}),
+        _free_name("rotated_mount", {joint.name for joint in model.joints}),
         "fixed",
         link.name,
         model.root,
@@ -43,7 +43,7 @@ def rotate_world(model: Model) -> tuple[Model, Callable[[Floats], Floats]]:
     return replace(model, links=links, joints=joints, gravity=(x, y, z)), lambda q: q
 
 
-def _free_name(wanted: str, taken: set[str]) -> str:
-    while wanted in taken:
-        wanted += "_"
-    return wanted
+def _free_name(name: str, taken: set[str]) -> str:
+    while name in taken:
+        name += "_"
+    return name

@@ -14,7 +14,7 @@ from dynx.model.model import Base
 
 @dataclass(frozen=True)
 class AgreementTask:
-    """A robot, and the options of its comparison; those that are None are left to `dynx.agree`."""
+    """A robot and the options of its comparison; None stands for the default of `dynx.agree`."""
 
     robot: str
     base: Base

@@ -1,8 +1,8 @@
-"""Every tolerance of the project, and why it is what it is.
+"""Every tolerance of the project, and its derivation.
 
-Errors are judged relative to the natural size of a quantity (`dynx.agreement.magnitudes`), so a
-tolerance is a pure number. Each is derived from the unit roundoff and from how often rounding errors
-are handed on; the bars are what dynx promises and cap whatever the derivation allows.
+Errors are relative to the natural magnitude of a quantity (`dynx.agreement.natural_magnitudes`), so a
+tolerance is a pure number. Each is derived from the unit roundoff and the number of joints through which
+rounding errors accumulate, and is at most the error that dynx promises.
 """
 
 from __future__ import annotations
@@ -10,23 +10,23 @@ from __future__ import annotations
 from dynx.agreement.magnitudes import EPS
 
 BAR = 1e-12
-"""Promise for poses, Jacobians, inverse dynamics, mass matrix and gravity, in the max norm; and for
-forward dynamics as a backward error: the torque that the acceleration found really takes, less the
-torque asked for. A forward error is no measure of it, since an ill-conditioned mass matrix turns one
-rounding error into any acceleration error with nobody at fault."""
+"""Promised bound on the error of poses, Jacobians, inverse dynamics, mass matrix and gravity, in the max
+norm; and on the backward error of forward dynamics: the torque that the acceleration requires minus the
+given torque. Its forward error has no such bound: with an ill-conditioned mass matrix one rounding error of
+the input changes the acceleration by any amount."""
 
-COMPONENT_BAR = 1e-10
-"""Promise for each torque by itself. A finger at the end of a long arm inherits the rounding errors
-of the arm's acceleration times its own size, so relative to its own torque it is worse off than the
-largest torque by the ratio of its distance from its axis to its radius of gyration."""
+MAX_COMPONENT_ERROR = 1e-10
+"""Promised bound on the error of each torque over its own magnitude. The torque of a finger at the end of a
+long arm has the rounding errors of the arm's acceleration, so its relative error exceeds that of the largest
+torque by the ratio of its distance from the arm's axis to its radius of gyration."""
 
 ROUNDINGS = 32
-"""Rounding errors, in units of the roundoff, that one joint adds on the way out and back: a rotation
-(three products and two sums an entry) applied to motions outward and to wrenches inward, the
-rounding of sine and cosine, and the lumping of welded links, each once in either engine."""
+"""Rounding errors, in units of the roundoff, that one joint adds: a rotation (three products and two sums an
+entry) applied to motions outward and to wrenches inward, the rounding of sine and cosine, and the merging of
+fixed joints, each once in either engine."""
 
 FIXED_JOINTS = 4
-"""Joints' worth of rounding that even a robot without joints has: base pose, frame offset, inertia."""
+"""Number of joints that the rounding errors of base pose, frame offset and inertia count as."""
 
 STEP = 1.0 / 16.0
 """Step of a numerical derivative times the highest angular frequency in the function (see
@@ -39,41 +39,41 @@ TRUNCATION = 1.0 / 630.0
 """The difference of order 8 misses h^8 f^(9) / 630 (Fornberg 1988, table 1)."""
 
 CANCELLATION = 2.1
-"""Sum of the absolute weights of that difference: how much of a rounding error it passes on, over h."""
+"""Sum of the absolute weights of that difference: the factor on a rounding error, over h."""
 
-REACHED = 1e-6
-"""A target counts as reached within this many metres and radians: what `dynx.ik` asks by default."""
+TARGET_TOLERANCE = 1e-6
+"""Distance [m, rad] within which a target is reached, the default of `dynx.ik`."""
 
 
 def rounding(depth: int) -> float:
-    """Error of a quantity that is handed through a chain of `depth` joints."""
+    """Bound on the error of a quantity that is computed along a chain of `depth` joints."""
     return min(BAR, ROUNDINGS * EPS * (depth + FIXED_JOINTS))
 
 
 def component(depth: int) -> float:
-    """Error of a single torque relative to its own natural size."""
-    return min(COMPONENT_BAR, rounding(depth) * 1e3)
+    """Bound on the error of a single torque over its own magnitude."""
+    return min(MAX_COMPONENT_ERROR, rounding(depth) * 1e3)
 
 
 def solving() -> float:
-    """Backward error of solving for accelerations.
+    """Bound on the backward error of solving for accelerations.
 
     Solving with the mass matrix would cost order nv roundoffs (Higham 2002, theorem 10.4), but the
-    articulated-body algorithm is not backward stable in the ratio of the masses: under a root of
-    1e-4 kg it loses three digits with nobody at fault. So this is the bar itself.
+    articulated-body algorithm is not backward stable in the ratio of the masses: on a root link of
+    1e-4 kg it loses three digits. So this is the promised bound itself.
     """
     return BAR
 
 
 def eigenvalue(depth: int, nv: int) -> float:
-    """How far below zero rounding can push an eigenvalue of the mass matrix at unit diagonal: nv
-    times the error of an entry (Weyl)."""
+    """Bound on the rounding error of an eigenvalue of the mass matrix at unit diagonal: nv times the error
+    of an entry (Weyl)."""
     return nv * rounding(depth)
 
 
 def derivative(depth: int) -> float:
-    """Error of a numerical derivative relative to size times frequency: Bernstein's bound on the ninth
-    derivative of a band-limited function gives the truncation, `CANCELLATION` the rounding."""
+    """Bound on the error of a numerical derivative over magnitude times frequency: Bernstein's bound on the
+    ninth derivative of a band-limited function gives the truncation, `CANCELLATION` the rounding."""
     return STEP**ORDER * TRUNCATION + CANCELLATION * ROUNDINGS * EPS * (depth + FIXED_JOINTS) / STEP
 
 
@@ -82,6 +82,6 @@ def singular(nv: int) -> float:
     return ROUNDINGS * EPS * nv
 
 
-def reached(depth: int, length: float) -> float:
-    """Distance [m, rad] from the target at which another engine's poses may put a solution."""
-    return REACHED + rounding(depth) * max(1.0, length)
+def target_distance(depth: int, length: float) -> float:
+    """Bound on the distance [m, rad] of a solution from its target by the poses of another engine."""
+    return TARGET_TOLERANCE + rounding(depth) * max(1.0, length)

@@ -52,7 +52,7 @@ class Judge:
 
     def __init__(self, samples: Batch) -> None:
         self._samples = samples
-        self._sizes = Magnitudes(_as_agreement_samples(samples))
+        self._magnitudes = Magnitudes(_as_agreement_samples(samples))
         self._reference = ReferenceBackend(samples.model)
 
     def check(self, name: str, results: Floats) -> Check:
@@ -65,14 +65,14 @@ class Judge:
             return self._check_forward_dynamics(results)
         reference, scale = self._reference_values(quantity)
         verdict = judge(results - reference, scale)
-        return Check(verdict.relative, tolerances.rounding(self._sizes.depth))
+        return Check(verdict.relative, tolerances.rounding(self._magnitudes.depth))
 
     def _reference_values(self, quantity: Quantity) -> tuple[Floats, Floats]:
         """Reference values and natural magnitudes, of one frame for a quantity of frames."""
         frame = [self._samples.frame] if quantity.of_frame else []
         method = getattr(self._reference, quantity.name)
         magnitude = NATURAL_MAGNITUDES[quantity.natural_magnitude]
-        scale = magnitude.scale(self._sizes)
+        scale = magnitude.scale(self._magnitudes)
         if magnitude.layout == "frames":
             scale = scale[:, 0]
         elif magnitude.layout != "samples":
@@ -85,14 +85,14 @@ class Judge:
         if not np.isfinite(a).all():
             return Check(float("inf"), tolerances.solving())
         taken = self._reference.inverse_dynamics(state.q, state.v, a)
-        verdict = judge(taken - state.tau, self._sizes.solved_torque(a)[:, None])
+        verdict = judge(taken - state.tau, self._magnitudes.solved_torque(a)[:, None])
         return Check(verdict.relative, tolerances.solving())
 
 
 def _as_agreement_samples(batch: Batch) -> Samples:
     n = len(batch)
     kind: Kind = "within"
-    questions = (FrameSamples(batch.frame, LOCAL_WORLD_ALIGNED, np.arange(n)),)
+    frame_samples = (FrameSamples(batch.frame, LOCAL_WORLD_ALIGNED, np.arange(n)),)
     return Samples(
         model=batch.model,
         index=np.arange(n),
@@ -103,6 +103,6 @@ def _as_agreement_samples(batch: Batch) -> Samples:
         tau=batch.tau,
         wrench=np.zeros((n, 6)),
         wrench_frame=batch.frame,
-        every_frame=questions,
-        derivatives=questions,
+        every_frame=frame_samples,
+        derivatives=frame_samples,
     )

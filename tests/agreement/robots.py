@@ -70,14 +70,14 @@ class Broken(ReferenceBackend):
 
 
 class GravityUpsideDown(Broken):
-    """A sign."""
+    """Gravity torque with the opposite sign."""
 
     def _gravity_torque(self, q: Floats) -> Floats:
         return -super()._gravity_torque(q)
 
 
 class WrongTorque(Broken):
-    """One joint's velocity products are lost."""
+    """Inverse dynamics with the last velocity zero."""
 
     def _inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
         slow = np.array(v)
@@ -86,7 +86,7 @@ class WrongTorque(Broken):
 
 
 class TransposedRotation(Broken):
-    """Rotations the wrong way round."""
+    """Transposed rotations."""
 
     def _frame_placements(self, q: Floats) -> Floats:
         T = super()._frame_placements(q)
@@ -95,14 +95,14 @@ class TransposedRotation(Broken):
 
 
 class LocalMeansWorld(Broken):
-    """One of the three references mixed up."""
+    """Jacobians in ``world`` where ``local`` is requested."""
 
     def _jacobian(self, q: Floats, frame: int, reference: Reference) -> Floats:
         return super()._jacobian(q, frame, "world" if reference == "local" else reference)
 
 
 class UndampedMass(Broken):
-    """An inertia a little too large: a part in 10^9."""
+    """A mass matrix too large by one part in 10^9."""
 
     def _mass_matrix(self, q: Floats) -> Floats:
         return super()._mass_matrix(q) * (1.0 + 1e-9)
@@ -116,7 +116,7 @@ class DizzySolver(Broken):
 
 
 class Silent(Broken):
-    """NaN instead of an answer."""
+    """NaN in place of a result."""
 
     def _center_of_mass(self, q: Floats) -> Floats:
         return np.full((*q.shape[:-1], 3), np.nan)
@@ -131,4 +131,4 @@ DEFECTS: list[tuple[type[Broken], str]] = [
     (DizzySolver, "forward_dynamics"),
     (Silent, "center_of_mass"),
 ]
-"""Each defect, and a quantity in which it must be seen."""
+"""Each defect, and a quantity that shows it."""

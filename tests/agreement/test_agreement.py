@@ -35,7 +35,7 @@ def test_every_installed_backend_agrees_about_an_arm_with_a_mimic_joint(base: Ba
     assert report.worst("inverse_dynamics") <= BAR
 
 
-def test_pairs_are_each_two_backends_each_with_the_referee_and_each_with_its_derivation() -> None:
+def test_backends_are_paired_with_each_other_the_referee_and_their_derivation() -> None:
     report = agree(arm(), ["reference", "pinocchio"])
     pairs = {row.pair for row in report.quantities}
     assert pairs == {
@@ -48,10 +48,10 @@ def test_pairs_are_each_two_backends_each_with_the_referee_and_each_with_its_der
     assert {check.backend for check in report.identities} == {"reference", "pinocchio"}
 
 
-def test_no_tolerance_is_above_what_is_promised() -> None:
+def test_no_tolerance_exceeds_the_promised_error() -> None:
     for row in agree(arm("floating"), ["reference"]).quantities:
-        bar = {"inverse_dynamics_component": 1e-10, "inverse_kinematics": 1.1e-6}.get(row.quantity, 1e-12)
-        assert row.tolerance <= bar, row
+        promised = {"inverse_dynamics_component": 1e-10, "inverse_kinematics": 1.1e-6}
+        assert row.tolerance <= promised.get(row.quantity, 1e-12), row
 
 
 @pytest.mark.parametrize(("defect", "quantity"), DEFECTS, ids=[d.__name__ for d, _ in DEFECTS])
@@ -66,7 +66,7 @@ def test_a_defect_is_seen_and_its_backend_is_named(defect: type[Broken], quantit
 
 
 @pytest.mark.parametrize(("defect", "quantity"), DEFECTS, ids=[d.__name__ for d, _ in DEFECTS])
-def test_a_defect_is_seen_with_nothing_to_compare_it_with(defect: type[Broken], quantity: str) -> None:
+def test_a_defect_shows_without_another_backend(defect: type[Broken], quantity: str) -> None:
     report = agree(arm(), [defect(arm())], samples=8)
     assert not report.agree
     assert {suspect.backend for suspect in report.suspects} == {"broken"}
@@ -79,7 +79,7 @@ def test_equal_seeds_give_equal_reports() -> None:
     assert first.quantities != other.quantities
 
 
-def test_a_singular_mass_matrix_is_refused_alike_and_said() -> None:
+def test_a_singular_mass_matrix_is_refused_alike_and_noted() -> None:
     report = agree(massless_finger())
     assert report.agree
     rows = [row for row in report.quantities if row.quantity == "forward_dynamics"]
@@ -117,7 +117,7 @@ def test_text_of_a_urdf_is_taken() -> None:
         ("<robot", "DescriptionError"),
     ],
 )
-def test_what_cannot_be_read_gives_a_report_with_the_error(description: str, kind: str) -> None:
+def test_an_unreadable_description_gives_a_report_with_the_error(description: str, kind: str) -> None:
     report = agree(description, ["reference"])
     assert not report.agree
     assert report.error is not None
@@ -146,7 +146,7 @@ def test_a_backend_given_ready_is_left_open() -> None:
         assert engine.mass_matrix(arm().neutral()).shape == (3, 3)
 
 
-def test_arguments_that_suit_no_robot_are_refused() -> None:
+def test_invalid_arguments_are_refused() -> None:
     counts: tuple[Any, ...] = (0, -1, True, 2.5)
     for samples in counts:
         with pytest.raises(ArgumentError, match="samples"):
@@ -164,7 +164,7 @@ def test_arguments_that_suit_no_robot_are_refused() -> None:
         agree(arm(), ["pinochio"])
 
 
-def test_progress_is_told_every_step() -> None:
+def test_progress_is_called_with_every_step() -> None:
     steps: list[str] = []
     agree(arm(), ["reference", "pinocchio"], samples=2, progress=steps.append)
     assert steps[0] == "reference~pinocchio"
@@ -172,7 +172,7 @@ def test_progress_is_told_every_step() -> None:
     assert "identities of pinocchio" in steps
 
 
-def test_two_backends_of_one_name_are_told_apart() -> None:
+def test_two_backends_of_one_name_are_numbered() -> None:
     model = arm()
     report = agree(model, [ReferenceBackend(model), ReferenceBackend(model)], samples=2)
     assert report.backends == ("reference", "reference#2")

@@ -1,4 +1,4 @@
-"""A backend from elsewhere that breaks its promises is a difference in the report, never an exception."""
+"""Backends of other packages that break their contract give differences in the report, not exceptions."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ MODEL = load("double_pendulum")
 
 
 class Single(ReferenceBackend):
-    """One sample at a time, as most engines answer."""
+    """A backend that evaluates one sample at a time, like most engines."""
 
     vectorized = False
 
@@ -47,7 +47,7 @@ class TooFewFrames(Single):
 
 
 @pytest.mark.parametrize("kind", [WrongShape, Raises, NotANumber, TooFewFrames])
-def test_it_differs_and_the_note_says_how(kind: type[Single]) -> None:
+def test_a_broken_backend_differs_and_has_a_note(kind: type[Single]) -> None:
     broken = kind(MODEL)
     report = agree(MODEL, ["reference", broken], samples=2, referee_samples=1)
     assert report.error is None
@@ -56,7 +56,7 @@ def test_it_differs_and_the_note_says_how(kind: type[Single]) -> None:
     assert {suspect.backend for suspect in report.suspects} == set(report.backends[1:])
 
 
-def test_a_list_of_the_right_numbers_is_an_answer() -> None:
+def test_a_list_of_the_right_numbers_is_accepted() -> None:
     report = agree(MODEL, ["reference", ReturnsAList(MODEL)], samples=2, referee_samples=1)
     assert report.error is None
 

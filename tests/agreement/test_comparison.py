@@ -16,19 +16,19 @@ from tests.agreement.robots import Broken, arm
 MASS = next(quantity for quantity in compared_quantities() if quantity.name == "mass_matrix")
 
 
-def test_the_largest_relative_error_and_its_place() -> None:
+def test_the_largest_relative_error_and_its_position() -> None:
     verdict = judge(np.array([[1.0, -3.0], [0.5, 0.0]]), np.array([[1.0, 10.0], [0.1, 0.0]]))
     assert verdict.absolute == 3.0
     assert verdict.relative == 5.0
     assert verdict.position == (1, 0)
 
 
-def test_an_error_of_zero_needs_no_size_and_any_other_does() -> None:
+def test_at_scale_zero_only_an_error_of_zero_is_finite() -> None:
     assert judge(np.zeros(2), np.zeros(2)).relative == 0.0
     assert judge(np.array([1e-300]), np.zeros(1)).relative == np.inf
 
 
-def test_what_is_no_number_is_infinitely_wrong() -> None:
+def test_nan_and_infinity_are_infinite_errors() -> None:
     assert judge(np.array([0.0, np.nan]), np.ones(2)).relative == np.inf
     assert judge(np.array([-np.inf]), np.ones(1)).absolute == np.inf
 

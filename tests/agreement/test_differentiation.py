@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dynx.agreement import tolerances
-from dynx.agreement.differentiation import REST, WEIGHTS, time_derivative
+from dynx.agreement.differentiation import MAX_REST_FREQUENCY, WEIGHTS, time_derivative
 from dynx.agreement.magnitudes import EPS
 
 
@@ -18,7 +18,7 @@ def test_a_band_limited_function_is_differentiated_to_the_stated_error(
         lambda t: np.sin(frequency * t + phase) + np.cos(lower * t), np.array([frequency, frequency])
     )
     exact = frequency * np.cos(phase)
-    assert np.all(np.abs(rate - exact) <= 2.0 * max(frequency, REST) * tolerances.derivative(0))
+    assert np.all(np.abs(rate - exact) <= 2.0 * max(frequency, MAX_REST_FREQUENCY) * tolerances.derivative(0))
 
 
 def test_the_weights_differentiate_polynomials_of_their_order_exactly() -> None:

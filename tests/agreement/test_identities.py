@@ -16,19 +16,19 @@ from dynx.spatial.scalar import Floats
 from tests.agreement.robots import BODY, Broken, GravityUpsideDown, TransposedRotation, arm
 
 
-def checked(backend: Backend) -> dict[str, IdentityCheck]:
+def identity_checks(backend: Backend) -> dict[str, IdentityCheck]:
     samples = draw_samples(backend.model, 8, 0)
-    sizes = Magnitudes(samples.take(samples.differentiable(4), 1))
-    return {check.identity: check for check in check_identities(backend.name, backend, sizes)}
+    magnitudes = Magnitudes(samples.take(samples.differentiable(4), 1))
+    return {check.identity: check for check in check_identities(backend.name, backend, magnitudes)}
 
 
-def broken(backend: Backend) -> set[str]:
-    return {name for name, check in checked(backend).items() if not check.agree}
+def failed_identities(backend: Backend) -> set[str]:
+    return {name for name, check in identity_checks(backend).items() if not check.agree}
 
 
 @pytest.mark.parametrize("base", ["fixed", "floating"])
 def test_the_reference_keeps_every_identity(base: Base) -> None:
-    checks = checked(ReferenceBackend(arm(base)))
+    checks = identity_checks(ReferenceBackend(arm(base)))
     assert len(checks) == len(IDENTITIES) + 1
     assert all(check.agree for check in checks.values())
 
@@ -66,7 +66,7 @@ class WrongMomentum(Broken):
 
 
 class TiltedWorld(Broken):
-    """Gravity is taken to point down whatever the model says."""
+    """Gravity that points down in every model."""
 
     def _gravity(self) -> None:
         self._mechanism = self.model.with_gravity((0.0, 0.0, -9.81)).mechanism
@@ -93,12 +93,12 @@ class TiltedWorld(Broken):
     ],
 )
 def test_a_defect_breaks_its_identity(defect: type[Broken], identity: str) -> None:
-    assert identity in broken(defect(arm()))
+    assert identity in failed_identities(defect(arm()))
 
 
 def test_the_momentum_of_a_floating_base_is_checked_about_its_centre() -> None:
-    assert "momentum = base rows of M v" in broken(WrongMomentum(arm("floating")))
-    assert checked(ReferenceBackend(arm()))["momentum = base rows of M v"].note
+    assert "momentum = base rows of M v" in failed_identities(WrongMomentum(arm("floating")))
+    assert identity_checks(ReferenceBackend(arm()))["momentum = base rows of M v"].note
 
 
 class Shapeless(Broken):
@@ -106,15 +106,15 @@ class Shapeless(Broken):
         return super()._gravity_torque(q)[..., :1].repeat(7, axis=-1)
 
 
-def test_an_answer_of_the_wrong_shape_breaks_identities_rather_than_the_test() -> None:
+def test_a_result_of_the_wrong_shape_fails_identities_without_an_exception() -> None:
     joints = [Joint("j", "continuous", "a", "b"), Joint("k", "continuous", "b", "c")]
     model = Model.build("two", [Link("a", BODY), Link("b", BODY), Link("c", BODY)], joints)
-    assert "C v + gravity = bias" in broken(Shapeless(model))
+    assert "C v + gravity = bias" in failed_identities(Shapeless(model))
 
 
-def test_positivity_is_not_asked_where_no_body_has_such_an_inertia() -> None:
+def test_positivity_is_not_checked_where_an_inertia_is_not_physical() -> None:
     model = arm()
     odd = replace(model.links[1], inertial=Inertial(1.0, ixx=-0.1, iyy=0.1, izz=0.1))
-    check = checked(ReferenceBackend(replace(model, links=(model.links[0], odd, *model.links[2:]))))
+    check = identity_checks(ReferenceBackend(replace(model, links=(model.links[0], odd, *model.links[2:]))))
     assert check["mass matrix is positive"].agree
     assert "upper" in (check["mass matrix is positive"].note or "")

@@ -6,7 +6,7 @@ from hypothesis import given
 import dynx
 from dynx.agreement import tolerances
 from dynx.agreement.compared_quantities import compared_quantities
-from dynx.agreement.magnitudes import SLENDER, Magnitudes
+from dynx.agreement.magnitudes import MIN_INERTIA_RATIO, Magnitudes
 from dynx.agreement.sampling import draw_samples
 from dynx.model import Model
 from dynx.reference.backend import ReferenceBackend
@@ -28,57 +28,57 @@ BOUNDS = {
     "center_of_mass_jacobian",
     "centroidal_momentum",
 }
-"""Quantities whose natural size is a proven bound."""
+"""Quantities whose natural magnitude is a proven bound."""
 
 
 @given(models(base="either"))
-def test_natural_sizes_bound_the_quantities(model: Model) -> None:
+def test_natural_magnitudes_bound_the_quantities(model: Model) -> None:
     samples = draw_samples(model, 6, 0)
-    sizes = Magnitudes(samples)
-    slack = 1.0 + tolerances.rounding(sizes.depth)
+    magnitudes = Magnitudes(samples)
+    slack = 1.0 + tolerances.rounding(magnitudes.depth)
     with ReferenceBackend(model) as backend:
         for quantity in compared_quantities():
             if quantity.name in BOUNDS:
                 value = np.abs(np.asarray(quantity.evaluate(backend, samples), dtype=float))
-                scale = np.asarray(quantity.scale(sizes))
-                floor = tolerances.rounding(sizes.depth) * np.max(scale, initial=0.0)
+                scale = np.asarray(quantity.scale(magnitudes))
+                floor = tolerances.rounding(magnitudes.depth) * np.max(scale, initial=0.0)
                 assert np.all(value <= 2.0 * scale * slack + floor), quantity.name
 
 
 @given(models())
-def test_poses_turn_no_faster_than_the_bound(model: Model) -> None:
+def test_frames_move_no_faster_than_the_bounds(model: Model) -> None:
     samples = draw_samples(model, 4, 1)
-    sizes = Magnitudes(samples)
+    magnitudes = Magnitudes(samples)
     with ReferenceBackend(model) as backend:
         for frame in model.frame_names:
             twist = backend.frame_velocity(samples.q, samples.v, frame)
-            slack = 1.0 + tolerances.rounding(sizes.depth)
-            assert np.all(np.linalg.norm(twist[:, 3:], axis=-1) <= 2.0 * sizes.turning_speed * slack)
-            assert np.all(np.linalg.norm(twist[:, :3], axis=-1) <= 2.0 * sizes.speed * slack)
+            slack = 1.0 + tolerances.rounding(magnitudes.depth)
+            assert np.all(np.linalg.norm(twist[:, 3:], axis=-1) <= 2.0 * magnitudes.angular_speed * slack)
+            assert np.all(np.linalg.norm(twist[:, :3], axis=-1) <= 2.0 * magnitudes.speed * slack)
 
 
-def test_a_tensor_that_breaks_the_triangle_inequality_counts_as_a_whole() -> None:
-    """0.125 about one oblique axis and nothing about the others: no rod, and rounded like what it is."""
+def test_a_tensor_that_violates_the_triangle_inequality_counts_as_a_whole() -> None:
+    """0.125 kg m^2 about one oblique axis and none about the others, which no body has."""
     text = """<robot name="spindle"><link name="only"><inertial>
         <origin xyz="0 0 0" rpy="0.7853981633974483 1.5707963267948966 0.7853981633974483"/>
         <mass value="1"/><inertia ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0.125"/>
         </inertial></link></robot>"""
     spindle = dynx.load(text, base="floating")
-    sizes = Magnitudes(draw_samples(spindle, 2, 0))
-    np.testing.assert_allclose(sizes.root_inertia[:, 3:] ** 2, 0.125)
+    magnitudes = Magnitudes(draw_samples(spindle, 2, 0))
+    np.testing.assert_allclose(magnitudes.sqrt_diagonal[:, 3:] ** 2, 0.125)
     assert dynx.agree(spindle, ["reference", "pinocchio"], samples=2).agree
 
 
-def test_a_tensor_at_the_triangle_inequality_counts_by_a_small_share() -> None:
-    """A rod about its axis: its own moment is zero, and the tensor counts by `SLENDER` only."""
+def test_a_tensor_at_the_triangle_inequality_bounds_a_zero_moment() -> None:
+    """A rod has no moment about its axis; `MIN_INERTIA_RATIO` of the tensor counts there."""
     text = """<robot name="rod"><link name="only"><inertial><mass value="1"/>
         <inertia ixx="0.125" ixy="0" ixz="0" iyy="0.125" iyz="0" izz="0"/></inertial></link></robot>"""
-    sizes = Magnitudes(draw_samples(dynx.load(text, base="floating"), 2, 0))
-    np.testing.assert_allclose(sizes.root_inertia[:, 3:5] ** 2, 0.125)
-    np.testing.assert_allclose(sizes.root_inertia[:, 5] ** 2, SLENDER * 0.125)
+    magnitudes = Magnitudes(draw_samples(dynx.load(text, base="floating"), 2, 0))
+    np.testing.assert_allclose(magnitudes.sqrt_diagonal[:, 3:5] ** 2, 0.125)
+    np.testing.assert_allclose(magnitudes.sqrt_diagonal[:, 5] ** 2, MIN_INERTIA_RATIO * 0.125)
 
 
-def test_so_it_does_where_an_acceleration_is_put_back() -> None:
+def test_the_lower_bound_holds_for_torques_of_found_accelerations() -> None:
     """A joint about the small moment of such a tensor: the large one is in the rounding of its torque."""
     text = """<robot name="blade"><link name="hub"><inertial><mass value="1"/>
         <inertia ixx="0.125" ixy="0" ixz="0" iyy="0.125" iyz="0" izz="0.125"/></inertial></link>

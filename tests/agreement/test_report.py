@@ -61,7 +61,7 @@ def test_the_document_has_the_form_that_is_documented() -> None:
     }
 
 
-def test_the_worst_sample_is_enough_to_see_the_error_again() -> None:
+def test_the_worst_sample_reproduces_the_error() -> None:
     model = arm("floating")
     backends = ReferenceBackend(model), GravityUpsideDown(model)
     report = agree(model, backends, samples=4)
@@ -81,7 +81,7 @@ def test_the_worst_sample_of_a_frame_names_frame_and_reference() -> None:
     assert row.worst_sample.reference in ("local", "world", "local_world_aligned")
 
 
-def test_an_error_without_a_size_is_null() -> None:
+def test_an_infinite_error_is_null() -> None:
     row = Comparison("mass_matrix", "a~b", np.inf, np.nan, 1e-13, False, note="refused")
     entry = AgreementReport("x", quantities=(row,)).to_dict()["quantities"][0]
     assert entry["max_abs_error"] is None

@@ -39,38 +39,38 @@ def test_a_joint_whose_limits_have_no_width_moves_all_the_same() -> None:
     assert np.count_nonzero(samples.q) >= 4
 
 
-def test_limits_beyond_all_reason_are_narrowed_where_something_is_differentiated() -> None:
+def test_huge_limits_are_narrowed_where_quantities_are_differentiated() -> None:
     joint = Joint("rotor", "revolute", "a", "b", limits=Limits(-1e16, 1e16))
     samples = draw_samples(Model.build("rotor", [Link("a"), Link("b")], [joint]), 16, 0)
-    calm = samples.differentiable(4)
-    assert len(calm) == 4
-    assert np.all(np.abs(samples.q[calm]) <= MAX_DIFFERENTIATED_POSITION)
+    chosen = samples.differentiable(4)
+    assert len(chosen) == 4
+    assert np.all(np.abs(samples.q[chosen]) <= MAX_DIFFERENTIATED_POSITION)
 
 
 @given(st.integers(1, 40), st.integers(1, 20), st.integers(1, 4), st.integers(1, 3))
-def test_every_frame_is_asked_for_and_together_they_see_every_sample(
+def test_every_frame_is_assigned_and_together_they_cover_every_sample(
     n_frames: int, count: int, each: int, references: int
 ) -> None:
     frames = tuple(f"frame{k}" for k in range(n_frames))
     each = min(each, count)
-    questions = assign_frames(frames, count, each=each, references=references)
-    asked = {(question.frame, question.reference) for question in questions}
-    assert len(asked) == n_frames * references
-    assert {frame for frame, _ in asked} == set(frames)
-    assert n_frames < 3 or {reference for _, reference in asked} == set(REFERENCES)
-    seen = {int(k) for question in questions for k in question.samples}
-    assert len(seen) == min(count, n_frames * references * each)
+    entries = assign_frames(frames, count, each=each, references=references)
+    pairs = {(entry.frame, entry.reference) for entry in entries}
+    assert len(pairs) == n_frames * references
+    assert {frame for frame, _ in pairs} == set(frames)
+    assert n_frames < 3 or {reference for _, reference in pairs} == set(REFERENCES)
+    covered = {int(k) for entry in entries for k in entry.samples}
+    assert len(covered) == min(count, n_frames * references * each)
 
 
-def test_a_part_of_the_samples_remembers_their_numbers() -> None:
+def test_a_part_of_the_samples_keeps_their_numbers() -> None:
     samples = draw_samples(arm(), 8, 3)
     part = samples.take([5, 2], 1)
     assert part.index.tolist() == [5, 2]
     assert np.array_equal(part.q[1], samples.q[2])
-    assert {question.frame for question in part.every_frame} == set(arm().frame_names)
+    assert {entry.frame for entry in part.every_frame} == set(arm().frame_names)
 
 
-def test_counts_and_seeds_that_are_none() -> None:
+def test_invalid_counts_and_seeds_are_refused() -> None:
     with pytest.raises(ArgumentError, match="samples"):
         draw_samples(arm(), 0, 0)
     with pytest.raises(ArgumentError, match="seed"):

@@ -1,4 +1,4 @@
-"""A solution is judged by the engine that did not find it."""
+"""Each engine's solution is verified by the other."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ DISPLACEMENT = 1e-3
 
 
 class Displaced(Broken):
-    """All frames a millimetre beside where they are: its own poses call its solutions right."""
+    """All frames displaced by a millimetre; its solutions are right by its own poses only."""
 
     def _frame_placements(self, q: Floats) -> Floats:
         T = super()._frame_placements(q)

@@ -17,7 +17,7 @@ def test_nobody_is_suspected_where_all_agree() -> None:
     assert not names([row("a~b", True), row("a~referee", True)], [], ["a", "b"])
 
 
-def test_the_referee_convicts_even_against_a_majority() -> None:
+def test_the_referee_outweighs_a_majority() -> None:
     rows = [row("a~b", False), row("a~c", False), row("b~c", True)]
     rows += [row("a~referee", True), row("b~referee", False), row("c~referee", False)]
     assert names(rows, [], ["a", "b", "c"]) == ["b", "c"]
@@ -35,12 +35,12 @@ def test_without_referee_and_majority_an_identity_or_the_derivation_decides() ->
     assert names([*rows, row("a~derived", False)], [], ["a", "b"]) == ["a"]
 
 
-def test_without_evidence_both_parties_are_named() -> None:
+def test_without_evidence_both_backends_are_named() -> None:
     found = find_suspects([row("a~b", False)], [], ["a", "b"])
     assert [suspect.backend for suspect in found] == ["a", "b"]
     assert all("nothing shows" in suspect.evidence[0] for suspect in found)
 
 
-def test_an_identity_broken_where_nothing_differs_names_its_backend() -> None:
+def test_a_failed_identity_names_its_backend_where_nothing_differs() -> None:
     broken = IdentityCheck("mass matrix is symmetric", "b", 1.0, 1e-13, False)
     assert names([row("a~b", True)], [broken], ["a", "b"]) == ["b"]

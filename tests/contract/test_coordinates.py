@@ -108,7 +108,7 @@ def test_velocity_is_the_rate_of_the_pose(make: Make, base: str) -> None:
     def holds(state: Sample) -> None:
         q, v, _ = state
         close = ErrorBounds(samples_at(model, q, v))
-        frequency = close.sizes.frequency
+        frequency = close.magnitudes.frequency
 
         def poses(t: Floats) -> Floats:
             return engine.forward_kinematics(model.integrate(q, v * t[..., None]))

@@ -108,7 +108,7 @@ def test_derivative_of_the_jacobian(make: Make, model: Model, reference: str) ->
         def jacobians(t: Floats) -> Floats:
             return engine.jacobian(model.integrate(q, v * t[..., None]), FRAME, reference=reference)
 
-        rate = time_derivative(jacobians, close.sizes.frequency)[0]
+        rate = time_derivative(jacobians, close.magnitudes.frequency)[0]
         close.check_rate("jacobian", engine.jacobian_derivative(q, v, FRAME, reference=reference), rate)
 
     holds()

@@ -33,8 +33,8 @@ CHECKS_FAULTS = (
     Fault(
         "agreement_with_one_refusal",
         "dynx.agreement.comparison",
-        right="alike = len(refused) == len(results) and all(answer.singular for answer in refused)",
-        wrong="alike = bool(refused)",
+        right="if len(refused) == len(results) and all(result.singular for result in refused):",
+        wrong="if refused:",
         test_file="tests/agreement/test_comparison.py",
         test="test_a_refusal_by_one_is_a_difference_that_names_it",
     ),
