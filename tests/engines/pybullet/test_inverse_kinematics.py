@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dynx.agreement.tolerances import REACHED
+from dynx.agreement.tolerances import TARGET_TOLERANCE
 from dynx.engines.pybullet.backend import PyBulletBackend
 from dynx.errors import ArgumentError, NotFiniteError
 from dynx.model.loading import load
@@ -31,7 +31,9 @@ def test_bullet_s_solver_reaches_targets_nearby(name: str, base: Base, frame: st
             found = engine.engine_inverse_kinematics(T, frame, start, iterations=500)
             np.testing.assert_array_equal(found[:-6], q[:-6])
             off, turned = pose_error(T, engine.forward_kinematics(found, frame))
-            reached += bool(np.linalg.norm(off) <= REACHED and np.linalg.norm(turned) <= REACHED)
+            reached += bool(
+                np.linalg.norm(off) <= TARGET_TOLERANCE and np.linalg.norm(turned) <= TARGET_TOLERANCE
+            )
     # It has no step control and fails at times; a wrong frame or attitude would reach none.
     assert reached >= 10
 
