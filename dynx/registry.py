@@ -1,9 +1,9 @@
 """Classes by name, from dynx itself, from the running program and from entry points of installed packages.
 
-Three sources; the first that has a name decides: a table of dynx's own classes, so that they are found in a
-source tree that was never installed; those that a program registered; and the entry points of one group. A
-name therefore never changes its meaning: `ClassRegistry.register` refuses a name that is taken, and an entry
-point with the name of one of dynx's own is ignored.
+A name is looked up in three places, in this order: a table of dynx's own classes (found also in a source tree
+that was never installed), the classes that a program registered, and the entry points of one group. A name
+never changes its meaning: `ClassRegistry.register` refuses a name that is taken, and an entry point with the
+name of one of dynx's own classes is ignored.
 
 A class is imported when it is first looked up, never to list names.
 """
@@ -34,7 +34,7 @@ class ClassRegistry(Generic[Kind]):
         error: type[DynxError],
         unknown: type[DynxError],
     ) -> None:
-        """`word` stands for such a class in messages; entries are ``"package.module:Class"``.
+        """`word` is the noun for such a class in messages; entries are ``"package.module:Class"``.
 
         `base` returns the base class; `error` is raised for a class that cannot be used, `unknown` for a
         name that nobody provides.
@@ -50,24 +50,24 @@ class ClassRegistry(Generic[Kind]):
         self._registered: dict[str, Callable[[], type[Kind]]] = {}
 
     def find(self, name: str) -> type[Kind]:
-        """The class of that name; this imports it."""
+        """Import and return the class of that name."""
         if not isinstance(name, str):
             raise ArgumentError(f"a {self._word}'s name is of type {type(name).__name__}; wanted a str")
         if name in self.built_in:
             module, _, attribute = self.built_in[name].partition(":")
-            return self._checked(name, lambda: getattr(import_module(module), attribute), "dynx itself")
+            return self._load(name, lambda: getattr(import_module(module), attribute), "dynx itself")
         if name in self._registered:
-            return self._checked(name, self._registered[name], "this program")
+            return self._load(name, self._registered[name], "this program")
         found = [point for point in self._entry_points() if point.name == name]
         if not found:
             raise self._unknown(f"no {self._word} {shown(name)}{nearest(name, self.names())}")
         if len({point.value for point in found}) > 1:
-            listed = " and ".join(_described(point) for point in found)
+            listed = " and ".join(_provider(point) for point in found)
             raise self._error(f"the {self._word} {shown(name)} is provided more than once: {listed}")
-        return self._checked(name, found[0].load, _described(found[0]))
+        return self._load(name, found[0].load, _provider(found[0]))
 
     def names(self) -> tuple[str, ...]:
-        """All names, dynx's own first; whether the classes can be imported is not tried."""
+        """Return all names, dynx's own first, without importing the classes."""
         points = sorted(point.name for point in self._entry_points())
         return tuple(dict.fromkeys([*self.built_in, *self._registered, *points]))
 
@@ -94,7 +94,7 @@ class ClassRegistry(Generic[Kind]):
             )
         del self._registered[name]
 
-    def _checked(self, name: str, loader: Callable[[], Any], provider: str) -> type[Kind]:
+    def _load(self, name: str, loader: Callable[[], Any], provider: str) -> type[Kind]:
         base = self._base()
         subject = f"the {self._word} {shown(name)}, provided by {provider},"
         try:
@@ -114,6 +114,6 @@ class ClassRegistry(Generic[Kind]):
         return [point for point in entry_points(group=self.group) if point.name not in self.built_in]
 
 
-def _described(point: EntryPoint) -> str:
+def _provider(point: EntryPoint) -> str:
     distribution = "" if point.dist is None else f" of {point.dist.name}"
     return f"the entry point {point.value}{distribution}"

@@ -43,7 +43,7 @@ _ERRORS = {"crash": EngineCrash, "timeout": EngineTimeout, "defect": InternalErr
 
 @dataclass(frozen=True)
 class Failure:
-    """Why a task has no value: its process died, took too long, or raised (a defect of dynx)."""
+    """Reason why a task has no value: its process died, took too long, or raised (a defect of dynx)."""
 
     kind: FailureKind
     message: str
@@ -86,7 +86,7 @@ class Workers:
         self.close()
 
     def run(self, tasks: Sequence[Any]) -> Iterator[Outcome]:
-        """The outcome of every task, in the order of completion."""
+        """Yield the outcome of every task, in the order of completion."""
         waiting: queue.SimpleQueue[tuple[int, Any]] = queue.SimpleQueue()
         for numbered in enumerate(tasks):
             waiting.put(numbered)
@@ -169,7 +169,7 @@ class _Worker:
         return self._expired or self._process.poll() is not None
 
     def compute(self, task: Any, timeout: float | None) -> tuple[Any] | Failure:
-        """The value of one task in a tuple of one, or the failure."""
+        """Return the value of one task in a tuple of one, or the failure."""
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         timer = None if timeout is None else threading.Timer(timeout, self._expire)

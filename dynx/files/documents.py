@@ -1,6 +1,6 @@
 """JSON documents: built from typed classes, read into them strictly, and described by JSON Schema.
 
-Each document has one class that says its keys and types. A number that is not finite is written as null,
+Each document has one class that declares its keys and types. A number that is not finite is written as null,
 because JSON has none: so every number of a schema may be null. This is the only module that uses msgspec.
 """
 

@@ -1,4 +1,4 @@
-"""Figures by matplotlib, of no window and no global state. No other module imports matplotlib."""
+"""Figures by matplotlib, without a window or global state. No other module imports matplotlib."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ RESOLUTION = 200
 
 
 def new_figure(width: float, height: float) -> Any:
-    """A `matplotlib.figure.Figure` of that size [in]. Raises NotInstalledError without matplotlib."""
+    """Make a `matplotlib.figure.Figure` of that size [in]. Raises NotInstalledError without matplotlib."""
     try:
         from matplotlib.figure import Figure
     except ImportError as error:
@@ -23,7 +23,7 @@ def new_figure(width: float, height: float) -> Any:
 
 
 def picture_format(path: str | os.PathLike[str]) -> str:
-    """The format that the name of a picture ends with, such as ``png``.
+    """Return the format that the name of a picture ends with, such as ``png``.
 
     Raises ArgumentError for a format that matplotlib does not write, NotInstalledError without matplotlib.
     """
@@ -35,7 +35,7 @@ def picture_format(path: str | os.PathLike[str]) -> str:
 
 
 def save_figure(figure: Any, path: str | os.PathLike[str]) -> None:
-    """Write a figure to a file, in the format that its name ends with: all of it, or nothing.
+    """Write a figure to a file, in the format that its name ends with, atomically.
 
     Raises ArgumentError for a format that matplotlib does not write or a file that cannot be written.
     """

@@ -12,7 +12,7 @@ MAX_BYTES = 64 * 1024 * 1024
 
 
 def read_file(path: str) -> bytes:
-    """The bytes of a regular file.
+    """Return the bytes of a regular file.
 
     Raises RobotNotFoundError where nothing is there, DescriptionError for a directory, a FIFO, a
     device, a file that may not be read, or one above MAX_BYTES.
@@ -39,7 +39,7 @@ def read_file(path: str) -> bytes:
 
 
 def printable(path: str) -> str:
-    """`path` for use in a message, quoted where it is long or holds control characters."""
+    """Return `path` for use in a message, quoted where it is long or holds control characters."""
     return path if path.isprintable() and len(path) <= 300 else shown(path, 300)
 
 

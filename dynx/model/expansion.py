@@ -10,7 +10,7 @@ from dynx.errors import DynxError, ModelError, RobotNotFoundError, shown
 from dynx.model.library import EXAMPLE_ROBOT_DATA, find, robots
 
 ALL = "all"
-"""The argument that means every robot of example-robot-data; ``./all`` is a file of that name."""
+"""Argument that stands for every robot of example-robot-data; ``./all`` is a file of that name."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""What every test of the command line needs."""
+"""Fixture for every test of the command line."""
 
 from __future__ import annotations
 
@@ -7,5 +7,5 @@ import pytest
 
 @pytest.fixture(autouse=True)
 def _piped(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Output goes to a pipe of no width, whatever the terminal (or test runner) that started pytest says."""
+    """Write output to a pipe without a width, whatever terminal (or test runner) started pytest."""
     monkeypatch.delenv("COLUMNS", raising=False)

@@ -11,7 +11,7 @@ from dynx.agreement.report import AgreementReport, results_document
 from dynx.agreement.task import AgreementTask, measure, refused
 from dynx.backends.registry import backend_class
 from dynx.cli.agree.tables import label, show_many, show_one, show_summary, verdict
-from dynx.cli.shell.exits import ANSWER_IS_NO, BAD_INPUT, DONE, complain
+from dynx.cli.shell.exits import BAD_INPUT, DONE, NEGATIVE_RESULT, complain
 from dynx.cli.shell.lazy import imported
 from dynx.cli.shell.output_file import check_writable, require_apart
 from dynx.cli.shell.run import Run, carry_out
@@ -104,10 +104,10 @@ def _report(run: AgreementRun, json_path: str | None, quiet: bool) -> int:
             complain(_refusal(entry))
     if document["summary"]["refused"]:
         return BAD_INPUT
-    return ANSWER_IS_NO if document["summary"]["differ"] else DONE
+    return NEGATIVE_RESULT if document["summary"]["differ"] else DONE
 
 
 def _refusal(entry: dict[str, Any]) -> str:
-    """The reason why a robot was refused, after its name where the message does not contain that."""
+    """Write the reason why a robot was refused, after its name where the message does not contain that."""
     message: str = entry["error"]["message"]
     return message if entry["robot"] in message else f"{label(entry)}: {message}"

@@ -72,8 +72,10 @@ def show_many(out: Console, entries: Sequence[Entry]) -> None:
     table = Table("robot", "nv", *headings, *references, "verdict", "s", right=right, keys=1)
     for entry in entries:
         checks: list[Check] = entry["quantities"]
-        cells = [_worst([check for check in checks if check["pair"] == pair]) for pair in pairs]
-        cells += [_worst([check for check in checks if _reference(check) == each]) for each in references]
+        cells = [_largest_error([check for check in checks if check["pair"] == pair]) for pair in pairs]
+        cells += [
+            _largest_error([each for each in checks if _reference(each) == name]) for name in references
+        ]
         refused = verdict(entry) == "refused"
         table.add_row(
             label(entry),
@@ -121,12 +123,12 @@ def _pivot(checks: Sequence[Check], row_key: str, column_key: str, error_key: st
     for row in dict.fromkeys(check[row_key] for check in checks):
         of_row = [check for check in checks if check[row_key] == row]
         by_column = {check[column_key]: check for check in of_row}
-        worst = max(of_row, key=lambda check: _severity(check, error_key))
+        largest = max(of_row, key=lambda check: _severity(check, error_key))
         table.add_row(
             row.replace("_", " "),
             *(_cell(by_column.get(column), error_key) for column in columns),
-            f"{worst['tolerance']:.1e}",
-            _digits(worst[error_key]),
+            f"{largest['tolerance']:.1e}",
+            _digits(largest[error_key]),
             _agreement(all(check["agree"] for check in of_row)),
         )
     return table
@@ -158,7 +160,7 @@ def _cell(check: Check | None, error_key: str) -> Text:
     return Text(_error(check[error_key], check["agree"]) + mark, "" if check["agree"] else "bold red")
 
 
-def _worst(checks: Sequence[Check]) -> Text:
+def _largest_error(checks: Sequence[Check]) -> Text:
     if not checks:
         return Text("")
     agree = all(check["agree"] for check in checks)
@@ -222,10 +224,10 @@ def _show_differences(out: Console, entry: Entry, limit: int | None) -> None:
 
 
 def _difference(check: Check, what: str, who: str, error: float | None) -> str:
-    worst = check["worst_sample"]
-    where = "" if worst is None else f", sample {worst['index']} ({worst['kind']})"
-    if worst is not None and worst["frame"] is not None:
-        where += f", frame {one_line(worst['frame'])}"
+    sample = check["worst_sample"]
+    where = "" if sample is None else f", sample {sample['index']} ({sample['kind']})"
+    if sample is not None and sample["frame"] is not None:
+        where += f", frame {one_line(sample['frame'])}"
     why = f" ({one_line(check['note'])})" if check["note"] else ""
     return (
         f"{what.replace('_', ' ')} of {who}: error {_error(error, False)}, "
@@ -243,10 +245,10 @@ def _conclusion(entry: Entry) -> Text:
     else:
         text = f"{', '.join(engines[:-1])} and {engines[-1]} {'agree' if agree else 'DIFFER'}"
         whose = "their"
-    worst = max(_rounding_errors(entry["quantities"]), default=None)
-    if agree and worst is not None:
+    largest = max(_rounding_errors(entry["quantities"]), default=None)
+    if agree and largest is not None:
         text += (
-            f"; {whose} results to {_digits(worst)} digits or more "
+            f"; {whose} results to {_digits(largest)} digits or more "
             "(except inverse kinematics and numerical derivatives)"
         )
     return Text(f"{text}; {entry['seconds']:.1f} s", "bold green" if agree else "bold red")

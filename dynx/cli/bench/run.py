@@ -19,7 +19,7 @@ from dynx.bench.session import (
     benchmark_cases,
 )
 from dynx.cli.bench.tables import show
-from dynx.cli.shell.exits import ANSWER_IS_NO, DONE, complain
+from dynx.cli.shell.exits import DONE, NEGATIVE_RESULT, complain
 from dynx.cli.shell.inputs import chosen_frame
 from dynx.cli.shell.interruption import interruptible
 from dynx.cli.shell.progress import progress_bar
@@ -91,4 +91,4 @@ def run_bench(session: Session, *, as_json: bool) -> int:
             complain(f"{each.implementation}, {each.case.quantity.replace('_', ' ')}: {each.problem}")
     if interruption.code is not None:
         return interruption.code
-    return ANSWER_IS_NO if wrong_ones else DONE
+    return NEGATIVE_RESULT if wrong_ones else DONE

@@ -14,7 +14,7 @@ from dynx.cli.doctor.outputs import Outputs
 from dynx.cli.doctor.run import doctor_run
 from dynx.cli.doctor.tables import error_text, show_engines, show_errors
 from dynx.cli.doctor.text import heading, sentence
-from dynx.cli.shell.exits import ANSWER_IS_NO, BAD_INPUT, DONE, complain, one_line, short_line
+from dynx.cli.shell.exits import BAD_INPUT, DONE, NEGATIVE_RESULT, complain, one_line, short_line
 from dynx.cli.shell.run import carry_out
 from dynx.cli.shell.tables import Table
 from dynx.cli.shell.terminal import console, counted
@@ -66,7 +66,7 @@ def _conclude(run: DoctorRun, outputs: Outputs, engines: tuple[str, ...] | None,
             complain(refusal(report))
     if any(report.error is not None for report in reports):
         return BAD_INPUT
-    return DONE if all(report.alike for report in reports) else ANSWER_IS_NO
+    return DONE if all(report.alike for report in reports) else NEGATIVE_RESULT
 
 
 def _show_one(out: Console, report: DoctorReport) -> None:
@@ -154,13 +154,13 @@ def vote_lines(report: DoctorReport, found: Vote) -> list[str]:
         each.engine for each in report.engines if each.refused is None and each.engine not in found.right
     ]
     if found.right:
-        has = "has" if len(found.right) == 1 else "have"
-        lines.append(f"{_and(found.right)} {has} the answer that follows from the file itself")
+        verb = "matches" if len(found.right) == 1 else "match"
+        lines.append(f"{_and(found.right)} {verb} the reference values of the file")
     for engine in report.engines:
         far = largest_quantity_error(engine)
         if engine.engine in wrong and far is not None:
             quantity, error = far
-            missing = f"gives no answer for {wording.quantity(quantity)}"
+            missing = f"returns no valid {wording.quantity(quantity)}"
             off = f"is off by up to {wording.size(error)} ({wording.quantity(quantity)})"
             lines.append(f"{engine.engine} {off if math.isfinite(error) else missing}")
     if largest_error(report) <= report.tolerance:

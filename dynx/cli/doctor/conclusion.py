@@ -11,7 +11,7 @@ from rich.console import Console
 from dynx.cli.doctor.mending import write_mended
 from dynx.cli.doctor.outputs import Outputs, save_counterexamples
 from dynx.cli.doctor.tables import show_many, show_one, show_summary
-from dynx.cli.shell.exits import ANSWER_IS_NO, BAD_INPUT, DONE, complain, one_line, short_line
+from dynx.cli.shell.exits import BAD_INPUT, DONE, NEGATIVE_RESULT, complain, one_line, short_line
 from dynx.cli.shell.run import Run
 from dynx.cli.shell.terminal import console, counted
 from dynx.doctor.formats.baseline import Baseline
@@ -57,7 +57,7 @@ class Conclusion:
         # First the files: a pipe that closes while the table is written must not lose them.
         self._outputs.write(reports, self._run.not_done, self._baseline, command())
         mended = self._mend()
-        saved = [self._saved(report) for report in reports]
+        saved = [self._save_counterexamples(report) for report in reports]
         if not quiet:
             self._show(console(err=self._outputs.on_stdout), saved, mended)
         refusals = [refusal(report) for report in reports if report.error is not None]
@@ -65,7 +65,7 @@ class Conclusion:
             complain(problem)
         if self._problems or any(report.error is not None for report in reports):
             return BAD_INPUT
-        return ANSWER_IS_NO if any(self._fails(report) for report in reports) else DONE
+        return NEGATIVE_RESULT if any(self._fails(report) for report in reports) else DONE
 
     def _fails(self, report: DoctorReport) -> bool:
         """Whether engines differ in a way that no baseline, read or just written, contains."""
@@ -88,7 +88,7 @@ class Conclusion:
                 self._problems.append(str(error))
         return written
 
-    def _saved(self, report: DoctorReport) -> Mapping[int, str]:
+    def _save_counterexamples(self, report: DoctorReport) -> Mapping[int, str]:
         try:
             return save_counterexamples(self._folder, report)
         except DynxError as error:
@@ -136,12 +136,12 @@ class Conclusion:
 
 
 def refusal(report: DoctorReport) -> str:
-    """The reason why a robot was refused, after its name where the message does not contain that."""
+    """Write the reason why a robot was refused, after its name where the message does not contain that."""
     assert report.error is not None
     message = report.error.message
     return message if report.robot in message else f"{short_line(report.robot)}: {message}"
 
 
 def command() -> str:
-    """The command line of this process, for running it again."""
+    """Return the command line of this process, for running it again."""
     return shlex.join(["dynx", *map(one_line, sys.argv[1:])])

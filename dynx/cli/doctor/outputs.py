@@ -69,25 +69,25 @@ class Outputs:
     ) -> None:
         """Write all files; `command` is the command line that the HTML page shows."""
         if self.json is not None:
-            self._json(reports, not_done)
+            self._write_json(reports, not_done)
         texts: dict[str | None, Callable[[], str]] = {
             self.html: lambda: html_page(reports, command=command, baseline=baseline),
             self.junit: lambda: junit_xml(reports, baseline),
             self.sarif: lambda: json_text(sarif_document(reports, baseline)) + "\n",
-            self.baseline: lambda: self._known(reports),
+            self.baseline: lambda: self._baseline_text(reports),
         }
         for path, text in texts.items():
             if path is not None:
                 write_text(path, text())
 
-    def _json(self, reports: Sequence[DoctorReport], not_done: Sequence[str]) -> None:
+    def _write_json(self, reports: Sequence[DoctorReport], not_done: Sequence[str]) -> None:
         document = results_document(reports, not_done)
         if self.json == STDOUT:
             echo_json(document)
         elif self.json is not None:
             write_text(self.json, json_text(document) + "\n")
 
-    def _known(self, reports: Sequence[DoctorReport]) -> str:
+    def _baseline_text(self, reports: Sequence[DoctorReport]) -> str:
         return json_text(baseline_document(reports, os.path.dirname(self.baseline or ""))) + "\n"
 
 

@@ -76,19 +76,19 @@ def show_engines(out: Console, report: DoctorReport) -> None:
 
 def show_errors(out: Console, report: DoctorReport, *, mended: bool = True) -> None:
     """Print the error of each engine by quantity, before mending and, with `mended`, after."""
-    asked = [each for each in report.engines if each.before or each.after]
-    rows = list(dict.fromkeys(key for each in asked for key in (*each.before, *each.after)))
+    compared = [each for each in report.engines if each.before or each.after]
+    rows = list(dict.fromkeys(key for each in compared for key in (*each.before, *each.after)))
     if not rows:
         return
     mended = mended and report.mended is not None
-    title = "error against what the file says"
+    title = "error against the reference values"
     calls = " with the calls below" if report.calls else ""
     heading(out, f"{title}: as loaded -> mended{calls}" if mended else f"{title}, as loaded")
-    names = [each.engine for each in asked]
+    names = [each.engine for each in compared]
     table = Table("quantity", *names, right=names, keys=1)
     for key in rows:
         table.add_row(
-            wording.quantity(key), *(_change(each, key, report.tolerance, mended) for each in asked)
+            wording.quantity(key), *(_change(each, key, report.tolerance, mended) for each in compared)
         )
     out.print(table)
     if "inverse_dynamics" in rows and "forward_dynamics" not in rows:
@@ -147,8 +147,8 @@ def _show_causes(out: Console, title: str, found: Sequence[Cause]) -> None:
 
 def _show_places(out: Console, cause: Cause) -> None:
     for finding in cause.findings[:_MAX_PLACES]:
-        said = [each for each in (wording.effects(finding), wording.name(finding.message, 300)) if each]
-        sentence(out, f"{_place(finding)}: {'; '.join(said)}", 6, "dim")
+        parts = [each for each in (wording.effects(finding), wording.name(finding.message, 300)) if each]
+        sentence(out, f"{_place(finding)}: {'; '.join(parts)}", 6, "dim")
     if len(cause.findings) > _MAX_PLACES:
         out.print(f"      and {len(cause.findings) - _MAX_PLACES} more", style="dim")
 
@@ -160,13 +160,13 @@ def _place(finding: Finding) -> str:
 
 def _cause_line(cause: Cause) -> Text:
     """Make the line of a cause: rule, largest effect, and whether it is proved."""
-    worst = cause.largest_effect
+    largest = cause.largest_effect
     line = Text(f"  {wording.name(cause.rule)} {wording.name(cause.name)}", STYLES[cause.severity])
-    if worst is not None:
-        line.append(f"  {wording.effect(worst)}", STYLES[cause.severity])
+    if largest is not None:
+        line.append(f"  {wording.effect(largest)}", STYLES[cause.severity])
         if cause.severity == "warning":
             line.append(" (rounding)", "dim")
-    if worst is not None and not cause.proved:
+    if largest is not None and not cause.proved:
         line.append("  not proved", "bold red")
     return line
 
@@ -197,7 +197,7 @@ def _show_unexplained(out: Console, report: DoctorReport, saved: Mapping[int, st
         return
     heading(out, "unexplained: no rule accounts for these differences", "bold red")
     for number, each in enumerate(report.unexplained):
-        where = "" if each.joint is None else f", worst at joint {wording.name(each.joint)}"
+        where = "" if each.joint is None else f", largest at joint {wording.name(each.joint)}"
         what = f"{wording.quantity(each.quantity)} of {wording.name(each.engine)}"
         sentence(out, f"{what}: {wording.relative(each.relative_error)}{where}", 2, "red")
         found = each.counterexample
@@ -213,8 +213,8 @@ def _show_unexplained(out: Console, report: DoctorReport, saved: Mapping[int, st
 def _show_next(out: Console, report: DoctorReport, mended: str | None) -> None:
     out.print()
     if mended is not None:
-        said = "nothing to change in the text; copied to" if report.mended is None else "mended:"
-        out.print(f"{said} {one_line(mended)}", style="bold green")
+        action = "nothing to change in the text; copied to" if report.mended is None else "mended:"
+        out.print(f"{action} {one_line(mended)}", style="bold green")
     elif report.mended is not None:
         base = "" if report.base == "fixed" else f" --base {report.base}"
         robot = shlex.quote(short_line(report.robot))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from dynx.cli.queries.evaluate import document_head, title
-from dynx.cli.shell.exits import ANSWER_IS_NO, DONE, one_line
+from dynx.cli.shell.exits import DONE, NEGATIVE_RESULT, one_line
 from dynx.cli.shell.inputs import (
     Numbers,
     chosen_frame,
@@ -38,7 +38,7 @@ def ik(target: Numbers, frame: str | None, q: Numbers, as_json: bool, **robot: A
             "restarts": int(found.restarts),
         }
         joints = dict(zip(model.joint_names, result["q"][model.nq - len(model.joint_names) :], strict=True))
-    code = DONE if result["success"] else ANSWER_IS_NO
+    code = DONE if result["success"] else NEGATIVE_RESULT
     if as_json:
         echo_json(result)
         return code

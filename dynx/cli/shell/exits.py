@@ -23,7 +23,7 @@ import click
 
 from dynx.errors import DynxError, traceback_wanted
 
-DONE, ANSWER_IS_NO, BAD_INPUT, DEFECT, NOT_WRITTEN, INTERRUPTED, PIPE_CLOSED = 0, 1, 2, 70, 74, 130, 141
+DONE, NEGATIVE_RESULT, BAD_INPUT, DEFECT, NOT_WRITTEN, INTERRUPTED, PIPE_CLOSED = 0, 1, 2, 70, 74, 130, 141
 
 _WRITING_FAILED = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF}
 """Errors of writing to an open stream; an error of opening a file has its name instead."""

@@ -16,7 +16,7 @@ class Interruption:
         self.code: int | None = None
         self.finishing = False
 
-    def arrived(self, number: int, frame: FrameType | None) -> None:
+    def handle(self, number: int, frame: FrameType | None) -> None:
         """Handle a signal: the first ends the work, later ones are ignored so that no results are lost."""
         if self.finishing or self.code is not None:
             return
@@ -32,7 +32,7 @@ def interruptible() -> Iterator[Interruption]:
         yield interruption  # only the main thread can set handlers and receives signals
         return
     numbers = (signal.SIGINT, signal.SIGTERM)
-    before = [signal.signal(number, interruption.arrived) for number in numbers]
+    before = [signal.signal(number, interruption.handle) for number in numbers]
     try:
         yield interruption
     finally:

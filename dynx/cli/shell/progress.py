@@ -13,9 +13,9 @@ Advance = Callable[[int, str], None]
 
 
 @contextmanager
-def progress_bar(total: int, done: int = 0, words: str = "", *, wanted: bool = True) -> Iterator[Advance]:
+def progress_bar(total: int, done: int = 0, words: str = "", *, enabled: bool = True) -> Iterator[Advance]:
     """Show a bar of `total` items during the block."""
-    if not wanted or not sys.stderr.isatty():
+    if not enabled or not sys.stderr.isatty():
         yield lambda done, words: None
         return
     # Imported where a bar is shown: it takes a quarter of the time of all of rich.

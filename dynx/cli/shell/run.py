@@ -17,7 +17,7 @@ from dynx.workers import Workers
 
 
 class RobotTask(Protocol):
-    """The work on one robot."""
+    """A task for one robot."""
 
     @property
     def robot(self) -> str:
@@ -86,7 +86,7 @@ class Run(Generic[Task, Result]):
         """
         started = time.perf_counter()
         pending = [index for index in range(len(self.tasks)) if index not in self._results]
-        bar = progress_bar(len(self.tasks), len(self._results), self._status(), wanted=show_progress)
+        bar = progress_bar(len(self.tasks), len(self._results), self._status(), enabled=show_progress)
         try:
             with Workers(self._target, jobs, timeout) as workers, bar as advance:
                 for outcome in workers.run([self.tasks[index] for index in pending]):

@@ -1,6 +1,6 @@
 """The JSON documents of ``dynx sim``: their keys and types, from which their schemas are generated.
 
-Lengths are in m, angles in rad, torques in N m or N; errors are null where there is nothing to follow.
+Lengths are in m, angles in rad, torques in N m or N; errors are null without a reference.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from typing import Any, Literal, TypedDict
 
 
 class BodyErrorPart(TypedDict):
-    """The length of a position or rotation error: its maximum, when, and at the end."""
+    """Norm of a position or rotation error: its maximum, the time of that, and its final value."""
 
     max: float
     max_time: float
@@ -17,14 +17,14 @@ class BodyErrorPart(TypedDict):
 
 
 class BodyError(TypedDict):
-    """The error of a floating base or of a frame."""
+    """Error of a floating base or of a frame."""
 
     position: BodyErrorPart
     rotation: BodyErrorPart
 
 
 class JointEntry(TypedDict):
-    """One coordinate of v, those of a floating base first; `saturated` is the share of steps at the limit."""
+    """Coordinate of v, those of a floating base first; `saturated` is the fraction of steps at the limit."""
 
     name: str
     unit: Literal["rad", "m"]
@@ -38,7 +38,7 @@ class JointEntry(TypedDict):
 
 
 class SimulationEnd(TypedDict):
-    """What ended a simulation early, and the state there."""
+    """Reason why a simulation ended early, and the state there."""
 
     type: str
     message: str
@@ -57,7 +57,7 @@ class PayloadEntry(TypedDict):
 
 
 class FinalState(TypedDict):
-    """The last state of the record."""
+    """Last state of the record."""
 
     t: float
     q: list[float]
@@ -65,7 +65,7 @@ class FinalState(TypedDict):
 
 
 class SimDocument(TypedDict):
-    """One simulation: what was asked for, and what came of it; `settings` are those of the record."""
+    """One simulation: its options and its results; `settings` are those of the record."""
 
     schema: int
     dynx: str
@@ -112,7 +112,7 @@ class SimDocument(TypedDict):
 
 
 class ModeOnPlant(TypedDict):
-    """How well one mode of control tracked on one plant; null where it failed, and `problem` says why."""
+    """Tracking errors of one mode of control on one plant; null where it failed, for the reason `problem`."""
 
     max_error: float | None
     rms_error: float | None

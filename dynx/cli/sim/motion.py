@@ -52,106 +52,109 @@ class MotionInput:
         return cls(**{field.name: given[field.name] for field in fields(cls)})
 
     @property
-    def chosen(self) -> str:
+    def chosen_profile(self) -> str:
         """The profile given, or the one that the other options imply."""
         if self.profile is not None:
             return self.profile
-        return "cycloidal" if self.goes else "hold"
+        return "cycloidal" if self.has_target else "hold"
 
     @property
-    def goes(self) -> bool:
+    def has_target(self) -> bool:
         """Whether a target is given."""
         return self.to is not None or self.to_pose is not None
 
     @property
     def needs_frame(self) -> bool:
         """Whether the target or the controller refers to a frame."""
-        law = CONTROLLERS.get(self.controller)
-        return self.to_pose is not None or (law is not None and law.controls == "frame")
+        controller = CONTROLLERS.get(self.controller)
+        return self.to_pose is not None or (controller is not None and controller.controls == "frame")
 
 
 @dataclass(frozen=True)
 class Motion:
-    """Reference (None for none), configuration at its start, and duration of the simulation [s]."""
+    """Reference or None, configuration at its start, duration of the simulation [s], and frame or None."""
 
     reference: Trajectory | Floats | None
-    begin: Floats
+    start: Floats
     duration: float
     frame: str | None
-    said: dict[str, Any]
-    """Description of the motion for the JSON document."""
+    description: dict[str, Any]
+    """Entry ``motion`` of the JSON document."""
 
 
-def planned(model: Model, asked: MotionInput) -> Motion:
+def plan_motion(model: Model, options: MotionInput) -> Motion:
     """Plan the motion that the options describe. Raises ArgumentError where they contradict each other."""
-    _refuse_contradictions(asked)
-    frame = chosen_frame(model, asked.frame) if asked.needs_frame else None
-    start = configuration(model, asked.start, "--from", model.clip(model.neutral()))
-    profile = asked.chosen
-    said: dict[str, Any] = {
+    _refuse_contradictions(options)
+    frame = chosen_frame(model, options.frame) if options.needs_frame else None
+    start = configuration(model, options.start, "--from", model.clip(model.neutral()))
+    profile = options.chosen_profile
+    description: dict[str, Any] = {
         "profile": profile,
-        "line": None if asked.to_pose is None else target_pose(asked.to_pose, "--to-pose").tolist(),
+        "line": None if options.to_pose is None else target_pose(options.to_pose, "--to-pose").tolist(),
         "from": start.tolist(),
-        "settle": asked.settle,
+        "settle": options.settle,
     }
     if profile == "hold":
-        wanted = start if asked.to is None else configuration(model, asked.to, "--to", start)
-        span = DURATION if asked.duration is None else asked.duration
-        reference = None if asked.controller == "none" and asked.to is None else wanted
-        said |= {"to": None if reference is None else wanted.tolist(), "duration": span}
-        return Motion(reference, start, span + asked.settle, frame, said)
-    motion = _to_pose(model, asked, frame, start) if asked.to is None else _to(model, asked, profile, start)
-    said |= {"to": motion.end.q.tolist(), "duration": motion.duration}
+        held = start if options.to is None else configuration(model, options.to, "--to", start)
+        span = DURATION if options.duration is None else options.duration
+        reference = None if options.controller == "none" and options.to is None else held
+        description |= {"to": None if reference is None else held.tolist(), "duration": span}
+        return Motion(reference, start, span + options.settle, frame, description)
+    if options.to is None:
+        motion = _to_pose(model, options, frame, start)
+    else:
+        motion = _to(model, options, profile, start)
+    description |= {"to": motion.end.q.tolist(), "duration": motion.duration}
     span = motion.duration
-    if profile in LIMITED and asked.duration is None:
+    if profile in LIMITED and options.duration is None:
         # The fastest motion ends between two steps; the simulation continues to the next.
-        dt = positive("--dt", asked.dt)
+        dt = positive("--dt", options.dt)
         span = dt * math.ceil(motion.duration / dt - 1e-9)
-    return Motion(motion, start, span + asked.settle, frame, said)
+    return Motion(motion, start, span + options.settle, frame, description)
 
 
-def _to(model: Model, asked: MotionInput, profile: str, start: Floats) -> Trajectory:
-    goal = configuration(model, asked.to, "--to", start)
+def _to(model: Model, options: MotionInput, profile: str, start: Floats) -> Trajectory:
+    goal = configuration(model, options.to, "--to", start)
     if profile in TIMED:
-        duration = DURATION if asked.duration is None else asked.duration
+        duration = DURATION if options.duration is None else options.duration
         return TIMED[profile](start, goal, duration, model=model)
     limits: dict[str, Any] = {
-        "acceleration": asked.acceleration,
-        "velocity": asked.velocity,
-        "duration": asked.duration,
+        "acceleration": options.acceleration,
+        "velocity": options.velocity,
+        "duration": options.duration,
     }
     if profile == "s-curve":
-        return trajectory.s_curve(start, goal, jerk=_given(asked.jerk), model=model, **limits)
+        return trajectory.s_curve(start, goal, jerk=_given(options.jerk), model=model, **limits)
     return trajectory.trapezoidal(start, goal, model=model, **limits)
 
 
-def _to_pose(model: Model, asked: MotionInput, frame: str | None, start: Floats) -> Trajectory:
-    duration = DURATION if asked.duration is None else asked.duration
-    law = TIMED[asked.chosen]([0.0], [1.0], duration)
-    return trajectory.line(model, str(frame), start, target_pose(asked.to_pose, "--to-pose"), law=law)
+def _to_pose(model: Model, options: MotionInput, frame: str | None, start: Floats) -> Trajectory:
+    duration = DURATION if options.duration is None else options.duration
+    time_law = TIMED[options.chosen_profile]([0.0], [1.0], duration)
+    return trajectory.line(model, str(frame), start, target_pose(options.to_pose, "--to-pose"), law=time_law)
 
 
-def _refuse_contradictions(asked: MotionInput) -> None:
-    profile = asked.chosen
-    if asked.to is not None and asked.to_pose is not None:
+def _refuse_contradictions(options: MotionInput) -> None:
+    profile = options.chosen_profile
+    if options.to is not None and options.to_pose is not None:
         raise ArgumentError("--to and --to-pose are both given; wanted one of them")
-    if not asked.goes and profile != "hold":
+    if not options.has_target and profile != "hold":
         raise ArgumentError(f"--profile {profile} needs --to or --to-pose")
-    if asked.to_pose is not None and profile not in TIMED:
+    if options.to_pose is not None and profile not in TIMED:
         raise ArgumentError(f"--to-pose takes --profile {', '.join(TIMED)}; not {profile}")
-    if asked.frame is not None and not asked.needs_frame:
+    if options.frame is not None and not options.needs_frame:
         raise ArgumentError("--frame needs --to-pose or --controller operational-space or impedance")
     needed = LIMITED.get(profile, ())
     for name in needed:
-        if getattr(asked, name) is None:
+        if getattr(options, name) is None:
             raise ArgumentError(f"--profile {profile} needs --{name}")
     allowed = ("velocity", *needed) if needed else ()
     for name in ("velocity", "acceleration", "jerk"):
-        if name not in allowed and getattr(asked, name) is not None:
+        if name not in allowed and getattr(options, name) is not None:
             takers = [each for each in PROFILES if each in LIMITED and name in ("velocity", *LIMITED[each])]
             raise ArgumentError(f"--{name} needs --profile {' or '.join(takers)}, not {profile}")
-    if asked.settle < 0.0:
-        raise ArgumentError(f"--settle is {asked.settle:g} s; wanted 0 or more")
+    if options.settle < 0.0:
+        raise ArgumentError(f"--settle is {options.settle:g} s; wanted 0 or more")
 
 
 def _given(limit: Limit | None) -> Limit:

@@ -9,7 +9,7 @@ import numpy as np
 
 from dynx.backends.registry import backend_class
 from dynx.cli.shell.inputs import configuration, velocity
-from dynx.cli.sim.motion import Motion, MotionInput, planned
+from dynx.cli.sim.motion import Motion, MotionInput, plan_motion
 from dynx.cli.sim.values import Coefficients, PayloadInput, PushInput
 from dynx.control import EngineMotor, FrictionCompensation, ModelBased
 from dynx.control.base import Controller
@@ -25,10 +25,10 @@ from dynx.sim.named_controllers import ControllerRequest, Gains, named_controlle
 from dynx.simd.machine import MAX_MEMORY_SHARE, memory_size
 
 GAINS = ("kp", "kd", "ki", "natural_frequency", "damping_ratio", "posture_kp", "posture_kd")
-PASSED_ON = ("plant", "integrator", "dt", "substeps", "control_dt", "delay", "position_limits")
+SCENARIO_FIELDS = ("plant", "integrator", "dt", "substeps", "control_dt", "delay", "position_limits")
 """Options that are fields of a `Scenario` under the same name."""
 
-ONLY_WITH = {
+REQUIRED_OPTION = {
     "method": "--integrator adaptive",
     "rtol": "--integrator adaptive",
     "atol": "--integrator adaptive",
@@ -63,15 +63,15 @@ def prepare(given: dict[str, Any]) -> Prepared:
     for engine in (given["plant"], given["backend"]):
         backend_class(engine).require_engine()
     losses = _losses(given)
-    _refuse_idle(given, losses)
-    motion = planned(model, MotionInput.of(given))
+    _refuse_useless(given, losses)
+    motion = plan_motion(model, MotionInput.of(given))
     clock = Clock.of(given["dt"], motion.duration, given["control_dt"], given["delay"])
     _require_memory(model, clock)
     controller = _controller(model, given, motion, clock, losses)
     limits: Coefficients | None = given["effort_limits"]
-    q0 = motion.begin if given["q0"] is None else configuration(model, given["q0"], "--q0", motion.begin)
+    q0 = motion.start if given["q0"] is None else configuration(model, given["q0"], "--q0", motion.start)
     fields: dict[str, Any] = {
-        **{name: given[name] for name in PASSED_ON},
+        **{name: given[name] for name in SCENARIO_FIELDS},
         **losses,
         **{name: given[name] for name in ("method", "rtol", "atol") if given[name] is not None},
         "duration": motion.duration,
@@ -94,7 +94,7 @@ def prepare(given: dict[str, Any]) -> Prepared:
         "backend": given["backend"] if _computes(controller) else None,
         "frame": motion.frame,
         "frame_given": given["frame"] is not None,
-        "motion": motion.said,
+        "motion": motion.description,
         "gains": _gains_of(controller),
         "motor_limits": _limits_of_motors(model, given["effort_limits"], controller),
     }
@@ -114,7 +114,7 @@ def _controller(
         given["controller"],
         ControllerRequest(
             model,
-            motion.begin,
+            motion.start,
             clock.control_dt,
             gains,
             motion.frame,
@@ -149,8 +149,8 @@ def _limits_of_motors(
     if limits is None or not isinstance(controller, EngineMotor):
         return None
     base = 6 if model.floating else 0
-    held: list[float] = checked_limit(model, _motor_limit(model, limits))[base:].tolist()
-    return held
+    motor_limits: list[float] = checked_limit(model, _motor_limit(model, limits))[base:].tolist()
+    return motor_limits
 
 
 def _losses(given: dict[str, Any]) -> dict[str, Any]:
@@ -161,8 +161,8 @@ def _losses(given: dict[str, Any]) -> dict[str, Any]:
     return {**losses, "friction_slip": SLIP if given["friction_slip"] is None else given["friction_slip"]}
 
 
-def _refuse_idle(given: dict[str, Any], losses: dict[str, Any]) -> None:
-    """Raise ArgumentError for an option that would have no effect."""
+def _refuse_useless(given: dict[str, Any], losses: dict[str, Any]) -> None:
+    """Raise ArgumentError for an option that would have no effect without another."""
     noisy = given["noise_q"] is not None or given["noise_v"] is not None
     has_use = {
         "--integrator adaptive": given["integrator"] == "adaptive",
@@ -170,7 +170,7 @@ def _refuse_idle(given: dict[str, Any], losses: dict[str, Any]) -> None:
         "--noise-q or --noise-v": noisy,
         "--resume": given["resume"] is not None,
     }
-    for name, other in ONLY_WITH.items():
+    for name, other in REQUIRED_OPTION.items():
         if given[name] is not None and not has_use[other]:
             raise ArgumentError(f"--{name.replace('_', '-')} needs {other}")
 
@@ -184,8 +184,8 @@ def _noise(given: dict[str, Any]) -> Noise | None:
 def _gains_of(controller: Controller[Any] | None) -> dict[str, list[float]]:
     """Gains of a controller, given or default."""
     inner = _innermost(controller)
-    kept = {name: getattr(inner, name, None) for name in ("kp", "ki", "kd", "stiffness", "damping")}
-    return {name: gain.tolist() for name, gain in kept.items() if isinstance(gain, np.ndarray)}
+    gains = {name: getattr(inner, name, None) for name in ("kp", "ki", "kd", "stiffness", "damping")}
+    return {name: gain.tolist() for name, gain in gains.items() if isinstance(gain, np.ndarray)}
 
 
 def _innermost(controller: Controller[Any] | None) -> Controller[Any] | None:

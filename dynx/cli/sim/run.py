@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from dynx.cli.shell.exits import ANSWER_IS_NO, BAD_INPUT, DONE, INTERRUPTED, complain
+from dynx.cli.shell.exits import BAD_INPUT, DONE, INTERRUPTED, NEGATIVE_RESULT, complain
 from dynx.cli.shell.interruption import interruptible
 from dynx.cli.shell.progress import progress_bar
 from dynx.cli.shell.terminal import console, echo_json
@@ -51,7 +51,7 @@ def run_sim(prepared: Prepared, outputs: Outputs, *, as_json: bool) -> int:
     started = time.perf_counter()
     with interruptible() as interruption:
         try:
-            rollout = _simulated(prepared)
+            rollout = _simulate(prepared)
         except (SimulationError, RolloutInterrupted) as early:
             ended, rollout = early, early.rollout
         except KeyboardInterrupt:
@@ -68,7 +68,8 @@ def run_sim(prepared: Prepared, outputs: Outputs, *, as_json: bool) -> int:
         else:
             show(console(), made)
         if ended is not None:
-            complain(f"{ended}{_saved(outputs, unwritten, resumable=isinstance(ended, RolloutInterrupted))}")
+            resumable = isinstance(ended, RolloutInterrupted)
+            complain(f"{ended}{_saved_files(outputs, unwritten, resumable=resumable)}")
         if unwritten is not None:
             complain(str(unwritten))
     if interruption.code is not None:
@@ -77,10 +78,10 @@ def run_sim(prepared: Prepared, outputs: Outputs, *, as_json: bool) -> int:
         return INTERRUPTED
     if unwritten is not None:
         return BAD_INPUT
-    return DONE if ended is None else ANSWER_IS_NO
+    return DONE if ended is None else NEGATIVE_RESULT
 
 
-def _simulated(prepared: Prepared) -> Rollout:
+def _simulate(prepared: Prepared) -> Rollout:
     with progress_bar(prepared.clock.n_steps, words="simulating") as advance:
         return simulate(
             prepared.scenario,
@@ -98,7 +99,7 @@ def _write(outputs: Outputs, rollout: Rollout) -> DynxError | None:
     return None
 
 
-def _saved(outputs: Outputs, unwritten: DynxError | None, *, resumable: bool) -> str:
+def _saved_files(outputs: Outputs, unwritten: DynxError | None, *, resumable: bool) -> str:
     """Name the files with the results so far, and the option that continues from them."""
     if not outputs.save or unwritten is not None:
         return ""

@@ -35,10 +35,10 @@ def show(out: Console, made: Entry) -> None:
     """Print what was simulated, a table with a line for each joint, and a summary."""
     _show_header(out, made)
     out.print(_joint_table(made))
-    out.print(_worst(made))
-    for what, error in (("base", made["base_error"]), (made["frame"], made["frame_error"])):
+    out.print(_largest_error(made))
+    for body, error in (("base", made["base_error"]), (made["frame"], made["frame_error"])):
         if error is not None:
-            out.print(_body_error(one_line(what), error))
+            out.print(_body_error(one_line(body), error))
     out.print(_energy(made))
     if made["law"] != "none":
         out.print(_saturation(made))
@@ -104,7 +104,7 @@ def _joint_table(made: Entry) -> Table:
     return table
 
 
-def _worst(made: Entry) -> str:
+def _largest_error(made: Entry) -> str:
     if made["motion"]["to"] is None:
         return "no tracking error: there is no reference"
     if made["max_error"] is None:
@@ -117,14 +117,14 @@ def _worst(made: Entry) -> str:
     )
 
 
-def _body_error(what: str, error: Entry) -> str:
+def _body_error(body: str, error: Entry) -> str:
     """Make two lines with the position and rotation errors of the base or a frame."""
     parts = [
         f"{error_text(error[name]['max'])} {unit} at {number(error[name]['max_time'])} s, "
         f"{error_text(error[name]['final'])} at the end"
         for name, unit in (("position", "m"), ("rotation", "rad"))
     ]
-    return f"error of {what}: position {parts[0]}\n{' ' * len(f'error of {what}')}  rotation {parts[1]}"
+    return f"error of {body}: position {parts[0]}\n{' ' * len(f'error of {body}')}  rotation {parts[1]}"
 
 
 def _energy(made: Entry) -> str:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from dynx._version import __version__
-from dynx.cli.shell.exits import ANSWER_IS_NO, BAD_INPUT, DONE, complain, one_line
+from dynx.cli.shell.exits import BAD_INPUT, DONE, NEGATIVE_RESULT, complain, one_line
 from dynx.cli.shell.inputs import configuration
 from dynx.cli.shell.interruption import interruptible
 from dynx.cli.shell.progress import progress_bar
@@ -59,7 +59,7 @@ def run_tutorial(robot: str | None, given: dict[str, Any], picture: str | None, 
         return interruption.code
     if undrawn is not None:
         return BAD_INPUT
-    return ANSWER_IS_NO if failed else DONE
+    return NEGATIVE_RESULT if failed else DONE
 
 
 def _draw(experiments: Tutorial, rows: Sequence[Row], picture: str) -> DynxError | None:

@@ -183,7 +183,7 @@ def test_an_interrupted_run_writes_what_is_done(number: int, code: int, tmp_path
     assert made["summary"]["not_done"] == len(made["not_done"]) > 0
 
 
-def test_quiet_says_nothing() -> None:
+def test_quiet_prints_nothing() -> None:
     result = agree("ur5", "--quiet")
     assert (result.exit_code, result.output) == (0, "")
 
@@ -195,9 +195,9 @@ def test_numbers_and_words_stay_whole_on_a_narrow_terminal(
     full = agree("ur5").stdout
     monkeypatch.setenv("COLUMNS", str(width))
     narrow = agree("ur5").stdout
-    # The last line holds the time that was taken; rules are as long as their block.
-    wanted = {word for word in full.split() if not word.startswith("─")}
-    assert wanted - {*full.splitlines()[-1].split()} <= {*narrow.split()}
+    # The last line has the elapsed time; rules are as long as their block.
+    expected = {word for word in full.split() if not word.startswith("─")}
+    assert expected - {*full.splitlines()[-1].split()} <= {*narrow.split()}
     table = narrow.splitlines()[2:-2]
     assert max(len(line) for line in table if "native result" not in line) <= width
 

@@ -1,4 +1,4 @@
-"""`dynx bench`: table, document, exit codes, interruption. Nothing here depends on how long things take."""
+"""`dynx bench`: table, document, exit codes, interruption. No test depends on measured times."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ QUICK = ["--quick", "--quantity", "inverse_dynamics", "--batch", "16", "--backen
 
 @pytest.fixture(autouse=True)
 def _known_machine(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The machine is not measured, which takes a second."""
+    """Replace the measurement of the machine, which takes a second."""
     peak = Peak(1, 10e9, 20e9)
     monkeypatch.setattr(
         "dynx.bench.session.Session.measure_machine", lambda self, n: self.peaks.update({n: peak})
@@ -56,7 +56,7 @@ def test_a_wrong_quantity_lists_those_of_the_library() -> None:
     assert f"known: {', '.join(QUANTITIES)} " in result.stderr
 
 
-def test_a_table_for_each_work() -> None:
+def test_a_table_for_each_case() -> None:
     result = bench("double_pendulum", *QUICK, "--batch", "1")
     assert result.exit_code == 0
     assert result.stderr == ""
@@ -114,8 +114,8 @@ def test_arguments_that_cannot_be_used(arguments: list[str], clue: str) -> None:
     assert result.stderr.count("\n") == 1
 
 
-def made_up(*implementations: Implementation) -> tuple[int, str]:
-    """The exit code and the table of a session of these implementations."""
+def run_session(*implementations: Implementation) -> tuple[int, str]:
+    """Return the exit code and the table of a session of these implementations."""
     model = dynx.load("double_pendulum")
     with session_of([*implementations], model, (BenchmarkCase("mass_matrix", 4),), repetitions=1) as session:
         session.measure_machine(1)
@@ -126,8 +126,8 @@ def made_up(*implementations: Implementation) -> tuple[int, str]:
     return code, out.getvalue()
 
 
-def test_a_wrong_answer_is_said_and_is_exit_code_1(capsys: pytest.CaptureFixture[str]) -> None:
-    code, table = made_up(Scaled("right"), Scaled("wrong", 1.5))
+def test_a_wrong_result_is_reported_with_exit_code_1(capsys: pytest.CaptureFixture[str]) -> None:
+    code, table = run_session(Scaled("right"), Scaled("wrong", 1.5))
     assert code == 1
     err = capsys.readouterr().err
     assert err.startswith("dynx: error: wrong, mass matrix: wrong result, not timed: error ")
@@ -135,8 +135,10 @@ def test_a_wrong_answer_is_said_and_is_exit_code_1(capsys: pytest.CaptureFixture
     assert "wrong: wrong result, not timed" in table
 
 
-def test_an_engine_that_cannot_do_it_is_said_and_no_failure(capsys: pytest.CaptureFixture[str]) -> None:
-    code, table = made_up(Failing("one"), Scaled("right"), Failing("other"))
+def test_an_engine_without_the_quantity_is_no_failure(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    code, table = run_session(Failing("one"), Scaled("right"), Failing("other"))
     assert code == 0
     assert capsys.readouterr().err == ""
     assert "one, other: no such luck\n" in table
@@ -160,18 +162,18 @@ def test_the_fastest_is_shown_first_and_what_was_not_timed_last() -> None:
     assert "1 case not done" in text
 
 
-@pytest.mark.parametrize(("load", "said"), [(None, False), (0.2, False), (3.14, True)])
-def test_a_machine_that_was_busy_is_said(load: float | None, said: bool) -> None:
+@pytest.mark.parametrize(("load", "reported"), [(None, False), (0.2, False), (3.14, True)])
+def test_a_busy_machine_is_reported(load: float | None, reported: bool) -> None:
     model = dynx.load("double_pendulum")
     with session_of([], model, (BenchmarkCase("mass_matrix", 4),)) as session:
         made = document(session, [], "a processor")
     out = StringIO()
     show(Console(file=out, width=10_000), {**made, "load": load})
-    assert ("load 3.1 before the run" in out.getvalue()) == said
+    assert ("load 3.1 before the run" in out.getvalue()) == reported
 
 
 def implementation(name: str, ns: float | None) -> BenchWay:
-    """The entry of an implementation."""
+    """Return the entry of an implementation."""
     quartiles = None if ns is None else [ns, ns]
     return {
         "way": name,

@@ -89,7 +89,7 @@ def test_a_difference_is_named_mended_and_gone(arm: Path, tmp_path: Path) -> Non
     assert "all engines load it alike" in again.stdout
 
 
-def test_a_baseline_accepts_what_is_known_and_nothing_else(arm: Path) -> None:
+def test_a_baseline_accepts_known_differences_and_no_others(arm: Path) -> None:
     assert doctor("arm.urdf", "--write-baseline", "known.json", "--quiet").exit_code == 0
     # The same finding on another line is the same finding.
     arm.write_bytes(ARM.replace("<robot", "\n\n<robot").encode("latin-1"))
@@ -103,7 +103,7 @@ def test_a_baseline_accepts_what_is_known_and_nothing_else(arm: Path) -> None:
     assert "gone: DX101 link 'camera'" in other.stdout
 
 
-def test_files_are_mended_in_place_only_when_asked(arm: Path) -> None:
+def test_files_are_mended_in_place_only_with_in_place(arm: Path) -> None:
     assert doctor("arm.urdf", "--fix", "./arm.urdf").exit_code == 2
     assert arm.read_bytes() == ARM.encode("latin-1")
     arm.chmod(0o640)
@@ -178,14 +178,14 @@ def test_a_baseline_is_written_over_by_a_baseline_alone(arm: Path) -> None:
 
 
 def test_as_loaded_is_not_written_over_what_is_read(arm: Path) -> None:
-    for way in ([], ["--as-loaded"]):
-        result = CliRunner().invoke(cli, ["agree", "arm.urdf", *way, "--json", "arm.urdf"])
+    for option in ([], ["--as-loaded"]):
+        result = CliRunner().invoke(cli, ["agree", "arm.urdf", *option, "--json", "arm.urdf"])
         assert result.exit_code == 2
         assert "a robot that is read" in result.stderr
     assert arm.read_bytes() == ARM.encode("latin-1")
 
 
-def test_what_is_write_protected_is_not_mended_in_place(arm: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_write_protected_file_is_not_mended_in_place(arm: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # A new file could be put in its place, for which the permissions of the directory suffice.
     monkeypatch.setattr(os, "access", lambda path, mode: mode != os.W_OK or Path(path).name != "arm.urdf")
     result = doctor("arm.urdf", "--in-place", "--quiet")
@@ -234,7 +234,7 @@ def test_as_loaded_prints_calls_errors_and_the_vote(arm: Path) -> None:
         "pybullet is off by up to",
     ):
         assert words in result.stdout
-    assert "pinocchio has the answer that follows from the file" in result.stdout
+    assert "pinocchio matches the reference values of the file" in result.stdout
     assert "dynx doctor arm.urdf" in result.stdout
     [entry] = json.loads(Path("x.json").read_text())["results"]
     assert [each for each in entry["findings"] if each["effect"]] == []

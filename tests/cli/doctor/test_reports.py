@@ -33,7 +33,7 @@ from tests.doctor.formats.reports import HOSTILE, MENDED, SMALL, TEXT, alike, di
 from tests.workers.targets import interrupt_at_a_pipe
 
 
-def concluded(
+def conclude(
     reports: Sequence[DoctorReport],
     folder: Path,
     baseline: Baseline | None = None,
@@ -43,7 +43,7 @@ def concluded(
     left: int = 0,
     engines: Sequence[str] | None = ("pinocchio",),
 ) -> int:
-    """The exit code of a run that gave these reports, and `left` robots without one."""
+    """Return the exit code of a run that gave these reports, and `left` robots without one."""
     names = [report.robot for report in reports] + ["later"] * left
     run = doctor_run([DoctorTask(name, "fixed") for name in names])
     for number, report in enumerate(reports):
@@ -64,21 +64,21 @@ def concluded(
     ],
     ids=["alike", "differ", "one differs", "one refused", "none"],
 )
-def test_the_exit_code_is_that_of_the_worst(reports: list[DoctorReport], code: int, tmp_path: Path) -> None:
-    assert concluded(reports, tmp_path) == code
+def test_the_exit_code_is_the_largest_one(reports: list[DoctorReport], code: int, tmp_path: Path) -> None:
+    assert conclude(reports, tmp_path) == code
 
 
-def test_a_baseline_just_written_knows_everything(tmp_path: Path) -> None:
+def test_a_baseline_just_written_accepts_everything(tmp_path: Path) -> None:
     path = tmp_path / "known.json"
-    assert concluded([differing()], tmp_path, outputs=Outputs(baseline=str(path))) == 0
+    assert conclude([differing()], tmp_path, outputs=Outputs(baseline=str(path))) == 0
     known = read_baseline(path.read_text(), str(path))
-    assert concluded([differing()], tmp_path, known) == 0
-    assert concluded([differing(link="another")], tmp_path, known) == 1
+    assert conclude([differing()], tmp_path, known) == 0
+    assert conclude([differing(link="another")], tmp_path, known) == 1
 
 
 def test_the_document_names_what_was_not_done(tmp_path: Path) -> None:
     path = tmp_path / "x.json"
-    concluded([alike()], tmp_path, outputs=Outputs(json=str(path)), left=2)
+    conclude([alike()], tmp_path, outputs=Outputs(json=str(path)), left=2)
     document = json.loads(path.read_text())
     assert document["summary"]["not_done"] == 2
     assert document["not_done"] == ["later", "later"]
@@ -93,11 +93,11 @@ def test_a_counterexample_is_a_file_that_loads(tmp_path: Path) -> None:
     assert "q = [0.5]" in path.read_text()
 
 
-def test_a_folder_that_cannot_be_made_is_said_and_the_rest_is_done(
+def test_a_folder_that_cannot_be_created_is_reported_and_the_rest_is_done(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "file").write_text("")
-    assert concluded([differing()], tmp_path / "file" / "folder") == 2
+    assert conclude([differing()], tmp_path / "file" / "folder") == 2
     found = capsys.readouterr()
     assert "DX901" in found.out
     assert "cannot be created" in found.err
@@ -119,7 +119,7 @@ def shown(report: DoctorReport, width: int = 80) -> str:
     return out.getvalue()
 
 
-def test_one_robot_is_told_in_the_order_of_importance() -> None:
+def test_the_report_of_one_robot_is_in_the_order_of_importance() -> None:
     text = shown(differing())
     order = [
         *(
@@ -135,7 +135,7 @@ def test_one_robot_is_told_in_the_order_of_importance() -> None:
             "(rounding)",
         ),
         *("bad practice", "DX903", "--choose DX901=keep", "p.changeDynamics(robot, link)"),
-        *("worst at joint elbow", "q = [0.5]", "--fix OUT.urdf"),
+        *("largest at joint elbow", "q = [0.5]", "--fix OUT.urdf"),
     ]
     places = [text.find(words) for words in order]
     assert -1 not in places
@@ -157,14 +157,14 @@ def test_names_cannot_write_on_the_terminal(report: DoctorReport) -> None:
         assert "x" * 1000 not in text
 
 
-def test_a_library_robot_and_an_unknown_one_are_told_apart_in_the_worker() -> None:
+def test_an_unknown_robot_is_refused_in_the_worker() -> None:
     report = examine(DoctorTask("nosuch", "fixed", ("pinocchio",)))
     assert report.error is not None
     assert report.error.type == "RobotNotFoundError"
     assert report.robot == "nosuch"
 
 
-def test_a_missing_engine_is_a_line_that_says_what_to_install(
+def test_a_missing_engine_is_a_line_with_the_package_to_install(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def absent(name: str) -> None:
@@ -173,9 +173,9 @@ def test_a_missing_engine_is_a_line_that_says_what_to_install(
     monkeypatch.setattr("dynx.doctor.task.loader_class", absent)
     assert [line.split("'")[1] for line in missing_engines([differing(), alike()])] == ["drake"]
     assert missing_engines([refused()]) == []
-    concluded([differing()], tmp_path, engines=None)
+    conclude([differing()], tmp_path, engines=None)
     assert "note: the engine 'drake' needs a package: pip install 'dynx[drake]'" in capsys.readouterr().out
-    concluded([differing()], tmp_path, engines=("pinocchio", "pybullet", "mujoco"))
+    conclude([differing()], tmp_path, engines=("pinocchio", "pybullet", "mujoco"))
     assert "drake" not in capsys.readouterr().out
 
 
@@ -188,11 +188,11 @@ def test_an_interrupted_run_writes_what_is_done(
     run = doctor_run([DoctorTask(name, "fixed") for name in ("arm", pipe, "third")], interrupt_at_a_pipe)
     record = run.record
 
-    def record_and_tell(index: int, result: DoctorReport) -> None:
+    def record_and_signal(index: int, result: DoctorReport) -> None:
         record(index, result)
         Path(pipe).write_text("the first is recorded")
 
-    monkeypatch.setattr(run, "record", record_and_tell)
+    monkeypatch.setattr(run, "record", record_and_signal)
     outputs = Outputs(json=str(tmp_path / "x.json"))
     conclusion = Conclusion(run, outputs, None, [None] * 3, False, str(tmp_path), None)
     assert carry_out(run, 1, 0.0, True, lambda: conclusion.reach(quiet=True)) == 130
@@ -205,16 +205,16 @@ def test_an_interrupted_run_writes_what_is_done(
 # -- where mended files go ----------------------------------------------------------------------
 
 
-def planned(out: str, *robots: RobotInput) -> list[str | None]:
-    """The files for these inputs."""
+def targets_of(out: str, *robots: RobotInput) -> list[str | None]:
+    """Return the files for these inputs."""
     return planned_targets(robots, out, in_place=False, bases=1)
 
 
 def test_one_robot_goes_to_a_file_and_several_to_a_folder(tmp_path: Path) -> None:
     out = str(tmp_path / "out")
-    assert planned(f"{out}.urdf", RobotInput("ur5")) == [f"{out}.urdf"]
-    assert planned(str(tmp_path), RobotInput("ur5")) == [str(tmp_path / "ur5.urdf")]
-    several = planned(
+    assert targets_of(f"{out}.urdf", RobotInput("ur5")) == [f"{out}.urdf"]
+    assert targets_of(str(tmp_path), RobotInput("ur5")) == [str(tmp_path / "ur5.urdf")]
+    several = targets_of(
         out, RobotInput("ur5"), RobotInput("x/arm.urdf.xacro"), RobotInput("d/e/f.urdf", folder="d")
     )
     assert several == [f"{out}/ur5.urdf", f"{out}/arm.urdf", f"{out}/e/f.urdf"]
@@ -222,14 +222,14 @@ def test_one_robot_goes_to_a_file_and_several_to_a_folder(tmp_path: Path) -> Non
 
 def test_no_two_robots_share_a_file_and_none_is_its_input(tmp_path: Path) -> None:
     with pytest.raises(ArgumentError, match="both"):
-        planned(str(tmp_path / "out"), RobotInput("a/arm.urdf"), RobotInput("b/arm.urdf"))
+        targets_of(str(tmp_path / "out"), RobotInput("a/arm.urdf"), RobotInput("b/arm.urdf"))
     path = tmp_path / "arm.urdf"
     path.write_text(TEXT)
     for out in (str(path), f"{tmp_path}/./arm.urdf", str(tmp_path)):
         with pytest.raises(ArgumentError, match="in-place"):
-            planned(out, RobotInput(str(path)))
+            targets_of(out, RobotInput(str(path)))
     with pytest.raises(ArgumentError, match="directory"):
-        planned(str(path), RobotInput("a"), RobotInput("b"))
+        targets_of(str(path), RobotInput("a"), RobotInput("b"))
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "ISO-8859-1", "UTF-16", "cp1252", "Shift_JIS"])
@@ -257,7 +257,7 @@ def test_nothing_to_mend_is_a_copy_and_in_place_nothing(tmp_path: Path) -> None:
 
 
 def voters(*errors: float) -> DoctorReport:
-    """Engines a, b, c, ... that far from the file; any two differ by the difference of their errors."""
+    """Report of engines a, b, c, ... with these errors; any two differ by the difference of theirs."""
     names = [chr(ord("a") + k) for k in range(len(errors))]
     distance = dict(zip(names, errors, strict=True))
     pairs = [
@@ -269,16 +269,16 @@ def voters(*errors: float) -> DoctorReport:
     return DoctorReport("r", engines=tuple(engines), pairs=tuple(pairs), tolerance=1e-12)
 
 
-def test_who_stands_alone_and_who_is_right() -> None:
+def test_the_vote_names_engines_alone_and_engines_that_are_right() -> None:
     found = vote(voters(0.0, 0.5, 0.0, 1e-16))
     assert found.groups == (("a", "c", "d"), ("b",))
     assert found.alone == ("b",)
     assert found.right == ("a", "c", "d")
     assert vote(voters(0.5, 0.5, 0.0)).right == ("c",)  # the majority may be wrong
     assert vote(voters(0.0, 0.0)).alone == ()
-    said = vote_lines(voters(0.5, 0.5, 0.0), vote(voters(0.5, 0.5, 0.0)))
-    assert "a and b agree with each other" in said
-    assert "c has the answer that follows from the file itself" in said
+    lines = vote_lines(voters(0.5, 0.5, 0.0), vote(voters(0.5, 0.5, 0.0)))
+    assert "a and b agree with each other" in lines
+    assert "c matches the reference values of the file" in lines
     assert vote_lines(DoctorReport("r"), vote(DoctorReport("r"))) == ["no engine loads the file"]
 
 

@@ -22,8 +22,8 @@ Q = [0.1, -1.5, 1.4, 0.2, 0.3, -0.4]
 Q_TEXT = ",".join(map(repr, Q))
 
 
-def answer(*arguments: str) -> dict[str, Any]:
-    """The JSON that a command writes."""
+def document(*arguments: str) -> dict[str, Any]:
+    """Return the JSON document that a command writes."""
     result = CliRunner().invoke(cli, [*arguments, "--json"])
     assert result.exit_code == 0, result.stderr
     found: dict[str, Any] = json.loads(result.stdout)
@@ -37,7 +37,7 @@ def test_a_list_of_numbers_is_read_exactly(numbers: list[float]) -> None:
 
 
 def test_info() -> None:
-    found = answer("info", "ur5")
+    found = document("info", "ur5")
     model = load("ur5")
     assert found["name"] == model.name
     assert found["base"] == "fixed"
@@ -50,7 +50,7 @@ def test_info() -> None:
 
 
 def test_info_of_a_floating_robot_with_a_locked_joint() -> None:
-    found = answer("info", "ur5", "--base", "floating", "--lock", "elbow_joint=0.5")
+    found = document("info", "ur5", "--base", "floating", "--lock", "elbow_joint=0.5")
     assert (found["nq"], found["nv"]) == (12, 11)
     assert [j["locked_at"] for j in found["joints"] if j["name"] == "elbow_joint"] == [0.5]
 
@@ -63,25 +63,25 @@ def test_the_tree_shows_every_link(robot: str) -> None:
 
 
 def test_robots_are_all_listed() -> None:
-    names = {entry["name"]: entry for entry in answer("robots")["robots"]}
+    names = {entry["name"]: entry for entry in document("robots")["robots"]}
     assert {"ur5", "panda", "talos", "xarm7", "z1"} <= set(names)
     assert set(names["ur5"]) == {"name", "aliases", "source", "path"}
 
 
 def test_backends() -> None:
-    found = {entry["name"]: entry for entry in answer("backends")["backends"]}
+    found = {entry["name"]: entry for entry in document("backends")["backends"]}
     assert found["reference"]["installed"] is True
 
 
 def test_id_is_the_backends() -> None:
     v, a = [0.1] * 6, [0.2] * 6
     vectors = ["--v", ",".join(map(repr, v)), "--a", ",".join(map(repr, a))]
-    found = answer("id", "ur5", "--q", Q_TEXT, *vectors, "--backend", "reference")
+    found = document("id", "ur5", "--q", Q_TEXT, *vectors, "--backend", "reference")
     assert found["tau"] == backend("reference", load("ur5")).inverse_dynamics(Q, v, a).tolist()
 
 
 def test_fd_is_the_backends() -> None:
-    found = answer("fd", "ur5", "--q", Q_TEXT, "--tau", "shoulder_lift_joint=10", "--backend", "reference")
+    found = document("fd", "ur5", "--q", Q_TEXT, "--tau", "shoulder_lift_joint=10", "--backend", "reference")
     tau = [0.0, 10.0, 0.0, 0.0, 0.0, 0.0]
     assert found["tau"] == tau
     assert found["a"] == backend("reference", load("ur5")).forward_dynamics(Q, np.zeros(6), tau).tolist()
@@ -92,20 +92,20 @@ def test_fk_jacobian_and_mass_are_the_backends() -> None:
     frame = default_frame(engine.model)
     options = ["ur5", "--q", Q_TEXT, "--backend", "reference"]
     assert frame == "tool0"
-    assert answer("fk", *options)["T_world_frame"] == engine.forward_kinematics(Q, frame).tolist()
-    assert answer("jacobian", *options)["jacobian"] == engine.jacobian(Q, frame).tolist()
-    assert answer("mass", *options)["mass_matrix"] == engine.mass_matrix(Q).tolist()
+    assert document("fk", *options)["T_world_frame"] == engine.forward_kinematics(Q, frame).tolist()
+    assert document("jacobian", *options)["jacobian"] == engine.jacobian(Q, frame).tolist()
+    assert document("mass", *options)["mass_matrix"] == engine.mass_matrix(Q).tolist()
 
 
 def test_joints_by_name() -> None:
-    found = answer("fk", "ur5", "--q", "elbow_joint=0.5", "--backend", "reference")
+    found = document("fk", "ur5", "--q", "elbow_joint=0.5", "--backend", "reference")
     assert found["q"] == [0.0, 0.0, 0.5, 0.0, 0.0, 0.0]
 
 
-def test_ik_reaches_what_fk_gave_and_says_when_it_does_not() -> None:
+def test_ik_reaches_a_pose_of_fk_and_reports_an_unreachable_one() -> None:
     options = ["--frame", "tool0", "--backend", "reference"]
-    T = np.array(answer("fk", "ur5", "--q", Q_TEXT, *options)["T_world_frame"])
-    found = answer("ik", "ur5", "--target", ",".join(map(repr, T.ravel().tolist())), *options)
+    T = np.array(document("fk", "ur5", "--q", Q_TEXT, *options)["T_world_frame"])
+    found = document("ik", "ur5", "--target", ",".join(map(repr, T.ravel().tolist())), *options)
     assert found["success"] is True
     assert len(found["q"]) == 6
     far = CliRunner().invoke(cli, ["ik", "asr_twodof", "--target", "99,0,0", "--backend", "reference"])
@@ -141,7 +141,7 @@ def test_ik_reaches_what_fk_gave_and_says_when_it_does_not() -> None:
         (["info", "/"], "directory"),
     ],
 )
-def test_what_cannot_be_used_is_said_in_one_line(arguments: list[str], clue: str) -> None:
+def test_unusable_input_is_one_line(arguments: list[str], clue: str) -> None:
     result = CliRunner().invoke(cli, arguments)
     assert result.exit_code == 2
     assert clue in result.stderr
@@ -151,18 +151,18 @@ def test_what_cannot_be_used_is_said_in_one_line(arguments: list[str], clue: str
 
 def test_a_position_has_no_rotation_error() -> None:
     options = ["ur5", "--target", "0.4,0.2,0.3", "--backend", "reference"]
-    assert answer("ik", *options)["rotation_error"] is None
+    assert document("ik", *options)["rotation_error"] is None
     assert " rad" not in CliRunner().invoke(cli, ["ik", *options]).stdout
-    posed = answer("ik", "ur5", "--target", "0.4,0.2,0.3,0,0,0", "--backend", "reference")
+    posed = document("ik", "ur5", "--target", "0.4,0.2,0.3,0,0,0", "--backend", "reference")
     assert 0.0 <= posed["rotation_error"] < 1e-6
 
 
-def test_what_was_counted_is_singular_or_plural() -> None:
+def test_counts_are_singular_or_plural() -> None:
     assert [counted(count, "restart") for count in (0, 1, 2)] == ["0 restarts", "1 restart", "2 restarts"]
 
 
 @pytest.mark.parametrize("command", [["fk"], ["jacobian"], ["ik", "--target", "0.4,0.2,0.3"]])
-def test_the_frame_that_was_taken_by_default_is_said(command: list[str]) -> None:
+def test_the_default_frame_is_named(command: list[str]) -> None:
     arguments = [command[0], "ur5", *command[1:], "--backend", "reference"]
     assert "tool0 ends" in CliRunner().invoke(cli, arguments).stdout
     assert "--frame chooses" in CliRunner().invoke(cli, arguments).stdout
@@ -171,9 +171,7 @@ def test_the_frame_that_was_taken_by_default_is_said(command: list[str]) -> None
 
 @pytest.mark.parametrize("width", [40, 60, 80, 120, None])
 @pytest.mark.parametrize("command", ["mass", "jacobian"])
-def test_a_wide_matrix_is_shown_whole(
-    command: str, width: int | None, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_wide_matrix_is_complete(command: str, width: int | None, monkeypatch: pytest.MonkeyPatch) -> None:
     arguments = [
         command,
         "talos",
@@ -184,7 +182,7 @@ def test_a_wide_matrix_is_shown_whole(
         "--q",
         "arm_left_4_joint=-1",
     ]
-    found = answer(*arguments)
+    found = document(*arguments)
     matrix = found["mass_matrix" if command == "mass" else "jacobian"]
     if width is not None:
         monkeypatch.setenv("COLUMNS", str(width))
@@ -213,7 +211,7 @@ def test_piped_lines_have_no_trailing_blanks(arguments: list[str]) -> None:
 
 
 @pytest.mark.parametrize("width", ["40", "60"])
-def test_no_name_of_a_tree_is_cut(width: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_name_of_a_tree_is_truncated(width: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", width)
     shown = CliRunner().invoke(cli, ["info", "talos"]).stdout
     assert all(f"{joint.name} ({joint.type})" in shown for joint in load("talos").joints)

@@ -14,7 +14,7 @@ from dynx.rules import Rule, all_rules, find_rule
 
 
 def run(*arguments: str) -> str:
-    """Output of a command that succeeds."""
+    """Return the output of a command that succeeds."""
     result = CliRunner().invoke(cli, ["explain", *arguments])
     assert result.exit_code == 0, result.stderr
     return result.stdout
@@ -57,7 +57,7 @@ def test_json_of_one_and_of_all() -> None:
     assert one["rule"] in every
 
 
-def test_a_typo_is_told_the_nearest_name() -> None:
+def test_a_typo_is_reported_with_the_nearest_name() -> None:
     result = CliRunner().invoke(cli, ["explain", "inertia-beyond-geometri"])
     assert result.exit_code == 2
     assert "did you mean 'inertia-beyond-geometry'" in result.stderr

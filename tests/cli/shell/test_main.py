@@ -1,4 +1,4 @@
-"""The group of commands: help, start-up, and how errors leave."""
+"""The group of commands: help, start-up, and the exit codes of errors."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def test_the_default_of_samples_is_that_of_agree() -> None:
 
 
 def test_help_imports_nothing_slow() -> None:
-    """Neither the group nor the declaration of any command imports more of dynx than the options need."""
+    """Import no slow package for the group or for the declaration of any command."""
     script = (
         "import click, sys; from dynx.cli.shell.main import COMMANDS, cli; context = click.Context(cli); "
         "[cli.get_command(context, name).get_help(context) for name in COMMANDS]; cli.get_help(context); "
@@ -51,7 +51,7 @@ def test_help_imports_nothing_slow() -> None:
 
 
 def broken() -> CommandLine:
-    """A command line with a defect."""
+    """Return a command line with a defect."""
 
     @click.command()
     def fail() -> None:
@@ -71,7 +71,7 @@ def test_a_defect_is_one_line_and_70(monkeypatch: pytest.MonkeyPatch) -> None:
     assert result.stderr.count("\n") == 1
 
 
-def test_a_traceback_is_shown_when_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_environment_variable_turns_tracebacks_on(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("DYNX_TRACEBACK", "1")
     assert "Traceback" in CliRunner().invoke(broken(), ["fail"]).stderr
 
@@ -85,14 +85,14 @@ def test_python_dash_m() -> None:
 
 
 def closed_pipe(*arguments: str) -> tuple[int, bytes]:
-    """Exit code and standard error of a command whose reader is gone before it writes."""
+    """Return exit code and standard error of a command whose reader is gone before it writes."""
     command = [sys.executable, "-m", "dynx", *arguments]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
         assert process.stdout is not None
         assert process.stderr is not None
         process.stdout.close()
-        said = process.stderr.read()
-    return process.returncode, said
+        errors = process.stderr.read()
+    return process.returncode, errors
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGPIPE")
@@ -100,7 +100,7 @@ def closed_pipe(*arguments: str) -> tuple[int, bytes]:
     "arguments",
     [["--help"], ["--version"], ["fk", "--help"], ["robots"], ["robots", "--json"], ["id", "ur5"]],
 )
-def test_a_closed_pipe_is_not_the_answer_no(arguments: list[str]) -> None:
+def test_a_closed_pipe_is_not_a_negative_result(arguments: list[str]) -> None:
     assert closed_pipe(*arguments) == (141, b"")
 
 

@@ -12,7 +12,7 @@ widths = st.integers(1, 120)
 
 
 def shown(table: Table, width: int) -> list[str]:
-    """The lines of a table."""
+    """Return the lines of a table."""
     return [line.plain for line in table.lines(width)]
 
 

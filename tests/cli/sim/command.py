@@ -1,4 +1,4 @@
-"""`dynx sim` as the tests call it."""
+"""Calls of `dynx sim` for the tests."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def sim(*arguments: str) -> Result:
 
 
 def document(*arguments: str, code: int = 0) -> dict[str, Any]:
-    """What is written with ``--json``."""
+    """Return the document that ``--json`` writes."""
     result = sim(*arguments, "--json")
     assert result.exit_code == code, result.output
     made: dict[str, Any] = json.loads(result.stdout)

@@ -1,4 +1,4 @@
-"""`dynx sim`: what is simulated, its table and its document."""
+"""`dynx sim`: the simulation, its table and its document."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ KEYS = """
     seconds max_error max_error_joint max_error_time rms_error final_error base_error frame_error
     energy_change energy_drift max_kinetic_energy saturated joints final files
 """
-"""Of the document, schema 1."""
+"""Keys of the document, schema 1."""
 
 
 def test_the_options_are_those_of_the_library() -> None:
@@ -79,7 +79,7 @@ def test_the_table_has_a_line_for_each_joint() -> None:
     assert "simulated 0.05 s in " in result.stdout
 
 
-def test_the_document_says_all_that_was_asked_and_found() -> None:
+def test_the_document_has_every_option_and_result() -> None:
     made = document(
         *(
             "ur5",
@@ -117,8 +117,8 @@ def test_the_document_says_all_that_was_asked_and_found() -> None:
     keys = "name unit max_error rms_error final_error max_speed max_torque effort_limit saturated"
     assert all(set(joint) == set(keys.split()) for joint in made["joints"])
     assert made["max_error"] == max(joint["max_error"] for joint in made["joints"])
-    worst = next(joint for joint in made["joints"] if joint["name"] == made["max_error_joint"])
-    assert worst["max_error"] == made["max_error"]
+    largest = next(joint for joint in made["joints"] if joint["name"] == made["max_error_joint"])
+    assert largest["max_error"] == made["max_error"]
     assert made["final_error"] == max(abs(joint["final_error"]) for joint in made["joints"])
     assert len(made["final"]["q"]) == 6
 
@@ -131,8 +131,8 @@ def test_the_record_is_that_of_the_library(tmp_path: Path) -> None:
     arguments = ["--to", ",".join(map(str, there)), "--plant", "pybullet", "--gravity", "0,0,-9.8"]
     made = document("ur5", *arguments, "--dt", "0.002", "--save", str(target))
     motion = trajectory.cycloidal(np.zeros(6), there, duration=2.0)
-    law = control.ComputedTorque(arm, kp=400, kd=40, backend="pinocchio")
-    rollout = simulate(arm, law, motion, plant="pybullet", dt=2e-3)
+    controller = control.ComputedTorque(arm, kp=400, kd=40, backend="pinocchio")
+    rollout = simulate(arm, controller, motion, plant="pybullet", dt=2e-3)
     saved = Rollout.load(target)
     np.testing.assert_array_equal(saved.q, rollout.q)
     np.testing.assert_array_equal(saved.tau, rollout.tau)
@@ -141,7 +141,7 @@ def test_the_record_is_that_of_the_library(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["none", *CONTROLLERS])
-def test_every_law_runs(name: str) -> None:
+def test_every_controller_runs(name: str) -> None:
     if name in MOTORS and "pybullet" not in installed_backends():
         pytest.skip("PyBullet is not installed")
     start = "0.2,-1.4,1.2,0.1,0.5,0.2"
@@ -159,7 +159,7 @@ def test_every_law_runs(name: str) -> None:
 
 
 @needs_bullet
-def test_motors_of_the_engine_are_held_to_limits() -> None:
+def test_motors_of_the_engine_are_saturated_at_limits() -> None:
     motor = ["pendulum", "--to", "1", "--controller", "position-motor", "--plant", "pybullet", "--dt", "0.01"]
     free, described, weak = (
         document(*motor, *limits) for limits in ([], ["--effort-limits", "urdf"], ["--effort-limits", "1"])
@@ -181,13 +181,13 @@ def test_motors_of_the_engine_are_held_to_limits() -> None:
         (["--profile", "s-curve", "--acceleration", "2", "--jerk", "20", "--velocity", "0.3"], None),
     ],
 )
-def test_profiles_lead_there(arguments: list[str], duration: float | None) -> None:
+def test_every_profile_ends_at_the_target(arguments: list[str], duration: float | None) -> None:
     given = [] if duration is None else ["--duration", str(duration)]
     made = document("ur5", "--to", "elbow_joint=0.2", *arguments, *given)
     assert made["final"]["q"][2] == pytest.approx(0.2, abs=1e-3)
     took = made["motion"]["duration"]
     if duration is None:
-        # The robot is watched until the step in which the fastest motion ends.
+        # The simulation lasts until the step in which the fastest motion ends.
         assert took <= made["simulated"] < took + 1e-3
     else:
         assert took == made["simulated"] == duration
@@ -198,7 +198,7 @@ def test_joints_that_are_not_named_stay() -> None:
     assert made["motion"]["to"] == [0.0, 0.0, 0.01, 0.3, 0.0, 0.0]
 
 
-def test_hold_wants_the_end_at_once() -> None:
+def test_hold_is_a_step_of_the_reference() -> None:
     made = document(
         "ur5", "--from", "elbow_joint=0.1", "--to", "elbow_joint=0", "--profile", "hold", "--duration", "0.5"
     )
@@ -206,7 +206,7 @@ def test_hold_wants_the_end_at_once() -> None:
     assert made["final_error"] < 0.01
 
 
-def test_a_frame_goes_on_a_straight_line(tmp_path: Path) -> None:
+def test_a_frame_moves_on_a_straight_line(tmp_path: Path) -> None:
     target = tmp_path / "line.npz"
     start = "0.2,-1.4,1.2,0.1,0.5,0.2"
     made = document(
@@ -222,7 +222,7 @@ def test_a_frame_goes_on_a_straight_line(tmp_path: Path) -> None:
     assert np.abs(off).max() < 1e-3
 
 
-def test_friction_is_given_back() -> None:
+def test_friction_compensation_removes_the_error() -> None:
     losses = ["--friction", "0.5", "--damping", "1", "--controller", "discrete-computed-torque"]
     without = document("ur5", *SHORT, *losses)
     given = document("ur5", *SHORT, *losses, "--friction-compensation")
@@ -244,15 +244,15 @@ def test_a_passive_robot_keeps_its_energy() -> None:
 
 def test_a_robot_without_joints_is_no_defect() -> None:
     for base in ("fixed", "floating"):
-        for law in ("none", "pd"):
-            arguments = ["free_body", "--base", base, "--controller", law, "--duration", "0.05"]
+        for controller in ("none", "pd"):
+            arguments = ["free_body", "--base", base, "--controller", controller, "--duration", "0.05"]
             assert sim(*arguments).exit_code == 0
             made = document(*arguments)
             assert len(made["joints"]) == (6 if base == "floating" else 0)
             assert made["steps"] == 50
 
 
-def test_a_floating_base_has_lines_of_its_own() -> None:
+def test_a_floating_base_has_six_lines() -> None:
     made = document("solo12", "--base", "floating", "--controller", "pd", "--duration", "0.05")
     assert [joint["name"] for joint in made["joints"]][:6] == [
         f"base {c}" for c in ("x", "y", "z", "rx", "ry", "rz")

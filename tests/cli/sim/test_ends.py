@@ -1,4 +1,4 @@
-"""How `dynx sim` ends: files, exit codes, what diverges, what is interrupted and taken up again."""
+"""End of `dynx sim`: files, exit codes, divergence, interruption, resuming."""
 
 from __future__ import annotations
 
@@ -64,14 +64,14 @@ def test_a_simulation_that_diverges_keeps_its_record(tmp_path: Path) -> None:
     assert (error["type"], error["step"], error["time"], len(error["v"])) == ("DivergedError", 2, 0.002, 6)
 
 
-def test_a_law_without_a_torque_is_told_from_a_plant_that_diverges() -> None:
+def test_an_invalid_torque_is_not_reported_as_divergence() -> None:
     made = document("ur5", *SHORT, "--kp", "1e308", "--q0", "1,1,1,1,1,1", code=1)
     assert made["status"] == "control failed"
     assert made["error"]["type"] == "ControlError"
     assert made["steps"] == 0
 
 
-def test_what_cannot_be_written_in_the_end_loses_nothing_else(
+def test_a_record_that_cannot_be_written_leaves_the_table(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def full(self: Rollout, path: str) -> None:
@@ -98,7 +98,7 @@ def test_a_plot_without_matplotlib_names_the_extra(tmp_path: Path, monkeypatch: 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_an_interrupted_run_keeps_what_is_done(number: int, code: int, tmp_path: Path) -> None:
     target = tmp_path / "out.npz"
-    # A plant that is slow, so that there is something left to do.
+    # A slow plant, so that the run is not complete when the signal arrives.
     start = [sys.executable, "-m", "dynx", "sim", "ur5", "--to", "elbow_joint=1", "--plant", "reference"]
     start += ["--duration", "200", "--save", str(target)]
     for patience in (4.0, 16.0, 64.0):
@@ -117,7 +117,7 @@ def test_an_interrupted_run_keeps_what_is_done(number: int, code: int, tmp_path:
     assert 0 < len(Rollout.load(target)) < 200_000
 
 
-def test_an_interrupted_run_is_taken_up_to_the_last_bit(
+def test_an_interrupted_run_is_resumed_to_the_last_bit(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     part, rest, whole = (tmp_path / f"{name}.npz" for name in ("part", "rest", "whole"))

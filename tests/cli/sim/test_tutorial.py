@@ -22,7 +22,7 @@ from tests.oracles.closed_form import MODELS
 from tests.sim.bars import TRACKING
 
 QUICK = ["--duration", "1.2", "--dt", "0.004"]
-"""As long a step as every law can hold the arm with."""
+"""Options of a short run, with the largest step at which every controller holds the arm."""
 
 
 def tutorial(*arguments: str) -> Result:
@@ -30,14 +30,14 @@ def tutorial(*arguments: str) -> Result:
 
 
 def document(*arguments: str, code: int = 0) -> dict[str, Any]:
-    """What is written with ``--json``."""
+    """Return the document that ``--json`` writes."""
     result = tutorial(*arguments, "--json")
     assert result.exit_code == code, result.output
     made: dict[str, Any] = json.loads(result.stdout)
     return made
 
 
-def test_what_takes_part_is_an_option_of_the_command() -> None:
+def test_the_help_of_tutorial_lists_its_options() -> None:
     assert {str(param.name) for param in command.params} >= sim_options.TUTORIAL_OPTIONS
     help_text = {param.name: param for param in command.params}["tutorial"].to_info_dict()["help"]
     for param in command.params:
@@ -65,7 +65,7 @@ def test_the_whole_tutorial() -> None:
     assert motor["pinocchio"]["problem"] == "a motor inside PyBullet"
 
 
-def test_the_table_has_one_line_for_each_mode_that_says_what_it_is() -> None:
+def test_the_table_has_one_line_for_each_mode_with_its_description() -> None:
     result = tutorial(*QUICK)
     assert result.exit_code == 0
     assert result.stderr == ""
@@ -85,11 +85,11 @@ def test_numbers_stay_whole_on_a_narrow_terminal(width: int, monkeypatch: pytest
     full = tutorial(*QUICK).stdout
     monkeypatch.setenv("COLUMNS", str(width))
     narrow = tutorial(*QUICK).stdout
-    wanted = {word for word in full.split() if not word.startswith("─")}
-    assert wanted <= {*narrow.split()}
+    expected = {word for word in full.split() if not word.startswith("─")}
+    assert expected <= {*narrow.split()}
 
 
-def test_without_pybullet_its_columns_say_so(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_pybullet_the_table_states_that_it_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
     def missing() -> None:
         raise NotInstalledError("PyBullet is missing")
 
@@ -170,10 +170,10 @@ def test_arguments_that_cannot_be_used(arguments: list[str], clue: str) -> None:
 
 
 def test_an_interrupted_run_shows_the_modes_that_are_done(monkeypatch: pytest.MonkeyPatch) -> None:
-    done = Tutorial.rows
+    all_rows = Tutorial.rows
 
     def impatient(self: Tutorial) -> Iterator[Row]:
-        for number, row in enumerate(done(self)):
+        for number, row in enumerate(all_rows(self)):
             if number == 5:
                 signal.raise_signal(signal.SIGINT)
             yield row

@@ -1,4 +1,4 @@
-"""What `dynx sim` says in words: of what differs from the nominal run, of energy, errors and mistakes."""
+"""Text of `dynx sim`: deviations from the nominal run, energy, errors, refused input."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ FALLING = ["solo12", "--base", "floating", "--controller", "pd", "--duration", "
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "expected"),
     [
         (["--payload", "tool0:2"], "plant: payload 2 kg on tool0"),
         (["--payload", "tool0:1"] * 4, "plant: 4 payloads"),
@@ -40,8 +40,8 @@ FALLING = ["solo12", "--base", "floating", "--controller", "pd", "--duration", "
         (["--friction", "0.5", "--delay", "0.002"], "plant: friction 0.5; controller: delay 0.002 s"),
     ],
 )
-def test_the_header_says_what_differs_from_the_nominal_run(arguments: list[str], said: str) -> None:
-    assert said in sim("ur5", *SHORT, *arguments).stdout.splitlines()
+def test_the_header_lists_the_deviations_from_the_nominal_run(arguments: list[str], expected: str) -> None:
+    assert expected in sim("ur5", *SHORT, *arguments).stdout.splitlines()
 
 
 def test_losses_of_a_floating_robot_are_those_of_its_joints() -> None:
@@ -49,10 +49,10 @@ def test_losses_of_a_floating_robot_are_those_of_its_joints() -> None:
     assert "plant: friction 0.5, armature 0.1" in sim(*FALLING, *losses).stdout.splitlines()
 
 
-def test_the_header_of_a_nominal_run_says_no_more() -> None:
+def test_the_header_of_a_nominal_run_has_no_deviations() -> None:
     lines = sim("ur5", *SHORT, "--joint-dynamics").stdout.splitlines()
     assert lines[2] == "kp 400, kd 40"
-    assert not any(line.startswith(("plant:", "law:")) for line in lines)
+    assert not any(line.startswith(("plant:", "controller:")) for line in lines)
 
 
 def test_a_step_begins_where_every_profile_begins() -> None:
@@ -67,23 +67,23 @@ SWING = ["pendulum", "--controller", "none", "--q0", "1", "--duration", "0.1"]
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "expected"),
     [
         (SWING, "energy drift "),
         ([*SWING, "--damping", "urdf", "--friction", "urdf"], "energy changed by up to "),
         (FALLING, "energy changed by up to "),
         (["pendulum", "--controller", "none", "--duration", "0.1"], "the robot stayed at rest"),
-        # What moves by rounding alone has no kinetic energy that a change could be compared with.
+        # Motion by rounding alone has no kinetic energy with which to compare a change.
         (["ur5", "--controller", "gravity-pd", "--duration", "0.05"], "the robot stayed at rest"),
     ],
 )
-def test_no_cause_is_made_up_for_a_change_of_energy(arguments: list[str], said: str) -> None:
+def test_energy_drift_is_reported_only_for_a_passive_robot(arguments: list[str], expected: str) -> None:
     lines = sim(*arguments).stdout.splitlines()
     energy = [line for line in lines if line.startswith(("energy", "the robot stayed at rest"))]
     assert len(energy) == 1
-    assert energy[0].startswith(said)
+    assert energy[0].startswith(expected)
     assert "work" not in energy[0]
-    assert (" times " in energy[0]) == (said == "energy drift ")
+    assert (" times " in energy[0]) == (expected == "energy drift ")
 
 
 def test_the_change_of_energy_is_that_of_the_record() -> None:
@@ -94,7 +94,7 @@ def test_the_change_of_energy_is_that_of_the_record() -> None:
     assert not made["passive"]
 
 
-def test_limits_that_are_broken_are_told_apart() -> None:
+def test_every_violated_limit_is_listed() -> None:
     motion = ["--to", "elbow_joint=3,wrist_1_joint=3", "--duration", "0.1"]
     result = sim("ur5", *motion)
     assert result.exit_code == 2
@@ -110,10 +110,10 @@ def test_limits_that_are_broken_are_told_apart() -> None:
     assert tutorial.endswith("(a longer --duration lowers velocities)\n")
 
 
-def test_the_document_has_objects_for_what_was_asked() -> None:
-    asked = ["--noise-q", "1e-5", "--noise-v", "1e-3", "--seed", "7", "--armature", "0.1"]
+def test_noise_and_pushes_are_objects_in_the_document() -> None:
+    noise = ["--noise-q", "1e-5", "--noise-v", "1e-3", "--seed", "7", "--armature", "0.1"]
     pushes = ["--push", "tool0:1,2,3", "--push", "tool0:0,0,0,0,0,1:0.01:0.02"]
-    settings = document("ur5", *SHORT, *asked, *pushes)["settings"]
+    settings = document("ur5", *SHORT, *noise, *pushes)["settings"]
     assert settings["noise"] == {"q": 1e-5, "v": 1e-3, "seed": 7}
     always, briefly = settings["pushes"]
     assert always == {
@@ -128,7 +128,7 @@ def test_the_document_has_objects_for_what_was_asked() -> None:
     assert document("ur5", *SHORT)["settings"]["noise"] is None
 
 
-def test_the_document_of_an_interrupted_run_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_document_of_an_interrupted_run_has_that_status(monkeypatch: pytest.MonkeyPatch) -> None:
     @contextmanager
     def impatient(total: int, words: str) -> Iterator[Callable[[int, str], None]]:
         def advance(taken: int, words: str) -> None:
@@ -158,7 +158,7 @@ def test_numbers_of_one_column_are_of_one_style() -> None:
 
 
 @pytest.mark.parametrize(
-    ("share", "said"),
+    ("ratio", "expected"),
     [
         (0.0, "0 %"),
         (3.5e-17, "<0.01 %"),
@@ -171,8 +171,8 @@ def test_numbers_of_one_column_are_of_one_style() -> None:
         (290.0, ">9999 %"),
     ],
 )
-def test_shares_are_no_wider_than_they_say(share: float, said: str) -> None:
-    assert percent_text(share) == said
+def test_percentages_are_at_most_seven_characters_wide(ratio: float, expected: str) -> None:
+    assert percent_text(ratio) == expected
 
 
 @pytest.mark.parametrize("motion", [["--to", "panda_joint1=0.3"], ["--controller", "pd"]])
@@ -192,8 +192,8 @@ def test_errors_of_a_floating_base_are_apart_from_those_of_joints() -> None:
     dog = dynx.load("solo12", base="floating")
     q0 = dog.neutral()
     q0[7 + dog.joint_names.index("FL_KFE")] = 0.1
-    law = control.PD(dog, kp=3.0, kd=np.array(made["gains"]["kd"]))
-    error = simulate(dog, law, dog.neutral(), q0=q0, duration=0.05).error
+    controller = control.PD(dog, kp=3.0, kd=np.array(made["gains"]["kd"]))
+    error = simulate(dog, controller, dog.neutral(), q0=q0, duration=0.05).error
     position, rotation = (np.linalg.norm(error[:, part], axis=1) for part in (slice(3), slice(3, 6)))
     assert made["base_error"]["position"]["max"] == pytest.approx(position.max(), rel=1e-9)
     assert made["base_error"]["position"]["final"] == pytest.approx(position[-1], rel=1e-9)
@@ -239,11 +239,11 @@ def test_the_ratio_is_that_of_the_mass_matrix() -> None:
     assert found is not None
     assert found.ratio == pytest.approx(40.0 * 2e-3 / inertia.min(), rel=1e-12)
     assert found.joint == arm.joint_names[int(np.argmin(inertia))]
-    for law in (control.PD(arm, kp=1.0, kd=0.01), control.ComputedTorque(arm, kp=400, kd=40), None):
-        assert largest_overshoot(law, arm.neutral(), 1e-3) is None
+    for controller in (control.PD(arm, kp=1.0, kd=0.01), control.ComputedTorque(arm, kp=400, kd=40), None):
+        assert largest_overshoot(controller, arm.neutral(), 1e-3) is None
 
 
-def test_a_run_that_diverges_otherwise_blames_no_gains() -> None:
+def test_divergence_for_another_reason_has_no_overshoot() -> None:
     diverging = ["ur5", "--controller", "none", "--v0", "1,1,1,1,1,1", "--damping", "1e5"]
     assert document(*diverging, code=1)["overshoot"] is None
     assert "smaller gains" not in sim(*diverging).stdout
@@ -253,14 +253,14 @@ def test_a_run_that_diverges_otherwise_blames_no_gains() -> None:
 LINE = ["ur5", "--from", "0.2,-1.4,1.2,0.1,0.5,0.2", "--to-pose", "0.4,0.2,0.5", "--duration", "0.5"]
 
 
-def test_the_frame_that_was_picked_is_in_the_header() -> None:
-    picked = "frame tool0 ends the longest chain of moving joints; --frame chooses another"
-    assert picked in sim(*LINE).stdout.splitlines()
+def test_the_default_frame_is_in_the_header() -> None:
+    note = "frame tool0 ends the longest chain of moving joints; --frame chooses another"
+    assert note in sim(*LINE).stdout.splitlines()
     named = sim(*LINE, "--frame", "wrist_3_link").stdout
     assert "wrist_3_link along a straight line" in named
     assert "longest chain" not in named
-    law = sim("ur5", *SHORT, "--controller", "operational-space", "--frame", "wrist_3_link").stdout
-    assert "operational-space of wrist_3_link computed by" in law
+    header = sim("ur5", *SHORT, "--controller", "operational-space", "--frame", "wrist_3_link").stdout
+    assert "operational-space of wrist_3_link computed by" in header
 
 
 def test_the_error_of_the_frame_itself() -> None:
@@ -269,9 +269,9 @@ def test_the_error_of_the_frame_itself() -> None:
     made = document(*arguments)
     arm = dynx.load("ur5")
     bodies = dynx.backend("pinocchio", arm)
-    wanted, found = bodies.forward_kinematics(np.array([made["motion"]["from"], beside]), "tool0")
+    wanted, actual = bodies.forward_kinematics(np.array([made["motion"]["from"], beside]), "tool0")
     error = made["frame_error"]
-    assert error["position"]["max"] == pytest.approx(np.linalg.norm(wanted[:3, 3] - found[:3, 3]), rel=0.02)
+    assert error["position"]["max"] == pytest.approx(np.linalg.norm(wanted[:3, 3] - actual[:3, 3]), rel=0.02)
     assert error["rotation"]["max"] == pytest.approx(0.05, rel=0.02)  # about the first joint's axis
     assert error["position"]["final"] < 0.1 * error["position"]["max"]
     ended = bodies.forward_kinematics(np.array(made["final"]["q"]), "tool0")[:3, 3]
@@ -281,17 +281,17 @@ def test_the_error_of_the_frame_itself() -> None:
     assert f" rotation {error['rotation']['max']:.1e} rad at " in text
 
 
-def test_a_controller_that_is_none_of_them_lists_all() -> None:
+def test_an_unknown_controller_lists_all() -> None:
     result = sim(*ELBOW, "--controller", "lqr")
     assert result.exit_code == 2
     assert f"there is no 'lqr'; known: {', '.join(['none', *CONTROLLERS])} " in result.stderr
 
 
-def test_the_help_says_what_is_not_simulated() -> None:
+def test_the_help_states_that_contacts_are_not_simulated() -> None:
     assert "there is no ground, and links do not collide" in " ".join(sim("--help").stdout.split())
 
 
-def test_a_plot_says_in_which_axes_a_base_is() -> None:
+def test_the_plot_of_a_floating_base_names_its_axes() -> None:
     pytest.importorskip("matplotlib")
     dog = dynx.load("solo12", base="floating")
     figure = simulate(dog, control.PD(dog, kp=1.0, kd=0.1), dog.neutral(), duration=2e-3).plot()
