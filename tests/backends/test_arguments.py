@@ -33,6 +33,7 @@ def _at(position: int, value: object, dtype: Any = float) -> Any:
     return array
 
 
+FRAME = ENGINE.model.frame_names[-1]
 BAD_VECTORS = {
     "too short": (np.zeros(2), ShapeError, r"has shape \(2,\); wanted \(\.\.\., 3\)"),
     "too long": (np.zeros((4, 5)), ShapeError, r"has shape \(4, 5\); wanted \(\.\.\., 3\)"),
@@ -64,6 +65,8 @@ def test_a_bad_array_is_named_with_what_was_wanted(name: str, bad: str) -> None:
     else:
         with pytest.raises(kind, match=f"^{name}.*{message}"):
             ENGINE.inverse_dynamics(arguments["q"], arguments["v"], arguments.get("a", ZERO))
+        with pytest.raises(kind, match=f"^{name}.*{message}"):
+            ENGINE.frame_acceleration(arguments["q"], arguments["v"], arguments.get("a", ZERO), FRAME)
 
 
 def test_every_method_looks_at_its_arguments() -> None:

@@ -13,6 +13,7 @@ from dynx.control import (
     PD,
     ComputedTorque,
     Controller,
+    DiscreteComputedTorque,
     Impedance,
     Measurement,
     OperationalSpace,
@@ -109,6 +110,7 @@ def test_a_controller_prints_its_gains_with_units() -> None:
     assert repr(Saturated(law, limit=4.0)) == f"<Saturated of ur5, inner {said}, limit 4 N m or N>"
     assert repr(TorqueMotor(law)) == f"<TorqueMotor of ur5, inner {said}>"
     assert "position_gain 0.1" in repr(PositionMotor(ARM))
+    assert "control_dt 0.002 s" in repr(DiscreteComputedTorque(ARM, control_dt=0.002))
     assert repr(Plain(2.0)) == "<Plain of ur5>"
 
 

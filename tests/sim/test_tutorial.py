@@ -102,6 +102,16 @@ def test_without_pybullet_the_other_plant_is_left(monkeypatch: pytest.MonkeyPatc
         assert row.mode in MOTORS or row.outcomes[DYNX].rollout is not None
 
 
+def test_a_mode_that_cannot_be_simulated_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refusing(*arguments: object, **options: object) -> None:
+        raise ArgumentError("no such motion")
+
+    monkeypatch.setattr("dynx.sim.tutorial.simulate", refusing)
+    for row in tutorial(duration=2.0, dt=0.02, plants=(DYNX,)).rows():
+        outcome = row.outcomes[DYNX]
+        assert row.mode in MOTORS or (outcome.problem, outcome.rollout) == ("no such motion", None)
+
+
 def test_a_mode_that_diverges_keeps_its_record() -> None:
     # In steps of 0.2 s a critically damped error of 20 rad/s is beyond what a step can hold.
     rows = {row.mode: row for row in tutorial(dt=0.2, duration=20.0, plants=(DYNX,)).rows()}
