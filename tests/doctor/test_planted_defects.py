@@ -1,6 +1,6 @@
-"""Planted defects: the doctor names each at its place, alone and in pairs, and blames no clean robot.
+"""Planted defects: `diagnose` finds each at its place, alone and in pairs, and nothing in clean robots.
 
-A share of the bench, on the robots that are quick; ``python -m tests.doctor.planting`` is the whole.
+These are the trials on the fastest robots; ``python -m tests.doctor.planting`` runs all.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from dynx.model.model import Base
 from dynx.rules import all_rules
 from tests.doctor.planting.catalogue import EXEMPT, PLANTERS
 from tests.doctor.planting.judging import complaint_about_clean, judge
-from tests.doctor.planting.plan import Trial, alone, in_pairs, planted
+from tests.doctor.planting.plan import Trial, pair_trials, plant_defects, single_trials
 from tests.doctor.planting.robots import OWN, QUICK, REAL, ROBOTS, bases, clean_skeleton, clean_text
-from tests.doctor.planting.site import NotHere
+from tests.doctor.planting.site import CannotPlant
 
 needs_all_engines = pytest.mark.skipif(
     set(installed_engines()) != set(ENGINES), reason="a cause shows in the engines that it concerns"
@@ -47,21 +47,21 @@ def test_a_clean_robot_is_not_blamed(robot: str, base: Base) -> None:
 
 
 @needs_all_engines
-@pytest.mark.parametrize("trial", list(alone(RULES, 2, among=QUICK)), ids=str)
+@pytest.mark.parametrize("trial", list(single_trials(RULES, 2, among=QUICK)), ids=str)
 def test_a_defect_alone_is_named_at_its_place(trial: Trial) -> None:
     assert judge(trial).complaints == ()
 
 
 @needs_all_engines
-@pytest.mark.parametrize("trial", list(in_pairs(RULES, 1, among=QUICK)), ids=str)
+@pytest.mark.parametrize("trial", list(pair_trials(RULES, 1, among=QUICK)), ids=str)
 def test_two_defects_are_named_at_their_places(trial: Trial) -> None:
     assert judge(trial).complaints == ()
 
 
 @pytest.mark.parametrize("rule", RULES)
 def test_a_planter_repeats_itself_and_changes_little(rule: str) -> None:
-    trial = next(alone([rule], 1, among=QUICK))
-    once, again = planted(trial)[-1], planted(trial)[-1]
+    trial = next(single_trials([rule], 1, among=QUICK))
+    once, again = plant_defects(trial)[-1], plant_defects(trial)[-1]
     assert once.source.text == again.source.text
     assert once.place == again.place
     assert once.place[0] == rule
@@ -73,13 +73,13 @@ def test_a_planter_repeats_itself_and_changes_little(rule: str) -> None:
 
 
 def test_two_defects_are_never_planted_at_one_place() -> None:
-    for trial in in_pairs(RULES, 1, seed=1, among=QUICK):
-        one, other = planted(trial)
+    for trial in pair_trials(RULES, 1, seed=1, among=QUICK):
+        one, other = plant_defects(trial)
         assert one.place[1:] != other.place[1:] or one.place[1:] == (None, None)
 
 
 def test_a_planter_says_where_it_cannot_plant() -> None:
-    with pytest.raises(NotHere, match="DX106 is no defect on the floating base"):
-        planted(Trial(("DX106",), "ur5", "floating", 0))
-    with pytest.raises(NotHere, match="no second joint that moves"):
-        planted(Trial(("DX215",), "pendulum", "fixed", 0))
+    with pytest.raises(CannotPlant, match="DX106 is no defect on the floating base"):
+        plant_defects(Trial(("DX106",), "ur5", "floating", 0))
+    with pytest.raises(CannotPlant, match="no second joint that moves"):
+        plant_defects(Trial(("DX215",), "pendulum", "fixed", 0))

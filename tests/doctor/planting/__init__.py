@@ -1,1 +1,1 @@
-"""The bench of planted defects: one known cause, or two, put into robots that all engines load alike."""
+"""Planted defects: one or two known causes put into robots that all engines load alike."""

@@ -1,6 +1,8 @@
-"""The whole bench: ``python -m tests.doctor.planting [--robots 10] [--pairs 10] [--rules DX101 ...]``.
+"""Diagnosis of all planted defects.
 
-Prints a table by rule, every miss, and the share of defects that were named rightly.
+``python -m tests.doctor.planting [--robots 10] [--pairs 10] [--rules DX101 ...]``
+
+Prints a table by rule, every miss, and the share of defects that were found correctly.
 """
 
 from __future__ import annotations
@@ -15,31 +17,31 @@ from collections.abc import Sequence
 from dynx.model.model import Base
 from dynx.workers import Workers
 from tests.doctor.planting.catalogue import EXEMPT, PLANTERS
-from tests.doctor.planting.judging import Verdict, work
-from tests.doctor.planting.plan import Trial, alone, in_pairs
+from tests.doctor.planting.judging import Verdict, run_task
+from tests.doctor.planting.plan import Trial, pair_trials, single_trials
 from tests.doctor.planting.robots import ROBOTS, bases
 
-BAR = 0.99
-"""Share of defects to be named rightly, alone and in pairs."""
+MIN_SHARE = 0.99
+"""Share of defects that must be found correctly, alone and in pairs."""
 
 TIMEOUT = 120.0
-"""[s] for one trial."""
+"""Time limit of one trial [s]."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the bench; 0 if the bar is met and no clean robot is blamed."""
+    """Run all trials; return 0 if the share is reached and no clean robot has a finding."""
     options = _options(arguments)
     started = time.perf_counter()
     rules = options.rules or list(PLANTERS)
-    trials = list(alone(rules, options.robots, options.seed))
+    trials = list(single_trials(rules, options.robots, options.seed))
     if len(rules) > 1:
-        trials += in_pairs(rules, options.pairs, options.seed)
+        trials += pair_trials(rules, options.pairs, options.seed)
     clean = [(robot, base) for robot in ROBOTS for base in bases(robot)]
     tasks: list[Trial | tuple[str, Base]] = [*clean, *trials]
     print(f"{len(clean)} clean robots, {len(trials)} planted ones", flush=True)
     verdicts: list[Verdict] = []
     unclean = 0
-    with Workers(work, options.jobs, TIMEOUT) as workers:
+    with Workers(run_task, options.jobs, TIMEOUT) as workers:
         for outcome in workers.run(tasks):
             task = tasks[outcome.index]
             if isinstance(task, Trial):
@@ -53,11 +55,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 print(f"NOT CLEAN {outcome.value or outcome.failure}", flush=True)
     share = _table(verdicts)
     print(f"clean robots with a finding: {unclean}; {time.perf_counter() - started:.0f} s")
-    return 0 if not unclean and share >= BAR else 1
+    return 0 if not unclean and share >= MIN_SHARE else 1
 
 
 def _table(verdicts: Sequence[Verdict]) -> float:
-    """Print the table; the smaller of the two shares."""
+    """Print the table; return the smaller of the two shares."""
     shares = []
     columns: list[dict[str, tuple[int, int]]] = []
     for count in (1, 2):
@@ -76,7 +78,7 @@ def _table(verdicts: Sequence[Verdict]) -> float:
         print(f"{rule:8}{cells[0]:>10}{cells[1]:>12}")
     for rule, reason in EXEMPT.items():
         print(f"{rule:8} exempt: {reason}")
-    print("named rightly: " + ", ".join(f"{share:.2%}" for share in shares) + " (alone, in pairs)")
+    print("found correctly: " + ", ".join(f"{share:.2%}" for share in shares) + " (alone, in pairs)")
     return min(shares, default=0.0)
 
 

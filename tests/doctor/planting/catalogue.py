@@ -12,4 +12,4 @@ PLANTERS: dict[str, Planter] = {
 EXEMPT: dict[str, str] = {
     "DX112": "MuJoCo up to 3.13 alone; no engine version that is installed has the defect",
 }
-"""Rules that nothing can show here, and why."""
+"""Rules without a planter, and the reason."""

@@ -1,53 +1,53 @@
-"""DX3: what engines add to the rigid bodies, planted."""
+"""Planters of DX3: joint dynamics and forces that engines add to rigid bodies."""
 
 from __future__ import annotations
 
 from tests.doctor.planting.joints import SINGLE, driven, limited, moving, transmission
-from tests.doctor.planting.site import NotHere, Planted, Planter, Site
+from tests.doctor.planting.site import CannotPlant, PlantedDefect, Planter, Site
 
 
-def damping(site: Site) -> Planted:
+def damping(site: Site) -> PlantedDefect:
     """Viscous friction identified on the machine."""
     return _dynamics(site, "DX301", damping=site.rng.choice(["0.5", "0.01", "12.0"]))
 
 
-def friction(site: Site) -> Planted:
+def friction(site: Site) -> PlantedDefect:
     """Dry friction identified on the machine."""
     return _dynamics(site, "DX302", friction=site.rng.choice(["0.2", "0.03", "5.0"]))
 
 
-def negative_damping(site: Site) -> Planted:
-    """A sign slipped in. What is negative is a damping all the same: it enters torques as one does."""
+def negative_damping(site: Site) -> PlantedDefect:
+    """A wrong sign; a negative damping enters torques too, so DX301 also applies."""
     return _dynamics(site, "DX303", also=["DX301"], damping=site.rng.choice(["-0.1", "-2.0"]))
 
 
-def mimic(site: Site) -> Planted:
+def mimic(site: Site) -> PlantedDefect:
     """One joint follows another, as the fingers of a gripper do."""
     joint, element = site.pick_joint(moving, "joint that moves")
     followed, _ = site.pick_joint(lambda each: moving(each) and each is not joint, "joint to follow")
     multiplier = site.rng.choice(["1", "-1", "0.5"])
     text = f'<mimic joint="{followed.name}" multiplier="{multiplier}" offset="0"/>'
-    return site.planted(
+    return site.defect(
         "DX304", site.source.insertion(element, text), joint=joint.name, touched=[followed.name]
     )
 
 
-def empty_dynamics(site: Site) -> Planted:
-    """The element of a template whose numbers were not known."""
+def empty_dynamics(site: Site) -> PlantedDefect:
+    """The empty element of a template."""
     joint, element = site.pick_joint(lambda each: each.type in SINGLE, "joint that moves")
     edit = site.source.insertion(element, "<dynamics/>")
-    return site.planted("DX305", edit, joint=joint.name)
+    return site.defect("DX305", edit, joint=joint.name)
 
 
-def no_room(site: Site) -> Planted:
-    """A range of zero width; PyBullet takes one without an upper end for none."""
+def no_room(site: Site) -> PlantedDefect:
+    """A range of zero width."""
     joint, element = site.pick_joint(limited, "joint with a limit")
     value = site.rng.choice(["0", "0.0", "0.3"])
     edits = site.part_edits(element, "limit", lower=value, upper=value)
-    return site.planted("DX306", *edits, joint=joint.name)
+    return site.defect("DX306", *edits, joint=joint.name)
 
 
-def rotor(site: Site) -> Planted:
+def rotor(site: Site) -> PlantedDefect:
     """The rotor of a geared motor, as Drake's extension has it."""
     joint, _ = site.pick_joint(driven, "joint that moves")
     inside = (
@@ -55,13 +55,14 @@ def rotor(site: Site) -> Planted:
         '    <drake:rotor_inertia value="0.0003"/>\n    <drake:gear_ratio value="50"/>\n  </actuator>'
     )
     text = transmission(f"gear_of_{joint.name}", inside)
-    return site.planted("DX307", site.source.insertion(site.source.root, text), joint=joint.name)
+    return site.defect("DX307", site.source.insertion(site.source.root, text), joint=joint.name)
 
 
-def contacts(site: Site) -> Planted:
-    """Shapes larger than the links, on a link and on what hangs two joints below it.
+def contacts(site: Site) -> PlantedDefect:
+    """Shapes larger than the links, on a link and on a link two joints below it.
 
-    Off centre: between points of two axes that meet the distance stays, and a contact there does no work.
+    They are off centre: the distance of two points on axes that intersect is constant, so that a contact
+    between them has no torque.
     """
     skeleton = site.skeleton
     upper = {joint.child: joint.parent for joint in site.model.joints}
@@ -77,14 +78,14 @@ def contacts(site: Site) -> Planted:
     place, sphere = '<origin xyz="0.3 0.2 -0.1"/>', '<sphere radius="1.5"/>'
     shape = f"<collision>\n  {place}\n  <geometry>\n    {sphere}\n  </geometry>\n</collision>"
     edits = [site.source.insertion(site.element("link", name), shape) for name in (first, second)]
-    return site.planted("DX308", *edits, touched=[first, second], sign="<collision>")
+    return site.defect("DX308", *edits, touched=[first, second], sign="<collision>")
 
 
-def _dynamics(site: Site, rule: str, also: tuple[str, ...] | list[str] = (), **words: str) -> Planted:
+def _dynamics(site: Site, rule: str, also: tuple[str, ...] | list[str] = (), **words: str) -> PlantedDefect:
     joint, element = site.pick_joint(moving, "joint that moves")
     if element.first("dynamics") is not None:
-        raise NotHere("the joint has dynamics")
-    return site.planted(rule, *site.part_edits(element, "dynamics", **words), joint=joint.name, also=also)
+        raise CannotPlant("the joint has dynamics")
+    return site.defect(rule, *site.part_edits(element, "dynamics", **words), joint=joint.name, also=also)
 
 
 PLANTERS = (

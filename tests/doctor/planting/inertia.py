@@ -1,4 +1,4 @@
-"""DX1: what can be wrong with masses and tensors, planted."""
+"""Planters of DX1: defects of masses and tensors."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from dynx.model.elements import Inertial
 from dynx.model.xml.source import Edit, SourceElement
-from tests.doctor.planting.site import NotHere, Planted, Planter, Site
+from tests.doctor.planting.site import CannotPlant, PlantedDefect, Planter, Site
 
 MOMENTS = ("ixx", "iyy", "izz")
 PRODUCTS = ("ixy", "ixz", "iyz")
@@ -17,19 +17,19 @@ ZERO = '  <inertial>\n    <mass value="0"/>\n    <inertia ixx="0" ixy="0" ixz="0
 ZERO += "  </inertial>\n"
 
 
-def without_inertial(site: Site) -> Planted:
-    """A frame on a link that moves: nobody thought of its mass."""
+def without_inertial(site: Site) -> PlantedDefect:
+    """A frame without mass on a link that moves."""
     skeleton = site.skeleton
     parent, _ = site.pick_link(lambda each: skeleton.moves(each) and skeleton.mass(each) > 0.0, "heavy link")
     name = site.rng.choice(["tool0", "camera_frame", "ee_link", "imu_site", "ft_sensor"])
-    if not_new(site, name):
-        raise NotHere(f"has a link {name}")
-    return site.planted("DX101", site.attached(name, parent), link=name, touched=[parent])
+    if has_link(site, name):
+        raise CannotPlant(f"has a link {name}")
+    return site.defect("DX101", site.link_insertion(name, parent), link=name, touched=[parent])
 
 
-def on_the_edge(site: Site) -> Planted:
-    """A thin plate in short decimals, whose moments add up but for the last binary digit."""
-    name, link, old = turned_body(site)
+def on_the_edge(site: Site) -> PlantedDefect:
+    """A thin plate whose moments, in few decimals, miss the triangle inequality by rounding."""
+    name, link, old = rotating_body(site)
     size = max(old.ixx, old.iyy, old.izz)
     digits = -int(np.floor(np.log10(size))) + 2
     while True:
@@ -40,42 +40,42 @@ def on_the_edge(site: Site) -> Planted:
     moments = [str(small), str(middle), str(large)]
     site.rng.shuffle(moments)
     edits = tensor(site, link, **dict(zip(MOMENTS, moments, strict=True)), **dict.fromkeys(PRODUCTS, "0"))
-    return site.planted("DX102", *edits, link=name)
+    return site.defect("DX102", *edits, link=name)
 
 
-def of_no_body(site: Site) -> Planted:
+def of_no_body(site: Site) -> PlantedDefect:
     """A decimal point in the wrong place, or one small number for all six."""
     name, link, old = solid_body(site)
     if site.rng.random() < 0.25:
         words = dict.fromkeys((*MOMENTS, *PRODUCTS), "1e-6")
         if not site.skeleton.ranks[name]:
-            raise NotHere("the tensor would not matter")
-        return site.planted("DX103", *tensor(site, link, **words), link=name)
+            raise CannotPlant("the tensor would not matter")
+        return site.defect("DX103", *tensor(site, link, **words), link=name)
     which = site.rng.choice(MOMENTS)
     value = getattr(old, which)
     others = sum(getattr(old, each) for each in MOMENTS) - value
     while value < 2.0 * others:
         value *= 10.0
     edits = tensor(site, link, **{which: f"{value:.6g}"}, **dict.fromkeys(PRODUCTS, "0"))
-    return site.planted("DX103", *edits, link=name)
+    return site.defect("DX103", *edits, link=name)
 
 
-def negative(site: Site) -> Planted:
-    """A sign that slipped in, or a product of inertia ten times too large."""
+def negative(site: Site) -> PlantedDefect:
+    """A wrong sign, or a product of inertia ten times too large."""
     name, link, old = solid_body(site)
     if site.rng.random() < 0.5:
         which = site.rng.choice(MOMENTS)
         words = {which: f"-{getattr(old, which):.6g}", **dict.fromkeys(PRODUCTS, "0")}
     else:
         words = {**dict.fromkeys(PRODUCTS, "0"), "ixy": f"{10.0 * max(old.ixx, old.iyy):.6g}"}
-    return site.planted("DX104", *tensor(site, link, **words), link=name)
+    return site.defect("DX104", *tensor(site, link, **words), link=name)
 
 
-def not_diagonal(site: Site) -> Planted:
-    """The tensor of a nearly round body as CAD exports it, with what rounding left of its products.
+def not_diagonal(site: Site) -> PlantedDefect:
+    """The tensor of a nearly round body as CAD exports it, with small products of inertia.
 
     Bullet drops what is below a millionth of the tensor. On a body of less than a thousandth of the
-    robot's largest inertia that is nothing which a comparison of engines could show, and no defect.
+    robot's largest inertia the effect is below the tolerance, and no defect.
     """
     skeleton = site.skeleton
     name, link = site.pick_link(
@@ -91,96 +91,98 @@ def not_diagonal(site: Site) -> Planted:
     products = {
         each: f"{site.rng.choice((-1, 1)) * size * site.rng.uniform(2e-7, 9e-7):.9g}" for each in PRODUCTS
     }
-    return site.planted("DX105", *tensor(site, link, **moments, **products), link=name)
+    return site.defect("DX105", *tensor(site, link, **moments, **products), link=name)
 
 
-def root_rotated(site: Site) -> Planted:
-    """The axes of the root's inertial turned, as CAD likes to give them."""
+def root_rotated(site: Site) -> PlantedDefect:
+    """The axes of the root's inertial rotated, as CAD programs export them."""
     root = site.model.root
     if not site.free(root):
-        raise NotHere("the root is taken")
+        raise CannotPlant("the root is taken")
     link = site.element("link", root)
     inertial = link.first("inertial")
     if inertial is None:
-        raise NotHere("the root has no inertial")
+        raise CannotPlant("the root has no inertial")
     if not any(joint.moves for joint in site.model.joints):
-        raise NotHere("nothing moves")
+        raise CannotPlant("nothing moves")
     rpy = site.rng.choice(["0 1.5708 0", "1.5708 0 0", "0.3 -0.2 0.1", "-0.785398 0.52 1.1"])
     origin = inertial.first("origin")
     if origin is None:
         edit = site.source.insertion(inertial, f'<origin xyz="0 0 0" rpy="{rpy}"/>', first=True)
     else:
         edit = site.source.attribute_edit(origin, "rpy", rpy)
-    return site.planted("DX106", edit, link=root)
+    return site.defect("DX106", edit, link=root)
 
 
-def massless_root(site: Site) -> Planted:
-    """A root that is a mere name, put on top of a floating robot or made of its body."""
+def massless_root(site: Site) -> PlantedDefect:
+    """A root without mass: above a floating robot, or its own root."""
     root = site.model.root
     if not site.free(root) or site.skeleton.mass(root) == 0.0:
-        raise NotHere("the root is taken, or has no mass")
+        raise CannotPlant("the root is taken, or has no mass")
     if site.rng.random() < 0.5:
         edits = weightless(site, site.element("link", root))
-        return site.planted("DX107", *edits, link=root, touched=site.skeleton.welded(root))
+        return site.defect("DX107", *edits, link=root, touched=site.skeleton.rigid_group(root))
     name = site.rng.choice(["base_footprint", "root_link"])
-    if not_new(site, name):
-        raise NotHere(f"has a link {name}")
+    if has_link(site, name):
+        raise CannotPlant(f"has a link {name}")
     text = (
         f'<link name="{name}">\n{ZERO}</link>\n<joint name="{name}_joint" type="fixed">\n'
         f'  <origin xyz="0 0 0.1" rpy="0 0 0"/>\n'
         f'  <parent link="{name}"/>\n  <child link="{root}"/>\n</joint>'
     )
     edit = site.source.insertion(site.source.root, text, first=True)
-    return site.planted("DX107", edit, link=name, touched=[root])
+    return site.defect("DX107", edit, link=name, touched=[root])
 
 
-def massless_with_inertia(site: Site) -> Planted:
-    """The mass set to zero, the tensor forgotten; a root without mass that floats is DX107's."""
+def massless_with_inertia(site: Site) -> PlantedDefect:
+    """The mass set to zero and the tensor kept; a floating root without mass is DX107."""
     skeleton = site.skeleton
     name, link = site.pick_link(
         lambda each: each != site.model.root and skeleton.moves(each) and skeleton.solid(each), "moving body"
     )
-    return site.planted("DX108", *mass(site, link, "0"), link=name)
+    return site.defect("DX108", *mass(site, link, "0"), link=name)
 
 
-def named_world(site: Site) -> Planted:
-    """A link that carries the name of the ground."""
-    if not_new(site, "world"):
-        raise NotHere("has a link world")
+def named_world(site: Site) -> PlantedDefect:
+    """A link named world."""
+    if has_link(site, "world"):
+        raise CannotPlant("has a link world")
     root = site.model.root
     name, _ = site.pick_link(
         lambda each: site.model.floating or (each != root and site.skeleton.moves(each)), "link to rename"
     )
     edits = site.rename_edits("link", name, "world")
-    return site.planted("DX109", *edits, link="world", touched=[name])
+    return site.defect("DX109", *edits, link="world", touched=[name])
 
 
-def massless_moving(site: Site) -> Planted:
-    """A link between two joints whose inertia nobody entered."""
+def massless_moving(site: Site) -> PlantedDefect:
+    """A link without inertia between two joints."""
     skeleton = site.skeleton
     names = {each.name for each in site.model.links}
     heavy = {each for each in names - site.taken if skeleton.mass(each) > 0.0}
     name, link = site.pick_link(
         lambda each: (
             skeleton.solid(each)
-            and skeleton.alone(each)
-            and any(heavy.intersection(skeleton.welded(far)) for far in skeleton.beyond(each))
+            and skeleton.is_single_body(each)
+            and any(heavy.intersection(skeleton.rigid_group(far)) for far in skeleton.groups_beyond(each))
         ),
         "body between two joints",
     )
-    return site.planted("DX110", *weightless(site, link), link=name, touched=skeleton.welded(name))
+    return site.defect("DX110", *weightless(site, link), link=name, touched=skeleton.rigid_group(name))
 
 
-def too_small(site: Site) -> Planted:
-    """Moments in units of the wrong size: dust."""
+def too_small(site: Site) -> PlantedDefect:
+    """Moments in a unit that is far too large."""
     skeleton = site.skeleton
-    name, link = site.pick_link(lambda each: skeleton.solid(each) and skeleton.alone(each), "body on a joint")
+    name, link = site.pick_link(
+        lambda each: skeleton.solid(each) and skeleton.is_single_body(each), "body on a joint"
+    )
     value = site.rng.choice(["1e-15", "3e-16", "2.5e-17"])
     words = {**dict.fromkeys(MOMENTS, value), **dict.fromkeys(PRODUCTS, "0")}
-    return site.planted("DX111", *tensor(site, link, **words), link=name)
+    return site.defect("DX111", *tensor(site, link, **words), link=name)
 
 
-def singular(site: Site) -> Planted:
+def singular(site: Site) -> PlantedDefect:
     """The last body of a chain without mass."""
     skeleton = site.skeleton
     others = [
@@ -189,19 +191,19 @@ def singular(site: Site) -> Planted:
     name, link = site.pick_link(
         lambda each: (
             skeleton.solid(each)
-            and skeleton.alone(each)
-            and not skeleton.beyond(each)
+            and skeleton.is_single_body(each)
+            and not skeleton.groups_beyond(each)
             and any(skeleton.heads[other] != each for other in others)
-            and not any(each in skeleton.beyond(other) for other in site.taken & skeleton.heads.keys())
+            and not any(each in skeleton.groups_beyond(other) for other in site.taken & skeleton.heads.keys())
         ),
         "body at the end of a chain",
     )
-    return site.planted("DX113", *weightless(site, link), link=name, touched=skeleton.welded(name))
+    return site.defect("DX113", *weightless(site, link), link=name, touched=skeleton.rigid_group(name))
 
 
-def scaled(site: Site) -> Planted:
-    """PyBullet's extension for steadier contacts, copied from one of its files."""
-    name, link, _ = turned_body(site)
+def scaled(site: Site) -> PlantedDefect:
+    """PyBullet's extension that scales inertia for stable contacts."""
+    name, link, _ = rotating_body(site)
     value = site.rng.choice(["3.0", "0.5", "10"])
     contact = link.first("contact")
     scaling = f'<inertia_scaling value="{value}"/>'
@@ -210,28 +212,28 @@ def scaled(site: Site) -> Planted:
     else:
         text = f'<contact>\n  <lateral_friction value="1.0"/>\n  {scaling}\n</contact>'
         edit = site.source.insertion(link, text)
-    return site.planted("DX114", edit, link=name)
+    return site.defect("DX114", edit, link=name)
 
 
-# -- what the planters share --------------------------------------------------------------------
+# -- helpers --------------------------------------------------------------------------------
 
 
-def not_new(site: Site, name: str) -> bool:
+def has_link(site: Site, name: str) -> bool:
     """Check for a link of that name in the clean robot or the text."""
     here = [each.attributes.get("name") for each in site.source.root.all("link")]
     return name in here or any(each.name == name for each in site.model.links)
 
 
 def solid_body(site: Site) -> tuple[str, SourceElement, Inertial]:
-    """A link with a true inertia, moving or not."""
+    """Draw a link with mass and inertia, moving or not."""
     name, link = site.pick_link(site.skeleton.solid, "body")
     inertial = site.skeleton.inertial(name)
     assert inertial is not None
     return name, link, inertial
 
 
-def turned_body(site: Site, rank: int = 1) -> tuple[str, SourceElement, Inertial]:
-    """A link with a true inertia that turns about so many directions, so that the tensor matters."""
+def rotating_body(site: Site, rank: int = 1) -> tuple[str, SourceElement, Inertial]:
+    """Draw a link with mass and inertia that rotates about at least `rank` independent directions."""
     skeleton = site.skeleton
     name, link = site.pick_link(
         lambda each: skeleton.solid(each) and skeleton.ranks[each] >= rank, f"body that turns in {rank} ways"
@@ -242,25 +244,25 @@ def turned_body(site: Site, rank: int = 1) -> tuple[str, SourceElement, Inertial
 
 
 def tensor(site: Site, link: SourceElement, **words: str) -> list[Edit]:
-    """Numbers of the tensor of a link."""
+    """Set numbers of the tensor of a link."""
     inertial = link.first("inertial")
     element = None if inertial is None else inertial.first("inertia")
     if element is None:
-        raise NotHere("the link has no tensor")
+        raise CannotPlant("the link has no tensor")
     return [site.source.attribute_edit(element, name, value) for name, value in words.items()]
 
 
 def mass(site: Site, link: SourceElement, value: str) -> list[Edit]:
-    """The mass of a link."""
+    """Set the mass of a link."""
     inertial = link.first("inertial")
     element = None if inertial is None else inertial.first("mass")
     if element is None:
-        raise NotHere("the link has no mass")
+        raise CannotPlant("the link has no mass")
     return [site.source.attribute_edit(element, "value", value)]
 
 
 def weightless(site: Site, link: SourceElement) -> list[Edit]:
-    """Zeros in every number of a link's inertia."""
+    """Set every number of a link's inertia to zero."""
     return mass(site, link, "0.0") + tensor(site, link, **dict.fromkeys((*MOMENTS, *PRODUCTS), "0.0"))
 
 

@@ -1,4 +1,4 @@
-"""Which defects go into which robots: the same for the same seed, on any machine."""
+"""Plan of the defects planted into each robot: equal for equal seeds, on any machine."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from dynx.model.model import Base
 from dynx.model.xml.source import XmlSource
 from tests.doctor.planting.catalogue import PLANTERS
 from tests.doctor.planting.robots import ROBOTS, bases, clean_skeleton, clean_text
-from tests.doctor.planting.site import NotHere, Planted, Site
+from tests.doctor.planting.site import CannotPlant, PlantedDefect, Site
 
 ATTEMPTS = 8
 """Draws in one robot before the next is taken: not every draw of a pair leaves room for both."""
@@ -19,7 +19,7 @@ ATTEMPTS = 8
 
 @dataclass(frozen=True)
 class Trial:
-    """Defects of these rules, one after the other, in a robot on a base; `seed` makes the draw."""
+    """Defects of these rules, one after the other, in a robot on a base; `seed` selects the places."""
 
     rules: tuple[str, ...]
     robot: str
@@ -30,24 +30,26 @@ class Trial:
         return f"{'+'.join(self.rules)} in {self.robot}, {self.base} (seed {self.seed})"
 
 
-def planted(trial: Trial) -> list[Planted]:
-    """The defects of a trial, each in the text of the one before; NotHere where there is no room."""
+def plant_defects(trial: Trial) -> list[PlantedDefect]:
+    """Plant the defects of a trial, each in the text of the one before; CannotPlant without room."""
     rng = Random(f"{trial.rules} {trial.robot} {trial.base} {trial.seed}")
     source = XmlSource(clean_text(trial.robot, trial.base), f"{trial.robot}.urdf")
     skeleton = clean_skeleton(trial.robot, trial.base)
-    found: list[Planted] = []
+    found: list[PlantedDefect] = []
     for rule in trial.rules:
         planter = PLANTERS[rule]
         if trial.base not in planter.bases:
-            raise NotHere(f"{rule} is no defect on the {trial.base} base")
+            raise CannotPlant(f"{rule} is no defect on the {trial.base} base")
         taken = found[-1].touched if found else frozenset()
         found.append(planter.plant(Site(source, skeleton, rng, taken)))
         source = found[-1].source
     return found
 
 
-def alone(rules: Sequence[str], robots: int, seed: int = 0, among: Sequence[str] = ROBOTS) -> Iterator[Trial]:
-    """Each rule in so many different robots, on both bases in turn."""
+def single_trials(
+    rules: Sequence[str], robots: int, seed: int = 0, among: Sequence[str] = ROBOTS
+) -> Iterator[Trial]:
+    """Plan each rule in `robots` different robots, on a random base."""
     for rule in rules:
         rng = Random(f"{rule} {seed}")
         order = rng.sample(among, len(among))
@@ -61,10 +63,10 @@ def alone(rules: Sequence[str], robots: int, seed: int = 0, among: Sequence[str]
                 yield trial
 
 
-def in_pairs(
+def pair_trials(
     rules: Sequence[str], pairs: int, seed: int = 0, among: Sequence[str] = ROBOTS
 ) -> Iterator[Trial]:
-    """Pairs of different rules, each rule in so many at least, and no pair twice."""
+    """Plan pairs of different rules: each rule in at least `pairs`, and no pair twice."""
     rng = Random(f"pairs {seed}")
     counts = Counter(dict.fromkeys(rules, 0))
     seen: set[frozenset[str]] = set()
@@ -90,8 +92,8 @@ def _with_room(rules: tuple[str, ...], robot: str, rng: Random, seed: int) -> Tr
         for attempt in range(ATTEMPTS):
             trial = Trial(rules, robot, base, 1000 * seed + attempt)
             try:
-                planted(trial)
-            except NotHere:
+                plant_defects(trial)
+            except CannotPlant:
                 continue
             return trial
     return None

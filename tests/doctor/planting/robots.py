@@ -1,7 +1,7 @@
 """Robots that every installed engine loads alike, made from real files, into which defects are planted.
 
-A file is freed of what is no defect and still parts engines (damping, friction, mimic joints, limits
-without room, primitive collision shapes), and the rest is mended by the remedies of the catalogue.
+Elements of a file that are no defects but make engines differ are removed (damping, friction, mimic joints,
+limits without range, primitive collision shapes), and the rest is mended by the remedies of the catalogue.
 Formatting and comments stay as they are.
 """
 
@@ -52,11 +52,11 @@ OWN = (
 ROBOTS = (*REAL, *OWN)
 
 QUICK = (*OWN, "asr_twodof", "double_pendulum", "hextilt", "kinova", "so100", "ur5")
-"""Those that take the doctor the shortest time."""
+"""Robots that are diagnosed fastest."""
 
 
 def bases(name: str) -> tuple[Base, ...]:
-    """Those on which the robot has a mass matrix worth the name: not free where its root is a mere mount."""
+    """Return the bases for which the mass matrix is regular: not floating if the root group has no mass."""
     return BASES if _has_free_body(name) else ("fixed",)
 
 
@@ -65,8 +65,8 @@ _STRIPPED = ("dynamics", "mimic", "safety_controller")
 
 @cache
 def clean_text(name: str, base: Base) -> str:
-    """The URDF of a robot on a base, without anything that parts engines."""
-    return mend(Case(_stripped(name), base)).case.source.text
+    """The URDF of a robot on a base, without anything on which engines differ."""
+    return mend(Case(_strip(name), base)).case.source.text
 
 
 @cache
@@ -77,11 +77,11 @@ def clean_skeleton(name: str, base: Base) -> Skeleton:
 
 @cache
 def _has_free_body(name: str) -> bool:
-    skeleton = Skeleton.of(read_model(_stripped(name).text, name, base="floating"))
-    return any(skeleton.mass(each) > 0.0 for each in skeleton.welded(skeleton.model.root))
+    skeleton = Skeleton.of(read_model(_strip(name).text, name, base="floating"))
+    return any(skeleton.mass(each) > 0.0 for each in skeleton.rigid_group(skeleton.model.root))
 
 
-def _stripped(name: str) -> XmlSource:
+def _strip(name: str) -> XmlSource:
     path = find(name)
     source = XmlSource(path.read_bytes(), path.name)
     return source.apply(*(edit for part in source.root.children for edit in _strip_edits(source, part)))

@@ -1,4 +1,4 @@
-"""Where a defect is planted: a robot's text, what may still be touched in it, and the luck of the draw."""
+"""Site of a defect: a robot's text, the parts of it that hold no defect yet, and the random draws."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ Place = tuple[str, "str | None", "str | None"]
 T = TypeVar("T")
 
 
-class NotHere(Exception):
-    """The defect cannot be planted into this robot, and why."""
+class CannotPlant(Exception):
+    """Raised, with the reason, where a defect cannot be planted into a robot."""
 
 
 @dataclass(frozen=True)
-class Planted:
-    """A defect in a text, and where a diagnosis has to put it.
+class PlantedDefect:
+    """A text with a defect, and the place at which a diagnosis must report it.
 
-    `touched` are the links and joints that took part. `sign` is text that stands in the line of the
-    defect, for rules whose place is no link and no joint. `also` are further findings that are true of
-    the same defect at the same place: see `Site.planted`.
+    `touched` are the links and joints involved. `sign` is text in the line of the
+    defect, for rules whose place is no link and no joint. `also` are further correct findings
+    for the same defect at the same place: see `Site.defect`.
     """
 
     source: XmlSource
@@ -59,9 +59,9 @@ class Site:
     # -- choosing -----------------------------------------------------------------------------
 
     def pick(self, candidates: Sequence[T], wanted: str) -> T:
-        """One of them at random; NotHere where there is none."""
+        """Draw one of them; CannotPlant where there is none."""
         if not candidates:
-            raise NotHere(f"no {wanted}")
+            raise CannotPlant(f"no {wanted}")
         return self.rng.choice(candidates)
 
     def free(self, *names: str) -> bool:
@@ -70,26 +70,26 @@ class Site:
         return not self.taken.intersection(names) and here.issuperset(names)
 
     def pick_joint(self, fits: Callable[[Joint], bool], wanted: str) -> tuple[Joint, SourceElement]:
-        """A joint of the robot, and its element in the text."""
+        """Draw a joint of the robot, and return its element in the text too."""
         joint = self.pick([each for each in self.model.joints if self.free(each.name) and fits(each)], wanted)
         return joint, self.element("joint", joint.name)
 
     def pick_link(self, fits: Callable[[str], bool], wanted: str) -> tuple[str, SourceElement]:
-        """The name of a link, and its element in the text."""
+        """Draw the name of a link, and return its element in the text too."""
         names = [each.name for each in self.model.links]
         name = self.pick([each for each in names if self.free(each) and fits(each)], wanted)
         return name, self.element("link", name)
 
     def element(self, tag: str, name: str) -> SourceElement:
-        """The link or joint of that name in the text."""
+        """Find the link or joint of that name in the text."""
         found = [each for each in self.source.root.all(tag) if each.attributes.get("name") == name]
         if not found:
-            raise NotHere(f"the text has no {tag} {name} any more")
+            raise CannotPlant(f"the text has no {tag} {name} any more")
         return found[0]
 
     # -- planting -----------------------------------------------------------------------------
 
-    def planted(
+    def defect(
         self,
         rule: str,
         *edits: Edit,
@@ -98,10 +98,10 @@ class Site:
         touched: Sequence[str] = (),
         sign: str = "",
         also: Sequence[str] = (),
-    ) -> Planted:
-        """The text with the edits; `also` are ids of rules about the very same words of the same place."""
+    ) -> PlantedDefect:
+        """Apply the edits; `also` are ids of rules about the same text at the same place."""
         own = [name for name in (link, joint) if name is not None]
-        return Planted(
+        return PlantedDefect(
             self.source.apply(*edits),
             (rule, link, joint),
             self.taken | {*own, *touched},
@@ -109,8 +109,8 @@ class Site:
             frozenset((each, link, joint) for each in also),
         )
 
-    def attached(self, name: str, parent: str, *, inertial: str = "", joint: str | None = None) -> Edit:
-        """A further link on a fixed joint, at the end of the robot."""
+    def link_insertion(self, name: str, parent: str, *, inertial: str = "", joint: str | None = None) -> Edit:
+        """Insert a further link on a fixed joint, at the end of the document."""
         x, y, z = (round(self.rng.uniform(-0.1, 0.1), 3) for _ in range(3))
         link = f'<link name="{name}">\n{inertial}</link>' if inertial else f'<link name="{name}"/>'
         text = (
@@ -121,7 +121,7 @@ class Site:
         return self.source.insertion(self.source.root, text)
 
     def part_edits(self, part: SourceElement, tag: str, **attributes: str) -> list[Edit]:
-        """Attributes of the first element `tag` of a part, which is made where there is none."""
+        """Set attributes of the first element `tag` of a part, inserted where there is none."""
         element = part.first(tag)
         if element is not None:
             return [self.source.attribute_edit(element, name, value) for name, value in attributes.items()]
@@ -129,7 +129,7 @@ class Site:
         return [self.source.insertion(part, f"<{tag} {words}/>")]
 
     def rename_edits(self, tag: str, old: str, new: str) -> list[Edit]:
-        """Another name for a link or joint, wherever the document mentions it."""
+        """Rename a link or joint wherever the document names it."""
         mentions = {"link": {"parent": "link", "child": "link"}, "joint": {"mimic": "joint", "joint": "name"}}
         edits = []
         for element in self.source.root.walk():
@@ -140,7 +140,7 @@ class Site:
         return edits
 
     def text_edit(self, element: SourceElement, name: str, text: str) -> Edit:
-        """The text of an attribute as it stands, tabs and line breaks too."""
+        """Set the text of an attribute as given, tabs and line breaks included."""
         place = element.places[name]
         old = self.source.data[place.start : place.end].decode("utf-8")
         return Edit(place.start, place.end, f'{old[: old.index(name)]}{name}="{text}"')
@@ -148,8 +148,8 @@ class Site:
 
 @dataclass(frozen=True)
 class Planter:
-    """Plants the defect of one rule; `bases` are those on which it is one."""
+    """Plants the defect of one rule; `bases` are those on which it is a defect."""
 
     rule: str
-    plant: Callable[[Site], Planted]
+    plant: Callable[[Site], PlantedDefect]
     bases: tuple[Base, ...] = ("fixed", "floating")

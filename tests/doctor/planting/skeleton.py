@@ -1,6 +1,6 @@
 """Skeleton of a robot: rigidly connected links, moving links, and which link carries which.
 
-Written afresh, from the model alone: planters must not see robots by the eyes of the rules they test.
+Independent of `dynx.rules`: planters must not use the code of the rules that they test.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from dynx.spatial.so3 import rotation_from_rpy
 
 @dataclass(frozen=True, eq=False)
 class Skeleton:
-    """`heads` names the first of the links welded to a link; `ranks` counts the independent directions
-    about which a link turns, in the zero position."""
+    """Rigid groups of a model: `heads` names the first of the links rigidly connected to a link;
+    `ranks` counts the independent directions about which a link rotates, in the zero position."""
 
     model: Model
     heads: dict[str, str]
@@ -28,7 +28,7 @@ class Skeleton:
 
     @staticmethod
     def of(model: Model) -> Skeleton:
-        """The skeleton of a model."""
+        """Make the skeleton of a model."""
         heads = {model.root: model.root}
         rotations: dict[str, Floats] = {model.root: np.eye(3)}
         axes: dict[str, list[Floats]] = {model.root: list(np.eye(3)) if model.floating else []}
@@ -45,11 +45,11 @@ class Skeleton:
         return Skeleton(model, heads, ranks)
 
     def inertial(self, link: str) -> Inertial | None:
-        """Inertial of the link in the file."""
+        """Return the inertial of the link in the file."""
         return next(each.inertial for each in self.model.links if each.name == link)
 
     def mass(self, link: str) -> float:
-        """[kg]"""
+        """Return the mass of a link [kg]."""
         inertial = self.inertial(link)
         return 0.0 if inertial is None else inertial.mass
 
@@ -61,13 +61,13 @@ class Skeleton:
         return min(inertial.ixx, inertial.iyy, inertial.izz) > 1e-9
 
     def size(self, link: str) -> float:
-        """The largest moment of the link [kg m^2]."""
+        """Return the largest moment of inertia of the link [kg m^2]."""
         inertial = self.inertial(link)
         return 0.0 if inertial is None else max(inertial.ixx, inertial.iyy, inertial.izz)
 
     @cached_property
     def largest_inertia(self) -> float:
-        """The largest entry of the mass matrix at one pose: what errors are measured against."""
+        """Largest entry of the mass matrix at one pose, to which errors are relative."""
         model = self.model
         with ReferenceBackend(model) as reference:
             return float(np.max(np.abs(reference.mass_matrix(model.random(0))), initial=0.0))
@@ -76,26 +76,26 @@ class Skeleton:
         """Check that some joint moves the link."""
         return self.model.floating or self.heads[link] != self.model.root
 
-    def welded(self, link: str) -> list[str]:
-        """All that is welded to the link, and the link."""
+    def rigid_group(self, link: str) -> list[str]:
+        """List the links rigidly connected to the link, itself included."""
         return [each for each, head in self.heads.items() if head == self.heads[link]]
 
     def carried(self, link: str) -> list[str]:
-        """The links that joints hold on it, fixed ones too."""
+        """List the children of the link, on moving and fixed joints."""
         return [joint.child for joint in self.model.joints if joint.parent == link]
 
-    def alone(self, link: str) -> bool:
+    def is_single_body(self, link: str) -> bool:
         """Check that the link has a parent joint, and nothing rigidly connected to it has mass."""
         carried = self.heads[link] == link and link != self.model.root
-        return carried and all(self.mass(each) < 1e-6 for each in self.welded(link) if each != link)
+        return carried and all(self.mass(each) < 1e-6 for each in self.rigid_group(link) if each != link)
 
-    def beyond(self, link: str) -> list[str]:
-        """Heads of what moving joints carry beyond all that is welded to the link."""
-        group = set(self.welded(link))
+    def groups_beyond(self, link: str) -> list[str]:
+        """List the heads of all rigid groups beyond that of the link."""
+        group = set(self.rigid_group(link))
         found: list[str] = []
         for joint in self.model.joints:
             if joint.parent in group and joint.child not in group:
                 found.append(joint.child)
                 group.add(joint.child)
-                group.update(self.welded(joint.child))
+                group.update(self.rigid_group(joint.child))
         return found
