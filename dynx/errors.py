@@ -215,6 +215,11 @@ def escaped(text: object, limit: int = 80) -> str:
     return inside if len(inside) <= limit else f"{inside[: limit - 20]}... ({len(str(text))} characters)"
 
 
+def nonblank_lines(text: object) -> list[str]:
+    """Split `text`, such as an exception, into its stripped lines without the blank ones."""
+    return [line.strip() for line in str(text).splitlines() if line.strip()]
+
+
 def nearest(name: str, known: Iterable[str]) -> str:
     """Make a clause such as ``; did you mean 'tool0'?`` or, without a near name, the known names."""
     names = list(known)

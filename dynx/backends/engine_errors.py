@@ -14,11 +14,11 @@ Failures = type[BaseException] | tuple[type[BaseException], ...]
 
 
 def engine_errors(
-    engine: str, gist: Callable[[BaseException], str], failures: Failures = Exception
+    engine: str, message: Callable[[BaseException], str], failures: Failures = Exception
 ) -> Callable[[Hook], Hook]:
-    """A decorator of hooks that turns `failures` into EngineError with the `gist` of what the engine said.
+    """Make a decorator of hooks that turns `failures` into EngineError with the engine's `message`.
 
-    A backend that another thread closes during a call fails in any way; that is ClosedError.
+    A backend that another thread closes during a call may fail in any way, which raises ClosedError.
     """
 
     def decorate(hook: Hook) -> Hook:
@@ -32,7 +32,7 @@ def engine_errors(
                 if self._arguments.closed:
                     words = f"this backend of {self.model.name} was closed during a call"
                     raise ClosedError(words) from error
-                raise EngineError(f"{engine} failed on {self.model.name}: {gist(error)}") from error
+                raise EngineError(f"{engine} failed on {self.model.name}: {message(error)}") from error
 
         return cast(Hook, call)
 

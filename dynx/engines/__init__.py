@@ -1,1 +1,1 @@
-"""Foreign engines, each imported in exactly one file, with the line that says how to install it."""
+"""Foreign engines, each imported in one file, which names the command that installs it in its error."""

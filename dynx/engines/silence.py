@@ -9,6 +9,8 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from tempfile import TemporaryFile
 
+from dynx.errors import nonblank_lines
+
 
 @contextmanager
 def silence() -> Iterator[None]:
@@ -34,8 +36,7 @@ def capture_output(lines: list[str]) -> Iterator[None]:
                 yield
         finally:
             file.seek(0)
-            written = file.read().decode("utf-8", "replace").splitlines()
-            lines += [line.strip() for line in written if line.strip()]
+            lines += nonblank_lines(file.read().decode("utf-8", "replace"))
 
 
 @contextmanager

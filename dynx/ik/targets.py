@@ -16,7 +16,7 @@ ORTHONORMALITY_TOLERANCE = 1e-6
 """Largest accepted entry of R'R - 1, and of the last row minus (0, 0, 0, 1), in a pose."""
 
 _ROUNDING_TOLERANCE = 1e-12
-"""Deviation from orthonormality above which (a pose in float32, say) the nearest rotation is used."""
+"""Deviation from orthonormality above which the nearest rotation is used, as for a pose in float32."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,7 +14,7 @@ from dynx.trajectory.base import Setpoint, Trajectory, read_only
 GAP_TOLERANCE = 1e-9
 """Largest gap [rad, m; rad/s, m/s] between the end of a trajectory and the start of the next one.
 
-The ends are given numbers, not computed ones, so this is far above rounding and far below what matters.
+It is far above rounding, since ends are specified and not computed, and far below a jump that matters.
 """
 
 

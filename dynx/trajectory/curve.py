@@ -52,11 +52,11 @@ class PiecewisePolynomial(Curve):
         """Return (x, dx/dt, d2x/dt2) by Horner's scheme; at a break the piece after it applies."""
         piece = np.clip(np.searchsorted(self.breaks, t, side="right") - 1, 0, len(self.coefficients) - 1)
         s = (t - self.breaks[piece])[:, None]
-        parts = [self.coefficients[piece, p] for p in range(self.coefficients.shape[1])]
-        rates = [p * part for p, part in enumerate(parts)][1:]
-        changes = [p * rate for p, rate in enumerate(rates)][1:]
+        x_terms = [self.coefficients[piece, p] for p in range(self.coefficients.shape[1])]
+        v_terms = [p * term for p, term in enumerate(x_terms)][1:]
+        a_terms = [p * term for p, term in enumerate(v_terms)][1:]
         x, v, a = np.zeros((3, len(t), self.coefficients.shape[2]))
-        for sums, terms in ((x, parts), (v, rates), (a, changes)):
+        for sums, terms in ((x, x_terms), (v, v_terms), (a, a_terms)):
             for term in reversed(terms):
                 sums *= s
                 sums += term

@@ -53,12 +53,12 @@ class Cycloid(Curve):
         part = t / T
         sine = np.sin(2.0 * np.pi * part)
         half = np.sin(np.pi * part)
-        position = part - sine / (2.0 * np.pi)
+        s = part - sine / (2.0 * np.pi)
         # 1 - cos(2 u) = 2 sin(u)^2, which does not cancel near rest.
-        speed = 2.0 * half * half / T
-        change = 2.0 * np.pi * sine / (T * T)
+        s_dot = 2.0 * half * half / T
+        s_ddot = 2.0 * np.pi * sine / (T * T)
         return (
-            position[:, None] * self.direction,
-            speed[:, None] * self.direction,
-            change[:, None] * self.direction,
+            s[:, None] * self.direction,
+            s_dot[:, None] * self.direction,
+            s_ddot[:, None] * self.direction,
         )

@@ -19,7 +19,7 @@ SAMPLES = 500
 """Number of evenly spaced times that are checked, besides both sides of every knot."""
 
 REFINEMENT_SAMPLES = 16
-"""Number of further times on either side of the worst of those."""
+"""Number of further times on either side of each worst time."""
 
 RELATIVE_TOLERANCE = 1e-12
 """A limit is violated if exceeded by more than this fraction of it, or of the largest value of the joint.
@@ -28,7 +28,7 @@ A motion planned up to a limit meets it only to rounding.
 """
 
 Excess = tuple[Literal["position", "velocity", "effort"], Floats, Floats, Floats]
-"""A quantity, its values (n, nv), the limit that each is nearest to, and the amount by which they exceed it.
+"""A quantity, its values (n, nv), the nearest limit of each, and the amount by which they exceed it.
 """
 
 
@@ -82,7 +82,7 @@ def violations(
     if isinstance(backend, Backend) and backend.model != model:
         raise ArgumentError(f"backend is one of {shown(backend.model.name)}, not of this model")
     effort = effort and bool(np.isfinite(model.effort_limit).any())
-    with _open_backend(backend, model) if effort else nullcontext() as engine:
+    with open_backend(backend, model) if effort else nullcontext() as engine:
         times = _coarse_times(trajectory)
         coarse = list(_excesses(model, trajectory, times, engine, joint_dynamics))
         refined = _refined_times(times, coarse)
@@ -138,6 +138,6 @@ def _refined_times(times: Floats, coarse: list[Excess]) -> Floats:
     return np.unique(before[:, None] + parts * (after - before)[:, None])
 
 
-def _open_backend(backend: str | Backend, model: Model) -> AbstractContextManager[Backend]:
+def open_backend(backend: str | Backend, model: Model) -> AbstractContextManager[Backend]:
     """Return a backend of the model as a context that leaves the caller's own backend open."""
     return nullcontext(backend) if isinstance(backend, Backend) else make_backend(backend, model)

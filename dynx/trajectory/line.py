@@ -9,13 +9,12 @@ deviation is measured by forward kinematics, and the spacing halved until it is 
 
 from __future__ import annotations
 
-from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dynx.backends import Backend, backend
+from dynx.backends import Backend
 from dynx.errors import ArgumentError, ShapeError, TrajectoryError, shown
 from dynx.ik import checked_targets
 from dynx.model import Model
@@ -25,13 +24,14 @@ from dynx.spatial.se3 import homogeneous, pose_error
 from dynx.spatial.so3 import quat_exp, quat_from_rotation, quat_log, rotation_from_quat
 from dynx.trajectory.base import Trajectory
 from dynx.trajectory.curve import PiecewisePolynomial
+from dynx.trajectory.limit_check import open_backend
 from dynx.trajectory.polynomials import quintic
 from dynx.trajectory.time_scaling import TimeScaledTrajectory, checked_law, end_setpoints
 from dynx.trajectory.waypoints import spline_curve
 
 MIN_INTERVALS, RELIABLE_INTERVALS, MAX_INTERVALS = 8, 256, 1024
 """Numbers of intervals between solutions: the initial one; the one from which a failure of inverse kinematics
-counts as out of reach; the one at which the motion is given up.
+means that the target is out of reach; the largest one tried.
 """
 
 IK_TOLERANCE = 1e-10
@@ -84,13 +84,16 @@ def line(
     change its posture. Raises ArgumentError for invalid arguments.
     """
     path = _Line(model, frame, q0, target, backend)
-    if (law is None) == (duration is None):
+    if law is not None and duration is None:
+        motion_law = checked_law(law)
+    elif law is None and duration is not None:
+        motion_law = quintic([0.0], [1.0], duration)
+    else:
         raise ArgumentError("wanted either a duration or a law, one of them")
-    motion_law = checked_law(law) if law is not None else quintic([0.0], [1.0], _given(duration))
     for name, bound in (("deviation", deviation), ("rotation_deviation", rotation_deviation)):
         if not (isinstance(bound, int | float | np.number) and MIN_DEVIATION <= bound < np.inf):
             raise ArgumentError(f"{name} is {shown(bound)}; wanted a number, at least {MIN_DEVIATION:g}")
-    with path.open_backend() as engine:
+    with open_backend(backend, model) as engine:
         curve, n, off, angle = _refine(path, engine, deviation, rotation_deviation)
     q1 = curve(np.array([1.0]))[0][0]
     start, end = end_setpoints(curve, motion_law, path.q0, q1)
@@ -148,19 +151,12 @@ class _Line:
         if targets.batch:
             raise ShapeError(f"target has shape {np.shape(target)}; wanted a pose (4, 4) or a position (3,)")
         self._require_start_within_limits()
-        self._engine = engine
         self._target_position, self._has_rotation = targets.positions, targets.rotations is not None
-        with self.open_backend() as kinematics:
+        with open_backend(engine, model) as kinematics:
             T = kinematics.forward_kinematics(self.q0, frame)
         self._start_position, self._start_rotation = T[:3, 3], T[:3, :3]
         rotation = self._start_rotation if targets.rotations is None else targets.rotations
         self._rotation_vector = quat_log(quat_from_rotation(self._start_rotation.T @ rotation))
-
-    def open_backend(self) -> AbstractContextManager[Backend]:
-        """Return the backend as a context that leaves the caller's own backend open."""
-        if isinstance(self._engine, Backend):
-            return nullcontext(self._engine)
-        return backend(self._engine, self.model)
 
     def poses(self, s: Floats) -> Floats:
         """Return T_world_frame (n, 4, 4) on the line at s (n,)."""
@@ -170,9 +166,9 @@ class _Line:
 
     def solve(self, engine: Backend, n: int) -> Floats:
         """Return configurations (n + 1, nq) at evenly spaced s, starting with q0."""
-        places = np.linspace(0.0, 1.0, n + 1)
+        fractions = np.linspace(0.0, 1.0, n + 1)
         found = [self.q0]
-        for s, T in zip(places[1:].tolist(), self.poses(places[1:]), strict=True):
+        for s, T in zip(fractions[1:].tolist(), self.poses(fractions[1:]), strict=True):
             result = engine.inverse_kinematics(
                 T if self._has_rotation else T[:3, 3],
                 self.frame,
@@ -210,8 +206,3 @@ class _Line:
                 f"{self.model.lower[k]:g} to {self.model.upper[k]:g}",
                 at=0.0,
             )
-
-
-def _given(duration: float | None) -> float:
-    assert duration is not None
-    return duration

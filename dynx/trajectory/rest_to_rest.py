@@ -56,7 +56,7 @@ def trapezoidal(
         top_speed = A * rise
         spans, rates = (rise, max(0.0, 1.0 / top_speed - rise), rise), (A, 0.0, -A)
         return _trajectory_of_phases(ends, spans, rates, 2, duration)
-    return _stationary(ends, duration)
+    return _standstill(ends, duration)
 
 
 def s_curve(
@@ -90,7 +90,7 @@ def s_curve(
         cruise_time = max(0.0, 1.0 / top_speed - (2.0 * jerk_time + constant_time))
         spans = (jerk_time, constant_time, jerk_time, cruise_time, jerk_time, constant_time, jerk_time)
         return _trajectory_of_phases(ends, spans, (J, 0.0, -J, 0.0, -J, 0.0, J), 3, duration)
-    return _stationary(ends, duration)
+    return _standstill(ends, duration)
 
 
 def _trajectory_of_phases(
@@ -118,13 +118,13 @@ def _trajectory_of_phases(
 def _at_rest(ends: Ends, T: float, curve: PiecewisePolynomial) -> Trajectory:
     """Return the motion with v exactly 0 at both ends, and a of the first and the last phase there."""
     rest = np.zeros(ends.nv)
-    change = 2.0 * curve.coefficients[0, 2]
+    acceleration = 2.0 * curve.coefficients[0, 2]
     if curve.coefficients.shape[1] == 4:
         return ends.rest_to_rest(T, curve)
-    return ends.trajectory(T, curve, (rest, change), (rest, -change))
+    return ends.trajectory(T, curve, (rest, acceleration), (rest, -acceleration))
 
 
-def _stationary(ends: Ends, duration: float) -> Trajectory:
+def _standstill(ends: Ends, duration: float) -> Trajectory:
     T = checked_duration(duration)
     return ends.rest_to_rest(T, single_polynomial(T, np.zeros(ends.nv)))
 

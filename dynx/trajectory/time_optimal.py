@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dynx.errors import ArgumentError, NotInstalledError, TrajectoryError
+from dynx.errors import ArgumentError, NotInstalledError, TrajectoryError, nonblank_lines
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import MAX_DURATION, MIN_DURATION, Trajectory
@@ -97,7 +97,8 @@ def _run_ruckig(
         result = ruckig.Ruckig(ends.nv).calculate(parameters, trajectory)
     except (ruckig.RuckigError, ValueError) as error:
         # Ruckig raises ValueError if its result code has no name.
-        raise TrajectoryError(f"Ruckig finds no motion between these states: {_first_line(error)}") from error
+        cause = (nonblank_lines(error) or [type(error).__name__])[0]
+        raise TrajectoryError(f"Ruckig finds no motion between these states: {cause}") from error
     if result not in (ruckig.Result.Working, ruckig.Result.Finished):
         raise TrajectoryError(f"Ruckig finds no motion between these states: {result}")
     return trajectory
@@ -160,7 +161,3 @@ def _require_ends_within_limits(ends: Ends, limits: dict[str, Floats], states: d
                 f"v{n} = {v[k]:g} with a{n} = {a[k]:g} of {ends.name(k)} takes a velocity of {reached[k]:g} "
                 f"{'afterwards' if n == 0 else 'before'}, beyond its limit, {V[k]:g}"
             )
-
-
-def _first_line(error: Exception) -> str:
-    return next((line.strip() for line in str(error).splitlines() if line.strip()), type(error).__name__)

@@ -19,16 +19,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dynx.errors import ArgumentError, NotInstalledError, ShapeError, TrajectoryError
+from dynx.errors import ArgumentError, NotInstalledError, TrajectoryError
 from dynx.model import Model
-from dynx.model.configuration import checked_entries, real_array
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Trajectory, read_only_setpoint
 from dynx.trajectory.curve import PiecewisePolynomial
 from dynx.trajectory.displacement import DisplacementTrajectory, Ends, configuration
 from dynx.trajectory.motion_limits import checked_limit, require_positive_finite, velocity_limits
 from dynx.trajectory.time_scaling import TimeScaledTrajectory, end_setpoints
-from dynx.trajectory.waypoints import spline_curve
+from dynx.trajectory.waypoints import checked_waypoints, spline_curve
 
 GRID_POINTS_PER_SEGMENT = 100
 """Grid points of TOPP-RA from one waypoint to the next."""
@@ -59,7 +58,8 @@ def time_optimal_path(
     Raises NotInstalledError without the extra ``trajectory``, TrajectoryError if no such motion is found,
     ArgumentError for invalid arguments.
     """
-    points = _checked_waypoints(waypoints, model)
+    points = checked_waypoints(waypoints)
+    configuration("a waypoint", points[0], model)
     ends = Ends(points[0], points[-1], points[-1] - points[0], model)
     if ends.floating is not None:
         raise ArgumentError(f"{ends.floating.name} has a floating base; a path needs a fixed one")
@@ -70,16 +70,16 @@ def time_optimal_path(
     if not lengths.all():
         k = int(np.argmin(lengths))
         raise ArgumentError(f"waypoints {k} and {k + 1} are the same; wanted distinct successive waypoints")
-    marks = np.concatenate([[0.0], np.cumsum(lengths)])
-    marks /= marks[-1]
-    law = _motion_law(*_speeds(marks, points, V, A))
-    path = spline_curve(marks, points)
+    s_points = np.concatenate([[0.0], np.cumsum(lengths)])
+    s_points /= s_points[-1]
+    law = _motion_law(*_speeds(s_points, points, V, A))
+    path = spline_curve(s_points, points)
     motion = _follow(path, law, points)
     return _follow(path, _stretch(law, _stretch_factor(motion, V, A)), points)
 
 
-def _speeds(marks: Floats, points: Floats, V: Floats, A: Floats) -> tuple[Floats, Floats]:
-    """Return grid points on the path in [0, 1], and TOPP-RA's ds/dt at each."""
+def _speeds(s_points: Floats, points: Floats, V: Floats, A: Floats) -> tuple[Floats, Floats]:
+    """Return grid points s in [0, 1], and TOPP-RA's ds/dt at each; waypoint k is at `s_points[k]`."""
     try:
         # TOPP-RA's source has invalid escapes, of which Python warns when compiling it.
         with warnings.catch_warnings():
@@ -92,12 +92,12 @@ def _speeds(marks: Floats, points: Floats, V: Floats, A: Floats) -> tuple[Floats
             f"time_optimal_path needs TOPP-RA: pip install 'dynx[trajectory]' ({error})"
         ) from error
     parts = np.linspace(0.0, 1.0, GRID_POINTS_PER_SEGMENT, endpoint=False)
-    grid = np.append((marks[:-1, None] + parts * np.diff(marks)[:, None]).ravel(), 1.0)
+    grid = np.append((s_points[:-1, None] + parts * np.diff(s_points)[:, None]).ravel(), 1.0)
     limits: list[Any] = [
         JointVelocityConstraint(np.stack([-V, V], axis=-1)),
         JointAccelerationConstraint(np.stack([-A, A], axis=-1)),
     ]
-    path = toppra.SplineInterpolator(marks, points, bc_type="not-a-knot")
+    path = toppra.SplineInterpolator(s_points, points, bc_type="not-a-knot")
     _, speeds, *_ = TOPPRA(limits, path, gridpoints=grid).compute_parameterization(0.0, 0.0)
     if speeds is None or not np.isfinite(speeds).all() or not (speeds[:-1] + speeds[1:] > 0.0).all():
         raise TrajectoryError("TOPP-RA finds no motion along the path within the limits")
@@ -108,8 +108,10 @@ def _motion_law(grid: Floats, speeds: Floats) -> PiecewisePolynomial:
     """Return s(t) with constant acceleration between grid points."""
     lengths = np.diff(grid)
     times = np.concatenate([[0.0], np.cumsum(2.0 * lengths / (speeds[:-1] + speeds[1:]))])
-    changes = (speeds[1:] ** 2 - speeds[:-1] ** 2) / (2.0 * lengths)
-    return PiecewisePolynomial(times, np.stack([grid[:-1], speeds[:-1], 0.5 * changes], axis=-1)[..., None])
+    accelerations = (speeds[1:] ** 2 - speeds[:-1] ** 2) / (2.0 * lengths)
+    return PiecewisePolynomial(
+        times, np.stack([grid[:-1], speeds[:-1], 0.5 * accelerations], axis=-1)[..., None]
+    )
 
 
 def _stretch(law: PiecewisePolynomial, factor: float) -> PiecewisePolynomial:
@@ -120,9 +122,9 @@ def _stretch(law: PiecewisePolynomial, factor: float) -> PiecewisePolynomial:
 
 def _follow(path: PiecewisePolynomial, law: PiecewisePolynomial, points: Floats) -> TimeScaledTrajectory:
     """Return the motion that follows the path with the motion law, from rest to rest."""
-    T, change = float(law.breaks[-1]), 2.0 * law.coefficients[:, 2]
-    start = read_only_setpoint(np.zeros(1), np.zeros(1), change[0])
-    end = read_only_setpoint(np.ones(1), np.zeros(1), change[-1])
+    T, acceleration = float(law.breaks[-1]), 2.0 * law.coefficients[:, 2]
+    start = read_only_setpoint(np.zeros(1), np.zeros(1), acceleration[0])
+    end = read_only_setpoint(np.ones(1), np.zeros(1), acceleration[-1])
     time_scaling = DisplacementTrajectory(T, start, end, law)
     return TimeScaledTrajectory(
         T, *end_setpoints(path, time_scaling, points[0], points[-1]), path, time_scaling
@@ -138,11 +140,3 @@ def _stretch_factor(motion: Trajectory, V: Floats, A: Floats) -> float:
     too_fast = float((np.abs(v) / V).max())
     too_sudden = math.sqrt(float((np.abs(a) / A).max()))
     return max(1.0, too_fast, too_sudden) * (1.0 + STRETCH_MARGIN)
-
-
-def _checked_waypoints(waypoints: ArrayLike, model: Model | None) -> Floats:
-    points = checked_entries("waypoints", real_array("waypoints", waypoints))
-    if points.ndim != 2 or len(points) < 2 or not points.shape[1]:
-        raise ShapeError(f"waypoints has shape {points.shape}; wanted (n, nq) with n at least 2")
-    configuration("a waypoint", points[0], model)
-    return points

@@ -29,9 +29,9 @@ class TimeScaledTrajectory(Trajectory):
 
     def inside(self, t: Floats) -> Setpoint:
         """Return q, q' ds/dt and q'' (ds/dt)^2 + q' d2s/dt2 (the chain rule)."""
-        s, rate, change = self.law.inside(t)
+        s, s_dot, s_ddot = self.law.inside(t)
         q, slope, curvature = self.path(np.clip(s[:, 0], 0.0, 1.0))
-        return Setpoint(q, slope * rate, curvature * rate * rate + slope * change)
+        return Setpoint(q, slope * s_dot, curvature * s_dot * s_dot + slope * s_ddot)
 
 
 def end_setpoints(path: Curve, law: Trajectory, q0: Floats, q1: Floats) -> tuple[Setpoint, Setpoint]:

@@ -43,9 +43,7 @@ def spline(
 
     Raises ArgumentError (ShapeError, DTypeError, NotFiniteError) for invalid arguments.
     """
-    points = checked_entries("waypoints", real_array("waypoints", waypoints))
-    if points.ndim != 2 or len(points) < 2 or not points.shape[1]:
-        raise ShapeError(f"waypoints has shape {points.shape}; wanted (n, nq) with n at least 2")
+    points = checked_waypoints(waypoints)
     breaks = _checked_times(times, len(points))
     if kind not in ("cubic", "quintic"):
         raise ArgumentError(f"kind is {shown(kind)}; wanted 'cubic' or 'quintic'")
@@ -114,6 +112,14 @@ def _trajectory_of_curve(
         read_only_setpoint(points[-1], v[1], a[1]),
         PiecewisePolynomial(curve.breaks, coefficients),
     )
+
+
+def checked_waypoints(waypoints: ArrayLike) -> Floats:
+    """Return waypoints (n, nq), n >= 2; raise ShapeError, DTypeError or NotFiniteError for invalid ones."""
+    points = checked_entries("waypoints", real_array("waypoints", waypoints))
+    if points.ndim != 2 or len(points) < 2 or not points.shape[1]:
+        raise ShapeError(f"waypoints has shape {points.shape}; wanted (n, nq) with n at least 2")
+    return points
 
 
 def _checked_times(times: ArrayLike, count: int) -> Floats:

@@ -1,4 +1,4 @@
-"""What engines print is kept from the streams of the process, and can be had."""
+"""Output of engines is kept from the streams of the process, and can be captured."""
 
 from __future__ import annotations
 
@@ -54,9 +54,9 @@ def test_what_was_said_before_an_error_is_kept() -> None:
 
     def fail() -> None:
         with capture_output(lines):
-            os.write(1, b"said\n")
+            os.write(1, b"printed\n")
             raise ValueError("no")
 
     with pytest.raises(ValueError, match="no"):
         fail()
-    assert lines == ["said"]
+    assert lines == ["printed"]

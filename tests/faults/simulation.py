@@ -64,8 +64,8 @@ SIMULATION_FAULTS = (
     Fault(
         "trajectory_path_without_the_centripetal_term",
         "dynx.trajectory.time_scaling",
-        right="return Setpoint(q, slope * rate, curvature * rate * rate + slope * change)",
-        wrong="return Setpoint(q, slope * rate, slope * change)",
+        right="return Setpoint(q, slope * s_dot, curvature * s_dot * s_dot + slope * s_ddot)",
+        wrong="return Setpoint(q, slope * s_dot, slope * s_ddot)",
         test_file="tests/trajectory/test_every_trajectory.py",
         test="test_v_and_a_are_the_derivatives_of_the_slow_motions",
     ),

@@ -28,7 +28,7 @@ def engine() -> Iterator[Backend]:
 
 
 @pytest.mark.parametrize(
-    ("target", "error", "says"),
+    ("target", "error", "message"),
     [
         (REFLECTION, ArgumentError, "reflection"),
         (STRETCHED, ArgumentError, "not orthonormal"),
@@ -45,8 +45,8 @@ def engine() -> Iterator[Backend]:
         (np.eye(4) * 1j, DTypeError, "complex"),
     ],
 )
-def test_invalid_targets_raise(engine: Backend, target: Any, error: type[Exception], says: str) -> None:
-    with pytest.raises(error, match=says):
+def test_invalid_targets_raise(engine: Backend, target: Any, error: type[Exception], message: str) -> None:
+    with pytest.raises(error, match=message):
         engine.inverse_kinematics(target, "flange")
 
 

@@ -59,7 +59,7 @@ def test_any_change_makes_another_model(model: Model) -> None:
 
 
 @pytest.mark.parametrize(
-    ("ask", "message"),
+    ("look_up", "message"),
     [
         (lambda m: m.joint("elbow"), "no joint 'elbow' in ur5; did you mean 'elbow_joint'"),
         (lambda m: m.joint("forearm_link"), "that is a link; the joint that moves it is 'elbow_joint'"),
@@ -73,10 +73,10 @@ def test_any_change_makes_another_model(model: Model) -> None:
         (lambda m: m.frame_index(3), "no frame '3'"),
     ],
 )
-def test_errors_for_unknown_names(ask: object, message: str) -> None:
-    assert callable(ask)
+def test_errors_for_unknown_names(look_up: object, message: str) -> None:
+    assert callable(look_up)
     with pytest.raises(UnknownNameError, match=message):
-        ask(load("ur5"))
+        look_up(load("ur5"))
 
 
 def test_names_of_frames_are_unique() -> None:

@@ -70,7 +70,7 @@ def test_everything_that_determines_the_code_is_part_of_the_key(
 ) -> None:
     made = CountedProgram(TWICE)
     target = host()
-    ways: list[Callable[[], Kernel]] = [
+    loads: list[Callable[[], Kernel]] = [
         lambda: load_kernel(b"twice", made),
         lambda: load_kernel(b"twicf", made),
         lambda: load_kernel(b"twice", made, settings=Settings(2)),
@@ -79,14 +79,14 @@ def test_everything_that_determines_the_code_is_part_of_the_key(
         lambda: load_kernel(b"twice", made, target=replace(target, cpu="x86-64")),
     ]
     if not target.triple.startswith("x86_64"):
-        ways.pop()
-    for ask in [*ways, *ways]:
-        ask()
-    assert made.times == len(ways)
+        loads.pop()
+    for load in [*loads, *loads]:
+        load()
+    assert made.times == len(loads)
     for name in ("compiler_version", "_emitter_version"):
         monkeypatch.setattr(cache, name, lambda: "another version")
         load_kernel(b"twice", made)
-    assert made.times == len(ways) + 2 == len(files(folder))
+    assert made.times == len(loads) + 2 == len(files(folder))
 
 
 def test_recipes_of_programs() -> None:

@@ -1,7 +1,7 @@
 """The algorithms of `dynx.rbd`, traced on random robots: interpreted and compiled, as on floats.
 
-Each is compared with its own float64 evaluation, from which both differ by rounding only. How much
-rounding there may be says `rounding.bounds`, for the program as written and for the simplified one.
+Each is compared with its own float64 evaluation, from which both differ by rounding only: by at most
+`rounding.bounds`, for the program as written and for the simplified one.
 """
 
 from __future__ import annotations

@@ -107,7 +107,7 @@ def test_the_rule_sets_match_the_preconditions() -> None:
 
 
 class Both:
-    """A shape with and without one rule; `fired` says whether the rule applied."""
+    """A shape with and without one rule; `fired`: the rule applied."""
 
     def __init__(self, rule: Rule, shape: Shape, constants: dict[str, float]) -> None:
         self._constants = constants

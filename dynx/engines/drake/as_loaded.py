@@ -4,7 +4,7 @@ The plant is continuous (``time_step=0.0``) and has no scene graph, because the 
 compared and a discrete plant returns a step of its contact solver. Inverse dynamics is called as Drake's own
 `InverseDynamics` system calls it, with the forces of `CalcForceElementsContribution`, which are gravity and
 joint damping. A mimic joint becomes a constraint: kinematics, mass matrix and inverse dynamics leave it out,
-forward dynamics of a continuous plant refuses it.
+and forward dynamics of a continuous plant raises an exception.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from dynx.model import Model
 from dynx.spatial.scalar import Floats
 
 _V = JacobianWrtVariable.kV
-_HERE: Floats = np.zeros(3)
+_ORIGIN: Floats = np.zeros(3)
 
 
 class LoadedDrake(LoadedRobot):
@@ -51,7 +51,7 @@ class LoadedDrake(LoadedRobot):
         self._model = model
         self._plant = plant = MultibodyPlant(time_step=0.0)
         self._default_gravity: Floats = np.array(plant.gravity_field().gravity_vector())
-        with self._mapped("load"), captured_log() as log:
+        with self._convert_errors("load"), captured_log() as log:
             instances = Parser(plant).AddModels(str(path))
             plant.mutable_gravity_field().set_gravity_vector(np.array(model.gravity))
             self._bodies = self._find_bodies(instances)
@@ -77,7 +77,7 @@ class LoadedDrake(LoadedRobot):
 
     @classmethod
     def load_call(cls, floating: bool) -> str:
-        """Four lines for a fixed base; without the weld to the world the base floats."""
+        """Four lines for a fixed base; without ``WeldFrames`` the base floats."""
         weld = "plant.WeldFrames(plant.world_frame(), plant.GetFrameByName(root_link))\n"
         return (
             "plant = MultibodyPlant(time_step=0.0)\n"
@@ -89,7 +89,7 @@ class LoadedDrake(LoadedRobot):
     def link_poses(self, q: Floats) -> Floats:
         """``EvalBodyPoseInWorld``."""
         T = np.full((len(self._model.links), 4, 4), np.nan)
-        with self._mapped("EvalBodyPoseInWorld"):
+        with self._convert_errors("EvalBodyPoseInWorld"):
             self._place(q)
             for k, link in enumerate(self._model.links):
                 if link.name in self._bodies:
@@ -102,34 +102,34 @@ class LoadedDrake(LoadedRobot):
         if link not in self._bodies:
             return np.full((6, self._model.nv), np.nan)
         frame, world = self._bodies[link].body_frame(), self._plant.world_frame()
-        with self._mapped("CalcJacobianSpatialVelocity"):
+        with self._convert_errors("CalcJacobianSpatialVelocity"):
             R = self._place(q)
-            J = self._plant.CalcJacobianSpatialVelocity(self._context, _V, frame, _HERE, world, world)
+            J = self._plant.CalcJacobianSpatialVelocity(self._context, _V, frame, _ORIGIN, world, world)
         return self._coordinates.forces_back(R, np.concatenate([J[3:], J[:3]]))
 
     def mass_matrix(self, q: Floats) -> Floats:
         """``CalcMassMatrix``, which includes the reflected inertia of rotors."""
-        with self._mapped("CalcMassMatrix"):
+        with self._convert_errors("CalcMassMatrix"):
             R = self._place(q)
             return self._coordinates.matrix_back(R, np.array(self._plant.CalcMassMatrix(self._context)))
 
     def inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
         """``CalcInverseDynamics`` with the forces of ``CalcForceElementsContribution``."""
         plant, coordinates = self._plant, self._coordinates
-        with self._mapped("CalcInverseDynamics"):
+        with self._convert_errors("CalcInverseDynamics"):
             R = self._place(q)
             plant.SetVelocities(self._context, coordinates.velocities(R, v))
             plant.CalcForceElementsContribution(self._context, self._forces)
-            wanted = coordinates.accelerations(R, v, a)
-            tau = np.array(plant.CalcInverseDynamics(self._context, wanted, self._forces))
+            vdot = coordinates.accelerations(R, v, a)
+            tau = np.array(plant.CalcInverseDynamics(self._context, vdot, self._forces))
         return coordinates.forces_back(R, tau)
 
     def forward_dynamics(self, q: Floats, v: Floats, tau: Floats) -> Floats:
-        """The port ``generalized_acceleration``; where a joint that the model lacks is held, solved from
-        ``CalcMassMatrix`` and ``CalcInverseDynamics``."""
+        """The port ``generalized_acceleration``; solved from ``CalcMassMatrix`` and
+        ``CalcInverseDynamics`` where a joint that the model lacks is held."""
         if self._model.nv < self._plant.num_velocities():
             return self._solved_acceleration(q, v, tau)
-        with self._mapped("compute forward dynamics of"):
+        with self._convert_errors("compute forward dynamics of"):
             R = self._place(q)
             self._plant.SetVelocities(self._context, self._coordinates.velocities(R, v))
             self._torque.FixValue(self._context, self._coordinates.forces(R, tau))
@@ -142,7 +142,7 @@ class LoadedDrake(LoadedRobot):
     # -- what was loaded ----------------------------------------------------------------------
 
     def describe(self) -> LoadedModel:
-        """The model from the engine's bodies, joints and actuators; Drake merges no links.
+        """Describe the model from the engine's bodies, joints and actuators; Drake merges no links.
 
         Joint friction is 0, because Drake has none and warns about files with joint friction.
         """
@@ -183,7 +183,7 @@ class LoadedDrake(LoadedRobot):
         return found
 
     def _find_joints(self, instances: list[Any]) -> dict[str, Any]:
-        """The file's joints by name: not the weld to the world, nor the joint of a floating base."""
+        """The file's joints by name, without the one to the world that is a weld or floats."""
         plant = self._plant
         known = {joint.name for joint in self._model.joints}
         joints = [
@@ -228,7 +228,7 @@ class LoadedDrake(LoadedRobot):
         return self._coordinates.attitude(q)
 
     @contextmanager
-    def _mapped(self, call: str) -> Iterator[None]:
+    def _convert_errors(self, call: str) -> Iterator[None]:
         """Raise the engine's exceptions as `EngineError` with its messages."""
         try:
             yield

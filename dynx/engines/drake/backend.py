@@ -7,8 +7,8 @@ Safe to use from several threads: the plant is never changed after it is made, a
 of its own, made on its first call. Calls hold the GIL, so threads give no speed.
 
 Jacobian derivatives and Coriolis matrices are derived: Drake has J v and dJ/dt v, not dJ/dt. Forward dynamics
-is Drake's articulated-body algorithm; where that refuses a body whose inertia is not positive (a file may
-state one, and the mass matrix be regular all the same), it is solved from the mass matrix.
+is Drake's articulated-body algorithm; where that raises because a body's inertia is not positive (a file may
+state one, and the mass matrix may still be regular), it is solved from the mass matrix.
 """
 
 from __future__ import annotations
@@ -34,10 +34,10 @@ from dynx.rbd.jacobians import Reference
 from dynx.spatial.scalar import Floats
 
 _V = JacobianWrtVariable.kV
-_HERE: Floats = np.zeros(3)
+_ORIGIN: Floats = np.zeros(3)
 _AT_WORLD = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
-_mapped = engine_errors("drake", error_message, DRAKE_FAILURES)
+_convert_errors = engine_errors("drake", error_message, DRAKE_FAILURES)
 
 
 class _Workspace(local):
@@ -88,54 +88,54 @@ class DrakeBackend(Backend):
 
     # -- kinematics ---------------------------------------------------------------------------
 
-    @_mapped
+    @_convert_errors
     def _frame_placements(self, q: Floats) -> Floats:
-        context, _ = self._placed(q)
+        context, _ = self._set_positions(q)
         where = self._plant.EvalBodyPoseInWorld
         bodies = np.array([where(context, body).GetAsMatrix4() for body in self._built.bodies])
         return np.asarray(bodies[self._built.body_of_frame] @ self._built.T_body_frame)
 
-    @_mapped
+    @_convert_errors
     def _frame_placement(self, q: Floats, frame: int) -> Floats:
-        context, _ = self._placed(q)
+        context, _ = self._set_positions(q)
         T: Floats = self._built.frames[frame].CalcPoseInWorld(context).GetAsMatrix4()
         return T
 
-    @_mapped
+    @_convert_errors
     def _jacobian(self, q: Floats, frame: int, reference: Reference) -> Floats:
-        context, R = self._placed(q)
+        context, R = self._set_positions(q)
         on_robot = self._built.frames[frame]
         axes = on_robot if reference == "local" else self._world
-        point = _HERE
+        point = _ORIGIN
         if reference == "world":
             point = on_robot.CalcPoseInWorld(context).inverse().translation()
         J = self._plant.CalcJacobianSpatialVelocity(context, _V, on_robot, point, self._world, axes)
         return self._coordinates.forces_back(R, _linear_first(J))
 
-    @_mapped
+    @_convert_errors
     def _frame_velocity(self, q: Floats, v: Floats, frame: int, reference: Reference) -> Floats:
-        context, _ = self._moving(q, v)
+        context, _ = self._set_state(q, v)
         on_robot = self._built.frames[frame]
         velocity = _linear_first(on_robot.CalcSpatialVelocityInWorld(context).get_coeffs())
-        return self._referred(velocity, on_robot, context, reference)
+        return self._convert_to_reference(velocity, on_robot, context, reference)
 
-    @_mapped
+    @_convert_errors
     def _frame_acceleration(
         self, q: Floats, v: Floats, a: Floats, frame: int, reference: Reference
     ) -> Floats:
-        context, R = self._moving(q, v)
+        context, R = self._set_state(q, v)
         on_robot, world = self._built.frames[frame], self._world
-        J = self._plant.CalcJacobianSpatialVelocity(context, _V, on_robot, _HERE, world, world)
-        bias = self._plant.CalcBiasSpatialAcceleration(context, _V, on_robot, _HERE, world, world)
+        J = self._plant.CalcJacobianSpatialVelocity(context, _V, on_robot, _ORIGIN, world, world)
+        bias = self._plant.CalcBiasSpatialAcceleration(context, _V, on_robot, _ORIGIN, world, world)
         wanted = self._coordinates.accelerations(R, v, a)
-        # Drake's is the classical acceleration of the origin; the spatial one leaves out w x v.
+        # Drake returns the classical acceleration of the origin; the spatial one leaves out w x v.
         acceleration = _linear_first(J @ wanted + bias.get_coeffs())
         if reference != "local_world_aligned":
             velocity = on_robot.CalcSpatialVelocityInWorld(context)
             acceleration[:3] -= np.cross(velocity.rotational(), velocity.translational())
-        return self._referred(acceleration, on_robot, context, reference)
+        return self._convert_to_reference(acceleration, on_robot, context, reference)
 
-    def _referred(self, motion: Floats, frame: Any, context: Any, reference: Reference) -> Floats:
+    def _convert_to_reference(self, motion: Floats, frame: Any, context: Any, reference: Reference) -> Floats:
         """A spatial vector at the frame's origin, in world axes, converted to `reference`."""
         if reference == "local_world_aligned":
             return motion
@@ -148,25 +148,25 @@ class DrakeBackend(Backend):
 
     # -- dynamics -----------------------------------------------------------------------------
 
-    @_mapped
+    @_convert_errors
     def _inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
         if self.model.floating:
-            # Gravity is an acceleration of the base the other way; see `_upright`.
+            # An acceleration opposite to gravity stands in for gravity; see `_upright`.
             a = a.copy()
             a[:3] -= self._gravity @ self._coordinates.attitude(q)
-            context, R = self._moving(_upright(q), v)
+            context, R = self._set_state(_upright(q), v)
             wanted = self._coordinates.accelerations(R, v, a)
             tau = self._plant.CalcInverseDynamics(context, wanted, self._workspace.no_forces)
             return self._coordinates.forces_back(R, tau)
-        context, R = self._moving(q, v)
+        context, R = self._set_state(q, v)
         plant, forces, coordinates = self._plant, self._workspace.forces, self._coordinates
         plant.CalcForceElementsContribution(context, forces)
         wanted = coordinates.accelerations(R, v, a)
         return coordinates.forces_back(R, plant.CalcInverseDynamics(context, wanted, forces))
 
-    @_mapped
+    @_convert_errors
     def _forward_dynamics(self, q: Floats, v: Floats, tau: Floats) -> Floats:
-        context, R = self._moving(q, v)
+        context, R = self._set_state(q, v)
         self._torque.FixValue(context, self._coordinates.forces(R, tau))
         try:
             vdot = self._acceleration.Eval(context)
@@ -175,9 +175,9 @@ class DrakeBackend(Backend):
             return super()._forward_dynamics(q, v, tau)
         return self._coordinates.accelerations_back(R, v, vdot)
 
-    @_mapped
+    @_convert_errors
     def _mass_matrix(self, q: Floats) -> Floats:
-        context, R = self._placed(_upright(q) if self.model.floating else q)
+        context, R = self._set_positions(_upright(q) if self.model.floating else q)
         plant = self._plant
         # The composite inertia of a body in counterweighted parts cannot be divided by its mass.
         compute = (
@@ -186,78 +186,78 @@ class DrakeBackend(Backend):
         M = self._coordinates.matrix_back(R, compute(context))
         return np.asarray(0.5 * (M + M.T))
 
-    @_mapped
+    @_convert_errors
     def _bias_torque(self, q: Floats, v: Floats) -> Floats:
         if self.model.floating:
-            # Without acceleration in its own axes the base may have one in world axes, as Drake uses them.
+            # A zero acceleration in base axes need not be zero in the world axes that Drake uses.
             return self._inverse_dynamics(q, v, np.zeros_like(v))
-        context, R = self._moving(q, v)
+        context, R = self._set_state(q, v)
         bias = self._plant.CalcBiasTerm(context) - self._plant.CalcGravityGeneralizedForces(context)
         return self._coordinates.forces_back(R, bias)
 
-    @_mapped
+    @_convert_errors
     def _gravity_torque(self, q: Floats) -> Floats:
-        context, R = self._placed(q)
+        context, R = self._set_positions(q)
         return self._coordinates.forces_back(R, -self._plant.CalcGravityGeneralizedForces(context))
 
     # -- the whole body -----------------------------------------------------------------------
 
-    @_mapped
+    @_convert_errors
     def _center_of_mass(self, q: Floats) -> Floats:
         if not self._has_mass:
             return self._derive("center_of_mass", q)
-        context, _ = self._placed(q)
+        context, _ = self._set_positions(q)
         center: Floats = self._plant.CalcCenterOfMassPositionInWorld(context)
         return center
 
-    @_mapped
+    @_convert_errors
     def _center_of_mass_jacobian(self, q: Floats) -> Floats:
         if not self._has_mass:
             return self._derive("center_of_mass_jacobian", q)
-        context, R = self._placed(q)
+        context, R = self._set_positions(q)
         J = self._plant.CalcJacobianCenterOfMassTranslationalVelocity(context, _V, self._world, self._world)
         return self._coordinates.forces_back(R, J)
 
-    @_mapped
+    @_convert_errors
     def _centroidal_momentum(self, q: Floats, v: Floats) -> Floats:
         if not self._has_mass:
             return self._derive("centroidal_momentum", q, v)
-        context, _ = self._moving(q, v)
+        context, _ = self._set_state(q, v)
         center = self._plant.CalcCenterOfMassPositionInWorld(context)
         momentum = self._plant.CalcSpatialMomentumInWorldAboutPoint(context, center)
         return _linear_first(momentum.get_coeffs())
 
-    @_mapped
+    @_convert_errors
     def _kinetic_energy(self, q: Floats, v: Floats) -> Floats:
-        context, _ = self._moving(q, v)
+        context, _ = self._set_state(q, v)
         return np.asarray(self._plant.CalcKineticEnergy(context))
 
-    @_mapped
+    @_convert_errors
     def _potential_energy(self, q: Floats) -> Floats:
-        context, _ = self._placed(q)
+        context, _ = self._set_positions(q)
         return np.asarray(self._plant.CalcPotentialEnergy(context))
 
     # -- the state of the engine --------------------------------------------------------------
 
-    def _placed(self, q: Floats) -> tuple[Any, Floats]:
-        """The context of this thread at `q`, and the attitude of the base."""
+    def _set_positions(self, q: Floats) -> tuple[Any, Floats]:
+        """Set the configuration of this thread's context; return the context and the attitude of the base."""
         context = self._workspace.context
         self._plant.SetPositions(context, self._coordinates.positions(q))
         return context, self._coordinates.attitude(q)
 
-    def _moving(self, q: Floats, v: Floats) -> tuple[Any, Floats]:
-        """The context of this thread at `q` and `v`, and the attitude of the base."""
-        context, R = self._placed(q)
+    def _set_state(self, q: Floats, v: Floats) -> tuple[Any, Floats]:
+        """Set the state of this thread's context; return the context and the attitude of the base."""
+        context, R = self._set_positions(q)
         self._plant.SetVelocities(context, self._coordinates.velocities(R, v))
         return context, R
 
 
 def _upright(q: Floats) -> Floats:
-    """The configuration with the base at the world's frame; mass matrix and torques do not depend on the base
-    pose.
+    """The configuration with the base frame at that of the world, on whose pose no mass matrix or torque
+    depends.
 
-    Drake works in world axes: rotating a slender robot there and its results back would lose the digits by
-    which its small moment differs from its large ones.
+    Drake computes in world axes: rotating a slender robot there and its results back would lose the digits
+    of its small moment beside its large ones.
     """
     q = q.copy()
     q[:7] = _AT_WORLD

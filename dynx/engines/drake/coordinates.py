@@ -3,7 +3,7 @@
 A floating base has in Drake the position (quaternion wxyz, origin in the world) and the velocity V =
 (angular, linear), both in world axes; in dynx (origin, quaternion xyzw) and (linear, angular) in base axes.
 With R = R_world_base, V = (R w, R u) for the dynx velocity (u, w), so dV/dt = (R dw, R (du + w x u)), and
-forces go back by the transpose (virtual work). Joints keep their numbers, in Drake's own order.
+the transpose converts forces back (virtual work). Joint coordinates only change their order.
 
 Source: Drake's documentation of `QuaternionFloatingJoint`; Featherstone, Rigid Body Dynamics Algorithms,
 section 2.10, for the two time derivatives.
@@ -24,11 +24,9 @@ _ANGULAR_THEN_LINEAR = (3, 4, 5, 0, 1, 2)
 class DrakeCoordinates:
     """The map between the tree coordinates of dynx and those of a plant, one sample at a time.
 
-    `q_index`, `v_index`: where each joint of dynx, in tree order, has its position and velocity in the
-    plant. `n_q`, `n_v`: how many the plant has; those unknown to dynx are zero. `base`: where
-    the plant's floating base starts in its q and v, or None for a fixed base.
-
-    R is the result of `attitude` at the configuration.
+    `q_index` and `v_index` are the plant's indices of the joints of dynx, in tree order; `n_q` and `n_v` the
+    sizes of the plant's q and v, in which entries unknown to dynx are zero; `base` the index of the floating
+    base in both, or None for a fixed base. Methods take as R the result of `attitude` at the configuration.
     """
 
     def __init__(
@@ -101,7 +99,7 @@ class DrakeCoordinates:
             return force
         out: Floats = force[..., self._columns]
         if self._floating:
-            # Two rows of three: those in world axes times R are those in base axes.
+            # Rows of three in world axes, times R, are rows in base axes.
             pairs = out[..., :6].reshape(*out.shape[:-1], 2, 3) @ R
             out[..., :6] = pairs.reshape(*out.shape[:-1], 6)
         return out
@@ -118,12 +116,12 @@ class DrakeCoordinates:
         return (np.append(x, 0.0) if self._pad_v else x)[self._from_v]
 
 
-def _gather(places: Sequence[int], length: int) -> tuple[Array, bool]:
-    """The index of the entry for each place of the plant (one past the end for none), and whether some have
-    none."""
-    source = np.full(length, len(places))
-    source[list(places)] = range(len(places))
-    return source, len(places) != length
+def _gather(indices: Sequence[int], length: int) -> tuple[Array, bool]:
+    """The index of the source of each of the plant's entries (one past the end for none), and whether some
+    have none."""
+    source = np.full(length, len(indices))
+    source[list(indices)] = range(len(indices))
+    return source, len(indices) != length
 
 
 def _cross_product(v: Floats) -> tuple[float, float, float]:

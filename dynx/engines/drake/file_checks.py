@@ -1,4 +1,4 @@
-"""Checks that find files which Drake must not load.
+"""Checks for files that Drake must not load.
 
 For most faults Drake raises an exception, but some fail an internal check (``DRAKE_DEMAND``). In C++ that
 ends the process; pydrake raises ``SystemExit``, which also ends programs that catch ``Exception``.
@@ -24,16 +24,16 @@ _MOVING = ("revolute", "continuous", "prismatic")
 
 
 def require_harmless(path: Path, model: Model) -> None:
-    """Raise EngineError for a file on which Drake would end the process, or which it misreads as a whole."""
+    """Raise EngineError for a file on which Drake would end the process or misplace the robot."""
     require_file(path)
     if len(model.links) > MAX_LINKS:
-        raise EngineError(f"{model.name} has {len(model.links)} links; drake is given at most {MAX_LINKS}")
+        raise EngineError(f"{model.name} has {len(model.links)} links; drake can load at most {MAX_LINKS}")
     _require_own_world(model)
     try:
         source = XmlSource(read_file(str(path)), str(path))
     except ModelError as error:
-        raise EngineError(f"drake is not given a file that is no XML: {error}") from error
-    for message, line in _fatal(source):
+        raise EngineError(f"drake cannot load a file that is not XML: {error}") from error
+    for message, line in _fatal_faults(source):
         raise EngineError(located(f"drake would end the process: {message}", str(path), line))
 
 
@@ -52,7 +52,7 @@ def _require_own_world(model: Model) -> None:
         )
 
 
-def _fatal(source: XmlSource) -> Iterator[tuple[str, int]]:
+def _fatal_faults(source: XmlSource) -> Iterator[tuple[str, int]]:
     root = source.root
     if root.attributes.get("name") == "":
         yield "the robot's name is empty", root.line
@@ -87,7 +87,7 @@ def _begins_with_text(source: XmlSource, element: SourceElement) -> bool:
 
 
 def _number(element: SourceElement, attribute: str, default: float) -> float:
-    """The attribute as a number; the default where it is absent or no number."""
+    """The attribute as a number; the default where it is absent or not a number."""
     try:
         value = float(element.attributes.get(attribute, default))
     except ValueError:

@@ -4,8 +4,8 @@ Importing pydrake.multibody takes about half a second, most of it for geometry a
 `MultibodyPlant` needs. pydrake sends Drake's log to Python's logger ``drake`` and adds no handler, so
 messages about a file are captured with `captured_log` and shown nowhere else.
 
-The classes are of type Any: the stubs that come with some versions of pydrake take no NumPy array where the
-functions themselves take any.
+The classes are of type Any, because the stubs of some versions of pydrake reject NumPy arrays that the
+functions accept.
 """
 
 from __future__ import annotations

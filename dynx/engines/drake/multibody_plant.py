@@ -33,7 +33,7 @@ from dynx.spatial.scalar import Array, Floats
 from dynx.spatial.se3 import homogeneous
 
 MAX_RATIO = 1e150
-"""Length [m], or square of a radius of gyration [m^2], beyond which products with it may overflow."""
+"""Length [m], or squared radius of gyration [m^2], whose products may overflow if it is larger."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +42,7 @@ class BuiltPlant:
 
     `bodies` are the engine's bodies, the root first; `frames` the engine's frames by the number of
     the dynx frame; `body_of_frame` (n_frames,) and `T_body_frame` (n_frames, 4, 4) place each frame in
-    `bodies`. `counterweighted` says whether some body is in parts of opposite mass.
+    `bodies`. `counterweighted`: some body is made of parts of opposite mass.
     """
 
     plant: Any
@@ -107,16 +107,16 @@ def build_plant(mechanism: Mechanism) -> BuiltPlant:
 
 
 def _parts(inertia: RigidInertia) -> list[Any]:
-    """The inertia as one of Drake's, or as several where it cannot be divided by its mass."""
+    """Drake's inertia, or several that add up to it where it cannot be divided by its mass."""
     mass = float(inertia.mass)
     if not (inertia.first_moment.any() or inertia.rotational_inertia.any()):
         return [_inertia(mass, inertia)]
     largest = float(max(np.max(np.abs(inertia.first_moment)), np.max(np.abs(inertia.rotational_inertia))))
     if mass and largest < MAX_RATIO * abs(mass):
         return [_inertia(mass, inertia)]
-    nothing = RigidInertia(inertia.mass, np.zeros(3), np.zeros((3, 3)))
-    parts = [_inertia(largest, inertia), _inertia(-largest, nothing)]
-    return [*parts, _inertia(mass, nothing)] if mass else parts
+    point = RigidInertia(inertia.mass, np.zeros(3), np.zeros((3, 3)))
+    parts = [_inertia(largest, inertia), _inertia(-largest, point)]
+    return [*parts, _inertia(mass, point)] if mass else parts
 
 
 def _inertia(mass: float, moments: RigidInertia) -> Any:

@@ -1,4 +1,4 @@
-"""Settings of a robot that Drake has loaded: the remedies at run time."""
+"""Remedies at run time: settings of a robot that Drake has loaded."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ CALLS: Mapping[str, str] = {
 
 NEGLIGIBLE_MASS = 2.0**-200
 """Mass [kg] of a link for which the file states an inertia and no mass: a power of two, so that dividing by
-it is exact, and too small for its weight to show beside any inertia."""
+it is exact, and so small that its weight is lost in rounding."""
 
 
 def set_before_finalize(plant: Any, calls: Collection[str]) -> None:

@@ -1,4 +1,4 @@
-"""A URDF as MuJoCo loads it from the file.
+"""A URDF file as MuJoCo loads it.
 
 Quantities are those of the calls that users make, `mj_inverse` and `mj_forward`, with all forces that MuJoCo
 adds to rigid bodies. Joint damping, dry friction, violated limits, `<mimic>` (an equality constraint) and
@@ -26,7 +26,7 @@ from dynx.spatial.scalar import Floats
 
 
 class LoadedMujoco(LoadedRobot):
-    """The robot as `mujoco.MjModel.from_xml_path` gives it; see `LoadedRobot`."""
+    """A robot as `mujoco.MjModel.from_xml_path` loads it; see `LoadedRobot`."""
 
     name: ClassVar[str] = "mujoco"
     CALLS: ClassVar[Mapping[str, str]] = CALLS
@@ -39,7 +39,7 @@ class LoadedMujoco(LoadedRobot):
         self._bodies = [self._body(link.name) for link in model.links]
         joints = [self._joint(name) for name in model.joint_names]
         base = 6 if model.floating else 0
-        # Places of dynx's coordinates among MuJoCo's; the free joint comes first in both.
+        # Indices of dynx's coordinates among MuJoCo's; the free joint comes first in both.
         self._q = [int(loaded.jnt_qposadr[joint]) for joint in joints]
         self._v = [*range(base), *(int(loaded.jnt_dofadr[joint]) for joint in joints)]
         self._data = mujoco.MjData(loaded)
@@ -55,7 +55,7 @@ class LoadedMujoco(LoadedRobot):
         return FLOATING if floating else FIXED
 
     def describe(self) -> LoadedModel:
-        """The description of MuJoCo's model."""
+        """Describe MuJoCo's model."""
         return describe_model(self._loaded, self._model, self._gravity)
 
     def link_poses(self, q: Floats) -> Floats:
@@ -90,7 +90,7 @@ class LoadedMujoco(LoadedRobot):
         self._place(q)
         mujoco.mj_forward(self._loaded, self._data)
         M = np.zeros((self._loaded.nv, self._loaded.nv))
-        # Since 4.0 its argument is the data, before that their field qM.
+        # Since MuJoCo 4.0 the argument is the data, before that its field qM.
         if hasattr(self._data, "qM"):
             mujoco.mj_fullM(self._loaded, M, self._data.qM)
         else:
@@ -163,8 +163,8 @@ class LoadedMujoco(LoadedRobot):
 
     def _joint(self, name: str) -> int:
         number = int(mujoco.mj_name2id(self._loaded, mujoco.mjtObj.mjOBJ_JOINT, name))
-        one = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
-        if number < 0 or self._loaded.jnt_type[number] not in [int(kind) for kind in one]:
-            there = "not there" if number < 0 else "of several degrees of freedom"
-            raise lacking_joints(self.name, self._model, {name: there})
+        single = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
+        if number < 0 or self._loaded.jnt_type[number] not in [int(kind) for kind in single]:
+            instead = "not there" if number < 0 else "of several degrees of freedom"
+            raise lacking_joints(self.name, self._model, {name: instead})
         return number

@@ -1,8 +1,8 @@
 """The backend `mujoco`: MuJoCo's kinematics, Jacobians, accelerations and LDL' solver.
 
 The engine's model is built from the links and joints of the `Model` (`tree`), independently of
-`dynx.model.mechanism`; it has no limits, contacts, damping or actuators, so MuJoCo's constraint solver has no
-work. Mass matrix and torques are computed from MuJoCo's poses, axes, accelerations and inertias, because
+`dynx.model.mechanism`; it has no limits, contacts, damping or actuators, so MuJoCo's constraint solver is
+idle. Mass matrix and torques are computed from MuJoCo's poses, axes, accelerations and inertias, because
 `mj_crb` and `mj_rne` lose digits (`projection`). Tree coordinates are MuJoCo's own except for a floating
 base: its quaternion is (w, x, y, z), and its linear velocity is in world axes.
 
@@ -23,7 +23,7 @@ from dynx.backends.engine_errors import engine_errors
 from dynx.engines.mujoco.library import mujoco, silent_data
 from dynx.engines.mujoco.projection import ProjectedDynamics
 from dynx.engines.mujoco.tree import ROOT, build_tree
-from dynx.errors import DynxError, EngineError
+from dynx.errors import DynxError, EngineError, nonblank_lines
 from dynx.model import Model
 from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED, Reference
 from dynx.spatial.scalar import Floats
@@ -34,11 +34,10 @@ ALMOST_SINGULAR = int(mujoco.mjtWarning.mjWARN_INERTIA)
 
 
 def _message(error: BaseException) -> str:
-    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
-    return f"{type(error).__name__}: {lines[0] if lines else 'no message'}"
+    return f"{type(error).__name__}: {(nonblank_lines(error) or ['no message'])[0]}"
 
 
-_mapped = engine_errors("mujoco", _message)
+_convert_errors = engine_errors("mujoco", _message)
 
 
 class _Workspace(local):
@@ -56,7 +55,7 @@ class MujocoBackend(Backend):
 
     A batch is a Python loop over the engine's calls. For batches the backend ``compiled`` gives the same
     numbers, to rounding, about 200 times as fast in forward dynamics, which is MuJoCo's own, and 8,000 times
-    in inverse dynamics, which is put together in Python (UR5, one thread, to one significant figure:
+    in inverse dynamics, which is composed in Python (UR5, one thread, to one significant figure:
     ``dynx bench ur5 --batch 65536 --threads 1``; other quantities are in docs/bench.md).
     """
 
@@ -90,51 +89,50 @@ class MujocoBackend(Backend):
 
     # -- kinematics ---------------------------------------------------------------------------
 
-    @_mapped
+    @_convert_errors
     def _frame_placements(self, q: Floats) -> Floats:
-        work = self._placed(q)
+        work = self._set_positions(q)
         T = np.zeros((len(self._bodies), 4, 4))
         bodies = list(self._bodies)
         T[:, :3, :3], T[:, :3, 3], T[:, 3, 3] = work.R[bodies], work.p[bodies], 1.0
         return T
 
-    @_mapped
+    @_convert_errors
     def _frame_placement(self, q: Floats, frame: int) -> Floats:
-        work, body = self._placed(q), self._bodies[frame]
+        work, body = self._set_positions(q), self._bodies[frame]
         T = np.zeros((4, 4))
         T[:3, :3], T[:3, 3], T[3, 3] = work.R[body], work.p[body], 1.0
         return T
 
-    @_mapped
+    @_convert_errors
     def _jacobian(self, q: Floats, frame: int, reference: Reference) -> Floats:
-        work, body = self._placed(q), self._bodies[frame]
+        work, body = self._set_positions(q), self._bodies[frame]
         mujoco.mj_comPos(self._engine, work.data)
         J = self._columns(work, mujoco.mj_jac, ORIGIN if reference == "world" else work.p[body], body)
         if reference == "local":
             return np.concatenate([work.R[body].T @ J[:3], work.R[body].T @ J[3:]])
         return J
 
-    @_mapped
+    @_convert_errors
     def _jacobian_derivative(self, q: Floats, v: Floats, frame: int, reference: Reference) -> Floats:
-        work, body = self._moving(q, v), self._bodies[frame]
+        work, body = self._set_state(q, v), self._bodies[frame]
         p, R = work.p[body], work.R[body]
         J = self._columns(work, mujoco.mj_jac, p, body)
         dJ = self._columns(work, mujoco.mj_jacDot, p, body)
         if self._floating:
             # The base's linear columns are its axes, which rotate with it.
-            root = work.R[ROOT] @ skew(v[3:6])
-            dJ[:3, :3] = root
+            dJ[:3, :3] = work.R[ROOT] @ skew(v[3:6])
         if reference == LOCAL_WORLD_ALIGNED:
             return dJ
-        velocity, omega = (J[:3] @ v, J[3:] @ v)
+        velocity, omega = J[:3] @ v, J[3:] @ v
         if reference == "local":
             spin = skew(omega)
             return np.concatenate([R.T @ (dJ[:3] - spin @ J[:3]), R.T @ (dJ[3:] - spin @ J[3:])])
         return np.concatenate([dJ[:3] + skew(velocity) @ J[3:] + skew(np.array(p)) @ dJ[3:], dJ[3:]])
 
-    @_mapped
+    @_convert_errors
     def _frame_velocity(self, q: Floats, v: Floats, frame: int, reference: Reference) -> Floats:
-        work, body = self._moving(q, v), self._bodies[frame]
+        work, body = self._set_state(q, v), self._bodies[frame]
         twist = np.zeros(6)
         kind = mujoco.mjtObj.mjOBJ_XBODY
         mujoco.mj_objectVelocity(self._engine, work.data, kind, body, twist, reference == "local")
@@ -145,18 +143,18 @@ class MujocoBackend(Backend):
 
     # -- dynamics -----------------------------------------------------------------------------
 
-    @_mapped
+    @_convert_errors
     def _inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
-        work = self._moving(q, v)
+        work = self._set_state(q, v)
         work.a[:] = a
         if self._floating:
             work.a[:3] = work.R[ROOT] @ (a[:3] + np.cross(v[3:6], v[:3]))
         mujoco.mj_rnePostConstraint(self._engine, work.data)
         return self._dynamics.torque(work.data, work.R[ROOT], work.p[ROOT])
 
-    @_mapped
+    @_convert_errors
     def _forward_dynamics(self, q: Floats, v: Floats, tau: Floats) -> Floats:
-        work = self._moving(q, v)
+        work = self._set_state(q, v)
         work.tau[:] = tau
         if self._floating:
             work.tau[:3] = work.R[ROOT] @ tau[:3]
@@ -172,26 +170,26 @@ class MujocoBackend(Backend):
             a[:3] = work.R[ROOT].T @ a[:3] - np.cross(v[3:6], v[:3])
         return a
 
-    @_mapped
+    @_convert_errors
     def _mass_matrix(self, q: Floats) -> Floats:
-        work = self._placed(q)
+        work = self._set_positions(q)
         return self._dynamics.mass_matrix(work.data, work.R[ROOT], work.p[ROOT])
 
     # -- the whole body -----------------------------------------------------------------------
 
-    @_mapped
+    @_convert_errors
     def _center_of_mass(self, q: Floats) -> Floats:
         if not self._masses_add:
             return self._derive("center_of_mass", q)
-        work = self._placed(q)
+        work = self._set_positions(q)
         mujoco.mj_comPos(self._engine, work.data)
         return np.array(work.data.subtree_com[ROOT])
 
-    @_mapped
+    @_convert_errors
     def _center_of_mass_jacobian(self, q: Floats) -> Floats:
         if not self._masses_add:
             return self._derive("center_of_mass_jacobian", q)
-        work = self._placed(q)
+        work = self._set_positions(q)
         mujoco.mj_comPos(self._engine, work.data)
         J = np.zeros((3, self._nv))
         mujoco.mj_jacSubtreeCom(self._engine, work.data, J, ROOT)
@@ -199,25 +197,25 @@ class MujocoBackend(Backend):
             J[:, :3] = J[:, :3] @ work.R[ROOT]
         return J
 
-    @_mapped
+    @_convert_errors
     def _centroidal_momentum(self, q: Floats, v: Floats) -> Floats:
         if not self._masses_add:
             return self._derive("centroidal_momentum", q, v)
-        data = self._moving(q, v).data
+        data = self._set_state(q, v).data
         mujoco.mj_subtreeVel(self._engine, data)
         linear = self._total_mass * data.subtree_linvel[ROOT]
         return np.concatenate([linear, data.subtree_angmom[ROOT]])
 
-    @_mapped
+    @_convert_errors
     def _potential_energy(self, q: Floats) -> Floats:
-        data = self._placed(q).data
+        data = self._set_positions(q).data
         mujoco.mj_energyPos(self._engine, data)
         return np.array(data.energy[0])
 
     # -- the engine's state -------------------------------------------------------------------
 
-    def _placed(self, q: Floats) -> _Workspace:
-        """The workspace of this thread with the poses of all bodies at `q`."""
+    def _set_positions(self, q: Floats) -> _Workspace:
+        """Compute the poses of all bodies at `q` in this thread's workspace, which is returned."""
         work = self._workspace
         work.q[:] = q
         if self._floating:
@@ -225,9 +223,9 @@ class MujocoBackend(Backend):
         mujoco.mj_kinematics(self._engine, work.data)
         return work
 
-    def _moving(self, q: Floats, v: Floats) -> _Workspace:
-        """The workspace of this thread with poses and velocities of all bodies."""
-        work = self._placed(q)
+    def _set_state(self, q: Floats, v: Floats) -> _Workspace:
+        """Compute the poses and velocities of all bodies in this thread's workspace, which is returned."""
+        work = self._set_positions(q)
         work.v[:] = v
         if self._floating:
             work.v[:3] = work.R[ROOT] @ v[:3]

@@ -10,7 +10,7 @@ from typing import Any
 
 from dynx.engines.mujoco.library import MAX_DEPTH, mujoco
 from dynx.engines.silence import silence
-from dynx.errors import EngineError, shown
+from dynx.errors import EngineError, nonblank_lines, shown
 from dynx.loaded.robot import require_file
 from dynx.model import Model
 
@@ -33,8 +33,7 @@ FLOATING = (
 
 
 def load_file(path: Path, model: Model, calls: Collection[str]) -> Any:
-    """MuJoCo's model of the file, `calls` applied; raises EngineError with MuJoCo's message where it
-    refuses."""
+    """Load the file in MuJoCo and apply `calls`; raises EngineError with MuJoCo's message if that fails."""
     _refuse_crashes(path, model)
     names: dict[str, Any] = {"mujoco": mujoco, "path": str(path)}
     loading = FLOATING if model.floating else FIXED
@@ -85,12 +84,11 @@ def _refuse_crashes(path: Path, model: Model) -> None:
         depth[joint.child] = depth[joint.parent] + 1
     if max(depth.values()) > MAX_DEPTH:
         raise EngineError(
-            f"mujoco is not given {path.name}: it has {max(depth.values())} links in a row, and "
-            f"long chains crash MuJoCo (at most {MAX_DEPTH} are tried)"
+            f"{path.name} has {max(depth.values())} links in a row; long chains crash mujoco, so dynx loads "
+            f"at most {MAX_DEPTH}"
         )
 
 
 def _message(error: Exception) -> str:
-    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     # Such as "Error: inertia must satisfy A + B >= C" and "Element name 'arm', id 2".
-    return "; ".join(lines[:2]) or type(error).__name__
+    return "; ".join(nonblank_lines(error)[:2]) or type(error).__name__

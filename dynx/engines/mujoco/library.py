@@ -1,4 +1,4 @@
-"""The only import of MuJoCo, as the module `mujoco`, and how dynx silences its warnings."""
+"""The only import of MuJoCo, as the module `mujoco`, and the silencing of its warnings."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ except (ImportError, AttributeError, OSError, RuntimeError) as error:
 __all__ = ["MAX_DEPTH", "mujoco", "silence_warnings", "silent_data"]
 
 MAX_DEPTH = 1000
-"""Largest depth of the tree of links that MuJoCo is given. Its compiler has a limit of 1,024 bodies; its
-reader of files is recursive, and ends the process when the stack of the thread is full (measured, 4.0)."""
+"""Largest depth of a tree of links for MuJoCo. Its compiler has a limit of 1,024 bodies; its reader of files
+is recursive, and ends the process when the stack of the thread is full (measured, 4.0)."""
 
 
 def silent_data(model: Any) -> Any:

@@ -1,4 +1,4 @@
-"""The model that MuJoCo holds after loading a file, link by link and joint by joint."""
+"""Description of the links and joints that MuJoCo holds after loading a file."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ NAMES = {
 
 
 def describe_model(loaded: Any, model: Model, gravity: Floats) -> LoadedModel:
-    """The description of a MuJoCo model `loaded` from a file with the names of `model`."""
+    """Describe a MuJoCo model `loaded` from a file with the names of `model`."""
     here = {loaded.body(number).name: number for number in range(1, loaded.nbody)}
-    merged = _merged(model, here)
+    merged = _merged_links(model, here)
     links = {
         link.name: _inertial(loaded, here[link.name], merged.get(link.name, ()))
         for link in model.links
@@ -54,7 +54,7 @@ def describe_model(loaded: Any, model: Model, gravity: Floats) -> LoadedModel:
     )
 
 
-def _merged(model: Model, here: dict[str, int]) -> dict[str, tuple[str, ...]]:
+def _merged_links(model: Model, here: dict[str, int]) -> dict[str, tuple[str, ...]]:
     """For each link that MuJoCo kept, the links that it merged into it."""
     carrier = {model.root: model.root}
     found: dict[str, list[str]] = {}
@@ -100,10 +100,10 @@ def _placement(loaded: Any, body: int, model: Model, here: dict[str, int]) -> Fl
     parents = [joint.parent for joint in model.joints if joint.child == child]
     if not parents:
         return None
-    holder = int(loaded.body_parentid[body])
+    parent = int(loaded.body_parentid[body])
     # A root link that became the world keeps its frame.
     kept = here.get(parents[0], WORLD if parents[0] == model.root else None)
-    return _pose(loaded.body_pos[body], loaded.body_quat[body]) if kept == holder else None
+    return _pose(loaded.body_pos[body], loaded.body_quat[body]) if kept == parent else None
 
 
 def _pose(p: Floats, quat_wxyz: Floats) -> Floats:

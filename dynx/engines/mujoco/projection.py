@@ -1,12 +1,12 @@
-"""Mass matrix and torques projected from MuJoCo's kinematics, because MuJoCo's own lose digits.
+"""Mass matrix and torques projected from MuJoCo's kinematics, because those of MuJoCo lose digits.
 
 MuJoCo refers the inertia of every body to the centre of mass of the whole robot. For a finger of mass m at a
-distance d from there that adds m d^2 to an inertia that may be a thousandth of it, and takes it away again
+distance d from there, m d^2 is added to an inertia that may be a thousandth of it, and later subtracted
 (`mj_crb`, `mj_rne`): on robots with hands the entries of its matrix are off by 1e-12 of sqrt(M_ii M_jj)
-(MuJoCo 4.0), and the torque about an axis through a point mass, which is zero, comes out as a rounding of the
-largest one. Here M is the sum of m Jp' Jp + Jr' I Jr over the bodies (Siciliano et al., Robotics, eq. 7.32)
-and the torque the sum of Jp' m (a - g) + Jr' (I dw + w x I w) (Newton and Euler, projected as in Kane's
-method), with levers from joint to body, which need no distant point.
+(MuJoCo 4.0), and the torque about an axis through a point mass, which is zero, comes out as a rounding error
+of the largest torque. Here M is the sum of m Jp' Jp + Jr' I Jr over the bodies (Siciliano et al., Robotics,
+eq. 7.32) and the torque the sum of Jp' m (a - g) + Jr' (I dw + w x I w) (Newton and Euler, projected as in
+Kane's method), with lever arms from joint to body, not from a distant point.
 """
 
 from __future__ import annotations
@@ -20,8 +20,7 @@ from dynx.spatial.scalar import Floats
 
 
 class ProjectedDynamics:
-    """Mass matrix and torques of one model; it keeps the bodies with inertia and the coordinates that move
-    them.
+    """Mass matrix and torques of one model, from its bodies with inertia.
 
     Coordinates are MuJoCo's, except that the velocity of a floating base is in base axes.
     """
@@ -45,7 +44,7 @@ class ProjectedDynamics:
     def mass_matrix(self, data: Any, R_root: Floats, p_root: Floats) -> Floats:
         """The mass matrix (nv, nv); `data` after `mj_kinematics`, (R, p) the pose of the root."""
         Jp, Jr = self._jacobians(data, R_root, p_root)
-        M: Floats = _weighted(Jp, np.repeat(self._mass, 3)) + _weighted(Jr, self._moments.ravel())
+        M: Floats = _gramian(Jp, np.repeat(self._mass, 3)) + _gramian(Jr, self._moments.ravel())
         return np.asarray(0.5 * (M + M.T))
 
     def torque(self, data: Any, R_root: Floats, p_root: Floats) -> Floats:
@@ -82,7 +81,7 @@ class ProjectedDynamics:
         return Jp, Jr
 
 
-def _weighted(J: Floats, weights: Floats) -> Floats:
+def _gramian(J: Floats, weights: Floats) -> Floats:
     """The sum of w J' J over the rows of all bodies."""
     rows = J.reshape(len(weights), J.shape[-1])
     return np.asarray(rows.T @ (weights[:, None] * rows))

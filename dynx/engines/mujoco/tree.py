@@ -3,10 +3,10 @@ moves.
 
 MuJoCo's compiler refuses inertias that a description can hold (no mass on a moving body, a violated triangle
 inequality, a negative principal moment). So it compiles the tree with substitute inertias, and the numbers of
-the description are written into the compiled model: the algorithms accept any, since they are affine in them.
-Of the fields that the compiler derives from inertias, the algorithms used here read `body_subtreemass` only,
-which is written too. The substitutes lie off the body frames, so that the compiler does not simplify bodies
-with a diagonal inertia.
+the description are written into the compiled model: the algorithms accept any inertia, since they are affine
+in it. Of the fields that the compiler derives from inertias, the algorithms used here read only
+`body_subtreemass`, which is written too. The substitutes lie off the body frames, so that the compiler does
+not simplify bodies with a diagonal inertia.
 """
 
 from __future__ import annotations
@@ -37,9 +37,9 @@ ROOT = 1
 
 @dataclass(frozen=True)
 class MujocoTree:
-    """MuJoCo's compiled model, and the number of the body that is each frame of `Model.frames`.
+    """MuJoCo's compiled model, and MuJoCo's body for each frame of `Model.frames`.
 
-    `masses_add` says whether MuJoCo's own centres of mass are right: there is mass, and none is negative.
+    `masses_add`: MuJoCo's own centres of mass are right, because there is mass and none is negative.
     """
 
     model: Any

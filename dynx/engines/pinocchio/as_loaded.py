@@ -1,6 +1,6 @@
 """A URDF file as Pinocchio loads it: ``pin.buildModelFromUrdf`` and nothing more.
 
-Pinocchio orders joints in its own way, has two numbers (cos, sin) for a continuous joint, and makes joints of
+Pinocchio has its own order of joints, has two numbers (cos, sin) for a continuous joint, and makes joints of
 several degrees of freedom where the file has them. Here its coordinates are converted to those of dynx by the
 names of the joints.
 """
@@ -14,19 +14,14 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from dynx.engines.pinocchio.engine_model import MAX_NV, WORLD
 from dynx.engines.pinocchio.library import pin
 from dynx.engines.silence import capture_output
-from dynx.errors import EngineError
+from dynx.errors import EngineError, nonblank_lines
 from dynx.loaded.description import LoadedInertial, LoadedJoint, LoadedModel
 from dynx.loaded.robot import LoadedRobot, lacking_joints, require_file
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
-
-MAX_NV = 200
-"""Largest number of degrees of freedom: the engine's workspace takes 64 nv^3 bytes, twice."""
-
-WORLD = 0
-"""Pinocchio's joint 0, the universe."""
 
 _TYPES = {"FreeFlyer": "floating", "Planar": "planar", "Spherical": "spherical"}
 
@@ -41,7 +36,7 @@ class LoadedPinocchio(LoadedRobot):
         self._model = model
         root = [pin.JointModelFreeFlyer()] if model.floating else []
         messages: list[str] = []
-        with self._mapped("buildModelFromUrdf"):
+        with self._convert_errors("buildModelFromUrdf"):
             with capture_output(messages):
                 self._engine = pin.buildModelFromUrdf(str(path), *root)
             if self._engine.nv > MAX_NV:
@@ -61,7 +56,7 @@ class LoadedPinocchio(LoadedRobot):
             if frame.type == pin.FrameType.BODY
         }
         base = list(range(6)) if model.floating else []
-        # Places of dynx's coordinates among the engine's velocities.
+        # Index in the engine's velocity of each velocity of dynx.
         self._v = np.array(base + [int(joint.idx_v) for joint in self._joints], dtype=np.intp)
 
     @classmethod
@@ -71,7 +66,7 @@ class LoadedPinocchio(LoadedRobot):
 
     @classmethod
     def load_call(cls, floating: bool) -> str:
-        """One line; the joint of a free base is given as the second argument."""
+        """One line; the joint of a floating base is the second argument."""
         root = ", pinocchio.JointModelFreeFlyer()" if floating else ""
         return f"model = pinocchio.buildModelFromUrdf(path{root})"
 
@@ -80,7 +75,7 @@ class LoadedPinocchio(LoadedRobot):
     def link_poses(self, q: Floats) -> Floats:
         """Poses of the engine's BODY frames."""
         T = np.full((len(self._model.links), 4, 4), np.nan)
-        with self._mapped("framesForwardKinematics"):
+        with self._convert_errors("framesForwardKinematics"):
             pin.framesForwardKinematics(self._engine, self._data, self._configuration(q))
             for k, link in enumerate(self._model.links):
                 if link.name in self._links:
@@ -91,7 +86,7 @@ class LoadedPinocchio(LoadedRobot):
         """``computeFrameJacobian`` in LOCAL_WORLD_ALIGNED."""
         if link not in self._links:
             return np.full((6, self._model.nv), np.nan)
-        with self._mapped("computeFrameJacobian"):
+        with self._convert_errors("computeFrameJacobian"):
             J = pin.computeFrameJacobian(
                 self._engine,
                 self._data,
@@ -104,7 +99,7 @@ class LoadedPinocchio(LoadedRobot):
 
     def mass_matrix(self, q: Floats) -> Floats:
         """``crba``."""
-        with self._mapped("crba"):
+        with self._convert_errors("crba"):
             M = np.array(pin.crba(self._engine, self._data, self._configuration(q)))
         # Some versions fill the upper triangle only.
         M = np.triu(M) + np.triu(M, 1).T
@@ -112,17 +107,17 @@ class LoadedPinocchio(LoadedRobot):
 
     def inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
         """``rnea``."""
-        with self._mapped("rnea"):
+        with self._convert_errors("rnea"):
             tau = pin.rnea(
                 self._engine, self._data, self._configuration(q), self._velocity(v), self._velocity(a)
             )
         return np.asarray(tau[self._v])
 
     def forward_dynamics(self, q: Floats, v: Floats, tau: Floats) -> Floats:
-        """``aba``; where a joint that the model lacks is held, solved from ``crba`` and ``rnea``."""
+        """``aba``; solved from ``crba`` and ``rnea`` where a joint that the model lacks is held."""
         if len(self._v) < self._engine.nv:
             return self._solved_acceleration(q, v, tau)
-        with self._mapped("aba"):
+        with self._convert_errors("aba"):
             a = pin.aba(
                 self._engine, self._data, self._configuration(q), self._velocity(v), self._velocity(tau)
             )
@@ -134,7 +129,7 @@ class LoadedPinocchio(LoadedRobot):
     # -- what was loaded ----------------------------------------------------------------------
 
     def describe(self) -> LoadedModel:
-        """The model from frames, joint models and the engine's vectors of limits.
+        """Describe the model from frames, joint models and the engine's vectors of limits.
 
         Pinocchio keeps the inertia of a link on a fixed joint separately, and that of a link on a moving
         joint only merged with the links rigidly connected to it, which `LoadedInertial.merged` names.
@@ -235,13 +230,12 @@ class LoadedPinocchio(LoadedRobot):
         return x
 
     @contextmanager
-    def _mapped(self, call: str) -> Iterator[None]:
+    def _convert_errors(self, call: str) -> Iterator[None]:
         """Raise the engine's exceptions as `EngineError` with its messages."""
         try:
             yield
         except EngineError:
             raise
         except Exception as error:
-            lines = [line.strip() for line in str(error).splitlines() if line.strip()]
-            message = lines[-1] if lines else type(error).__name__
+            message = (nonblank_lines(error) or [type(error).__name__])[-1]
             raise EngineError(f"pinocchio failed in {call} for {self._model.name}: {message}") from error

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from dynx.engines.pinocchio.library import pin
-from dynx.errors import DynxError, EngineError, EngineLimitError, shown
+from dynx.errors import DynxError, EngineError, EngineLimitError, nonblank_lines, shown
 from dynx.model import Model
 from dynx.model.elements import Inertial, Joint, Pose
 from dynx.rbd.regressor import inertia_from_parameters, parameters_from_inertia
@@ -28,13 +28,12 @@ WORLD = 0
 def error_message(error: BaseException) -> str:
     """The engine's message, without the C++ signatures before and after it."""
     _, _, message = str(error).rpartition("message:\n")
-    lines = [line.strip() for line in message.splitlines() if line.strip()]
-    return f"{type(error).__name__}: {lines[0] if lines else 'no message'}"
+    return f"{type(error).__name__}: {(nonblank_lines(message) or ['no message'])[0]}"
 
 
 @lru_cache(maxsize=16)
 def engine_model(model: Model) -> tuple[Any, tuple[int, ...]]:
-    """Pinocchio's own model of `model`, and the number it gave to each frame of `model.frame_names`.
+    """Build Pinocchio's own model of `model`; also return the number of each frame of `model.frame_names`.
 
     It is made once for all backends of a model, which never change it. Its coordinates are those of the tree,
     mimic joints included. Raises EngineLimitError for a model that the engine would hold wrongly or that is
@@ -81,18 +80,19 @@ def _build(model: Model) -> tuple[Any, tuple[int, ...]]:
     for index, frame in enumerate(model.frames):
         carrier, T_carrier_link = placements[frame.link]
         T_carrier_frame = T_carrier_link * _placement(frame.placement)
-        made = pin.Frame(f"{index}:{frame.name}", carrier, 0, T_carrier_frame, pin.FrameType.OP_FRAME)
-        frame_ids.append(int(engine.addFrame(made, False)))
+        engine_frame = pin.Frame(f"{index}:{frame.name}", carrier, 0, T_carrier_frame, pin.FrameType.OP_FRAME)
+        frame_ids.append(int(engine.addFrame(engine_frame, False)))
     return engine, tuple(frame_ids)
 
 
 def joint_parameters_of_links(engine: Any, links: Sequence[int]) -> tuple[list[int], Floats]:
     """The map from inertial parameters of links to those of the joints that carry them.
 
-    For each link it has the number of its joint, not counting the universe, and the matrix (10, 10) from its
-    parameters in dynx's order to those of the joint in the engine's; zeros for links on the universe.
+    It consists, for each link, of the number of its joint, not counting the universe, and the matrix (10, 10)
+    from its parameters in dynx's order to the joint's in the engine's order, zero for links on the universe.
     """
-    theirs = [0, 1, 2, 3, 4, 5, 7, 6, 8, 9]  # the tensor goes down the columns of its upper triangle
+    # Pinocchio lists the upper triangle of the tensor column by column.
+    engine_order = [0, 1, 2, 3, 4, 5, 7, 6, 8, 9]
     joints, matrices = [], []
     for link in links:
         frame = engine.frames[link]
@@ -100,7 +100,7 @@ def joint_parameters_of_links(engine: Any, links: Sequence[int]) -> tuple[list[i
         moved = [
             parameters_from_inertia(inertia_from_parameters(unit).transform(R, p)) for unit in np.eye(10)
         ]
-        matrix = np.stack(moved, axis=-1)[theirs]
+        matrix = np.stack(moved, axis=-1)[engine_order]
         joints.append(max(int(frame.parentJoint) - 1, 0))
         matrices.append(0.0 * matrix if frame.parentJoint == WORLD else matrix)
     return joints, np.stack(matrices)
@@ -133,13 +133,13 @@ def _add_inertia(engine: Any, carrier: int, T_carrier_link: Any, inertial: Inert
     own = pin.Inertia.Zero()
     own.mass, own.inertia = inertial.mass, inertial.tensor
     placed = (T_carrier_link * _placement(inertial.origin)).act(own)
-    before = engine.inertias[carrier]
+    present = engine.inertias[carrier]
     if _is_zero(placed):
         return
-    if _is_zero(before):
+    if _is_zero(present):
         engine.inertias[carrier] = placed
         return
-    _refuse_light_sum(before.mass + placed.mass, link)
+    _refuse_light_sum(present.mass + placed.mass, link)
     engine.appendBodyToJoint(carrier, placed, pin.SE3.Identity())
 
 

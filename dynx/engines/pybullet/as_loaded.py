@@ -1,6 +1,6 @@
 """A URDF file as PyBullet loads it, with the flag that makes it read the file's inertias.
 
-Calls are made as by a careful user who knows Bullet's conventions: its world is the inertial frame of the
+Engine calls respect Bullet's conventions: its world is the inertial frame of the
 root (centre of mass, principal axes) for inverse dynamics, mass matrix and Jacobian of a floating base;
 columns are angular before linear; the pose of a link is composed from the double-precision pose of its
 inertial frame; gravity is rotated instead of the base. The frames are those that Bullet reports, never those
@@ -9,7 +9,7 @@ of the file.
 The effects of loading show in the results: masses and inertias that differ from the file, a base that stays
 in place because its root has no mass, axes that are not of unit length, damping and limits that act in a
 step. With a fixed base, inverse dynamics and the Jacobian are in the axes of the root's inertial frame
-instead of those of the world, since such a user cannot change that.
+instead of those of the world, because no call changes that.
 """
 
 from __future__ import annotations
@@ -120,7 +120,7 @@ class LoadedPyBullet(LoadedRobot):
         return f"robot = p.loadURDF(path, useFixedBase={not floating}, flags=p.URDF_USE_INERTIA_FROM_FILE)"
 
     def describe(self) -> LoadedModel:
-        """The model from `getDynamicsInfo` and `getJointInfo`."""
+        """Describe the model from `getDynamicsInfo` and `getJointInfo`."""
         base = self.link_poses(self._model.neutral())[0]
         return describe_model(self._client, self._model, self._links, base)
 
@@ -171,7 +171,7 @@ class LoadedPyBullet(LoadedRobot):
         return J
 
     def _base_jacobian(self, q: Floats, link: str) -> Floats:
-        """The Jacobian of a link that only the base moves."""
+        """The Jacobian of a link that moves with the base only."""
         J = np.zeros((6, self._model.nv))
         if self._model.floating:
             R = rotation_from_quat(q[3:7])
@@ -183,9 +183,9 @@ class LoadedPyBullet(LoadedRobot):
 
     def mass_matrix(self, q: Floats) -> Floats:
         """`calculateMassMatrix`."""
-        if not self._coordinates:
+        if not self._has_coordinates:
             return np.zeros((0, 0))
-        M = self._extrapolated(lambda client: client.mass_matrix(self._joints(q)))
+        M = self._extrapolate(lambda client: client.mass_matrix(self._joints(q)))
         base = 6 if self._model.floating else 0
         kept = [*range(base), *(base + k for k in self._order)]
         M = M[np.ix_(kept, kept)]
@@ -196,22 +196,22 @@ class LoadedPyBullet(LoadedRobot):
 
     def inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
         """`calculateInverseDynamics`."""
-        if not self._coordinates:
+        if not self._has_coordinates:
             return np.zeros(0)
         if not self._model.floating:
             gravity = list(self._model.gravity)
-            x = self._joints(q), self._spread(v), self._spread(a), gravity
-            return self._extrapolated(lambda client: client.inverse_dynamics(*x))[self._order]
+            x = self._joints(q), self._in_bullet_order(v), self._in_bullet_order(a), gravity
+            return self._extrapolate(lambda client: client.inverse_dynamics(*x))[self._order]
         v_C, a_C = self._X @ v[:6], self._X @ a[:6]
         # dv/dt in rotating axes to the classical acceleration of the centre of mass.
         a_C[3:] += cross(v_C[:3], v_C[3:])
         x = (
             self._joints(q),
-            [*v_C.tolist(), *self._spread(v[6:])],
-            [*a_C.tolist(), *self._spread(a[6:])],
+            [*v_C.tolist(), *self._in_bullet_order(v[6:])],
+            [*a_C.tolist(), *self._in_bullet_order(a[6:])],
             self._gravity_in_C(q),
         )
-        tau = self._extrapolated(lambda client: client.inverse_dynamics(*x))
+        tau = self._extrapolate(lambda client: client.inverse_dynamics(*x))
         # Bullet returns the force first.
         wrench = self._X.T @ np.concatenate([tau[3:6], tau[:3]])
         return np.concatenate([wrench, tau[6:][self._order]])
@@ -219,21 +219,23 @@ class LoadedPyBullet(LoadedRobot):
     def forward_dynamics(self, q: Floats, v: Floats, tau: Floats) -> Floats:
         """The change of the velocity in one step of unit length.
 
-        Where a joint that the model lacks is held, it is solved from mass matrix and inverse dynamics.
+        It is solved from mass matrix and inverse dynamics where a joint that the model lacks is held.
         """
-        if not self._coordinates:
+        if not self._has_coordinates:
             return np.zeros(0)
         if len(self._order) < len(self._client.moving):
             return self._solved_acceleration(q, v, tau)
         if not self._model.floating:
             gravity = list(self._model.gravity)
-            step = self._client.velocity_step(self._joints(q), self._spread(v), self._spread(tau), gravity)
+            step = self._client.velocity_step(
+                self._joints(q), self._in_bullet_order(v), self._in_bullet_order(tau), gravity
+            )
             return step[self._order]
         v_C, tau_C = self._X @ v[:6], self._X_inverse.T @ tau[:6]
         step = self._client.velocity_step(
             self._joints(q),
-            [*v_C.tolist(), *self._spread(v[6:])],
-            [*tau_C.tolist(), *self._spread(tau[6:])],
+            [*v_C.tolist(), *self._in_bullet_order(v[6:])],
+            [*tau_C.tolist(), *self._in_bullet_order(tau[6:])],
             self._gravity_in_C(q),
         )
         step[3:6] -= cross(v_C[:3], v_C[3:])
@@ -242,7 +244,7 @@ class LoadedPyBullet(LoadedRobot):
     # -- coordinates --------------------------------------------------------------------------
 
     def _find_joints(self) -> list[int]:
-        """The place of each coordinate of dynx among those of Bullet."""
+        """The index of each coordinate of dynx among those of Bullet."""
         engine, client = self._client.engine, self._client
         single = {engine.JOINT_REVOLUTE, engine.JOINT_PRISMATIC}
         kinds = {_text(info[1]): info[2] for info in client.joints}
@@ -258,19 +260,19 @@ class LoadedPyBullet(LoadedRobot):
         return [place[name] for name in names]
 
     @property
-    def _coordinates(self) -> bool:
-        """Whether there is any coordinate; without, Bullet returns None or an empty tuple."""
+    def _has_coordinates(self) -> bool:
+        """Whether there is any coordinate; Bullet returns None or an empty tuple where there is none."""
         return bool(self._client.moving) or self._model.floating
 
-    def _extrapolated(self, quantity: Callable[[LoadedClient], Floats]) -> Floats:
+    def _extrapolate(self, quantity: Callable[[LoadedClient], Floats]) -> Floats:
         if len(self._clients) == 1:
             return quantity(self._client)
         return 2.0 * quantity(self._clients[1]) - quantity(self._clients[2])
 
     def _joints(self, q: Floats) -> list[float]:
-        return self._spread(q[7 if self._model.floating else 0 :])
+        return self._in_bullet_order(q[7 if self._model.floating else 0 :])
 
-    def _spread(self, values: Floats) -> list[float]:
+    def _in_bullet_order(self, values: Floats) -> list[float]:
         """The last entries of `values`, one for each joint of dynx, in Bullet's order; zero for other
         joints."""
         n = len(self._order)

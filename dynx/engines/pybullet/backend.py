@@ -1,7 +1,7 @@
 """The backend `pybullet`: Bullet's inverse dynamics, mass matrix, Jacobian, kinematics and stepper.
 
 The modules beside this one make Bullet's results agree with those of other engines: `inertia` (principal
-inertias, ballast), `canonical_urdf` (the file that Bullet is given), `client` (loading and engine calls),
+inertias, ballast), `canonical_urdf` (the file that Bullet loads), `client` (loading and engine calls),
 `robot` (conventions).
 """
 
@@ -44,9 +44,9 @@ class PyBulletBackend(Backend):
     as it stands (see `ballast`), and where the step left a velocity exactly as it was: the stepper
     does not move a joint that carries less than 2.2e-16 kg m^2 (or kg).
 
-    Threads may share a backend: a lock lets one call in at a time (Bullet would hold the GIL
-    anyway). Each backend has a Bullet client of its own, two where there is ballast; Bullet has
-    1,024 of them, some 30 MB each, so close a backend that is done with. Picklable by its recipe.
+    Threads may share a backend: a lock admits one call at a time (Bullet would hold the GIL anyway).
+    Each backend has a Bullet client of its own, two where there is ballast; Bullet has 1,024 clients,
+    some 30 MB each, so close a backend after use. It is pickled as its model and options.
 
     A batch is a Python loop over the engine's calls. For batches the backend ``compiled`` gives the same
     numbers, to rounding, about 300 times as fast: inverse dynamics of UR5, one thread, to one significant
@@ -149,11 +149,11 @@ class PyBulletBackend(Backend):
 
     def _inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
         with self._lock:
-            return self._extrapolated([robot.inverse_dynamics(q, v, a) for robot in self._all_robots()])
+            return self._extrapolate([robot.inverse_dynamics(q, v, a) for robot in self._all_robots()])
 
     def _mass_matrix(self, q: Floats) -> Floats:
         with self._lock:
-            return self._extrapolated([robot.mass_matrix(q) for robot in self._all_robots()])
+            return self._extrapolate([robot.mass_matrix(q) for robot in self._all_robots()])
 
     def _forward_dynamics(self, q: Floats, v: Floats, tau: Floats) -> Floats:
         if self.ballast:
@@ -162,31 +162,31 @@ class PyBulletBackend(Backend):
         with self._lock, np.errstate(over="ignore", invalid="ignore"):
             a = self._robot().forward_dynamics(q, v, tau)
             if a.all():
-                return self._refined(q, v, tau, a) if np.isfinite(a).all() else a
+                return self._refine(q, v, tau, a) if np.isfinite(a).all() else a
         return super()._forward_dynamics(q, v, tau)
 
-    def _refined(self, q: Floats, v: Floats, tau: Floats, a: Floats) -> Floats:
+    def _refine(self, q: Floats, v: Floats, tau: Floats, a: Floats) -> Floats:
         """`a` after one step of iterative refinement, where its error is due to rounding.
 
         Under a root much lighter than what it carries, Bullet's inversion of the base's inertia
         loses digits (ten at a ratio of 1e-6). A step that changes more is not taken: the error then
         has another cause, which refinement must not hide. Raises EngineError where too few digits are left.
         """
-        left = tau - self._inverse_dynamics(q, v, a)
-        if np.max(np.abs(left), initial=0.0) <= MIN_RESIDUAL_TO_REFINE * np.max(np.abs(tau), initial=0.0):
+        residual = tau - self._inverse_dynamics(q, v, a)
+        if np.max(np.abs(residual), initial=0.0) <= MIN_RESIDUAL_TO_REFINE * np.max(np.abs(tau), initial=0.0):
             return a
-        again = self._robot().forward_dynamics(q, v, tau + left)
-        if np.max(np.abs(again - a)) <= MAX_REFINEMENT * np.max(np.abs(a)):
-            return again
-        # Weight and velocity products may cancel; a bound on them is as good as themselves here.
-        fastest, gravity = np.max(np.abs(v)), np.linalg.norm(self._mechanism.gravity)
+        refined = self._robot().forward_dynamics(q, v, tau + residual)
+        if np.max(np.abs(refined - a)) <= MAX_REFINEMENT * np.max(np.abs(a)):
+            return refined
+        # Weight and velocity products may cancel, so their bound stands in for them.
+        speed, gravity = np.max(np.abs(v)), np.linalg.norm(self._mechanism.gravity)
         inertia = np.abs(self._mass_matrix(q))
-        unbalanced = np.max(inertia) * (fastest + fastest**2 + gravity)
+        unbalanced = np.max(inertia) * (speed + speed**2 + gravity)
         terms = np.max(inertia @ np.abs(a)) + np.max(np.abs(tau)) + unbalanced
-        if np.max(np.abs(left)) > MAX_RESIDUAL * terms:
+        if np.max(np.abs(residual)) > MAX_RESIDUAL * terms:
             raise EngineError(
-                f"the stepper of pybullet loses its digits on {self.model.name}: the acceleration found "
-                f"misses the torque by {np.max(np.abs(left)) / terms:.1g}, relative "
+                f"the stepper of pybullet loses too many digits on {self.model.name}: the acceleration found "
+                f"misses the torque by {np.max(np.abs(residual)) / terms:.1g}, relative "
                 "(are masses very unequal?)"
             )
         return a
@@ -207,7 +207,7 @@ class PyBulletBackend(Backend):
         return self._robots
 
     @staticmethod
-    def _extrapolated(results: list[Floats]) -> Floats:
+    def _extrapolate(results: list[Floats]) -> Floats:
         if len(results) == 1:
             return results[0]
         once, twice = results

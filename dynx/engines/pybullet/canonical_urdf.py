@@ -1,4 +1,4 @@
-"""The canonical URDF that Bullet is given instead of the user's file.
+"""The canonical URDF that Bullet loads instead of the user's file.
 
 Moving bodies only, with fixed joints merged; generated ASCII names (`b`, then `l0`, `j0`, ...); unit axes;
 short lines; no shapes, limits, damping or meshes. Principal moments are written as zero: Bullet replaces
@@ -44,7 +44,7 @@ class BulletTree:
 
     Masses and moments are those of the mechanism divided by `unit`, a power of two [kg]. Bullet's
     checks compare with absolute numbers, about 1e-15, and refuse a possible body of 10 kg that rotates
-    about an axis 1 m away; in units in which no moment exceeds 1 they pass. Forces scale alike.
+    about an axis 1 m away; it passes in units in which no moment exceeds 1. Forces have the same factor.
     """
 
     floating: bool
@@ -54,17 +54,17 @@ class BulletTree:
 
 
 def bullet_tree(mechanism: Mechanism, ballast: tuple[Ballast, ...], times: int) -> BulletTree:
-    """The tree that Bullet is given for a long-double `mechanism`, with `times` the ballast."""
+    """The tree that Bullet loads for a long-double `mechanism`, with `times` the ballast."""
     root = principal_inertia(NOTHING)
-    sizes = [0.0]
+    largest_moments = [0.0]
     if mechanism.floating:
-        loaded = ballast[0].added(mechanism.root, times)
+        loaded = ballast[0].add_to(mechanism.root, times)
         root = principal_inertia(loaded, about_center=True)
-        sizes.append(float(np.max(root.moments)))
+        largest_moments.append(float(np.max(root.moments)))
     bodies = list(zip(mechanism.bodies, ballast[1:], strict=True))
-    inertias = [load.added(body.inertia, times) for body, load in bodies]
-    sizes += [float(np.max(np.abs(inertia.rotational_inertia))) for inertia in inertias]
-    unit = 2.0 ** max(0, int(np.frexp(max(sizes))[1]))
+    inertias = [load.add_to(body.inertia, times) for body, load in bodies]
+    largest_moments += [float(np.max(np.abs(inertia.rotational_inertia))) for inertia in inertias]
+    unit = 2.0 ** max(0, int(np.frexp(max(largest_moments))[1]))
     links = []
     for body, merged in zip(mechanism.bodies, inertias, strict=True):
         R, p = body.R, body.p

@@ -209,12 +209,12 @@ class BulletConnection(ABC):
         self.call(self.engine.setJointMotorControlArray, self.body, self.moving, mode, **targets)
 
     def release_motors(self) -> None:
-        """Let the velocity motors go that Bullet gives to every joint."""
+        """Release the velocity motors that Bullet gives to every joint."""
         if self.moving:
             self.control_motors(self.engine.VELOCITY_CONTROL, forces=[0.0] * len(self.moving))
 
     def disable_damping(self) -> None:
-        """Switch off the damping of the base and the limit of joint speeds, which are no part of a robot."""
+        """Switch off the damping of the base and the limit of joint speeds, which are not part of a robot."""
         # In a call of its own: together with a setting of a link Bullet would apply that to the root.
         options = {"linearDamping": 0.0, "angularDamping": 0.0, "maxJointVelocity": 1e300}
         self.call(self.engine.changeDynamics, self.body, ROOT, **options)

@@ -1,4 +1,4 @@
-"""Checks that find files which are known to crash PyBullet (measured with pybullet 3.2.5 to 3.2.7).
+"""Checks for files that are known to crash PyBullet (measured with pybullet 3.2.5 to 3.2.7).
 
 PyBullet checks nothing itself. It uses names as printf formats, an element without ``name`` or ``type`` or a
 graph that is no tree ends the process, and joint states have room for 127 joints.
@@ -42,9 +42,9 @@ def require_harmless(path: Path, model: Model) -> None:
             max_counts={"link": MAX_LINKS, "joint": MAX_LINKS},
         )
     except ModelError as error:
-        raise EngineError(f"pybullet is not given {model.name}: {error}") from error
+        raise EngineError(f"pybullet cannot load {model.name}: {error}") from error
     for reason in _hazards(root, model):
-        raise EngineError(f"pybullet is not given {model.name}, which would crash it: {reason}")
+        raise EngineError(f"pybullet would crash on {model.name}: {reason}")
     joints = len(root.all("joint"))
     if joints > MAX_JOINTS:
         raise EngineError(

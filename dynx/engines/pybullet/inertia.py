@@ -1,12 +1,12 @@
 """Rigid-body inertia in the form Bullet takes: mass, centre of mass, principal moments and axes.
 
-Bullet's own diagonalisation stops at a relative 1e-6, and its checks fail because of rounding. So the inertia
-is merged and diagonalised here, in NumPy's long double, and Bullet is given moments and axes.
+Bullet's own diagonalisation stops at a relative 1e-6, and its checks fail because of rounding. So inertias
+are merged and diagonalised here, in NumPy's long double, and Bullet receives moments and axes.
 
 Bullet also refuses some inertias that a description can hold: a negative principal moment, a rod or a point
 that meets a triangle inequality with equality, a mass that is not positive on a floating root (which it then
 fixes to the world), a first moment without a mass. Inverse dynamics f and the mass matrix are affine in the
-inertia of every body, so such a body is carried with *ballast* s, once and twice: f(I) = 2 f(I + s) - f(I + 2
+inertia of every body, so such a body gets *ballast* s, once and twice: f(I) = 2 f(I + s) - f(I + 2
 s).
 """
 
@@ -28,8 +28,8 @@ class PrincipalInertia:
     """A rigid body by its centre of mass and principal axes, in long double.
 
     `axes` (3, 3) has the principal axes as columns, in the axes of the body frame (right-handed);
-    `moments` (3,) [kg m^2] belong to them. `accepted` says whether Bullet's inverse dynamics takes
-    the body with its axes in this order.
+    `moments` (3,) [kg m^2] belong to them. `accepted`: Bullet's inverse dynamics takes the
+    body with its axes in this order.
     """
 
     mass: float
@@ -41,12 +41,12 @@ class PrincipalInertia:
 
 @dataclass(frozen=True)
 class Ballast:
-    """Mass [kg] at the body's origin, and rotational inertia [kg m^2] alike about every axis."""
+    """Mass [kg] at the body's origin, and rotational inertia [kg m^2], the same about every axis."""
 
     mass: float = 0.0
     rotational: float = 0.0
 
-    def added(self, inertia: RigidInertia, times: int) -> RigidInertia:
+    def add_to(self, inertia: RigidInertia, times: int) -> RigidInertia:
         """The inertia of the body with `times` this ballast."""
         return RigidInertia(
             np.asarray(inertia.mass + times * longdouble(self.mass)),
@@ -58,8 +58,8 @@ class Ballast:
 def principal_inertia(inertia: RigidInertia, *, about_center: bool = False) -> PrincipalInertia:
     """Centre of mass, principal axes and moments of a body; about its origin if it has no mass.
 
-    The axes are in an order that Bullet accepts, where there is one. `about_center` says that Bullet
-    has the body's frame at the centre of mass (the root's), not at the joint.
+    The axes are in an order that Bullet accepts, where there is one. With `about_center` Bullet has the
+    body's frame at the centre of mass (as for the root), not at the joint.
     """
     mass = float(inertia.mass)
     second = longdouble(inertia.rotational_inertia)
@@ -111,11 +111,11 @@ def ballast_for(mechanism: Mechanism) -> tuple[Ballast, ...]:
 
 
 def _ballast(inertia: RigidInertia, unit: float, *, root: bool) -> Ballast:
-    """The least ballast that suffices, because it is subtracted again and costs digits."""
+    """The least ballast that suffices, because subtracting it again costs digits."""
     mass = float(inertia.mass)
     massless = mass == 0.0 and not root and not np.any(inertia.first_moment)
     needed = Ballast() if mass > 0.0 or massless else Ballast(mass=unit - mass)
-    body = principal_inertia(needed.added(inertia, 1), about_center=root)
+    body = principal_inertia(needed.add_to(inertia, 1), about_center=root)
     if not body.accepted:
         negative = max(0.0, -float(np.min(body.moments)))
         size = float(_size(inertia.rotational_inertia))

@@ -1,4 +1,4 @@
-"""PyBullet's diagonalisation and checks of an ``<inertial>``, repeated in float64.
+"""PyBullet's diagonalisation and checks of an ``<inertial>``, reimplemented in float64.
 
 The loader diagonalises a tensor with products of inertia by Jacobi's method, and sets all moments to zero
 where one is negative or exceeds the sum of the others, to the last bit. The tree of inverse dynamics, made
@@ -20,7 +20,7 @@ from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import rotation_from_rpy, skew
 
 _STOP_RATIO = 1e-6
-"""Ratio to the trace below which one more rotation is the last."""
+"""Ratio of the largest off-diagonal entry to the trace below which the next rotation is the last."""
 
 _ABSOLUTE = 5 * FLOAT64_EPS
 """Tolerance by which a leading minor may be negative, in all units [powers of kg m^2]."""
@@ -52,7 +52,7 @@ def bullet_reading(inertial: Inertial) -> BulletInertia:
     tensor = inertial.tensor
     if not (inertial.ixy or inertial.ixz or inertial.iyz):
         return BulletInertia(np.diagonal(tensor).copy(), np.eye(3))
-    return BulletInertia(*_diagonalised(tensor))
+    return BulletInertia(*_diagonalise(tensor))
 
 
 @lru_cache(maxsize=CACHE_SIZE)
@@ -69,7 +69,7 @@ def diagonalisation_error(inertial: Inertial) -> float:
 def tree_may_reject(inertial: Inertial, *, on_fixed_joint: bool) -> bool:
     """Whether the inertia is so near the bound that inverse dynamics may refuse the robot.
 
-    `on_fixed_joint` says that a fixed joint carries the link, for which no triangle inequality is checked.
+    Bullet checks no triangle inequality for a link on a fixed joint (`on_fixed_joint`).
     """
     held = bullet_reading(inertial)
     R = longdouble(rotation_from_rpy(np.array(inertial.origin.rpy))) @ longdouble(held.axes)
@@ -96,7 +96,7 @@ def tree_may_reject(inertial: Inertial, *, on_fixed_joint: bool) -> bool:
     return minor < _ROUNDING * x * y - _ABSOLUTE or determinant < _ROUNDING * mean * mean * mean - _ABSOLUTE
 
 
-def _diagonalised(tensor: Floats) -> tuple[Floats, Floats]:
+def _diagonalise(tensor: Floats) -> tuple[Floats, Floats]:
     """Eigenvalues and eigenvectors by Jacobi's method, as in Bullet."""
     A, V = tensor.copy(), np.eye(3)
     for step in range(30, 0, -1):

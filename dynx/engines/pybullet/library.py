@@ -1,4 +1,4 @@
-"""The only import of PyBullet, which happens at the first use and without the line that PyBullet prints."""
+"""The only import of PyBullet, at its first use and without the line that PyBullet prints."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _import_lock = Lock()
 
 
 def bullet() -> ModuleType:
-    """The module `pybullet`; raises NotInstalledError with the way to install it."""
+    """The module `pybullet`; raises NotInstalledError with the command that installs it."""
     loaded = sys.modules.get("pybullet")
     if loaded is not None:
         return loaded

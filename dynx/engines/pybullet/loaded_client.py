@@ -1,7 +1,7 @@
 """A robot in Bullet, loaded from the user's file.
 
-Settings that belong to a call rather than to the file are those of a careful user: no motors, no damping of
-the base, no limit of speeds, steps of unit length. Joint damping and joint limits of the file stay as loaded.
+Settings that do not come from the file are those of rigid-body dynamics: no motors, no damping of the base,
+no limit of speeds, steps of unit length. Joint damping and joint limits of the file stay as loaded.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ Setting = Callable[["LoadedClient"], None]
 
 
 class LoadedClient(BulletConnection):
-    """One robot as `loadURDF` made it."""
+    """One robot as `loadURDF` loads it."""
 
     def __init__(self, engine: ModuleType, path: Path, robot: str, *, fixed: bool) -> None:
         super().__init__(engine, robot)
@@ -57,7 +57,7 @@ class LoadedClient(BulletConnection):
         setting(self)
 
     def call(self, function: Callable[..., Any], *args: Any, **options: Any) -> Any:
-        """The result of an engine call; raises EngineError too where it needs a tree that Bullet refused."""
+        """The result of an engine call; raises EngineError also where it needs a tree that Bullet refused."""
         if self._refusal is not None and function in self._needs_tree:
             # Called again, Bullet would fail again and print.
             raise EngineError(str(self._refusal)) from self._refusal

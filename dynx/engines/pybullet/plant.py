@@ -1,7 +1,7 @@
 """PyBullet's own stepper as a plant: its articulated-body algorithm and its integration scheme only.
 
 `dynx.engines.pybullet.stepping` says which features are switched off, and why. Friction, pushes and armature
-are those of `dynx.sim.plants.disturbances`, given as torque, so that they mean what they mean in every plant.
+are torques from `dynx.sim.plants.disturbances`, so that they are the same in every plant.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class BulletPlant(Plant):
     """One robot in a Bullet world of its own, stepped by Bullet.
 
     Mimic joints and armature are unknown to Bullet's stepper. With them the acceleration is solved from
-    Bullet's mass matrix and bias, and the stepper is given the torque that causes it.
+    Bullet's mass matrix and bias, and the stepper applies the torque that causes it.
     """
 
     motor_commands: ClassVar[tuple[type, ...]] = (MotorCommand,)
@@ -103,10 +103,10 @@ class BulletPlant(Plant):
         return StepResult(self._q, self._v, first, tau)
 
     def refuse(self, controller: object) -> None:
-        """Bullet's motors know no rotors: refuse the two together."""
+        """Refuse an engine motor together with armature, which Bullet's motors lack."""
         if isinstance(controller, EngineMotor) and self.disturbances.has_armature:
             raise UnsupportedFeatureError(
-                f"{controller.name} is a motor inside PyBullet, which knows no armature; use a law of torque"
+                f"{controller.name} is a motor inside PyBullet, without armature; use a torque controller"
             )
 
     def close(self) -> None:
@@ -177,7 +177,7 @@ class BulletPlant(Plant):
 
     def _base_coordinates(self, base: BaseState, joints: Floats, rates: Floats) -> tuple[Floats, Floats]:
         quat = quat_product(np.array(base.quat_xyzw), self._axes_back)
-        # Bullet may change the sign of the quaternion; the sign that continues smoothly is used.
+        # Bullet may change the sign of the quaternion; keep the sign nearer to the last one.
         quat /= np.copysign(np.sqrt(quat.dot(quat)), quat.dot(self._q[3:7]))
         R = rotation_from_quat(quat)
         w = rotate_back(R, np.array(base.angular))
@@ -210,13 +210,13 @@ class BulletPlant(Plant):
 
     def _in_units(self, command: MotorCommand) -> MotorCommand:
         """Forces, and the gains that are forces, in Bullet's unit of mass."""
-        command = command._replace(forces=self._scaled(command.forces))
+        command = command._replace(forces=self._in_unit(command.forces))
         if command.mode != "PD_CONTROL":
             return command
         return command._replace(
-            position_gains=self._scaled(command.position_gains),
-            velocity_gains=self._scaled(command.velocity_gains),
+            position_gains=self._in_unit(command.position_gains),
+            velocity_gains=self._in_unit(command.velocity_gains),
         )
 
-    def _scaled(self, numbers: list[float] | None) -> list[float] | None:
+    def _in_unit(self, numbers: list[float] | None) -> list[float] | None:
         return None if numbers is None else [x / self._unit for x in numbers]

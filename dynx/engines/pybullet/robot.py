@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 from dynx.engines.pybullet.canonical_urdf import bullet_tree
 from dynx.engines.pybullet.client import BulletClient
 from dynx.engines.pybullet.inertia import Ballast, PrincipalInertia
-from dynx.model.mechanism import ROOT, BodyFrame, Mechanism
+from dynx.model.mechanism import ROOT, BodyFrame, Mechanism, float64
 from dynx.rbd.jacobians import Reference
 from dynx.spatial.scalar import Array, Floats
 from dynx.spatial.se3 import homogeneous
@@ -38,22 +38,22 @@ class BulletRobot:
         """`mechanism` was merged in long double; Bullet gets it rounded once."""
         tree = bullet_tree(mechanism, ballast, times)
         self._floating = mechanism.floating
-        self._gravity: Floats = _rounded(mechanism.gravity)
-        self._T_base_C = _rounded(homogeneous(tree.root.axes, tree.root.center))
-        self._X = _rounded(base_conversion(tree.root.axes, tree.root.center))
-        self._X_inverse = _rounded(inverse_base_conversion(tree.root.axes, tree.root.center))
-        # Bullet's unit of mass, a power of two, so that going there and back is exact.
+        self._gravity: Floats = float64(mechanism.gravity)
+        self._T_base_C = float64(homogeneous(tree.root.axes, tree.root.center))
+        self._X = float64(base_conversion(tree.root.axes, tree.root.center))
+        self._X_inverse = float64(inverse_base_conversion(tree.root.axes, tree.root.center))
+        # Bullet's unit of mass, a power of two, so that conversions are exact.
         self._unit = tree.unit
         self._inertias = [link.inertia for link in tree.links]
-        # A frame in the inertial frame of its body, where Bullet says where the body is.
+        # Frames in the inertial frames of their bodies, whose poses Bullet reports.
         self._frame_body = [frame.body for frame in mechanism.frames]
         self._offsets = np.array([self._offset(frame) for frame in mechanism.frames])
         self._points = [self._point(frame, tree.root) for frame in mechanism.frames]
-        self._frame_in_body = [_rounded(homogeneous(frame.R, frame.p)) for frame in mechanism.frames]
+        self._frame_in_body = [float64(homogeneous(frame.R, frame.p)) for frame in mechanism.frames]
         self._client = BulletClient(engine, tree, mechanism.name)
 
     def close(self) -> None:
-        """Give the client back."""
+        """Disconnect the client."""
         self._client.close()
 
     # -- kinematics ---------------------------------------------------------------------------
@@ -149,7 +149,7 @@ class BulletRobot:
         iterations: int,
         residual: float,
     ) -> Floats:
-        """Joints (n,) at which Bullet's solver stopped, from those of `q`; the base stays put."""
+        """Joints (n,) at which Bullet's solver stopped, from those of `q`; the base stays where it is."""
         body = self._frame_body[frame]
         if body == ROOT:
             return np.array(self._joints(q))
@@ -157,7 +157,7 @@ class BulletRobot:
         R_C_world = T_world_C[:3, :3].T
         T_world_body = T_world_target @ np.linalg.inv(self._frame_in_body[frame])
         position = R_C_world @ (T_world_body[:3, 3] - T_world_C[:3, 3])
-        axes = R_C_world @ T_world_body[:3, :3] @ _rounded(self._inertias[body].axes)
+        axes = R_C_world @ T_world_body[:3, :3] @ float64(self._inertias[body].axes)
         return self._client.inverse_kinematics(
             self._joints(q),
             body,
@@ -211,7 +211,7 @@ class BulletRobot:
             inertia = self._inertias[frame.body]
             R = inertia.axes.T @ frame.R
             T = homogeneous(R, inertia.axes.T @ (frame.p - inertia.center))
-        return _rounded(T)
+        return float64(T)
 
     def _point(self, frame: BodyFrame, root: PrincipalInertia) -> list[float]:
         """The frame's origin along the principal axes, from the origin of its body (root: from C)."""
@@ -219,7 +219,7 @@ class BulletRobot:
             point = root.axes.T @ (frame.p - root.center)
         else:
             point = self._inertias[frame.body].axes.T @ frame.p
-        numbers: list[float] = _rounded(point).tolist()
+        numbers: list[float] = float64(point).tolist()
         return numbers
 
 
@@ -252,7 +252,7 @@ _FROM_PRODUCTS = _products_to_rotation()
 
 
 def base_conversion(axes: Array, center: Array) -> Array:
-    """X (6, 6), for the axes (3, 3) and the origin (3,) of C in the base frame; see the head of this file."""
+    """X (6, 6), for the axes (3, 3) and the origin (3,) of C in the base frame; see the module docstring."""
     X = np.zeros((6, 6), dtype=axes.dtype)
     X[:3, 3:] = X[3:, :3] = axes.T
     X[3:, 3:] = -axes.T @ skew(center)
@@ -265,7 +265,3 @@ def inverse_base_conversion(axes: Array, center: Array) -> Array:
     X[3:, :3] = X[:3, 3:] = axes
     X[:3, :3] = skew(center) @ axes
     return X
-
-
-def _rounded(numbers: Array) -> Floats:
-    return np.asarray(numbers, dtype=np.float64)

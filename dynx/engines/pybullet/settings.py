@@ -1,4 +1,4 @@
-"""Settings of a robot that PyBullet has loaded: the remedies at run time, which a user applies by code."""
+"""Remedies at run time: settings of a robot that PyBullet has loaded."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def disable_limits(client: LoadedClient) -> None:
 
 
 def set_inertias(model: Model, links: Mapping[str, int]) -> Setting:
-    """Setting of moments that Bullet replaced by zero: those of the file, about the axes of Bullet."""
+    """Setting that restores the moments of the file where Bullet replaced them by zero."""
 
     def change(client: LoadedClient) -> None:
         for name, k in links.items():
@@ -79,7 +79,7 @@ def with_ballast(times: int) -> Setting:
             moments = client.dynamics(k)[2]
             if (k == ROOT and not client.floating) or _possible(*sorted(moments)):
                 continue
-            # A power of two, so that adding it costs as few digits as can be.
+            # A power of two, so that adding it costs the fewest digits.
             s = 2.0 ** np.ceil(np.log2(2.0 * max(map(abs, moments))))
             loaded = [float(moment + times * s) for moment in moments]
             client.call(client.engine.changeDynamics, client.body, k, localInertiaDiagonal=loaded)

@@ -5,11 +5,11 @@ the world. Its state is the pose of the root's inertial frame C, and the velocit
 along the axes of the world.
 
 **The trap.** Bullet gives every joint of a loaded robot a velocity motor that holds it at speed 0, and
-POSITION_CONTROL or VELOCITY_CONTROL leave one behind when they are no longer called. A torque that is
+POSITION_CONTROL or VELOCITY_CONTROL leave one active when they are no longer called. A torque that is
 commanded afterwards is added to that of the motor, which cancels it: the arm stands still, without any
 message. A motor is released by VELOCITY_CONTROL with a force of 0; `BulletClient` does so when it opens, and
 `SteppingClient.apply` whenever torques follow a motor. Bullet also damps the base (0.04 of its speed per
-second), damps joints as the URDF says, and limits speeds to 100: all of that is off.
+second), damps joints as in the URDF, and limits speeds to 100: dynx switches all of that off.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from dynx.engines.pybullet.connection import Reals
 from dynx.errors import ArgumentError, shown
 
 MODES = ("POSITION_CONTROL", "VELOCITY_CONTROL", "TORQUE_CONTROL", "PD_CONTROL")
-"""Control modes of the engine that a joint's motor takes."""
+"""Control modes of the engine for a joint's motor."""
 
 
 class BaseState(NamedTuple):
@@ -49,7 +49,7 @@ class SteppingClient(BulletClient):
         super().__init__(engine, tree, robot)
 
     def place(self, joints: Reals, velocities: Reals, base: BaseState | None) -> None:
-        """Set the state; `base` is given where the base floats."""
+        """Set the state; `base` is None where the base is fixed."""
         self.reset_joints(joints, velocities)
         if base is not None:
             self.check(base.linear, base.angular)

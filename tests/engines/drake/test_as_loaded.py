@@ -138,13 +138,13 @@ def test_a_mimic_joint_is_a_constraint_that_forward_dynamics_refuses() -> None:
     q, v, a = motion(model)
     with loaded(LoadedDrake, model, text) as robot:
         assert_alike(robot, model, solve=False)
-        said = robot.describe().remarks
-        if "1 mimic joints are constraints" in said:
+        remarks = robot.describe().remarks
+        if "1 mimic joints are constraints" in remarks:
             with pytest.raises(EngineError, match="does not support constraints"):
                 robot.forward_dynamics(q, v, a)
         else:
             # Versions before (1.40 is one) leave the tag out of a continuous plant, with a warning.
-            assert any("mimic" in remark for remark in said)
+            assert any("mimic" in remark for remark in remarks)
             assert_alike(robot, model)
     with loaded(LoadedDrake, model, text, ["drake.free_mimics"]) as robot:
         assert_alike(robot, model)
@@ -276,7 +276,7 @@ def test_files_that_it_refuses_are_errors_in_its_words() -> None:
         (text.replace("continuous", "planar"), "'z_joint' .planar"),
         (text.replace("continuous", "floating"), "'z_joint' .not there"),
         (text.replace('"tool"', '"z_joint_parent"'), "frame named 'z_joint_parent'"),
-        (text.replace("</robot>", ""), "no XML"),
+        (text.replace("</robot>", ""), "not XML"),
     ):
         assert spoiled != text
         with pytest.raises(EngineError, match=words):

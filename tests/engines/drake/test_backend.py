@@ -1,4 +1,4 @@
-"""What is Drake's own in the backend `drake`; `tests.contract` asks what all backends must answer."""
+"""The backend `drake` where it differs from other backends; `tests.contract` checks what all must return."""
 
 from __future__ import annotations
 
@@ -56,9 +56,9 @@ def test_it_answers_as_the_reference_does(base: str, mimic: bool) -> None:
     sample = motion(model)
     condition = float(np.linalg.cond(ReferenceBackend(model).mass_matrix(sample[0])))
     expected = all_quantities(ReferenceBackend(model), *sample)
-    for quantity, answer in all_quantities(DrakeBackend(model), *sample).items():
+    for quantity, result in all_quantities(DrakeBackend(model), *sample).items():
         size = condition if quantity == "forward_dynamics" else 10.0
-        assert_close(answer, expected[quantity], size, what=quantity)
+        assert_close(result, expected[quantity], size, what=quantity)
 
 
 @pytest.mark.parametrize("base", BASES)
@@ -70,8 +70,8 @@ def test_inertias_that_no_body_can_have_are_used_as_they_stand(
     for model in (pair(BODY, STRANGE[strange], base, kind), pair(STRANGE[strange], BODY, base, kind)):
         sample = motion(model)
         expected = all_quantities(ReferenceBackend(model), *sample, forward_dynamics=False)
-        for quantity, answer in all_quantities(DrakeBackend(model), *sample, forward_dynamics=False).items():
-            assert_close(answer, expected[quantity], 10.0, what=quantity)
+        for quantity, result in all_quantities(DrakeBackend(model), *sample, forward_dynamics=False).items():
+            assert_close(result, expected[quantity], 10.0, what=quantity)
 
 
 def indefinite() -> Model:
@@ -99,7 +99,7 @@ def test_drake_itself_refuses_an_indefinite_mass_matrix() -> None:
     model = indefinite()
     q, v, tau = motion(model)
     ours = DrakeBackend(model)
-    context, R = ours._moving(q, v)
+    context, R = ours._set_state(q, v)
     ours._torque.FixValue(context, ours._coordinates.forces(R, tau))
     with pytest.raises(RuntimeError, match="not positive-definite"):
         ours._acceleration.Eval(context)
@@ -116,9 +116,9 @@ def test_no_acceleration_where_nothing_has_inertia() -> None:
 def test_a_robot_with_one_joint_or_none_has_arrays_of_the_usual_shapes(base: str, n: int) -> None:
     model = chain(n).with_base("floating" if base == "floating" else "fixed")
     sample = motion(model)
-    answers = all_quantities(DrakeBackend(model), *sample)
+    results = all_quantities(DrakeBackend(model), *sample)
     for quantity, expected in all_quantities(ReferenceBackend(model), *sample).items():
-        assert_close(answers[quantity], expected, 10.0, what=quantity)
+        assert_close(results[quantity], expected, 10.0, what=quantity)
 
 
 def test_names_of_the_engine_are_free_for_robots() -> None:
@@ -127,9 +127,9 @@ def test_names_of_the_engine_are_free_for_robots() -> None:
     joints.append(Joint("base", "revolute", "WorldBody", "0"))
     model = Model.build("WorldModelInstance", [Link(name, BODY) for name in names], joints, base="floating")
     sample = motion(model)
-    answers = all_quantities(DrakeBackend(model), *sample)
+    results = all_quantities(DrakeBackend(model), *sample)
     for quantity, expected in all_quantities(ReferenceBackend(model), *sample).items():
-        assert_close(answers[quantity], expected, 100.0, what=quantity)
+        assert_close(results[quantity], expected, 100.0, what=quantity)
 
 
 @pytest.mark.parametrize("base", BASES)
@@ -146,10 +146,10 @@ def test_each_thread_has_a_context_of_its_own() -> None:
     samples = [motion(model, seed) for seed in range(16)]
     expected = [all_quantities(engine, *sample) for sample in samples]
     with ThreadPoolExecutor(4) as pool:
-        for answers, wanted in zip(
+        for results, wanted in zip(
             pool.map(lambda sample: all_quantities(engine, *sample), samples), expected, strict=True
         ):
-            assert_same(answers, wanted)
+            assert_same(results, wanted)
 
 
 def test_a_call_that_close_overtakes_says_so() -> None:

@@ -16,7 +16,7 @@ JOINTS = 4
 
 @st.composite
 def coordinates(draw: st.DrawFn, floating: bool) -> DrakeCoordinates:
-    """Joints in any order among those of a plant, some of which dynx does not know, after the base."""
+    """Joints in any order among those of a plant, some of them unknown to dynx, after the base."""
     extra = draw(st.integers(0, 2))
     order = draw(st.permutations(range(JOINTS + extra)))[:JOINTS]
     if not floating:
@@ -46,7 +46,7 @@ def test_there_and_back(floating: bool, data: st.DataObject) -> None:
     np.testing.assert_allclose(mapped.forces_back(R, force), tau, rtol=0.0, atol=scale)
     vdot = mapped.accelerations(R, v, a)
     np.testing.assert_allclose(mapped.accelerations_back(R, v, vdot), a, rtol=0.0, atol=scale)
-    # Power and kinetic energy do not ask for coordinates.
+    # Power and kinetic energy do not depend on the coordinates.
     speed = mapped.velocities(R, v)
     np.testing.assert_allclose(force @ speed, tau @ v, rtol=0.0, atol=scale * base + scale)
     A = rng.standard_normal((len(speed), len(speed)))

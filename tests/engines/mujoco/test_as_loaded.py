@@ -97,7 +97,7 @@ def forked(base: Base = "fixed", dynamics: JointDynamics = NO_LOSSES) -> Model:
     return fork.forked(base, dynamics, wide=True)
 
 
-# -- what it answers ------------------------------------------------------------------------------
+# -- quantities -----------------------------------------------------------------------------------
 
 
 @given(st.data())
@@ -165,28 +165,28 @@ def test_a_fixed_root_named_world_is_the_world() -> None:
 
 
 @pytest.mark.parametrize("base", BASES)
-def test_no_order_of_calls_changes_an_answer(base: Base) -> None:
+def test_no_order_of_calls_changes_a_result(base: Base) -> None:
     model = forked(base, LOSSES)
     q, v, a = motion(model)
     others = motion(model, 1)
     with loaded(LoadedMujoco, model) as robot:
-        asks: tuple[Callable[[], Floats], ...] = (
+        calls: tuple[Callable[[], Floats], ...] = (
             lambda: robot.link_poses(q),
             lambda: robot.jacobian(q, "z"),
             lambda: robot.mass_matrix(q),
             lambda: robot.inverse_dynamics(q, v, a),
             lambda: robot.forward_dynamics(q, v, a),
         )
-        alone = [ask() for ask in asks]
+        alone = [call() for call in calls]
         rng = np.random.default_rng(0)
         for _ in range(60):
             robot.forward_dynamics(*others)
-            asks[rng.integers(len(asks))]()
-            index = int(rng.integers(len(asks)))
-            np.testing.assert_array_equal(asks[index](), alone[index])
+            calls[rng.integers(len(calls))]()
+            index = int(rng.integers(len(calls)))
+            np.testing.assert_array_equal(calls[index](), alone[index])
 
 
-# -- what MuJoCo adds, and the calls that take it out ----------------------------------------------
+# -- forces that MuJoCo adds, and the calls that remove them ----------------------------------------
 
 
 def test_damping_and_friction_are_in_the_torque() -> None:

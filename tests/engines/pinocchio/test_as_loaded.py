@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 
 import dynx
 from dynx.agreement.tolerances import BAR
-from dynx.engines.pinocchio.as_loaded import MAX_NV, LoadedPinocchio
+from dynx.engines.pinocchio.as_loaded import LoadedPinocchio
+from dynx.engines.pinocchio.engine_model import MAX_NV
 from dynx.errors import EngineError
 from dynx.loaded.difference import model_difference
 from dynx.model import Joint, Link, Model

@@ -53,13 +53,13 @@ def test_native_answers_are_those_derived_and_those_of_the_reference(base: str, 
     model = mixed_robot(base, mimic=mimic)
     native = PinocchioBackend(model)
     sample = motion(model, size=(5,))
-    answers = all_quantities(native, *sample)
+    results = all_quantities(native, *sample)
     for other in (DerivedBackend(native), ReferenceBackend(model)):
         for quantity, expected in all_quantities(other, *sample).items():
             # An acceleration amplifies rounding by the condition number of the mass matrix.
             size = float(np.linalg.cond(native.mass_matrix(sample[0])).max())
             assert_close(
-                answers[quantity], expected, size if quantity == "forward_dynamics" else 1.0, quantity
+                results[quantity], expected, size if quantity == "forward_dynamics" else 1.0, quantity
             )
 
 
@@ -230,9 +230,9 @@ def test_a_long_chain_of_fixed_links_is_no_danger_in_a_small_stack() -> None:
 def test_a_robot_with_one_joint_or_none_has_arrays_of_the_usual_shapes(base: str, n: int) -> None:
     model = chain(n).with_base("floating" if base == "floating" else "fixed")
     sample = motion(model)
-    answers = all_quantities(PinocchioBackend(model), *sample)
+    results = all_quantities(PinocchioBackend(model), *sample)
     for quantity, expected in all_quantities(ReferenceBackend(model), *sample).items():
-        assert_close(answers[quantity], expected, what=quantity)
+        assert_close(results[quantity], expected, what=quantity)
 
 
 def _pair(first: Inertial, second: Inertial, base: str = "fixed") -> Model:
@@ -262,10 +262,10 @@ def test_inertias_that_no_body_can_have_are_used_as_they_stand(strange: str, alo
     body = STRANGE[strange]
     model = _pair(body, Inertial() if alone else BODY, base)
     sample = motion(model)
-    answers = all_quantities(PinocchioBackend(model), *sample, forward_dynamics=False)
+    results = all_quantities(PinocchioBackend(model), *sample, forward_dynamics=False)
     expected = all_quantities(ReferenceBackend(model), *sample, forward_dynamics=False)
     for quantity, value in expected.items():
-        assert_close(answers[quantity], value, what=quantity)
+        assert_close(results[quantity], value, what=quantity)
 
 
 def test_a_tiny_mass_alone_keeps_its_relative_accuracy() -> None:
@@ -342,6 +342,6 @@ def test_names_of_the_engine_are_free_for_robots() -> None:
         base="floating",
     )
     sample = motion(model)
-    answers = all_quantities(backend("pinocchio", model), *sample)
+    results = all_quantities(backend("pinocchio", model), *sample)
     for quantity, expected in all_quantities(ReferenceBackend(model), *sample).items():
-        assert_close(answers[quantity], expected, what=quantity)
+        assert_close(results[quantity], expected, what=quantity)

@@ -1,4 +1,4 @@
-"""What the tests of the backend `pybullet` share: its clients, and agreement with the reference."""
+"""Clients of the backend `pybullet` and checks of agreement with the reference, shared by its tests."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from tests.error_bounds import ErrorBounds, samples_at
 
 
 def assert_agrees(model: Model, seed: int = 0, samples: int = 2) -> None:
-    """Rigid-body answers as the reference gives them, at random states."""
+    """Check rigid-body quantities against the reference at random states."""
     q, v, a = motion(model, seed, (samples,))
     with PyBulletBackend(model) as engine:
         reference = ReferenceBackend(model)
@@ -27,7 +27,7 @@ def assert_agrees(model: Model, seed: int = 0, samples: int = 2) -> None:
 
 
 def assert_solves(model: Model, seed: int = 0, faster: float = 1.0) -> None:
-    """Forward dynamics, put into the reference's inverse dynamics, takes the torque asked for."""
+    """Check that the reference's inverse dynamics of the computed acceleration returns the applied torque."""
     q, v, tau = motion(model, seed, (2,))
     v, tau = faster * v, faster * tau
     with PyBulletBackend(model) as engine:

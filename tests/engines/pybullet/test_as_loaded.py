@@ -146,15 +146,15 @@ def test_numbers_that_are_not_finite_are_not_handed_over() -> None:
     bad = np.array([np.nan, 0.0])
     fine = np.zeros(2)
     with loaded(LoadedPyBullet, model) as robot:
-        questions: tuple[Callable[[], object], ...] = (
+        calls: tuple[Callable[[], object], ...] = (
             lambda: robot.link_poses(bad),
             lambda: robot.mass_matrix(bad),
             lambda: robot.inverse_dynamics(fine, bad, fine),
             lambda: robot.forward_dynamics(fine, fine, bad),
         )
-        for ask in questions:
+        for call in calls:
             with pytest.raises(EngineError, match="NaN or infinity"):
-                ask()
+                call()
 
 
 def test_clients_are_given_back() -> None:

@@ -1,4 +1,4 @@
-"""The answers of PyBullet are those of the reference, at every attitude, gravity, speed and size."""
+"""The results of PyBullet are those of the reference, at every attitude, gravity, speed and size."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from tests.error_bounds import ErrorBounds, samples_at
 pytest.importorskip("pybullet")
 
 
-# -- the same answers ------------------------------------------------------------------------------
+# -- the same results ------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("mimic", [False, True])
@@ -34,11 +34,11 @@ def test_every_quantity_is_that_of_the_reference(base: Base, mimic: bool) -> Non
     model = mixed_robot(base, mimic=mimic)
     sample = motion(model, size=(5,))
     engine = PyBulletBackend(model)
-    answers = all_quantities(engine, *sample)
+    results = all_quantities(engine, *sample)
     assert not engine.ballast
     for quantity, expected in all_quantities(ReferenceBackend(model), *sample).items():
         size = float(np.linalg.cond(engine.mass_matrix(sample[0])).max())
-        assert_close(answers[quantity], expected, size if quantity == "forward_dynamics" else 1.0, quantity)
+        assert_close(results[quantity], expected, size if quantity == "forward_dynamics" else 1.0, quantity)
 
 
 @given(models(), st.integers(0, 9))

@@ -1,4 +1,4 @@
-"""What loading a file does to a robot in PyBullet, and what the calls at run time undo."""
+"""Changes that loading a file makes to a robot in PyBullet, and the calls at run time that undo them."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def arm(
 
 
 def properties(robot: LoadedPyBullet, model: Model) -> list[tuple[str, str]]:
-    """What the model difference has beside gravity, as (name, property)."""
+    """Return the rows of the model difference except gravity, as (name, property)."""
     rows = model_difference(model, [robot.describe()])
     return [(row.name, row.property) for row in rows if row.part != "gravity"]
 
@@ -80,20 +80,20 @@ def test_impossible_moments_become_zero_until_they_are_set() -> None:
 
 
 @pytest.mark.parametrize("base", BASES)
-def test_negative_moments_are_answered_by_extrapolation(base: Base) -> None:
-    # At the joint, where no lever makes up for it.
+def test_extrapolation_allows_negative_moments(base: Base) -> None:
+    # At the joint, where no parallel-axis term makes it positive.
     tip = replace(BOX, origin=Pose(), ixx=-0.1)
     model = arm(tip=tip, base=base, root=BOX if base == "floating" else NOTHING)
     q, v, a = motion(model)
     with loaded(LoadedPyBullet, model, calls=["pybullet.set_inertias"]) as robot:
-        questions: tuple[Callable[[], object], ...] = (
+        engine_calls: tuple[Callable[[], object], ...] = (
             lambda: robot.mass_matrix(q),
             lambda: robot.inverse_dynamics(q, v, a),
             lambda: robot.jacobian(q, "tip"),
         )
-        for ask in questions:
+        for call in engine_calls:
             with pytest.raises(EngineError, match="calculateInverseDynamics for arm"):
-                ask()
+                call()
         assert_close(robot.link_poses(q), ReferenceBackend(model).forward_kinematics(q))
     calls = ["pybullet.set_inertias", "pybullet.extrapolate_inertias"]
     with loaded(LoadedPyBullet, model, calls=calls) as robot:

@@ -1,4 +1,4 @@
-"""What comes out of PyBullet beside answers: exceptions, misread files, lines printed."""
+"""Failures of PyBullet: exceptions, misread files, printed lines."""
 
 from __future__ import annotations
 

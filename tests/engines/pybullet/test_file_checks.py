@@ -40,11 +40,11 @@ CHANGES: dict[str, Callable[[str], str]] = {
 
 @pytest.mark.parametrize("reason", CHANGES)
 def test_what_crashes_it_is_not_handed_over(reason: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(bullet, "loadURDF", lambda *args, **options: pytest.fail("it was asked"))
+    monkeypatch.setattr(bullet, "loadURDF", lambda *args, **options: pytest.fail("Bullet was called"))
     text = CHANGES[reason](TEXT)
     assert text != TEXT
     with (
-        pytest.raises(EngineError, match="pybullet is not given chain") as caught,
+        pytest.raises(EngineError, match="pybullet (would crash on|cannot load) chain") as caught,
         loaded(LoadedPyBullet, chain(2), text),
     ):
         pass

@@ -101,9 +101,9 @@ def test_with_ballast_once_or_twice_bullet_takes_every_body(model: Model) -> Non
     bodies = [(load, body.inertia, False) for load, body in zip(rest, mechanism.bodies, strict=True)]
     if model.floating:
         bodies.append((root, mechanism.root, True))
-        assert float(root.added(mechanism.root, 1).mass) > 0.0
+        assert float(root.add_to(mechanism.root, 1).mass) > 0.0
     for load, inertia, about_center in bodies:
         for times in (1, 2):
-            loaded = principal_inertia(load.added(inertia, times), about_center=about_center)
+            loaded = principal_inertia(load.add_to(inertia, times), about_center=about_center)
             assert loaded.mass >= 0.0
             assert loaded.accepted

@@ -1,4 +1,4 @@
-"""No call to PyBullet leaves a trace, and what is opened is given back."""
+"""No call to PyBullet changes the result of a later one, and clients are disconnected."""
 
 from __future__ import annotations
 
@@ -76,11 +76,11 @@ def test_no_order_of_calls_changes_an_answer(base: Base) -> None:
     alone = [call() for call in calls]
     rng = np.random.default_rng(0)
     for _ in range(300):
-        disturb, ask = rng.integers(0, len(calls), 2)
-        calls[disturb]()
+        before, tested = rng.integers(0, len(calls), 2)
+        calls[before]()
         if rng.random() < 0.3:
             engine.forward_dynamics(*other)
-        np.testing.assert_array_equal(calls[ask](), alone[ask])
+        np.testing.assert_array_equal(calls[tested](), alone[tested])
 
 
 @pytest.mark.parametrize("base", BASES)
@@ -98,9 +98,9 @@ def test_nan_does_not_poison_the_engine(base: Base) -> None:
             (engine.inverse_dynamics, (q, bad_v, x)),
             (engine.forward_dynamics, (q, v, bad_v)),
         )
-        for ask, arguments in calls:
+        for call, arguments in calls:
             with np.errstate(all="ignore"), pytest.raises(NotFiniteError):
-                ask(*arguments)
+                call(*arguments)
     assert_same(all_quantities(engine, q, v, x), before)
 
 
