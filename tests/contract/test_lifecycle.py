@@ -53,9 +53,7 @@ def alone(backend_name: str) -> dict[Call, Floats]:
     return {}
 
 
-def test_no_order_of_calls_changes_an_answer(
-    make: Make, backend_name: str, alone: dict[Call, Floats]
-) -> None:
+def test_no_order_of_calls_changes_a_result(make: Make, backend_name: str, alone: dict[Call, Floats]) -> None:
     """Any calls to several robots in turn, against each call made to a backend of its own."""
     engines = [make(model) for model in MODELS]
 

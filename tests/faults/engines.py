@@ -115,7 +115,7 @@ ENGINES_FAULTS = (
         right="        self.reset_joints(joints)\n        if not self.links",
         wrong="        if not self.links",
         test_file="tests/contract/test_lifecycle.py",
-        test="test_no_order_of_calls_changes_an_answer[pybullet]",
+        test="test_no_order_of_calls_changes_a_result[pybullet]",
     ),
     Fault(
         "pybullet_root_children_not_moved_to_its_center_of_mass",

@@ -133,7 +133,7 @@ def test_names_of_the_engine_are_free_for_robots() -> None:
 
 
 @pytest.mark.parametrize("base", BASES)
-def test_no_order_of_calls_changes_an_answer_and_answers_are_the_callers(base: str) -> None:
+def test_no_order_of_calls_changes_a_result_and_results_are_the_callers(base: str) -> None:
     check_answers_belong_to_the_caller(DrakeBackend(mixed_robot(base)))
 
 

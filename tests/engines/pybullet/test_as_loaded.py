@@ -96,7 +96,7 @@ def test_a_robot_without_joints_has_answers(base: Base) -> None:
 
 
 @pytest.mark.parametrize("base", BASES)
-def test_no_order_of_calls_changes_an_answer(base: Base) -> None:
+def test_no_order_of_calls_changes_a_result(base: Base) -> None:
     model = forked(base)
     q, v, x = motion(model)
     other, w, y = motion(model, 1)

@@ -44,7 +44,7 @@ def test_what_crashes_it_is_not_handed_over(reason: str, monkeypatch: pytest.Mon
     text = CHANGES[reason](TEXT)
     assert text != TEXT
     with (
-        pytest.raises(EngineError, match="pybullet (would crash on|cannot load) chain") as caught,
+        pytest.raises(EngineError, match=r"pybullet (would crash on|cannot load) chain") as caught,
         loaded(LoadedPyBullet, chain(2), text),
     ):
         pass

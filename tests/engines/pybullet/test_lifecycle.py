@@ -56,7 +56,7 @@ def test_robots_of_equal_size_do_not_share_inertia() -> None:
 
 
 @pytest.mark.parametrize("base", BASES)
-def test_no_order_of_calls_changes_an_answer(base: Base) -> None:
+def test_no_order_of_calls_changes_a_result(base: Base) -> None:
     model = mixed_robot(base)
     engine = PyBulletBackend(model)
     q, v, x = motion(model)
