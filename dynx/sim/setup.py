@@ -73,8 +73,8 @@ def known_controller(scenario: Scenario) -> Controller[Any] | None:
     for part in (scenario.controller, scenario.reference):
         if isinstance(part, Unknown):
             raise ArgumentError(
-                f"{part.name} was read from a file, and cannot be rebuilt: import the module of its class "
-                "before, which must be a frozen dataclass, or replace it by dataclasses.replace"
+                f"{part.name} was read from a file, and cannot be rebuilt: before, import the module of its "
+                "class, a frozen dataclass (and register a controller), or replace it by dataclasses.replace"
             )
     controller = scenario.controller
     assert not isinstance(controller, Unknown)

@@ -124,20 +124,19 @@ class Simulation:
     def step(self, n: int = 1, tau: ArrayLike | None = None) -> State:
         """Take `n` steps of `dt`, and return the state after them.
 
-        `tau` (nv,) [N m or N] replaces the torque of the controller in these steps; effort limits hold for
-        it, and the controller is not evaluated. Raises DivergedError and ControlError, with the record so
-        far in ``error.rollout``.
+        `tau` (nv,) [N m or N] replaces the torque of the controller, which is not evaluated in these steps;
+        effort limits hold for it, and it is held until the next control step. Raises DivergedError and
+        ControlError, with the record so far in ``error.rollout``.
         """
         if n != 1 and (not isinstance(n, int | np.integer) or n < 1):
             raise ArgumentError(f"n is {shown(n)}; wanted a number of steps, 1 or more")
         given = None
         if tau is not None:
-            given = checked_array("tau", tau, self._setup.model.nv)
+            given = checked_array("tau", tau, self._setup.model.nv).copy()
             if given.ndim != 1:
                 raise ArgumentError(f"tau has shape {given.shape}; wanted ({self._setup.model.nv},)")
             self._depart("torques of the caller")
-        if not self._executor:
-            self._executor = ("plain: stepped by the caller",)
+        self._note("plain: stepped by the caller")
         end = self._record.steps + int(n)
         held = self._advance(end, given)
         return State(end * self._dt, held.q.copy(), held.v.copy())
@@ -182,8 +181,7 @@ class Simulation:
                 time.sleep(ahead)
 
     def _advance(self, end: int, given: Floats | None, *, compiled: bool = False) -> Held:
-        if self._closed:
-            raise ClosedError("the simulation is closed")
+        self._refuse_closed()
         record = self._record
         if end > len(record):
             self._extend(end)
@@ -203,7 +201,8 @@ class Simulation:
             with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
                 if compiled:
                     self._advance_staged(record, held, end)
-                self._loop.advance(record, held, end, given)
+                if record.steps < end:
+                    self._loop.advance(record, held, end, given)
         except BaseException as error:
             # The plant may be in the middle of a step: it is placed anew before the next one.
             self._misplaced = True
@@ -222,6 +221,10 @@ class Simulation:
         made.run(record, held, end)
         if record.steps < end:
             self._note(f"plain from step {record.steps}: {made.stopped}")
+
+    def _refuse_closed(self) -> None:
+        if self._closed:
+            raise ClosedError("the simulation is closed")
 
     def _note(self, executor: str) -> None:
         if executor not in self._executor:
@@ -282,8 +285,8 @@ class Simulation:
 
     def save(self) -> Snapshot:
         """The simulation as it is now, with its record; `restore` continues from it bit for bit."""
-        held = self._held or self._loop.start(self._record)
-        self._held = held
+        self._refuse_closed()
+        held = self._held = self._held or self._loop.start(self._record)
         return Snapshot(self.scenario, self._record.copy(), replace(held), self._executor, self._departures)
 
     def restore(self, snapshot: Snapshot) -> State:
@@ -293,6 +296,7 @@ class Simulation:
         state at its next control step. Raises ArgumentError for a snapshot of another robot or `dt`, and
         for a controller that changes itself.
         """
+        self._refuse_closed()
         theirs, ours = snapshot.scenario, self.scenario
         robots = [(each.model.joint_names, each.model.base) for each in (theirs, ours)]
         if robots[0] != robots[1] or theirs.dt != ours.dt:
@@ -338,7 +342,7 @@ class Simulation:
         if step > len(self._record):
             self._extend(step)
         self._record.take(theirs, step)
-        self._held = None
+        self._held, self._executor, self._departures = None, (), ()
 
     # -- end ----------------------------------------------------------------------------------
 

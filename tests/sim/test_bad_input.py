@@ -76,6 +76,7 @@ REST = np.zeros(6)
         ({"mass_scale": {"forearm": 2.0}}, UnknownNameError, "forearm_link"),
         ({"noise": Noise(-1.0)}, GainError, "noise"),
         ({"noise": Noise(seed=-1)}, ArgumentError, "seed"),
+        ({"noise": Noise(rollout=2**63)}, ArgumentError, "rollout"),
         ({"pushes": [Push("tool0", np.zeros(3))]}, ArgumentError, "wrench"),
         ({"pushes": [Push("tool0", np.zeros(6), reference="here")]}, ArgumentError, "here"),
         ({"pushes": [Push("tool", np.zeros(6))]}, UnknownNameError, "tool0"),

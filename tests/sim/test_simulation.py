@@ -236,6 +236,49 @@ def test_bad_torques_and_a_closed_simulation() -> None:
         Simulation(wrong)
 
 
+@pytest.mark.parametrize("plant", ["pinocchio", pytest.param("pybullet", marks=needs_bullet)])
+def test_a_closed_simulation_is_neither_saved_nor_restored(plant: str) -> None:
+    scenario = replace(SCENARIOS["passive"], plant=plant)
+    with Simulation(scenario) as simulation:
+        saved = simulation.save()
+    for use in (simulation.save, lambda: simulation.restore(saved), simulation.run):
+        with pytest.raises(ClosedError):
+            use()
+
+
+def test_a_torque_of_the_caller_is_copied_and_held_until_the_next_control_step() -> None:
+    scenario = replace(SCENARIOS["rk4"], controller=PD(ARM, kp=1, kd=1))
+    tau = np.ones(6)
+    with Simulation(scenario) as simulation:
+        simulation.step(tau=tau)
+        tau[:] = 9.0
+        simulation.step(3)
+        found = simulation.rollout
+    assert np.array_equal(found.tau[:3], np.ones((3, 6)))
+    assert not np.array_equal(found.tau[3], np.ones(6))
+
+
+@needs_bullet
+def test_a_torque_of_the_caller_replaces_motors_of_the_engine() -> None:
+    passive = replace(SCENARIOS["passive"], plant="pybullet")
+    with Simulation(SCENARIOS["motor"]) as simulation:
+        begun = simulation.step(4)
+        moved = simulation.step(3, np.ones(6))
+    with Simulation(replace(passive, q0=begun.q, v0=begun.v)) as free:
+        assert np.array_equal(free.step(3, np.ones(6)).q, moved.q)
+
+
+@needs_bullet
+def test_simulations_that_take_turns_do_not_disturb_each_other() -> None:
+    scenarios = [SCENARIOS["pybullet"], replace(SCENARIOS["pybullet"], payload=Payload("tool0", 2.0))]
+    with Simulation(scenarios[0]) as one, Simulation(scenarios[1]) as other:
+        for _ in range(STEPS):
+            one.step()
+            other.step()
+        for each, scenario in zip((one, other), scenarios, strict=True):
+            the_same(each.rollout, simulate(scenario))
+
+
 def test_a_controller_that_changes_itself_is_not_restored() -> None:
     class Counting(Controller[None]):
         def __init__(self) -> None:
@@ -257,6 +300,10 @@ def test_the_record_says_how_its_steps_were_computed() -> None:
         return simulate(ARM, law, tutorial_motion(), duration=0.3, **options).executor
 
     assert executor() == "staged"
+    with Simulation(replace(SCENARIOS["passive"], duration=0.3)) as simulation:
+        simulation.run()
+        simulation.step()
+        assert simulation.rollout.executor == "staged; plain: stepped by the caller"
     assert executor(position_limits=True) == "plain: position limits are not compiled"
     assert executor(damping=1.0).startswith("plain: the plant has disturbances")
     few = staged.MIN_STEPS_TO_COMPILE

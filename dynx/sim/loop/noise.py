@@ -20,6 +20,9 @@ from dynx.spatial.scalar import Floats
 BLOCK_STEPS = 64
 """Control steps whose noise follows from one state of the generator."""
 
+MAX_ROLLOUT = 2**63 - 1
+"""Largest number of a rollout: half of a word of the generator's key, so that a batch can count on."""
+
 
 @dataclass(frozen=True)
 class Noise:
@@ -44,6 +47,8 @@ class Noise:
         for name, number in (("seed", self.seed), ("rollout", self.rollout)):
             if not isinstance(number, int) or isinstance(number, bool) or number < 0:
                 raise ArgumentError(f"{name} is {shown(number)}; wanted a whole number, 0 or more")
+        if self.rollout > MAX_ROLLOUT:
+            raise ArgumentError(f"rollout is {shown(self.rollout)}; wanted at most {MAX_ROLLOUT}")
         return checked_gain("noise.q", self.q, nv), checked_gain("noise.v", self.v, nv)
 
     def rows(self, model: Model, n_controls: int) -> tuple[Floats, Floats]:

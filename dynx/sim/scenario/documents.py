@@ -12,16 +12,16 @@ import importlib
 import json
 import math
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
 from hashlib import sha256
-from types import FunctionType
+from types import CodeType, FunctionType
 from typing import Any
 
 import numpy as np
 
 from dynx.backends import Backend
-from dynx.control.base import Controller
+from dynx.control.base import Controller, chain_of
 from dynx.control.content import attributes_of
 from dynx.control.registry import from_document, to_document
 from dynx.errors import ArgumentError, ModelError, UnknownNameError, shown
@@ -32,8 +32,11 @@ from dynx.sim.loop.controller_checks import controller_numbers
 MAX_WORDS_LENGTH = 80
 """Characters of a value in a message."""
 
+JSON_KINDS = "biufU"
+"""Kinds of NumPy's types whose elements JSON can hold."""
+
 Document = Any
-"""What `json.dumps` takes."""
+"""Value that `json.dumps` accepts."""
 
 FINGERPRINT, CLASS, MODEL, ARRAY, CONTROLLER = "fingerprint", "class", "model", "array", "controller"
 
@@ -69,14 +72,14 @@ def encode(value: Any, model: Model | None = None) -> Document:
         return value
     if isinstance(value, float):
         return value if math.isfinite(value) else {"float": repr(value)}
-    if isinstance(value, np.ndarray):
+    if isinstance(value, np.ndarray) and value.dtype.kind in JSON_KINDS:
         return _array(value)
     if isinstance(value, Model):
         if model is not None and value == model:
             return SAME_MODEL
         gravity = [float(x) for x in value.gravity]
         return {MODEL: {"urdf": value.to_urdf(), "base": value.base, "gravity": gravity}}
-    if isinstance(value, Backend):
+    if isinstance(value, Backend) and (model is None or value.model == model):
         return value.name
     if isinstance(value, Unknown):
         return json.loads(value.text)
@@ -201,6 +204,8 @@ def _is_declared(value: Any) -> bool:
 
 def _controller(controller: Controller[Any], model: Model | None) -> Document | None:
     """A controller that is registered, and the model that it knows; None for any other."""
+    if any(each.model != controller.model for each in chain_of(controller)):
+        return None
     try:
         return {CONTROLLER: to_document(controller), MODEL: encode(controller.model, model)}
     except ArgumentError:
@@ -226,17 +231,37 @@ def _class_of(name: str) -> Any:
 
 
 def _fingerprint(value: Any, model: Model | None) -> str:
-    """Checksum of the attributes of an object, and of those of the objects in it."""
-    digest = sha256()
+    """Checksum of the parts of an object, and of those of the objects in it."""
+    parts = [json.dumps(encode(part, model), sort_keys=True) for part in _parts(value)]
+    # The order of a set changes from process to process.
+    parts = sorted(parts) if isinstance(value, set | frozenset) else parts
+    return sha256(json.dumps(parts).encode()).hexdigest()
+
+
+def _parts(value: Any) -> Iterable[Any]:
+    """Code and closure of a function; of any other object all that a copy of it would get."""
+    if isinstance(value, set | frozenset):
+        return value
+    if isinstance(value, bytes):
+        return [value.hex()]
+    if isinstance(value, type):
+        return [_name_of(value)]
+    if isinstance(value, Backend):
+        return [value.name, value.model]
+    if isinstance(value, CodeType):
+        return [value.co_code, value.co_names, value.co_consts]
     if isinstance(value, FunctionType):
-        digest.update(value.__qualname__.encode() + value.__code__.co_code)
-        return digest.hexdigest()
+        closure = [cell.cell_contents for cell in value.__closure__ or ()]
+        return [value.__qualname__, value.__code__, value.__defaults__, value.__kwdefaults__, closure]
     try:
         attributes = attributes_of(value)
+        reduced = value.__reduce_ex__(2)
     except TypeError:
-        # An object that cannot be copied, such as a lock, is known by its class.
-        attributes = {}
-    for name in sorted(attributes):
-        content = json.dumps(encode(attributes[name], model), sort_keys=True)
-        digest.update(f"{name}={content};".encode())
-    return digest.hexdigest()
+        # An object that cannot be copied is known by its class, and by its name if it has one, as ufuncs do.
+        return [getattr(value, "__name__", None)]
+    if isinstance(reduced, str):
+        return [reduced]
+    arguments, state, entries, items = [*reduced, None, None, None][1:5]
+    states = state if isinstance(state, tuple) else (state,)
+    hidden = [part for part in states if not isinstance(part, Mapping)]
+    return [arguments, hidden, list(entries or ()), list(items or ()), *sorted(attributes.items())]

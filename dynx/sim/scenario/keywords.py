@@ -32,7 +32,8 @@ def refuse_beside_scenario(given: Mapping[str, Any]) -> None:
     for name, value in given.items():
         known = Scenario.__dataclass_fields__.get(name)
         default = None if known is None else known.default
-        if value is not default and not (isinstance(value, str | float | int | tuple) and value == default):
+        plain = type(value) is type(default) and isinstance(value, str | float | int | tuple)
+        if value is not default and not (plain and value == default):
             raise ArgumentError(
                 f"{name} is given beside a scenario, which has its own: change it by dataclasses.replace"
             )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, fields, replace
 from typing import Any, NamedTuple
 
@@ -18,7 +18,7 @@ from dynx.sim.loop.noise import Noise
 from dynx.sim.plants.disturbances import Push
 from dynx.sim.plants.model_error import MassScale, Payload
 from dynx.sim.plants.registry import default_integrator
-from dynx.sim.scenario.documents import Document, Unknown, decode, encode
+from dynx.sim.scenario.documents import ARRAY, Document, Unknown, decode, encode
 from dynx.trajectory.base import Trajectory
 
 SCHEMA = "dynx.scenario/1"
@@ -89,11 +89,15 @@ class Scenario:
         for name in NUMBERS:
             object.__setattr__(self, name, _as_array(getattr(self, name)))
         payload = () if self.payload is None else self.payload
-        payload = (payload,) if isinstance(payload, Payload) else tuple(payload)
-        object.__setattr__(self, "payload", payload)
-        object.__setattr__(self, "pushes", tuple(self.pushes))
+        kinds: dict[str, tuple[Any, type]] = {"payload": (payload, Payload), "pushes": (self.pushes, Push)}
+        for name, (given, kind) in kinds.items():
+            parts = tuple(given) if isinstance(given, Iterable) else (given,)
+            if not all(isinstance(each, kind | Unknown) for each in parts):
+                raise ArgumentError(f"{name} is {shown(given)}; wanted a {kind.__name__}, or a list of them")
+            object.__setattr__(self, name, parts)
         if isinstance(self.mass_scale, Mapping):
-            object.__setattr__(self, "mass_scale", dict(self.mass_scale))
+            by_name = sorted(self.mass_scale.items(), key=lambda entry: str(entry[0]))
+            object.__setattr__(self, "mass_scale", dict(by_name))
 
     @property
     def payloads(self) -> tuple[Payload, ...]:
@@ -140,15 +144,15 @@ class Scenario:
         for each in fields(self):
             value = getattr(self, each.name)
             default = () if each.name == "payload" else each.default
-            if each.name != "model" and encode(value, self.model) != encode(default, self.model):
+            if each.name != "model" and not _same(encode(value, self.model), encode(default, self.model)):
                 shown_fields.append(f"{each.name}={value}")
         return ",\n    ".join(shown_fields) + ")"
 
     def to_dict(self) -> dict[str, Document]:
         """A document of numbers and text, which `from_dict` turns back into an equal scenario.
 
-        A controller or a trajectory of your own can be rebuilt if its class is a frozen dataclass;
-        otherwise it is written as a fingerprint, which can only be compared.
+        A trajectory of your own can be rebuilt if its class is a frozen dataclass, a controller if it is
+        registered besides; otherwise it is written as a fingerprint, which can only be compared.
         """
         document: dict[str, Document] = {"schema": SCHEMA, "model": encode(self.model)}
         for name in field_names():
@@ -215,7 +219,10 @@ def _differences(name: str, ours: Document, theirs: Document) -> list[Difference
 
 
 def _same(one: Document, other: Document) -> bool:
-    """Equality of documents in which True and 1 are different."""
+    """Equality of documents in which True and 1 are different, and lists and arrays of numbers are not."""
+    one, other = (
+        each[ARRAY] if isinstance(each, dict) and each.keys() == {ARRAY} else each for each in (one, other)
+    )
     if isinstance(one, list) and isinstance(other, list):
         return len(one) == len(other) and all(map(_same, one, other))
     if isinstance(one, dict) and isinstance(other, dict):
