@@ -19,7 +19,7 @@ from dynx.cli.shell.options import model_options, name_list, run_options
 @click.option(
     "--as-loaded",
     is_flag=True,
-    help="Comparison of the robots that engines get when each loads the file itself.",
+    help="Comparison of the engines when each loads the file itself.",
 )
 @model_options
 @click.option(

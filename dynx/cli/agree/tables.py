@@ -11,7 +11,7 @@ from rich.text import Text
 
 from dynx.cli.shell.exits import one_line, short_line
 from dynx.cli.shell.tables import Table
-from dynx.cli.shell.terminal import counted
+from dynx.cli.shell.terminal import counted, summary_line
 
 Entry = dict[str, Any]
 """An entry of ``results`` in the document that `dynx.agreement.report` describes."""
@@ -96,10 +96,8 @@ def show_many(out: Console, entries: Sequence[Entry]) -> None:
 
 def show_summary(out: Console, summary: dict[str, int], seconds: float) -> None:
     """Print the last line: the counts of the document's ``summary``, and the time."""
-    parts = [f"{summary[word]} {word}" for word in ("agree", "differ", "refused")]
-    if summary["not_done"]:
-        parts.append(f"{summary['not_done']} not done")
-    out.print(f"{counted(summary['robots'], 'robot')}: {', '.join(parts)}; {seconds:.1f} s")
+    counts = {word: summary[word] for word in ("agree", "differ", "refused")}
+    out.print(summary_line(counted(summary["robots"], "robot"), counts, summary["not_done"], seconds))
 
 
 def label(entry: Entry) -> str:

@@ -17,7 +17,7 @@ from dynx.cli.doctor.text import heading, sentence
 from dynx.cli.shell.exits import BAD_INPUT, DONE, NEGATIVE_RESULT, complain, one_line, short_line
 from dynx.cli.shell.run import carry_out
 from dynx.cli.shell.tables import Table
-from dynx.cli.shell.terminal import console, counted
+from dynx.cli.shell.terminal import console, counted, summary_line
 from dynx.doctor.formats import wording
 from dynx.doctor.formats.vote import Vote, largest_error, largest_quantity_error, vote
 from dynx.doctor.report import DoctorReport
@@ -112,7 +112,7 @@ def _show_pairs(out: Console, report: DoctorReport) -> None:
     out.print(table)
 
 
-def _show_many(out: Console, reports: Sequence[DoctorReport], seconds: float, left: int) -> None:
+def _show_many(out: Console, reports: Sequence[DoctorReport], seconds: float, not_done: int) -> None:
     engines = list(dict.fromkeys(each.engine for report in reports for each in report.engines))
     table = Table("robot", *engines, "alone", "verdict", right=engines, keys=1)
     for report in reports:
@@ -134,10 +134,9 @@ def _show_many(out: Console, reports: Sequence[DoctorReport], seconds: float, le
     out.print(table)
     refusals = sum(report.error is not None for report in reports)
     same = sum(report.alike for report in reports)
-    parts = [f"{same} alike", f"{len(reports) - same - refusals} differ", f"{refusals} refused"]
-    parts += [f"{left} not done"] if left else []
+    counts = {"alike": same, "differ": len(reports) - same - refusals, "refused": refusals}
     out.print()
-    out.print(f"{counted(len(reports), 'robot')}: {', '.join(parts)}; {seconds:.1f} s")
+    out.print(summary_line(counted(len(reports), "robot"), counts, not_done, seconds))
 
 
 def vote_lines(report: DoctorReport, found: Vote) -> list[str]:

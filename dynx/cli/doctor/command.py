@@ -64,7 +64,7 @@ from dynx.cli.shell.options import choice_pair, name_list, run_options
 @run_options
 @runs("dynx.cli.doctor.run:doctor")
 def doctor() -> None:
-    """Find out why engines differ on a file: let each load it, prove every cause, and mend the file.
+    """Find out why engines differ on a file: load it with each, prove every cause, and mend the file.
 
     ROBOT is a name (see `dynx robots`), a URDF file, a directory (every .urdf below it), or `all`:
     every robot of example-robot-data. For one robot the full report is printed, for several a line each.

@@ -12,7 +12,7 @@ from rich.text import Text
 from dynx.cli.doctor.text import STYLES, block, heading, sentence
 from dynx.cli.shell.exits import one_line, short_line
 from dynx.cli.shell.tables import Table
-from dynx.cli.shell.terminal import counted
+from dynx.cli.shell.terminal import counted, summary_line
 from dynx.doctor.formats import wording
 from dynx.doctor.formats.causes import ROUNDING, Cause, Status, causes, severity, status
 from dynx.doctor.formats.vote import largest_error
@@ -121,15 +121,13 @@ def show_many(out: Console, reports: Sequence[DoctorReport]) -> None:
     out.print()
 
 
-def show_summary(out: Console, reports: Sequence[DoctorReport], seconds: float, left: int) -> None:
+def show_summary(out: Console, reports: Sequence[DoctorReport], seconds: float, not_done: int) -> None:
     """Print the last line: the number of robots alike, explained, unexplained, refused and not done."""
     verdicts = [status(report) for report in reports]
-    parts = [f"{verdicts.count(word)} {word}" for word in get_args(Status)]
-    if left:
-        parts.append(f"{left} not done")
+    counts = {word: verdicts.count(word) for word in get_args(Status)}
     bases = len({report.base for report in reports}) > 1
     what = counted(len(reports), "examination" if bases else "robot")
-    out.print(f"{what}: {', '.join(parts)}; {seconds:.1f} s")
+    out.print(summary_line(what, counts, not_done, seconds))
 
 
 def _show_causes(out: Console, title: str, found: Sequence[Cause]) -> None:

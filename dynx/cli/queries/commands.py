@@ -71,7 +71,7 @@ def info() -> None:
 @json_flag
 @runs("dynx.cli.queries.explain:explain")
 def explain() -> None:
-    """Print the page of a RULE, given by its id or name: what it finds, what each engine does, what to do.
+    """Print the page of a RULE, given by its id or name: cause, behaviour of each engine, remedy.
 
     Without RULE, list all rules. A rule of kind "difference" makes engines compute different numbers or
     refuse the file; one of kind "practice" is bad practice, or concerns a single engine.

@@ -18,7 +18,7 @@ from dynx.errors import TRACEBACK_VARIABLE
 COMMANDS = {
     "agree": LazyCommand("dynx.cli.agree.command:agree", "Compare the results of all engines on robots."),
     "doctor": LazyCommand(
-        "dynx.cli.doctor.command:doctor", "Find, prove and mend what makes engines differ on a file."
+        "dynx.cli.doctor.command:doctor", "Find, prove and mend the causes of differences between engines."
     ),
     "sim": LazyCommand("dynx.cli.sim.command:sim", "Simulate a robot under a controller."),
     "bench": LazyCommand("dynx.cli.bench.command:bench", "Time the engines on a robot and this machine."),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import sys
+from collections.abc import Mapping
 from typing import TextIO
 
 import click
@@ -40,6 +41,13 @@ def number(value: float) -> str:
 def counted(count: int, noun: str) -> str:
     """Write ``1 robot`` or ``2 robots``."""
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def summary_line(what: str, counts: Mapping[str, int], not_done: int, seconds: float) -> str:
+    """Write the last line of a run over robots: the number of results of each kind, and the time."""
+    parts = [f"{count} {word}" for word, count in counts.items()]
+    parts += [f"{not_done} not done"] if not_done else []
+    return f"{what}: {', '.join(parts)}; {seconds:.1f} s"
 
 
 def _standard_output() -> TextIO:

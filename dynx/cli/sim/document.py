@@ -18,15 +18,15 @@ from dynx.spatial.scalar import Floats
 SCHEMA = 1
 
 Entry = dict[str, Any]
+EarlyEnd = SimulationError | RolloutInterrupted | None
+"""Error or interrupt that ended a simulation before its last step; None where it is complete."""
 
 DONE, DIVERGED, CONTROL_FAILED, INTERRUPTED = "done", "diverged", "control failed", "interrupted"
 """Values of ``status``."""
 
 
-def document(
-    prepared: Prepared, rollout: Rollout, seconds: float, ended: SimulationError | KeyboardInterrupt | None
-) -> Entry:
-    """Describe a simulation and its results; `ended` is the error or interrupt that ended it early.
+def document(prepared: Prepared, rollout: Rollout, seconds: float, ended: EarlyEnd) -> Entry:
+    """Describe a simulation and its results.
 
     Absent numbers (errors without a reference, unlimited efforts) are null.
     """
@@ -68,13 +68,13 @@ def document(
 def _summary(rollout: Rollout) -> Entry:
     """Numbers of the whole robot, over all joints and times."""
     with np.errstate(all="ignore"):
-        of_all = rollout.summary()
+        summary = rollout.summary()
         return {
             **joint_error(rollout),
             "energy_change": float(np.max(np.abs(rollout.energy - rollout.energy[0]))),
-            "energy_drift": of_all.energy_drift,
+            "energy_drift": summary.energy_drift,
             "max_kinetic_energy": float(np.max(rollout.kinetic_energy)),
-            "saturated": of_all.saturated,
+            "saturated": summary.saturated,
         }
 
 
@@ -82,8 +82,8 @@ def _joints(model: Model, rollout: Rollout) -> list[Entry]:
     """Entries of all coordinates of v, those of a floating base first."""
     with np.errstate(all="ignore"):
         summary = rollout.summary()
-    in_force = rollout.settings.get("effort_limits")
-    limit: Floats = model.effort_limit if in_force is None else np.array(in_force)
+    in_effect = rollout.settings.get("effort_limits")
+    limit: Floats = model.effort_limit if in_effect is None else np.array(in_effect)
     entries = []
     for k, (name, unit) in enumerate(zip(_names(model), _units(model), strict=True)):
         known = rollout.reference is not None
@@ -117,7 +117,7 @@ def _units(model: Model) -> list[str]:
 
 
 def _settings(prepared: Prepared, rollout: Rollout) -> Entry:
-    """Settings of the record, with objects in place of their Python text, and with the armature."""
+    """Settings of the record, with noise and pushes as objects, and with the armature."""
     scenario, kept = prepared.scenario, rollout.settings
     return {
         **kept,
@@ -145,20 +145,20 @@ def _push(push: Push) -> Entry:
 def _is_passive(prepared: Prepared, rollout: Rollout) -> bool:
     """Whether nothing does work on the robot, so that its energy is conserved."""
     joints = rollout.settings["joints"]
-    loads = any(joints["damping"]) or any(joints["friction"]) or prepared.scenario.pushes
-    return prepared.controller is None and not loads and not prepared.scenario.position_limits
+    disturbed = any(joints["damping"]) or any(joints["friction"]) or prepared.scenario.pushes
+    return prepared.controller is None and not disturbed and not prepared.scenario.position_limits
 
 
-def _status(ended: SimulationError | KeyboardInterrupt | None) -> str:
+def _status(ended: EarlyEnd) -> str:
     if ended is None:
         return DONE
-    if isinstance(ended, KeyboardInterrupt):
+    if isinstance(ended, RolloutInterrupted):
         return INTERRUPTED
     return DIVERGED if isinstance(ended, DivergedError) else CONTROL_FAILED
 
 
-def _overshoot(prepared: Prepared, ended: object) -> Entry | None:
-    """Joint at which the damping is unstable for the step, where that can be the reason for divergence."""
+def _overshoot(prepared: Prepared, ended: EarlyEnd) -> Entry | None:
+    """Joint whose damping is unstable for the time step, where that can be the reason for divergence."""
     if not isinstance(ended, DivergedError):
         return None
     found = largest_overshoot(
@@ -167,26 +167,14 @@ def _overshoot(prepared: Prepared, ended: object) -> Entry | None:
     return None if found is None else found._asdict()
 
 
-def _error(ended: SimulationError | KeyboardInterrupt | None) -> Entry | None:
+def _error(ended: EarlyEnd) -> Entry | None:
     """Reason why the simulation ended early, with time and state."""
+    if ended is None:
+        return None
     if isinstance(ended, RolloutInterrupted):
         kept = ended.rollout
-        return {
-            "type": "Interrupted",
-            "message": str(ended),
-            "time": float(kept.t[-1]),
-            "step": len(kept),
-            "q": kept.q[-1].tolist(),
-            "v": kept.v[-1].tolist(),
-        }
-    if not isinstance(ended, SimulationError):
-        return None
-    q, v = ended.state
-    return {
-        "type": type(ended).__name__,
-        "message": str(ended),
-        "time": ended.time,
-        "step": ended.step,
-        "q": np.asarray(q).tolist(),
-        "v": np.asarray(v).tolist(),
-    }
+        name, time, step, (q, v) = "Interrupted", float(kept.t[-1]), len(kept), (kept.q[-1], kept.v[-1])
+    else:
+        name, time, step, (q, v) = type(ended).__name__, ended.time, ended.step, ended.state
+    vectors = {"q": np.asarray(q).tolist(), "v": np.asarray(v).tolist()}
+    return {"type": name, "message": str(ended), "time": time, "step": step, **vectors}

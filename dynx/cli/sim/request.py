@@ -44,7 +44,7 @@ STEP_BYTES = 2000
 
 @dataclass(frozen=True)
 class Prepared:
-    """A scenario whose options are checked, with all that its document needs."""
+    """A scenario with checked options, and the other input of its document."""
 
     scenario: Scenario
     controller: Controller[Any] | None
@@ -162,7 +162,7 @@ def _losses(given: dict[str, Any]) -> dict[str, Any]:
 
 
 def _refuse_useless(given: dict[str, Any], losses: dict[str, Any]) -> None:
-    """Raise ArgumentError for an option that would have no effect without another."""
+    """Raise ArgumentError for an option that has no effect without another that is missing."""
     noisy = given["noise_q"] is not None or given["noise_v"] is not None
     has_use = {
         "--integrator adaptive": given["integrator"] == "adaptive",

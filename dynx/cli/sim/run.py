@@ -11,7 +11,7 @@ from dynx.cli.shell.exits import BAD_INPUT, DONE, INTERRUPTED, NEGATIVE_RESULT, 
 from dynx.cli.shell.interruption import interruptible
 from dynx.cli.shell.progress import progress_bar
 from dynx.cli.shell.terminal import console, echo_json
-from dynx.cli.sim.document import document
+from dynx.cli.sim.document import EarlyEnd, document
 from dynx.cli.sim.motion import limit_message
 from dynx.cli.sim.options import TUTORIAL_OPTIONS
 from dynx.cli.sim.outputs import Outputs
@@ -47,7 +47,7 @@ def _refuse_beside_tutorial(context: click.Context) -> None:
 
 def run_sim(prepared: Prepared, outputs: Outputs, *, as_json: bool) -> int:
     """Simulate, write the files and show the results, also of a part; return the exit code."""
-    ended: SimulationError | RolloutInterrupted | None = None
+    ended: EarlyEnd = None
     started = time.perf_counter()
     with interruptible() as interruption:
         try:
