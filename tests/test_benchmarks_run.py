@@ -42,7 +42,7 @@ def test_integrators_are_of_their_order() -> None:
 
 
 def run(*command: str) -> subprocess.CompletedProcess[str]:
-    """What `python -m` with these arguments came to, in the root of the repository."""
+    """Run `python -m` with these arguments in the root of the repository."""
     # Options meant for this run, such as its number of processes, are not meant for that one.
     environment = {name: value for name, value in os.environ.items() if name != "PYTEST_ADDOPTS"}
     return subprocess.run(

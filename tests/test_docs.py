@@ -14,7 +14,7 @@ DOCS = Path(__file__).parents[1] / "docs"
 
 @pytest.fixture(scope="module")
 def rules_page() -> str:
-    """What the program would write now."""
+    """Return the text that the program writes now."""
     written = runpy.run_path(str(DOCS / "write_rules.py"))["page"]()
     assert isinstance(written, str)
     return written

@@ -32,7 +32,7 @@ SCHEMAS: dict[str, dict[str, Any]] = WRITER["schemas"]()
 
 
 def errors(name: str, document: object) -> list[str]:
-    """What a validator finds wrong in a document, as it is written."""
+    """List the errors of a validator in a document, as it is written."""
     found = Draft202012Validator(SCHEMAS[name]).iter_errors(json.loads(json_text(document)))
     return [f"{error.json_path}: {error.message[:200]}" for error in found]
 

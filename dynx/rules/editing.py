@@ -14,7 +14,7 @@ from dynx.rules.rule import Detection, Kind, Remedy, Rule
 
 @dataclass(frozen=True)
 class Correction:
-    """One place where a rule applies, and the edits that correct it; no edits where nothing can."""
+    """One place where a rule applies, and the edits that correct it; no edits where none does."""
 
     detection: Detection
     edits: tuple[Edit, ...] = ()
@@ -40,13 +40,13 @@ class EditingRule(Rule):
     """A rule whose corrections serve both to find the places and to correct them."""
 
     changed: ClassVar[str]
-    """What the remedy did, stated once for all places; see `Remedy.changed`."""
+    """The change by the remedy, stated once for all places; see `Remedy.changed`."""
 
     changes_physics: ClassVar[bool] = False
 
     @abstractmethod
     def corrections(self, case: Case) -> Iterable[Correction]:
-        """Yield one for every place where the rule applies, in document order."""
+        """Yield a correction for every place where the rule applies, in document order."""
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
         """Yield the places of the corrections."""

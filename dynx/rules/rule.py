@@ -61,7 +61,7 @@ class Rule(ABC):
     """A cause. The docstring of the module that defines the rule is its page.
 
     The page begins with a heading, ``DX101 link-without-inertial: A link without ...``, which gives the `id`,
-    the `name` and the `title`. The body says what the cause is, what each engine does, and what to do.
+    the `name` and the `title`. The body describes the cause, its effect in each engine, and the remedy.
     """
 
     id: ClassVar[str]
@@ -83,7 +83,7 @@ class Rule(ABC):
     fails if the engine behaves otherwise."""
 
     advice: ClassVar[str] = ""
-    """What to do, in one sentence."""
+    """Advice to the user, in one sentence."""
 
     choices: ClassVar[Mapping[str, str]] = {}
     """Ways to remove the cause where there are several, the default first: name -> what it does, in the
@@ -153,7 +153,7 @@ class CallingRule(Rule):
     """Ids of `LoadedRobot.CALLS`."""
 
     changed: ClassVar[str]
-    """What was done, as in `Remedy.changed`."""
+    """The change, as in `Remedy.changed`."""
 
     def detect(self, case: Case) -> Sequence[Detection]:
         """Return the occurrences; none once the calls are made."""

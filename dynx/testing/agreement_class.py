@@ -25,7 +25,7 @@ def agreement_tests(
     base: Literal["fixed", "floating", "both"] = "fixed",
     backends: Sequence[str] | None = None,
 ) -> type:
-    """Make a test class: do engines agree on this robot, in each quantity and law of mechanics?
+    """Make a test class that checks the agreement of engines on a robot in each quantity and identity.
 
         TestMyRobot = agreement_tests("my.urdf")
 
@@ -43,7 +43,7 @@ def agreement_tests(
         @pytest.mark.parametrize("check", CHECKS)
         @pytest.mark.parametrize("robot_base", _BASES[base])
         def test_agreement(self, robot_base: Base, check: str, request: pytest.FixtureRequest) -> None:
-            """One quantity or law."""
+            """Check one quantity or identity."""
             found = path_or_name(robot, request.path.parent)
             try:
                 require_agreement(measured_agreement(request.config, found, robot_base, chosen), check, robot)

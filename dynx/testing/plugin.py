@@ -1,6 +1,6 @@
 """The pytest plugin: ``pytest --dynx-robot my.urdf`` tests whether engines agree on your robot.
 
-Each robot and base becomes one test per quantity and per law of mechanics that `dynx.agree` looks at;
+Each robot and base becomes one test per quantity and per identity that `dynx.agree` checks;
 no test file is needed. ``--dynx-as-loaded`` adds one test in which every engine loads the file itself
 (`dynx.diagnose`). In an ini file, ``dynx_robots`` lists robots for every run. See ``docs/testing.md``.
 
@@ -83,8 +83,8 @@ def pytest_configure(config: pytest.Config) -> None:
 
     home = config.inipath.parent if config.inipath is not None else config.rootpath
     here = config.invocation_params.dir
-    asked = [(robot, here) for robot in config.option.dynx_robot] + [(robot, home) for robot in listed]
-    config.stash[_PLAN] = plan_robots(config, asked)
+    robots = [(robot, here) for robot in config.option.dynx_robot] + [(robot, home) for robot in listed]
+    config.stash[_PLAN] = plan_robots(config, robots)
 
 
 def pytest_report_header(config: pytest.Config) -> str | None:

@@ -1,4 +1,4 @@
-"""Checks of a robot: each quantity and each law of mechanics of `dynx.agree`.
+"""Checks of a robot: each quantity and each identity of `dynx.agree`.
 
 The agreement of a robot on a base is measured once in a run of pytest, for all its tests; a test reads its
 part, and reports where engines differ so that it can be reproduced.

@@ -59,12 +59,12 @@ class RobotPlan:
         return f"dynx: {listed}; {' and '.join(self.bases)} base; {engines}"
 
 
-def plan_robots(config: pytest.Config, asked: Sequence[tuple[str, Path]]) -> RobotPlan:
+def plan_robots(config: pytest.Config, requested: Sequence[tuple[str, Path]]) -> RobotPlan:
     """Make the plan from the options of `config` and robots, each with the folder to which its path is
     relative. Raises UsageError for invalid ones."""
     option = config.option
     try:
-        robots = dict.fromkeys(each for robot, folder in asked for each in _found(robot, folder, config))
+        robots = dict.fromkeys(each for robot, folder in requested for each in _found(robot, folder, config))
         return RobotPlan(
             robots=tuple(robots),
             bases=("fixed", "floating") if option.dynx_base == "both" else (option.dynx_base or "fixed",),

@@ -1,4 +1,4 @@
-"""An engine made of the reference, with faults on purpose: what the doctor must say of it is known."""
+"""Engine with known faults, made of the reference backend, so that the correct diagnosis is known."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ NAME = "pybullet"
 """Name of an engine in the rules."""
 
 SECRET = "secret"
-"""It refuses a file that holds this word."""
+"""Word in a file that the engine refuses."""
 
 HEAVY = Inertial(1.0, ixx=1.0, iyy=1.0, izz=1.0)
 """Inertial of a link without ``<inertial>``, as in PyBullet (DX101)."""
 
 
 class FaultyEngine(LoadedRobot):
-    """Right but for links without ``<inertial>``; subclasses spoil more."""
+    """Correct except for links without ``<inertial>``; subclasses have more faults."""
 
     name: ClassVar[str] = NAME
     CALLS: ClassVar[Mapping[str, str]] = {}
@@ -45,16 +45,16 @@ class FaultyEngine(LoadedRobot):
 
     @classmethod
     def engine_version(cls) -> str:
-        """A version for which the rules hold."""
+        """Return a version for which the rules hold."""
         return "3.2.7"
 
     @classmethod
     def load_call(cls, floating: bool) -> str:
-        """No call."""
+        """Return a placeholder."""
         return "load(path)"
 
     def describe(self) -> LoadedModel:
-        """Nothing."""
+        """Return an empty description."""
         return LoadedModel(NAME, {}, {}, np.eye(4), np.array([0.0, 0.0, -9.80665]))
 
     def link_poses(self, q: Floats) -> Floats:
@@ -83,12 +83,12 @@ class FaultyEngine(LoadedRobot):
 
 
 def examiner(engine: type[LoadedRobot] = FaultyEngine, samples: int = 3) -> Examiner:
-    """A laboratory with that engine alone."""
+    """Make an examiner of that engine alone."""
     made = Examiner((), samples, 0)
     made.engines[NAME] = engine
     return made
 
 
-def examined(case: Case, engine: type[LoadedRobot] = FaultyEngine, samples: int = 3) -> Examination:
-    """The engine's answers to a case."""
+def examine_case(case: Case, engine: type[LoadedRobot] = FaultyEngine, samples: int = 3) -> Examination:
+    """Examine a case with that engine."""
     return examiner(engine, samples).examine(case)

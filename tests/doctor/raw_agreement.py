@@ -1,4 +1,4 @@
-"""Running the raw scripts: mended files through Pinocchio and PyBullet, each in a process of its own."""
+"""Runs of the scripts without dynx: mended files in Pinocchio and PyBullet, each in its own process."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ SCRIPTS = {name: Path(__file__).with_name(f"raw_{name}.py") for name in ("pinocc
 
 
 def beside(original: Path, data: bytes, folder: Path) -> Path:
-    """A file in the place of `original` in a copy, made of links, of the collection that it is from.
+    """Write a file at the place of `original` in a copy, made of symbolic links, of its collection.
 
     PyBullet refuses a file whose meshes it does not find, and it looks for them from the file upwards.
     """
@@ -67,12 +67,12 @@ def task(path: Path, base: Base, samples: int = 3, seed: int = 1) -> dict[str, A
     }
 
 
-def answers(engine: str, tasks: Sequence[dict[str, Any]], folder: Path) -> list[Any]:
+def run_script(engine: str, tasks: Sequence[dict[str, Any]], folder: Path) -> list[Any]:
     """Run one engine in a process without dynx."""
-    questions, found = folder / f"{engine}_tasks.json", folder / f"{engine}_answers.json"
-    questions.write_text(json.dumps(list(tasks)), encoding="utf-8")
+    inputs, found = folder / f"{engine}_tasks.json", folder / f"{engine}_results.json"
+    inputs.write_text(json.dumps(list(tasks)), encoding="utf-8")
     subprocess.run(
-        [sys.executable, str(SCRIPTS[engine]), str(questions), str(found)], check=True, capture_output=True
+        [sys.executable, str(SCRIPTS[engine]), str(inputs), str(found)], check=True, capture_output=True
     )
     loaded: list[Any] = json.loads(found.read_text(encoding="utf-8"))
     return loaded
@@ -82,16 +82,16 @@ def difference(one: Any, other: Any) -> float:
     """Largest relative difference of poses, mass matrix and torque; infinite where one refused."""
     if "error" in one or "error" in other:
         return float("inf")
-    worst = 0.0
+    largest = 0.0
     for quantity in ("poses", "M", "tau"):
         mine, theirs = (np.array([state[quantity] for state in each]) for each in (one, other))
         size = float(np.max(np.abs(mine), initial=0.0))
         gap = float(np.max(np.abs(mine - theirs), initial=0.0))
-        worst = max(worst, gap / size if size else gap)
-    return worst
+        largest = max(largest, gap / size if size else gap)
+    return largest
 
 
-def checked(entries: Sequence[dict[str, Any]], folder: Path, shapes: bool) -> list[tuple[float, str]]:
+def check_files(entries: Sequence[dict[str, Any]], folder: Path, shapes: bool) -> list[tuple[float, str]]:
     """Measure the differences of the engines on each mended file, or the message where one refuses it."""
     tasks = []
     for entry in entries:
@@ -100,11 +100,11 @@ def checked(entries: Sequence[dict[str, Any]], folder: Path, shapes: bool) -> li
         place = beside(Path(entry["path"]), data, folder / f"{entry['base']}-{shapes}")
         tasks.append(task(place, entry["base"]))
     with ThreadPoolExecutor(2) as pool:
-        one, other = pool.map(lambda engine: answers(engine, tasks, folder), SCRIPTS)
-    said = [[each["error"] for each in pair if "error" in each] for pair in zip(one, other, strict=True)]
+        one, other = pool.map(lambda engine: run_script(engine, tasks, folder), SCRIPTS)
+    messages = [[each["error"] for each in pair if "error" in each] for pair in zip(one, other, strict=True)]
     return [
         (difference(first, second), "; ".join(words))
-        for first, second, words in zip(one, other, said, strict=True)
+        for first, second, words in zip(one, other, messages, strict=True)
     ]
 
 
@@ -116,9 +116,9 @@ def main() -> None:
     """
     entries = [entry for entry in json.loads(Path(sys.argv[1]).read_text("utf-8")) if entry.get("mended")]
     with TemporaryDirectory(prefix="dynx-") as folder:
-        found = checked(entries, Path(folder), shapes=True)
+        found = check_files(entries, Path(folder), shapes=True)
         refused = [k for k, (gap, _) in enumerate(found) if not np.isfinite(gap)]
-        again = checked([entries[k] for k in refused], Path(folder), shapes=False)
+        again = check_files([entries[k] for k in refused], Path(folder), shapes=False)
     for k, result in zip(refused, again, strict=True):
         name = Path(entries[k]["path"]).name
         print(f"{name}, {entries[k]['base']}: {found[k][1]}; without meshes: {result[0]:.1e} {result[1]}")
@@ -128,7 +128,7 @@ def main() -> None:
         if not gap <= BAR:
             print(f"DIFFERS: {Path(entry['path']).name}, {entry['base']}: {gap:.1e} {words}")
     print(f"{sum(gap <= BAR for gap in apart)} of {len(apart)} agree within {BAR:g}")
-    print(f"worst of those: {max(gap for gap in apart if gap <= BAR):.1e}")
+    print(f"largest of those: {max(gap for gap in apart if gap <= BAR):.1e}")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""The doctor from beginning to end: what differs, why, with proof, and the file mended."""
+"""Diagnosis from beginning to end: differences, causes, proofs and the mended file."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ BOTH = ["pinocchio", "pybullet"]
 TRAP = find_trap("DX101")
 
 
-def differing() -> list[Rule]:
-    """The rules about differences that hold for an engine installed here."""
+def difference_rules() -> list[Rule]:
+    """List the rules about differences that hold for an installed engine."""
     versions = {engine: loader_class(engine).engine_version() for engine in installed_engines()}
     return [rule for rule in all_rules() if rule.kind == "difference" and rule.holds_for(versions)]
 
 
-@pytest.mark.parametrize("rule", differing(), ids=lambda rule: rule.id)
+@pytest.mark.parametrize("rule", difference_rules(), ids=lambda rule: rule.id)
 def test_each_trap_is_explained_by_its_rule(rule: Rule) -> None:
     case = trap_case(rule)
     report = diagnose(find_trap(rule), base=case.base, samples=3, counterexamples=False)
@@ -81,7 +81,7 @@ def test_only_what_must_change_changes() -> None:
 def test_robots_without_a_cause_are_alike(data: st.DataObject) -> None:
     model = data.draw(models(max_links=5))
     first = diagnose(model, engines=BOTH, samples=2, counterexamples=False, base=model.base)
-    # What a random robot has of causes is taken away; then nothing may be left to find.
+    # The causes of a random robot are removed; then no difference may remain.
     assert first.explained, first.unexplained
     if first.mended is None:
         return
@@ -152,7 +152,7 @@ def test_a_robot_that_cannot_be_read_gives_a_report_with_its_error(tmp_path: Pat
 
 
 @pytest.mark.parametrize(
-    ("arguments", "error", "said"),
+    ("arguments", "error", "message"),
     [
         ({"engines": ["pinochio"]}, UnknownBackendError, "did you mean 'pinocchio'"),
         ({"engines": "pinocchio"}, ArgumentError, "wanted names"),
@@ -169,23 +169,23 @@ def test_a_robot_that_cannot_be_read_gives_a_report_with_its_error(tmp_path: Pat
     ],
 )
 def test_arguments_that_are_right_for_no_robot_are_refused(
-    arguments: dict[str, Any], error: type[Exception], said: str
+    arguments: dict[str, Any], error: type[Exception], message: str
 ) -> None:
-    with pytest.raises(error, match=said):
+    with pytest.raises(error, match=message):
         diagnose(TRAP, **arguments)
 
 
 def test_a_missing_engine_is_named_when_asked_for_and_left_out_otherwise(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def missing(engine: str) -> type:
+    def refuse_to_load(engine: str) -> type:
         if engine in ("mujoco", "drake"):
             raise NotInstalledError(f"pip install 'dynx[{engine}]'")
         return known(engine)
 
     known = registry.loader_class
-    monkeypatch.setattr(registry, "loader_class", missing)
-    monkeypatch.setattr("dynx.doctor.examine.examination.loader_class", missing)
+    monkeypatch.setattr(registry, "loader_class", refuse_to_load)
+    monkeypatch.setattr("dynx.doctor.examine.examination.loader_class", refuse_to_load)
     report = diagnose(TRAP, counterexamples=False)
     assert [each.engine for each in report.engines] == [e for e in ENGINES if e not in ("mujoco", "drake")]
     with pytest.raises(NotInstalledError, match=r"dynx\[drake\]"):

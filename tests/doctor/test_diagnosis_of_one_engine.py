@@ -1,4 +1,4 @@
-"""Diagnosis with an engine whose faults are known, so that what the report has to say is known too."""
+"""Diagnosis with an engine whose faults are known, so that the correct report is known too."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ FRAMES = case_of(
 )
 
 
-def diagnosed(monkeypatch: pytest.MonkeyPatch, engine: type[LoadedRobot], text: str) -> DoctorReport:
+def diagnose_with(monkeypatch: pytest.MonkeyPatch, engine: type[LoadedRobot], text: str) -> DoctorReport:
     """Diagnose a file with that engine alone."""
     for module in ("examine.examination", "report_assembly"):
         monkeypatch.setattr(f"dynx.doctor.{module}.loader_class", lambda name: engine)
@@ -33,7 +33,7 @@ def diagnosed(monkeypatch: pytest.MonkeyPatch, engine: type[LoadedRobot], text: 
 
 
 class OnlyFlanges(FaultyEngine):
-    """Takes a flange for a body, and no other frame."""
+    """Reads a flange as a body, and no other frame."""
 
     def __init__(self, *arguments: Any) -> None:
         super().__init__(*arguments)
@@ -45,7 +45,7 @@ class OnlyFlanges(FaultyEngine):
         self.right = ReferenceBackend(replace(model, links=tuple(links)))
 
 
-class Shy(FaultyEngine):
+class ElbowOff(FaultyEngine):
     """Torques of the second joint are off by 1e-9 of their size."""
 
     def inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
@@ -53,7 +53,7 @@ class Shy(FaultyEngine):
 
 
 def test_only_the_place_that_matters_is_mended(monkeypatch: pytest.MonkeyPatch) -> None:
-    report = diagnosed(monkeypatch, OnlyFlanges, FRAMES.source.text)
+    report = diagnose_with(monkeypatch, OnlyFlanges, FRAMES.source.text)
     assert report.explained
     assert [each.link for each in report.differences] == ["flange"]
     assert [each.link for each in report.findings if each.rule == "DX101"] == ["flange", "camera"]
@@ -65,11 +65,11 @@ def test_only_the_place_that_matters_is_mended(monkeypatch: pytest.MonkeyPatch) 
 def test_every_place_that_matters_is_mended_and_the_file_is_then_alike(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    report = diagnosed(monkeypatch, FaultyEngine, FRAMES.source.text)
+    report = diagnose_with(monkeypatch, FaultyEngine, FRAMES.source.text)
     assert [(each.link, each.proved) for each in report.differences] == [("flange", True), ("camera", True)]
     (engine,) = report.engines
     assert max(engine.before.values()) > report.tolerance >= max(engine.after.values()) == report.residual
-    assert diagnosed(monkeypatch, FaultyEngine, report.mended or "").alike
+    assert diagnose_with(monkeypatch, FaultyEngine, report.mended or "").alike
 
 
 def test_a_small_difference_that_no_rule_explains_is_said_with_its_joint(
@@ -77,7 +77,7 @@ def test_a_small_difference_that_no_rule_explains_is_said_with_its_joint(
 ) -> None:
     links = (link(name, center=(0.1, 0.2, 0.3)) for name in ("base", "upper", "lower"))
     case = case_of(*links, joint("j", "base", "upper"), joint("k", "upper", "lower"))
-    report = diagnosed(monkeypatch, Shy, case.source.text)
+    report = diagnose_with(monkeypatch, ElbowOff, case.source.text)
     (left,) = report.unexplained
     assert (left.quantity, left.joint) == (TORQUE, "k")
     assert 1e-10 < left.relative_error <= 1e-9
@@ -86,7 +86,7 @@ def test_a_small_difference_that_no_rule_explains_is_said_with_its_joint(
 
 
 def test_a_file_that_is_refused_to_the_end_is_not_explained(monkeypatch: pytest.MonkeyPatch) -> None:
-    report = diagnosed(monkeypatch, FaultyEngine, case_of(link("base"), f"<!-- {SECRET} -->").source.text)
+    report = diagnose_with(monkeypatch, FaultyEngine, case_of(link("base"), f"<!-- {SECRET} -->").source.text)
     (left,) = report.unexplained
     assert left.quantity == LOADING
     assert report.engines[0].refused_after == report.engines[0].refused == f"robot.urdf is a {SECRET}"
@@ -95,6 +95,6 @@ def test_a_file_that_is_refused_to_the_end_is_not_explained(monkeypatch: pytest.
 
 def test_meshes_that_are_nowhere_are_no_cause(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     mesh = f'<visual><geometry><mesh filename="{tmp_path.name}/none.stl"/></geometry></visual>'
-    report = diagnosed(monkeypatch, FaultyEngine, case_of(link("base", mesh)).source.text)
+    report = diagnose_with(monkeypatch, FaultyEngine, case_of(link("base", mesh)).source.text)
     assert report.alike
     assert report.mended is None

@@ -15,7 +15,7 @@ from dynx.doctor import diagnose
 from dynx.loaded import installed_engines
 from dynx.model.library import find
 from dynx.model.model import Base
-from tests.doctor.raw_agreement import answers, beside, difference, task
+from tests.doctor.raw_agreement import beside, difference, run_script, task
 
 ROBOTS = [
     "allegro_left_hand",
@@ -42,7 +42,7 @@ def test_mended_files_are_loaded_alike_by_raw_engines(base: Base, tmp_path: Path
         assert report.explained, (name, report.unexplained)
         text = report.mended or report.text or ""
         tasks.append(task(beside(Path(find(name)), text.encode(), tmp_path / name), base))
-    found = {engine: answers(engine, tasks, tmp_path) for engine in ("pinocchio", "pybullet")}
+    found = {engine: run_script(engine, tasks, tmp_path) for engine in ("pinocchio", "pybullet")}
     apart = {
         name: difference(one, other)
         for name, one, other in zip(ROBOTS, found["pinocchio"], found["pybullet"], strict=True)
@@ -52,6 +52,6 @@ def test_mended_files_are_loaded_alike_by_raw_engines(base: Base, tmp_path: Path
 
 def test_the_scripts_see_what_the_doctor_mends(tmp_path: Path) -> None:
     questions = [task(Path(find(name)), "fixed") for name in ROBOTS if name != "ur5"]
-    found = {engine: answers(engine, questions, tmp_path) for engine in ("pinocchio", "pybullet")}
+    found = {engine: run_script(engine, questions, tmp_path) for engine in ("pinocchio", "pybullet")}
     apart = [difference(*pair) for pair in zip(found["pinocchio"], found["pybullet"], strict=True)]
     assert min(apart) > BAR

@@ -35,7 +35,7 @@ class Fault:
                 return top_level
         return None
 
-    def planted(self, source: str) -> str:
+    def faulty_source(self, source: str) -> str:
         """Return the source with the mistake in it; raise ValueError unless it fits exactly once."""
         count = source.count(self.right)
         if count != 1:

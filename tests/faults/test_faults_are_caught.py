@@ -28,14 +28,14 @@ def skip_without_engine(fault: Fault) -> None:
         pytest.skip(f"needs {fault.engine}, which is not installed")
 
 
-def planted(fault: Fault) -> Change:
+def change_of(fault: Fault) -> Change:
     source = (ROOT / f"{fault.module.replace('.', '/')}.py").read_text(encoding="utf-8")
-    return Change(fault.module, fault.planted(source))
+    return Change(fault.module, fault.faulty_source(source))
 
 
 @pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name)
 def test_a_fault_fits_the_source_and_its_test_exists(fault: Fault) -> None:
-    change = planted(fault)
+    change = change_of(fault)
     compile(change.source, change.module, "exec")
     tests = ast.parse((ROOT / fault.test_file).read_text(encoding="utf-8"))
     defined = {node.name for node in ast.walk(tests) if isinstance(node, ast.FunctionDef | ast.ClassDef)}
@@ -50,7 +50,7 @@ def test_names_of_faults_are_distinct() -> None:
 @pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name)
 def test_a_fault_is_caught(runner: Runner, fault: Fault) -> None:
     skip_without_engine(fault)
-    code, output = runner.run([fault.caught_by], planted(fault))
+    code, output = runner.run([fault.caught_by], change_of(fault))
     # 1: tests ran and one failed. 0 would be a fault that no test notices, 2 and above a broken run.
     assert code == 1, f"{fault.caught_by} did not fail:\n{output[-3000:]}"
     assert " failed" in output, f"{fault.caught_by} did not get to its assertions:\n{output[-3000:]}"

@@ -1,4 +1,4 @@
-"""Runs of pytest with one module of dynx changed, each in a process forked from one that is warm.
+"""Runs of pytest with one module of dynx changed, each forked from a process with loaded imports.
 
 ``python -m tests.faults.warm`` imports what dynx and its tests need from elsewhere, but nothing of dynx, and
 then serves requests: a line of JSON on stdin (see `Runner.run`), a line of JSON ``[exit code, output]`` on
@@ -25,9 +25,9 @@ from typing import Any
 
 ROOT = Path(__file__).resolve().parents[2]
 TIMEOUT = 300
-"""Processor time of the tests of one request, at most [s]."""
+"""Largest processor time of the tests of one request [s]."""
 WALL_PER_CPU = 10
-"""Wall time that a run may take for its processor time; others may use the machine."""
+"""Largest ratio of wall time to processor time of a run, on a machine with other programs."""
 TIMED_OUT = (-27, -14)
 """Exit codes of a run that took too long: the negative numbers of SIGPROF and SIGALRM."""
 
@@ -117,16 +117,16 @@ def serve() -> None:
     replies = os.fdopen(os.dup(1), "w")
     with tempfile.TemporaryDirectory() as folder:
         if sys.dont_write_bytecode:
-            # Bytecode that one run writes, the next ones read: half the time of most. A changed module is
-            # never among it (`tests.faults.plant`).
+            # Later runs read the bytecode that one run writes, which halves the time of most. A changed
+            # module never writes any (`tests.faults.plant`).
             sys.pycache_prefix, sys.dont_write_bytecode = folder, False
         for line in sys.stdin:
-            asked = json.loads(line)
-            if asked["change"] is not None:
-                asked["change"] = write_change(Path(folder, "change.json"), asked["change"])
+            request = json.loads(line)
+            if request["change"] is not None:
+                request["change"] = write_change(Path(folder, "change.json"), request["change"])
             with tempfile.TemporaryFile() as output:
                 run = run_in_child if hasattr(os, "fork") else run_here
-                code = run(asked, output.fileno())
+                code = run(request, output.fileno())
                 output.seek(0)
                 print(json.dumps([code, output.read().decode(errors="replace")]), file=replies, flush=True)
 
@@ -136,43 +136,43 @@ def write_change(path: Path, change: dict[str, str]) -> str:
     return str(path)
 
 
-def run_in_child(asked: dict[str, Any], output: int) -> int:
+def run_in_child(request: dict[str, Any], output: int) -> int:
     """Run the tests in a forked process that writes to the file descriptor `output`; return its exit code."""
     child = os.fork()
     if child == 0:
         code = 3
         try:
             os.setpgid(0, 0)
-            code = run_here(asked, output)
+            code = run_here(request, output)
         finally:
             os._exit(code)
     try:
         _, status = os.waitpid(child, 0)
     finally:
-        # The child, where this process is interrupted, and processes that its tests started and left.
+        # Ends the child if this process is interrupted, and processes that the tests have left.
         with contextlib.suppress(ProcessLookupError, PermissionError):
             os.killpg(child, signal.SIGKILL)
     return os.waitstatus_to_exitcode(status)
 
 
-def run_here(asked: dict[str, Any], output: int) -> int:
+def run_here(request: dict[str, Any], output: int) -> int:
     """Run the tests in this process, writing to the file descriptor `output`; return pytest's exit code."""
     if hasattr(signal, "setitimer"):
         # A change may be one that never ends; the timers end the process, which is then no failed test.
-        signal.setitimer(signal.ITIMER_PROF, asked["timeout"])
-        signal.setitimer(signal.ITIMER_REAL, asked["timeout"] * WALL_PER_CPU)
+        signal.setitimer(signal.ITIMER_PROF, request["timeout"])
+        signal.setitimer(signal.ITIMER_REAL, request["timeout"] * WALL_PER_CPU)
     nothing = os.open(os.devnull, os.O_RDONLY)
     os.dup2(nothing, 0)
     os.dup2(output, 1)
     os.dup2(output, 2)
     os.environ["HYPOTHESIS_PROFILE"] = "faults"
-    if asked["change"] is not None:
-        os.environ["DYNX_PLANT"] = asked["change"]
+    if request["change"] is not None:
+        os.environ["DYNX_PLANT"] = request["change"]
         # Kernels are compiled anew: those in the cache are from the source on the disk.
         os.environ["DYNX_CACHE"] = "0"
     import pytest
 
-    code = int(pytest.main([*OPTIONS, *asked["tests"]]))
+    code = int(pytest.main([*OPTIONS, *request["tests"]]))
     sys.stdout.flush()
     sys.stderr.flush()
     return code

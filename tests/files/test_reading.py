@@ -1,4 +1,4 @@
-"""What is no readable regular file is refused at once, by name, without waiting."""
+"""Anything but a readable regular file raises an error at once that names it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""All installed backends give one answer, to every quantity, on random robots and on real ones."""
+"""All installed backends agree on every quantity, on random robots and on real ones."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ from tests.error_bounds import samples_at
 
 REAL = ("ur5", "panda", "solo12", "hyq", "xarm7", "z1", "six_axis_arm", "seven_axis_arm", "scara")
 REAL_COMPILED = [(robot, ("fixed", "floating")[k % 2]) for k, robot in enumerate(REAL)]
-"""All of them with the compiled backend too, which takes seconds a robot: each on one of the bases."""
+"""Real robots for the compiled backend, which takes seconds per robot: each on one base."""
 
 COMPILED_EXAMPLES = 40
-"""Random robots that the compiled backend meets in one property."""
+"""Number of random robots in a test of the compiled backend."""
 
 STATES = 2
-"""States in one example, evaluated as a batch."""
+"""Number of states in one example, evaluated as a batch."""
 
 Base = Literal["fixed", "floating"]
 each_base = pytest.mark.parametrize("base", ["fixed", "floating"])
@@ -41,18 +41,18 @@ each_base = pytest.mark.parametrize("base", ["fixed", "floating"])
 
 @contextmanager
 def backends_of(model: Model, names: Sequence[str] | None = None) -> Iterator[list[Backend]]:
-    """Every installed backend of a model, or those named, closed at the end."""
+    """Open all installed backends of a model, or those named, and close them at the end."""
     with ExitStack() as stack:
         yield [stack.enter_context(backend(name, model)) for name in names or installed_backends()]
 
 
 INTERPRETED = [name for name in installed_backends() if name != "compiled"]
-"""Backends to which a new robot costs nothing. The compiled one makes some thirty kernels for each, which
-takes it half a second, so it meets fewer of them (`test_compiled_random_robots`)."""
+"""Backends that load a new robot at once. The compiled one makes some thirty kernels for each robot, which
+takes half a second, so it is tested on fewer robots (`test_compiled_random_robots`)."""
 
 
 def assert_agree(engines: list[Backend], states: Samples) -> None:
-    """Every quantity, every pair of backends, every frame in every reference."""
+    """Compare every quantity of every pair of backends, for every frame in every reference."""
     sizes = Magnitudes(states)
     results = [BackendResults(engine.name, engine, states) for engine in engines]
     for pair in combinations(results, 2):
@@ -72,11 +72,11 @@ def assert_agreement(comparison: Comparison) -> None:
 def robots_in_states(
     draw: st.DrawFn, base: Base, physical: bool = True, solvable: bool = False
 ) -> tuple[Model, Samples]:
-    """A random robot and some states, with a wrench on one of its frames."""
+    """Draw a robot and some states, with a wrench on one of its frames."""
     model = draw(models(base=base, physical=physical, solvable=solvable))
     q, v, a = (np.stack(each) for each in zip(*(draw(samples(model)) for _ in range(STATES)), strict=True))
     frame = draw(st.sampled_from(model.frame_names))
-    # Torques as inverse dynamics gives them are those at which forward dynamics is of use.
+    # The magnitude of such torques is that of accelerations, as in `Samples`.
     tau = draw(samples(model)).a
     return model, samples_at(model, q, v, a, tau, wrench=draw(wrenches()), frame=frame, references=1)
 
@@ -124,8 +124,8 @@ def test_random_robots_with_impossible_inertias(base: Base, data: st.DataObject)
 
 @each_base
 @given(data=st.data())
-def test_derived_answers_are_the_native_ones(base: Base, data: st.DataObject) -> None:
-    """What an engine computes itself, against what the base derives from its poses and torques."""
+def test_derived_results_equal_native_ones(base: Base, data: st.DataObject) -> None:
+    """Compare quantities that an engine computes with those derived from its poses and torques."""
     model, states = data.draw(robots_in_states(base))
     note(model.to_urdf())
     sizes = Magnitudes(states)

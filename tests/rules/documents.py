@@ -12,7 +12,7 @@ LIMIT = '<limit lower="-1" upper="1" effort="10" velocity="5"/>'
 
 
 def case_of(*parts: str, base: Base = "fixed", source: Path | str = "<string>") -> Case:
-    """The case of a robot of these elements, one a line; `source` is where meshes are looked for."""
+    """Make the case of a robot with these elements, one per line; meshes are relative to `source`."""
     lines = "\n".join(f"  {part}" for part in parts)
     return Case(XmlSource(f'<robot name="robot">\n{lines}\n</robot>\n', str(source)), base=base)
 
@@ -24,7 +24,7 @@ def link(
     moments: tuple[float, float, float] = (0.01, 0.01, 0.01),
     center: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> str:
-    """A link with principal moments along its axes."""
+    """Write a link with principal moments along its axes."""
     x, y, z = (repr(value) for value in center)
     ixx, iyy, izz = (repr(moment) for moment in moments)
     return (
@@ -35,14 +35,14 @@ def link(
 
 
 def visual(shape: str, xyz: str = "0 0 0", rpy: str = "0 0 0") -> str:
-    """A visual of one shape element."""
+    """Write a visual with one shape element."""
     return f'<visual><origin xyz="{xyz}" rpy="{rpy}"/><geometry>{shape}</geometry></visual>'
 
 
 def joint(
     name: str, parent: str, child: str, *inside: str, type: str = "revolute", limit: str = LIMIT
 ) -> str:
-    """A joint about z at the parent's origin; further elements go inside."""
+    """Write a joint about z at the parent's origin; `inside` are further elements."""
     ends = f'<parent link="{parent}"/><child link="{child}"/>'
     moving = "" if type == "fixed" else f'<axis xyz="0 0 1"/>{limit}'
     return f'<joint name="{name}" type="{type}">{ends}{moving}{"".join(inside)}</joint>'

@@ -1,4 +1,4 @@
-"""How far two readings of a robot are apart."""
+"""Difference between two readings of a robot."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from dynx.rules import Case
 from dynx.spatial.scalar import Floats
 
 
-def distance(one: Case, other: Case) -> float:
-    """How far two readings are apart: poses, mass matrix and torque at the same states, relative."""
+def reading_difference(one: Case, other: Case) -> float:
+    """Return the largest relative difference of poses, mass matrix and torque at equal states."""
     first, second = one.model, other.model
     assert len(first.joint_names) == len(second.joint_names)
     states = draw_states(first, 3, 0)
@@ -26,6 +26,6 @@ def distance(one: Case, other: Case) -> float:
 
 
 def poses_of(reference: ReferenceValues, links: list[str]) -> Floats:
-    """Poses (n, links, 4, 4)."""
+    """Return the poses (n, links, 4, 4) of `links`."""
     names = [link.name for link in reference.model.links]
     return reference.poses[:, [names.index(link) for link in links]]

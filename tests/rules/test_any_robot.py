@@ -1,4 +1,4 @@
-"""Every rule on robots and spellings that nobody chose: nothing breaks, and remedies remove their causes."""
+"""Every rule on random robots in random spellings: no error occurs, and remedies remove their causes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from dynx.model.model import Base
 from dynx.model.xml.source import XmlSource
 from dynx.rules import Case, Rule, all_rules
 from dynx.testing.strategies import urdf_text
-from tests.rules.readings import distance
+from tests.rules.readings import reading_difference
 
 BASES: tuple[Base, ...] = ("fixed", "floating")
 
@@ -28,16 +28,16 @@ def test_a_remedy_removes_its_cause_from_any_robot(text: str, base: Base) -> Non
 
 
 def with_choice(case: Case, rule: Rule, choice: str) -> Case:
-    """The case with what a user chose for one rule."""
+    """Return the case with a user's choice for one rule."""
     return Case(case.source, case.base, case.gravity, choices={rule.id: choice})
 
 
 def check_remedy(rule: Rule, case: Case) -> None:
-    """The remedy, if there is one, leaves no trace of the cause, and otherwise the same robot."""
+    """Check that the remedy, if there is one, removes the cause and leaves the robot unchanged."""
     remedy = rule.remedy(case, rule.detect(case))
     if remedy is None:
         return
     assert not rule.detect(remedy.case)
     assert remedy.case.readable, remedy.case.reading
     if not remedy.changes_physics and rule.stage == "model":
-        assert distance(case, remedy.case) <= BAR
+        assert reading_difference(case, remedy.case) <= BAR

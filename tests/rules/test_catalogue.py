@@ -16,22 +16,22 @@ from dynx.model.xml.source import SourceElement, XmlSource
 from dynx.rules import Case, Detection, Rule, all_rules, find_rule
 from dynx.rules.inertia.rigid_groups import rigid_groups
 from dynx.rules.traps import find_trap, trap_case
-from tests.rules.readings import distance
+from tests.rules.readings import reading_difference
 
 RULES = all_rules()
 every_rule = pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.id)
 
-# Causes that cannot be shown without another: rule -> ids of difference rules its trap also has, and why.
+# Causes that occur only with another one: rule -> difference rules that its trap also has, and the reason.
 ALSO_IN_TRAP: dict[str, dict[str, str]] = {
     "DX303": {"DX301": "a negative damping is a damping, however small"},
     "DX511": {"DX304": "followers of a follower are followers"},
     "DX512": {"DX304": "a follower that leaves its limits follows"},
 }
 
-# What may change outside of the links, joints and lines that a rule names: rule -> why.
+# Rules whose remedy changes more than the links, joints and lines of the detections: rule -> the reason.
 CHANGES_ELSEWHERE: dict[str, str] = {
     "DX109": "a link has another name wherever the document names it",
-    "DX212": "frames are taken away, with the joints that hold them",
+    "DX212": "frames are removed, with their joints",
     "DX414": "a link has another name wherever the document names it",
 }
 
@@ -115,9 +115,9 @@ def test_detections_say_where_and_what(rule: Rule) -> None:
         assert "\n" not in each.message
 
 
-def mended(rule: Rule) -> tuple[Case, Case, bool] | None:
-    """The trap, the trap after the remedy (by the last choice where the first does nothing), and
-    whether that changes the physics; None where nothing can remove the cause."""
+def mended_trap(rule: Rule) -> tuple[Case, Case, bool] | None:
+    """Return the trap, the mended trap (by the first choice that has a remedy), and whether the remedy
+    changes the physics; None where the cause has no remedy."""
     for choice in [None, *rule.choices]:
         trap = trap_case(rule)
         choices = None if choice is None else {rule.id: choice}
@@ -131,7 +131,7 @@ def mended(rule: Rule) -> tuple[Case, Case, bool] | None:
 
 @every_rule
 def test_the_remedy_removes_the_cause(rule: Rule) -> None:
-    cured = mended(rule)
+    cured = mended_trap(rule)
     if cured is not None:
         case, after, _ = cured
         assert not rule.detect(after)
@@ -140,30 +140,30 @@ def test_the_remedy_removes_the_cause(rule: Rule) -> None:
 
 @every_rule
 def test_the_remedy_leaves_the_rest_of_the_text_as_it_is(rule: Rule) -> None:
-    cured = mended(rule)
+    cured = mended_trap(rule)
     if cured is None or rule.id in CHANGES_ELSEWHERE:
         return
     case, after, _ = cured
-    spared = untouched_lines(case, rule.detect(case))
+    untouched = untouched_lines(case, rule.detect(case))
     remaining = iter(after.source.text.splitlines())
-    for line in spared:
+    for line in untouched:
         assert line in remaining, f"lost or moved: {line}"
 
 
 @every_rule
 def test_the_mended_trap_is_the_same_robot(rule: Rule) -> None:
-    cured = mended(rule)
+    cured = mended_trap(rule)
     if cured is None or rule.stage == "reading":
         return
     case, after, changes_physics = cured
     assert after.readable
     if not changes_physics:
-        assert distance(case, after) <= BAR
+        assert reading_difference(case, after) <= BAR
 
 
 def untouched_lines(case: Case, detections: Sequence[Detection]) -> list[str]:
-    """The lines of a document that hold nothing of what the detections are about: links (and what is
-    welded to them), joints, and the parts of the robot in which they stand."""
+    """List the lines outside of the links (with those rigidly connected to them), joints and other elements
+    in which something was detected."""
     names = {("link", each.link) for each in detections} | {("joint", each.joint) for each in detections}
     if case.readable:
         groups = rigid_groups(case)
@@ -179,7 +179,7 @@ def untouched_lines(case: Case, detections: Sequence[Detection]) -> list[str]:
 
 
 def lines_of(source: XmlSource, element: SourceElement) -> range:
-    """Numbers of the lines that an element covers."""
+    """Return the numbers of the lines of an element."""
     within = source.data[element.span.start : element.span.end].count(b"\n")
     return range(element.line, element.line + within + 1)
 

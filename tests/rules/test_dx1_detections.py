@@ -22,11 +22,11 @@ RULES = [rule for rule in all_rules() if "DX101" <= rule.id <= "DX113"]
 OWN = [entry.path for entry in robots() if entry.source == DYNX_MODELS and "dx" not in entry.name]
 
 SOLID = Inertial(1.5, Pose((0.1, 0.02, 0.05)), ixx=0.02, iyy=0.03, izz=0.025)
-"""Without a trace of any of the causes."""
+"""Inertial without any of the causes."""
 
 
-def made_clean(case: Case) -> Case:
-    """The robot with a plain solid body in every link."""
+def clean(case: Case) -> Case:
+    """Put the inertial `SOLID` into every link."""
     edits: list[Edit] = []
     for each in case.model.links:
         edits += inertial_edits(case.source, case.links[each.name], each.inertial, SOLID)
@@ -35,7 +35,7 @@ def made_clean(case: Case) -> Case:
 
 def robot(name: str, base: Base) -> Case:
     path = next(path for path in OWN if path.stem == name)
-    return made_clean(Case(XmlSource(path.read_bytes()), base=base))
+    return clean(Case(XmlSource(path.read_bytes()), base=base))
 
 
 def findings(case: Case) -> list[tuple[str, str | None, int | None]]:

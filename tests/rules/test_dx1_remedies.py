@@ -1,4 +1,4 @@
-"""The remedies of DX101 to DX113 leave the robot what it is and the document what it was elsewhere."""
+"""The remedies of DX101 to DX113 change neither the robot nor other parts of the document."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ from tests.rules.test_dx1_detections import PLANTS
 EPS = float(np.finfo(float).eps)
 RULES = [rule for rule in all_rules() if "DX101" <= rule.id <= "DX113"]
 ROUNDS = 4
-LEAST_MEANT = 1.5e-11
-"""Largest moment [kg m^2] of a robot whose links DX111 leaves alone: what MuJoCo takes for zero would be
-more than a thousandth of it."""
+MIN_CORRECTED_INERTIA = 1.5e-11
+"""Smallest largest moment [kg m^2] of a robot that DX111 corrects: below it, the smallest moment that MuJoCo
+accepts is more than a thousandth of it."""
 FILES = {entry.name: entry.path for entry in robots() if entry.source == EXAMPLE_ROBOT_DATA}
 
 
 def mended(case: Case) -> tuple[Case, list[tuple[str, Remedy]]]:
-    """The case after all remedies in their order, again and again until nothing changes."""
+    """Apply all remedies in their order until nothing changes."""
     done: list[tuple[str, Remedy]] = []
     for _ in range(ROUNDS):
         before = case.source.data
@@ -54,7 +54,7 @@ def equations(model: Model, seed: int = 0) -> tuple[Floats, Floats]:
 
 
 def assert_same_robot(before: Model, after: Model, done: list[tuple[str, Remedy]]) -> None:
-    """Equal equations of motion, to what writing numbers in float64 and lifting bodies off the edge costs."""
+    """Check that the equations of motion are equal, up to rounding and the moments raised by DX102."""
     if not before.nv or any(remedy.changes_physics for _, remedy in done):
         return
     bodies = len(before.links)
@@ -87,7 +87,7 @@ def test_every_choice_is_carried_out(model: Model) -> None:
         after, _ = mended(case)
         assert after.readable
         kept = {rule.id for rule in RULES if rule.detect(after)} - {"DX112"}
-        if largest_inertia(after.model) < LEAST_MEANT:
+        if largest_inertia(after.model) < MIN_CORRECTED_INERTIA:
             kept -= {"DX111"}
         assert kept <= {rule for rule, choice in choices.items() if choice == "keep"}
 
@@ -124,7 +124,7 @@ def test_only_the_tensor_changes_in_the_text() -> None:
 def test_a_tensor_that_is_a_body_with_its_neighbour_is_lumped_at_equal_dynamics() -> None:
     heavy = link("b", mass=5.0, moments=(0.3, 0.3, 0.3))
     case = case_of(*(link("a"), heavy, link("c")), joint("ab", "a", "b"), joint("bc", "b", "c", type="fixed"))
-    case = planted(case, "c", PLANTS["DX103"])
+    case = with_inertial(case, "c", PLANTS["DX103"])
     after, done = mended(case)
     assert [rule for rule, _ in done] == ["DX103"]
     assert not done[0][1].changes_physics
@@ -139,7 +139,7 @@ def test_a_tensor_that_is_a_body_with_its_neighbour_is_lumped_at_equal_dynamics(
 
 
 def test_a_tensor_of_no_body_without_neighbours_becomes_the_nearest_one() -> None:
-    case = planted(case_of(link("a"), link("b"), joint("ab", "a", "b")), "b", PLANTS["DX103"])
+    case = with_inertial(case_of(link("a"), link("b"), joint("ab", "a", "b")), "b", PLANTS["DX103"])
     after, done = mended(case)
     assert [(rule, remedy.changes_physics) for rule, remedy in done] == [("DX103", True)]
     nearest = {each.name: each.inertial for each in after.model.links}["b"]
@@ -188,7 +188,7 @@ def test_a_root_without_inertial_gets_that_of_the_body_welded_to_it() -> None:
 
 def test_a_body_on_the_edge_is_put_inside_by_what_nobody_can_measure() -> None:
     clean = case_of(link("a"), link("b"), joint("ab", "a", "b"))
-    case = planted(clean, "b", PLANTS["DX102"])
+    case = with_inertial(clean, "b", PLANTS["DX102"])
     rule = find_rule("DX102")
     remedy = rule.remedy(case, rule.detect(case))
     assert remedy is not None
@@ -204,7 +204,7 @@ def test_a_body_on_the_edge_is_put_inside_by_what_nobody_can_measure() -> None:
 
 def test_a_tensor_without_mass_goes_to_the_link_it_is_welded_to() -> None:
     case = case_of(*(link(n) for n in "abc"), joint("ab", "a", "b"), joint("bc", "b", "c", type="fixed"))
-    case = planted(case, "c", PLANTS["DX108"])
+    case = with_inertial(case, "c", PLANTS["DX108"])
     after, done = mended(case)
     assert [rule for rule, _ in done] == ["DX108"]
     assert_same_robot(case.model, after.model, done)
@@ -226,7 +226,7 @@ def test_a_link_named_world_is_renamed_wherever_it_is_named() -> None:
     assert '"world"' not in after.source.text
 
 
-def planted(case: Case, name: str, inertial: Inertial) -> Case:
+def with_inertial(case: Case, name: str, inertial: Inertial) -> Case:
     """The case with another inertial in one link."""
     element = case.links[name]
     old = {each.name: each.inertial for each in case.model.links}[name]

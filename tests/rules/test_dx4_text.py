@@ -13,7 +13,7 @@ from dynx.model.library import find
 from dynx.model.loading import load
 from dynx.model.xml.source import XmlSource
 from dynx.rules import Case, all_rules, find_rule
-from dynx.rules.catalogue.dx413_line_too_long import LONGEST
+from dynx.rules.catalogue.dx413_line_too_long import MAX_LINE_BYTES
 from dynx.rules.text.misspelled_numbers import MisspelledNumberRule
 from dynx.rules.text.numeric_attributes import NumericAttribute, numeric_attributes
 from dynx.testing.strategies import urdf_text
@@ -146,7 +146,7 @@ def test_an_inertial_without_mass_weighs_nothing(mass: str) -> None:
     assert remedy.case.model.inertial("tool").mass == 0.0
 
 
-@given(st.integers(0, 3 * LONGEST))
+@given(st.integers(0, 3 * MAX_LINE_BYTES))
 def test_what_pybullet_cuts_is_found_and_mended(padding: int) -> None:
     text = find("six_axis_arm").read_text(encoding="utf-8")
     start = text.index("<link")
@@ -162,9 +162,11 @@ def test_what_pybullet_cuts_is_found_and_mended(padding: int) -> None:
 
 
 def _cut(source: XmlSource) -> XmlSource:
-    """The document as PyBullet has it: a line break behind every 8191 bytes of a line."""
+    """Return the document as PyBullet reads it: a line break behind every 8191 bytes of a line."""
     lines = source.data.split(b"\n")
-    pieces = [line[k : k + LONGEST] for line in lines for k in range(0, max(len(line), 1), LONGEST)]
+    pieces = [
+        line[k : k + MAX_LINE_BYTES] for line in lines for k in range(0, max(len(line), 1), MAX_LINE_BYTES)
+    ]
     return _Torn(b"\n".join(pieces))
 
 
@@ -176,7 +178,7 @@ class _Torn(XmlSource):
 
 
 def _tags(source: XmlSource) -> list[bytes]:
-    """What stands between each pair of angle brackets."""
+    """Return the text of each tag."""
     pieces = source.data.split(b"<")
     return [piece.partition(b">")[0] for piece in pieces if piece.strip()[:1] != b"!"]
 

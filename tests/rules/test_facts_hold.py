@@ -1,8 +1,8 @@
-"""What the catalogue says of engines, measured on the engines installed.
+"""Facts about engines in the catalogue, measured on the installed engines.
 
 A rule names the versions of an engine in which its cause shows. Here the engine loads the rule's trap: it
 must be wrong before the remedy and right after it, and where the installed version is not among those
-named, right before it. So an engine release that changes its mind fails here by name.
+named, right before it. So a release of an engine that behaves otherwise fails here by name.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ STATES, SEED = 3, 0
 
 VERSIONS = {engine: loader_class(engine).engine_version() for engine in installed_engines()}
 
-# Engines that are wrong on a trap for another cause that the trap cannot do without: why.
-WRONG_BESIDES: dict[tuple[str, str], str] = {
-    ("DX210", "mujoco"): "its three joints for a planar one move alike and have other names",
+# Engines that are wrong on a trap for a second cause that the trap must contain: the reason.
+WRONG_FOR_SECOND_CAUSE: dict[tuple[str, str], str] = {
+    ("DX210", "mujoco"): "its three joints for a planar one have the same motion and other names",
     ("DX511", "mujoco"): "DX304: followers of a follower are followers",
     ("DX511", "drake"): "DX304: followers of a follower are followers",
     ("DX512", "mujoco"): "DX304: a follower that leaves its limits follows",
@@ -36,8 +36,8 @@ WRONG_BESIDES: dict[tuple[str, str], str] = {
 }
 
 
-def stated(named: bool) -> list[Any]:
-    """Every rule with every engine installed that it names, or does not name."""
+def rules_and_engines(named: bool) -> list[Any]:
+    """Pair each rule with the installed engines that it names, or does not name."""
     return [
         pytest.param(rule, engine, id=f"{rule.id}-{engine}-{version}")
         for rule in all_rules()
@@ -48,12 +48,12 @@ def stated(named: bool) -> list[Any]:
 
 @cache
 def examiner(engine: str) -> Examiner:
-    """A laboratory with one engine."""
+    """Make the examiner of one engine."""
     return Examiner([engine], STATES, SEED)
 
 
-def cured(rule: Rule) -> Case | None:
-    """The trap with the cause removed, by the first choice that removes anything; None where none does."""
+def mended_trap(rule: Rule) -> Case | None:
+    """Return the trap mended by the first choice that has a remedy; None where none has."""
     trap = trap_case(rule)
     for choice in [None, *rule.choices]:
         case = Case(trap.source, trap.base, choices=None if choice is None else {rule.id: choice})
@@ -63,51 +63,49 @@ def cured(rule: Rule) -> Case | None:
     return None
 
 
-def right_answers(rule: Rule, engine: str) -> ReferenceValues:
-    """Those for the trap; where dynx refuses its text, those for the robot that the remedy makes of it."""
+def reference_of(rule: Rule, engine: str) -> ReferenceValues:
+    """Return the reference values of the trap; of the mended trap where dynx refuses the text."""
     try:
         return examiner(engine).reference(trap_case(rule))
     except ModelError:
-        mended = cured(rule)
+        mended = mended_trap(rule)
         assert mended is not None
         return examiner(engine).reference(mended)
 
 
-def said(examination: Examination, engine: str) -> str:
-    """What an engine did, for the message of a failure."""
-    answers = examination.outputs[engine]
-    return (
-        f"{engine}: {examination.errors(engine)}, refused: {answers.refused}, failed: {dict(answers.failed)}"
-    )
+def description(examination: Examination, engine: str) -> str:
+    """Describe the output of an engine for the message of a failure."""
+    output = examination.outputs[engine]
+    return f"{engine}: {examination.errors(engine)}, refused: {output.refused}, failed: {dict(output.failed)}"
 
 
-@pytest.mark.parametrize(("rule", "engine"), stated(named=True))
+@pytest.mark.parametrize(("rule", "engine"), rules_and_engines(named=True))
 def test_fact(rule: Rule, engine: str) -> None:
-    before = examiner(engine).examine(trap_case(rule), reference=right_answers(rule, engine))
+    before = examiner(engine).examine(trap_case(rule), reference=reference_of(rule, engine))
     if VERSIONS[engine] not in SpecifierSet(rule.engines[engine], prereleases=True):
-        assert before.max_error(engine) <= BAR, said(before, engine)
+        assert before.max_error(engine) <= BAR, description(before, engine)
         return
-    assert before.max_error(engine) > BAR, said(before, engine)
-    case = cured(rule)
+    assert before.max_error(engine) > BAR, description(before, engine)
+    case = mended_trap(rule)
     if case is None:
         return
     after = examiner(engine).examine(case)
     if after.max_error(engine) > BAR:
         # A remedy may bring up another cause: links without mass between the halves of a split joint.
         after = examiner(engine).examine(mend(case).case)
-    assert after.max_error(engine) <= BAR, said(after, engine)
+    assert after.max_error(engine) <= BAR, description(after, engine)
 
 
 @pytest.mark.parametrize("rule", all_rules(), ids=lambda rule: rule.id)
 def test_a_remedy_at_run_time_is_known_to_its_engine(rule: Rule) -> None:
-    case = cured(rule)
+    case = mended_trap(rule)
     calls = frozenset() if case is None else case.calls
     known = {call for engine in VERSIONS for call in loader_class(engine).CALLS}
     assert {call for call in calls if call.split(".")[0] in VERSIONS} <= known
 
 
-@pytest.mark.parametrize(("rule", "engine"), stated(named=False))
+@pytest.mark.parametrize(("rule", "engine"), rules_and_engines(named=False))
 def test_an_engine_that_is_not_named_reads_the_trap_as_dynx_does(rule: Rule, engine: str) -> None:
-    before = examiner(engine).examine(trap_case(rule), reference=right_answers(rule, engine))
+    before = examiner(engine).examine(trap_case(rule), reference=reference_of(rule, engine))
     wrong = before.max_error(engine) > BAR
-    assert wrong == ((rule.id, engine) in WRONG_BESIDES), said(before, engine)
+    assert wrong == ((rule.id, engine) in WRONG_FOR_SECOND_CAUSE), description(before, engine)

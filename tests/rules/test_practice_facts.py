@@ -1,4 +1,4 @@
-"""What the pages of kind practice say of engines, held against the engines installed.
+"""Statements of the practice rules about engines, checked with the installed engines.
 
 These rules change no equation of motion, so there is no number to compare; what they change is the limits
 that an engine holds, or whether it takes the file at all.
@@ -23,8 +23,8 @@ INSTALLED = installed_engines()
 NONE = (-math.inf, math.inf)
 
 
-def held(rule: str, engine: str) -> LoadedJoint:
-    """What an engine holds of the elbow in the trap of a rule."""
+def loaded_elbow(rule: str, engine: str) -> LoadedJoint:
+    """Return the elbow of a rule's trap as an engine loads it."""
     if engine not in INSTALLED:
         pytest.skip(f"{engine} is not installed")
     case = trap_case(rule)
@@ -58,7 +58,7 @@ def held(rule: str, engine: str) -> LoadedJoint:
     ],
 )
 def test_limits_that_an_engine_holds(rule: str, engine: str, property: str, value: Any) -> None:
-    assert getattr(held(rule, engine), property) == value, loader_class(engine).engine_version()
+    assert getattr(loaded_elbow(rule, engine), property) == value, loader_class(engine).engine_version()
 
 
 @pytest.mark.parametrize(

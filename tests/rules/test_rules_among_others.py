@@ -1,4 +1,4 @@
-"""What the bench of planted defects found: rules in files where other things are odd too."""
+"""Rules in files with other defects: regressions that the planted defects have found."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from dynx.rules.traps import trap_case
 from tests.rules.documents import case_of, joint, link
 
 
-def changed(rule: str, old: str, new: str, count: int = 1) -> Case:
-    """The trap of a rule with other words in it."""
+def changed_trap(rule: str, old: str, new: str, count: int = 1) -> Case:
+    """Return the trap of a rule with some text replaced."""
     case = trap_case(rule)
     text = case.source.text.replace(old, new, count)
     assert text != case.source.text
@@ -21,7 +21,7 @@ def changed(rule: str, old: str, new: str, count: int = 1) -> Case:
 
 
 def test_a_floating_joint_at_the_root_is_no_joint_of_several_freedoms_in_an_unreadable_file() -> None:
-    case = changed("DX211", 'upper="3.2"', 'upper="inf"')
+    case = changed_trap("DX211", 'upper="3.2"', 'upper="inf"')
     assert not case.readable
     assert not find_rule("DX210").detect(case)
     inside = Case(XmlSource(case.source.text.replace('<mass value="0"/>', '<mass value="1"/>')))

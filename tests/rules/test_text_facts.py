@@ -1,4 +1,4 @@
-"""What the pages on text say of single engines beyond their traps, held against the engines installed."""
+"""Statements of the text rules about engines beyond their traps, checked with the installed engines."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The trap of a rule as a case, and what is asked of every mended trap."""
+"""Traps of rules as cases, and checks of mended traps."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ TRAPS = Path(__file__).parents[2] / "models" / "traps"
 
 
 def trap(rule_id: str, **choices: str) -> Case:
-    """The trap of a rule, with the user's choices by rule id."""
+    """Return the trap of a rule, with the user's choices by rule id."""
     rule = find_rule(rule_id)
     path = TRAPS / rule.trap()
     return Case(XmlSource(path.read_bytes(), str(path)), rule.trap_base, choices=choices)
 
 
 def mended(rule_id: str, case: Case) -> tuple[list[Detection], Remedy]:
-    """What the rule finds in a case, and its remedy, which must leave nothing to find."""
+    """Return the detections of the rule and its remedy, after which it must detect nothing."""
     rule = find_rule(rule_id)
     found = list(rule.detect(case))
     remedy = rule.remedy(case, found)
@@ -33,13 +33,13 @@ def mended(rule_id: str, case: Case) -> tuple[list[Detection], Remedy]:
 
 
 def only(found: list[Detection]) -> Detection:
-    """The one detection."""
+    """Return the only detection."""
     assert len(found) == 1, found
     return found[0]
 
 
 def assert_same_robot(one: Model, other: Model) -> None:
-    """Same poses, mass matrix and inverse dynamics, bit by bit up to a few roundings."""
+    """Check that poses, mass matrix and inverse dynamics are equal up to four roundings."""
     assert one.joint_names == other.joint_names
     q = one.random(0)
     v, a = np.linspace(-1.0, 1.0, one.nv), np.linspace(0.5, -0.7, one.nv)
@@ -54,6 +54,6 @@ def assert_same_robot(one: Model, other: Model) -> None:
 
 
 def changed_lines(before: Case, after: Case) -> list[str]:
-    """The lines of the text before that are not in the text after."""
+    """List the lines of the old text that are not in the new one."""
     gone = Counter(before.source.text.splitlines()) - Counter(after.source.text.splitlines())
     return [line.strip() for line in gone.elements()]

@@ -1,4 +1,4 @@
-"""Checks that a strategy draws examples of some kind, and which is the simplest."""
+"""Checks that a strategy draws examples of some kind, and the simplest of them."""
 
 from __future__ import annotations
 
@@ -22,5 +22,5 @@ SHRUNK = settings(max_examples=2000, phases=[Phase.generate, Phase.shrink], data
 
 
 def simplest(strategy: st.SearchStrategy[T], sort: Callable[[T], bool]) -> T:
-    """The example of the sort to which Hypothesis shrinks; what explains it, which takes longest, is left."""
+    """Return the example of the sort to which Hypothesis shrinks, without its slow phase `explain`."""
     return find(strategy, sort, settings=SHRUNK)

@@ -36,7 +36,7 @@ NOT_REWRITTEN = ("-W", "ignore::pytest.PytestAssertRewriteWarning")
 
 @dataclass(frozen=True)
 class PytestRun:
-    """The exit code of a run of pytest, and what it said."""
+    """The exit code of a run of pytest, and its output."""
 
     code: int
     stdout: str
@@ -51,13 +51,13 @@ class PytestRun:
         }
 
     @property
-    def said(self) -> str:
-        """All of it, for the message of an assertion."""
+    def output(self) -> str:
+        """Exit code and all output, for the message of an assertion."""
         return f"exit code {self.code}\n{self.stdout}{self.stderr}"
 
 
 def python_path(site: Path) -> list[str]:
-    """Where dynx and its plugin are found; `site` is an empty folder for what is to be put beside dynx."""
+    """Return the import path with dynx and its plugin, and `site`, a folder for further packages."""
     if any(point.name == "dynx" for point in entry_points(group="pytest11")):
         return [str(ROOT)]
     # A source tree that was never installed has no entry points.
@@ -69,7 +69,7 @@ def python_path(site: Path) -> list[str]:
 
 
 def run_started(arguments: tuple[str, ...], folder: Path, path: list[str]) -> PytestRun:
-    """``python -m pytest`` in `folder`, by an interpreter started for it."""
+    """Run ``python -m pytest`` in `folder`, in a new interpreter."""
     inherited = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST")}
     done = subprocess.run(
         [sys.executable, "-m", "pytest", *OPTIONS, *arguments],

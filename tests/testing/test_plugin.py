@@ -1,4 +1,4 @@
-"""The pytest plugin, in runs of pytest of their own: as users run it, from a directory of theirs."""
+"""The pytest plugin, in separate runs of pytest from a user's directory."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from dynx.testing import agreement_tests
 from dynx.testing.robot_checks import CHECKS
 from tests.testing.pytest_runs import PytestRun, python_path, run_forked, run_started
 
-FEW = ("--dynx-backends", "reference,pinocchio")
+BACKENDS = ("--dynx-backends", "reference,pinocchio")
 PENDULUM = find("pendulum").read_text(encoding="utf-8")
 
 MASSLESS_ELBOW = """\
@@ -96,8 +96,10 @@ def start(tmp_path: Path, home: Path) -> Run:
 
 
 def test_without_a_test_file(start: Run, home: Path) -> None:
-    result = start("--dynx-robot", "pendulum", *FEW, "--strict-config", "--strict-markers", "-W", "error")
-    assert result.outcome == {"passed": len(CHECKS)}, result.said
+    result = start(
+        "--dynx-robot", "pendulum", *BACKENDS, "--strict-config", "--strict-markers", "-W", "error"
+    )
+    assert result.outcome == {"passed": len(CHECKS)}, result.output
     assert result.code == 0
     assert "dynx: pendulum; fixed base; reference, pinocchio" in result.stdout
     assert not [path.name for path in home.iterdir() if path.name != ".benchmarks"]
@@ -113,7 +115,7 @@ def test_every_quantity_and_identity_is_a_test() -> None:
 def test_files_bases_and_names_of_tests(run: Run, home: Path) -> None:
     (home / "robots").mkdir()
     (home / "robots" / "mine.urdf").write_text(PENDULUM)
-    result = run("--dynx-robot=robots", "--dynx-robot", "ur5", "--dynx-base", "both", *FEW, "--co", "-q")
+    result = run("--dynx-robot=robots", "--dynx-robot", "ur5", "--dynx-base", "both", *BACKENDS, "--co", "-q")
     nodes = [line for line in result.stdout.splitlines() if "::" in line]
     assert nodes == [
         f"{robot}::{base}::{check}"
@@ -132,10 +134,10 @@ def test_robots_of_the_ini_file(run: Run, home: Path) -> None:
     (home / "tests" / "test_own.py").write_text("def test_own(): pass\n")
     everything = len(CHECKS) * 2 + 1
     for folder, arguments in ((".", ()), (".", ("tests",)), ("tests", ())):
-        result = run("--co", "-q", *FEW, *arguments, folder=folder)
-        assert f"{everything} tests collected" in result.stdout, result.said
-    one_file = run("tests/test_own.py", *FEW)
-    assert one_file.outcome == {"passed": 1}, one_file.said
+        result = run("--co", "-q", *BACKENDS, *arguments, folder=folder)
+        assert f"{everything} tests collected" in result.stdout, result.output
+    one_file = run("tests/test_own.py", *BACKENDS)
+    assert one_file.outcome == {"passed": 1}, one_file.output
     asked_for = run("tests/test_own.py", "--dynx-robot", "pendulum", "--co", "-q")
     assert f"{len(CHECKS) + 1} tests collected" in asked_for.stdout
 
@@ -198,9 +200,9 @@ def test_with_xdist(start: Run, home: Path, distribution: str) -> None:
     # Three interpreters start, so they load no plugin that they do not need.
     lean = ("-p", "no:hypothesispytest", "-p", "no:benchmark")
     result = start(*chosen, *lean, "-n", "2", "--dist", distribution)
-    assert result.code == 0, result.said
+    assert result.code == 0, result.output
     # One engine alone is not compared on quantities that neither referee nor derivation gives.
-    assert result.outcome["passed"] + result.outcome["skipped"] == 2 * len(CHECKS), result.said
+    assert result.outcome["passed"] + result.outcome["skipped"] == 2 * len(CHECKS), result.output
     assert result.outcome["passed"] > result.outcome["skipped"]
     measured = (home / "measured.txt").read_text().splitlines()
     assert set(measured) == {"pendulum fixed", "pendulum floating"}
@@ -214,7 +216,7 @@ def test_a_robot_is_measured_once_and_only_for_tests_that_run(run: Run, home: Pa
         "from dynx.testing import agreement_tests\n"
         "TestMore = agreement_tests('pendulum', backends=['reference', 'pinocchio'])\n"
     )
-    chosen = ("--dynx-robot", "pendulum", "--dynx-base=both", *FEW)
+    chosen = ("--dynx-robot", "pendulum", "--dynx-base=both", *BACKENDS)
     run(*chosen, "--collect-only")
     assert not (home / "measured.txt").exists()
     run(*chosen, "-k", "fixed")
@@ -226,14 +228,14 @@ def test_a_robot_is_measured_once_and_only_for_tests_that_run(run: Run, home: Pa
 def test_a_description_that_cannot_be_read_is_one_failing_test(run: Run, home: Path) -> None:
     (home / "bad.urdf").write_text(PENDULUM.replace('<mass value="', '<mass value="heavy'))
     (home / "test_own.py").write_text("def test_own(): pass\n")
-    result = run("--dynx-robot=bad.urdf", *FEW)
+    result = run("--dynx-robot=bad.urdf", *BACKENDS)
     assert result.outcome == {"failed": 1, "passed": 1}, result.stdout
     assert "DescriptionError" in result.stdout
     assert re.search(r"bad\.urdf:\d+: ", result.stdout)
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "message"),
     [
         (("--dynx-robot", "pendulun"), "did you mean 'pendulum'"),
         (("--dynx-robot", "robots/none.urdf"), "no such file"),
@@ -249,10 +251,10 @@ def test_a_description_that_cannot_be_read_is_one_failing_test(run: Run, home: P
     ],
     ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
 )
-def test_what_is_asked_wrongly(arguments: tuple[str, ...], said: str, run: Run) -> None:
+def test_invalid_arguments(arguments: tuple[str, ...], message: str, run: Run) -> None:
     result = run(*arguments)
-    assert result.code == pytest.ExitCode.USAGE_ERROR, result.said
-    assert said in result.stderr
+    assert result.code == pytest.ExitCode.USAGE_ERROR, result.output
+    assert message in result.stderr
     assert "Traceback" not in result.stderr
 
 
@@ -270,7 +272,7 @@ def test_as_loaded(run: Run, home: Path) -> None:
         "loaded",
     )
     refused = run(*chosen)
-    assert refused.outcome == {"failed": 1}, refused.said
+    assert refused.outcome == {"failed": 1}, refused.output
     assert "DX101 link 'elbow' (pybullet): relative error" in refused.stdout
     line = MASSLESS_ELBOW[: MASSLESS_ELBOW.index('<link name="elbow"')].count("\n") + 1
     assert f"mine.urdf:{line}: " in refused.stdout
@@ -296,5 +298,5 @@ def test_it_costs_nothing_when_it_is_not_used(start: Run, home: Path) -> None:
     result = start(
         "-p", "no:hypothesispytest", "-p", "no:benchmark", "-p", "no:xdist", "-W", "error", "test_own.py"
     )
-    assert result.outcome == {"passed": 1}, result.said
+    assert result.outcome == {"passed": 1}, result.output
     assert "dynx:" not in result.stdout

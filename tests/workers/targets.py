@@ -1,4 +1,4 @@
-"""What the worker processes of the tests do: answer, die, hang, raise."""
+"""Functions that worker processes run in tests: they return, exit, hang or raise."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tests.doctor.formats.reports import differing
 
 
 def act(task: Any) -> Any:
-    """Do what `task` says; anything else is answered with itself and the number of the process."""
+    """Do what `task` says; any other task is returned with the number of the process."""
     if task == "segfault":
         os.kill(os.getpid(), signal.SIGSEGV)
     elif task == "exit":

@@ -14,7 +14,7 @@ from tests.workers.targets import act, crash_on_panda
 
 
 def outcomes(tasks: list[str], size: int = 2, timeout: float | None = None) -> list[object]:
-    """What becomes of each task, in order: its name, or the failure."""
+    """Return the outcome of each task, in order: its name, or the failure."""
     found: list[object] = [None] * len(tasks)
     with Workers(act, size, timeout) as workers:
         for outcome in workers.run(tasks):

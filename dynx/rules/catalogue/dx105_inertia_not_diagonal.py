@@ -29,8 +29,8 @@ from dynx.rules.inertia.edits import line_of, with_inertials
 from dynx.rules.inertia.physical import fault_beyond_rounding, is_borderline, with_raised_moments
 from dynx.rules.inertia.rigid_groups import inertials_in_groups
 
-_NOTICEABLE = 1e-14
-"""Share of the tensor: a hundredth of what the comparison of engines can show."""
+_MAX_ERROR = 1e-14
+"""Largest error, relative to the tensor, that is not reported: 1 % of the tolerance of `dynx.diagnose`."""
 
 
 class InertiaNotDiagonal(Rule):
@@ -43,7 +43,7 @@ class InertiaNotDiagonal(Rule):
             if group.static or bullet_reading(inertial).zeroed:
                 continue
             error = diagonalisation_error(inertial)
-            if error > _NOTICEABLE:
+            if error > _MAX_ERROR:
                 message = f"PyBullet's diagonalisation of the tensor is off by {error:.1e} of its size"
                 yield Detection(name, None, line_of(case, name, "inertia"), message)
 

@@ -24,8 +24,8 @@ from dynx.rules.inertia.central import CentralInertia
 from dynx.rules.inertia.edits import line_of
 from dynx.rules.inertia.rigid_groups import inertials_in_groups
 
-_VISIBLE = 1e-14
-"""Share of the largest moment."""
+_MAX_CHANGE = 1e-14
+"""Largest change, relative to the largest moment, that is not reported."""
 
 
 class InertialRotationIgnored(Rule):
@@ -39,7 +39,7 @@ class InertialRotationIgnored(Rule):
                 continue
             change = np.max(np.abs(CentralInertia.of(inertial).tensor - inertial.tensor))
             size = float(np.max(np.abs(inertial.tensor)))
-            if change > _VISIBLE * size:
+            if change > _MAX_CHANGE * size:
                 line = line_of(case, name, "origin")
                 message = f"without its rpy the tensor is off by {float(change) / size:.2g} of its size"
                 yield Detection(name, None, line, message)

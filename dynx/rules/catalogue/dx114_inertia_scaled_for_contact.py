@@ -30,7 +30,7 @@ class InertiaScaledForContact(EditingRule):
     changed = "removed <inertia_scaling>"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
-        """Scales other than 1."""
+        """Yield the scales other than 1."""
         for link in case.source.root.all("link"):
             for contact in link.all("contact"):
                 for scaling in contact.all("inertia_scaling"):
@@ -41,5 +41,5 @@ class InertiaScaledForContact(EditingRule):
 
 
 def _scale(scaling: SourceElement) -> float:
-    """What PyBullet reads: 0 where it finds no number."""
+    """Return the scale that PyBullet reads: 0 where the value is no number."""
     return number_or_none(scaling, "value") or 0.0

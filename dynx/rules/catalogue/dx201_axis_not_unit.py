@@ -27,7 +27,7 @@ from dynx.rules.text.attributes import vector_of
 from dynx.rules.text.number_text import decimal
 
 _ROUNDING = 1e-15
-"""How far from 1 the length of a unit vector can be after rounding; dynx leaves such an axis alone."""
+"""Distance from 1 of the length of a rounded unit vector; dynx does not change such an axis."""
 
 
 class AxisNotUnit(EditingRule):
@@ -36,7 +36,7 @@ class AxisNotUnit(EditingRule):
     changed = "scaled the axes of joints to length 1"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
-        """Axes of revolute, continuous and prismatic joints."""
+        """Yield the axes of revolute, continuous and prismatic joints."""
         for joint, axis in elements_in_joints(case, "axis", SINGLE):
             written = vector_of(axis, "xyz")
             if written is None:

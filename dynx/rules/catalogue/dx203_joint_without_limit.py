@@ -34,13 +34,13 @@ class JointWithoutLimit(EditingRule):
     changed = "made joints without limit continuous, or gave them one"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
-        """Such joints."""
+        """Yield such joints."""
         for joint in joints_of_type(case, ("revolute", "prismatic")):
             if joint.first("limit") is None:
                 message = f"the joint is {joint.attributes['type']} and has no <limit>"
-                yield correction(joint, message, self._mended(case, joint))
+                yield correction(joint, message, self._correction_edit(case, joint))
 
-    def _mended(self, case: Case, joint: SourceElement) -> Edit:
+    def _correction_edit(self, case: Case, joint: SourceElement) -> Edit:
         if self.chosen(case) == "zero":
             return case.source.insertion(joint, _ZERO)
         if joint.attributes["type"] == "revolute":

@@ -32,7 +32,7 @@ class LowerLimitAboveUpper(EditingRule):
     changed = "exchanged lower and upper limits that were in the wrong order"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
-        """Limits of joints that move."""
+        """Yield the limits of joints that move."""
         for _, limit in elements_in_joints(case, "limit", SINGLE):
             lower, upper = number_or_none(limit, "lower"), number_or_none(limit, "upper")
             if lower is None or upper is None or lower <= upper:

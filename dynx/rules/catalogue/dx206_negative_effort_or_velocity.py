@@ -33,16 +33,16 @@ class NegativeEffortOrVelocity(EditingRule):
     changed = "made the largest efforts and velocities of joints positive"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
-        """Limits of joints that move."""
+        """Yield the limits of joints that move."""
         for _, limit in elements_in_joints(case, "limit", SINGLE):
             below = [name for name in ("effort", "velocity") if (number_or_none(limit, name) or 0.0) < 0.0]
             if below:
                 listed = " and ".join(f"{name}={limit.attributes[name].strip()}" for name in below)
                 edits = tuple(
-                    case.source.attribute_edit(limit, name, self._instead(case, limit.attributes[name]))
+                    case.source.attribute_edit(limit, name, self._correct(case, limit.attributes[name]))
                     for name in below
                 )
                 yield correction(limit, f"<limit> has {listed}", *edits)
 
-    def _instead(self, case: Case, written: str) -> str:
+    def _correct(self, case: Case, written: str) -> str:
         return LARGEST if self.chosen(case) == "unlimited" else written.strip().removeprefix("-")

@@ -35,7 +35,7 @@ class MimicOfFixedJoint(EditingRule):
     changed = "made joints that mimic a fixed one fixed or free"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
-        """Joints that move by their type and have a ``<mimic>``, and are fixed to dynx."""
+        """Yield joints that move by their type and have a ``<mimic>``, and are fixed to dynx."""
         known = {joint.name: joint for joint in case.model.joints}
         for element, mimic in elements_in_joints(case, "mimic", SINGLE):
             joint = known[element.attributes["name"]]

@@ -41,7 +41,7 @@ class JointOfSeveralFreedoms(EditingRule):
     changed = "replaced joints of several degrees of freedom"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
-        """Such joints, but for a floating one below an empty root, which DX211 is about."""
+        """Yield such joints, except a floating one below an empty root (DX211)."""
         for joint in joints_of_type(case, TYPES):
             kind = joint.attributes["type"]
             if not joint.attributes.get("name") or (kind == "floating" and _is_the_base(case, joint)):

@@ -25,7 +25,7 @@ class TransmissionOfNothing(EditingRule):
     changed = "removed transmissions that lack a part or a joint"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
-        """Such transmissions, of those that Drake reads."""
+        """Yield such transmissions, of those that Drake reads."""
         for transmission in transmissions_drake_reads(case):
             message = _fault(case, transmission)
             if message is not None:

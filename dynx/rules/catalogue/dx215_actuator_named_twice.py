@@ -30,7 +30,7 @@ class ActuatorNamedTwice(EditingRule):
     changed = "gave actuators of the same name different ones"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
-        """Actuators, of those that Drake makes, whose name was there before."""
+        """Yield the actuators, of those that Drake makes, whose name occurs before."""
         actuators = list(_actuators(case))
         taken = {each.attributes["name"] for each in actuators}
         seen = set()

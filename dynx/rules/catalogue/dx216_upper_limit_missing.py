@@ -28,7 +28,7 @@ from dynx.rules.joints.elements import elements_in_joints
 from dynx.rules.text.attributes import number_or_none
 
 _UPPER_OF_PYBULLET = -1.0
-"""What PyBullet has for an upper limit that is not given; URDF has 0."""
+"""Upper limit that PyBullet uses where none is given; URDF has 0."""
 
 
 class UpperLimitMissing(EditingRule):

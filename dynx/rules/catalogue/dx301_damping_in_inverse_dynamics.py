@@ -31,7 +31,7 @@ class DampingInInverseDynamics(CallingRule):
     changed = "compared without joint damping"
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
-        """Joints that move with a damping that is not zero."""
+        """Yield joints that move with a damping that is not zero."""
         for _, dynamics in elements_in_joints(case, "dynamics", SINGLE):
             if damping := number_or_none(dynamics, "damping"):
                 yield found_at(dynamics, f"the joint has damping {damping:g}")

@@ -30,7 +30,7 @@ class MimicAsConstraint(CallingRule):
     changed = "compared with mimic joints free"
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
-        """Joints that follow one that moves."""
+        """Yield joints that follow a moving joint."""
         for joint in case.model.joints:
             mimic = case.joints[joint.name].first("mimic")
             if joint.mimic is not None and mimic is not None:

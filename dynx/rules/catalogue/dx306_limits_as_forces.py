@@ -31,7 +31,7 @@ class LimitsAsForces(CallingRule):
     changed = "compared without joint limits"
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
-        """Joints with limits and no room between them."""
+        """Yield joints with equal limits."""
         for joint in case.model.joints:
             limit = case.joints[joint.name].first("limit")
             if limit is None or "upper" not in limit.attributes:

@@ -30,7 +30,7 @@ class RotorInertia(CallingRule):
     changed = "compared without rotors"
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
-        """Actuators with a rotor inertia that is not zero."""
+        """Yield actuators with a rotor inertia that is not zero."""
         for transmission in case.source.root.all("transmission"):
             joint = transmission.first("joint") if moves_by_actuator(case, transmission) else None
             for actuator in transmission.all("actuator"):

@@ -37,7 +37,7 @@ class VectorOfWrongLength(MisspelledNumberRule):
     elements = ("origin", "axis")
 
     def edit(self, case: Case, attribute: NumericAttribute, misspelling: Misspelling) -> Edit:
-        """By the user's choice."""
+        """Correct or remove the vector, by the user's choice."""
         if self.chosen(case) == "first":
             return super().edit(case, attribute, misspelling)
         if attribute.element.tag == "axis":

@@ -22,8 +22,8 @@ from collections.abc import Iterable, Iterator
 from dynx.model.xml.source import Edit, SourceElement, Span
 from dynx.rules import Case, Correction, EditingRule, correction, measured_on
 
-LONGEST = 8191
-"""Bytes that PyBullet reads at once."""
+MAX_LINE_BYTES = 8191
+"""Number of bytes of a line that PyBullet reads at once."""
 
 
 class LineTooLong(EditingRule):
@@ -41,7 +41,7 @@ class LineTooLong(EditingRule):
         broken: set[int] = set()
         for element in elements:
             for line in long_lines:
-                cut = _cut(case.source.data, element, line)
+                cut = _cut_position(case.source.data, element, line)
                 if cut is None:
                     continue
                 message = (
@@ -58,31 +58,31 @@ def _long_lines(data: bytes) -> Iterator[Span]:
     while start < len(data):
         end = data.find(b"\n", start)
         end = len(data) if end < 0 else end
-        if end - start > LONGEST:
+        if end - start > MAX_LINE_BYTES:
             yield Span(start, end)
         start = end + 1
 
 
-def _cut(data: bytes, element: SourceElement, line: Span) -> int | None:
+def _cut_position(data: bytes, element: SourceElement, line: Span) -> int | None:
     """Return the byte of a line before which a cut falls into the element's start or end tag."""
     tags = [element.start_tag]
     if not element.empty:
         tags.append(Span(data.rindex(b"</", 0, element.span.end), element.span.end))
     for tag in tags:
-        first = max(1, -(-(tag.start + 1 - line.start) // LONGEST))
-        cut = line.start + first * LONGEST
+        first = max(1, -(-(tag.start + 1 - line.start) // MAX_LINE_BYTES))
+        cut = line.start + first * MAX_LINE_BYTES
         if tag.start < cut < min(tag.end, line.end):
             return cut
     return None
 
 
 def _breaks(data: bytes, elements: list[SourceElement], line: Span) -> Iterator[Edit]:
-    """Line breaks in front of the elements of a line, and of the attributes of a tag that is too long."""
+    """Yield line breaks in front of the elements of a line, and of the attributes of a long tag."""
     for element in elements:
         tag = element.start_tag
         if line.start < tag.start < line.end and data[line.start : tag.start].strip():
             yield Edit(tag.start, tag.start, "\n")
-        if tag.end - max(tag.start, line.start) > LONGEST:
+        if tag.end - max(tag.start, line.start) > MAX_LINE_BYTES:
             for place in element.places.values():
                 if line.start < place.start < line.end:
                     yield Edit(place.start, place.start, "\n")

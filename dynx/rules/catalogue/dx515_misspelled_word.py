@@ -57,7 +57,7 @@ def _misspelled(part: SourceElement, root: SourceElement) -> Iterator[tuple[Sour
         yield part, f"<{part.tag}> is ignored; <{meant}> was meant"
     if part.tag not in ("link", "joint"):
         return
-    for element in _that_matter(part):
+    for element in _dynamic_elements(part):
         known = _ATTRIBUTES.get(element.tag, ())
         for attribute in element.attributes:
             meant = _meant(attribute, known, element.attributes)
@@ -70,7 +70,7 @@ def _misspelled(part: SourceElement, root: SourceElement) -> Iterator[tuple[Sour
                 yield child, f"<{child.tag}> in <{element.tag}> is ignored; <{meant}> was meant"
 
 
-def _that_matter(part: SourceElement) -> Iterator[SourceElement]:
+def _dynamic_elements(part: SourceElement) -> Iterator[SourceElement]:
     """Yield a link or joint and what it holds for dynamics; shapes have words of their own."""
     yield part
     for child in part.children:

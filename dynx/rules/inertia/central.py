@@ -82,7 +82,7 @@ class CentralInertia:
 
 
 def _nearest_axes(axes: Array, wanted: Array) -> tuple[list[int], Array]:
-    """Order and directions of the columns of `axes` that make the rotation nearest to `wanted`."""
+    """Return the order and directions of the columns of `axes` that make the rotation nearest to `wanted`."""
     overlap = wanted.T @ axes
     best: tuple[float, list[int], Array] | None = None
     for chosen in permutations(range(3)):

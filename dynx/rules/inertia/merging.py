@@ -21,7 +21,7 @@ def as_inertial(case: Case, link: str, body: CentralInertia, old: Inertial | Non
 
 
 def merged_inertials(case: Case, group: RigidGroup, links: Sequence[str], into: str) -> dict[str, Inertial]:
-    """New inertials for some links of a group: the sum in the link `into`, zero in the others."""
+    """Merge the inertials of some links of a group: the sum in the link `into`, zero in the others."""
     body = _sum(case, group, links, into)
     bodies = {into: as_inertial(case, into, body, case.inertials[into])}
     for name in links:

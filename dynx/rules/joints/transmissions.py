@@ -22,7 +22,7 @@ def type_of(case: Case, transmission: SourceElement) -> str | None:
 
 
 def transmissions_drake_reads(case: Case) -> Iterator[SourceElement]:
-    """Transmissions of the one type that Drake knows, with any prefix, and those without a type."""
+    """Yield transmissions of the one type that Drake reads, with any prefix, and those without a type."""
     for transmission in case.source.root.all("transmission"):
         kind = type_of(case, transmission)
         if kind is None or _SIMPLE in kind:

@@ -64,10 +64,10 @@ def urdf_text(model: Model | None = None) -> Strategy[str]:
 
 def _check_expressible(model: Model) -> None:
     if model.extra_frames:
-        raise ArgumentError(f"{model.name} has frames besides its links, which URDF text cannot hold")
+        raise ArgumentError(f"{model.name} has frames besides its links, which URDF text cannot express")
     for joint in model.joints:
         if joint.locked_at is not None:
-            raise ArgumentError(f"joint {joint.name} of {model.name} is locked, which URDF text cannot say")
+            raise ArgumentError(f"joint {joint.name} of {model.name} is locked, which URDF cannot express")
 
 
 @dataclass(frozen=True)

@@ -36,14 +36,16 @@ def case_of(robot: str, base: Base = "fixed") -> Case:
     return Case(XmlSource(find(robot).read_bytes(), robot), base)
 
 
-def found(case: Case, difference: Difference, budget: float | None = None, seed: int = 0) -> Counterexample:
+def find_counterexample(
+    case: Case, difference: Difference, budget: float | None = None, seed: int = 0
+) -> Counterexample:
     result = smallest_counterexample(case, difference, tolerance=BAR, seed=seed, budget=budget)
     assert result is not None
     return result
 
 
 def assert_shows(result: Counterexample, difference: Difference, base: Base) -> Model:
-    """The text loads, the state is one of that robot, and the error is what is said."""
+    """Check that the text loads, the state fits the robot, and the error is the reported one."""
     case = Case(XmlSource(result.urdf), base)
     model = model_without_mimics(case.source, base)
     q, v, a = (np.array(row) for row in (result.q, result.v, result.a))
@@ -54,8 +56,8 @@ def assert_shows(result: Counterexample, difference: Difference, base: Base) -> 
     return model
 
 
-def turning(link: str, joint: str) -> Difference:
-    """An engine that is wrong where there is a link of that name and that joint is turned."""
+def error_at_angle(link: str, joint: str) -> Difference:
+    """Simulate an engine with an error if the link exists and the joint is not at zero."""
 
     def difference(case: Case, model: Model, q: Floats, v: Floats, a: Floats) -> float:
         if link not in {each.name for each in model.links} or joint not in model.joint_names:
@@ -66,8 +68,8 @@ def turning(link: str, joint: str) -> Difference:
     return difference
 
 
-def with_mass_one(link: str) -> Difference:
-    """An engine that reads the mass of a link as 1 kg, in inverse dynamics."""
+def error_of_unit_mass(link: str) -> Difference:
+    """Simulate an engine that reads the mass of a link as 1 kg, in inverse dynamics."""
 
     def difference(case: Case, model: Model, q: Floats, v: Floats, a: Floats) -> float:
         links = tuple(
@@ -76,12 +78,12 @@ def with_mass_one(link: str) -> Difference:
             else each
             for each in model.links
         )
-        answers = []
+        torques = []
         for robot in (model, replace(model, links=links)):
             with ReferenceBackend(robot) as engine:
-                answers.append(engine.inverse_dynamics(q, v, a))
-        size = max(float(np.max(np.abs(answer), initial=0.0)) for answer in answers)
-        gap = float(np.max(np.abs(answers[0] - answers[1]), initial=0.0))
+                torques.append(engine.inverse_dynamics(q, v, a))
+        size = max(float(np.max(np.abs(torque), initial=0.0)) for torque in torques)
+        gap = float(np.max(np.abs(torques[0] - torques[1]), initial=0.0))
         return gap / size if size else 0.0
 
     return difference
@@ -97,8 +99,8 @@ def with_mass_one(link: str) -> Difference:
     ],
 )
 def test_a_link_and_a_joint_are_all_that_stays(robot: str, link: str, joint: str, base: Base) -> None:
-    difference = turning(link, joint)
-    result = found(case_of(robot, base), difference)
+    difference = error_at_angle(link, joint)
+    result = find_counterexample(case_of(robot, base), difference)
     model = assert_shows(result, difference, base)
     assert len(model.links) == 2
     assert model.joint_names == (joint,)
@@ -116,8 +118,8 @@ def test_a_link_and_a_joint_are_all_that_stays(robot: str, link: str, joint: str
     ("robot", "link"), [("talos", "arm_left_5_link"), ("tiago", "arm_4_link")], ids=["talos", "tiago"]
 )
 def test_a_mass_that_is_read_wrong(robot: str, link: str, base: Base, links: int, moving: int) -> None:
-    difference = with_mass_one(link)
-    result = found(case_of(robot, base), difference)
+    difference = error_of_unit_mass(link)
+    result = find_counterexample(case_of(robot, base), difference)
     model = assert_shows(result, difference, base)
     assert link in {each.name for each in model.links}
     assert (len(model.links), result.moving_joints) == (links, moving)
@@ -125,40 +127,42 @@ def test_a_mass_that_is_read_wrong(robot: str, link: str, base: Base, links: int
     assert sum(x != 0.0 for x in (*result.v, *result.a)) <= 1
 
 
-def test_a_difference_in_the_text_is_not_written_away() -> None:
+def test_a_difference_in_the_text_is_kept() -> None:
     def difference(case: Case, model: Model, q: Floats, v: Floats, a: Floats) -> float:
         axes = [axis for joint in case.joints.values() for axis in joint.all("axis")]
         return 1.0 if any("  " in axis.attributes.get("xyz", "") for axis in axes) else 0.0
 
     text = find("ur5").read_text(encoding="utf-8").replace('<axis xyz="0 1 0"', '<axis xyz="0  1 0"')
     case = Case(XmlSource(text))
-    result = found(case, difference)
+    result = find_counterexample(case, difference)
     model = assert_shows(result, difference, "fixed")
     assert len(model.links) == 2
     assert 'xyz="0  1 0"' in result.urdf
 
 
 def test_two_parts_of_the_state_that_must_change_at_once() -> None:
-    """Only Hypothesis turns both signs; the plain way ends where each sign by itself must stay."""
+    """Only Hypothesis changes both signs at once; the greedy reduction cannot change one alone."""
 
     def difference(case: Case, model: Model, q: Floats, v: Floats, a: Floats) -> float:
         return 1.0 if model.nv >= 2 and v[0] * v[1] > 0.0 else 0.0
 
     for seed in range(1, 5):
-        result = found(case_of("double_pendulum"), difference, seed=seed)
+        result = find_counterexample(case_of("double_pendulum"), difference, seed=seed)
         assert result.v == (1.0, 1.0)
 
 
 def test_without_hypothesis(monkeypatch: pytest.MonkeyPatch) -> None:
-    difference = turning("base_link", "leg_right_6_joint")
-    with_it = found(case_of("talos"), difference)
+    difference = error_at_angle("base_link", "leg_right_6_joint")
+    with_it = find_counterexample(case_of("talos"), difference)
     monkeypatch.setitem(sys.modules, "hypothesis", None)
-    assert found(case_of("talos"), difference) == with_it
+    assert find_counterexample(case_of("talos"), difference) == with_it
 
 
 def test_nothing_is_left_behind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    found(case_of("double_pendulum"), lambda case, model, q, v, a: float(np.max(np.abs(v), initial=0.0)))
+    find_counterexample(
+        case_of("double_pendulum"), lambda case, model, q, v, a: float(np.max(np.abs(v), initial=0.0))
+    )
     assert list(tmp_path.iterdir()) == []
 
 
@@ -169,23 +173,23 @@ def test_no_counterexample() -> None:
     assert smallest_counterexample(no_robot, lambda *_: 1.0, tolerance=BAR, seed=0, budget=None) is None
 
 
-def test_an_answer_that_is_no_number_counts() -> None:
-    result = found(case_of("ur5"), lambda *_: float("nan"))
+def test_a_nan_is_an_infinite_error() -> None:
+    result = find_counterexample(case_of("ur5"), lambda *_: float("nan"))
     assert result.relative_error == float("inf")
     assert result.moving_joints == 0
 
 
 def test_a_real_difference_does_not_end_as_noise() -> None:
-    """Rounding noise of the smallest robots is above the tolerance here, and not what was asked for."""
+    """Rounding noise of the smallest robots is above the tolerance here, and is no counterexample."""
 
     def difference(case: Case, model: Model, q: Floats, v: Floats, a: Floats) -> float:
         return 0.5 if "wrist_3_joint" in model.joint_names else 10 * BAR
 
-    assert found(case_of("ur5"), difference).relative_error == 0.5
+    assert find_counterexample(case_of("ur5"), difference).relative_error == 0.5
 
 
 class Clock:
-    """Time that passes by one second with each question to the engine."""
+    """Clock that advances by one second with each evaluation of the difference."""
 
     def __init__(self, difference: Difference) -> None:
         self.now = 0.0
@@ -194,18 +198,18 @@ class Clock:
     def __call__(self) -> float:
         return self.now
 
-    def asked(self, case: Case, model: Model, q: Floats, v: Floats, a: Floats) -> float:
+    def difference(self, case: Case, model: Model, q: Floats, v: Floats, a: Floats) -> float:
         self.now += 1.0
         return self._difference(case, model, q, v, a)
 
 
 @pytest.mark.parametrize("budget", [1, INITIAL_STATES + 1, 30])
 def test_the_budget_is_respected(budget: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    difference = turning("arm_4_link", "arm_3_joint")
+    difference = error_at_angle("arm_4_link", "arm_3_joint")
     clock = Clock(difference)
     monkeypatch.setattr(trials, "perf_counter", clock)
     result = smallest_counterexample(
-        case_of("tiago"), clock.asked, tolerance=BAR, seed=0, budget=float(budget)
+        case_of("tiago"), clock.difference, tolerance=BAR, seed=0, budget=float(budget)
     )
     assert clock.now <= budget
     if result is not None:
@@ -213,17 +217,16 @@ def test_the_budget_is_respected(budget: int, monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_the_number_of_trials_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
-    difference = turning("arm_4_link", "arm_3_joint")
+    difference = error_at_angle("arm_4_link", "arm_3_joint")
     clock = Clock(difference)
     monkeypatch.setattr(trials, "MAX_TRIALS", 40)
-    assert_shows(found(case_of("tiago"), clock.asked), difference, "fixed")
+    assert_shows(find_counterexample(case_of("tiago"), clock.difference), difference, "fixed")
     assert clock.now <= 40
 
 
 @st.composite
 def robots_with_a_difference(draw: st.DrawFn) -> tuple[Case, Difference]:
-    """A random robot, and an engine that is wrong about one of its links when one of its joints turns,
-    or about the mass of one of its links."""
+    """Draw a robot, and an engine with an error that depends on a joint angle or on the mass of a link."""
     model = draw(models(from_urdf=True, locks=False, min_links=2))
     case = Case(XmlSource(model.to_urdf(), "<random>"), model.base)
     names = [link.name for link in model.links]
@@ -231,11 +234,11 @@ def robots_with_a_difference(draw: st.DrawFn) -> tuple[Case, Difference]:
     link = draw(st.sampled_from(names))
     about_a_mass = draw(st.booleans())
     if moving and not about_a_mass:
-        return case, turning(link, draw(st.sampled_from(moving)))
-    return case, with_mass_one(link)
+        return case, error_at_angle(link, draw(st.sampled_from(moving)))
+    return case, error_of_unit_mass(link)
 
 
-@settings(max_examples=40)  # an example asks a hundred robots
+@settings(max_examples=40)  # each example examines a hundred robots
 @given(robots_with_a_difference(), st.integers(0, 3))
 def test_on_random_robots(robot: tuple[Case, Difference], seed: int) -> None:
     case, difference = robot

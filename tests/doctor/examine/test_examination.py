@@ -17,7 +17,7 @@ from dynx.doctor.examine.examination import (
 )
 from dynx.errors import EngineError
 from dynx.spatial.scalar import Floats
-from tests.doctor.faulty_engine import NAME, SECRET, FaultyEngine, examined
+from tests.doctor.faulty_engine import NAME, SECRET, FaultyEngine, examine_case
 from tests.rules.documents import case_of, joint, link
 
 ARM = case_of(
@@ -28,7 +28,7 @@ ARM = case_of(
 
 
 class Weak(FaultyEngine):
-    """All torques and mass matrices one in a hundred too large."""
+    """All torques and mass matrices 1 % too large."""
 
     def mass_matrix(self, q: Floats) -> Floats:
         return np.asarray(1.01 * super().mass_matrix(q))
@@ -38,14 +38,14 @@ class Weak(FaultyEngine):
 
 
 class Fast(FaultyEngine):
-    """All accelerations one in a hundred too large."""
+    """All accelerations 1 % too large."""
 
     def forward_dynamics(self, q: Floats, v: Floats, tau: Floats) -> Floats:
         return np.asarray(1.01 * super().forward_dynamics(q, v, tau))
 
 
 class Stop(FaultyEngine):
-    """A stop that holds the first joint from turning backwards."""
+    """A stop on one side of the first joint."""
 
     def forward_dynamics(self, q: Floats, v: Floats, tau: Floats) -> Floats:
         a: Floats = super().forward_dynamics(q, v, tau).copy()
@@ -54,7 +54,7 @@ class Stop(FaultyEngine):
 
 
 class Lost(FaultyEngine):
-    """No numbers for dynamics; one link fused away, one without a place."""
+    """No dynamics; one link merged into another, one without a pose."""
 
     def link_poses(self, q: Floats) -> Floats:
         T: Floats = super().link_poses(q).copy()
@@ -65,11 +65,11 @@ class Lost(FaultyEngine):
         return np.full(len(v), np.nan)
 
     def mass_matrix(self, q: Floats) -> Floats:
-        raise EngineError("no mass matrix today")
+        raise EngineError("no mass matrix")
 
 
-def test_the_right_answers_have_no_error() -> None:
-    errors = examined(ARM).errors(NAME)
+def test_reference_values_have_no_error() -> None:
+    errors = examine_case(ARM).errors(NAME)
     assert set(errors) == set(QUANTITIES)
     assert max(errors.values()) == 0.0 or max(errors.values()) <= BAR
 
@@ -82,59 +82,59 @@ def test_an_error_is_relative_whatever_the_robot_weighs(mass: float) -> None:
         link("arm", mass=mass, moments=moments, center=(0.1, 0.2, 0.3)),
         joint("j", "base", "arm"),
     )
-    errors = examined(case, Weak).errors(NAME)
+    errors = examine_case(case, Weak).errors(NAME)
     assert errors[TORQUE] == pytest.approx(0.01)
     assert errors[MASS] == pytest.approx(0.01)
     assert errors[KINEMATICS] <= BAR
     assert errors[JACOBIAN] <= BAR
 
 
-def test_where_the_right_answer_is_zero_an_error_is_all_of_the_answer() -> None:
+def test_where_the_reference_value_is_zero_the_error_is_1() -> None:
     case = case_of('<link name="base"/>', '<link name="frame"/>', joint("j", "base", "frame"))
-    errors = examined(case).errors(NAME)
+    errors = examine_case(case).errors(NAME)
     assert errors[MASS] == errors[TORQUE] == 1.0
     # Nothing has mass, so no torque gives an acceleration.
     assert ACCELERATION not in errors
 
 
 def test_an_acceleration_is_judged_by_the_torque_that_it_takes() -> None:
-    error = examined(ARM, Fast, samples=20).error(NAME, ACCELERATION)
-    # M a is a part of |M| |a| + |bias| + |tau|, and what is too much of it is a hundredth.
+    error = examine_case(ARM, Fast, samples=20).error(NAME, ACCELERATION)
+    # M a is a part of |M| |a| + |bias| + |tau|, and its excess is 1 %.
     assert 1e-4 < error <= 0.01
 
 
 def test_a_force_that_acts_on_one_side_alone_shows() -> None:
-    assert all(examined(ARM, Stop, samples=1).error(NAME, quantity) <= BAR for quantity in (MASS, TORQUE))
-    assert examined(ARM, Stop, samples=1).error(NAME, ACCELERATION) > BAR
+    assert all(examine_case(ARM, Stop, samples=1).error(NAME, quantity) <= BAR for quantity in (MASS, TORQUE))
+    assert examine_case(ARM, Stop, samples=1).error(NAME, ACCELERATION) > BAR
 
 
 def test_what_is_no_number_is_no_agreement() -> None:
-    lost = examined(ARM, Lost)
+    lost = examine_case(ARM, Lost)
     assert lost.error(NAME, TORQUE) == lost.error(NAME, MASS) == lost.error(NAME, KINEMATICS) == np.inf
     assert lost.max_error(NAME) == np.inf
-    assert "no mass matrix today" in lost.outputs[NAME].failed[MASS]
+    assert "no mass matrix" in lost.outputs[NAME].failed[MASS]
 
 
-def test_a_link_that_is_fused_away_is_not_compared_and_one_without_place_is() -> None:
-    assert set(examined(ARM, Lost).outputs[NAME].deviation[KINEMATICS]) == {"upper", "lower"}
+def test_a_link_that_is_merged_is_not_compared_and_one_without_place_is() -> None:
+    assert set(examine_case(ARM, Lost).outputs[NAME].deviation[KINEMATICS]) == {"upper", "lower"}
 
 
 def test_a_file_that_is_refused_has_no_errors_and_is_wrong() -> None:
-    refusing = examined(case_of(link("base"), f"<!-- {SECRET} -->"))
+    refusing = examine_case(case_of(link("base"), f"<!-- {SECRET} -->"))
     assert refusing.outputs[NAME].refused == f"robot.urdf is a {SECRET}"
     assert refusing.errors(NAME) == {}
     assert refusing.max_error(NAME) == refusing.error(NAME, TORQUE) == np.inf
 
 
 def test_fewer_states_are_the_first_of_them() -> None:
-    whole, first = examined(ARM, Weak, samples=3), examined(ARM, Weak, samples=3).first(1)
+    whole, first = examine_case(ARM, Weak, samples=3), examine_case(ARM, Weak, samples=3).first(1)
     assert len(first.reference.states) == 1
     for quantity in QUANTITIES:
         for part, gap in whole.outputs[NAME].deviation[quantity].items():
             np.testing.assert_array_equal(first.outputs[NAME].deviation[quantity][part], gap[:1])
 
 
-def test_how_far_answers_moved() -> None:
+def test_the_largest_change_of_two_deviations() -> None:
     one, two = np.zeros((3, 2)), np.array([[0.0, -2.0], [1.0, 0.0], [0.0, 0.0]])
     assert max_change({"": one}, {"": two}) == max_change({"": two}, {"": one}) == 2.0
     assert max_change({"a": one, "b": two}, {"a": one}) == 0.0
@@ -147,6 +147,6 @@ def test_a_joint_has_its_own_error() -> None:
         def inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
             return super().inverse_dynamics(q, v, a) * [1.0, 1.5]
 
-    errors = examined(ARM, Elbow).joint_errors(NAME)
+    errors = examine_case(ARM, Elbow).joint_errors(NAME)
     assert errors["elbow"] == pytest.approx(0.5)
     assert errors["shoulder"] <= BAR

@@ -1,4 +1,4 @@
-"""A cause is proved by taking it away alone, and by an engine that is right once all are taken away."""
+"""A cause is proved by removing it alone, and by an engine that is right once all are removed."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ TWO = case_of(
 )
 
 
-class Replaced(Rule):
-    """Puts a text in the place of another."""
+class Replacement(Rule):
+    """Rule that replaces a text by another."""
 
     id = "DX998"
     name = "text-replaced"
@@ -45,19 +45,19 @@ class Replaced(Rule):
 
 
 class Heavy(FaultyEngine):
-    """Wrong by one in a hundred, for which there is no rule."""
+    """Torques are 1 % too large, for which there is no rule."""
 
     def inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
         return 1.01 * super().inverse_dynamics(q, v, a)
 
 
-def attributed(
+def attribute(
     case: Case,
     *rules: Rule,
     engine: type[LoadedRobot] = FaultyEngine,
     tolerance: float = BAR,
 ) -> list[Attribution]:
-    """Attributions in a case by rules."""
+    """Attribute the differences in a case to rules."""
     made = examiner(engine)
     before, after = made.examine(case), made.examine(mend(case, rules).case)
     attributor = Attributor(made, case, rules, before, after, tolerance, lambda step: None)
@@ -65,7 +65,7 @@ def attributed(
 
 
 def test_a_cause_that_explains_all_is_proved_at_each_place_with_its_own_effect() -> None:
-    near, far = attributed(TWO, find_rule("DX101"))
+    near, far = attribute(TWO, find_rule("DX101"))
     assert near.proved
     assert far.proved
     assert near.largest_effect is not None
@@ -82,7 +82,7 @@ def test_an_effect_below_the_tolerance_is_none(tolerance: float) -> None:
         joint("j", "base", "arm"),
         joint("k", "arm", "tool", type="fixed"),
     )
-    (found,) = attributed(case, find_rule("DX101"), tolerance=tolerance)
+    (found,) = attribute(case, find_rule("DX101"), tolerance=tolerance)
     # 1 kg m^2 more than the arm's 2e4.
     assert bool(found.effects) == (tolerance == BAR)
     assert found.proved == (tolerance == BAR)
@@ -94,33 +94,33 @@ def test_a_cause_is_not_proved_where_the_engine_stays_wrong() -> None:
     case = case_of(
         link("base"), arm, FRAME.format("tool"), joint("j", "base", "arm"), joint("k", "arm", "tool")
     )
-    (found,) = attributed(case, find_rule("DX101"), engine=Heavy)
+    (found,) = attribute(case, find_rule("DX101"), engine=Heavy)
     assert found.effects
     assert not found.proved
 
 
 def test_a_remedy_that_changes_the_robot_has_no_effect_on_an_engine_that_is_right() -> None:
     case = case_of(*(link("base"), link("arm", center=(0.1, 0.2, 0.3))), joint("j", "base", "arm"))
-    rule = Replaced('<mass value="1.0"/>', '<mass value="2.0"/>', changes_physics=True)
-    (found,) = attributed(case, rule)
+    rule = Replacement('<mass value="1.0"/>', '<mass value="2.0"/>', changes_physics=True)
+    (found,) = attribute(case, rule)
     assert not found.effects
     assert not found.proved
 
 
 def test_of_two_refusals_each_is_proved_among_the_mended() -> None:
     case = case_of(link("base"), f"<!-- {SECRET} one -->", f"<!-- {SECRET} two -->")
-    rules = [Replaced(f"{SECRET} {number}", "") for number in ("one", "two")]
-    for found in attributed(case, *rules):
+    rules = [Replacement(f"{SECRET} {number}", "") for number in ("one", "two")]
+    for found in attribute(case, *rules):
         assert found.proved
         assert found.effects[NAME].quantity == LOADING
         assert found.effects[NAME].relative_error == float("inf")
 
 
 def test_a_rule_has_no_effect_on_an_engine_that_it_does_not_name() -> None:
-    class Silent(Replaced):
+    class Silent(Replacement):
         engines: ClassVar[Mapping[str, str]] = {"drake": ">=1.51.1"}
 
-    (found,) = attributed(case_of(link("base"), f"<!-- {SECRET} -->"), Silent(SECRET, ""))
+    (found,) = attribute(case_of(link("base"), f"<!-- {SECRET} -->"), Silent(SECRET, ""))
     assert not found.effects
     assert not found.proved
 
@@ -133,7 +133,7 @@ def test_the_quantity_is_the_one_that_moves_most() -> None:
             return right if all(each.name != "odd" for each in links) else 3.0 * right
 
     case = case_of(*(link("base"), link("odd", center=(0.1, 0.2, 0.3))), joint("j", "base", "odd"))
-    (found,) = attributed(case, Replaced('"odd"', '"even"', changes_physics=True), engine=Wrong)
+    (found,) = attribute(case, Replacement('"odd"', '"even"', changes_physics=True), engine=Wrong)
     assert found.largest_effect is not None
     assert found.largest_effect.quantity == TORQUE
     assert found.largest_effect.relative_error == pytest.approx(2.0)

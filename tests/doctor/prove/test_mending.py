@@ -11,7 +11,7 @@ from dynx.doctor.examine.examination import Examiner
 from dynx.doctor.prove.mending import all_except, mend, place_of
 from dynx.loaded import installed_engines
 from dynx.rules import find_rule
-from tests.doctor.prove.test_attribution import Replaced
+from tests.doctor.prove.test_attribution import Replacement
 from tests.rules.documents import case_of, link
 from tests.rules.trap_cases import trap
 
@@ -25,7 +25,7 @@ def test_bad_practice_is_mended_where_the_user_chose_so(rule_id: str, choice: st
     assert f"{rule_id}={choice}: {rule.choices[choice]}" in mended.choices[0]
 
 
-class Opinion(Replaced):
+class Opinion(Replacement):
     """A rule about practice that would edit if it were asked."""
 
     kind = "practice"

@@ -1,4 +1,4 @@
-"""Where meshes are looked for, and when somebody can say that one is missing."""
+"""Search for mesh files, and the error for a missing one."""
 
 from __future__ import annotations
 
