@@ -67,17 +67,17 @@ def json_schema(document_class: type[Any], title: str, *, omits_defaults: bool =
     """
     import msgspec
 
-    schema = _published(msgspec.json.schema(document_class), omits_defaults)
+    schema = _strict_schema(msgspec.json.schema(document_class), omits_defaults)
     return {"$schema": SCHEMA_DIALECT, "title": title, **schema}
 
 
-def _published(part: Any, omits_defaults: bool) -> Any:
+def _strict_schema(part: Any, omits_defaults: bool) -> Any:
     """Let every number be null, forbid keys that are not listed, and leave out the defaults of Python."""
     if isinstance(part, list):
-        return [_published(each, omits_defaults) for each in part]
+        return [_strict_schema(each, omits_defaults) for each in part]
     if not isinstance(part, dict):
         return part
-    part = {key: _published(each, omits_defaults) for key, each in part.items() if key != "default"}
+    part = {key: _strict_schema(each, omits_defaults) for key, each in part.items() if key != "default"}
     if part.get("type") == "number":
         part["type"] = ["number", "null"]
     if "properties" in part and part.get("type") == "object":

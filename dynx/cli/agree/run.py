@@ -12,7 +12,7 @@ from dynx.agreement.task import AgreementTask, measure, refused
 from dynx.backends.registry import backend_class
 from dynx.cli.agree.tables import label, show_many, show_one, show_summary, verdict
 from dynx.cli.shell.exits import BAD_INPUT, DONE, NEGATIVE_RESULT, complain
-from dynx.cli.shell.lazy import imported
+from dynx.cli.shell.lazy import import_object
 from dynx.cli.shell.output_file import check_writable, require_apart
 from dynx.cli.shell.run import Run, carry_out
 from dynx.cli.shell.terminal import console, echo_json
@@ -43,7 +43,7 @@ def agree(
         if lock:
             raise click.UsageError("--lock changes the robot, and --as-loaded compares files as they are")
         # Importing the doctor would take a third of the start of every other comparison.
-        compare: Callable[..., int] = imported("dynx.cli.doctor.as_loaded:compare")
+        compare: Callable[..., int] = import_object("dynx.cli.doctor.as_loaded:compare")
         return compare(
             robots,
             base,

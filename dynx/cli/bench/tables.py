@@ -18,27 +18,27 @@ MAX_IDLE_LOAD = 0.5
 """Load average before the run [processes] up to which the machine counts as idle."""
 
 
-def show(out: Console, made: Entry) -> None:
+def show(out: Console, report: Entry) -> None:
     """Print the robot, the machine, and a table for each benchmark case."""
     out.print(
-        f"{one_line(made['robot'])}, {made['base']} base, nq {made['nq']}, nv {made['nv']}, "
-        f"frame {one_line(made['frame'])}, {counted(made['repetitions'], 'repetition')}"
-        f"  ({one_line(made['source'])})",
+        f"{one_line(report['robot'])}, {report['base']} base, nq {report['nq']}, nv {report['nv']}, "
+        f"frame {one_line(report['frame'])}, {counted(report['repetitions'], 'repetition')}"
+        f"  ({one_line(report['source'])})",
         style="bold",
     )
-    out.print(made["processor"])
-    if made["load"] is not None and made["load"] > MAX_IDLE_LOAD:
-        load = f"load {made['load']:.1f} before the run"
+    out.print(report["processor"])
+    if report["load"] is not None and report["load"] > MAX_IDLE_LOAD:
+        load = f"load {report['load']:.1f} before the run"
         out.print(f"{load}: other processes were running, so times vary", style="yellow")
-    for peak in made["peaks"]:
+    for peak in report["peaks"]:
         out.print(
             f"{counted(peak['threads'], 'thread')}: copy bandwidth {peak['copy_bandwidth'] / 1e9:.3g} GB/s "
             f"(read and written), multiply-add peak {2e-9 * peak['multiply_adds']:.3g} GFLOP/s"
         )
-    for result in made["results"]:
+    for result in report["results"]:
         _show_result(out, result)
-    if made["not_done"]:
-        out.print(f"\n{counted(len(made['not_done']), 'case')} not done", style="yellow")
+    if report["not_done"]:
+        out.print(f"\n{counted(len(report['not_done']), 'case')} not done", style="yellow")
 
 
 def _show_result(out: Console, result: Entry) -> None:

@@ -44,7 +44,7 @@ class LazyGroup(click.Group):
     @cached_property
     def _entry_points(self) -> dict[str, Any]:
         """Entry points of installed packages by the name of the command."""
-        if not _is_offered():
+        if not _may_have_entry_points():
             return {}
         from importlib.metadata import entry_points  # imported only here: it takes as long as click itself
 
@@ -60,7 +60,7 @@ class LazyGroup(click.Group):
         Raises ClickException for an entry point that cannot be loaded.
         """
         if name in self.table:
-            return _command(imported(self.table[name].target))
+            return _command(import_object(self.table[name].target))
         if name in self.commands or name not in self._entry_points:
             return super().get_command(ctx, name)
         point = self._entry_points[name]
@@ -99,20 +99,20 @@ def runs(target: str) -> Callable[[Callable[[], None]], Callable[..., Any]]:
     def decorate(described: Callable[[], None]) -> Callable[..., Any]:
         @wraps(described)
         def callback(**parameters: Any) -> Any:
-            return imported(target)(**parameters)
+            return import_object(target)(**parameters)
 
         return callback
 
     return decorate
 
 
-def imported(target: str) -> Any:
+def import_object(target: str) -> Any:
     """Import the object that ``module:attribute`` names."""
     module, _, attribute = target.partition(":")
     return getattr(import_module(module), attribute)
 
 
-def _is_offered() -> bool:
+def _may_have_entry_points() -> bool:
     """Whether metadata on ``sys.path`` names the entry-point group (or may, inside an archive)."""
     for folder in sys.path:
         try:

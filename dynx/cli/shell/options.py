@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 import click
 
-from dynx.cli.shell.lazy import imported
+from dynx.cli.shell.lazy import import_object
 from dynx.errors import nearest, shown
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -52,7 +52,7 @@ def one_of(*names: str, source: str | None = None) -> Callable[[str], str]:
     """
 
     def name(word: str) -> str:
-        more = () if source is None else imported(source)
+        more = () if source is None else import_object(source)
         if word not in names and word not in more:
             known = (*names, *more)
             close = nearest(word, known)

@@ -13,9 +13,9 @@ _MAX_LISTED = 3
 """Number of links, payloads or pushes up to which each is named; more are counted."""
 
 
-def deviations(made: Entry) -> str:
+def deviations(report: Entry) -> str:
     """Make ``plant: payload 2 kg on tool0, ...; controller: noise ..., delay ...``; empty if nominal."""
-    sides = {"plant": _plant_deviations(made), "controller": _controller_deviations(made)}
+    sides = {"plant": _plant_deviations(report), "controller": _controller_deviations(report)}
     return "; ".join(f"{side}: {', '.join(parts)}" for side, parts in sides.items() if parts)
 
 
@@ -26,12 +26,14 @@ def value_range(values: float | list[float]) -> str:
     return smallest if smallest == largest else f"{smallest} to {largest}"
 
 
-def _plant_deviations(made: Entry) -> list[str]:
-    settings = made["settings"]
-    payloads = [f"payload {number(each['mass'])} kg on {one_line(each['frame'])}" for each in made["payload"]]
-    parts = _listed(payloads, "payloads") + _mass_parts(made["mass_scale"])
+def _plant_deviations(report: Entry) -> list[str]:
+    settings = report["settings"]
+    payloads = [
+        f"payload {number(each['mass'])} kg on {one_line(each['frame'])}" for each in report["payload"]
+    ]
+    parts = _listed(payloads, "payloads") + _mass_parts(report["mass_scale"])
     # A floating base has no damping, friction or armature.
-    base = 6 if made["base"] == "floating" else 0
+    base = 6 if report["base"] == "floating" else 0
     joints = {name: settings["joints"][name][base:] for name in ("damping", "friction", "armature")}
     parts += [f"{name} {value_range(each)}" for name, each in joints.items() if any(each)]
     parts += _listed([_push(each) for each in settings["pushes"]], "pushes")
@@ -42,8 +44,8 @@ def _plant_deviations(made: Entry) -> list[str]:
     return parts
 
 
-def _controller_deviations(made: Entry) -> list[str]:
-    settings = made["settings"]
+def _controller_deviations(report: Entry) -> list[str]:
+    settings = report["settings"]
     parts = []
     noise = settings["noise"]
     if noise is not None:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from dynx._version import __version__
-from dynx.cli.sim.request import Prepared
+from dynx.cli.sim.request import SimulationRequest
 from dynx.errors import DivergedError, SimulationError
 from dynx.model import Model
 from dynx.sim import Noise, Push, Rollout, RolloutInterrupted
@@ -25,12 +25,12 @@ DONE, DIVERGED, CONTROL_FAILED, INTERRUPTED = "done", "diverged", "control faile
 """Values of ``status``."""
 
 
-def document(prepared: Prepared, rollout: Rollout, seconds: float, ended: EarlyEnd) -> Entry:
+def document(request: SimulationRequest, rollout: Rollout, seconds: float, ended: EarlyEnd) -> Entry:
     """Describe a simulation and its results.
 
     Absent numbers (errors without a reference, unlimited efforts) are null.
     """
-    scenario, model, summary = prepared.scenario, prepared.scenario.model, _summary(rollout)
+    scenario, model, summary = request.scenario, request.scenario.model, _summary(rollout)
     return {
         "schema": SCHEMA,
         "dynx": __version__,
@@ -40,26 +40,26 @@ def document(prepared: Prepared, rollout: Rollout, seconds: float, ended: EarlyE
         "gravity": list(model.gravity),
         "nq": model.nq,
         "nv": model.nv,
-        **prepared.header,
-        "settings": _settings(prepared, rollout),
+        **request.header,
+        "settings": _settings(request, rollout),
         "payload": [
             {"frame": each.frame, "mass": each.mass, "center": np.asarray(each.center).tolist()}
             for each in scenario.payloads
         ],
         "mass_scale": scenario.mass_scale,
         "total_mass": rollout.model.total_mass,
-        "passive": _is_passive(prepared, rollout),
+        "passive": _is_passive(request, rollout),
         "status": _status(ended),
         "error": _error(ended),
-        "overshoot": _overshoot(prepared, ended),
-        "dt": prepared.clock.dt,
+        "overshoot": _overshoot(request, ended),
+        "dt": request.clock.dt,
         "steps": len(rollout),
-        "steps_asked": prepared.clock.n_steps,
+        "steps_asked": request.clock.n_steps,
         "simulated": float(rollout.t[-1]),
         "seconds": seconds,
         **summary,
         "base_error": base_error(rollout),
-        "frame_error": frame_error(rollout, prepared.motion.frame),
+        "frame_error": frame_error(rollout, request.motion.frame),
         "joints": _joints(model, rollout),
         "final": {"t": float(rollout.t[-1]), "q": rollout.q[-1].tolist(), "v": rollout.v[-1].tolist()},
     }
@@ -116,9 +116,9 @@ def _units(model: Model) -> list[str]:
     return [*base, *("m" if kinds[name] == "prismatic" else "rad" for name in model.joint_names)]
 
 
-def _settings(prepared: Prepared, rollout: Rollout) -> Entry:
+def _settings(request: SimulationRequest, rollout: Rollout) -> Entry:
     """Settings of the record, with noise and pushes as objects, and with the armature."""
-    scenario, kept = prepared.scenario, rollout.settings
+    scenario, kept = request.scenario, rollout.settings
     return {
         **kept,
         "joints": {**kept["joints"], "armature": np.diag(rollout.rotors).tolist()},
@@ -142,11 +142,11 @@ def _push(push: Push) -> Entry:
     }
 
 
-def _is_passive(prepared: Prepared, rollout: Rollout) -> bool:
+def _is_passive(request: SimulationRequest, rollout: Rollout) -> bool:
     """Whether nothing does work on the robot, so that its energy is conserved."""
     joints = rollout.settings["joints"]
-    disturbed = any(joints["damping"]) or any(joints["friction"]) or prepared.scenario.pushes
-    return prepared.controller is None and not disturbed and not prepared.scenario.position_limits
+    disturbed = any(joints["damping"]) or any(joints["friction"]) or request.scenario.pushes
+    return request.controller is None and not disturbed and not request.scenario.position_limits
 
 
 def _status(ended: EarlyEnd) -> str:
@@ -157,13 +157,11 @@ def _status(ended: EarlyEnd) -> str:
     return DIVERGED if isinstance(ended, DivergedError) else CONTROL_FAILED
 
 
-def _overshoot(prepared: Prepared, ended: EarlyEnd) -> Entry | None:
+def _overshoot(request: SimulationRequest, ended: EarlyEnd) -> Entry | None:
     """Joint whose damping is unstable for the time step, where that can be the reason for divergence."""
     if not isinstance(ended, DivergedError):
         return None
-    found = largest_overshoot(
-        prepared.controller, np.asarray(prepared.scenario.q0), prepared.clock.control_dt
-    )
+    found = largest_overshoot(request.controller, np.asarray(request.scenario.q0), request.clock.control_dt)
     return None if found is None else found._asdict()
 
 

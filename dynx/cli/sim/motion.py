@@ -9,7 +9,6 @@ from typing import Any
 from dynx import trajectory
 from dynx.cli.shell.inputs import Numbers, chosen_frame, configuration, target_pose
 from dynx.cli.shell.terminal import counted
-from dynx.cli.sim.options import PROFILES
 from dynx.errors import ArgumentError, LimitError, LimitViolation, shown
 from dynx.model import Model
 from dynx.sim.clock import positive
@@ -20,10 +19,10 @@ from dynx.trajectory import Trajectory
 DURATION = 2.0
 """Default duration of a motion without limits [s]."""
 
-TIMED = {"cycloidal": trajectory.cycloidal, "cubic": trajectory.cubic, "quintic": trajectory.quintic}
+TIMED_PROFILES = {"cycloidal": trajectory.cycloidal, "cubic": trajectory.cubic, "quintic": trajectory.quintic}
 """Profiles with a given duration."""
 
-LIMITED = {"trapezoidal": ("acceleration",), "s-curve": ("acceleration", "jerk")}
+LIMITED_PROFILES = {"trapezoidal": ("acceleration",), "s-curve": ("acceleration", "jerk")}
 """Profiles as fast as limits allow, and the limits that they require besides that of velocity."""
 
 Limit = float | list[float]
@@ -101,36 +100,36 @@ def plan_motion(model: Model, options: MotionInput) -> Motion:
         description |= {"to": None if reference is None else held.tolist(), "duration": span}
         return Motion(reference, start, span + options.settle, frame, description)
     if options.to is None:
-        motion = _to_pose(model, options, frame, start)
+        motion = _line_motion(model, options, frame, start)
     else:
-        motion = _to(model, options, profile, start)
+        motion = _joint_motion(model, options, profile, start)
     description |= {"to": motion.end.q.tolist(), "duration": motion.duration}
     span = motion.duration
-    if profile in LIMITED and options.duration is None:
+    if profile in LIMITED_PROFILES and options.duration is None:
         # The fastest motion ends between two steps; the simulation continues to the next.
         dt = positive("--dt", options.dt)
         span = dt * math.ceil(motion.duration / dt - 1e-9)
     return Motion(motion, start, span + options.settle, frame, description)
 
 
-def _to(model: Model, options: MotionInput, profile: str, start: Floats) -> Trajectory:
+def _joint_motion(model: Model, options: MotionInput, profile: str, start: Floats) -> Trajectory:
     goal = configuration(model, options.to, "--to", start)
-    if profile in TIMED:
+    if profile in TIMED_PROFILES:
         duration = DURATION if options.duration is None else options.duration
-        return TIMED[profile](start, goal, duration, model=model)
+        return TIMED_PROFILES[profile](start, goal, duration, model=model)
     limits: dict[str, Any] = {
         "acceleration": options.acceleration,
         "velocity": options.velocity,
         "duration": options.duration,
     }
     if profile == "s-curve":
-        return trajectory.s_curve(start, goal, jerk=_given(options.jerk), model=model, **limits)
+        return trajectory.s_curve(start, goal, jerk=_required(options.jerk), model=model, **limits)
     return trajectory.trapezoidal(start, goal, model=model, **limits)
 
 
-def _to_pose(model: Model, options: MotionInput, frame: str | None, start: Floats) -> Trajectory:
+def _line_motion(model: Model, options: MotionInput, frame: str | None, start: Floats) -> Trajectory:
     duration = DURATION if options.duration is None else options.duration
-    time_law = TIMED[options.chosen_profile]([0.0], [1.0], duration)
+    time_law = TIMED_PROFILES[options.chosen_profile]([0.0], [1.0], duration)
     return trajectory.line(model, str(frame), start, target_pose(options.to_pose, "--to-pose"), law=time_law)
 
 
@@ -140,24 +139,24 @@ def _refuse_contradictions(options: MotionInput) -> None:
         raise ArgumentError("--to and --to-pose are both given; wanted one of them")
     if not options.has_target and profile != "hold":
         raise ArgumentError(f"--profile {profile} needs --to or --to-pose")
-    if options.to_pose is not None and profile not in TIMED:
-        raise ArgumentError(f"--to-pose takes --profile {', '.join(TIMED)}; not {profile}")
+    if options.to_pose is not None and profile not in TIMED_PROFILES:
+        raise ArgumentError(f"--to-pose takes --profile {', '.join(TIMED_PROFILES)}; not {profile}")
     if options.frame is not None and not options.needs_frame:
         raise ArgumentError("--frame needs --to-pose or --controller operational-space or impedance")
-    needed = LIMITED.get(profile, ())
+    needed = LIMITED_PROFILES.get(profile, ())
     for name in needed:
         if getattr(options, name) is None:
             raise ArgumentError(f"--profile {profile} needs --{name}")
     allowed = ("velocity", *needed) if needed else ()
     for name in ("velocity", "acceleration", "jerk"):
         if name not in allowed and getattr(options, name) is not None:
-            takers = [each for each in PROFILES if each in LIMITED and name in ("velocity", *LIMITED[each])]
+            takers = [each for each, required in LIMITED_PROFILES.items() if name in ("velocity", *required)]
             raise ArgumentError(f"--{name} needs --profile {' or '.join(takers)}, not {profile}")
     if options.settle < 0.0:
         raise ArgumentError(f"--settle is {options.settle:g} s; wanted 0 or more")
 
 
-def _given(limit: Limit | None) -> Limit:
+def _required(limit: Limit | None) -> Limit:
     assert limit is not None
     return limit
 

@@ -43,7 +43,7 @@ STEP_BYTES = 2000
 
 
 @dataclass(frozen=True)
-class Prepared:
+class SimulationRequest:
     """A scenario with checked options, and the other input of its document."""
 
     scenario: Scenario
@@ -56,23 +56,23 @@ class Prepared:
     """Entries of the document that the record does not contain."""
 
 
-def prepare(given: dict[str, Any]) -> Prepared:
+def prepare(given: dict[str, Any]) -> SimulationRequest:
     """Make a scenario from the options `given` by parameter name. Raises ArgumentError for invalid ones."""
     base: Base = given["base"]
     model = load(given["robot"], base=base, lock=dict(given["lock"]), gravity=given["gravity"])
     for engine in (given["plant"], given["backend"]):
         backend_class(engine).require_engine()
-    losses = _losses(given)
-    _refuse_useless(given, losses)
+    dynamics = _joint_dynamics(given)
+    _refuse_ineffective_options(given, dynamics)
     motion = plan_motion(model, MotionInput.of(given))
     clock = Clock.of(given["dt"], motion.duration, given["control_dt"], given["delay"])
     _require_memory(model, clock)
-    controller = _controller(model, given, motion, clock, losses)
+    controller = _controller(model, given, motion, clock, dynamics)
     limits: Coefficients | None = given["effort_limits"]
     q0 = motion.start if given["q0"] is None else configuration(model, given["q0"], "--q0", motion.start)
     fields: dict[str, Any] = {
         **{name: given[name] for name in SCENARIO_FIELDS},
-        **losses,
+        **dynamics,
         **{name: given[name] for name in ("method", "rtol", "atol") if given[name] is not None},
         "duration": motion.duration,
         "q0": q0,
@@ -91,7 +91,7 @@ def prepare(given: dict[str, Any]) -> Prepared:
     }
     header = {
         "law": given["controller"],
-        "backend": given["backend"] if _computes(controller) else None,
+        "backend": given["backend"] if _uses_backend(controller) else None,
         "frame": motion.frame,
         "frame_given": given["frame"] is not None,
         "motion": motion.description,
@@ -99,11 +99,11 @@ def prepare(given: dict[str, Any]) -> Prepared:
         "motor_limits": _limits_of_motors(model, given["effort_limits"], controller),
     }
     scenario = Scenario(model, controller, motion.reference, **fields)
-    return Prepared(scenario, controller, motion, clock, options, header)
+    return SimulationRequest(scenario, controller, motion, clock, options, header)
 
 
 def _controller(
-    model: Model, given: dict[str, Any], motion: Motion, clock: Clock, losses: dict[str, Any]
+    model: Model, given: dict[str, Any], motion: Motion, clock: Clock, dynamics: dict[str, Any]
 ) -> Controller[Any] | None:
     gains = Gains(**{name: given[name] for name in GAINS})
     if given["controller"] == "none":
@@ -128,12 +128,15 @@ def _controller(
         raise UnsupportedFeatureError(
             f"{given['controller']} is a motor inside PyBullet; no torque can be added"
         )
-    if losses["damping"] is False and losses["friction"] is False:
+    if dynamics["damping"] is False and dynamics["friction"] is False:
         raise ArgumentError(
-            "--friction-compensation needs joint losses: --damping, --friction or --joint-dynamics"
+            "--friction-compensation needs joint dynamics: --damping, --friction or --joint-dynamics"
         )
     return FrictionCompensation(
-        controller, damping=losses["damping"], friction=losses["friction"], slip=losses["friction_slip"]
+        controller,
+        damping=dynamics["damping"],
+        friction=dynamics["friction"],
+        slip=dynamics["friction_slip"],
     )
 
 
@@ -153,20 +156,23 @@ def _limits_of_motors(
     return motor_limits
 
 
-def _losses(given: dict[str, Any]) -> dict[str, Any]:
+def _joint_dynamics(given: dict[str, Any]) -> dict[str, Any]:
     """Damping, friction and armature of the joints; single options override ``--joint-dynamics``."""
     all_of_urdf: bool = given["joint_dynamics"]
     names = ("damping", "friction", "armature")
-    losses = {name: all_of_urdf if given[name] is None else given[name] for name in names}
-    return {**losses, "friction_slip": SLIP if given["friction_slip"] is None else given["friction_slip"]}
+    dynamics = {name: all_of_urdf if given[name] is None else given[name] for name in names}
+    return {
+        **dynamics,
+        "friction_slip": SLIP if given["friction_slip"] is None else given["friction_slip"],
+    }
 
 
-def _refuse_useless(given: dict[str, Any], losses: dict[str, Any]) -> None:
+def _refuse_ineffective_options(given: dict[str, Any], dynamics: dict[str, Any]) -> None:
     """Raise ArgumentError for an option that has no effect without another that is missing."""
     noisy = given["noise_q"] is not None or given["noise_v"] is not None
     has_use = {
         "--integrator adaptive": given["integrator"] == "adaptive",
-        "--friction": losses["friction"] is not False,
+        "--friction": dynamics["friction"] is not False,
         "--noise-q or --noise-v": noisy,
         "--resume": given["resume"] is not None,
     }
@@ -192,7 +198,7 @@ def _innermost(controller: Controller[Any] | None) -> Controller[Any] | None:
     return controller.inner if isinstance(controller, FrictionCompensation) else controller
 
 
-def _computes(controller: Controller[Any] | None) -> bool:
+def _uses_backend(controller: Controller[Any] | None) -> bool:
     """Whether the controller evaluates its model with a backend."""
     return isinstance(_innermost(controller), ModelBased)
 

@@ -15,7 +15,7 @@ from dynx.cli.sim.document import EarlyEnd, document
 from dynx.cli.sim.motion import limit_message
 from dynx.cli.sim.options import TUTORIAL_OPTIONS
 from dynx.cli.sim.outputs import Outputs
-from dynx.cli.sim.request import Prepared, prepare
+from dynx.cli.sim.request import SimulationRequest, prepare
 from dynx.cli.sim.tables import show
 from dynx.cli.sim.tutorial_run import run_tutorial
 from dynx.errors import ArgumentError, DynxError, LimitError, SimulationError
@@ -45,47 +45,47 @@ def _refuse_beside_tutorial(context: click.Context) -> None:
             raise click.UsageError(f"{param.opts[0]} has no effect with --tutorial", context)
 
 
-def run_sim(prepared: Prepared, outputs: Outputs, *, as_json: bool) -> int:
+def run_sim(request: SimulationRequest, outputs: Outputs, *, as_json: bool) -> int:
     """Simulate, write the files and show the results, also of a part; return the exit code."""
     ended: EarlyEnd = None
     started = time.perf_counter()
     with interruptible() as interruption:
         try:
-            rollout = _simulate(prepared)
+            rollout = _simulate(request)
         except (SimulationError, RolloutInterrupted) as early:
             ended, rollout = early, early.rollout
         except KeyboardInterrupt:
             complain("interrupted before the first step")
             return interruption.code or INTERRUPTED
         except LimitError as error:
-            raise ArgumentError(limit_message(error, prepared.scenario.model.name, ignorable=True)) from error
+            raise ArgumentError(limit_message(error, request.scenario.model.name, ignorable=True)) from error
         seconds = time.perf_counter() - started
         interruption.finishing = True
-        unwritten = _write(outputs, rollout)
-        made = {**document(prepared, rollout, seconds, ended), "files": [] if unwritten else outputs.files}
+        write_error = _write(outputs, rollout)
+        made = {**document(request, rollout, seconds, ended), "files": [] if write_error else outputs.files}
         if as_json:
             echo_json(made)
         else:
             show(console(), made)
         if ended is not None:
             resumable = isinstance(ended, RolloutInterrupted)
-            complain(f"{ended}{_saved_files(outputs, unwritten, resumable=resumable)}")
-        if unwritten is not None:
-            complain(str(unwritten))
+            complain(f"{ended}{_saved_files(outputs, write_error, resumable=resumable)}")
+        if write_error is not None:
+            complain(str(write_error))
     if interruption.code is not None:
         return interruption.code
     if isinstance(ended, RolloutInterrupted):
         return INTERRUPTED
-    if unwritten is not None:
+    if write_error is not None:
         return BAD_INPUT
     return DONE if ended is None else NEGATIVE_RESULT
 
 
-def _simulate(prepared: Prepared) -> Rollout:
-    with progress_bar(prepared.clock.n_steps, words="simulating") as advance:
+def _simulate(request: SimulationRequest) -> Rollout:
+    with progress_bar(request.clock.n_steps, words="simulating") as advance:
         return simulate(
-            prepared.scenario,
-            **prepared.options,
+            request.scenario,
+            **request.options,
             progress=lambda taken, wanted: advance(taken, "simulating"),
         )
 
@@ -99,9 +99,9 @@ def _write(outputs: Outputs, rollout: Rollout) -> DynxError | None:
     return None
 
 
-def _saved_files(outputs: Outputs, unwritten: DynxError | None, *, resumable: bool) -> str:
+def _saved_files(outputs: Outputs, write_error: DynxError | None, *, resumable: bool) -> str:
     """Name the files with the results so far, and the option that continues from them."""
-    if not outputs.save or unwritten is not None:
+    if not outputs.save or write_error is not None:
         return ""
     complete = [path for path in outputs.save if path.lower().endswith(".npz")]
     hint = f"; the same command with --resume {complete[0]} continues" if resumable and complete else ""

@@ -31,62 +31,62 @@ _STEPPERS = {
 """Integrators by their name in the document."""
 
 
-def show(out: Console, made: Entry) -> None:
+def show(out: Console, report: Entry) -> None:
     """Print what was simulated, a table with a line for each joint, and a summary."""
-    _show_header(out, made)
-    out.print(_joint_table(made))
-    out.print(_largest_error(made))
-    for body, error in (("base", made["base_error"]), (made["frame"], made["frame_error"])):
+    _show_header(out, report)
+    out.print(_joint_table(report))
+    out.print(_largest_error(report))
+    for body, error in (("base", report["base_error"]), (report["frame"], report["frame_error"])):
         if error is not None:
             out.print(_body_error(one_line(body), error))
-    out.print(_energy(made))
-    if made["law"] != "none":
-        out.print(_saturation(made))
-    if made["overshoot"] is not None:
-        out.print(_overshoot(made))
-    out.print(f"simulated {number(made['simulated'])} s in {made['seconds']:.2f} s")
+    out.print(_energy(report))
+    if report["law"] != "none":
+        out.print(_saturation(report))
+    if report["overshoot"] is not None:
+        out.print(_overshoot(report))
+    out.print(f"simulated {number(report['simulated'])} s in {report['seconds']:.2f} s")
 
 
-def _show_header(out: Console, made: Entry) -> None:
-    settings = made["settings"]
-    controller = "no motors" if made["law"] == "none" else made["law"]
-    if made["frame"] is not None and made["motion"]["line"] is None:
-        controller += f" of {one_line(made['frame'])}"
-    engine = "" if made["backend"] is None else f" computed by {made['backend']}"
+def _show_header(out: Console, report: Entry) -> None:
+    settings = report["settings"]
+    controller = "no motors" if report["law"] == "none" else report["law"]
+    if report["frame"] is not None and report["motion"]["line"] is None:
+        controller += f" of {one_line(report['frame'])}"
+    engine = "" if report["backend"] is None else f" computed by {report['backend']}"
     stepper = _STEPPERS.get(settings["integrator"], settings["integrator"])
     out.print(
-        f"{one_line(made['robot'])}, {made['base']} base: {controller}{engine}, on {settings['plant']} "
+        f"{one_line(report['robot'])}, {report['base']} base: {controller}{engine}, on {settings['plant']} "
         f"with {stepper}",
         style="bold",
     )
     out.print(
-        f"{_motion(made)}; {counted(made['steps'], 'step')} of {number(made['dt'])} s, "
-        f"gravity {' '.join(number(g) for g in made['gravity'])} m/s^2"
+        f"{_motion(report)}; {counted(report['steps'], 'step')} of {number(report['dt'])} s, "
+        f"gravity {' '.join(number(g) for g in report['gravity'])} m/s^2"
     )
-    if made["frame"] is not None and not made["frame_given"]:
-        out.print(default_frame_note(made["frame"]))
-    gains = [f"{name} {value_range(gain)}" for name, gain in made["gains"].items() if gain]
+    if report["frame"] is not None and not report["frame_given"]:
+        out.print(default_frame_note(report["frame"]))
+    gains = [f"{name} {value_range(gain)}" for name, gain in report["gains"].items() if gain]
     if gains:
         out.print(", ".join(gains))
-    deviating = deviations(made)
+    deviating = deviations(report)
     if deviating:
         out.print(deviating)
 
 
-def _motion(made: Entry) -> str:
-    motion = made["motion"]
+def _motion(report: Entry) -> str:
+    motion = report["motion"]
     if motion["profile"] == "hold":
         return "no reference" if motion["to"] is None else "constant reference"
-    where = "" if motion["line"] is None else f", {one_line(made['frame'])} along a straight line"
+    where = "" if motion["line"] is None else f", {one_line(report['frame'])} along a straight line"
     return f"{motion['profile']} motion of {number(motion['duration'])} s{where}"
 
 
-def _joint_table(made: Entry) -> Table:
+def _joint_table(report: Entry) -> Table:
     """Table with a line for each coordinate of v; errors are those of its position."""
-    joints: list[Entry] = made["joints"]
+    joints: list[Entry] = report["joints"]
     right = ("max\nerror", "RMS\nerror", "max\nspeed", "max\ntorque", "torque\nlimit", "of\nlimit")
     table = Table("joint", "unit", *right, right=right, keys=1)
-    base = 6 if made["base"] == "floating" else 0
+    base = 6 if report["base"] == "floating" else 0
     speeds = column_text([joint["max_speed"] for joint in joints])
     torques = column_text([joint["max_torque"] for joint in joints])
     for k, (joint, speed, torque) in enumerate(zip(joints, speeds, torques, strict=True)):
@@ -104,16 +104,16 @@ def _joint_table(made: Entry) -> Table:
     return table
 
 
-def _largest_error(made: Entry) -> str:
-    if made["motion"]["to"] is None:
+def _largest_error(report: Entry) -> str:
+    if report["motion"]["to"] is None:
         return "no tracking error: there is no reference"
-    if made["max_error"] is None:
+    if report["max_error"] is None:
         return "no tracking error of joints: the robot has none"
-    units = {joint["name"]: joint["unit"] for joint in made["joints"]}
-    joint = made["max_error_joint"]
+    units = {joint["name"]: joint["unit"] for joint in report["joints"]}
+    joint = report["max_error_joint"]
     return (
-        f"largest error {error_text(made['max_error'])} {units[joint]} of {one_line(joint)} at "
-        f"{number(made['max_error_time'])} s, {error_text(made['final_error'])} at the end"
+        f"largest error {error_text(report['max_error'])} {units[joint]} of {one_line(joint)} at "
+        f"{number(report['max_error_time'])} s, {error_text(report['final_error'])} at the end"
     )
 
 
@@ -127,29 +127,29 @@ def _body_error(body: str, error: Entry) -> str:
     return f"error of {body}: position {parts[0]}\n{' ' * len(f'error of {body}')}  rotation {parts[1]}"
 
 
-def _energy(made: Entry) -> str:
+def _energy(report: Entry) -> str:
     """Make the line about energy: a relative drift where no work was done on the robot, else its change."""
-    kinetic = made["max_kinetic_energy"]
+    kinetic = report["max_kinetic_energy"]
     if kinetic < KINETIC_ENERGY_AT_REST:
         return "the robot stayed at rest"
     largest = f"largest kinetic energy {kinetic:.3g} J"
-    if made["passive"]:
-        return f"energy drift {made['energy_drift']:.2g} times the {largest}"
-    return f"energy changed by up to {made['energy_change']:.3g} J; {largest}"
+    if report["passive"]:
+        return f"energy drift {report['energy_drift']:.2g} times the {largest}"
+    return f"energy changed by up to {report['energy_change']:.3g} J; {largest}"
 
 
-def _saturation(made: Entry) -> str:
-    if made["motor_limits"] is not None:
+def _saturation(report: Entry) -> str:
+    if report["motor_limits"] is not None:
         return "PyBullet saturated its motors at the limits; how often is unknown"
-    if made["settings"]["effort_limits"] is None:
+    if report["settings"]["effort_limits"] is None:
         return "torques were not limited (--effort-limits urdf limits them)"
-    return f"torques were saturated in {100.0 * made['saturated']:.3g} % of the steps"
+    return f"torques were saturated in {100.0 * report['saturated']:.3g} % of the steps"
 
 
-def _overshoot(made: Entry) -> str:
-    settings, found = made["settings"], made["overshoot"]
+def _overshoot(report: Entry) -> str:
+    settings, found = report["settings"], report["overshoot"]
     step = "--dt" if settings["control_dt"] == settings["dt"] else "--control-dt"
-    gain = "damping" if made["law"] == "impedance" else "kd"
+    gain = "damping" if report["law"] == "impedance" else "kd"
     return (
         f"smaller gains or a smaller {step} can help: {gain} {step[2:].replace('-', '_')} / inertia is "
         f"{found['ratio']:.3g} at {one_line(found['joint'])}, and a step is unstable above 2"

@@ -42,7 +42,7 @@ def run_tutorial(robot: str | None, given: dict[str, Any], picture: str | None, 
             complain(f"interrupted: {counted(len(MODES) - len(rows), 'controller')} not done")
         interruption.finishing = True
         made = document(experiments, rows)
-        undrawn = None if picture is None else _draw(experiments, rows, picture)
+        plot_error = None if picture is None else _draw(experiments, rows, picture)
         if as_json:
             echo_json(made)
         else:
@@ -53,11 +53,11 @@ def run_tutorial(robot: str | None, given: dict[str, Any], picture: str | None, 
             for plant, outcome in row.outcomes.items()
             if outcome.failed
         ]
-        for complaint in [*failed, *([] if undrawn is None else [str(undrawn)])]:
+        for complaint in [*failed, *([] if plot_error is None else [str(plot_error)])]:
             complain(complaint)
     if interruption.code is not None:
         return interruption.code
-    if undrawn is not None:
+    if plot_error is not None:
         return BAD_INPUT
     return NEGATIVE_RESULT if failed else DONE
 

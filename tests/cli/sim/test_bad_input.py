@@ -56,7 +56,7 @@ ELBOW = ["ur5", "--to", "elbow_joint=0.1"]
         ([*ELBOW, "--controller", "none", "--kp", "1"], "takes no gains"),
         ([*ELBOW, "--controller", "impedance"], "impedance needs kp"),
         ([*ELBOW, "--controller", "position-motor"], "pybullet"),
-        ([*ELBOW, "--friction-compensation"], "needs joint losses: --damping"),
+        ([*ELBOW, "--friction-compensation"], "needs joint dynamics: --damping"),
         ([*ELBOW, "--damping=-1"], "damping is negative"),
         ([*ELBOW, "--friction", "1", "--friction-slip=-1"], "slip"),
         ([*ELBOW, "--push", "tool0"], "--push"),
