@@ -1,1 +1,1 @@
-"""What dynx costs, measured: ``pytest benchmarks``. Each benchmark checks the answer before it times it."""
+"""Benchmarks of dynx: ``pytest benchmarks``. Each one checks the result before it times it."""

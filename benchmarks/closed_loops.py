@@ -1,8 +1,8 @@
-"""One closed loop, in several ways: `dynx.simulate`, the tutorial's own loop, NumPy with Pinocchio.
+"""One closed loop in several implementations: `dynx.simulate`, the tutorial's loop, NumPy with Pinocchio.
 
-All do the same: computed torque, semi-implicit Euler, and positions, velocities and torques kept. Of dynx the
-whole call is timed, with its checks and with what it opens and closes. Of the peers it is the loop alone, for
-a robot that is loaded and a reference that is computed.
+All compute the same: computed torque, semi-implicit Euler, and recorded positions, velocities and torques. Of
+dynx the whole call is timed, with its checks and with opening and closing the engine. Of the others only the
+loop is timed; the robot is loaded and the reference trajectory computed before.
 """
 
 from __future__ import annotations

@@ -36,23 +36,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--without", action="append", default=[], choices=list(SUPPORTED), help="leave out a peer"
     )
-    asked = parser.parse_args(arguments)
-    model = load(asked.robot, lock=LOCKED.get(asked.robot))
-    batch = draw_batch(model, FRAMES[asked.robot], asked.batch)
+    options = parser.parse_args(arguments)
+    model = load(options.robot, lock=LOCKED.get(options.robot))
+    batch = draw_batch(model, FRAMES[options.robot], options.batch)
     beaten = []
-    implementations, absent = implementations_of(model, asked.threads, asked.without)
+    implementations, absent = implementations_of(model, options.threads, options.without)
     for reason in absent:
         print(reason)
-    for quantity in asked.quantity or BENCHMARK_QUANTITIES:
-        case = BenchmarkCase(quantity, asked.batch, asked.threads)
+    for quantity in options.quantity or BENCHMARK_QUANTITIES:
+        case = BenchmarkCase(quantity, options.batch, options.threads)
         able = [
             implementation
             for implementation in implementations
             if implementation.supports(case)
             and quantity in SUPPORTED.get(implementation.name, BENCHMARK_QUANTITIES)
         ]
-        found = measure(case, able, batch, asked.repetitions)
-        print(f"\n{quantity}, {asked.robot}, threads {asked.threads}\n")
+        found = measure(case, able, batch, options.repetitions)
+        print(f"\n{quantity}, {options.robot}, threads {options.threads}\n")
         print(*table(found, able), sep="\n", flush=True)
         left_out = [implementation.name for implementation in implementations if implementation not in able]
         print(*(f"- does not do this: {name}" for name in left_out), sep="\n", flush=True)

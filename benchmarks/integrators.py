@@ -160,7 +160,7 @@ def fall_by_hand(n_steps: int) -> tuple[Floats, Floats]:
     Q, V = np.zeros((n_steps + 1, engine.nq)), np.zeros((n_steps + 1, engine.nv))
 
     def acceleration(q: Floats, v: Floats) -> Floats:
-        # The answer is the engine's own memory, which the next call writes to.
+        # The result is memory of the engine, which the next call overwrites.
         return np.array(pin.aba(engine, data, q, v, none))
 
     for k in range(n_steps):
@@ -186,11 +186,11 @@ def momenta(duration: float) -> Iterator[Line]:
         f"\nFree body for {duration:g} s at 1 ms: largest change of momentum in a step, linear and angular",
         True,
     )
-    ways = [("pinocchio", "rk4"), ("pinocchio", "adaptive"), ("pinocchio", "semi_implicit")]
+    plants = [("pinocchio", "rk4"), ("pinocchio", "adaptive"), ("pinocchio", "semi_implicit")]
     if "pybullet" in installed_backends():
-        ways.append(("pybullet", "engine"))
+        plants.append(("pybullet", "engine"))
     body = load("free_body", base="floating").with_gravity(np.zeros(3))
-    for plant, integrator in ways:
+    for plant, integrator in plants:
         rollout = simulate(body, v0=SPEED, dt=DT, duration=duration, plant=plant, integrator=integrator)
         with backend("reference", body) as engine:
             momentum = engine.centroidal_momentum(rollout.q, rollout.v)

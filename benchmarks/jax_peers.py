@@ -41,7 +41,7 @@ THREADS = "NPROC"
 
 
 MOST_JOINTS = 16
-"""Of a robot whose dynamics adam is asked for on JAX."""
+"""Largest number of joints of a robot whose dynamics adam evaluates on JAX."""
 
 
 class JaxPeer(CompilingPeer):

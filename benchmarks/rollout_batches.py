@@ -1,8 +1,8 @@
 """Batches of rollouts of UR5, in steps of 1 ms: `dynx.simulate_batch`, MuJoCo's rollout, Pinocchio's batches.
 
-With a controller all rollouts do the task of `Task`, so each has to end where the loop written by hand does.
-Without one they fall from random configurations, and MuJoCo has to fall with dynx. Peers that are slower are
-timed with fewer rollouts, which fit into the caches, to their advantage; the time of a step is what counts.
+With a controller all rollouts perform `Task`, so each must end where the loop written by hand does.
+Without one they fall from random configurations, and MuJoCo must fall as dynx does. Slower libraries are
+timed with fewer rollouts, which fit into the caches, to their advantage; times are compared by the step.
 """
 
 from __future__ import annotations
@@ -33,18 +33,18 @@ PINOCCHIO = "pinocchio C++ batches, closed loop"
 MUJOCO = "mujoco rollout, no control"
 BATCHES = (CLOSED, FALLING, PINOCCHIO, MUJOCO)
 
-FALLEN_APART = 1e-9
-"""How far two engines may be apart at the end of a fall [rad]: rounding, and what becomes of it in 2 s."""
-COMPARED = 8
-"""Falls that are compared."""
-WIDE = (2048, 100)
-"""Rollouts and steps that Pinocchio's batches are timed with at most: its threads meet twice in each step, so
-that they need many rollouts, and fewer steps do."""
+MAX_FALL_DIFFERENCE = 1e-9
+"""Bound on the difference of two engines at the end of a fall [rad]: rounding errors that grow for 2 s."""
+COMPARED_FALLS = 8
+"""Number of falls that are compared."""
+MAX_PINOCCHIO_SIZE = (2048, 100)
+"""Largest numbers of rollouts and steps for Pinocchio's batches: its threads synchronise twice a step, so
+that they need many rollouts; fewer steps suffice."""
 
 
 @dataclass(frozen=True)
 class Size:
-    """How many rollouts of how many steps."""
+    """Numbers of rollouts and of steps."""
 
     task: Task
     rollouts: int
@@ -87,7 +87,7 @@ class DynxClosedLoops(Batch):
 
     def __init__(self, name: str, size: Size, threads: int) -> None:
         super().__init__(name, size, size.rollouts, threads)
-        self._law = size.task.law()
+        self._controller = size.task.law()
 
     def call(self) -> BatchRollouts:
         """The whole call."""
@@ -110,7 +110,7 @@ class DynxClosedLoops(Batch):
         task = self.size.task
         return simulate_batch(
             task.model,
-            self._law,
+            self._controller,
             task.motion,
             rollouts=self.rollouts,
             dt=DT,
@@ -120,11 +120,11 @@ class DynxClosedLoops(Batch):
 
 
 class DynxFalls(Batch):
-    """`dynx.simulate_batch` under a law that gives no torque: the work that MuJoCo's rollout does."""
+    """`dynx.simulate_batch` under a controller without torque, to compare with MuJoCo's rollout."""
 
     def __init__(self, name: str, size: Size, threads: int) -> None:
         super().__init__(name, size, size.rollouts, threads)
-        self._law = NoTorque(size.task.model)
+        self._controller = NoTorque(size.task.model)
         self._q0 = size.start_of_fall(self.rollouts)
 
     def call(self) -> BatchRollouts:
@@ -143,7 +143,7 @@ class DynxFalls(Batch):
         model = self.size.task.model
         rest = model.neutral()
         return simulate_batch(
-            model, self._law, rest, q0=self._q0, dt=DT, duration=duration, threads=self.threads
+            model, self._controller, rest, q0=self._q0, dt=DT, duration=duration, threads=self.threads
         )
 
 
@@ -151,8 +151,8 @@ class PinocchioLoops(Batch):
     """`rneaInParallel` and `abaInParallel` in each step, NumPy's arrays over all rollouts between them."""
 
     def __init__(self, name: str, size: Size, threads: int) -> None:
-        super().__init__(name, size, min(size.rollouts, WIDE[0]), threads)
-        self._n_steps = min(size.task.n_steps, WIDE[1])
+        super().__init__(name, size, min(size.rollouts, MAX_PINOCCHIO_SIZE[0]), threads)
+        self._n_steps = min(size.task.n_steps, MAX_PINOCCHIO_SIZE[1])
         self.steps = self.rollouts * self._n_steps
         self._pool = pin.ModelPool(pinocchio_model(size.task.model), threads)
 
@@ -228,16 +228,16 @@ class MujocoRollouts(Batch):
 
 def apart_from_falls_by_hand(size: Size, fallen: Floats) -> Check:
     """How far the first of the configurations (rollouts, 6) at the end are from those computed by hand."""
-    apart = float(np.max(np.abs(fallen[:COMPARED] - falls_by_hand(size))))
-    return Check("distance from the falls by hand [rad]", apart, FALLEN_APART)
+    apart = float(np.max(np.abs(fallen[:COMPARED_FALLS] - falls_by_hand(size))))
+    return Check("distance from the falls by hand [rad]", apart, MAX_FALL_DIFFERENCE)
 
 
 @cache
 def falls_by_hand(size: Size) -> Floats:
-    """Where the first falls end, by `pin.aba` and two sums in each step (COMPARED, 6)."""
+    """Where the first falls end, by `pin.aba` and two sums in each step (COMPARED_FALLS, 6)."""
     engine = pinocchio_model(size.task.model)
     data = engine.createData()
-    fallen = size.start_of_fall(COMPARED)
+    fallen = size.start_of_fall(COMPARED_FALLS)
     for row in range(len(fallen)):
         q, v, none = fallen[row], np.zeros(engine.nv), np.zeros(engine.nv)
         for _ in range(size.task.n_steps):

@@ -1,8 +1,8 @@
-"""Simulation beside its peers, in one run: ``python -m benchmarks.simulation``.
+"""Comparison of simulation with other libraries: ``python -m benchmarks.simulation``.
 
-One closed loop in six ways, and batches of rollouts on one thread and on two. Every way is checked first;
-then each repetition does all of them in turn, single loops three times. It prints two tables of medians, and
-ends with 1 where an answer was wrong. docs/bench.md says what is compared.
+One closed loop in six implementations, and batches of rollouts on one thread and on two. Every one is checked
+first; then each repetition runs all of them in turn, single loops three times. It prints two tables of
+medians, and exits with 1 where a result was wrong. docs/bench.md describes what is compared.
 """
 
 from __future__ import annotations
@@ -18,60 +18,60 @@ from benchmarks.progress import tell
 from benchmarks.rollout_batches import BATCHES, FULL, QUICK, Size, rollout_batch
 from benchmarks.simulation_report import Found, bars, document, tables
 from benchmarks.simulator import Simulator
-from dynx.bench.machine import described, load
+from dynx.bench.machine import load, processor_description
 from dynx.bench.timing import Times, once
 from dynx.errors import NotInstalledError
 
 REPETITIONS = 5
 LOOPS_IN_A_TURN = 3
-"""A single loop takes some hundredths of a second, a batch seconds: a repetition has more of the former."""
+"""Number of runs of a single loop in a repetition: it takes hundredths of a second, a batch seconds."""
 THREADS = (1, 2)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Print the tables and what the bars come to, or one document of JSON."""
+    """Print the tables and the promised bounds, or one JSON document."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.simulation", description=__doc__)
     parser.add_argument("--repetitions", type=int, default=REPETITIONS)
     parser.add_argument("--quick", action="store_true", help="few rollouts and steps, to see that it runs")
     parser.add_argument("--json", action="store_true", help="a document instead of tables")
-    asked = parser.parse_args(arguments)
-    simulators, problems = made(QUICK if asked.quick else FULL)
+    options = parser.parse_args(arguments)
+    simulators, problems = make_simulators(QUICK if options.quick else FULL)
     try:
-        right, wrong = checked(simulators)
-        found = measured(right, max(1, asked.repetitions))
+        right, wrong = check_simulators(simulators)
+        found = time_simulators(right, max(1, options.repetitions))
     finally:
         tell("")
         for simulator in simulators:
             simulator.close()
     problems += wrong
-    if asked.json:
+    if options.json:
         print(json.dumps(document(found, problems), indent=2))
     else:
-        print(f"{described()}; load {load()}; medians of {asked.repetitions} repetitions\n")
-        reached = [] if asked.quick else bars(found)
+        print(f"{processor_description()}; load {load()}; medians of {options.repetitions} repetitions\n")
+        reached = [] if options.quick else bars(found)
         print(*tables(found), "", *problems, *reached, sep="\n")
     return 1 if wrong else 0
 
 
-def made(size: Size) -> tuple[list[Simulator], list[str]]:
-    """All that can be simulated here, and why the rest cannot."""
+def make_simulators(size: Size) -> tuple[list[Simulator], list[str]]:
+    """Make all simulators whose libraries are installed; the reasons are returned for the others."""
     makers: list[Callable[[], Simulator]] = [partial(closed_loop, name, size.task) for name in LOOPS]
     makers += [partial(rollout_batch, name, size, threads) for name in BATCHES for threads in THREADS]
-    attempts = [attempt(maker) for maker in makers]
+    attempts = [make_simulator(maker) for maker in makers]
     simulators = [each for each in attempts if isinstance(each, Simulator)]
     return simulators, [each for each in attempts if isinstance(each, str)]
 
 
-def attempt(maker: Callable[[], Simulator]) -> Simulator | str:
-    """What is made, or why it cannot be."""
+def make_simulator(maker: Callable[[], Simulator]) -> Simulator | str:
+    """Make a simulator, or return the reason why it cannot be made."""
     try:
         return maker()
     except NotInstalledError as reason:
         return f"left out: {reason}"
 
 
-def checked(simulators: Sequence[Simulator]) -> tuple[list[Found], list[str]]:
-    """Those that are right, not timed yet, and what is wrong with the others."""
+def check_simulators(simulators: Sequence[Simulator]) -> tuple[list[Found], list[str]]:
+    """Return the simulators whose results are right, not timed yet, and the errors of the others."""
     right, wrong = [], []
     for simulator in simulators:
         tell(f"checking {simulator}")
@@ -84,8 +84,8 @@ def checked(simulators: Sequence[Simulator]) -> tuple[list[Found], list[str]]:
     return right, wrong
 
 
-def measured(right: Sequence[Found], repetitions: int) -> list[Found]:
-    """With their times: every repetition does all, each time another one first."""
+def time_simulators(right: Sequence[Found], repetitions: int) -> list[Found]:
+    """Time the simulators: every repetition runs all of them, each time with another one first."""
     calls: list[list[float]] = [[] for _ in right]
     starts: list[list[float]] = [[] for _ in right]
     for repetition in range(repetitions):

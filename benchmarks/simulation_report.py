@@ -1,4 +1,4 @@
-"""What the benchmark of simulation found, as tables of Markdown, as bars kept or missed, and as JSON."""
+"""Results of the benchmark of simulation as Markdown tables, against promised bounds, and as JSON."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from benchmarks.closed_loops import DYNX, TUTORIAL
 from benchmarks.rollout_batches import CLOSED, MUJOCO
 from benchmarks.simulator import Check, Simulator
 from dynx._version import __version__
-from dynx.bench.machine import described, load
+from dynx.bench.machine import load, processor_description
 from dynx.bench.timing import Times
 
 SCHEMA = 1
@@ -18,7 +18,7 @@ SCHEMA = 1
 
 @dataclass(frozen=True)
 class Found:
-    """One simulator, how right it was, and seconds of a call and of a call with a single step."""
+    """One simulator, its checks, and the times of a call and of a call with a single step."""
 
     simulator: Simulator
     checks: Sequence[Check]
@@ -32,13 +32,13 @@ class Found:
 
     @property
     def step(self) -> float:
-        """Seconds of a step: the median over the calls, by all steps of a call."""
+        """Time of a step [s]: the median over the calls, divided by the steps of a call."""
         return float("nan") if self.call is None else self.call.median / self.simulator.steps
 
 
 @dataclass(frozen=True)
 class Baselines:
-    """Seconds of a step of what others are compared with; NaN for what is not there."""
+    """Times of a step [s] of the simulators that others are compared with; NaN where not measured."""
 
     tutorial: float
     mujoco: dict[int, float]
@@ -46,13 +46,13 @@ class Baselines:
 
     @classmethod
     def among(cls, found: Sequence[Found]) -> Baselines:
-        """Those that were measured."""
+        """The baselines among the measured simulators."""
         steps = {(each.simulator.name, each.simulator.threads): each.step for each in found}
         mujoco = {threads: step for (name, threads), step in steps.items() if name == MUJOCO}
         return cls(steps.get((TUTORIAL, 1), float("nan")), mujoco)
 
     def ratios(self, found: Found) -> dict[str, float]:
-        """How many times faster it is than the tutorial's loop, and than MuJoCo on as many threads."""
+        """Speed-up over the tutorial's loop, and over MuJoCo on as many threads."""
         mujoco = self.mujoco.get(found.simulator.threads, float("nan"))
         return {"tutorial": self.tutorial / found.step, "mujoco": mujoco / found.step}
 
@@ -60,8 +60,8 @@ class Baselines:
 def tables(found: Sequence[Found]) -> Iterator[str]:
     """Single loops, then batches.
 
-    ``tutorial / this`` says how many times longer a step of the tutorial's loop takes, ``MuJoCo / this`` one
-    of its rollout on as many threads. ``spread`` is the distance of the quartiles over the median.
+    ``tutorial / this`` is the speed-up of a step over the tutorial's loop, ``MuJoCo / this`` over MuJoCo's
+    rollout on as many threads. ``spread`` is the distance of the quartiles over the median.
     """
     baselines = Baselines.among(found)
     yield "| one closed loop | us a step | spread | steps/s | tutorial / this | start [ms] | error [rad] |"
@@ -116,7 +116,7 @@ def document(found: Sequence[Found], problems: Sequence[str]) -> dict[str, Any]:
     return {
         "schema": SCHEMA,
         "dynx": __version__,
-        "processor": described(),
+        "processor": processor_description(),
         "load": load(),
         "problems": list(problems),
         "results": [entry(each, baselines.ratios(each)) for each in found],
@@ -124,7 +124,7 @@ def document(found: Sequence[Found], problems: Sequence[str]) -> dict[str, Any]:
 
 
 def entry(found: Found, ratios: dict[str, float]) -> dict[str, Any]:
-    """One way."""
+    """The entry of one simulator."""
     one = found.simulator
     return {
         "name": one.name,

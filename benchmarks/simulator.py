@@ -1,4 +1,4 @@
-"""What is timed in the benchmarks of simulation: something that takes steps, and is right."""
+"""Simulators that the benchmarks of simulation check and time."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from dynx.bench.timing import Call
 
 @dataclass(frozen=True)
 class Check:
-    """The largest error found of some kind, and what it may be."""
+    """The largest error of some kind, and its bound."""
 
     what: str
     error: float
@@ -19,7 +19,7 @@ class Check:
 
     @property
     def right(self) -> bool:
-        """Whether it may be timed."""
+        """Whether the error is within its bound."""
         return self.error <= self.allowed
 
     def __str__(self) -> str:
@@ -27,9 +27,9 @@ class Check:
 
 
 class Simulator(ABC):
-    """A way to simulate, made ready once and called again and again.
+    """An implementation of simulation, prepared once and called repeatedly.
 
-    `threads` is how many it uses, `steps` how many a call takes in all rollouts together.
+    `threads` is the number of threads it uses, `steps` that of the steps of a call in all rollouts together.
     """
 
     name: str
@@ -43,14 +43,14 @@ class Simulator(ABC):
 
     @abstractmethod
     def checks(self) -> Sequence[Check]:
-        """Simulate once, and say how right that was."""
+        """Simulate once, and return the errors."""
 
     def start(self) -> Call | None:
-        """The same with a single step: what a call costs before the first one. None where that is nothing."""
+        """A call with a single step, to measure the cost of starting; None where there is none."""
         return None
 
-    def close(self) -> None:  # most hold nothing
-        """Release what is held."""
+    def close(self) -> None:  # most hold no resources
+        """Release resources."""
         return
 
     def __str__(self) -> str:
@@ -58,6 +58,6 @@ class Simulator(ABC):
 
 
 def assert_right(simulator: Simulator) -> None:
-    """Fail where an answer is wrong."""
+    """Fail where a result is wrong."""
     for check in simulator.checks():
         assert check.right, f"{simulator}: {check}"

@@ -71,7 +71,7 @@ def targets_of(arm: str) -> Floats:
 
 @pytest.fixture(params=["pinocchio", "pybullet", "ik_LM"])
 def solver(request: pytest.FixtureRequest, arm: str) -> Iterator[tuple[str, Solve]]:
-    """A way to solve, by name."""
+    """The name of a solver, and the solver."""
     if request.param == "ik_LM":
         yield "ik_LM", _toolbox_solver(arm)
         return

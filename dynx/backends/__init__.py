@@ -1,7 +1,7 @@
 """One interface over several engines: `backend(name, model)`.
 
 Importing this package imports no engine; each foreign one is imported in exactly one file, when a
-backend of that name is asked for.
+backend of that name is first used.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Checking what a user passes to a backend: quickly when it is right, clearly when it is wrong."""
+"""Checks of the arguments of a backend: fast for valid ones, with a precise error for invalid ones."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _FLOAT64 = np.dtype(np.float64)
 
 
 class Arguments:
-    """The checks of one model's arguments; also where a closed backend refuses."""
+    """The checks of one model's arguments, which also raise ClosedError once the backend is closed."""
 
     def __init__(self, model: Model) -> None:
         self.closed = False
@@ -41,8 +41,8 @@ class Arguments:
         self._q_shape = (model.nq,)
         self._v_shape = (model.nv,)
 
-    # The length of a vector is below a bound only if every entry is, and none is NaN: one C loop
-    # over a list, several times faster than NumPy at this size. Otherwise the slow path decides.
+    # The norm of a vector is below a bound only if every entry is, and none is NaN: one C loop
+    # over a list, several times faster than NumPy at this size. Otherwise every entry is checked.
 
     def q(self, q: Any) -> Floats:
         """A configuration (..., nq), finite, with a unit quaternion for a floating base."""
@@ -103,7 +103,7 @@ class Arguments:
         return checked_vector("point", point)
 
     def finite_acceleration(self, a: Floats) -> Floats:
-        """What forward dynamics found, unless the mass matrix was singular there."""
+        """The result of forward dynamics; raises SingularMassMatrixError where it is not finite."""
         if not np.isfinite(a).all():
             rows = np.argwhere(~np.isfinite(a).all(axis=-1))
             where = "at this configuration" if a.ndim == 1 else f"at sample {rows[0].tolist()}"

@@ -48,7 +48,7 @@ class Backend(QuantityCalls):
     A batch is a Python loop over the engine's calls unless the class is `vectorized`; in the backend
     ``reference`` NumPy evaluates it whole. The backend ``compiled`` gives the same numbers for batches, to
     rounding, on UR5 at least about 60 times as fast (to one significant figure, ``dynx bench ur5 --batch
-    65536 --threads 1``; docs/bench.md says which backend suits which work).
+    65536 --threads 1``; docs/bench.md recommends a backend for each use).
 
     Raises errors of `dynx.errors` only. With ``validate=False`` the arguments must be float64
     arrays of the right shape and are not checked; a wrong one then gives an undefined result.
@@ -341,7 +341,7 @@ class Backend(QuantityCalls):
     # -- terms that every engine shares -------------------------------------------------------
 
     def _force_torque(self, q: Any, tau: Any, forces: Forces, reference: str) -> Floats:
-        """J' w summed over the frames that a wrench acts on, to be added to or taken from `tau`."""
+        """J' w summed over the frames that a wrench w acts on, which broadcasts with `tau`."""
         wrenches = self._arguments.wrenches(forces)
         common_batch(tau, q, *wrenches.values())
         total: Any = 0.0

@@ -25,14 +25,14 @@ class DerivedBackend(Backend):
     name: ClassVar[str] = "derived"
 
     def __init__(self, inner: Backend, *, validate: bool = True) -> None:
-        # Facts of a class elsewhere, of the single object here.
+        # Class attributes of other backends; here they depend on `inner`.
         vars(self).update(name=f"{inner.name}/derived", vectorized=inner.vectorized)
         super().__init__(inner.model, validate=validate)
         self.inner = inner
 
     @property
     def engine_version(self) -> str:
-        """That of the backend behind."""
+        """Name and version of the engine of `inner`."""
         return self.inner.engine_version
 
     def _frame_placements(self, q: Floats) -> Floats:
@@ -43,7 +43,7 @@ class DerivedBackend(Backend):
 
     def _open(self) -> Backend:
         if self.inner._arguments.closed:
-            raise ClosedError(f"the backend behind {self.name} of {self.model.name} was closed")
+            raise ClosedError(f"the backend that {self.name} of {self.model.name} uses was closed")
         return self.inner
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -1,8 +1,8 @@
 """Evaluation of an engine's hook at samples with any leading axes, reduced by mimic joints.
 
-A mimic joint is a linear map v_tree = S v (`dynx.model.mechanism.Coupling`). By virtual work torques
-go back by S', Jacobians and matrices by S, so every engine gives the reduced dynamics although it
-only ever sees a plain tree.
+Mimic joints are a linear map v_tree = S v (`dynx.model.mechanism.Coupling`). By virtual work, torques
+are mapped back by S', Jacobians and matrices by S. So every engine gives the reduced dynamics although it
+only models the tree without mimic joints.
 """
 
 from __future__ import annotations
@@ -102,6 +102,6 @@ def batch_rows(array: Floats, batch: tuple[int, ...]) -> Floats:
     if array.shape[:-1] == batch:
         return array.reshape(prod(batch), array.shape[-1])
     if array.ndim == 1:
-        # One sample for the whole batch is not copied.
+        # A single sample is broadcast without a copy.
         return np.broadcast_to(array, (prod(batch), *array.shape))
     return np.broadcast_to(array, (*batch, array.shape[-1])).reshape(prod(batch), array.shape[-1])

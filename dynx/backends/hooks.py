@@ -36,7 +36,7 @@ class EngineHooks(ABC):
     model: Model
     _mechanism: Mechanism
 
-    def _in_this_thread(self, quantity: str) -> Callable[..., Floats] | None:
+    def _unchecked_callable(self, quantity: str) -> Callable[..., Floats] | None:
         """Unchecked callable for `quantity` bound to the calling thread, or None if the engine has none.
 
         For loops of one thread in which microseconds count. Exceptions of the engine are not translated.

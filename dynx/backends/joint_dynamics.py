@@ -1,7 +1,7 @@
-"""Damping, dry friction and armature of the description: one option, one meaning in every backend.
+"""Joint dynamics: damping, Coulomb friction and armature of the description, the same for every backend.
 
-On the torque side, tau = rigid bodies + armature a + damping v + friction sign(v) for each moving
-joint. A mimic joint has its own three numbers; they act on its driver through its multiplier.
+They add ``armature a + damping v + friction sign(v)`` to the torque of each moving joint. Those of a mimic
+joint act on its driver through its multiplier.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class JointDynamicsTerms:
         self.has_rotors = bool(np.any(armature != 0.0))
 
     def losses(self, v: Any) -> Floats:
-        """Torque (..., nv) that damping and dry friction take at velocity v (..., nv)."""
+        """Torque (..., nv) of damping and Coulomb friction at velocity v (..., nv)."""
         tree = np.asarray(v) @ self._S.T
         return np.asarray((self._damping * tree + self._friction * np.sign(tree)) @ self._S)
 

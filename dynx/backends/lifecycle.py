@@ -1,4 +1,4 @@
-"""What a backend is apart from the questions it answers: its name, how it closes, how it pickles."""
+"""Name, closing and pickling of a backend, apart from the quantities it computes."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Lifecycle:
     """
 
     name: ClassVar[str]
-    """The name that reports and messages use; that of the class in lower case, if it says none."""
+    """Name in reports and messages; by default that of the class in lower case."""
 
     model: Model
     """The robot."""
@@ -32,27 +32,27 @@ class Lifecycle:
         self.model = model
         self._arguments = arguments
         self._options: dict[str, Any] = {"validate": validate}
-        # True while arguments are looked at; a closed backend always looks, and refuses.
+        # True also once the backend is closed, so that the checks raise ClosedError.
         self._validate = validate
 
     @property
     def engine_version(self) -> str:
-        """Name and version of the engine behind, as far as the backend knows them."""
+        """Name and version of the engine; the name of the backend alone if the version is unknown."""
         return self.name
 
     @classmethod
     def require_engine(cls) -> None:
-        """Raise NotInstalledError if the engine is missing: for one that its class imports late."""
+        """Raise NotInstalledError if the engine is missing, for a class that imports it late."""
 
     def close(self) -> None:
-        """Release what the engine holds; further calls raise ClosedError. Closing twice is harmless."""
+        """Release the resources of the engine; further calls raise ClosedError. Closing twice is harmless."""
         if not self._arguments.closed:
             self._validate = True
             self._arguments.closed = True
             self._release()
 
     def _release(self) -> None:
-        """Give back what the engine holds."""
+        """Release the resources of the engine."""
 
     def __enter__(self: Self) -> Self:
         return self

@@ -51,9 +51,9 @@ def refuse_other_than_model(model: object) -> None:
 def backend(name: str, model: Model, **options: Any) -> Backend:
     """The backend of that name for `model`; `options` go to its constructor (``validate=False``).
 
-    Raises UnknownBackendError for a name nobody provides, NotInstalledError where its engine is
-    missing, EngineLimitError where the engine cannot hold the model, and ArgumentError for an
-    option that the backend does not have or something that is no `Model`.
+    Raises UnknownBackendError for an unknown name, NotInstalledError where its engine is
+    missing, EngineLimitError where the engine cannot represent the model, and ArgumentError for an
+    option that the backend does not have or anything but a `Model`.
     """
     kind = backend_class(name)
     refuse_other_than_model(model)
@@ -71,20 +71,20 @@ def backend_class(name: str) -> type[Backend]:
 
 
 def backend_names() -> tuple[str, ...]:
-    """Every name that `backend` knows, dynx's own first; whether their engines work is not tried."""
+    """All names of backends, dynx's own first, whether or not their engines are installed."""
     return _backends.names()
 
 
 def installed_backends() -> tuple[str, ...]:
-    """The names among `backend_names` whose engines can be imported here; this imports them."""
-    return tuple(name for name in backend_names() if _works(name))
+    """The names among `backend_names` whose engines can be imported; this imports them."""
+    return tuple(name for name in backend_names() if _is_installed(name))
 
 
 def register(name: str, loader: Callable[[], type[Backend]]) -> None:
     """Add a backend class of the running program; `loader()` returns it when it is first used.
 
-    Raises ArgumentError for a name that is taken; a backend is never replaced. A package offers its
-    backend by an entry point in the group ``dynx.backends`` instead.
+    Raises ArgumentError for a name that is taken: backends cannot be replaced. Packages offer their
+    backends by entry points in the group ``dynx.backends`` instead.
     """
     _backends.register(name, loader)
 
@@ -94,7 +94,7 @@ def unregister(name: str) -> None:
     _backends.unregister(name)
 
 
-def _works(name: str) -> bool:
+def _is_installed(name: str) -> bool:
     try:
         backend_class(name).require_engine()
     except BackendError:

@@ -1,7 +1,7 @@
-"""Whether forward dynamics has an answer at all: joints that move no inertia, by name.
+"""Detection of robots whose mass matrix is singular at every configuration, and of the joints to blame.
 
-A joint below which nothing has mass makes the mass matrix singular at every configuration. Engines
-then answer NaN, zero or garbage, each its own way; dynx refuses alike in every backend.
+A joint that moves no inertia makes it singular. Engines then return NaN, zero or garbage; every backend of
+dynx raises the same error.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ from dynx.spatial.scalar import Floats
 
 
 class Solvability:
-    """Which coordinates of a model have no unique acceleration, found once and remembered."""
+    """The coordinates of a model without a unique acceleration, computed when first needed."""
 
     def __init__(self, model: Model) -> None:
         self._model = model
-        self._found: dict[bool, tuple[str, ...]] = {}
+        self._singular: dict[bool, tuple[str, ...]] = {}
 
     def refuse_singular(self, joint_dynamics: bool) -> None:
         """Raise SingularMassMatrixError, naming the joints, if M is singular at every q."""
-        if joint_dynamics not in self._found:
-            self._found[joint_dynamics] = singular_coordinates(self._model, joint_dynamics)
-        names = self._found[joint_dynamics]
+        if joint_dynamics not in self._singular:
+            self._singular[joint_dynamics] = singular_coordinates(self._model, joint_dynamics)
+        names = self._singular[joint_dynamics]
         if names:
             listed = ", ".join(shown(name) for name in names[:6])
             listed += f" and {len(names) - 6} more" if len(names) > 6 else ""
@@ -37,10 +37,10 @@ class Solvability:
 
 
 def singular_coordinates(model: Model, joint_dynamics: bool = False) -> tuple[str, ...]:
-    """Coordinates that take part in a motion without inertia, at every configuration; often none.
+    """Names of the coordinates in the null space of M at every configuration: joints, or ``base``.
 
-    Names are those of joints, or ``base``. Found by three random configurations: M scaled to a unit
-    diagonal has an eigenvalue below nv times the rounding error of its entries.
+    Determined at three random configurations, where M scaled to a unit diagonal has an eigenvalue below nv
+    times the rounding error of its entries.
     """
     q = model.random(np.random.default_rng(0), 3)
     coupling = model.mechanism.coupling
@@ -60,12 +60,12 @@ def _null_coordinates(M: Floats) -> list[int]:
     diagonal = np.diagonal(M)
     if not len(diagonal):
         return []
-    floor = 1e-14 * max(float(np.max(np.abs(diagonal))), np.finfo(float).tiny)
-    massless = np.flatnonzero(diagonal <= floor * 1e-6)
-    scale = 1.0 / np.sqrt(np.where(diagonal > floor * 1e-6, diagonal, 1.0))
+    smallest = 1e-20 * max(float(np.max(np.abs(diagonal))), np.finfo(float).tiny)
+    massless = np.flatnonzero(diagonal <= smallest)
+    scale = 1.0 / np.sqrt(np.where(diagonal > smallest, diagonal, 1.0))
     scaled = M * scale[:, None] * scale[None, :]
     if not np.isfinite(scaled).all():
-        return []  # numbers so large that nothing is known of it
+        return []  # overflow: undecided
     values, vectors = np.linalg.eigh(scaled)
     null = vectors[:, np.abs(values) < len(M) * 4 * np.finfo(float).eps]
     mixed = np.flatnonzero(np.max(np.abs(null), axis=1, initial=0.0) > 1e-3)

@@ -25,7 +25,7 @@ BENCHMARK_QUANTITIES = (
 origin and in the axes of the world."""
 
 MAX_POSITION = 2.0 * np.pi
-"""Positions are drawn within the limits, and no farther than this from zero [rad or m]."""
+"""Bound on the drawn positions [rad or m], which are also within the limits."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class BenchmarkCase:
 
 @dataclass(frozen=True)
 class Batch:
-    """n samples of a model as a user has them: q (n, nq), v, a, tau (n, nv), row-major float64."""
+    """n samples of a model: q (n, nq), v, a, tau (n, nv), row-major float64."""
 
     model: Model
     frame: str
@@ -70,7 +70,7 @@ class Batch:
         return self._replaced(slice(count))
 
     def take(self, rows: Sequence[int]) -> Batch:
-        """The samples of these numbers, in a copy."""
+        """A copy of the samples with the given numbers."""
         return self._replaced(list(rows))
 
     def _replaced(self, rows: slice | list[int]) -> Batch:

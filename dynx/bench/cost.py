@@ -14,11 +14,11 @@ from dynx.simd.trace import trace
 from dynx.simd.trigonometry import COS, HALF_PI, SIN
 
 SINE_COSINE_PAIRS = 1 + len(HALF_PI) + (len(SIN) - 1) + 1 + (len(COS) + 1)
-"""Products with a sum in the sine and cosine of one angle: the nearest quarter turn, the reduction, and
+"""Multiply-adds in the sine and cosine of one angle: the nearest quarter turn, the reduction, and
 the two polynomials (`dynx.simd.trigonometry`)."""
 
 SINE_COSINE_SINGLES = 3
-"""Its sums and products that stand alone: the quarter turn as a number, r^2, and r^3."""
+"""Sums and products beside those multiply-adds: the quarter turn as a number, r^2, and r^3."""
 
 _SUMS = frozenset({"add", "sub"})
 _NOT_COUNTED = frozenset({"input", "constant", "sin", "cos", "neg", "abs"})
@@ -26,11 +26,11 @@ _NOT_COUNTED = frozenset({"input", "constant", "sin", "cos", "neg", "abs"})
 
 @dataclass(frozen=True)
 class Cost:
-    """Of one sample.
+    """The cost of one sample.
 
     `bytes` are those of the inputs and outputs, each moved once. `operations` are sums, products,
-    quotients and roots. `multiply_adds` counts what a machine has to issue if every product that only
-    one sum uses is done together with it; a sum or product without a partner counts as one.
+    quotients and roots. `multiply_adds` counts instructions if every product that only one sum uses is
+    fused with it; a sum or product without a partner counts as one.
     """
 
     bytes: int

@@ -1,8 +1,7 @@
-"""What this machine can do, measured: how fast it copies memory, and how fast it multiplies and adds.
+"""Measured peaks of this machine: the bandwidth of copying memory, and the rate of multiply-adds.
 
-Both are the best of some repetitions, since they stand for what the machine can do; the times of
-kernels are medians, since they stand for what a user gets. On several threads each works on a part
-of its own.
+Both are the best of some repetitions, since they bound what the machine can do; the times of
+kernels are medians, since users get those. Several threads each work on a part of their own.
 """
 
 from __future__ import annotations
@@ -27,15 +26,15 @@ from dynx.spatial.scalar import Floats
 COPIED_BYTES = 128 * 2**20
 """Size of the array that is copied: more than the caches hold."""
 
-ROW = 8
-"""Doubles in a row of it."""
+ROW_SIZE = 8
+"""Number of doubles in a row of the copied array."""
 
 CHAINS = 12
-"""Products with a sum that do not wait for each other: they hide the delay of each and still fit, with
+"""Number of independent chains of multiply-adds: enough to hide the latency of each, few enough to fit, with
 factor and term, into sixteen vector registers."""
 
-LINKS = 64
-"""Products with a sum in each chain, one after the other."""
+CHAIN_LENGTH = 64
+"""Number of successive multiply-adds in each chain."""
 
 PEAK_SAMPLES = 65536
 """Samples for which each thread runs the chains in one repetition."""
@@ -43,11 +42,11 @@ PEAK_SAMPLES = 65536
 REPETITIONS = 10
 
 Part = Callable[[int, int], object]
-"""Does the rows from the first number up to the second."""
+"""Function that processes the rows from the first number up to the second."""
 
 
-def measured_peak(threads: int, repetitions: int = REPETITIONS, size: int = COPIED_BYTES) -> Peak:
-    """The machine's peaks on so many threads; `size` [B] is that of the array that is copied."""
+def measure_peak(threads: int, repetitions: int = REPETITIONS, size: int = COPIED_BYTES) -> Peak:
+    """Measure the peaks on a number of threads; `size` [B] is that of the array that is copied."""
     with ThreadPoolExecutor(threads) as pool:
         return Peak(
             threads,
@@ -56,24 +55,24 @@ def measured_peak(threads: int, repetitions: int = REPETITIONS, size: int = COPI
         )
 
 
-def described() -> str:
-    """The processor, and how wide its vectors are, in one line."""
+def processor_description() -> str:
+    """Name of the processor and the width of its vectors, in one line."""
     target = host()
     return f"{target.cpu} ({platform.machine()}), {target.lanes} doubles in a vector"
 
 
 def load() -> float | None:
-    """How many programs wanted to run at a time during the last minute; None where nobody counts."""
+    """Load average of the last minute; None where the system does not report it."""
     try:
         return os.getloadavg()[0]
     except (AttributeError, OSError):
         return None
 
 
-def chains_program(chains: int = CHAINS, links: int = LINKS) -> Program:
-    """Chains x -> x a + b in turns, and the sum of their ends; nothing in it can be left out.
+def chains_program(chains: int = CHAINS, links: int = CHAIN_LENGTH) -> Program:
+    """Program of interleaved chains x -> x a + b and the sum of their ends, which no optimiser can shorten.
 
-    Built node by node, since the order matters: one link of every chain, then the next.
+    It is built node by node, since the order matters: one link of every chain, then the next.
     """
     inputs = [Node("input", slot=k) for k in range(chains + 2)]
     nodes, ends = list(inputs), list(range(chains))
@@ -93,9 +92,9 @@ def chains_program(chains: int = CHAINS, links: int = LINKS) -> Program:
 
 def _copy_bandwidth(pool: ThreadPoolExecutor, threads: int, repetitions: int, size: int) -> float:
     """Bytes read and written in a second, by the faster of a kernel that copies and NumPy."""
-    rows = max(size // (8 * ROW), threads * host().lanes)
-    source, target = np.ones((rows, ROW)), np.zeros((rows, ROW))
-    kernel = Kernel(trace(lambda x: x, {"x": (ROW,)}))
+    rows = max(size // (8 * ROW_SIZE), threads * host().lanes)
+    source, target = np.ones((rows, ROW_SIZE)), np.zeros((rows, ROW_SIZE))
+    kernel = Kernel(trace(lambda x: x, {"x": (ROW_SIZE,)}))
 
     def by_kernel(first: int, last: int) -> None:
         kernel([source[first:last]], [target[first:last]])

@@ -40,7 +40,7 @@ class Measurement:
 
     `times` are those of one sample, None where the implementation was not timed; `problem` then says why.
     `samples` is the number of samples in a call, `error` the largest one found before the timing, over
-    the natural size of the quantity.
+    the natural magnitude of the quantity.
     """
 
     case: BenchmarkCase
@@ -70,7 +70,7 @@ def measure(
 
 
 class Candidate(NamedTuple):
-    """An implementation and what is known of it before it is timed; `ready` is None where it will not be."""
+    """An implementation that was checked; `ready` is its prepared call, None if it will not be timed."""
 
     found: Measurement
     ready: PreparedCall | None
@@ -121,7 +121,7 @@ class Preparation:
         return Candidate(replace(found, problem=problem), None)
 
     def _affordable(self, implementation: Implementation, batch: Batch) -> int:
-        """How many samples fit into a repetition: all of them, or a power of two."""
+        """Number of samples that fit into a repetition: all of them, or a power of two."""
         if len(batch) <= TRIAL_SAMPLES:
             return len(batch)
         few = batch.first(TRIAL_SAMPLES)
@@ -139,7 +139,7 @@ class Preparation:
         return self._memory[: prod(shape)].reshape(shape)
 
     def _judge(self, batch: Batch) -> tuple[Judge, list[int]]:
-        """The judge of a batch, and the numbers of the samples it looks at."""
+        """The judge of a batch, and the numbers of the samples it checks."""
         key = (batch.model, len(batch))
         if key not in self._judges:
             rows = checked_rows(len(batch))

@@ -1,4 +1,4 @@
-"""The roofline: which of two bounds a kernel meets first, and how near to it it is.
+"""The roofline model: the shares of memory bandwidth and arithmetic rate that a kernel reaches.
 
 A kernel cannot be faster than its bytes over the memory bandwidth, nor than its operations over the
 peak rate of arithmetic (Williams, Waterman and Patterson, Roofline, CACM 52(4), 2009).
@@ -16,7 +16,7 @@ Bound = Literal["memory", "arithmetic"]
 
 @dataclass(frozen=True)
 class Peak:
-    """What the machine was measured to do on so many threads.
+    """Measured peaks of the machine on a number of threads.
 
     `copy_bandwidth` [B/s] counts bytes read and bytes written; `multiply_adds` [1/s] counts a product
     with a sum as one.
@@ -39,17 +39,17 @@ class Roofline:
 
     @property
     def binds(self) -> Bound:
-        """The bound that leaves less room."""
+        """The bound with the larger share, which limits the kernel."""
         return "memory" if self.memory_share > self.arithmetic_share else "arithmetic"
 
     @property
     def share(self) -> float:
-        """Of the bound that binds."""
+        """The larger of the two shares."""
         return max(self.memory_share, self.arithmetic_share)
 
 
 def roofline(cost: Cost, seconds: float, peak: Peak) -> Roofline:
-    """Of a kernel that takes `seconds` for a sample of this cost."""
+    """The roofline of a kernel that takes `seconds` for a sample of this cost."""
     return Roofline(
         memory_share=cost.bytes / peak.copy_bandwidth / seconds,
         arithmetic_share=cost.multiply_adds / peak.multiply_adds / seconds,

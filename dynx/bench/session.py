@@ -11,7 +11,7 @@ from dynx.bench.backend_implementations import backend_implementation
 from dynx.bench.cases import BENCHMARK_QUANTITIES, Batch, BenchmarkCase, draw_batch, require_memory
 from dynx.bench.cost import Cost, cost_of, program_of
 from dynx.bench.implementations import Implementation, PreparedCall, Role
-from dynx.bench.machine import load, measured_peak
+from dynx.bench.machine import load, measure_peak
 from dynx.bench.measurement import Measurement, measure
 from dynx.bench.roofline import Peak
 from dynx.errors import ArgumentError, DynxError, NotInstalledError
@@ -85,7 +85,7 @@ class Session:
         self,
         plan: Plan,
         *,
-        peak: Callable[[int], Peak] = measured_peak,
+        peak: Callable[[int], Peak] = measure_peak,
         implementations: Callable[[Plan, int], list[Implementation]] | None = None,
     ) -> None:
         self.plan = plan

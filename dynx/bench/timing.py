@@ -1,4 +1,4 @@
-"""Times of several calls, taken in turn so that the machine's other business falls on all alike."""
+"""Times of several calls, interleaved so that other programs on the machine slow all of them alike."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ import numpy as np
 Call = Callable[[], Any]
 Clock = Callable[[], float]
 
-LEAST_SECONDS = 1e-3
-"""One timing lasts at least so long: a shorter call is repeated within it."""
+MIN_TIMING_SECONDS = 1e-3
+"""Shortest duration of one timing [s]: a shorter call is repeated within it."""
 
 
 @dataclass(frozen=True)
@@ -24,35 +24,32 @@ class Times:
 
     @property
     def median(self) -> float:
-        """Half of the repetitions were faster."""
+        """Median over the repetitions [s]."""
         return float(np.median(self.seconds))
 
     @property
     def quartiles(self) -> tuple[float, float]:
-        """A quarter of the repetitions were faster than the first, a quarter slower than the second."""
+        """Lower and upper quartile over the repetitions [s]."""
         low, high = np.percentile(self.seconds, [25.0, 75.0])
         return float(low), float(high)
 
     @property
     def spread(self) -> float:
-        """The distance of the quartiles over the median."""
+        """Distance of the quartiles over the median."""
         low, high = self.quartiles
         return (high - low) / self.median if self.median > 0.0 else float("inf")
 
     def less(self, other: Times) -> Times:
-        """What is left when the other's time is taken away, repetition by repetition.
-
-        Where noise is larger than what is left, an entry may be negative.
-        """
+        """Difference of the times in each repetition; negative where noise exceeds the difference."""
         return Times(tuple(own - taken for own, taken in zip(self.seconds, other.seconds, strict=True)))
 
     def per(self, count: int) -> Times:
-        """The seconds of one of `count` things that the call did."""
+        """Times divided by `count`."""
         return Times(tuple(each / count for each in self.seconds))
 
 
 def interleaved(calls: Sequence[Call], repetitions: int, clock: Clock = time.perf_counter) -> list[Times]:
-    """The times of each call: every repetition does all of them, each time another one first."""
+    """Time each call: every repetition makes all of them, each time with another one first."""
     rounds = [_rounds(call, clock) for call in calls]
     found: list[list[float]] = [[] for _ in calls]
     for repetition in range(repetitions):
@@ -68,13 +65,13 @@ def once(call: Call, clock: Clock = time.perf_counter) -> float:
 
 
 def _rounds(call: Call, clock: Clock) -> int:
-    """How often the call is repeated within one timing; finding out warms it up."""
+    """Number of repetitions of the call within one timing; determining it warms the call up."""
     rounds = 1
     while True:
         taken = rounds * _timed(call, rounds, clock)
-        if taken >= LEAST_SECONDS:
+        if taken >= MIN_TIMING_SECONDS:
             return rounds
-        rounds = 2 * rounds if taken <= 0.0 else max(rounds + 1, int(rounds * LEAST_SECONDS / taken) + 1)
+        rounds = 2 * rounds if taken <= 0.0 else max(rounds + 1, int(rounds * MIN_TIMING_SECONDS / taken) + 1)
 
 
 def _timed(call: Call, rounds: int, clock: Clock) -> float:

@@ -1,8 +1,8 @@
 """Checks of batches without temporary arrays.
 
-The checks of the base make several passes and temporary arrays, which takes longer than a kernel. Here the
-largest and the smallest entry show at once whether all are finite and not too large; only if they do not are
-the checks of the base made, which name the wrong entry.
+The checks of `Arguments` make several passes and temporary arrays, which takes longer than a kernel. Here the
+largest and the smallest entry show whether all are finite and not too large; only if they are not, the checks
+of `Arguments` follow, which name the invalid entry.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _MAX_LIST_SIZE = 64
 """Size up to which a C loop over a Python list is faster than NumPy."""
 
 _MAX_ACCELERATION = 1e300
-"""Bound above which the base checks accelerations one by one."""
+"""Bound above which accelerations are checked one by one."""
 
 
 class BatchArguments(Arguments):

@@ -69,7 +69,7 @@ class CompiledBackend(Backend):
         self._eliminates = self._straight or has_physical_inertias(self._mechanism)
         self._calls: dict[object, Call] = {}
         self._chain_kernels: dict[object, Kernel] = {}
-        # The same by the arguments of public methods, names that are not looked up again.
+        # The calls again, by the arguments of the public methods, which saves looking up names.
         self._public_calls: dict[object, Call] = {}
 
     @property
@@ -78,7 +78,7 @@ class CompiledBackend(Backend):
         return f"dynx {__version__}, {compiler_version()}, {host().cpu}"
 
     def _release(self) -> None:
-        # Calls that other threads are in keep their kernel until they end.
+        # Calls in progress on other threads keep their kernels until they return.
         with COMPILE_LOCK:
             self._public_calls, self._calls, self._chain_kernels = {}, {}, {}
 
@@ -195,7 +195,7 @@ class CompiledBackend(Backend):
     # -- kernels ------------------------------------------------------------------------------
 
     def _evaluate(self, name: str, q: Floats, *rates: Floats, details: tuple[Any, ...] = ()) -> Floats:
-        """By a kernel in model coordinates, into which mimic joints are compiled."""
+        """Evaluate by a kernel in model coordinates, into which mimic joints are compiled."""
         return self._call_for(name, details or QUANTITIES[name].implied_details(self.model))(q, *rates)
 
     def _call_by_name(self, quantity: str) -> Call:
@@ -217,7 +217,7 @@ class CompiledBackend(Backend):
         key = (quantity, details, tree)
         call = self._calls.get(key)
         if call is None:
-            # A fork waits for this lock, so that a child does not find it taken.
+            # A fork waits for this lock, so that it is free in the child.
             with COMPILE_LOCK:
                 self._arguments.refuse_closed()
                 call = self._calls.get(key)

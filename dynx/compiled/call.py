@@ -186,7 +186,7 @@ class KernelCall:
 
 
 class NumericCall:
-    """A quantity that is not worth compiling, evaluated by NumPy; it has the interface of `KernelCall`."""
+    """A quantity whose code is too long to compile, evaluated by NumPy with the interface of `KernelCall`."""
 
     def __init__(
         self,
@@ -202,7 +202,7 @@ class NumericCall:
         self._checks, self._tree, self._check_result = checks, tree, check_result
 
     def evaluate(self, q: Any, v: Any = _ABSENT, a: Any = _ABSENT, out: Floats | None = None) -> Floats:
-        """As `KernelCall.evaluate` does."""
+        """The result (..., *shape), as of `KernelCall.evaluate`."""
         arguments = (x for x in (q, v, a) if x is not _ABSENT)
         arrays = [check(argument) for check, argument in zip(self._checks, arguments, strict=True)]
         batch = common_batch(*arrays)

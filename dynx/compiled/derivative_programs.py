@@ -29,16 +29,16 @@ def forward_dynamics_derivatives(mechanism: Mechanism) -> Program:
     """Program of q, v and tau, with the outputs da_dq, da_dv and da_dtau, each (nv, nv)."""
     program = _differentiated_torque(mechanism)
 
-    def by_implicit_function_theorem(q: Array, v: Array, tau: Array) -> dict[str, Array]:
-        # M does not depend on the acceleration, which is needed before the rest.
-        still = np.zeros(len(v))
-        L, D = factorize_mass_matrix(mechanism, _torque_derivatives(program, q, v, still)["dtau_da"])
-        a = solve_with_factors(L, D, tau - _torque(mechanism, q, v, still))
+    def implicit_derivatives(q: Array, v: Array, tau: Array) -> dict[str, Array]:
+        # By the implicit function theorem. M = dtau/da does not depend on the acceleration.
+        zero = np.zeros(len(v))
+        L, D = factorize_mass_matrix(mechanism, _torque_derivatives(program, q, v, zero)["dtau_da"])
+        a = solve_with_factors(L, D, tau - _torque(mechanism, q, v, zero))
         found = _torque_derivatives(program, q, v, a)
-        by = {"da_dq": -found["dtau_dq"], "da_dv": -found["dtau_dv"], "da_dtau": np.eye(len(v), dtype=int)}
-        return {name: solve_with_factors(L, D, side.T).T for name, side in by.items()}
+        sides = {"da_dq": -found["dtau_dq"], "da_dv": -found["dtau_dv"], "da_dtau": np.eye(len(v), dtype=int)}
+        return {name: solve_with_factors(L, D, side.T).T for name, side in sides.items()}
 
-    return trace(by_implicit_function_theorem, argument_shapes(mechanism, ("q", "v", "tau")))
+    return trace(implicit_derivatives, argument_shapes(mechanism, ("q", "v", "tau")))
 
 
 def factors_of_mass(mechanism: Mechanism) -> Program:
@@ -68,10 +68,10 @@ def solution_by_factors(mechanism: Mechanism) -> Program:
 def acceleration(mechanism: Mechanism) -> Program:
     """Program of q, v and tau, with the output a (nv,)."""
 
-    def found(q: Array, v: Array, tau: Array) -> Array:
+    def solve(q: Array, v: Array, tau: Array) -> Array:
         return evaluate_quantity(mechanism, "forward_dynamics", (), q, v, tau)
 
-    return trace(found, argument_shapes(mechanism, ("q", "v", "tau")))
+    return trace(solve, argument_shapes(mechanism, ("q", "v", "tau")))
 
 
 def pose_derivative(mechanism: Mechanism, frame: int) -> Program:
@@ -94,9 +94,9 @@ def _torque(mechanism: Mechanism, q: Array, v: Array, a: Array) -> Array:
 
 
 def _differentiated_torque(mechanism: Mechanism) -> Program:
-    """Derivatives of the torque by a displacement d of q, by v and by a.
+    """Program of the derivatives of the torque by a displacement d of q, by v and by a.
 
-    In reverse mode, since there are more arguments than torques.
+    Differentiation is in reverse mode, since there are more arguments than torques.
     """
 
     def torque(q: Array, d: Array, v: Array, a: Array) -> dict[str, Array]:

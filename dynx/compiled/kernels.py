@@ -5,11 +5,11 @@ below `MAX_DEFECT` exactly if the arguments are finite, not too large, and of un
 quaternion, and the result is finite where it might not be. So arguments are checked while they are in the
 processor's registers anyway.
 
-Mimic joints are traced with the rest: a kernel works in the coordinates of the model, unless those of
-the tree are asked for.
+Mimic joints are part of the traced program: inputs are coordinates of the model, or with ``tree=True`` those
+of the tree.
 
-Placements of frames have the frames folded in as constants, for most programs ask for one. Other
-quantities of frames have kernels that many frames share (`dynx.compiled.frames`). The kernel follows from
+Placements of frames have the frames folded in as constants, for most programs use one frame. Other
+quantities of frames have kernels that many frames share (`dynx.compiled.frames`). The kernel is determined by
 the call alone, so no result depends on earlier calls.
 """
 

@@ -1,4 +1,4 @@
-"""Kernels of one robot beside those of quantities: kept in the cache, and evaluated for batches."""
+"""Kernels of one robot for programs other than quantities, such as derivatives, and their evaluation."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ from dynx.simd.target import host
 from dynx.spatial.scalar import Floats
 
 MAX_NV_OF_LONG_SEGMENTS = 16
-"""Degrees of freedom above which code is divided into shorter segments: it takes half the time to compile
-and runs about a tenth slower."""
+"""Degrees of freedom above which code is divided into shorter segments, which compile in half the time and
+run about a tenth slower."""
 
 
 def robot_kernel(model: Model, purpose: object, program: Callable[[], Program]) -> Kernel:
-    """The kernel of a program that follows from `model` and `purpose`, from the cache if it is there."""
+    """The kernel of `program`, which `model` and `purpose` determine; from the cache if it is there."""
     content = (model.links, model.joints, model.base, model.gravity, model.extra_frames)
     recipe = repr((_algorithms(), content, purpose)).encode()
     lanes = host().lanes
@@ -55,7 +55,7 @@ def evaluate_kernel(kernel: Kernel, arrays: Sequence[Floats], threads: int) -> l
 
 @cache
 def _algorithms() -> str:
-    """Hash of the source of everything that makes such programs."""
+    """Hash of the source of the packages that build such programs."""
     packages = (dynx.rbd, dynx.spatial, dynx.model, dynx.backends, dynx.compiled)
     folders = [Path(str(package.__file__)).parent for package in packages]
     return f"{__version__} {np.__version__} {source_hash(*folders)}"

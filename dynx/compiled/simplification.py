@@ -16,9 +16,9 @@ def simplify_mechanism(mechanism: Mechanism) -> Mechanism:
     """The mechanism with the fewest constants: frames along the joint axes, no rounding residue in rotations.
 
     A right angle in a file becomes cos(pi/2) = 6e-17 where 0 was meant. Entries below half the
-    spacing of doubles at 1 are smaller than the rounding of the entries of order 1 beside them, so to
-    leave them out changes a rotation by no more than it is uncertain anyway; but each would cost a
-    multiplication in all that it is part of.
+    spacing of doubles at 1 are smaller than the rounding errors of the entries of order 1 beside them, so
+    zeroing them changes a rotation by no more than its own rounding errors; but each would cost a
+    multiplication wherever it is used.
 
     Inverse dynamics takes the inertias by base parameters as well (`dynx.rbd.base_parameters`). Forward
     dynamics does not: it would be a tenth faster and, on some robots, a hundred times less accurate.

@@ -74,7 +74,7 @@ class EngineDynamics(Dynamics):
 
     def bound_to_thread(self, quantity: str) -> Evaluation:
         """Callable for the calling thread alone, quicker where the engine has one."""
-        quick = self.backend._in_this_thread(quantity) if self._calls_hook(quantity) else None
+        quick = self.backend._unchecked_callable(quantity) if self._calls_hook(quantity) else None
         usual: Evaluation = getattr(self, quantity)
         return quick or usual
 

@@ -1,4 +1,4 @@
-"""Checks that no call to a backend shows in another: not through arrays, threads or copies."""
+"""Checks that no call to a backend affects another: not through arrays, threads or copies."""
 
 from __future__ import annotations
 
@@ -16,28 +16,28 @@ from tests.backends.robots import all_quantities, assert_same, motion
 
 THREADS = 8
 SWITCH_INTERVAL = 1e-6
-"""Between threads, so that they meet in the middle of a call [s]."""
+"""Time [s] after which Python switches threads, so short that it happens within calls."""
 
 AnyBackend = TypeVar("AnyBackend", bound=Backend)
 
 
-def check_answers_belong_to_the_caller(engine: Backend) -> None:
-    """Later calls change no earlier answer, nor what is written into one a later call; arguments stay."""
+def check_results_belong_to_the_caller(engine: Backend) -> None:
+    """Check that later calls change no earlier result, writing to a result no later call, and no argument."""
     first, second = motion(engine.model, seed=1), motion(engine.model, seed=2)
     before = tuple(x.copy() for x in first)
-    answers = all_quantities(engine, *first)
-    kept = {quantity: answer.copy() for quantity, answer in answers.items()}
+    results = all_quantities(engine, *first)
+    kept = {quantity: result.copy() for quantity, result in results.items()}
     all_quantities(engine, *second)
-    assert_same(answers, kept)
-    for answer in answers.values():
-        answer[...] = np.nan
+    assert_same(results, kept)
+    for result in results.values():
+        result[...] = np.nan
     assert_same(all_quantities(engine, *first), kept)
     for given_array, original in zip(first, before, strict=True):
         np.testing.assert_array_equal(given_array, original)
 
 
-def check_threads_get_what_one_gets(engine: Backend, samples: int) -> None:
-    """`THREADS` threads begin at once, each with another sample, and all go through all samples."""
+def check_threads_get_equal_results(engine: Backend, samples: int) -> None:
+    """Check the results of `THREADS` threads that evaluate all samples at once, each from another one on."""
     states = [motion(engine.model, seed) for seed in range(samples)]
     expected = [all_quantities(engine, *state) for state in states]
     together = threading.Barrier(THREADS)
@@ -53,13 +53,13 @@ def check_threads_get_what_one_gets(engine: Backend, samples: int) -> None:
             found = list(pool.map(work, range(THREADS)))
     finally:
         sys.setswitchinterval(interval)
-    for worker, answers in enumerate(found):
-        for answer, wanted in zip(answers, expected[worker:] + expected[:worker], strict=True):
-            assert_same(answer, wanted)
+    for worker, results in enumerate(found):
+        for result, wanted in zip(results, expected[worker:] + expected[:worker], strict=True):
+            assert_same(result, wanted)
 
 
-def check_pickle_makes_the_same(engine: AnyBackend) -> AnyBackend:
-    """A copy by way of pickle is of the same kind, for the same robot, and of one answer; it is returned."""
+def check_pickle_round_trip(engine: AnyBackend) -> AnyBackend:
+    """Check that a pickled copy has the same class, robot and results, and return it."""
     copy: AnyBackend = pickle.loads(pickle.dumps(engine))
     assert type(copy) is type(engine)
     assert copy.model == engine.model

@@ -74,7 +74,7 @@ def chain(n: int, kind: JointType = "revolute") -> Model:
 
 
 def pair(root: Inertial | None, tip: Inertial | None, base: Base, prismatic: bool = False) -> Model:
-    """A root, a link that carries the inertial in question, and a sound one beyond it."""
+    """A root and a first link with these inertials, and a second link with an ordinary one."""
     kind: JointType = "prismatic" if prismatic else "revolute"
     joints = [
         Joint("a", kind, "root", "tip", Pose((0.1, 0.2, 0.3), (0.4, 0.5, 0.6)), (0.6, 0.0, 0.8)),
@@ -94,9 +94,9 @@ def motion(model: Model, seed: int = 0, size: tuple[int, ...] = ()) -> tuple[Flo
 def all_quantities(
     backend: Backend, q: Floats, v: Floats, x: Floats, *, forward_dynamics: bool = True
 ) -> dict[str, Floats]:
-    """Every quantity that the backend computes, for the frame listed last; `x` serves as a and as tau."""
+    """Every quantity of the backend, for the last frame of the model; `x` serves as a and as tau."""
     frame = backend.model.frame_names[-1]
-    answers = {
+    results = {
         "forward_kinematics": backend.forward_kinematics(q),
         "forward_kinematics of one": backend.forward_kinematics(q, frame),
         "inverse_dynamics": backend.inverse_dynamics(q, v, x),
@@ -112,21 +112,21 @@ def all_quantities(
         "potential_energy": backend.potential_energy(q),
     }
     for reference in REFERENCES:
-        answers[f"jacobian {reference}"] = backend.jacobian(q, frame, reference=reference)
-        answers[f"jacobian_derivative {reference}"] = backend.jacobian_derivative(
+        results[f"jacobian {reference}"] = backend.jacobian(q, frame, reference=reference)
+        results[f"jacobian_derivative {reference}"] = backend.jacobian_derivative(
             q, v, frame, reference=reference
         )
-        answers[f"frame_velocity {reference}"] = backend.frame_velocity(q, v, frame, reference=reference)
-        answers[f"frame_acceleration {reference}"] = backend.frame_acceleration(
+        results[f"frame_velocity {reference}"] = backend.frame_velocity(q, v, frame, reference=reference)
+        results[f"frame_acceleration {reference}"] = backend.frame_acceleration(
             q, v, x, frame, reference=reference
         )
     if forward_dynamics:
-        answers["forward_dynamics"] = backend.forward_dynamics(q, v, x)
-    return answers
+        results["forward_dynamics"] = backend.forward_dynamics(q, v, x)
+    return results
 
 
 def assert_same(actual: dict[str, Floats], expected: dict[str, Floats]) -> None:
-    """Equal to the last bit, and of equal shape."""
+    """Assert that results are equal to the last bit, and of equal shape."""
     assert actual.keys() == expected.keys()
     for quantity, value in actual.items():
         assert np.shape(value) == np.shape(expected[quantity]), quantity
@@ -134,7 +134,7 @@ def assert_same(actual: dict[str, Floats], expected: dict[str, Floats]) -> None:
 
 
 def assert_close(actual: Floats, expected: Floats, size: float = 1.0, what: str = "") -> None:
-    """Within `BAR` of the larger of `size` and the answer, and of equal shape."""
+    """Assert an error within `BAR` times the larger of `size` and the result, and equal shapes."""
     assert np.shape(actual) == np.shape(expected), what
     scale = max(size, float(np.max(np.abs(expected), initial=0.0)))
     np.testing.assert_allclose(actual, expected, rtol=0.0, atol=BAR * scale, err_msg=what)

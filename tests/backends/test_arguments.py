@@ -56,7 +56,7 @@ BAD_VECTORS = {
 
 @pytest.mark.parametrize("bad", BAD_VECTORS)
 @pytest.mark.parametrize("name", ["q", "v", "a", "tau"])
-def test_a_bad_array_is_named_with_what_was_wanted(name: str, bad: str) -> None:
+def test_a_bad_array_is_named_with_the_valid_form(name: str, bad: str) -> None:
     value, kind, message = BAD_VECTORS[bad]
     arguments: dict[str, Any] = {"q": ZERO, "v": ZERO, name: value}
     if name == "tau":
@@ -69,7 +69,7 @@ def test_a_bad_array_is_named_with_what_was_wanted(name: str, bad: str) -> None:
             ENGINE.frame_acceleration(arguments["q"], arguments["v"], arguments.get("a", ZERO), FRAME)
 
 
-def test_every_method_looks_at_its_arguments() -> None:
+def test_every_method_checks_its_arguments() -> None:
     bad = np.full(3, np.nan)
     calls: tuple[Callable[[], Floats], ...] = (
         lambda: ENGINE.forward_kinematics(bad, "link1"),
@@ -102,21 +102,21 @@ def test_a_quaternion_must_have_length_one(quaternion: tuple[float, ...]) -> Non
             FLOATING.gravity_torque(wrong)
 
 
-def test_the_quaternion_of_a_batch_that_is_wrong_is_named_by_its_place() -> None:
+def test_an_invalid_quaternion_of_a_batch_is_named_by_its_index() -> None:
     q = np.tile(FLOATING.model.neutral(), (2, 3, 1))
     q[1, 2, 3:7] = 0.5, 0.0, 0.0, 0.0
     with pytest.raises(ArgumentError, match=r"q\[1, 2, 3:7\] is a quaternion .* of length 0\.5;"):
         FLOATING.gravity_torque(q)
 
 
-def test_numbers_below_the_bound_are_taken_though_their_norm_is_above() -> None:
+def test_numbers_below_the_bound_are_accepted_though_their_norm_exceeds_it() -> None:
     tau = np.full(3, 0.9 * MAX_MAGNITUDE)
     assert np.linalg.norm(tau) > MAX_MAGNITUDE
     assert ENGINE._arguments.v(tau) is tau
 
 
 @pytest.mark.parametrize("dtype", ["f4", "f2", ">f8", "i8", "u1"])
-def test_real_numbers_of_any_type_are_taken_as_float64(dtype: str) -> None:
+def test_real_numbers_of_any_type_are_converted_to_float64(dtype: str) -> None:
     q = np.array([1, 0, 2], dtype=dtype)
     np.testing.assert_array_equal(ENGINE.mass_matrix(q), ENGINE.mass_matrix(np.array([1.0, 0.0, 2.0])))
     np.testing.assert_array_equal(ENGINE.mass_matrix(q.tolist()), ENGINE.mass_matrix(q))
@@ -147,7 +147,7 @@ def test_an_unknown_frame_is_named_with_the_nearest(bad: str) -> None:
             call()
 
 
-def test_forward_kinematics_wants_names() -> None:
+def test_forward_kinematics_takes_names_only() -> None:
     number: Any = 3
     with pytest.raises(ArgumentError, match="frame is of type int"):
         ENGINE.forward_kinematics(ZERO, number)
@@ -239,7 +239,7 @@ ANYTHING = st.recursive(
 
 
 @given(ANYTHING, ANYTHING, ANYTHING, ANYTHING)
-def test_whatever_is_passed_only_errors_of_dynx_come_out(q: Any, v: Any, frame: Any, option: Any) -> None:
+def test_any_arguments_raise_only_errors_of_dynx(q: Any, v: Any, frame: Any, option: Any) -> None:
     calls: tuple[Callable[[], Floats], ...] = (
         lambda: ENGINE.forward_kinematics(q, frame),
         lambda: ENGINE.forward_kinematics(ZERO, frame),
@@ -249,10 +249,10 @@ def test_whatever_is_passed_only_errors_of_dynx_come_out(q: Any, v: Any, frame: 
         lambda: ENGINE.forward_dynamics(ZERO, v, ZERO, external_forces=option),
     )
     for call in calls:
-        assert _answers_or_refuses(call)
+        assert _returns_or_refuses(call)
 
 
-def _answers_or_refuses(call: Callable[[], Floats]) -> bool:
+def _returns_or_refuses(call: Callable[[], Floats]) -> bool:
     """Whether an array of floats comes out, or an error of dynx with something to say."""
     try:
         return call().dtype == np.float64

@@ -47,7 +47,7 @@ def test_a_batch_is_its_samples_one_by_one(data: st.DataObject) -> None:
     together = all_quantities(engine, q, v, x)
     for index in np.ndindex(*shape):
         alone = all_quantities(engine, q[index], v[index], x[index])
-        assert_same({quantity: answer[index] for quantity, answer in together.items()}, alone)
+        assert_same({quantity: result[index] for quantity, result in together.items()}, alone)
 
 
 @each_kind
@@ -59,10 +59,10 @@ def test_leading_axes_broadcast(kind: type[Backend], base: str) -> None:
     v, x = v[:, :, 0][:, :, None], x[0, 0, 0]
     batch = (2, 1, 3)
     full = [np.array(np.broadcast_to(array, (*batch, array.shape[-1]))) for array in (q, v, x)]
-    answers, expected = all_quantities(engine, q, v, x), all_quantities(engine, *full)
-    assert_same(answers, expected)
-    for quantity, answer in answers.items():
-        assert answer.shape[:3] == batch, quantity
+    results, expected = all_quantities(engine, q, v, x), all_quantities(engine, *full)
+    assert_same(results, expected)
+    for quantity, result in results.items():
+        assert result.shape[:3] == batch, quantity
     # The batch may come from the velocity alone.
     assert engine.bias_torque(q[0, 0, 0], v).shape == (2, 1, 1, model.nv)
 
@@ -75,13 +75,13 @@ def test_a_batch_may_be_empty(kind: type[Backend], base: str, mimic: bool, shape
     model = mixed_robot(base, mimic=mimic)
     engine = kind(model)
     one = all_quantities(engine, *motion(model))
-    for quantity, answer in all_quantities(engine, *motion(model, size=shape)).items():
-        assert answer.shape == (*shape, *one[quantity].shape), quantity
-        assert answer.dtype == np.float64
+    for quantity, result in all_quantities(engine, *motion(model, size=shape)).items():
+        assert result.shape == (*shape, *one[quantity].shape), quantity
+        assert result.dtype == np.float64
 
 
 @each_kind
-def test_frames_can_be_asked_for_by_one_name_by_several_or_all(kind: type[Backend]) -> None:
+def test_frames_are_selected_by_one_name_several_or_all(kind: type[Backend]) -> None:
     model = mixed_robot("floating", mimic=True)
     engine = kind(model)
     q = motion(model, size=(2,))[0]
@@ -101,7 +101,7 @@ def test_frames_can_be_asked_for_by_one_name_by_several_or_all(kind: type[Backen
 
 @each_kind
 @each_base
-def test_without_validation_the_answers_are_the_same(kind: type[Backend], base: str) -> None:
+def test_without_validation_the_results_are_the_same(kind: type[Backend], base: str) -> None:
     model = mixed_robot(base, mimic=True)
     for size in ((), (2,)):
         sample = motion(model, size=size)
@@ -280,7 +280,7 @@ def test_a_joint_that_moves_no_inertia_is_named(kind: type[Backend]) -> None:
     assert np.isfinite(engine.inverse_dynamics(np.zeros(3), np.ones(3), np.ones(3))).all()
 
 
-def test_solving_with_a_singular_mass_matrix_says_so() -> None:
+def test_solving_with_a_singular_mass_matrix_raises() -> None:
     with pytest.raises(SingularMassMatrixError, match="is singular"):
         solve_mass_matrix(np.zeros((2, 2)), np.ones(2))
 

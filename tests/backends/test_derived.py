@@ -23,7 +23,7 @@ def test_a_view_computes_nothing_natively_but_the_two() -> None:
     assert native_quantities(ReferenceBackend) > MINIMUM
 
 
-def test_the_engine_is_asked_for_nothing_else(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_other_hook_of_the_engine_is_called(monkeypatch: pytest.MonkeyPatch) -> None:
     def never(*_: object) -> Floats:
         raise AssertionError("a native hook was used")
 
@@ -34,14 +34,14 @@ def test_the_engine_is_asked_for_nothing_else(monkeypatch: pytest.MonkeyPatch) -
         monkeypatch.setattr(PinocchioBackend, hook, never)
     monkeypatch.setattr(PinocchioBackend, "_frame_placement", never)
     model = mixed_robot("floating", mimic=True)
-    answers = all_quantities(DerivedBackend(PinocchioBackend(model)), *motion(model))
-    assert all(np.isfinite(answer).all() for answer in answers.values())
+    results = all_quantities(DerivedBackend(PinocchioBackend(model)), *motion(model))
+    assert all(np.isfinite(result).all() for result in results.values())
 
 
 @pytest.mark.parametrize("kind", [PinocchioBackend, ReferenceBackend])
 @pytest.mark.parametrize("base", ["fixed", "floating"])
 @pytest.mark.parametrize("size", [(), (2, 3)])
-def test_derived_answers_are_the_native_ones(kind: type[Backend], base: str, size: tuple[int, ...]) -> None:
+def test_derived_results_equal_native_ones(kind: type[Backend], base: str, size: tuple[int, ...]) -> None:
     model = mixed_robot(base, mimic=True)
     native = kind(model)
     view = DerivedBackend(native)
@@ -49,12 +49,12 @@ def test_derived_answers_are_the_native_ones(kind: type[Backend], base: str, siz
     sample = motion(model, size=size)
     condition = float(np.linalg.cond(native.mass_matrix(sample[0])).max())
     expected = all_quantities(native, *sample)
-    for quantity, answer in all_quantities(view, *sample).items():
+    for quantity, result in all_quantities(view, *sample).items():
         scale = condition if quantity == "forward_dynamics" else 1.0
-        assert_close(answer, expected[quantity], scale, quantity)
+        assert_close(result, expected[quantity], scale, quantity)
 
 
-def test_a_view_has_the_name_and_version_of_what_it_shows() -> None:
+def test_a_view_has_the_name_and_version_of_its_backend() -> None:
     inner = PinocchioBackend(chain(1))
     view = DerivedBackend(inner)
     assert view.name == "pinocchio/derived"
@@ -83,7 +83,7 @@ def test_a_view_of_a_closed_backend_refuses(validate: bool) -> None:
             call(np.zeros(2))
 
 
-def test_a_view_pickles_with_what_it_shows() -> None:
+def test_a_view_pickles_with_its_backend() -> None:
     model = mixed_robot()
     view = DerivedBackend(PinocchioBackend(model, validate=False), validate=False)
     copy = pickle.loads(pickle.dumps(view))

@@ -1,4 +1,4 @@
-"""Solving with a mass matrix that is singular, or is so but for rounding."""
+"""Solving with a mass matrix that is singular, exactly or up to rounding."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from dynx.errors import SingularMassMatrixError
     st.integers(-8, 8),
 )
 def test_a_matrix_singular_but_for_rounding_is_not_solved(B: np.ndarray, power: int) -> None:
-    """B B' has rank 2; elimination alone seldom meets an exact zero and would answer with garbage."""
+    """B B' has rank 2; elimination alone rarely meets an exact zero pivot and would return garbage."""
     M = (B @ B.T) * 10.0**power
     with pytest.raises(SingularMassMatrixError):
         solve_mass_matrix(M, np.ones(4))

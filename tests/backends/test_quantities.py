@@ -1,4 +1,4 @@
-"""The public methods of `Backend` say what the table of quantities says."""
+"""The public methods of `Backend` agree with the table of quantities."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ each_quantity = pytest.mark.parametrize("quantity", QUANTITIES.values(), ids=QUA
 
 
 def parameters(quantity: Quantity) -> list[str]:
-    """Names of the parameters that the table says its method has."""
+    """Names of the parameters of the method, by the table."""
     frame = ["frame"] if quantity.of_frame else []
     return ["self", *quantity.arguments, *frame, *quantity.options]
 

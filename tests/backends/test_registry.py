@@ -29,7 +29,7 @@ BUILT_IN = ("reference", "pinocchio", "pybullet", "mujoco", "drake", "compiled")
 
 
 class Mine(ReferenceBackend):
-    """A backend of somebody else's."""
+    """A backend of another package."""
 
     name = "mine"
 
@@ -54,14 +54,14 @@ def test_the_backends_of_dynx_are_known_without_package_metadata(monkeypatch: py
     assert {"reference", "pinocchio"} <= set(installed_backends())
 
 
-def test_every_engine_that_is_here_can_be_used() -> None:
-    """Tests that ask for the installed backends would otherwise leave out one that dynx has broken."""
+def test_every_installed_engine_can_be_used() -> None:
+    """Tests of all installed backends would otherwise leave out one that dynx itself breaks."""
     packages = {"reference": "numpy", "drake": "pydrake", "compiled": "llvmlite"}
     here = [name for name in BUILT_IN if find_spec(packages.get(name, name)) is not None]
     assert [name for name in installed_backends() if name in BUILT_IN] == here
 
 
-def test_the_metadata_of_dynx_says_what_its_table_says() -> None:
+def test_the_entry_points_of_dynx_are_those_of_its_table() -> None:
     project = (Path(__file__).resolve().parents[2] / "pyproject.toml").read_text(encoding="utf-8")
     table = project.partition(f'[project.entry-points."{registry.GROUP}"]\n')[2].partition("\n\n")[0]
     offered = dict(line.replace('"', "").split(" = ") for line in table.splitlines())
@@ -108,7 +108,7 @@ def test_a_backend_without_its_engine_is_known_but_not_installed(
         ("x" * 10_000, r"\(10000 characters\)"),
     ],
 )
-def test_an_unknown_name_is_answered_with_the_nearest(
+def test_an_unknown_name_is_refused_with_the_nearest(
     name: str, hint: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     _offer(monkeypatch)
@@ -126,12 +126,12 @@ def test_a_name_must_be_text(name: Any) -> None:
     ("model", "hint"),
     [("ur5", r"type str; wanted a Model, such as dynx\.load\('ur5'\)"), (None, r"type NoneType.*dynx\.load")],
 )
-def test_what_is_no_model_is_answered_with_how_to_make_one(model: Any, hint: str) -> None:
+def test_anything_but_a_model_is_refused_with_an_example(model: Any, hint: str) -> None:
     with pytest.raises(ArgumentError, match=hint):
         backend("reference", model)
 
 
-def test_an_unknown_option_is_answered_with_those_there_are() -> None:
+def test_an_unknown_option_is_refused_with_the_valid_ones() -> None:
     with pytest.raises(ArgumentError, match="'valdate'; its options: validate"):
         backend("pinocchio", chain(1), valdate=False)
 
@@ -145,7 +145,7 @@ def test_a_program_can_register_its_own(mine: str) -> None:
     assert type(backend(mine, chain(1))) is Mine
 
 
-def test_what_was_registered_can_be_taken_back(mine: str) -> None:
+def test_a_registered_backend_can_be_unregistered(mine: str) -> None:
     unregister(mine)
     assert mine not in backend_names()
     with pytest.raises(UnknownBackendError, match="was registered"):
@@ -175,7 +175,7 @@ def test_a_loader_must_be_callable() -> None:
 
 
 @pytest.mark.parametrize("loaded", [None, 3, dict, ReferenceBackend(chain(1))])
-def test_what_is_loaded_must_be_a_backend(loaded: Any) -> None:
+def test_a_loader_must_return_a_backend_class(loaded: Any) -> None:
     register("odd", lambda: loaded)
     try:
         with pytest.raises(BackendError, match=r"'odd', provided by this program, .*no subclass"):
@@ -200,7 +200,7 @@ def test_an_entry_point_cannot_take_the_name_of_a_built_in(monkeypatch: pytest.M
     assert backend_names() == BUILT_IN
 
 
-def test_a_broken_entry_point_is_named_only_when_it_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_broken_entry_point_is_named_only_when_it_is_used(monkeypatch: pytest.MonkeyPatch) -> None:
     _offer(monkeypatch, broken="no_such_package.backends:Theirs", absent=f"{__name__}:Absent")
     assert backend_names() == (*BUILT_IN, "absent", "broken")
     assert not {"absent", "broken"} & set(installed_backends())

@@ -16,7 +16,7 @@ PEAK = Peak(threads=1, copy_bandwidth=10e9, multiply_adds=20e9)
 
 
 class Scaled(Implementation):
-    """The right answers times a factor; one sample of a batch, `spoilt`, gets a factor of its own."""
+    """The right results times a factor, and plus 1e-6 for the sample `spoilt`."""
 
     version = "reference"
     threads = 1
@@ -49,14 +49,14 @@ class Scaled(Implementation):
 
 
 class Silent(Scaled):
-    """Returns the array for the answers and writes none."""
+    """An implementation that returns the array without writing to it."""
 
     def prepare(self, case: BenchmarkCase, batch: Batch, out: Floats) -> PreparedCall:
         return PreparedCall(lambda: out)
 
 
 class Failing(Scaled):
-    """Cannot be made ready."""
+    """An implementation that raises while it is prepared."""
 
     def prepare(self, case: BenchmarkCase, batch: Batch, out: Floats) -> PreparedCall:
         raise EngineError("no such luck")

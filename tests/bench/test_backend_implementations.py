@@ -16,7 +16,7 @@ from dynx.model.model import Base
 @pytest.mark.parametrize("count", [1, 5])
 @pytest.mark.parametrize("name", installed_backends())
 @pytest.mark.parametrize("base", ["fixed", "floating"])
-def test_every_backend_answers_every_work(name: str, base: Base, count: int) -> None:
+def test_every_backend_computes_every_quantity(name: str, base: Base, count: int) -> None:
     model = dynx.load("panda", base=base)
     batch = draw_batch(model, "panda_hand", count)
     implementation = backend_implementation(model, name, 1)

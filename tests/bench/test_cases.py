@@ -1,4 +1,4 @@
-"""What can be timed, and the samples."""
+"""Benchmark cases, and their samples."""
 
 from __future__ import annotations
 
@@ -47,8 +47,8 @@ def test_shapes_are_those_of_a_backend(quantity: str, base: Base) -> None:
     model = dynx.load("double_pendulum", base=base)
     batch = draw_batch(model, model.frame_names[-1], 3)
     frame = [batch.frame] if QUANTITIES[quantity].of_frame else []
-    answer = getattr(ReferenceBackend(model), quantity)(*batch.arguments(quantity), *frame)
-    assert answer.shape == (3, *QUANTITIES[quantity].shape_of(model))
+    result = getattr(ReferenceBackend(model), quantity)(*batch.arguments(quantity), *frame)
+    assert result.shape == (3, *QUANTITIES[quantity].shape_of(model))
 
 
 def test_a_batch_that_does_not_fit_is_refused_with_its_size(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,4 +1,4 @@
-"""Right answers pass, wrong ones do not, wherever in a batch they are."""
+"""Checks of results: right ones pass, wrong ones fail wherever in a batch they are."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from dynx.spatial.scalar import Floats
 ROBOTS = ("double_pendulum", "panda")
 
 
-def answers(quantity: str, robot: str, base: Base) -> tuple[Judge, Floats]:
-    """The judge of some samples, and the right answers."""
+def judge_and_reference(quantity: str, robot: str, base: Base) -> tuple[Judge, Floats]:
+    """The judge of some samples, and the reference values."""
     model = dynx.load(robot, base=base)
     batch = draw_batch(model, model.frame_names[-1], 20)
     frame = [batch.frame] if QUANTITIES[quantity].of_frame else []
@@ -30,8 +30,8 @@ def answers(quantity: str, robot: str, base: Base) -> tuple[Judge, Floats]:
 @pytest.mark.parametrize("base", ["fixed", "floating"])
 @pytest.mark.parametrize("robot", ROBOTS)
 @pytest.mark.parametrize("quantity", BENCHMARK_QUANTITIES)
-def test_right_answers_pass_and_small_errors_do_not(quantity: str, robot: str, base: Base) -> None:
-    judge, right = answers(quantity, robot, base)
+def test_right_results_pass_and_small_errors_do_not(quantity: str, robot: str, base: Base) -> None:
+    judge, right = judge_and_reference(quantity, robot, base)
     assert judge.check(quantity, right).right
     # An acceleration is judged by the torque it takes, which mostly holds gravity.
     error = 1e-6 if quantity == "forward_dynamics" else 1e-9
@@ -44,15 +44,15 @@ def test_right_answers_pass_and_small_errors_do_not(quantity: str, robot: str, b
 
 
 @pytest.mark.parametrize("quantity", QUANTITIES)
-@pytest.mark.parametrize("wild", [np.nan, np.inf])
-def test_what_is_no_number_is_wrong(quantity: str, wild: float) -> None:
-    judge, right = answers(quantity, "double_pendulum", "fixed")
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_nan_and_infinity_are_wrong(quantity: str, value: float) -> None:
+    judge, right = judge_and_reference(quantity, "double_pendulum", "fixed")
     assert judge.check(quantity, right).right
-    right[7] = wild
+    right[7] = value
     assert judge.check(quantity, right).error == np.inf
 
 
-def test_where_no_acceleration_is_right_none_is_judged() -> None:
+def test_a_singular_mass_matrix_is_refused() -> None:
     joint = Joint("joint", "revolute", "base", "tip")
     model = Model.build("massless", [Link("base"), Link("tip")], [joint])
     judge = Judge(draw_batch(model, "tip", 3))

@@ -1,4 +1,4 @@
-"""What a program costs, counted by hand."""
+"""Costs of programs, counted by hand."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def test_a_product_that_two_sums_use_is_done_alone() -> None:
     assert cost_of(trace(function, {"x": (3,)})) == Cost(bytes=8 * 5, operations=3, multiply_adds=3)
 
 
-def test_a_product_that_is_also_an_answer_is_done_alone() -> None:
+def test_a_product_that_is_also_an_output_is_done_alone() -> None:
     def function(x: Array) -> Array:
         product = x[0] * x[1]
         return np.array([product + x[2], product])
@@ -52,7 +52,7 @@ def test_sine_and_cosine_of_one_angle_cost_once() -> None:
     assert cost_of(both).operations == 2 * SINE_COSINE_PAIRS + SINE_COSINE_SINGLES
 
 
-def test_that_cost_is_what_the_compiler_writes() -> None:
+def test_the_cost_matches_the_emitted_instructions() -> None:
     write = Writer(4)
     sines_and_cosines(write, ["%x"], fma=True)
     labels = [k for k, line in enumerate(write.lines) if not line.startswith(" ")]
@@ -65,7 +65,7 @@ def test_that_cost_is_what_the_compiler_writes() -> None:
 
 @pytest.mark.parametrize("quantity", QUANTITIES)
 @pytest.mark.parametrize("robot", ["double_pendulum", "panda"])
-def test_bytes_are_those_of_arguments_and_answer(robot: str, quantity: str) -> None:
+def test_bytes_are_those_of_arguments_and_result(robot: str, quantity: str) -> None:
     model = dynx.load(robot)
     program = program_of(model, quantity, model.frame_names[-1])
     assert program is not None
@@ -76,7 +76,7 @@ def test_bytes_are_those_of_arguments_and_answer(robot: str, quantity: str) -> N
     assert cost_of(program).bytes == 8 * numbers
 
 
-def test_of_a_quantity_that_is_not_compiled_nothing_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_quantity_that_is_not_compiled_has_no_cost(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("dynx.bench.cost.compiles", lambda mechanism, name: False)
     model = dynx.load("double_pendulum")
     assert program_of(model, "inverse_dynamics", model.frame_names[-1]) is None

@@ -1,4 +1,4 @@
-"""Ways are checked before they are timed, and all that are right are."""
+"""Implementations are checked before they are timed; all that are right are timed."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from tests.bench.implementations import Failing, Scaled, Silent
 
 MODEL = dynx.load("double_pendulum")
 BATCH = draw_batch(MODEL, MODEL.frame_names[-1], 40)
-WORK = BenchmarkCase("inverse_dynamics", 40)
+CASE = BenchmarkCase("inverse_dynamics", 40)
 
 
-def test_right_ways_are_timed_per_sample() -> None:
+def test_right_implementations_are_timed_per_sample() -> None:
     implementation = Scaled("right")
-    (found,) = measure(WORK, [implementation], BATCH, 3)
+    (found,) = measure(CASE, [implementation], BATCH, 3)
     assert found.problem is None
     assert found.times is not None
     assert len(found.times.seconds) == 3
@@ -33,7 +33,7 @@ def test_right_ways_are_timed_per_sample() -> None:
 
 
 @pytest.mark.parametrize("quantity", BENCHMARK_QUANTITIES)
-def test_a_wrong_answer_is_reported_and_not_timed(quantity: str) -> None:
+def test_a_wrong_result_is_reported_and_not_timed(quantity: str) -> None:
     wrong, right = Scaled("wrong", 1.01), Scaled("right")
     found = measure(BenchmarkCase(quantity, 40), [wrong, right], BATCH, 2)
     assert [each.implementation for each in found] == ["wrong", "right"]
@@ -45,24 +45,24 @@ def test_a_wrong_answer_is_reported_and_not_timed(quantity: str) -> None:
 
 
 def test_one_wrong_sample_is_enough() -> None:
-    (found,) = measure(WORK, [Scaled("nearly", spoilt=39)], BATCH, 2)
+    (found,) = measure(CASE, [Scaled("nearly", spoilt=39)], BATCH, 2)
     assert found.times is None
 
 
-def test_a_way_that_writes_nothing_does_not_live_on_the_answers_of_another() -> None:
-    found = measure(WORK, [Scaled("right"), Silent("silent")], BATCH, 2)
+def test_an_implementation_that_writes_nothing_does_not_pass_on_earlier_results() -> None:
+    found = measure(CASE, [Scaled("right"), Silent("silent")], BATCH, 2)
     assert found[0].times is not None
     assert found[1].times is None
     assert found[1].error == np.inf
 
 
-def test_what_cannot_be_done_says_why() -> None:
-    (found,) = measure(WORK, [Failing("failing")], BATCH, 2)
+def test_a_failing_implementation_is_reported_with_the_error() -> None:
+    (found,) = measure(CASE, [Failing("failing")], BATCH, 2)
     assert (found.times, found.error, found.problem) == (None, None, "no such luck")
 
 
 class Slow(Scaled):
-    """So slow for one sample that a whole batch would take long."""
+    """An implementation so slow that a whole batch would take long."""
 
     whole = False
 
@@ -72,13 +72,13 @@ class Slow(Scaled):
         def slow() -> Floats:
             for _ in range(len(batch) * 200):
                 np.sqrt(2.0)
-            answers: Floats = call()
-            return answers
+            results: Floats = call()
+            return results
 
         return PreparedCall(slow)
 
 
-def test_a_slow_way_is_timed_at_fewer_samples() -> None:
+def test_a_slow_implementation_is_timed_at_fewer_samples() -> None:
     batch = draw_batch(MODEL, MODEL.frame_names[-1], 65536)
     found = measure(BenchmarkCase("inverse_dynamics", 65536), [Slow("slow"), Scaled("quick")], batch, 1)
     assert TRIAL_SAMPLES <= found[0].samples < 65536
@@ -86,14 +86,14 @@ def test_a_slow_way_is_timed_at_fewer_samples() -> None:
 
 
 class WithBaseline(Scaled):
-    """Something of its calls is not the case."""
+    """An implementation with a baseline, whose time is not part of the case."""
 
     def prepare(self, case: BenchmarkCase, batch: Batch, out: Floats) -> PreparedCall:
         return PreparedCall(super().prepare(case, batch, out).call, lambda: None)
 
 
-def made_up(monkeypatch: pytest.MonkeyPatch, *times: Times) -> None:
-    """Let calls have taken these times."""
+def replace_times(monkeypatch: pytest.MonkeyPatch, *times: Times) -> None:
+    """Replace the measured times by these."""
 
     def interleaved(calls: Sequence[Call], repetitions: int) -> list[Times]:
         assert len(calls) == len(times)
@@ -102,18 +102,18 @@ def made_up(monkeypatch: pytest.MonkeyPatch, *times: Times) -> None:
     monkeypatch.setattr(measurement, "interleaved", interleaved)
 
 
-def test_a_baseline_is_taken_away(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_baseline_is_subtracted(monkeypatch: pytest.MonkeyPatch) -> None:
     plain, with_baseline, baseline = Times((4.0, 4.0)), Times((8.0, 12.0)), Times((2.0, 4.0))
-    made_up(monkeypatch, with_baseline, baseline, plain)
-    found = measure(WORK, [WithBaseline("less"), Scaled("wrong", 2.0), Scaled("plain")], BATCH, 2)
+    replace_times(monkeypatch, with_baseline, baseline, plain)
+    found = measure(CASE, [WithBaseline("less"), Scaled("wrong", 2.0), Scaled("plain")], BATCH, 2)
     assert found[0].times == Times((6.0 / 40, 8.0 / 40))
     assert found[1].times is None
     assert found[2].times == Times((0.1, 0.1))
 
 
-def test_what_is_lost_in_the_noise_is_not_shown_as_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    made_up(monkeypatch, Times((5e-6,) * 3), Times((6e-6, 5e-6, 1e-6)))
-    (found,) = measure(WORK, [WithBaseline("less")], BATCH, 3)
+def test_a_time_within_the_noise_is_not_reported(monkeypatch: pytest.MonkeyPatch) -> None:
+    replace_times(monkeypatch, Times((5e-6,) * 3), Times((6e-6, 5e-6, 1e-6)))
+    (found,) = measure(CASE, [WithBaseline("less")], BATCH, 3)
     assert (found.times, found.problem) == (None, LOST_IN_NOISE)
     assert found.error == 0.0
 
@@ -121,11 +121,11 @@ def test_what_is_lost_in_the_noise_is_not_shown_as_a_time(monkeypatch: pytest.Mo
 def test_one_sample_has_no_batch_axis() -> None:
     shapes = []
 
-    class Asked(Scaled):
+    class Recording(Scaled):
         def prepare(self, case: BenchmarkCase, batch: Batch, out: Floats) -> PreparedCall:
             shapes.append((len(batch), out.shape))
             return super().prepare(case, batch, out)
 
-    (found,) = measure(BenchmarkCase("jacobian", 1), [Asked("asked")], BATCH, 1)
+    (found,) = measure(BenchmarkCase("jacobian", 1), [Recording("asked")], BATCH, 1)
     assert shapes == [(1, (1, 6, MODEL.nv))]
     assert isinstance(found.times, Times)

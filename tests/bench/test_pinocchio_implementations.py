@@ -1,4 +1,4 @@
-"""Pinocchio's own calls answer as the reference does, with mimic joints set free."""
+"""Direct calls of Pinocchio agree with the reference, with mimic joints as free joints."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ ROBOTS: tuple[tuple[str, Base], ...] = (
 
 @pytest.mark.parametrize("count", [1, 5])
 @pytest.mark.parametrize(("robot", "base"), ROBOTS)
-def test_they_answer_rightly(robot: str, base: Base, count: int) -> None:
+def test_they_agree_with_the_reference(robot: str, base: Base, count: int) -> None:
     model = dynx.load(robot, base=base)
     batch = draw_batch(model, model.frame_names[-1], count)
     implementations = list(pinocchio_implementations(model, 2))
@@ -51,17 +51,17 @@ def test_the_batches_are_for_two_quantities_and_several_samples() -> None:
     assert implementation.threads == 2
 
 
-def test_the_batches_write_where_they_are_told() -> None:
+def test_the_batches_write_into_the_given_array() -> None:
     model = dynx.load("panda")
     implementation = PinocchioBatch(model, 1)
     batch = implementation.samples(draw_batch(model, "panda_hand", 50))
     out = np.full((50, implementation.model.nv), np.nan)
-    answers = implementation.prepare(BenchmarkCase("inverse_dynamics", 50), batch, out).call()
-    assert answers is out
+    results = implementation.prepare(BenchmarkCase("inverse_dynamics", 50), batch, out).call()
+    assert results is out
     assert np.isfinite(out).all()
 
 
-def test_mimic_joints_become_coordinates_at_the_same_state() -> None:
+def test_freed_mimic_joints_have_the_same_state() -> None:
     model = dynx.load("panda")
     free = without_mimics(model)
     assert (model.nv, free.nv) == (8, 9)
@@ -80,7 +80,7 @@ def test_mimic_joints_become_coordinates_at_the_same_state() -> None:
     )
 
 
-def test_a_robot_without_them_stays_as_it_is() -> None:
+def test_a_robot_without_mimic_joints_is_unchanged() -> None:
     model = dynx.load("ur5")
     assert without_mimics(model) is model
     batch = draw_batch(model, "tool0", 3)
@@ -102,7 +102,7 @@ def test_the_baseline_runs_on_a_model_of_one_joint(quantity: str) -> None:
 
 
 def answer_of(quantity: str) -> tuple[int, ...]:
-    """The shape of the pendulum's answer."""
+    """Shape of the quantity for the pendulum."""
     return {"forward_kinematics": (4, 4), "jacobian": (6, 1), "mass_matrix": (1, 1)}.get(quantity, (1,))
 
 

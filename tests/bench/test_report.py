@@ -1,4 +1,4 @@
-"""The document of made-up measurements."""
+"""The JSON document of invented measurements."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from dynx.bench.session import benchmark_cases
 from dynx.bench.timing import Times
 from tests.bench.implementations import PEAK, Scaled, session_of
 
-WORK = BenchmarkCase("inverse_dynamics", 65536)
+CASE = BenchmarkCase("inverse_dynamics", 65536)
 COST = Cost(bytes=192, operations=750, multiply_adds=400)
 
 
 def found(implementation: str, nanoseconds: tuple[float, ...] | None, role: str = "backend") -> Measurement:
-    """A measurement of so many nanoseconds."""
+    """A measurement of the given nanoseconds."""
     times = None if nanoseconds is None else Times(tuple(1e-9 * each for each in nanoseconds))
-    return Measurement(WORK, implementation, role, "1.0", 1, 65536, 1e-15, 1e-13, times)
+    return Measurement(CASE, implementation, role, "1.0", 1, 65536, 1e-15, 1e-13, times)
 
 
 GROUP = [
@@ -34,7 +34,7 @@ GROUP = [
 ]
 
 
-def test_a_ratio_says_how_many_times_faster_than_each_peer() -> None:
+def test_a_ratio_is_the_speed_up_over_each_peer() -> None:
     implementations = result(GROUP, [None] * 5, {})["ways"]
     assert implementations[0]["ratios"] == pytest.approx({"batch": 25.0, "loop": 50.0})
     assert implementations[1]["ratios"] == pytest.approx({"batch": 0.25, "loop": 0.5})
@@ -49,7 +49,7 @@ def test_times_are_nanoseconds_of_one_sample() -> None:
     assert implementation["ns_quartiles"] == pytest.approx([39.0, 41.0])
 
 
-def test_the_roofline_is_that_of_the_threads_of_the_way() -> None:
+def test_the_roofline_is_that_of_the_threads_of_the_implementation() -> None:
     with_cost = result(GROUP[:1], [COST], {1: PEAK})["ways"][0]["roofline"]
     assert with_cost is not None
     # 19.2 ns for the bytes and 20 ns for the operations, of 40.
@@ -61,15 +61,15 @@ def test_the_roofline_is_that_of_the_threads_of_the_way() -> None:
     assert result(GROUP[:1], [None], {1: PEAK})["ways"][0]["roofline"] is None
 
 
-def test_what_is_wrong() -> None:
-    right, refused = GROUP[0], Measurement(WORK, "x", "backend", "", 1, 8, problem="cannot")
-    bad = Measurement(WORK, "x", "backend", "", 1, 8, 1e-3, 1e-13, problem="wrong answer")
-    nothing = Measurement(WORK, "x", "backend", "", 1, 8, float("nan"), 1e-13)
+def test_wrong_results_and_failures_are_listed() -> None:
+    right, refused = GROUP[0], Measurement(CASE, "x", "backend", "", 1, 8, problem="cannot")
+    bad = Measurement(CASE, "x", "backend", "", 1, 8, 1e-3, 1e-13, problem="wrong result")
+    nothing = Measurement(CASE, "x", "backend", "", 1, 8, float("nan"), 1e-13)
     assert [is_wrong(each) for each in (right, refused, bad, nothing)] == [False, False, True, True]
     assert wrong([[right, bad], [refused]]) == [bad]
 
 
-def test_the_document_says_what_was_done_and_what_was_not() -> None:
+def test_the_document_lists_timed_and_skipped_cases() -> None:
     model = dynx.load("double_pendulum")
     both = benchmark_cases(["jacobian", "mass_matrix"], (4,))
     with session_of([Scaled("compiled"), Scaled("peer", role="peer")], model, both) as session:

@@ -1,4 +1,4 @@
-"""Which bound a kernel meets, on machines that are made up."""
+"""Roofline bounds of kernels on invented machines."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from dynx.bench.roofline import Peak, roofline
 PEAK = Peak(threads=1, copy_bandwidth=10e9, multiply_adds=20e9)
 
 
-def test_shares_are_the_least_times_over_the_time_taken() -> None:
+def test_shares_are_lower_bounds_over_the_measured_time() -> None:
     # At least 10 ns for the bytes and 25 ns for the operations; it takes 50.
     found = roofline(Cost(bytes=100, operations=900, multiply_adds=500), 50e-9, PEAK)
     assert found.memory_share == pytest.approx(0.2)

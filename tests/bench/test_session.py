@@ -1,4 +1,4 @@
-"""A session of made-up implementations, and which cases a plan holds."""
+"""Sessions of invented implementations, and the cases of a plan."""
 
 from __future__ import annotations
 
@@ -37,11 +37,11 @@ def test_large_batches_come_first_and_small_ones_have_one_thread() -> None:
     )
 
 
-def test_threads_that_are_asked_for_are_tried_on_any_batch() -> None:
+def test_requested_threads_are_used_for_any_batch() -> None:
     assert benchmark_cases(["jacobian"], (8,), (2,), least=1) == (BenchmarkCase("jacobian", 8, 2),)
 
 
-def test_everything_is_the_default() -> None:
+def test_all_cases_are_the_default() -> None:
     made = benchmark_cases()
     assert {case.batch for case in made} == set(BATCHES)
     assert len(made) == len(BATCHES) * 5
@@ -53,7 +53,7 @@ def test_a_robot_without_coordinates_is_refused() -> None:
         Plan(still, "base", benchmark_cases())
 
 
-def test_a_plan_without_works_is_refused() -> None:
+def test_a_plan_without_cases_is_refused() -> None:
     with pytest.raises(ArgumentError, match="nothing to time"):
         Plan(MODEL, FRAME, ())
 
@@ -78,8 +78,8 @@ def test_on_several_threads_backends_with_one_are_left_out_and_peers_are_not() -
     assert found == [["backend", "peer"], ["peer"]]
 
 
-def test_leaving_closes_the_ways() -> None:
-    implementation = Scaled("way")
+def test_leaving_the_session_closes_the_implementations() -> None:
+    implementation = Scaled("scaled")
     with session_of([implementation], MODEL, benchmark_cases(["jacobian"], (2,)), repetitions=1) as session:
         session.measure(BenchmarkCase("jacobian", 2))
         assert not implementation.closed
@@ -95,11 +95,11 @@ def test_the_cost_is_that_of_the_compiled_program() -> None:
 
 
 def measured(implementation: str) -> Measurement:
-    """Something found of the mass matrix."""
+    """A measurement of the mass matrix."""
     return Measurement(BenchmarkCase("mass_matrix", 8), implementation, "backend", "", 1, 8)
 
 
-def test_all_ways_are_the_backends_then_the_peers() -> None:
+def test_all_implementations_are_the_backends_then_the_peers() -> None:
     found = all_implementations(Plan(MODEL, FRAME, benchmark_cases()), 1)
     names = [implementation.name for implementation in found if implementation.role == "backend"]
     assert names == list(installed_backends())
@@ -114,7 +114,7 @@ def test_all_ways_are_the_backends_then_the_peers() -> None:
     ]
 
 
-def test_an_engine_that_cannot_hold_the_robot_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_engine_that_refuses_the_robot_is_reported_with_the_error(monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*_: object, **__: object) -> None:
         raise EngineLimitError("too large")
 

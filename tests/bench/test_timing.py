@@ -1,4 +1,4 @@
-"""Times by a clock that is known."""
+"""Times measured by a simulated clock."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from collections.abc import Callable
 
 import pytest
 
-from dynx.bench.timing import LEAST_SECONDS, Times, interleaved, once
+from dynx.bench.timing import MIN_TIMING_SECONDS, Times, interleaved, once
 
 
 class Clock:
-    """Stands still but for the calls that take time."""
+    """A clock that only the timed calls advance."""
 
     def __init__(self) -> None:
         self.now = 0.0
@@ -20,7 +20,7 @@ class Clock:
         return self.now
 
     def taking(self, seconds: float, name: str = "") -> Callable[[], None]:
-        """A call that takes so long."""
+        """A call of the given duration."""
 
         def call() -> None:
             self.now += seconds
@@ -40,12 +40,12 @@ def test_times_of_one_sample() -> None:
     assert Times((8.0, 4.0)).per(4) == Times((2.0, 1.0))
 
 
-def test_a_baseline_is_taken_away_repetition_by_repetition() -> None:
+def test_a_baseline_is_subtracted_in_each_repetition() -> None:
     # The machine was slow in the second repetition, in which both took longer.
     assert Times((3.0, 13.0)).less(Times((1.0, 11.0))) == Times((2.0, 2.0))
 
 
-def test_nothing_left_has_no_spread_that_means_anything() -> None:
+def test_a_median_of_zero_has_no_relative_spread() -> None:
     assert Times((0.0, 0.0)).spread == float("inf")
 
 
@@ -55,7 +55,7 @@ def test_every_call_is_timed_in_every_repetition() -> None:
     assert found == [Times((1.0,) * 3), Times((0.25,) * 3)]
 
 
-def test_calls_are_taken_in_turn_each_time_another_one_first() -> None:
+def test_calls_rotate_with_another_one_first_each_time() -> None:
     clock = Clock()
     calls = [clock.taking(1.0, name) for name in "abc"]
     interleaved(calls, 3, clock)
@@ -65,13 +65,13 @@ def test_calls_are_taken_in_turn_each_time_another_one_first() -> None:
 
 def test_a_short_call_is_repeated_and_its_time_is_that_of_one() -> None:
     clock = Clock()
-    (times,) = interleaved([clock.taking(LEAST_SECONDS / 64.0)], 2, clock)
-    assert times.seconds == pytest.approx((LEAST_SECONDS / 64.0,) * 2)
+    (times,) = interleaved([clock.taking(MIN_TIMING_SECONDS / 64.0)], 2, clock)
+    assert times.seconds == pytest.approx((MIN_TIMING_SECONDS / 64.0,) * 2)
     assert len(clock.done) >= 2 * 64
 
 
-def test_a_clock_that_stands_still_meanwhile_is_outlasted() -> None:
-    clock, tick = Clock(), LEAST_SECONDS / 4.0
+def test_calls_are_repeated_until_a_coarse_clock_advances() -> None:
+    clock, tick = Clock(), MIN_TIMING_SECONDS / 4.0
 
     def coarse() -> float:
         return tick * (clock() // tick)

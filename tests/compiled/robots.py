@@ -1,4 +1,4 @@
-"""What the tests of the compiled backend share: robots, and a backend and states of one."""
+"""Robots, backends and states for the tests of the compiled backend."""
 
 from __future__ import annotations
 

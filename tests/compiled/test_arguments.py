@@ -1,4 +1,4 @@
-"""What the compiled backend refuses, wherever in a batch it is."""
+"""Arguments that the compiled backend refuses, wherever in a batch they are."""
 
 from __future__ import annotations
 
@@ -27,7 +27,9 @@ def engine(request: pytest.FixtureRequest) -> CompiledBackend:
 @pytest.mark.parametrize("n", [None, 1, 9, MAX_COPIED_SAMPLES + 9])
 @pytest.mark.parametrize("which", [0, 1, 2])
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, MAX_MAGNITUDE, -2 * MAX_MAGNITUDE, 1e300])
-def test_a_bad_number_anywhere(engine: CompiledBackend, n: int | None, which: int, value: float) -> None:
+def test_an_invalid_number_anywhere_is_named(
+    engine: CompiledBackend, n: int | None, which: int, value: float
+) -> None:
     given = state(engine.model, () if n is None else (n,))
     given[which].reshape(-1)[-1] = value
     error = ArgumentError if np.isfinite(value) else NotFiniteError
@@ -36,7 +38,7 @@ def test_a_bad_number_anywhere(engine: CompiledBackend, n: int | None, which: in
 
 
 def test_large_numbers_that_are_allowed() -> None:
-    """The sum of their squares passes the bound on one number, but not that on its square."""
+    """The sum of squares exceeds the bound on one number, but not the square of that bound."""
     model = chain(2)
     engine = made(model)
     v = np.full((3, 2), 0.9 * MAX_MAGNITUDE)
@@ -72,7 +74,7 @@ def test_without_validation_nothing_is_refused() -> None:
         q, v, a = state(model, size)
         v[..., 0] = np.nan
         assert np.isnan(engine.inverse_dynamics(q, v, a)[..., 0]).all()
-    # Shapes are looked at all the same: nothing outside the arrays is read.
+    # Shapes are checked all the same: nothing outside the arrays is read.
     with pytest.raises(ShapeError):
         engine.inverse_dynamics(np.zeros((9, 3)), np.zeros((9, 2)), np.zeros((9, 2)))
 
@@ -92,14 +94,14 @@ def test_a_configuration_without_an_acceleration() -> None:
         Link("c", replace(body, mass=1.0)),
     ]
     model = Model.build("slides", links, joints)
-    engine, ask = made(model), np.zeros(3)
+    engine, tau = made(model), np.zeros(3)
     for q in (np.zeros(3), np.zeros((4, 3)), np.zeros((MAX_COPIED_SAMPLES + 4, 3))):
         with pytest.raises(SingularMassMatrixError, match=r"at this configuration|at sample"):
-            engine.forward_dynamics(q, ask, ask)
-    assert np.isfinite(engine.forward_dynamics(np.array([0.0, 1.0, 0.0]), ask, ask)).all()
+            engine.forward_dynamics(q, tau, tau)
+    assert np.isfinite(engine.forward_dynamics(np.array([0.0, 1.0, 0.0]), tau, tau)).all()
 
 
-def test_which_sample_is_at_fault() -> None:
+def test_the_invalid_sample_is_named() -> None:
     model = dynx.load("ur5", base="floating")
     q = np.tile(model.neutral(), (40, 1))
     q[37, 3:7] = 2.0
@@ -114,7 +116,7 @@ def test_which_sample_is_at_fault() -> None:
 
 
 @pytest.mark.parametrize("n", [5, MAX_COPIED_SAMPLES + 5])
-def test_unchecked_numbers_that_are_none_spoil_their_own_sample_only(n: int) -> None:
+def test_unchecked_nan_spoils_its_own_sample_only(n: int) -> None:
     model = dynx.load("ur5")
     q = np.zeros((n, 6))
     q[3, 2] = np.nan
@@ -124,7 +126,7 @@ def test_unchecked_numbers_that_are_none_spoil_their_own_sample_only(n: int) -> 
     assert np.isfinite(np.delete(a, 3, axis=0)).all()
 
 
-def test_what_is_no_model_is_said_so() -> None:
+def test_anything_but_a_model_is_refused() -> None:
     name: Any = "panda"
     for make in (dynx.Derivatives, dynx.parametric):
         with pytest.raises(ArgumentError, match=r"wanted a Model, such as dynx.load\('panda'\)"):

@@ -1,4 +1,4 @@
-"""The compiled backend: what it adds to the contract, and where its answers come from."""
+"""The compiled backend: threads, closing, and which kernels and algorithms compute its results."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from tests.compiled.robots import ROBOTS, TIP, made, state
 from tests.error_bounds import ErrorBounds, samples_at
 
 
-def test_it_is_found_by_name_and_says_what_it_is() -> None:
+def test_it_is_found_by_name_and_has_a_version() -> None:
     engine = dynx.backend("compiled", chain(1))
     assert "compiled" in dynx.installed_backends()
     for word in ("dynx", "llvmlite", "LLVM"):
@@ -34,7 +34,7 @@ def test_it_is_found_by_name_and_says_what_it_is() -> None:
 
 
 @pytest.mark.parametrize("threads", [0, -1, 2.0, "2", True])
-def test_odd_numbers_of_threads(threads: object) -> None:
+def test_invalid_numbers_of_threads_are_refused(threads: object) -> None:
     with pytest.raises(ArgumentError, match="threads is"):
         backend("compiled", chain(1), threads=threads)
 
@@ -43,34 +43,34 @@ def test_pickling_keeps_the_threads() -> None:
     assert pickle.loads(pickle.dumps(made(chain(1), threads=3)))._threads == 3
 
 
-def test_a_kernel_is_made_once_however_many_ask(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_concurrent_calls_compile_a_kernel_once(monkeypatch: pytest.MonkeyPatch) -> None:
     model = chain(3)
     engine = made(model)
-    asked: list[str] = []
+    traced: list[str] = []
     make = kernels.quantity_kernel
 
     def counted(mechanism: Mechanism, name: str, details: tuple[Any, ...], *, tree: bool) -> Kernel:
-        asked.append(name)
+        traced.append(name)
         return make(mechanism, name, details, tree=tree)
 
     monkeypatch.setattr("dynx.compiled.backend.quantity_kernel", counted)
     q, v, a = state(model)
     start = threading.Barrier(6)
 
-    def ask() -> None:
+    def call() -> None:
         start.wait()
         engine.inverse_dynamics(q, v, a)
 
-    threads = [threading.Thread(target=ask) for _ in range(6)]
+    threads = [threading.Thread(target=call) for _ in range(6)]
     for thread in threads:
         thread.start()
     for thread in threads:
         thread.join()
-    assert asked == ["inverse_dynamics"]
+    assert traced == ["inverse_dynamics"]
 
 
-def test_closing_while_others_ask() -> None:
-    """They get the right answer or ClosedError, and nothing is freed beneath them."""
+def test_closing_during_calls_of_other_threads() -> None:
+    """A call returns the right result or raises ClosedError; no memory in use is freed."""
     model = ROBOTS["fixed"]
     q, v, a = state(model, (5000,))
     wanted = made(model).inverse_dynamics(q, v, a)
@@ -78,15 +78,15 @@ def test_closing_while_others_ask() -> None:
         engine = made(model)
         wrong: list[object] = []
 
-        def ask(engine: CompiledBackend = engine, wrong: list[object] = wrong) -> None:
+        def call_until_closed(engine: CompiledBackend = engine, wrong: list[object] = wrong) -> None:
             try:
                 while True:
                     if not np.array_equal(engine.inverse_dynamics(q, v, a), wanted):
-                        wrong.append("answer")
+                        wrong.append("result")
             except ClosedError:
                 return
 
-        threads = [threading.Thread(target=ask) for _ in range(3)]
+        threads = [threading.Thread(target=call_until_closed) for _ in range(3)]
         for thread in threads:
             thread.start()
         engine.close()
@@ -95,7 +95,7 @@ def test_closing_while_others_ask() -> None:
         assert not wrong
 
 
-# -- where the answers come from ---------------------------------------------------------------------
+# -- kernels -----------------------------------------------------------------------------------------
 
 
 def test_every_quantity_is_native() -> None:
@@ -113,13 +113,13 @@ def test_mimic_joints_are_part_of_the_kernel() -> None:
     engine.inverse_dynamics(q, v, a)
     engine.bias_torque(q, v)
     engine.forward_dynamics(q, v, a)
-    for answer in engine._calls.values():
-        call = owner(answer)
+    for result in engine._calls.values():
+        call = owner(result)
         assert isinstance(call, KernelCall)
         assert {port.shape for port in call._kernel.inputs} == {(engine.model.nv,)}
 
 
-def test_hooks_answer_in_tree_coordinates() -> None:
+def test_hooks_use_tree_coordinates() -> None:
     engine = made(ROBOTS["mimic"])
     coupling = engine._mechanism.coupling
     assert coupling is not None
@@ -132,7 +132,7 @@ def test_hooks_answer_in_tree_coordinates() -> None:
 
 
 def test_an_unphysical_robot_with_mimic_joints_is_solved_with_pivots() -> None:
-    """Elimination without pivoting is not trusted with an indefinite mass matrix."""
+    """Elimination without pivoting is inaccurate for an indefinite mass matrix."""
     model = ROBOTS["mimic"]
     odd = replace(model.links[2].inertial or Inertial(1.0), ixx=-5.0)
     links = [replace(link, inertial=odd) if k == 2 else link for k, link in enumerate(model.links)]
@@ -150,7 +150,7 @@ def test_an_unphysical_robot_with_mimic_joints_is_solved_with_pivots() -> None:
 
 @pytest.mark.parametrize("quantity", QUANTITIES)
 @pytest.mark.parametrize("robot", ["fixed", "floating mimic"])
-def test_what_is_not_compiled_is_evaluated(
+def test_quantities_that_are_not_compiled_are_evaluated_by_numpy(
     quantity: str, robot: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     model = ROBOTS[robot]
@@ -161,15 +161,15 @@ def test_what_is_not_compiled_is_evaluated(
     arguments: dict[str, Any] = {"q": q, "v": v, "a": a, "tau": a}
     values = [arguments[name] for name in QUANTITIES[quantity].arguments]
     frame = [TIP] if QUANTITIES[quantity].of_frame else []
-    answers = [getattr(each, quantity)(*values, *frame) for each in (numbers, reference)]
-    np.testing.assert_array_equal(answers[0].shape, answers[1].shape)
+    results = [getattr(each, quantity)(*values, *frame) for each in (numbers, reference)]
+    np.testing.assert_array_equal(results[0].shape, results[1].shape)
     close = ErrorBounds(samples_at(model, q, v, a, a))
     if quantity == "forward_dynamics":
-        quantity, answers = "inverse_dynamics", [reference.inverse_dynamics(q, v, answers[0]), a]
+        quantity, results = "inverse_dynamics", [reference.inverse_dynamics(q, v, results[0]), a]
         close = ErrorBounds(samples_at(model, q, v, numbers.forward_dynamics(q, v, a)))
-    close.check(quantity, answers[0], answers[1])
+    close.check(quantity, results[0], results[1])
     assert numbers._calls
-    assert all(isinstance(owner(answer), NumericCall) for answer in numbers._calls.values())
+    assert all(isinstance(owner(result), NumericCall) for result in numbers._calls.values())
     assert not kernels._calls
 
 

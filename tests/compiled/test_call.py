@@ -1,4 +1,4 @@
-"""Calls of kernels: `out`, and every way from arguments to a kernel gives the same bits."""
+"""Calls of kernels: `out`, and equal bits from every code path."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from dynx.spatial.scalar import Floats
 from tests.backends.robots import chain
 from tests.compiled.robots import ROBOTS, TIP, made, state
 
-Ask = Callable[..., Floats]
+Method = Callable[..., Floats]
 
-WITH_OUT: dict[str, tuple[Ask, Callable[[Model], tuple[int, ...]]]] = {
+WITH_OUT: dict[str, tuple[Method, Callable[[Model], tuple[int, ...]]]] = {
     "inverse_dynamics": (lambda e, q, v, a, **o: e.inverse_dynamics(q, v, a, **o), lambda m: (m.nv,)),
     "joint dynamics": (
         lambda e, q, v, a, **o: e.inverse_dynamics(q, v, a, joint_dynamics=True, **o),
@@ -56,21 +56,21 @@ def engine(request: pytest.FixtureRequest) -> CompiledBackend:
 
 
 @pytest.mark.parametrize("size", [(), (0,), (1,), (2, 3), (MAX_COPIED_SAMPLES + 5,)])
-@pytest.mark.parametrize(("ask", "tail"), WITH_OUT.values(), ids=WITH_OUT)
+@pytest.mark.parametrize(("method", "tail"), WITH_OUT.values(), ids=WITH_OUT)
 def test_out(
-    engine: CompiledBackend, ask: Ask, tail: Callable[[Model], tuple[int, ...]], size: tuple[int, ...]
+    engine: CompiledBackend, method: Method, tail: Callable[[Model], tuple[int, ...]], size: tuple[int, ...]
 ) -> None:
     given = state(engine.model, size)
-    wanted = ask(engine, *given)
+    wanted = method(engine, *given)
     out = np.full((*size, *tail(engine.model)), np.nan)
-    assert ask(engine, *given, out=out) is out
+    assert method(engine, *given, out=out) is out
     np.testing.assert_array_equal(out, wanted)
 
 
 @pytest.mark.parametrize("size", [(), (3,), (MAX_COPIED_SAMPLES + 5,)])
-@pytest.mark.parametrize(("ask", "tail"), WITH_OUT.values(), ids=WITH_OUT)
+@pytest.mark.parametrize(("method", "tail"), WITH_OUT.values(), ids=WITH_OUT)
 def test_out_that_does_not_fit(
-    engine: CompiledBackend, ask: Ask, tail: Callable[[Model], tuple[int, ...]], size: tuple[int, ...]
+    engine: CompiledBackend, method: Method, tail: Callable[[Model], tuple[int, ...]], size: tuple[int, ...]
 ) -> None:
     given = state(engine.model, size)
     shape = (*size, *tail(engine.model))
@@ -85,12 +85,12 @@ def test_out_that_does_not_fit(
         (np.empty((*shape[:-1], 2 * shape[-1]))[..., ::2], ArgumentError),
     ]:
         with pytest.raises(error, match="out"):
-            ask(engine, *given, out=out)
+            method(engine, *given, out=out)
 
 
 @pytest.mark.parametrize("size", [(), (3,), (MAX_COPIED_SAMPLES + 5,)])
 def test_out_over_an_argument(engine: CompiledBackend, size: tuple[int, ...]) -> None:
-    """Also where the first look at the arguments finds a quaternion to be scaled."""
+    """Arguments stay valid even where a quaternion has to be scaled after the first evaluation."""
     q, v, a = state(engine.model, size)
     if engine.model.floating:
         q[..., 3:7] *= 1.0 + 1e-9
@@ -103,8 +103,8 @@ def test_out_over_an_argument(engine: CompiledBackend, size: tuple[int, ...]) ->
     "n",
     [1, 2, 3, 8, MAX_COPIED_SAMPLES - 1, MAX_COPIED_SAMPLES, MAX_COPIED_SAMPLES + 1, 3 * MAX_COPIED_SAMPLES],
 )
-def test_every_way_gives_the_same_bits(engine: CompiledBackend, n: int) -> None:
-    """One at a time, in the workspace, where the arrays lie, with strides, spread, by threads."""
+def test_every_code_path_gives_the_same_bits(engine: CompiledBackend, n: int) -> None:
+    """Single samples, copied to the workspace, read in place, strided, broadcast, and on several threads."""
     q, v, a = state(engine.model, (n,))
     whole = engine.inverse_dynamics(q, v, a)
     for k in range(n):
@@ -122,9 +122,9 @@ def test_every_way_gives_the_same_bits(engine: CompiledBackend, n: int) -> None:
 def test_threads_change_nothing() -> None:
     model = ROBOTS["floating"]
     q, v, a = state(model, (20_000,))
-    answers = [made(model, threads=threads).inverse_dynamics(q, v, a) for threads in (1, 2, 5, None)]
-    for answer in answers[1:]:
-        np.testing.assert_array_equal(answer, answers[0])
+    results = [made(model, threads=threads).inverse_dynamics(q, v, a) for threads in (1, 2, 5, None)]
+    for result in results[1:]:
+        np.testing.assert_array_equal(result, results[0])
 
 
 def test_a_batch_that_does_not_fit_into_memory() -> None:

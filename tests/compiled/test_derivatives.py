@@ -45,7 +45,7 @@ each_model = pytest.mark.parametrize("model", MODELS, ids=["fixed", "mimic", "fl
 
 
 class PinocchioDerivatives:
-    """Pinocchio's analytic derivatives, brought to the coordinates of the model."""
+    """Pinocchio's analytic derivatives in the coordinates of the model."""
 
     def __init__(self, model: Model) -> None:
         self._engine = PinocchioBackend(model)._engine
@@ -81,7 +81,7 @@ REAL = [
 
 
 @pytest.mark.parametrize(("name", "base"), REAL)
-def test_real_robots_as_pinocchio_has_it(name: str, base: Base) -> None:
+def test_real_robots_against_pinocchio(name: str, base: Base) -> None:
     model = dynx.load(name, base=base)
     derivatives, engine = Derivatives(model), PinocchioDerivatives(model)
     q, v, x = motion(model, size=(5,))
@@ -147,7 +147,7 @@ def test_forward_undoes_inverse(model: Model) -> None:
 
 
 @each_model
-def test_the_staged_way_gives_what_one_kernel_gives(model: Model, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_stages_give_the_results_of_one_kernel(model: Model, monkeypatch: pytest.MonkeyPatch) -> None:
     sizes = ((), (3,), (2, 40))
     samples_of = {size: motion(model, size=size) for size in sizes}
     monkeypatch.setattr("dynx.compiled.derivatives.MAX_NV_OF_ONE_KERNEL", 100)
@@ -182,20 +182,20 @@ def test_derivative_of_a_pose_is_its_jacobian(model: Model) -> None:
 def test_batches_broadcast_and_threads_change_nothing(model: Model) -> None:
     one, two = Derivatives(model, threads=1), Derivatives(model, threads=2)
     q, v, a = motion(model, size=(2, 3))
-    for ask in ("inverse_dynamics_derivatives", "forward_dynamics_derivatives"):
-        whole = getattr(one, ask)(q[:, :1], v[0], a[0, 0])
+    for method in ("inverse_dynamics_derivatives", "forward_dynamics_derivatives"):
+        whole = getattr(one, method)(q[:, :1], v[0], a[0, 0])
         for got, same, field in zip(
-            whole, getattr(two, ask)(q[:, :1], v[0], a[0, 0]), whole._fields, strict=True
+            whole, getattr(two, method)(q[:, :1], v[0], a[0, 0]), whole._fields, strict=True
         ):
             assert got.shape == (2, 3, model.nv, model.nv)
             np.testing.assert_array_equal(got, same)
-            single = getattr(getattr(one, ask)(q[1, 0], v[0, 2], a[0, 0]), field)
+            single = getattr(getattr(one, method)(q[1, 0], v[0, 2], a[0, 0]), field)
             assert_close(got[1, 2], single, float(np.max(np.abs(whole[2]))))
-        empty = getattr(one, ask)(q[:0], v[:0], a[:0])
+        empty = getattr(one, method)(q[:0], v[:0], a[:0])
         assert empty[0].shape == (0, 3, model.nv, model.nv)
 
 
-def test_the_implicit_way_is_smaller_than_differentiating_the_algorithm() -> None:
+def test_implicit_differentiation_is_smaller_than_that_of_the_algorithm() -> None:
     mechanism = dynx.load("ur5").mechanism
     assert mechanism.nv <= MAX_NV_OF_ONE_KERNEL
     program = acceleration(mechanism)
@@ -221,14 +221,14 @@ def test_the_smallest_robots(joints: int) -> None:
     model = chain(joints)
     derivatives = Derivatives(model)
     for size in ((), (5,)):
-        for ask in (derivatives.inverse_dynamics_derivatives, derivatives.forward_dynamics_derivatives):
-            found = ask(*motion(model, size=size))
+        for method in (derivatives.inverse_dynamics_derivatives, derivatives.forward_dynamics_derivatives):
+            found = method(*motion(model, size=size))
             assert all(x.shape == (*size, joints, joints) for x in found)
         dT = derivatives.forward_kinematics_derivative(motion(model, size=size)[0], model.frame_names[-1])
         assert dT.shape == (*size, 4, 4, joints)
 
 
-def test_what_is_refused() -> None:
+def test_invalid_arguments_are_refused() -> None:
     model = MODELS[0]
     derivatives = Derivatives(model)
     q, v, a = motion(model)

@@ -1,4 +1,4 @@
-"""One kernel for all frames of a chain: it answers for each of them, and few kernels are made."""
+"""Kernels that all frames of a chain share: right for each frame, and few in number."""
 
 from __future__ import annotations
 
@@ -27,11 +27,13 @@ from tests.error_bounds import ErrorBounds, samples_at
 each_quantity = pytest.mark.parametrize("quantity", sorted(ON_CHAINS))
 
 
-def asked(engine: Any, quantity: str, frame: str, reference: str, *given: Floats, **options: Any) -> Floats:
-    """A quantity of a frame, at q and as many of v and a as it takes."""
+def evaluate(
+    engine: Any, quantity: str, frame: str, reference: str, *given: Floats, **options: Any
+) -> Floats:
+    """Evaluate a quantity of a frame at q and those of v and a that it takes."""
     arguments = given[: len(QUANTITIES[quantity].arguments)]
-    answer: Floats = getattr(engine, quantity)(*arguments, frame, reference=reference, **options)
-    return answer
+    result: Floats = getattr(engine, quantity)(*arguments, frame, reference=reference, **options)
+    return result
 
 
 @pytest.fixture(scope="module", params=ROBOTS)
@@ -45,7 +47,7 @@ def engine(request: pytest.FixtureRequest) -> CompiledBackend:
 def test_any_frame_of_any_robot(
     quantity: str, base: Literal["fixed", "floating"], data: st.DataObject
 ) -> None:
-    """What is traced, evaluated on numbers, is what `dynx.rbd` gives for that frame."""
+    """The traced function, evaluated on numbers, agrees with `dynx.rbd` for that frame."""
     model = data.draw(models(base=base))
     note(model.to_urdf())
     mechanism, drawn = model.mechanism, data.draw(samples(model))
@@ -66,7 +68,7 @@ def test_any_frame_of_any_robot(
 
 @each_quantity
 @pytest.mark.parametrize("size", [(), (3,), (MAX_COPIED_SAMPLES + 5,)])
-def test_kernels_answer_for_every_frame(
+def test_kernels_serve_every_frame_of_their_chain(
     engine: CompiledBackend, quantity: str, size: tuple[int, ...]
 ) -> None:
     model = engine.model
@@ -75,51 +77,51 @@ def test_kernels_answer_for_every_frame(
     close = ErrorBounds(samples_at(model, *given))
     for frame in model.frame_names:
         for reference in REFERENCES:
-            got, wanted = (asked(each, quantity, frame, reference, *given) for each in (engine, numeric))
+            got, wanted = (evaluate(each, quantity, frame, reference, *given) for each in (engine, numeric))
             close.check(quantity, got, wanted)
 
 
 @each_quantity
-def test_no_order_of_questions_changes_an_answer(quantity: str) -> None:
+def test_the_order_of_calls_changes_no_result(quantity: str) -> None:
     model = ROBOTS["floating"]
     given = state(model, (5,))
-    questions = [(frame, reference) for frame in model.frame_names for reference in REFERENCES]
-    answers = []
-    for order in (questions, questions[::-1]):
+    pairs = [(frame, reference) for frame in model.frame_names for reference in REFERENCES]
+    results = []
+    for order in (pairs, pairs[::-1]):
         engine = made(model)
-        answers.append({question: asked(engine, quantity, *question, *given) for question in order})
-    for question in questions:
-        np.testing.assert_array_equal(answers[0][question], answers[1][question])
+        results.append({pair: evaluate(engine, quantity, *pair, *given) for pair in order})
+    for pair in pairs:
+        np.testing.assert_array_equal(results[0][pair], results[1][pair])
 
 
 @each_quantity
 @pytest.mark.parametrize("reference", REFERENCES)
-def test_every_way_gives_the_same_bits(engine: CompiledBackend, quantity: str, reference: str) -> None:
-    """One at a time, as a small batch, as a large one, with strides, into `out`."""
+def test_every_code_path_gives_the_same_bits(engine: CompiledBackend, quantity: str, reference: str) -> None:
+    """Single samples, small and large batches, strided arrays, and `out`."""
     given = state(engine.model, (MAX_COPIED_SAMPLES + 5,))
-    whole = asked(engine, quantity, TIP, reference, *given)
+    whole = evaluate(engine, quantity, TIP, reference, *given)
     for n in (1, 2, 7):
-        some = asked(engine, quantity, TIP, reference, *(x[:n] for x in given))
+        some = evaluate(engine, quantity, TIP, reference, *(x[:n] for x in given))
         np.testing.assert_array_equal(some, whole[:n])
-    one = asked(engine, quantity, TIP, reference, *(x[3] for x in given))
+    one = evaluate(engine, quantity, TIP, reference, *(x[3] for x in given))
     np.testing.assert_array_equal(one, whole[3])
-    strided = asked(engine, quantity, TIP, reference, *(x[::2] for x in given))
+    strided = evaluate(engine, quantity, TIP, reference, *(x[::2] for x in given))
     np.testing.assert_array_equal(strided, whole[::2])
     if quantity == "jacobian":
         out = np.full_like(whole, np.nan)
-        assert asked(engine, quantity, TIP, reference, *given, out=out) is out
+        assert evaluate(engine, quantity, TIP, reference, *given, out=out) is out
         np.testing.assert_array_equal(out, whole)
 
 
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_few_kernels_are_made(robot: str) -> None:
-    """One for each end of the tree, and one for each body in the Jacobian asked for most."""
+    """One for each leaf of the tree, and one for each body for the Jacobian in `local_world_aligned`."""
     engine, mechanism = made(ROBOTS[robot]), ROBOTS[robot].mechanism
     given = state(engine.model)
     for quantity in ON_CHAINS:
         for frame in engine.model.frame_names:
             for reference in REFERENCES:
-                asked(engine, quantity, frame, reference, *given)
+                evaluate(engine, quantity, frame, reference, *given)
     ends = set(range(len(mechanism.bodies))) - {body.parent for body in mechanism.bodies}
     assert len(engine._chain_kernels) == len(ON_CHAINS) * len(ends) + len(mechanism.bodies) + 1
 
@@ -136,7 +138,7 @@ def test_a_chain_holds_the_body_of_its_frame() -> None:
             assert parents == [ROOT, *each.bodies[:-1]][: len(parents)]
 
 
-def test_closing_lets_go_of_the_chains() -> None:
+def test_closing_releases_the_kernels_of_chains() -> None:
     engine = made(a_chain(1))
     engine.frame_velocity(np.zeros(1), np.zeros(1), "link1")
     assert engine._chain_kernels

@@ -1,4 +1,4 @@
-"""Which kernels there are, what is folded into them, and when one is compiled anew."""
+"""Kernels: their size, their constants, and when one is compiled again."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tests.backends.robots import chain, mixed_robot
 from tests.compiled.robots import ROBOTS, made, state
 
 
-def test_what_grows_too_long_is_not_compiled() -> None:
+def test_long_code_is_not_compiled() -> None:
     assert compiles(chain(30).mechanism, "mass_matrix")
     assert not compiles(chain(60).mechanism, "mass_matrix")
     assert compiles(chain(60).mechanism, "inverse_dynamics")
@@ -26,7 +26,7 @@ def test_what_grows_too_long_is_not_compiled() -> None:
     assert not compiles(chain(20).mechanism, "inertial_regressor")
 
 
-def test_dust_is_what_rounding_left() -> None:
+def test_rounding_residue_is_removed_from_rotations() -> None:
     """Right angles become exact, and nothing else changes."""
     pose = Pose((0.1, 0.2, 0.3), (np.pi / 2, 0.0, -np.pi / 2))
     links = [Link("a"), Link("b", Inertial(1.0, Pose((0.1, 0.0, 0.0)), 0.1, 0.0, 0.0, 0.1, 0.0, 0.1))]
@@ -43,7 +43,7 @@ def test_dust_is_what_rounding_left() -> None:
 
 
 def _variants(mechanism: Mechanism) -> list[Mechanism]:
-    """Every number of the mechanism changed by its last bit, one after another."""
+    """Mechanisms that each differ from the given one in the last bit of one number."""
     found = [
         replace(mechanism, gravity=np.nextafter(mechanism.gravity, 99.0)),
         replace(mechanism, floating=not mechanism.floating),
@@ -80,7 +80,7 @@ def test_every_number_of_the_robot_is_in_the_key() -> None:
     assert _fingerprint(build_mechanism(model)) == _fingerprint(build_mechanism(model))
 
 
-def test_warm_from_the_cache_nothing_is_traced(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_a_cached_kernel_is_loaded_without_tracing(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setitem(os.environ, "DYNX_CACHE_DIR", str(tmp_path))
     monkeypatch.delenv("DYNX_CACHE", raising=False)
     model = ROBOTS["floating"]

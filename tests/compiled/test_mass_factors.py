@@ -1,4 +1,4 @@
-"""Factors of the mass matrix keep the zeros between branches, and make the fill-in of mimic joints."""
+"""Factors of the mass matrix: zeros between branches, and fill-in of mimic joints."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Parameters as arguments: the model's own give its own answers, others those of a model so changed."""
+"""Parameters as arguments: the results are those of a model with the same parameters."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def check_same(
 
 @each_model
 @pytest.mark.parametrize("joint_dynamics", [False, True])
-def test_the_models_own_parameters_give_its_own_answers(model: Model, joint_dynamics: bool) -> None:
+def test_the_parameters_of_the_model_give_its_results(model: Model, joint_dynamics: bool) -> None:
     dynamics = parametric(
         model,
         links=["link6", "link0", "link8"],
@@ -69,7 +69,7 @@ def test_the_models_own_parameters_give_its_own_answers(model: Model, joint_dyna
 
 @given(st.data())
 @settings(max_examples=12)
-def test_random_robots_with_parameters_of_their_own(data: st.DataObject) -> None:
+def test_random_robots_with_random_parameters(data: st.DataObject) -> None:
     model = data.draw(models(max_links=4, base="either", solvable=True))
     links = data.draw(st.lists(st.sampled_from([link.name for link in model.links]), unique=True))
     q, v, a = data.draw(samples(model))
@@ -89,7 +89,7 @@ def test_changed_links_are_those_of_a_changed_model(model: Model) -> None:
 
 
 @each_model
-def test_payloads_are_links_that_are_welded_on(model: Model) -> None:
+def test_payloads_are_rigidly_connected_links(model: Model) -> None:
     carrier = next(frame for frame in model.frames if frame.name == "hand")
     for kind in ("payload", "point_payload"):
         point = kind == "point_payload"
@@ -115,7 +115,7 @@ def test_payloads_are_links_that_are_welded_on(model: Model) -> None:
 
 
 @each_model
-def test_every_sample_has_its_own(model: Model) -> None:
+def test_every_sample_has_its_own_parameters(model: Model) -> None:
     dynamics = parametric(model, links=["link6"], joint_dynamics=True, threads=2)
     q, v, a = motion(model, size=(9,))
     rng = np.random.default_rng(1)
@@ -128,7 +128,7 @@ def test_every_sample_has_its_own(model: Model) -> None:
     assert_close(spread[2, 5], dynamics.mass_matrix(q[2], parameters[5]))
 
 
-def test_joint_parameters_are_those_of_the_joints() -> None:
+def test_joint_parameters_change_the_joint_dynamics() -> None:
     model = chain(2)
     dynamics = parametric(model, joint_dynamics=True, threads=1)
     assert dynamics.parameters.names == tuple(
@@ -174,7 +174,7 @@ def test_without_parameters_it_is_the_robot() -> None:
     check_same(parametric(model), None, ReferenceBackend(model), motion(model), False)
 
 
-def test_what_is_refused() -> None:
+def test_invalid_arguments_are_refused() -> None:
     model = MODELS[0]
     with pytest.raises(UnknownNameError, match="no link 'link66'"):
         parametric(model, links=["link66"])

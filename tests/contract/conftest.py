@@ -13,7 +13,7 @@ from dynx.model import Model
 Make = Callable[..., Backend]
 
 ALIVE = 8
-"""More than any one test has open at a time."""
+"""Number of backends that are kept open, more than any one test uses at a time."""
 
 
 @pytest.fixture(scope="session", params=installed_backends())

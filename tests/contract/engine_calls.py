@@ -1,4 +1,4 @@
-"""Every engine_call that can be put to a backend, with the shape that its answer must have."""
+"""Calls of every method of a backend, with the shapes of their results."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tests.error_bounds import ErrorBounds, samples_at
 
 @dataclass(frozen=True)
 class State:
-    """q (..., nq), v, a, tau (..., nv); each may have leading axes of its own."""
+    """q (..., nq), v, a, tau (..., nv), with leading axes that broadcast."""
 
     q: Any
     v: Any
@@ -27,7 +27,7 @@ class State:
     tau: Any
 
     def map(self, change: Callable[[Any], Any]) -> State:
-        """The state with `change` made to each of the four."""
+        """Apply `change` to each of the four arrays."""
         return State(change(self.q), change(self.v), change(self.a), change(self.tau))
 
 

@@ -1,4 +1,4 @@
-"""What may be passed in, that it stays as it was, and that what comes out belongs to the caller."""
+"""Valid arguments, which stay unchanged, and results, which belong to the caller."""
 
 from __future__ import annotations
 
@@ -59,19 +59,19 @@ def test_any_array_of_the_same_numbers(
     engine = make(FLOATING)
     for size in ((), (3,)):
         state = random_state(FLOATING, 11, size)
-        answer = engine_call.evaluate(engine, state.map(spelling))
-        engine_call.check(engine, state, answer, engine_call.evaluate(engine, state))
+        result = engine_call.evaluate(engine, state.map(spelling))
+        engine_call.check(engine, state, result, engine_call.evaluate(engine, state))
 
 
 @pytest.mark.parametrize("dtype", ["float32", "float16", "int64", "int8", "uint8"])
 @each_call
-def test_other_real_numbers_are_taken_at_their_value(make: Make, engine_call: EngineCall, dtype: str) -> None:
+def test_other_real_numbers_are_converted_exactly(make: Make, engine_call: EngineCall, dtype: str) -> None:
     engine = make(FLOATING)
     narrow = random_state(FLOATING, 12).map(lambda x: np.rint(np.abs(x)).astype(dtype))
     narrow.q[3:7] = np.array([0, 0, 1, 0], dtype=dtype)
-    answer = engine_call.evaluate(engine, narrow)
-    np.testing.assert_array_equal(answer, engine_call.evaluate(engine, narrow.map(np.float64)))
-    assert np.asarray(answer).dtype == np.float64
+    result = engine_call.evaluate(engine, narrow)
+    np.testing.assert_array_equal(result, engine_call.evaluate(engine, narrow.map(np.float64)))
+    assert np.asarray(result).dtype == np.float64
 
 
 @each_call
@@ -86,7 +86,7 @@ def test_arguments_stay_as_they_were(make: Make, engine_call: EngineCall) -> Non
 
 
 @each_call
-def test_answers_belong_to_the_caller(make: Make, engine_call: EngineCall) -> None:
+def test_results_belong_to_the_caller(make: Make, engine_call: EngineCall) -> None:
     engine = make(FLOATING)
     for size in ((), (2,)):
         state = random_state(FLOATING, 14, size)
@@ -105,7 +105,7 @@ def test_answers_belong_to_the_caller(make: Make, engine_call: EngineCall) -> No
 
 
 @each_call
-def test_without_validation_the_answers_are_the_same(make: Make, engine_call: EngineCall) -> None:
+def test_without_validation_the_results_are_the_same(make: Make, engine_call: EngineCall) -> None:
     checked, trusting = make(FLOATING), make(FLOATING, validate=False)
     for size in ((), (2,)):
         state: State = random_state(FLOATING, 16, size)

@@ -1,4 +1,4 @@
-"""Bad input raises an error of `dynx.errors` that says what was got and what was wanted."""
+"""Bad input raises an error of `dynx.errors` that names the input and the valid form."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def test_an_array_that_cannot_be_used(make: Make, engine_call: EngineCall, kind:
 
 
 @each_call
-def test_the_largest_numbers_that_are_taken_overflow_nothing(make: Make, engine_call: EngineCall) -> None:
+def test_the_largest_valid_numbers_do_not_overflow(make: Make, engine_call: EngineCall) -> None:
     """A quaternion stays one; everything else is as large as the bound allows."""
     engine = make(FLOATING)
     large = 0.99 * MAX_MAGNITUDE
@@ -80,12 +80,12 @@ def test_the_largest_numbers_that_are_taken_overflow_nothing(make: Make, engine_
     q[:3], q[7:] = large, large
     v = np.full(FLOATING.nv, large)
     try:
-        answer = engine_call.evaluate(engine, State(q, v, -v, v))
+        result = engine_call.evaluate(engine, State(q, v, -v, v))
     except SingularMassMatrixError:
         # A body as far away as that leaves the joints' own inertia below its rounding error.
         assert str(engine_call) == "forward_dynamics"
     else:
-        assert np.isfinite(answer).all()
+        assert np.isfinite(result).all()
 
 
 @pytest.mark.parametrize("engine_call", [q for q in ENGINE_CALLS if len(q.arguments) > 1], ids=str)
@@ -114,7 +114,7 @@ def test_a_length_of_the_other_base(make: Make) -> None:
 
 
 class TestNames:
-    """A name that is not there; the message offers the nearest that is."""
+    """Unknown names; the message offers the nearest known one."""
 
     @pytest.mark.parametrize("method", ["forward_kinematics", "jacobian"])
     def test_frame(self, make: Make, method: str) -> None:
@@ -129,9 +129,9 @@ class TestNames:
 
     @pytest.mark.parametrize("name", ["", "x" * 10_000, "\0\n\x1b[31m", 7, 2.5, b"tool", ("tool",), {}])
     def test_frame_that_cannot_be_one(self, make: Make, name: Any) -> None:
-        for ask in self.about_frames(make(FIXED)):
+        for method in self.about_frames(make(FIXED)):
             with pytest.raises(ArgumentError) as caught:
-                ask(name)
+                method(name)
             message = str(caught.value)
             assert message.isprintable()
             assert len(message) < 400
@@ -166,7 +166,7 @@ class TestNames:
 
 
 class TestExternalForces:
-    """Frames, wrenches and points that cannot be."""
+    """Invalid frames, wrenches and points."""
 
     @pytest.mark.parametrize(
         ("forces", "error", "says"),
@@ -181,16 +181,16 @@ class TestExternalForces:
     )
     def test_forces(self, make: Make, forces: Any, error: type[DynxError], says: str) -> None:
         rest = np.zeros(FIXED.nv)
-        for ask in (make(FIXED).inverse_dynamics, make(FIXED).forward_dynamics):
+        for method in (make(FIXED).inverse_dynamics, make(FIXED).forward_dynamics):
             with pytest.raises(error, match=says):
-                ask(FIXED.neutral(), rest, rest, external_forces=forces)
+                method(FIXED.neutral(), rest, rest, external_forces=forces)
 
     def test_batches_that_do_not_broadcast(self, make: Make) -> None:
         state = random_state(FIXED, 63, (3,))
         forces = {"tool": np.zeros((2, 6))}
-        for ask in (make(FIXED).inverse_dynamics, make(FIXED).forward_dynamics):
+        for method in (make(FIXED).inverse_dynamics, make(FIXED).forward_dynamics):
             with pytest.raises(ShapeError, match="do not broadcast"):
-                ask(state.q, state.v, state.a, external_forces=forces)
+                method(state.q, state.v, state.a, external_forces=forces)
 
     @pytest.mark.parametrize("point", [[0.0, 0.0], np.zeros((2, 3)), "tip", [np.inf, 0, 0]])
     def test_point(self, make: Make, point: Any) -> None:
@@ -203,7 +203,7 @@ def test_options_that_a_backend_does_not_have(backend_name: str) -> None:
         backend(backend_name, FIXED, valdate=False)
 
 
-def test_something_that_is_no_model(backend_name: str) -> None:
+def test_anything_but_a_model_is_refused(backend_name: str) -> None:
     name_of_one: Any = "ur5"
     with pytest.raises(ArgumentError, match="Model"):
         backend(backend_name, name_of_one)
@@ -220,13 +220,13 @@ ARRAYS = hnp.arrays(
 
 
 @given(st.data())
-def test_whatever_is_passed_only_dynx_errors_come_back(make: Make, data: st.DataObject) -> None:
+def test_any_arguments_raise_only_errors_of_dynx(make: Make, data: st.DataObject) -> None:
     engine = make(FLOATING)
     engine_call = data.draw(st.sampled_from(ENGINE_CALLS))
     wrong = data.draw(st.sampled_from(engine_call.arguments))
     state = State(**{**vars(GOOD), wrong: data.draw(JUNK | ARRAYS)})
     try:
-        answer = engine_call.evaluate(engine, state)
+        result = engine_call.evaluate(engine, state)
     except DynxError:
         return
-    assert np.isfinite(answer).all()
+    assert np.isfinite(result).all()

@@ -1,4 +1,4 @@
-"""Where the bodies are: inertia, centre of mass and energy link by link, from poses alone.
+"""Inertia, centre of mass and energy, summed link by link from poses alone.
 
 A link that is welded to another counts where it sits. Each sum here is the definition: over the
 links of the description, at the poses and velocities that the backend itself gives.
@@ -27,7 +27,7 @@ each_model = pytest.mark.parametrize("model", MODELS.values(), ids=MODELS.keys()
 
 
 def center_jacobians(model: Model, engine: Backend, q: Floats) -> list[tuple[float, Floats, Floats, Floats]]:
-    """Of each body: mass, centre of mass in the world, its Jacobian in the world, tensor in the world."""
+    """For each body: mass, centre of mass, its Jacobian, and inertia tensor, in the world."""
     found = []
     for link in model.links:
         if link.inertial is None:

@@ -30,7 +30,7 @@ each_call = pytest.mark.parametrize("engine_call", ENGINE_CALLS, ids=str)
 
 
 def is_projected(engine_call: EngineCall) -> bool:
-    """Whether the answer of a robot with a mimic joint is a projection of that of the free robot."""
+    """Whether the result of a robot with a mimic joint is a projection of that without the coupling."""
     return not engine_call.options.get("joint_dynamics") and engine_call.method != "forward_dynamics"
 
 
@@ -44,7 +44,7 @@ def test_order_is_depth_first_in_the_order_of_the_document() -> None:
 
 @each_base
 def test_a_coordinate_moves_what_is_below_its_joint_along_its_axis(make: Make, base: str) -> None:
-    """Which frames move, and that the child moves by the coordinate about or along the axis."""
+    """Only frames below the joint move, and the child moves by the coordinate about or along the axis."""
     model = branched() if base == "fixed" else branched().with_base("floating")
     engine = make(model)
     for seed in range(3):
@@ -93,8 +93,8 @@ def test_a_continuous_joint_is_one_unbounded_angle(make: Make) -> None:
     turned = state.q.copy()
     turned[:, wheel] += 2 * np.pi
     for engine_call in ENGINE_CALLS:
-        answer = engine_call.evaluate(engine, State(turned, state.v, state.a, state.tau))
-        engine_call.check(engine, state, answer, engine_call.evaluate(engine, state))
+        result = engine_call.evaluate(engine, State(turned, state.v, state.a, state.tau))
+        engine_call.check(engine, state, result, engine_call.evaluate(engine, state))
 
 
 @each_base
@@ -158,11 +158,11 @@ class TestFloatingBase:
         engine, state = make(self.model), random_state(self.model, 22, (3,))
         other = state.q.copy()
         other[:, 3:7] *= -1.0
-        answer = engine_call.evaluate(engine, State(other, state.v, state.a, state.tau))
-        engine_call.check(engine, state, answer, engine_call.evaluate(engine, state))
+        result = engine_call.evaluate(engine, State(other, state.v, state.a, state.tau))
+        engine_call.check(engine, state, result, engine_call.evaluate(engine, state))
 
     def test_a_base_that_is_held_is_a_fixed_base(self, make: Make) -> None:
-        """Without motion of the base, the joints see the torques that they see on a fixed base."""
+        """Without motion of the base, joint torques are those of a fixed base."""
         fixed = branched()
         state = random_state(fixed, 23, (4,))
         q = np.concatenate([np.tile([0.0, 0, 0, 0, 0, 0, 1], (4, 1)), state.q], axis=1)
@@ -233,15 +233,15 @@ class TestMimicJoints:
         free = State(
             state.q @ self.S.T + self.offset, state.v @ self.S.T, state.a @ self.S.T, state.tau @ self.S.T
         )
-        # What is asked about a frame is about the one that the mimic joint moves.
+        # Quantities of a frame are those of the frame that the mimic joint moves.
         assert model.frame_names[-1] == self.free.frame_names[-1] == "beta"
-        answer = engine_call.evaluate(make(self.free), free)
+        result = engine_call.evaluate(make(self.free), free)
         wide, narrow = engine_call.tail(self.free), engine_call.tail(model)
         if wide[-1:] != narrow[-1:]:
-            answer = answer @ self.S
+            result = result @ self.S
         if wide[:-1] != narrow[:-1]:
-            answer = self.S.T @ answer
-        engine_call.check(make(model), state, engine_call.evaluate(make(model), state), answer)
+            result = self.S.T @ result
+        engine_call.check(make(model), state, engine_call.evaluate(make(model), state), result)
 
     def test_forward_dynamics_gives_what_inverse_dynamics_took(self, make: Make) -> None:
         model = mimicking()

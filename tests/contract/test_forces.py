@@ -1,4 +1,4 @@
-"""Gravity, external forces, and what the joints themselves do."""
+"""Gravity, external forces, and joint dynamics."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ each_reference = pytest.mark.parametrize("reference", REFERENCES)
 
 
 class TestGravity:
-    """It is the model's, by default (0, 0, -9.81)."""
+    """Gravity of the model, by default (0, 0, -9.81)."""
 
     def test_default(self, make: Make) -> None:
-        """A point mass on a hinge about y, held out along x, pulls by m g d."""
+        """A point mass at distance d along x on a hinge about y requires the torque m g d."""
         model = hinge(Inertial(2.0, Pose((0.5, 0.0, 0.0))))
         assert model.gravity == (0.0, 0.0, -9.81)
         close = ErrorBounds(samples_at(model, [0.0]))

@@ -35,7 +35,7 @@ def test_import_dynx_imports_nothing_heavy() -> None:
         "import dynx; dynx.backend('reference', dynx.load('<robot name=\"r\"><link name=\"l\"/></robot>'))",
     ],
 )
-def test_no_engine_is_imported_before_it_is_asked_for(program: str) -> None:
+def test_no_engine_is_imported_before_it_is_used(program: str) -> None:
     assert modules_after(program).isdisjoint(ENGINES)
 
 

@@ -1,4 +1,4 @@
-"""No order of calls changes an answer; threads, pickling, closing."""
+"""Independence of the order of calls; threads, pickling, closing."""
 
 from __future__ import annotations
 
@@ -43,18 +43,18 @@ def state_of(call: Call) -> State:
     return random_state(MODELS[model], 70 + state, SIZES[size])
 
 
-def answer(engine: Backend, call: Call) -> Floats:
+def result(engine: Backend, call: Call) -> Floats:
     return np.array(ENGINE_CALLS[call[1]].evaluate(engine, state_of(call)))
 
 
 @pytest.fixture(scope="module")
 def alone(backend_name: str) -> dict[Call, Floats]:
-    """Answers of a backend that was asked nothing before, filled as they are needed."""
+    """Results by call, each of a new backend; tests fill it."""
     return {}
 
 
 def test_no_order_of_calls_changes_a_result(make: Make, backend_name: str, alone: dict[Call, Floats]) -> None:
-    """Any calls to several robots in turn, against each call made to a backend of its own."""
+    """Calls to several robots in any order, against each call to a new backend."""
     engines = [make(model) for model in MODELS]
 
     @given(st.lists(CALLS, min_size=2, max_size=12))
@@ -62,8 +62,8 @@ def test_no_order_of_calls_changes_a_result(make: Make, backend_name: str, alone
         for call in calls:
             if call not in alone:
                 with backend(backend_name, MODELS[call[0]]) as fresh:
-                    alone[call] = answer(fresh, call)
-            np.testing.assert_array_equal(answer(engines[call[0]], call), alone[call])
+                    alone[call] = result(fresh, call)
+            np.testing.assert_array_equal(result(engines[call[0]], call), alone[call])
 
     holds()
 
@@ -80,7 +80,7 @@ def test_a_failed_call_leaves_nothing_behind(make: Make) -> None:
 
 
 def test_several_threads_at_once(make: Make) -> None:
-    """Each thread asks everything, of two robots, in an order of its own."""
+    """Each thread makes every call, for every robot, in another order."""
     engines = [make(model) for model in MODELS]
     calls = [
         (model, engine_call, state, size)
@@ -89,17 +89,17 @@ def test_several_threads_at_once(make: Make) -> None:
         for state in range(2)
         for size in range(len(SIZES))
     ]
-    wanted = [answer(engines[call[0]], call) for call in calls]
+    wanted = [result(engines[call[0]], call) for call in calls]
 
-    def ask_all(seed: int) -> list[Floats]:
-        answers = [np.empty(0)] * len(calls)
+    def call_all(seed: int) -> list[Floats]:
+        results = [np.empty(0)] * len(calls)
         for k in np.random.default_rng(seed).permutation(len(calls)):
-            answers[k] = answer(engines[calls[k][0]], calls[k])
-        return answers
+            results[k] = result(engines[calls[k][0]], calls[k])
+        return results
 
     with ThreadPoolExecutor(4) as pool:
-        for answers in pool.map(ask_all, range(4)):
-            for got, want in zip(answers, wanted, strict=True):
+        for results in pool.map(call_all, range(4)):
+            for got, want in zip(results, wanted, strict=True):
                 np.testing.assert_array_equal(got, want)
 
 
@@ -161,7 +161,7 @@ def test_a_closed_backend_can_be_pickled_and_opens_anew(backend_name: str) -> No
         np.testing.assert_array_equal(copy.mass_matrix(FIXED.neutral()), wanted)
 
 
-def test_it_says_what_it_is(make: Make, backend_name: str) -> None:
+def test_it_has_a_name_and_a_version(make: Make, backend_name: str) -> None:
     engine = make(FIXED)
     assert engine.name == backend_name
     assert engine.model is FIXED
@@ -183,7 +183,7 @@ def test_many_backends_one_after_another(backend_name: str) -> None:
 
 
 def test_a_backend_works_in_a_child_process(backend_name: str) -> None:
-    """Sent there by pickle."""
+    """The backend is sent to the process by pickle."""
     engine = backend(backend_name, FIXED)
     q = FIXED.neutral()
     program = (

@@ -22,7 +22,7 @@ each_massless = pytest.mark.parametrize("inertial", MASSLESS.values(), ids=MASSL
 def test_a_link_without_inertial_has_no_mass(
     make: Make, base: str, engine_call: EngineCall, inertial: Inertial | None
 ) -> None:
-    """Massless links welded on change no answer."""
+    """Massless links on fixed joints change no result."""
     extra_links = [Link("flag", inertial), Link("pole", inertial)]
     extra_joints = [
         Joint("pole_weld", "fixed", "trunk", "pole", Pose((0.5, 0.0, 1.0))),
@@ -34,20 +34,20 @@ def test_a_link_without_inertial_has_no_mass(
     )
     assert plain.frame_names[-1] == decked.frame_names[-1]
     state = random_state(plain, 51, (3,))
-    answer = engine_call.evaluate(make(decked), state)
+    result = engine_call.evaluate(make(decked), state)
     if engine_call.method == "inertial_regressor":
         # It has columns for the links that were added, too.
         shared = [decked.links.index(link) for link in plain.links]
-        by_link = answer.reshape(*answer.shape[:-1], len(decked.links), 10)
-        answer = by_link[..., shared, :].reshape(*answer.shape[:-1], -1)
-        engine_call.check(make(plain), state, answer, engine_call.evaluate(make(plain), state))
+        by_link = result.reshape(*result.shape[:-1], len(decked.links), 10)
+        result = by_link[..., shared, :].reshape(*result.shape[:-1], -1)
+        engine_call.check(make(plain), state, result, engine_call.evaluate(make(plain), state))
         return
-    engine_call.check(make(decked), state, answer, engine_call.evaluate(make(plain), state))
+    engine_call.check(make(decked), state, result, engine_call.evaluate(make(plain), state))
 
 
 @each_massless
 def test_a_massless_link_on_a_joint(make: Make, inertial: Inertial | None) -> None:
-    """No torque moves it; forward dynamics has no answer and says which joint is to blame."""
+    """Forward dynamics has no solution; the error names the joint."""
     engine = make(hinge(inertial))
     np.testing.assert_array_equal(engine.mass_matrix([0.4]), [[0.0]])
     np.testing.assert_array_equal(engine.inverse_dynamics([0.4], [1.0], [2.0]), [0.0])

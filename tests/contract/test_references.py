@@ -1,4 +1,4 @@
-"""What the rows of a Jacobian are, in each reference, at the frame and at a point beside it."""
+"""Rows of Jacobians in each reference, at the frame's origin and at another point."""
 
 from __future__ import annotations
 

@@ -27,11 +27,11 @@ each_call = pytest.mark.parametrize("engine_call", ENGINE_CALLS, ids=str)
 def test_shape_and_type_for_every_size_of_batch(make: Make, model: Model, engine_call: EngineCall) -> None:
     engine = make(model)
     for size in SIZES:
-        answer = engine_call.evaluate(engine, random_state(model, 1, size))
-        assert type(answer) is np.ndarray or size == (), f"{type(answer)} for {size}"
-        assert np.shape(answer) == (*size, *engine_call.tail(model))
-        assert np.asarray(answer).dtype == np.float64
-        assert np.isfinite(answer).all()
+        result = engine_call.evaluate(engine, random_state(model, 1, size))
+        assert type(result) is np.ndarray or size == (), f"{type(result)} for {size}"
+        assert np.shape(result) == (*size, *engine_call.tail(model))
+        assert np.asarray(result).dtype == np.float64
+        assert np.isfinite(result).all()
 
 
 @each_model
@@ -54,14 +54,14 @@ def test_leading_axes_broadcast(make: Make, base: str, engine_call: EngineCall) 
     engine = make(model)
     whole = random_state(model, 3, (2, 3))
     apart = State(whole.q[:, :1], whole.v[0], whole.a[0, 0], whole.tau[0, 0])
-    answer = engine_call.evaluate(engine, apart)
+    result = engine_call.evaluate(engine, apart)
     shapes = {"q": (2, 1), "v": (3,), "a": (), "tau": ()}
     batch = np.broadcast_shapes(*(shapes[argument] for argument in engine_call.arguments))
-    assert answer.shape == (*batch, *engine_call.tail(model))
+    assert result.shape == (*batch, *engine_call.tail(model))
     spread = apart.map(lambda x: np.broadcast_to(x, (2, 3, x.shape[-1])).reshape(6, -1))
-    answers = np.broadcast_to(answer, (2, 3, *engine_call.tail(model)))
+    results = np.broadcast_to(result, (2, 3, *engine_call.tail(model)))
     engine_call.check(
-        engine, spread, answers.reshape(6, *engine_call.tail(model)), engine_call.evaluate(engine, spread)
+        engine, spread, results.reshape(6, *engine_call.tail(model)), engine_call.evaluate(engine, spread)
     )
 
 

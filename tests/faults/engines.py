@@ -35,7 +35,7 @@ ENGINES_FAULTS = (
         right="self._inverse_dynamics(q, rest, rest + unit) - gravity for unit",
         wrong="self._inverse_dynamics(q, rest, rest + unit) for unit",
         test_file="tests/backends/test_derived.py",
-        test="test_derived_answers_are_the_native_ones[size0-fixed-ReferenceBackend]",
+        test="test_derived_results_equal_native_ones[size0-fixed-ReferenceBackend]",
     ),
     Fault(
         "mimic_torque_not_scaled",
@@ -51,7 +51,7 @@ ENGINES_FAULTS = (
         right="return np.array(np.broadcast_to(T, (*q.shape[:-1], 4, 4)))",
         wrong="return np.broadcast_to(T, (*q.shape[:-1], 4, 4))",
         test_file="tests/contract/test_arrays.py",
-        test="test_answers_belong_to_the_caller[reference-forward_kinematics]",
+        test="test_results_belong_to_the_caller[reference-forward_kinematics]",
     ),
     Fault(
         "pinocchio_chain_of_fixed_joints_forgotten",
@@ -83,7 +83,7 @@ ENGINES_FAULTS = (
         right="M: Floats = pin.crba(self._engine, self._workspace.data, q)\n        return M",
         wrong="pin.crba(self._engine, self._workspace.data, q)\n        return self._workspace.data.M",
         test_file="tests/contract/test_arrays.py",
-        test="test_answers_belong_to_the_caller[pinocchio-mass_matrix]",
+        test="test_results_belong_to_the_caller[pinocchio-mass_matrix]",
     ),
     Fault(
         "pybullet_base_linear_and_angular_exchanged",

@@ -32,7 +32,7 @@ SIMULATION_FAULTS = (
     Fault(
         "compiled_acceleration_at_a_moving_world_origin",
         "dynx.compiled.frames",
-        right=" + skew(self.stays * twist[:3]) @ x[3:]",
+        right=" + skew(self.fixed * twist[:3]) @ x[3:]",
         wrong="",
         test_file="tests/compiled/test_frames.py",
         test="test_any_frame_of_any_robot",
@@ -43,7 +43,7 @@ SIMULATION_FAULTS = (
         right="workspace.input_rows[-1][...] = self._place",
         wrong="workspace.input_rows[-1][:1] = self._place",
         test_file="tests/compiled/test_frames.py",
-        test="test_every_way_gives_the_same_bits",
+        test="test_every_code_path_gives_the_same_bits",
     ),
     Fault(
         "trajectory_moves_after_its_end",

@@ -1,4 +1,4 @@
-"""Robots written to a file and loaded by an engine, and their answers beside those of the reference."""
+"""Robots written to a file and loaded by an engine, compared with the reference."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ from tests.backends.robots import assert_close, motion
 from tests.error_bounds import ErrorBounds, samples_at
 
 TILTED = (0.3, -0.7, -9.81)
-"""Gravity in which an error of a frame shows."""
+"""Gravity [m/s^2] along no axis, which shows values in a wrong frame."""
 
 
 @contextmanager
 def loaded(
     kind: type[LoadedRobot], model: Model, text: str | None = None, calls: Collection[str] = ()
 ) -> Iterator[LoadedRobot]:
-    """`model`, or another text, written to a file and loaded by an engine; the file is gone then."""
+    """`model`, or another text, written to a temporary file and loaded by an engine."""
     with TemporaryDirectory() as folder:
         path = Path(folder) / "robot.urdf"
         path.write_text(model.to_urdf() if text is None else text, encoding="utf-8")
@@ -39,7 +39,7 @@ def loaded(
 
 
 def file_robots(base: BaseChoice = "either", *, solvable: bool = False) -> Strategy[Model]:
-    """Robots that a URDF file can say, all joints free, in tilted gravity."""
+    """Robots that URDF can express, without mimic joints, in tilted gravity."""
     drawn = models(base=base, mimics=False, locks=False, from_urdf=True, solvable=solvable)
     return drawn.map(lambda model: model.with_gravity(TILTED))
 
@@ -50,7 +50,7 @@ def clean_robots(base: BaseChoice = "either") -> Strategy[Model]:
 
 
 def clean(model: Model) -> Model:
-    """The robot with principal inertias far from any bound, no damping, and nothing on a fixed base."""
+    """The robot with principal inertias far from any bound, no damping, and no mass on a fixed base."""
     links = []
     for link in model.links:
         inertial = link.inertial or Inertial()
@@ -65,7 +65,7 @@ def clean(model: Model) -> Model:
 
 
 def assert_alike(robot: LoadedRobot, model: Model, seed: int = 0, *, solve: bool = True) -> None:
-    """Every answer of the engine is that of the reference, at a random state."""
+    """Assert that every result of the engine is that of the reference at a random state."""
     reference = ReferenceBackend(model)
     q, v, a = motion(model, seed)
     near = ErrorBounds(samples_at(model, q, v, a))

@@ -1,4 +1,4 @@
-"""A robot with two arms, and what every engine that leaves it as the file has it holds of it."""
+"""A robot with two arms, and the check that an engine loads it as the file describes it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ LOSSES = JointDynamics(0.5, 0.25)
 def forked(
     base: Base = "fixed", dynamics: JointDynamics = NO_LOSSES, *, root: str = "trunk", wide: bool = False
 ) -> Model:
-    """A turning arm with a tool welded to it, and a sliding arm.
+    """A rotating arm with a tool on a fixed joint, and a sliding arm.
 
     The names of both are against the order of the alphabet, and the arm that is deeper comes first in
     the document. `dynamics` are those of the turning arm, which is continuous; a `wide` one has limits, and
@@ -45,8 +45,8 @@ def forked(
     return Model.build("forked", links, joints, base=base, gravity=TILTED)
 
 
-def held_as_in_the_file(kind: type[LoadedRobot], model: Model) -> LoadedModel:
-    """What an engine holds of a fork that is not wide, found to be what the file says."""
+def check_loaded_as_written(kind: type[LoadedRobot], model: Model) -> LoadedModel:
+    """Check that an engine loads a fork that is not wide as the file describes it, and return that."""
     with loaded(kind, model) as robot:
         held = robot.describe()
     assert model_difference(model, [held]) == ()

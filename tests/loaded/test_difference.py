@@ -1,4 +1,4 @@
-"""The model difference: every deviation is listed, and nothing that is merely written otherwise."""
+"""The model difference lists every deviation, and nothing that only the notation distinguishes."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ ENGINE = "some engine"
 BODY = Inertial(2.0, Pose((0.1, 0.2, 0.3), (0.3, 0.2, 0.1)), 0.2, 0.01, 0.02, 0.3, 0.03, 0.4)
 
 
-def held(model: Model) -> LoadedModel:
-    """What an engine holds that reads the file as dynx does and fuses nothing."""
+def exact(model: Model) -> LoadedModel:
+    """The description by an engine that loads the file as dynx does and merges no links."""
     links = {}
     for link in model.links:
         inertial = link.inertial or Inertial()
@@ -49,10 +49,10 @@ def held(model: Model) -> LoadedModel:
     return LoadedModel(ENGINE, links, joints, np.eye(4), np.array(STANDARD_GRAVITY))
 
 
-def merged(model: Model) -> LoadedModel:
-    """The same where the engine holds one inertial for all links that fixed joints hold together."""
+def with_merged_links(model: Model) -> LoadedModel:
+    """The description by an engine that merges links connected by fixed joints."""
     mechanism = build_mechanism(model)
-    lumps = {}
+    inertials = {}
     places = {frame.name: frame.body for frame in mechanism.frames[: len(model.links)]}
     for body, inertia in enumerate([*(each.inertia for each in mechanism.bodies), mechanism.root]):
         number = body if body < len(mechanism.bodies) else -1
@@ -61,8 +61,8 @@ def merged(model: Model) -> LoadedModel:
         center = inertia.first_moment / mass if mass else np.zeros(3)
         arm = skew(center)
         tensor = inertia.rotational_inertia + mass * (arm @ arm)
-        lumps[first] = LoadedInertial(mass, np.asarray(center), np.asarray(tensor), tuple(others))
-    return replace(held(model), links=lumps)
+        inertials[first] = LoadedInertial(mass, np.asarray(center), np.asarray(tensor), tuple(others))
+    return replace(exact(model), links=inertials)
 
 
 def rows(model: Model, engine: LoadedModel) -> list[tuple[str, str, str]]:
@@ -81,13 +81,13 @@ def robot() -> Model:
 
 
 @given(file_robots())
-def test_what_is_read_alike_does_not_deviate(model: Model) -> None:
-    assert rows(model, held(model)) == []
+def test_equal_models_do_not_deviate(model: Model) -> None:
+    assert rows(model, exact(model)) == []
 
 
 @given(file_robots())
-def test_fused_links_are_compared_lump_with_lump(model: Model) -> None:
-    assert rows(model, merged(model)) == []
+def test_merged_links_are_compared_by_merged_inertia(model: Model) -> None:
+    assert rows(model, with_merged_links(model)) == []
 
 
 def _link(name: str, **changes: Any) -> Callable[[LoadedModel], LoadedModel]:
@@ -158,7 +158,7 @@ DEVIATIONS: list[tuple[Callable[[LoadedModel], LoadedModel], tuple[str, str, str
 def test_each_deviation_is_listed_and_no_other(
     change: Callable[[LoadedModel], LoadedModel], row: tuple[str, str, str]
 ) -> None:
-    found = rows(robot(), change(held(robot())))
+    found = rows(robot(), change(exact(robot())))
     if row == ("base", "base", "position"):
         assert found == [row, ("base", "base", "rotation")]
     else:
@@ -166,29 +166,29 @@ def test_each_deviation_is_listed_and_no_other(
 
 
 @given(st.data())
-def test_a_mass_off_by_more_than_rounding_is_listed(data: st.DataObject) -> None:
+def test_a_mass_that_differs_by_more_than_rounding_is_listed(data: st.DataObject) -> None:
     model = data.draw(file_robots("floating", solvable=True))
     name = data.draw(st.sampled_from([link.name for link in model.links]))
-    engine, off = held(model), data.draw(st.sampled_from((4.0, -4.0, 1e3, 1e11)))
+    engine, off = exact(model), data.draw(st.sampled_from((4.0, -4.0, 1e3, 1e11)))
     mass = engine.links[name].mass * (1.0 + off * ROUNDING)
     assert rows(model, _link(name, mass=mass)(engine)) == [("link", name, "mass")]
     mass = engine.links[name].mass * (1.0 + 0.25 * ROUNDING)
     assert rows(model, _link(name, mass=mass)(engine)) == []
 
 
-def test_what_is_no_number_deviates() -> None:
+def test_nan_deviates() -> None:
     for value in (float("nan"), float("inf")):
-        assert rows(robot(), _link("arm", mass=value)(held(robot()))) == [("link", "arm", "mass")]
+        assert rows(robot(), _link("arm", mass=value)(exact(robot()))) == [("link", "arm", "mass")]
         inertia = np.diag([0.2, 0.3, value])
-        assert rows(robot(), _link("arm", inertia=inertia)(held(robot()))) == [("link", "arm", "inertia")]
+        assert rows(robot(), _link("arm", inertia=inertia)(exact(robot()))) == [("link", "arm", "inertia")]
 
 
 def test_a_deviation_of_a_light_link_is_listed() -> None:
     feather = Inertial(1e-15, BODY.origin, ixx=1e-15, iyy=1e-15, izz=1e-15)
     links = tuple(replace(each, inertial=feather) if each.name == "arm" else each for each in robot().links)
     model = replace(robot(), links=links)
-    assert rows(model, held(model)) == []
-    found = rows(model, _link("arm", mass=1.5e-15, inertia=np.zeros((3, 3)))(held(model)))
+    assert rows(model, exact(model)) == []
+    found = rows(model, _link("arm", mass=1.5e-15, inertia=np.zeros((3, 3)))(exact(model)))
     assert found == [("link", "arm", "mass"), ("link", "arm", "inertia")]
 
 
@@ -202,31 +202,31 @@ SAME = [
 
 
 @pytest.mark.parametrize(("limits", "changes"), SAME)
-def test_another_way_of_writing_is_no_deviation(limits: Limits, changes: dict[str, Any]) -> None:
+def test_equivalent_notation_is_no_deviation(limits: Limits, changes: dict[str, Any]) -> None:
     joints = [replace(joint, limits=limits) for joint in robot().joints]
     model = replace(robot(), joints=tuple(joints))
-    assert rows(model, _joint("turn", **changes)(held(model))) == []
+    assert rows(model, _joint("turn", **changes)(exact(model))) == []
 
 
 def test_a_continuous_joint_may_be_revolute_without_limits() -> None:
     joints = (replace(robot().joints[0], type="continuous", limits=Limits()), *robot().joints[1:])
     model = replace(robot(), joints=joints)
     for limits in ((0.0, 0.0), (0.0, -1.0), (-np.inf, np.inf), None):
-        assert rows(model, _joint("turn", type="revolute", limits=limits)(held(model))) == []
-    found = rows(model, _joint("turn", type="revolute", limits=(-1.0, 1.0))(held(model)))
+        assert rows(model, _joint("turn", type="revolute", limits=limits)(exact(model))) == []
+    found = rows(model, _joint("turn", type="revolute", limits=(-1.0, 1.0))(exact(model)))
     assert found == [("joint", "turn", "lower"), ("joint", "turn", "upper")]
 
 
-def test_a_deviation_among_fused_links_is_that_of_the_lump() -> None:
+def test_a_deviation_among_merged_links_is_that_of_the_merged_link() -> None:
     model = robot()
-    engine = merged(model)
+    engine = with_merged_links(model)
     assert engine.links["hand"].merged == ("tool",)
     heavier = _link("hand", mass=engine.links["hand"].mass + 1.0)(engine)
     assert rows(model, heavier) == [("link", "hand", "mass")]
 
 
-def test_a_fused_link_that_is_held_apart_too_is_judged_once() -> None:
-    # As Pinocchio does: the lump, and the link on the fixed joint by itself.
+def test_a_merged_link_that_is_also_listed_alone_is_compared_once() -> None:
+    # As Pinocchio does: the merged link, and the link on the fixed joint by itself.
     model = robot()
     spoiled = replace(
         model,
@@ -234,21 +234,21 @@ def test_a_fused_link_that_is_held_apart_too_is_judged_once() -> None:
             replace(link, inertial=Inertial()) if link.name == "tool" else link for link in model.links
         ),
     )
-    engine = merged(spoiled)
-    engine = replace(engine, links={**engine.links, "tool": held(spoiled).links["tool"]})
+    engine = with_merged_links(spoiled)
+    engine = replace(engine, links={**engine.links, "tool": exact(spoiled).links["tool"]})
     assert rows(model, engine) == [("link", "tool", "mass"), ("link", "tool", "inertia")]
 
 
 def test_the_root_of_a_fixed_base_is_left_out() -> None:
     model = robot().with_base("fixed")
     nothing = LoadedInertial(0.0, np.zeros(3), np.zeros((3, 3)))
-    assert rows(model, _link("base", **vars(nothing))(held(model))) == []
-    assert rows(model, _without_link("base")(held(model))) == []
-    assert rows(robot(), _without_link("base")(held(robot()))) == [("link", "base", "existence")]
+    assert rows(model, _link("base", **vars(nothing))(exact(model))) == []
+    assert rows(model, _without_link("base")(exact(model))) == []
+    assert rows(robot(), _without_link("base")(exact(robot()))) == [("link", "base", "existence")]
 
 
-def test_values_are_plain_and_none_where_there_is_no_limit() -> None:
-    engine = _joint("turn", limits=(-np.inf, 2.0), axis=np.array([0.0, 1.0, 0.0]))(held(robot()))
+def test_values_are_plain_numbers_and_none_for_unlimited() -> None:
+    engine = _joint("turn", limits=(-np.inf, 2.0), axis=np.array([0.0, 1.0, 0.0]))(exact(robot()))
     first, second = model_difference(robot(), [engine, engine])[:2]
     assert first == Deviation(ENGINE, "joint", "turn", "axis", [1.0, 0.0, 0.0], [0.0, 1.0, 0.0])
     assert second == Deviation(ENGINE, "joint", "turn", "lower", -1.0, None)

@@ -46,7 +46,7 @@ def in_tree_coordinates(source: XmlSource, base: Base) -> Model:
     return replace(model, joints=tuple(replace(joint, mimic=None) for joint in model.joints))
 
 
-def test_there_is_one_robot_that_is_an_empty_shell() -> None:
+def test_one_robot_of_the_library_is_left_out() -> None:
     all_of_them = [entry for entry in robots() if entry.source == EXAMPLE_ROBOT_DATA]
     assert len(SOURCES) == len(all_of_them) - 1
 
@@ -63,7 +63,7 @@ def test_pinocchio_loads_it_as_dynx_reads_it(name: str, base: Base) -> None:
 
 @pytest.mark.parametrize("base", BASES)
 @pytest.mark.parametrize("name", SOURCES)
-def test_pybullet_differs_where_the_model_difference_says_so(name: str, base: Base) -> None:
+def test_pybullet_differs_where_the_model_difference_lists_it(name: str, base: Base) -> None:
     pytest.importorskip("pybullet")
     from dynx.engines.pybullet.as_loaded import LoadedPyBullet
 
@@ -89,7 +89,7 @@ def test_pybullet_differs_where_the_model_difference_says_so(name: str, base: Ba
 
 
 def _refusal(model: Model) -> str | None:
-    """Why the robot is refused: too many joints, or a free base whose root has no mass in PyBullet."""
+    """Text of the expected error: too many joints, or a free base whose root has no mass in PyBullet."""
     if len(model.joints) > 127:
         return "joints, fixed ones included"
     inertial = model.link(model.root).inertial

@@ -19,7 +19,7 @@ from dynx.model.loading import load
 from tests.backends.robots import chain
 
 PACKAGES = {"drake": "pydrake"}
-"""What an engine is imported as, where that is not its name."""
+"""Module names of engines where they differ from the engine's name."""
 
 
 def test_every_installed_engine_has_a_class_of_its_name() -> None:
@@ -43,8 +43,8 @@ def test_a_robot_is_loaded_by_the_engine_of_that_name(name: str, tmp_path: Path)
         assert robot.mass_matrix(chain(2).neutral()).shape == (2, 2)
 
 
-def test_every_engine_that_is_here_can_be_used() -> None:
-    """Tests that ask for the installed engines would otherwise leave out one that dynx has broken."""
+def test_every_installed_engine_can_be_used() -> None:
+    """Tests of all installed engines would otherwise leave out one that dynx itself breaks."""
     assert installed_engines() == tuple(name for name in ENGINES if find_spec(PACKAGES.get(name, name)))
 
 
@@ -67,7 +67,7 @@ def test_an_unknown_engine_is_named_with_the_nearest() -> None:
         loader_class("pinochio")
 
 
-def test_an_engine_that_is_missing_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_engine_is_refused_with_its_installation(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pybullet", None)
     with pytest.raises(NotInstalledError, match=r"pip install 'dynx\[pybullet\]'"):
         loader_class("pybullet")

@@ -6,7 +6,7 @@ from itertools import count
 
 from dynx.backends.registry import backend_class
 from dynx.bench.cases import BENCHMARK_QUANTITIES
-from dynx.bench.machine import described
+from dynx.bench.machine import processor_description
 from dynx.bench.measurement import Measurement
 from dynx.bench.report import document, wrong
 from dynx.bench.session import (
@@ -81,7 +81,7 @@ def run_bench(session: Session, *, as_json: bool) -> int:
         except KeyboardInterrupt:
             complain(f"interrupted: {len(cases) - len(found)} of {counted(len(cases), 'case')} not done")
         interruption.finishing = True
-        made = document(session, found, described())
+        made = document(session, found, processor_description())
         if as_json:
             echo_json(made)
         else:

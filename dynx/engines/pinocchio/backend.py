@@ -157,7 +157,7 @@ class PinocchioBackend(Backend):
 
     # -- dynamics -----------------------------------------------------------------------------
 
-    def _in_this_thread(self, quantity: str) -> Callable[..., Floats] | None:
+    def _unchecked_callable(self, quantity: str) -> Callable[..., Floats] | None:
         """The binding's function itself, with the `Data` of the calling thread."""
         function = _FUNCTIONS.get(quantity)
         hook = f"_{quantity}"

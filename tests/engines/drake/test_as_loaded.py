@@ -22,7 +22,7 @@ from dynx.model import Inertial, JointDynamics, Model
 from dynx.model.model import Base
 from tests.backends.robots import chain, motion
 from tests.loaded.files import TILTED, assert_alike, clean_robots, loaded
-from tests.loaded.fork import BASES, BODY, forked, held_as_in_the_file
+from tests.loaded.fork import BASES, BODY, check_loaded_as_written, forked
 
 pytest.importorskip("pydrake")
 from dynx.engines.drake.as_loaded import LoadedDrake
@@ -55,7 +55,7 @@ def test_joints_are_in_the_order_of_dynx(base: Base) -> None:
 @pytest.mark.parametrize("base", BASES)
 def test_what_it_holds_comes_link_by_link(base: Base) -> None:
     model = forked(base)
-    held = held_as_in_the_file(LoadedDrake, model)
+    held = check_loaded_as_written(LoadedDrake, model)
     assert list(held.links) == [link.name for link in model.links]
     assert all(link.mass == BODY.mass and link.merged == () for link in held.links.values())
     # Drake has no effort limit of a joint, and no losses are in this file.

@@ -18,7 +18,7 @@ from dynx.model import Inertial, Joint, Link, Model, Pose
 from dynx.model.elements import JointType
 from dynx.reference.backend import ReferenceBackend
 from dynx.spatial.scalar import Floats
-from tests.backends.independence import check_answers_belong_to_the_caller
+from tests.backends.independence import check_results_belong_to_the_caller
 from tests.backends.robots import all_quantities, assert_close, assert_same, chain, mixed_robot, motion
 from tests.error_bounds import ErrorBounds, samples_at
 
@@ -134,7 +134,7 @@ def test_names_of_the_engine_are_free_for_robots() -> None:
 
 @pytest.mark.parametrize("base", BASES)
 def test_no_order_of_calls_changes_a_result_and_results_are_the_callers(base: str) -> None:
-    check_answers_belong_to_the_caller(DrakeBackend(mixed_robot(base)))
+    check_results_belong_to_the_caller(DrakeBackend(mixed_robot(base)))
 
 
 def test_each_thread_has_a_context_of_its_own() -> None:

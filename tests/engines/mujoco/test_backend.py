@@ -19,9 +19,9 @@ from dynx.model.model import Base
 from dynx.reference.backend import ReferenceBackend
 from dynx.spatial.scalar import Floats
 from tests.backends.independence import (
-    check_answers_belong_to_the_caller,
-    check_pickle_makes_the_same,
-    check_threads_get_what_one_gets,
+    check_pickle_round_trip,
+    check_results_belong_to_the_caller,
+    check_threads_get_equal_results,
 )
 from tests.backends.robots import (
     BASES,
@@ -251,7 +251,7 @@ def test_the_longest_chain_that_it_takes_in_a_small_stack() -> None:
 
 @pytest.mark.parametrize("base", BASES)
 def test_answers_belong_to_the_caller(base: Base) -> None:
-    check_answers_belong_to_the_caller(MujocoBackend(mixed_robot(base)))
+    check_results_belong_to_the_caller(MujocoBackend(mixed_robot(base)))
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
@@ -269,11 +269,11 @@ def test_what_is_not_finite_leaves_nothing_behind(bad: float) -> None:
 
 
 def test_eight_threads_get_what_one_gets() -> None:
-    check_threads_get_what_one_gets(MujocoBackend(mixed_robot("floating")), samples=32)
+    check_threads_get_equal_results(MujocoBackend(mixed_robot("floating")), samples=32)
 
 
 def test_pickle_makes_the_same_backend() -> None:
-    check_pickle_makes_the_same(MujocoBackend(mixed_robot("floating"), validate=False))
+    check_pickle_round_trip(MujocoBackend(mixed_robot("floating"), validate=False))
 
 
 @pytest.mark.parametrize("validate", [True, False])

@@ -23,7 +23,7 @@ from dynx.reference.backend import ReferenceBackend
 from dynx.spatial.scalar import Floats
 from tests.backends.robots import chain, motion
 from tests.loaded.files import TILTED, assert_alike, clean_robots, error, file_robots, loaded
-from tests.loaded.fork import BASES, BODY, LOSSES, forked, held_as_in_the_file
+from tests.loaded.fork import BASES, BODY, LOSSES, check_loaded_as_written, forked
 
 
 @given(st.data())
@@ -58,7 +58,7 @@ def test_joints_are_in_the_order_of_dynx(base: Base) -> None:
 
 @pytest.mark.parametrize("base", BASES)
 def test_what_it_holds_comes_link_by_link(base: Base) -> None:
-    held = held_as_in_the_file(LoadedPinocchio, forked(base, LOSSES))
+    held = check_loaded_as_written(LoadedPinocchio, forked(base, LOSSES))
     assert held.links["tool"].mass == BODY.mass
     assert held.links["z"].merged == ("tool",)
     assert held.links["z"].mass == 2 * BODY.mass

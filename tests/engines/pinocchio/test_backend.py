@@ -26,9 +26,9 @@ from dynx.reference.backend import ReferenceBackend
 from dynx.spatial.scalar import Floats
 from dynx.testing.strategies import models
 from tests.backends.independence import (
-    check_answers_belong_to_the_caller,
-    check_pickle_makes_the_same,
-    check_threads_get_what_one_gets,
+    check_pickle_round_trip,
+    check_results_belong_to_the_caller,
+    check_threads_get_equal_results,
 )
 from tests.backends.robots import (
     REFERENCES,
@@ -88,7 +88,7 @@ def test_mass_matrix_is_symmetric_to_the_last_bit(data: st.DataObject) -> None:
 
 @pytest.mark.parametrize("base", BASES)
 def test_answers_belong_to_the_caller(base: str) -> None:
-    check_answers_belong_to_the_caller(PinocchioBackend(mixed_robot(base)))
+    check_results_belong_to_the_caller(PinocchioBackend(mixed_robot(base)))
 
 
 def _reversed_view(x: Floats) -> Floats:
@@ -124,7 +124,7 @@ def test_memory_layout_of_the_arguments_does_not_matter(laid_out: Any) -> None:
 
 
 def test_eight_threads_get_what_one_gets() -> None:
-    check_threads_get_what_one_gets(PinocchioBackend(mixed_robot("floating")), samples=64)
+    check_threads_get_equal_results(PinocchioBackend(mixed_robot("floating")), samples=64)
 
 
 def test_each_thread_has_a_workspace_of_its_own() -> None:
@@ -136,7 +136,7 @@ def test_each_thread_has_a_workspace_of_its_own() -> None:
 
 
 def test_pickle_makes_the_same_backend() -> None:
-    check_pickle_makes_the_same(PinocchioBackend(mixed_robot("floating"), validate=False))
+    check_pickle_round_trip(PinocchioBackend(mixed_robot("floating"), validate=False))
 
 
 @pytest.mark.parametrize("validate", [True, False])

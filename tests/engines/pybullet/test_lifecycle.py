@@ -17,9 +17,9 @@ from dynx.model import Inertial
 from dynx.model.model import Base
 from dynx.reference.backend import ReferenceBackend
 from tests.backends.independence import (
-    check_answers_belong_to_the_caller,
-    check_pickle_makes_the_same,
-    check_threads_get_what_one_gets,
+    check_pickle_round_trip,
+    check_results_belong_to_the_caller,
+    check_threads_get_equal_results,
 )
 from tests.backends.robots import (
     BASES,
@@ -117,11 +117,11 @@ def test_overflow_does_not_poison_the_engine() -> None:
 
 @pytest.mark.parametrize("base", BASES)
 def test_answers_belong_to_the_caller(base: Base) -> None:
-    check_answers_belong_to_the_caller(PyBulletBackend(mixed_robot(base)))
+    check_results_belong_to_the_caller(PyBulletBackend(mixed_robot(base)))
 
 
 def test_eight_threads_get_what_one_gets() -> None:
-    check_threads_get_what_one_gets(PyBulletBackend(mixed_robot("floating")), samples=8)
+    check_threads_get_equal_results(PyBulletBackend(mixed_robot("floating")), samples=8)
 
 
 # -- life cycle ----------------------------------------------------------------------------------------
@@ -129,7 +129,7 @@ def test_eight_threads_get_what_one_gets() -> None:
 
 def test_pickle_makes_the_same_backend() -> None:
     engine = PyBulletBackend(mixed_robot("floating"), validate=False)
-    copy = check_pickle_makes_the_same(engine)
+    copy = check_pickle_round_trip(engine)
     assert not set(clients(copy)) & set(clients(engine))
 
 
