@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import dynx
 from dynx.control import (
     PD,
     PID,
@@ -122,3 +123,10 @@ def test_what_has_no_document() -> None:
         unregister_controller("damper")
     with pytest.raises(ArgumentError, match="is taken"):
         register_controller("PD", lambda: Damper)
+
+
+def test_an_engine_is_written_by_its_name() -> None:
+    with dynx.backend("pinocchio", ARM) as engine:
+        law = ComputedTorque(ARM, kp=400, kd=40, backend=engine)
+        named = ComputedTorque(ARM, kp=400, kd=40, backend="pinocchio")
+        assert controller_to_document(law) == controller_to_document(named)

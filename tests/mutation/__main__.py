@@ -5,7 +5,7 @@
 
 Makes a random sample of mutants, runs for each the tests that execute the changed line (fastest first, up
 to the first failure), and prints the score and the survivors. What is done is kept in the folder of
-``--results``: the same command goes on where Ctrl-C ended it, ``--retry`` tries the survivors again.
+``--results``: the same command goes on where Ctrl-C ended it, ``--retry`` tries survivors again.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from queue import SimpleQueue
 from tests.faults.warm import ROOT, Runner
 from tests.mutation.coverage_map import CoverageMap, record
 from tests.mutation.population import Mutant, sample
-from tests.mutation.report import EQUIVALENT, summary
+from tests.mutation.report import EQUIVALENT, reason, summary
 from tests.mutation.trial import CAUGHT, Outcome, attempt
 
 ROOMS = ("rbd", "spatial", "model", "backends", "ik", "control", "sim", "agreement")
@@ -51,11 +51,13 @@ def main() -> None:
     mutants = [mutant for mutant in mutants if mutant.path.split("/")[1] in arguments.rooms]
     kept = arguments.results / "outcomes.json"
     outcomes = load(kept)
-    waiting = [
-        mutant
-        for mutant in mutants
-        if mutant.key not in outcomes or (arguments.retry and outcomes[mutant.key].status != CAUGHT)
-    ]
+    equivalent = json.loads(EQUIVALENT.read_text(encoding="utf-8"))
+    settled = {
+        key
+        for key, outcome in outcomes.items()
+        if not arguments.retry or outcome.status == CAUGHT or reason(outcome, equivalent) is not None
+    }
+    waiting = [mutant for mutant in mutants if mutant.key not in settled]
     try:
         for outcome in attempts(waiting, coverage, arguments.jobs):
             if outcome.key in outcomes:
@@ -66,7 +68,7 @@ def main() -> None:
     except KeyboardInterrupt:
         print("interrupted; the same command goes on from here")
     done = [outcomes[mutant.key] for mutant in mutants if mutant.key in outcomes]
-    print(summary(done, total, json.loads(EQUIVALENT.read_text(encoding="utf-8"))))
+    print(summary(done, total, equivalent))
 
 
 def parser() -> argparse.ArgumentParser:
@@ -86,7 +88,7 @@ def parser() -> argparse.ArgumentParser:
         help="try the mutants of the sample in these packages only",
     )
     made.add_argument("--jobs", type=int, default=2, help="mutants to try at a time")
-    made.add_argument("--retry", action="store_true", help="try mutants again that were not caught")
+    made.add_argument("--retry", action="store_true", help="try survivors again that are not equivalent")
     made.add_argument("--results", type=Path, default=ROOT / ".mutation", help="folder of what is kept")
     made.add_argument(
         "--record",
