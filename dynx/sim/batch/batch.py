@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,26 +15,31 @@ from dynx.backends.solvability import Solvability
 from dynx.compiled.parametric import ParametricDynamics
 from dynx.control.base import Controller, gains_of
 from dynx.control.friction import SLIP, Coefficients
-from dynx.control.saturation import checked_limit
 from dynx.errors import ArgumentError, shown
 from dynx.model import Model
 from dynx.model.configuration import checked_q
 from dynx.sim.batch.kernel import StepOf
-from dynx.sim.batch.loads import BatchLoads, refuse_ambiguous
+from dynx.sim.batch.loads import PLACEHOLDER, BatchLoads
 from dynx.sim.batch.part import KernelOf, Part, PartDone, PartNoise, pushing
 from dynx.sim.batch.rollouts import BatchRollouts
-from dynx.sim.batch.rows import RolloutRows, columns_of
+from dynx.sim.batch.rows import (
+    COEFFICIENTS,
+    PLANT,
+    RolloutRows,
+    coefficient_rows,
+    columns_of,
+    joints_of,
+    refuse_ambiguous,
+    split_rows,
+)
 from dynx.sim.batch.store import Store
 from dynx.sim.batch.traced_controller import innermost
 from dynx.sim.clock import Clock
-from dynx.sim.loop.controller_checks import check_controller
 from dynx.sim.loop.noise import Noise
-from dynx.sim.loop.references import checked_reference
 from dynx.sim.plants.disturbances import Push
-from dynx.sim.plants.model_error import MassScale, Payload, plant_model
-from dynx.sim.scenario.keywords import refuse_beside_scenario
-from dynx.sim.scenario.scenario import Scenario
-from dynx.sim.setup import known_controller, require_duration
+from dynx.sim.plants.model_error import MassScale, Payload
+from dynx.sim.scenario.scenario import Scenario, field_names
+from dynx.sim.setup import Setup, require_duration
 from dynx.simd.threads import checked_threads
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint, Trajectory
@@ -41,9 +47,6 @@ from dynx.trajectory.base import Setpoint, Trajectory
 PART = 1024
 """Rollouts in one part: few enough that their state stays in the caches, and enough to outweigh the start of
 a call. Results do not depend on it."""
-
-PLANT = "compiled"
-"""The plant of `dynx.simulate` that a batch runs on."""
 
 Progress = Callable[[int, int], object]
 """Called with the number of finished rollouts and that of all."""
@@ -109,7 +112,7 @@ def simulate_batch(
     k every k-th state is kept.
 
     The first argument may also be a `Scenario` on the plant ``compiled``, beside which only what may differ
-    from rollout to rollout is given.
+    from rollout to rollout is given. `BatchRollouts.scenario` is the one that all rollouts share.
 
     Parts are done by `threads` threads (None: all processors) or by any `executor`, also one of
     processes or of a cluster; results are the same bit for bit. With `keep`, a folder, each part is
@@ -120,107 +123,67 @@ def simulate_batch(
     UnsupportedFeatureError for controllers that branch on their measurement. A rollout that diverges does
     not stop the others: `BatchRollouts.diverged` has its time.
     """
-    if isinstance(model, Scenario):
-        fixed_in_scenario = {
-            "controller": controller,
-            "reference": reference,
-            "dt": dt,
-            "duration": duration,
-            "control_dt": control_dt,
-            "delay": delay,
-            "noise": noise,
-            "friction_slip": friction_slip,
-            "effort_limits": effort_limits,
-            "payload": payload,
-            "mass_scale": mass_scale,
-            "pushes": pushes,
-            "check_reference": check_reference,
-        }
-        refuse_beside_scenario(fixed_in_scenario)
-        refuse_uncompiled(model)
-        return simulate_batch(
-            model.model,
-            known_controller(model),
-            **{name: getattr(model, name) for name in fixed_in_scenario if name != "controller"},
-            plant=model.plant,
-            q0=model.q0 if q0 is None else q0,
-            v0=model.v0 if v0 is None else v0,
-            damping=model.damping if damping is False else damping,
-            friction=model.friction if friction is False else friction,
-            armature=model.armature if armature is False else armature,
-            rollouts=rollouts,
-            parametric=parametric,
-            parameters=parameters,
-            gains=gains,
-            record_every=record_every,
-            threads=threads,
-            executor=executor,
-            keep=keep,
-            progress=progress,
-        )
-    if plant != PLANT:
-        raise ArgumentError(f"plant is {shown(plant)}; a batch runs on the plant {PLANT!r}")
-    if not isinstance(controller, Controller):
-        raise ArgumentError(f"controller is of type {type(controller).__name__}; wanted a Controller")
-    moved = plant_model(model, payload, mass_scale)
+    given = {name: value for name, value in locals().items() if name in field_names() and name != "model"}
+    scenario, own = split_rows(model, given)
+    refuse_uncompiled(scenario)
+    joints = joints_of(scenario.model)
+    varied = {name: coefficient_rows(name, own[name], joints) for name in COEFFICIENTS if name in own}
+    stand_ins: dict[str, Any] = dict.fromkeys(varied, PLACEHOLDER)
+    if "q0" in own:
+        stand_ins["q0"] = scenario.model.neutral()
+    setup = Setup.of(replace(scenario, **stand_ins))
+    law, moved, clock, limit, noise = setup.controller, setup.model, setup.clock, setup.limit, scenario.noise
+    assert law is not None
+    assert setup.setpoint_of is not None
     if parametric is not None and parametric.model != moved:
-        scaled = "" if moved is model else ", with its payload and scaled masses (`plant_model`)"
+        wanted = scenario.model.name
+        if moved is not scenario.model:
+            wanted += ", with its payload and scaled masses (`plant_model`)"
         raise ArgumentError(
-            f"parametric is one of {parametric.model.name}; wanted dynx.parametric of {model.name}{scaled}"
+            f"parametric is one of {parametric.model.name}; wanted dynx.parametric of {wanted}"
         )
     if parameters is not None and parametric is None:
         raise ArgumentError("parameters were given without the model that they are of: dynx.parametric(...)")
-    span = reference.duration if duration is None and isinstance(reference, Trajectory) else duration
-    if span is None:
-        raise ArgumentError("duration is not given, and the reference is no trajectory that has one")
-    clock = Clock.of(dt, span, control_dt, delay)
-    check_controller(model, controller, clock)
     if isinstance(record_every, bool) or not isinstance(record_every, int) or record_every < 0:
         raise ArgumentError(f"record_every is {shown(record_every)}; wanted a whole number, 0 for no record")
-    limit = None
-    if effort_limits is not False:
-        limit = checked_limit(model, None if effort_limits is True else effort_limits)
-    loads = BatchLoads.of(moved, damping, friction, friction_slip, armature, pushes)
+    loads = BatchLoads.of(moved, setup.disturbances, varied)
     if parametric is None and not loads.rotors.any():
         Solvability(moved).refuse_singular(False)
     delayed = clock.delay_steps > 0
     step = StepOf(
-        moved, controller, clock.dt, tuple(gains or ()), parametric, noise is not None, delayed, limit, loads
+        moved, law, clock.dt, tuple(gains or ()), parametric, noise is not None, delayed, limit, loads
     )
-    setpoint_of = checked_reference(model, reference, within_limits=check_reference)
-    assert setpoint_of is not None
-    beginning = setpoint_of(np.zeros(1))
     rows = RolloutRows(rollouts)
-    at_rest = np.zeros(model.nv) if q0 is not None else beginning.v[0]
+    q, v = setup.start
     start = {
-        "q": rows.of("q0", beginning.q[0] if q0 is None else checked_q(model, q0, "q0"), model.nq),
-        "v": rows.of("v0", at_rest if v0 is None else v0, model.nv),
+        "q": rows.of("q0", checked_q(moved, own["q0"], "q0") if "q0" in own else q, moved.nq),
+        "v": rows.of("v0", own.get("v0", v), moved.nv),
     }
     fixed: dict[str, Floats] = {
-        name: rows.of(name, values, values.shape[1]) for name, values in loads.varied.items()
+        name: rows.of(name, values, values.shape[1]) for name, values in varied.items()
     }
     if parametric is not None:
-        given = parametric.parameters.defaults if parameters is None else parameters
-        fixed["parameters"] = rows.of("parameters", given, len(parametric.parameters.names))
-    law = innermost(controller)
+        chosen = parametric.parameters.defaults if parameters is None else parameters
+        fixed["parameters"] = rows.of("parameters", chosen, len(parametric.parameters.names))
     for name, values in (gains or {}).items():
-        fixed[f"gain_{name}"] = rows.of(name, columns_of(values), gains_of(law)[name].size, spread=True)
+        size = gains_of(innermost(law))[name].size
+        fixed[f"gain_{name}"] = rows.of(name, columns_of(values), size, spread=True)
     n = rows.count
-    refuse_ambiguous(loads, n, {"damping": damping, "friction": friction, "armature": armature})
+    refuse_ambiguous(given, joints, n)
     start = {name: rows.spread(array) for name, array in start.items()}
     fixed = {name: rows.spread(array) for name, array in fixed.items()}
-    state = controller.initial_state()
-    zeros = np.zeros((n, model.nv))
+    state = law.initial_state()
+    zeros = np.zeros((n, moved.nv))
     start |= {"worst": zeros, "squares": zeros}
     if limit is not None:
         start["cut"] = zeros
     if state is not None:
         start["state"] = np.tile(state, (n, 1))
-    deviations = None if noise is None else noise.deviations(model.nv)
+    deviations = None if noise is None else noise.deviations(moved.nv)
     wrenches = loads.wrenches(clock) if loads.pushes else np.zeros((clock.n_steps, 0))
     kernels = _kernels(step, clock, wrenches)
-    goals = setpoint_of(clock.times()[1:]).q
-    setpoints = Setpoint(*setpoint_of(clock.control_times(controller.lead)))
+    goals = setup.setpoint_of(clock.times()[1:]).q
+    setpoints = Setpoint(*setup.setpoint_of(clock.control_times(law.lead)))
     parts = [
         Part(
             kernels,
@@ -240,11 +203,11 @@ def simulate_batch(
         )
         for first in range(0, n, PART)
     ]
-    store = None if keep is None else Store(keep)
+    store = None if keep is None else Store(keep, scenario)
     done: dict[int, PartDone] = {}
 
     def outcome() -> BatchRollouts:
-        return _joined(model, clock, parts, done, record_every)
+        return _joined(scenario, clock, parts, done, record_every)
 
     try:
         _work(parts, done, checked_threads(threads), executor, store, progress, n)
@@ -255,14 +218,18 @@ def simulate_batch(
 
 def refuse_uncompiled(scenario: Scenario) -> None:
     """Raise ArgumentError for a scenario with an option that a batch does not have."""
-    integrator = scenario.with_defaults().integrator
-    for name, value, wanted in (
-        ("integrator", integrator, "semi_implicit"),
-        ("substeps", scenario.substeps, 1),
-        ("position_limits", scenario.position_limits, False),
+    for name, possible in (
+        ("plant", (PLANT,)),
+        ("integrator", ("semi_implicit", None)),
+        ("substeps", (1,)),
+        ("position_limits", (False,)),
     ):
-        if value != wanted:
-            raise ArgumentError(f"{name} is {shown(value)}; in a batch it is {wanted}")
+        value = getattr(scenario, name)
+        if value not in possible:
+            raise ArgumentError(f"{name} is {shown(value)}; in a batch it is {shown(possible[0])}")
+    for name in ("controller", "reference"):
+        if getattr(scenario, name) is None:
+            raise ArgumentError(f"{name} is None; a batch needs one")
     require_duration(scenario)
 
 
@@ -326,18 +293,18 @@ def _work(
 
 
 def _joined(
-    model: Model, clock: Clock, parts: list[Part], done: dict[int, PartDone], record_every: int
+    scenario: Scenario, clock: Clock, parts: list[Part], done: dict[int, PartDone], record_every: int
 ) -> BatchRollouts:
     kept = clock.n_steps // record_every if record_every else 0
-    nv = model.nv
+    nq, nv = scenario.model.nq, scenario.model.nv
 
     def nothing(count: int) -> PartDone:
         q, row, undone = (
-            np.full((count, model.nq), np.nan),
+            np.full((count, nq), np.nan),
             np.full((count, nv), np.nan),
             np.full(count, -1.0),
         )
-        q_record, record = np.full((count, kept, model.nq), np.nan), np.full((count, kept, nv), np.nan)
+        q_record, record = np.full((count, kept, nq), np.nan), np.full((count, kept, nv), np.nan)
         return PartDone(q, row, row, row, undone, q_record, record, record, row)
 
     outcomes = [done.get(number, nothing(part.count)) for number, part in enumerate(parts)]
@@ -346,8 +313,7 @@ def _joined(
     diverged = np.where(whole.diverged < 0, np.nan, whole.diverged * clock.dt)
     times = clock.times()[record_every::record_every] if record_every else np.zeros(0)
     return BatchRollouts(
-        tuple(model.joint_names),
-        clock.dt,
+        scenario,
         whole.q,
         whole.v,
         whole.max_error,

@@ -13,9 +13,10 @@ import numpy as np
 
 from dynx.errors import ArgumentError, shown
 from dynx.files.figures import new_figure, save_figure
+from dynx.sim.scenario.scenario import Scenario
 from dynx.spatial.scalar import Floats
 
-SCHEMA = "dynx.rollouts/1"
+SCHEMA = "dynx.rollouts/2"
 """Schema name of the file."""
 
 
@@ -27,8 +28,7 @@ class BatchRollouts:
     The record has the states after every `record_every` steps, and the torque that led there.
     """
 
-    joint_names: Sequence[str]
-    dt: float
+    scenario: Scenario  # that all rollouts share; arguments with a row for each rollout are not in it
     q: Floats  # (n, nq), at the end
     v: Floats  # (n, nv), at the end
     max_error: Floats  # (n, nv)
@@ -40,6 +40,16 @@ class BatchRollouts:
     v_record: Floats  # (n, kept, nv)
     tau_record: Floats  # (n, kept, nv)
     saturated: Floats  # (n, nv), the share of steps with the motor at its limit
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the joints of the robot."""
+        return tuple(self.scenario.model.joint_names)
+
+    @property
+    def dt(self) -> float:
+        """Length of a step [s]."""
+        return self.scenario.dt
 
     def __len__(self) -> int:
         return len(self.q)
@@ -61,8 +71,8 @@ class BatchRollouts:
         """Write a ``.npz`` that `load` reads. Raises ArgumentError for another name."""
         if Path(path).suffix != ".npz":
             raise ArgumentError(f"rollouts are saved as .npz, not as {shown(Path(path).name)}")
-        arrays: dict[str, Any] = {field.name: np.asarray(getattr(self, field.name)) for field in fields(self)}
-        np.savez(path, schema=SCHEMA, **arrays)
+        arrays: dict[str, Any] = {name: getattr(self, name) for name in _array_names()}
+        np.savez(path, schema=SCHEMA, scenario=self.scenario.to_json(), **arrays)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> BatchRollouts:
@@ -72,12 +82,11 @@ class BatchRollouts:
                 entries = {name: file[name] for name in file.files}
         except (OSError, ValueError, zipfile.BadZipFile) as error:
             raise ArgumentError(f"{os.fspath(path)} cannot be read as rollouts: {error}") from error
-        names = [field.name for field in fields(cls)]
-        if str(entries.get("schema")) != SCHEMA or not set(names) <= set(entries):
+        names = _array_names()
+        if str(entries.get("schema")) != SCHEMA or not {"scenario", *names} <= set(entries):
             raise ArgumentError(f"{os.fspath(path)} does not hold {SCHEMA!r}")
         arrays: dict[str, Any] = {name: entries[name] for name in names}
-        arrays |= {"joint_names": tuple(entries["joint_names"].tolist()), "dt": float(entries["dt"])}
-        return cls(**arrays)
+        return cls(Scenario.from_json(str(entries["scenario"])), **arrays)
 
     def plot(self, path: str | os.PathLike[str] | None = None) -> Any:
         """A `matplotlib.figure.Figure`: how many rollouts stay below an error, and each joint's errors.
@@ -94,9 +103,7 @@ class BatchRollouts:
         upper.set_xlabel("largest error of any joint [rad or m]")
         upper.set_ylabel("share of rollouts below")
         sound = self.done & np.isnan(self.diverged)
-        lower.boxplot(
-            self.max_error[sound], tick_labels=list(self.joint_names), whis=(5, 95), showfliers=False
-        )
+        lower.boxplot(self.max_error[sound], tick_labels=self.joint_names, whis=(5, 95), showfliers=False)
         lower.set_ylabel("largest error [rad or m]")
         lower.tick_params(axis="x", rotation=30)
         for axis in (upper, lower):
@@ -111,3 +118,7 @@ class BatchRollouts:
 
     def __repr__(self) -> str:
         return f"<BatchRollouts: {int(np.sum(self.done))} of {len(self)} done>"
+
+
+def _array_names() -> list[str]:
+    return [field.name for field in fields(BatchRollouts) if field.name != "scenario"]

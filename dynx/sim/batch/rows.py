@@ -2,12 +2,80 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dynx.errors import ArgumentError, shown
-from dynx.model.configuration import checked_array
+from dynx.errors import ArgumentError, GainError, shown
+from dynx.model import Model
+from dynx.model.configuration import checked_array, real_array
+from dynx.sim.scenario.keywords import scenario_of
+from dynx.sim.scenario.scenario import Scenario
 from dynx.spatial.scalar import Floats
+
+PLANT = "compiled"
+"""The plant of `dynx.simulate` that a batch runs on."""
+
+COEFFICIENTS = ("damping", "friction", "armature")
+
+PER_ROLLOUT = ("q0", "v0", *COEFFICIENTS)
+"""Fields of a scenario that a batch may have a row of for each rollout."""
+
+
+def split_rows(model: Model | Scenario, given: Mapping[str, Any]) -> tuple[Scenario, dict[str, Any]]:
+    """The scenario that all rollouts share, and the arguments with a row for each rollout, by name.
+
+    `given` are fields of a scenario, or what replaces those of `PER_ROLLOUT` in the one in place of a model.
+    """
+    own = {name: given[name] for name in PER_ROLLOUT if given[name] is not None and given[name] is not False}
+    fixed = {name: value for name, value in given.items() if name not in PER_ROLLOUT}
+    if isinstance(model, Scenario) and fixed["plant"] == PLANT:
+        del fixed["plant"]
+    scenario = scenario_of(model, None, fixed)
+    joints = joints_of(scenario.model)
+    rows = {name: value for name, value in own.items() if _has_rows(name, value, joints)}
+    return replace(scenario, **{name: own[name] for name in own if name not in rows}), rows
+
+
+def joints_of(model: Model) -> int:
+    """Number of joints that have a coordinate."""
+    return model.nv - (6 if model.floating else 0)
+
+
+def _has_rows(name: str, value: Any, joints: int) -> bool:
+    try:
+        shape = np.shape(value)
+    except ValueError:
+        # Lists of different lengths are refused with the scenario.
+        return False
+    return len(shape) > 1 or (name in COEFFICIENTS and len(shape) == 1 and shape != (joints,))
+
+
+def coefficient_rows(name: str, values: ArrayLike, joints: int) -> Floats:
+    """(n, joints) of one number, or one for each joint, for every rollout. Raises GainError for others."""
+    array = real_array(name, values)
+    rows = array[:, None] if array.ndim == 1 else array
+    if rows.ndim != 2 or rows.shape[1] not in (1, joints):
+        raise GainError(
+            f"{name} has shape {array.shape}; wanted one number, {joints} for the joints, "
+            f"or for each rollout: (n,), (n, 1) or (n, {joints})"
+        )
+    if not np.isfinite(rows).all() or (rows < 0.0).any():
+        raise GainError(f"{name} has entries that are negative or not finite")
+    return np.ascontiguousarray(np.broadcast_to(rows, (len(rows), joints)))
+
+
+def refuse_ambiguous(given: Mapping[str, Any], joints: int, n: int) -> None:
+    """Raise ArgumentError for coefficients in `given` that fit n joints as well as n rollouts."""
+    for name in COEFFICIENTS:
+        if n == joints > 1 and np.shape(given[name]) == (n,):
+            raise ArgumentError(
+                f"{name} has {n} numbers, and there are {n} joints and {n} rollouts: write it as (1, {n}) "
+                f"for the joints or as ({n}, 1) for the rollouts"
+            )
 
 
 class RolloutRows:
@@ -32,7 +100,7 @@ class RolloutRows:
         array = checked_array(name, array, size)
         if array.ndim > 2:
             raise ArgumentError(f"{name} has shape {array.shape}; wanted ({size},) or one such row a rollout")
-        if array.ndim == 2:
+        if array.ndim == 2 and len(array) != 1:
             if self._asked is not None and len(array) != self._asked:
                 raise ArgumentError(f"{name} has {len(array)} rows, {self._by} says {self._asked}")
             self._asked, self._by = len(array), name

@@ -1,6 +1,7 @@
 """Folder of finished parts, from which a run that was killed continues.
 
-The file of a part is named by the hash of its inputs. Files are written atomically, so each is complete.
+The file of a part is named by the hash of its scenario and its inputs. Files are written atomically, so each
+is complete.
 """
 
 from __future__ import annotations
@@ -16,14 +17,16 @@ import numpy as np
 from dynx.errors import ArgumentError, shown
 from dynx.files.writing import atomic_file
 from dynx.sim.batch.part import Part, PartDone
+from dynx.sim.scenario.scenario import Scenario
 
 
 class Store:
     """Folder of outcomes; runs with different arguments may share it."""
 
-    def __init__(self, folder: str | os.PathLike[str]) -> None:
+    def __init__(self, folder: str | os.PathLike[str], scenario: Scenario) -> None:
         """Raises ArgumentError if it cannot be made."""
         self._folder = Path(folder)
+        self._scenario = scenario.with_defaults().to_json()
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
@@ -43,10 +46,9 @@ class Store:
             np.savez(file, **outcome._asdict())
 
     def _path(self, part: Part) -> Path:
-        digest = sha256()
+        digest = sha256(self._scenario.encode())
         # Kernels count by what they compute; their machine code differs between processors.
-        numbers = (part.n_steps, part.dt, part.steps_per_control, part.delay_steps, part.record_every)
         arrays = (part.start, part.fixed, tuple(part.setpoints), part.goals, part.wrenches, part.noise)
         code = [(which, kernel.image) for which, kernel in sorted(part.kernels.items())]
-        digest.update(pickle.dumps((numbers, arrays, code), protocol=4))
+        digest.update(pickle.dumps((part.record_every, arrays, code), protocol=4))
         return self._folder / f"{digest.hexdigest()[:32]}.npz"

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -56,6 +57,11 @@ class Push:
             )
         return Push(self.frame, wrench, float(self.start), float(self.duration), self.reference)
 
+    def acts(self, t: Any, dt: float) -> Any:
+        """Whether it acts in the steps of length `dt` that begin at `t`, a time or an array of times [s]."""
+        since = t - self.start + WHOLE * dt
+        return (since >= 0.0) & (since < self.duration)
+
 
 class Disturbances:
     """All that acts on the joints of a plant besides its motors, from the arguments of `dynx.simulate`."""
@@ -76,7 +82,7 @@ class Disturbances:
         self.armature = _armature_matrix(model, armature)
         """Armature (nv, nv), added to the mass matrix."""
         self.has_armature = bool(self.armature.any())
-        self._early = WHOLE * dt
+        self._dt = dt
 
     @property
     def has_torque(self) -> bool:
@@ -87,8 +93,7 @@ class Disturbances:
         """The torque (nv,) of pushes less friction, in a step that began at `t`."""
         tau = -self.friction(v)
         for push in self.pushes:
-            since = t - push.start + self._early
-            if 0.0 <= since < push.duration:
+            if push.acts(t, self._dt):
                 tau = tau + engine.jacobian(q, push.frame, reference=push.reference).T @ push.wrench
         return tau
 

@@ -112,10 +112,10 @@ def test_payloads_gains_and_starts_of_their_own(arm: Model, reference: Trajector
 
 
 def equal(one: BatchRollouts, other: BatchRollouts) -> bool:
-    return all(
+    return one.scenario == other.scenario and all(
         np.array_equal(getattr(one, field.name), getattr(other, field.name), equal_nan=True)
         for field in fields(one)
-        if field.name != "joint_names"
+        if field.name != "scenario"
     )
 
 
@@ -219,7 +219,7 @@ def test_a_file_gives_them_back(arm: Model, reference: Trajectory, tmp_path: Pat
     found.save(tmp_path / "many.npz")
     again = BatchRollouts.load(tmp_path / "many.npz")
     assert equal(found, again)
-    assert again.joint_names == found.joint_names
+    assert again.joint_names == found.joint_names == tuple(arm.joint_names)
     for other in ("many.txt", "none.npz"):
         with pytest.raises(ArgumentError):
             found.save(tmp_path / other) if other == "many.txt" else BatchRollouts.load(tmp_path / other)

@@ -71,8 +71,10 @@ def whole() -> BatchRollouts:
 def assert_rows(found: BatchRollouts, rows: slice) -> None:
     """Every array of `found` is that of the whole batch, bit for bit."""
     for field in fields(found):
+        if field.name == "scenario":
+            continue
         one, other = (np.asarray(getattr(each, field.name)) for each in (found, whole()))
-        if field.name not in ("joint_names", "dt", "t"):
+        if field.name != "t":
             other = other[rows]
         assert one.tobytes() == np.ascontiguousarray(other).tobytes(), field.name
 

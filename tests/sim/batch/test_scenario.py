@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ import pytest
 from dynx.control import PD
 from dynx.errors import ArgumentError
 from dynx.model.loading import load
-from dynx.sim import Noise, Payload, Scenario, simulate, simulate_batch
+from dynx.sim import BatchRollouts, Noise, Payload, Scenario, simulate, simulate_batch
 
 ARM = load("planar_2r")
 LAW = PD(ARM, kp=20.0, kd=4.0)
@@ -36,6 +37,7 @@ def test_a_scenario_means_what_its_fields_mean_as_arguments() -> None:
     by_keywords = simulate_batch(ARM, LAW, GOAL, rollouts=3, record_every=1, **OPTIONS)
     for name in ("q", "v", "max_error", "q_record", "tau_record", "saturated"):
         assert np.array_equal(getattr(by_scenario, name), getattr(by_keywords, name)), name
+    assert by_keywords.scenario == by_scenario.scenario == SCENARIO
 
 
 def test_what_differs_is_given_beside_the_scenario() -> None:
@@ -43,6 +45,34 @@ def test_what_differs_is_given_beside_the_scenario() -> None:
     many = simulate_batch(SCENARIO, q0=starts, damping=[[0.1], [0.2], [0.3]])
     again = simulate_batch(ARM, LAW, GOAL, **{**OPTIONS, "q0": starts, "damping": [[0.1], [0.2], [0.3]]})
     assert np.array_equal(many.q, again.q)
+    assert many.scenario == SCENARIO
+    heavier = simulate_batch(SCENARIO, q0=starts, damping=0.3)
+    assert heavier.scenario == replace(SCENARIO, damping=0.3)
+    assert not np.array_equal(heavier.q, many.q)
+
+
+def test_one_row_is_for_all_rollouts() -> None:
+    of_joints = np.array([0.1, 0.2])
+    many = simulate_batch(SCENARIO, rollouts=2, damping=of_joints[None], q0=np.full((1, 2), 0.1))
+    other = simulate_batch(replace(SCENARIO, damping=of_joints, q0=np.full(2, 0.1)), rollouts=2)
+    assert np.array_equal(many.q, other.q)
+
+
+def test_a_file_keeps_the_scenario(tmp_path: Path) -> None:
+    simulate_batch(SCENARIO, rollouts=2).save(tmp_path / "many.npz")
+    again = BatchRollouts.load(tmp_path / "many.npz")
+    assert again.scenario == SCENARIO
+    assert np.array_equal(simulate_batch(again.scenario, rollouts=2).q, again.q)
+
+
+def test_kept_parts_belong_to_their_scenario(tmp_path: Path) -> None:
+    def kept(scenario: Scenario) -> int:
+        simulate_batch(scenario, rollouts=2, keep=tmp_path)
+        return len(list(tmp_path.glob("*.npz")))
+
+    assert kept(SCENARIO) == kept(replace(SCENARIO, integrator="semi_implicit")) == 1
+    # A reference that breaks no limit moves as it does unchecked, but it is another scenario.
+    assert kept(replace(SCENARIO, check_reference=False)) == 2
 
 
 @pytest.mark.parametrize(
@@ -53,6 +83,8 @@ def test_what_differs_is_given_beside_the_scenario() -> None:
         ({"substeps": 2}, "substeps"),
         ({"position_limits": True}, "position_limits"),
         ({"duration": None}, "duration"),
+        ({"controller": None}, "controller"),
+        ({"reference": None}, "reference"),
     ],
 )
 def test_what_a_batch_does_not_have_is_refused_by_name(change: dict[str, Any], name: str) -> None:
@@ -70,5 +102,5 @@ def test_what_the_scenario_has_is_not_given_beside_it(run: Any, given: dict[str,
 
 
 def test_a_plant_is_a_name() -> None:
-    with pytest.raises(ArgumentError, match="a batch runs on the plant 'compiled'"):
+    with pytest.raises(ArgumentError, match="plant is 'pybullet'; in a batch it is 'compiled'"):
         simulate_batch(ARM, LAW, GOAL, plant="pybullet", **OPTIONS)
