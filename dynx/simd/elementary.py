@@ -89,111 +89,86 @@ QUARTER_PI = (0.7853981633974483, 3.061616997868383e-17)
 """pi/4 as the sum of two doubles."""
 
 
-def elementary(write: Writer, op: str, x: str, *, fma: bool) -> str:
+def elementary(write: Writer, op: str, x: str) -> str:
     """Write the code of ``exp``, ``tanh`` or ``arctan`` of the vector `x`; return the name of the result."""
-    return {"exp": _exp, "tanh": _tanh, "arctan": _arctan}[op](_VectorOps(write, fma), x)
+    return {"exp": _exp, "tanh": _tanh, "arctan": _arctan}[op](write, x)
 
 
-class _VectorOps:
-    """Operations on whole vectors: each writes an instruction and returns the name of its result."""
-
-    def __init__(self, write: Writer, fma: bool) -> None:
-        self.write = write
-        self.fma = fma
-
-    def do(self, op: str, a: str, b: str) -> str:
-        return self.write.let(f"{op} {self.write.vector} {a}, {b}")
-
-    def multiply_add(self, a: str, b: str, c: str) -> str:
-        """Compute a b + c, with one rounding if the processor has fused multiply-add."""
-        vector = self.write.vector
-        if self.fma:
-            name = f"@llvm.fma.v{self.write.lanes}f64"
-            return self.write.let(f"call {vector} {name}({vector} {a}, {vector} {b}, {vector} {c})")
-        return self.do("fadd", self.do("fmul", a, b), c)
-
-    def polynomial(self, coefficients: Sequence[float], x: str) -> str:
-        """Evaluate a polynomial by Horner's rule; coefficients ascend in the power of x."""
-        found = self.write.splat(coefficients[-1])
-        for coefficient in reversed(coefficients[:-1]):
-            found = self.multiply_add(found, x, self.write.splat(coefficient))
-        return found
-
-    def select(self, order: str, a: str, b: str, yes: str, no: str) -> str:
-        """Select `yes` in the lanes where `fcmp order a, b` holds, and `no` elsewhere, also for NaN."""
-        write = self.write
-        chosen = write.let(f"fcmp {order} {write.vector} {a}, {b}")
-        return write.let(f"select {write.mask} {chosen}, {write.vector} {yes}, {write.vector} {no}")
-
-    def magnitude(self, x: str) -> str:
-        vector = self.write.vector
-        return self.write.let(f"call {vector} @llvm.fabs.v{self.write.lanes}f64({vector} {x})")
-
-    def bits(self, x: str) -> str:
-        return self.write.let(f"bitcast {self.write.vector} {x} to {self.write.integers}")
-
-    def copy_sign(self, magnitude: str, x: str) -> str:
-        return flip_sign(self.write, magnitude, self.bits(x))
-
-    def power_of_two(self, rounded: str) -> str:
-        """Compute 2^k, -1023 < k < 1024, from the double ROUNDING_SHIFT + k, whose last bits hold k."""
-        write = self.write
-        biased = write.let(f"add {write.integers} {self.bits(rounded)}, {write.integer_splat(1023)}")
-        exponent = write.let(f"shl {write.integers} {biased}, {write.integer_splat(52)}")
-        return write.let(f"bitcast {write.integers} {exponent} to {write.vector}")
+def _polynomial(write: Writer, coefficients: Sequence[float], x: str) -> str:
+    """Evaluate a polynomial by Horner's rule; coefficients ascend in the power of x."""
+    found = write.splat(coefficients[-1])
+    for coefficient in reversed(coefficients[:-1]):
+        found = write.multiply_add(found, x, write.splat(coefficient))
+    return found
 
 
-def _exp_of_remainder(ops: _VectorOps, x: str) -> tuple[str, str, str]:
+def _copy_sign(write: Writer, magnitude: str, x: str) -> str:
+    return flip_sign(write, magnitude, write.bits(x))
+
+
+def _power_of_two(write: Writer, rounded: str) -> str:
+    """Compute 2^k, -1023 < k < 1024, from the double ROUNDING_SHIFT + k, whose last bits hold k."""
+    biased = write.let(f"add {write.integers} {write.bits(rounded)}, {write.integer_splat(1023)}")
+    return write.from_bits(write.let(f"shl {write.integers} {biased}, {write.integer_splat(52)}"))
+
+
+def _exp_of_remainder(write: Writer, x: str) -> tuple[str, str, str]:
     """Return exp(r) of the remainder r = x - k ln 2, the double ROUNDING_SHIFT + k, and k."""
-    splat = ops.write.splat
-    rounded = ops.multiply_add(x, splat(1.4426950408889634), splat(ROUNDING_SHIFT))
-    k = ops.do("fsub", rounded, splat(ROUNDING_SHIFT))
-    high, low = LN2 if ops.fma else LN2_SHORT
-    r = ops.multiply_add(k, splat(-high), x)
+    splat = write.splat
+    rounded = write.multiply_add(x, splat(1.4426950408889634), splat(ROUNDING_SHIFT))
+    k = write.arithmetic("fsub", rounded, splat(ROUNDING_SHIFT))
+    high, low = LN2 if write.fma else LN2_SHORT
+    r = write.multiply_add(k, splat(-high), x)
     # The second part is so small that rounding r before adding it does no harm.
-    r = ops.multiply_add(k, splat(-low), r)
-    rest = ops.multiply_add(ops.do("fmul", r, r), ops.polynomial(EXP, r), r)
-    return ops.do("fadd", rest, splat(1.0)), rounded, k
+    r = write.multiply_add(k, splat(-low), r)
+    rest = write.multiply_add(write.arithmetic("fmul", r, r), _polynomial(write, EXP, r), r)
+    return write.arithmetic("fadd", rest, splat(1.0)), rounded, k
 
 
-def _exp(ops: _VectorOps, x: str) -> str:
-    splat = ops.write.splat
-    x = ops.select("ogt", x, splat(OVERFLOW), splat(OVERFLOW), x)
-    x = ops.select("olt", x, splat(UNDERFLOW), splat(UNDERFLOW), x)
-    power, _, k = _exp_of_remainder(ops, x)
-    half = ops.multiply_add(k, splat(0.5), splat(ROUNDING_SHIFT))
-    others = ops.do(
-        "fadd", ops.do("fsub", k, ops.do("fsub", half, splat(ROUNDING_SHIFT))), splat(ROUNDING_SHIFT)
+def _exp(write: Writer, x: str) -> str:
+    splat = write.splat
+    x = write.select("ogt", x, splat(OVERFLOW), splat(OVERFLOW), x)
+    x = write.select("olt", x, splat(UNDERFLOW), splat(UNDERFLOW), x)
+    power, _, k = _exp_of_remainder(write, x)
+    half = write.multiply_add(k, splat(0.5), splat(ROUNDING_SHIFT))
+    others = write.arithmetic(
+        "fadd",
+        write.arithmetic("fsub", k, write.arithmetic("fsub", half, splat(ROUNDING_SHIFT))),
+        splat(ROUNDING_SHIFT),
     )
-    scaled = ops.do("fmul", power, ops.power_of_two(half))
-    return ops.do("fmul", scaled, ops.power_of_two(others))
+    scaled = write.arithmetic("fmul", power, _power_of_two(write, half))
+    return write.arithmetic("fmul", scaled, _power_of_two(write, others))
 
 
-def _tanh(ops: _VectorOps, x: str) -> str:
-    splat = ops.write.splat
-    magnitude = ops.magnitude(x)
-    square = ops.do("fmul", magnitude, magnitude)
-    near = ops.multiply_add(ops.do("fmul", magnitude, square), ops.polynomial(TANH, square), magnitude)
-    cut = ops.select("ogt", magnitude, splat(TANH_SATURATION), splat(TANH_SATURATION), magnitude)
-    power, rounded, _ = _exp_of_remainder(ops, ops.do("fadd", cut, cut))
-    grown = ops.do("fadd", ops.do("fmul", power, ops.power_of_two(rounded)), splat(1.0))
-    far = ops.do("fsub", splat(1.0), ops.do("fdiv", splat(2.0), grown))
-    return ops.copy_sign(ops.select("olt", magnitude, splat(TANH_POLYNOMIAL_LIMIT), near, far), x)
+def _tanh(write: Writer, x: str) -> str:
+    splat = write.splat
+    magnitude = write.magnitude(x)
+    square = write.arithmetic("fmul", magnitude, magnitude)
+    near = write.multiply_add(
+        write.arithmetic("fmul", magnitude, square), _polynomial(write, TANH, square), magnitude
+    )
+    clamped = write.select("ogt", magnitude, splat(TANH_SATURATION), splat(TANH_SATURATION), magnitude)
+    power, rounded, _ = _exp_of_remainder(write, write.arithmetic("fadd", clamped, clamped))
+    grown = write.arithmetic(
+        "fadd", write.arithmetic("fmul", power, _power_of_two(write, rounded)), splat(1.0)
+    )
+    far = write.arithmetic("fsub", splat(1.0), write.arithmetic("fdiv", splat(2.0), grown))
+    return _copy_sign(write, write.select("olt", magnitude, splat(TANH_POLYNOMIAL_LIMIT), near, far), x)
 
 
-def _arctan(ops: _VectorOps, x: str) -> str:
-    splat = ops.write.splat
-    magnitude = ops.magnitude(x)
+def _arctan(write: Writer, x: str) -> str:
+    splat = write.splat
+    magnitude = write.magnitude(x)
 
     def by_range(flat: str, middle: str, steep: str) -> str:
-        above = ops.select("ogt", magnitude, splat(ARCTAN_STEEP), steep, middle)
-        return ops.select("ogt", magnitude, splat(ARCTAN_MIDDLE), above, flat)
+        above = write.select("ogt", magnitude, splat(ARCTAN_STEEP), steep, middle)
+        return write.select("ogt", magnitude, splat(ARCTAN_MIDDLE), above, flat)
 
-    top = by_range(magnitude, ops.do("fsub", magnitude, splat(1.0)), splat(-1.0))
-    bottom = by_range(splat(1.0), ops.do("fadd", magnitude, splat(1.0)), magnitude)
-    t = ops.do("fdiv", top, bottom)
-    square = ops.do("fmul", t, t)
+    top = by_range(magnitude, write.arithmetic("fsub", magnitude, splat(1.0)), splat(-1.0))
+    bottom = by_range(splat(1.0), write.arithmetic("fadd", magnitude, splat(1.0)), magnitude)
+    t = write.arithmetic("fdiv", top, bottom)
+    square = write.arithmetic("fmul", t, t)
     low = by_range(splat(0.0), splat(QUARTER_PI[1]), splat(2.0 * QUARTER_PI[1]))
     high = by_range(splat(0.0), splat(QUARTER_PI[0]), splat(2.0 * QUARTER_PI[0]))
-    curved = ops.multiply_add(ops.do("fmul", t, square), ops.polynomial(ARCTAN, square), low)
-    return ops.copy_sign(ops.do("fadd", high, ops.do("fadd", curved, t)), x)
+    curved = write.multiply_add(write.arithmetic("fmul", t, square), _polynomial(write, ARCTAN, square), low)
+    return _copy_sign(write, write.arithmetic("fadd", high, write.arithmetic("fadd", curved, t)), x)

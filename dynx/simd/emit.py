@@ -161,10 +161,9 @@ class _SegmentBody:
         number: int,
     ) -> None:
         self._program, self._settings, self._segment = program, settings, segment
-        self._fma = target.fma
         self._slots = slots
         self._number = number
-        self._write = Writer(settings.lanes)
+        self._write = Writer(settings.lanes, fma=target.fma)
         self._values: dict[int, str] = {}
         ports = [*program.inputs, *program.outputs]
         self._rows = [
@@ -214,26 +213,20 @@ class _SegmentBody:
         if node.op in _BINARY:
             name = write.let(f"{_BINARY[node.op]} {flags}{write.vector} {args[0]}, {args[1]}")
         elif node.op in _ORDER:
-            first = write.let(f"fcmp {_ORDER[node.op]} {write.vector} {args[0]}, {args[1]}")
-            name = write.let(
-                f"select {write.mask} {first}, {write.vector} {args[0]}, {write.vector} {args[1]}"
-            )
+            name = write.select(_ORDER[node.op], *args, *args)
         elif node.op in ELEMENTARY:
-            name = elementary(write, node.op, args[0], fma=self._fma)
+            name = elementary(write, node.op, args[0])
         elif node.op == "neg":
             name = write.let(f"fneg {flags}{write.vector} {args[0]}")
+        elif node.op == "abs":
+            name = write.magnitude(args[0])
         else:
-            function = {"abs": "fabs", "sqrt": "sqrt"}[node.op]
-            name = write.let(
-                f"call {write.vector} @llvm.{function}.v{write.lanes}f64({write.vector} {args[0]})"
-            )
+            name = write.let(f"call {write.vector} @llvm.sqrt.v{write.lanes}f64({write.vector} {args[0]})")
         self._set(index, name)
 
     def _trig(self, group: TrigGroup) -> None:
         angles = [self._value(angle) for angle in group.angles]
-        for found, (sin, cos) in zip(
-            sines_and_cosines(self._write, angles, fma=self._fma), group.nodes, strict=True
-        ):
+        for found, (sin, cos) in zip(sines_and_cosines(self._write, angles), group.nodes, strict=True):
             for index, name in ((sin, found.sin), (cos, found.cos)):
                 if index is not None:
                     self._set(index, name)

@@ -11,10 +11,14 @@ from collections.abc import Sequence
 
 
 class Writer:
-    """Lines of one function body, with fresh names for its values."""
+    """Lines of one function body, with fresh names for its values.
 
-    def __init__(self, lanes: int) -> None:
+    The code is for a processor with fused multiply-add if `fma` is true.
+    """
+
+    def __init__(self, lanes: int, *, fma: bool) -> None:
         self.lanes = lanes
+        self.fma = fma
         self.vector = f"<{lanes} x double>"
         self.integers = f"<{lanes} x i64>"
         self.mask = f"<{lanes} x i1>"
@@ -54,6 +58,38 @@ class Writer:
         mask = ", ".join(f"i32 {pick}" for pick in picks)
         kind = f"<{width} x double>"
         return self.let(f"shufflevector {kind} {a}, {kind} {b}, <{len(picks)} x i32> <{mask}>")
+
+    # -- operations on vectors of doubles -------------------------------------------------------------
+
+    def arithmetic(self, op: str, a: str, b: str) -> str:
+        """Write `op` of two vectors, such as ``fadd``; return the name of the result."""
+        return self.let(f"{op} {self.vector} {a}, {b}")
+
+    def multiply_add(self, a: str, b: str, c: str) -> str:
+        """Compute a b + c, with one rounding if the processor has fused multiply-add."""
+        if self.fma:
+            name = f"@llvm.fma.v{self.lanes}f64"
+            return self.let(
+                f"call {self.vector} {name}({self.vector} {a}, {self.vector} {b}, {self.vector} {c})"
+            )
+        return self.arithmetic("fadd", self.arithmetic("fmul", a, b), c)
+
+    def magnitude(self, x: str) -> str:
+        """Compute |x|."""
+        return self.let(f"call {self.vector} @llvm.fabs.v{self.lanes}f64({self.vector} {x})")
+
+    def select(self, order: str, a: str, b: str, yes: str, no: str) -> str:
+        """Select `yes` in the lanes where `fcmp order a, b` holds, and `no` elsewhere, also for NaN."""
+        chosen = self.let(f"fcmp {order} {self.vector} {a}, {b}")
+        return self.let(f"select {self.mask} {chosen}, {self.vector} {yes}, {self.vector} {no}")
+
+    def bits(self, x: str) -> str:
+        """Return the bits of x as a vector of integers."""
+        return self.let(f"bitcast {self.vector} {x} to {self.integers}")
+
+    def from_bits(self, bits: str) -> str:
+        """Return the doubles with these bits."""
+        return self.let(f"bitcast {self.integers} {bits} to {self.vector}")
 
 
 def hex_double(value: float) -> str:

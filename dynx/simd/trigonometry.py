@@ -57,18 +57,16 @@ class SineCosine(NamedTuple):
     cos: str
 
 
-def sines_and_cosines(write: Writer, angles: Sequence[str], *, fma: bool) -> list[SineCosine]:
+def sines_and_cosines(write: Writer, angles: Sequence[str]) -> list[SineCosine]:
     """Write sine and cosine of every vector in `angles`, with one branch for all of them."""
     near: list[SineCosine] = []
     far = "zeroinitializer"
     for batch in _batches(angles):
-        magnitudes = [
-            write.let(f"call {write.vector} @llvm.fabs.v{write.lanes}f64({write.vector} {x})") for x in batch
-        ]
+        magnitudes = [write.magnitude(x) for x in batch]
         for magnitude in magnitudes:
             beyond = write.let(f"fcmp ogt {write.vector} {magnitude}, {write.splat(LIMIT)}")
             far = write.let(f"or {write.mask} {far}, {beyond}")
-        near += _polynomials(write, batch, magnitudes, fma)
+        near += _polynomials(write, batch, magnitudes)
     bits = write.let(f"bitcast {write.mask} {far} to i{write.lanes}")
     some = write.let(f"icmp ne i{write.lanes} {bits}, 0")
     before, slow, done = (write.fresh(stem) for stem in ("near", "far", "trig"))
@@ -90,27 +88,19 @@ def sines_and_cosines(write: Writer, angles: Sequence[str], *, fma: bool) -> lis
 
 
 def _batches(angles: Sequence[str]) -> list[Sequence[str]]:
-    """Divide angles into batches of about equal magnitude, none larger than `ANGLES_PER_BATCH`."""
+    """Divide angles into batches of about equal size, none larger than `ANGLES_PER_BATCH`."""
     n = len(angles)
     parts = -(-n // ANGLES_PER_BATCH)
     return [angles[n * k // parts : n * (k + 1) // parts] for k in range(parts)]
 
 
-def _polynomials(
-    write: Writer, angles: Sequence[str], magnitudes: Sequence[str], fma: bool
-) -> list[SineCosine]:
+def _polynomials(write: Writer, angles: Sequence[str], magnitudes: Sequence[str]) -> list[SineCosine]:
     """Write sine and cosine of each angle by polynomials in its magnitude; the sign is applied at the end.
 
     Each step is written for all angles before the next one: their chains of operations then execute in
     parallel, and each coefficient is loaded once.
     """
-    vector, integers = write.vector, write.integers
-
-    def multiply_add(a: str, b: str, c: str) -> str:
-        if fma:
-            name = f"@llvm.fma.v{write.lanes}f64"
-            return write.let(f"call {vector} {name}({vector} {a}, {vector} {b}, {vector} {c})")
-        return write.let(f"fadd {vector} {write.let(f'fmul {vector} {a}, {b}')}, {c}")
+    multiply_add = write.multiply_add
 
     def polynomials(coefficients: Sequence[float]) -> list[str]:
         """Evaluate a polynomial by Horner's rule; coefficients ascend in powers of r^2."""
@@ -125,12 +115,12 @@ def _polynomials(
         multiply_add(magnitude, write.splat(2.0 / 3.141592653589793), write.splat(ROUNDING_SHIFT))
         for magnitude in magnitudes
     ]
-    counts = [write.let(f"bitcast {vector} {k} to {integers}") for k in shifted]
-    multiples = [write.let(f"fsub {vector} {k}, {write.splat(ROUNDING_SHIFT)}") for k in shifted]
-    remainders = _reduce(write, magnitudes, multiples, fma)
-    squares = [write.let(f"fmul {vector} {r}, {r}") for r in remainders]
+    counts = [write.bits(k) for k in shifted]
+    multiples = [write.arithmetic("fsub", k, write.splat(ROUNDING_SHIFT)) for k in shifted]
+    remainders = _reduce(write, magnitudes, multiples)
+    squares = [write.arithmetic("fmul", r, r) for r in remainders]
     sines = polynomials(SIN)
-    cubes = [write.let(f"fmul {vector} {z}, {r}") for z, r in zip(squares, remainders, strict=True)]
+    cubes = [write.arithmetic("fmul", z, r) for z, r in zip(squares, remainders, strict=True)]
     sines = [multiply_add(p, cube, r) for p, cube, r in zip(sines, cubes, remainders, strict=True)]
     cosines = polynomials((1.0, -0.5, *COS))
     return [_apply_quadrant(write, *numbers) for numbers in zip(angles, counts, sines, cosines, strict=True)]
@@ -144,7 +134,7 @@ def _apply_quadrant(write: Writer, x: str, k: str, sin: str, cos: str) -> SineCo
     s = write.let(f"select {write.mask} {swap}, {vector} {cos}, {vector} {sin}")
     c = write.let(f"select {write.mask} {swap}, {vector} {sin}, {vector} {cos}")
     after = write.let(f"add {integers} {k}, {write.integer_splat(1)}")
-    below = write.let(f"bitcast {vector} {x} to {integers}")
+    below = write.bits(x)
     half = write.let(f"shl {integers} {k}, {write.integer_splat(62)}")
     odd = write.let(f"xor {integers} {half}, {below}")
     even = write.let(f"shl {integers} {after}, {write.integer_splat(62)}")
@@ -154,36 +144,29 @@ def _apply_quadrant(write: Writer, x: str, k: str, sin: str, cos: str) -> SineCo
 def flip_sign(write: Writer, x: str, sign: str) -> str:
     """Return -x in the lanes where the first bit of `sign` is set, x elsewhere."""
     first = write.let(f"and {write.integers} {sign}, {write.integer_splat(-(2**63))}")
-    bits = write.let(f"bitcast {write.vector} {x} to {write.integers}")
-    flipped = write.let(f"xor {write.integers} {bits}, {first}")
-    return write.let(f"bitcast {write.integers} {flipped} to {write.vector}")
+    return write.from_bits(write.let(f"xor {write.integers} {write.bits(x)}, {first}"))
 
 
-def _reduce(write: Writer, magnitudes: Sequence[str], multiples: Sequence[str], fma: bool) -> list[str]:
+def _reduce(write: Writer, magnitudes: Sequence[str], multiples: Sequence[str]) -> list[str]:
     """Return x - k pi/2 for each magnitude x and multiple k."""
-    vector = write.vector
-    if not fma:
+    if not write.fma:
         return [_reduce_without_fma(write, x, k) for x, k in zip(magnitudes, multiples, strict=True)]
     remainders = list(magnitudes)
     for part in HALF_PI:
-        call = f"call {vector} @llvm.fma.v{write.lanes}f64"
         remainders = [
-            write.let(f"{call}({vector} {k}, {vector} {write.splat(-part)}, {vector} {r})")
-            for k, r in zip(multiples, remainders, strict=True)
+            write.multiply_add(k, write.splat(-part), r) for k, r in zip(multiples, remainders, strict=True)
         ]
     return remainders
 
 
 def _reduce_without_fma(write: Writer, x: str, k: str) -> str:
-    vector = write.vector
-    first, second, third = (write.let(f"fmul {vector} {k}, {write.splat(part)}") for part in HALF_PI_SHORT)
-    high = write.let(f"fsub {vector} {x}, {first}")
-    r = write.let(f"fsub {vector} {high}, {second}")
+    first, second, third = (write.arithmetic("fmul", k, write.splat(part)) for part in HALF_PI_SHORT)
+    high = write.arithmetic("fsub", x, first)
+    r = write.arithmetic("fsub", high, second)
     # Add what that subtraction rounded away, and the third part (Dekker's sum).
-    back = write.let(f"fsub {vector} {high}, {r}")
-    lost = write.let(f"fsub {vector} {back}, {second}")
-    rest = write.let(f"fsub {vector} {lost}, {third}")
-    return write.let(f"fadd {vector} {r}, {rest}")
+    back = write.arithmetic("fsub", high, r)
+    rest = write.arithmetic("fsub", write.arithmetic("fsub", back, second), third)
+    return write.arithmetic("fadd", r, rest)
 
 
 def _call_libm(write: Writer, x: str, near: SineCosine) -> SineCosine:
