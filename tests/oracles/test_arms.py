@@ -16,7 +16,7 @@ from tests.oracles.closed_form import MODELS
 
 @pytest.mark.parametrize("name", installed_backends())
 def test_wrist_centre_of_the_six_axis_arm(name: str) -> None:
-    """It depends on three joints: s, h offset and height, u upper arm, e, f offset and forearm."""
+    """The position depends on three joints: s, h offset and height, u upper arm, e, f offset and forearm."""
     s, h, u, e, f = 0.10, 0.40, 0.45, 0.05, 0.42
     model = load(MODELS / "six_axis_arm.urdf")
     with backend(name, model) as engine:
@@ -42,7 +42,7 @@ def test_wrist_centre_of_the_six_axis_arm(name: str) -> None:
 
 @pytest.mark.parametrize("name", installed_backends())
 def test_distance_of_the_seven_axis_arms_wrist(name: str) -> None:
-    """From the shoulder centre it depends on the elbow alone, by the law of cosines."""
+    """The distance from the shoulder centre depends on the elbow alone (law of cosines)."""
     h, u, f = 0.34, 0.40, 0.39
     model = load(MODELS / "seven_axis_arm.urdf")
     with backend(name, model) as engine:

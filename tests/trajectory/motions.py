@@ -49,9 +49,9 @@ def bounds(n: int) -> st.SearchStrategy[Floats]:
 @st.composite
 def displacements(draw: Draw, n: int) -> tuple[Floats, Floats]:
     """Draw two different configurations (n,)."""
-    q0, way = draw(vectors(n)), draw(vectors(n))
-    way[draw(st.integers(0, n - 1))] = draw(hundredths(0.1, 3.0))
-    return q0, q0 + way
+    q0, displacement = draw(vectors(n)), draw(vectors(n))
+    displacement[draw(st.integers(0, n - 1))] = draw(hundredths(0.1, 3.0))
+    return q0, q0 + displacement
 
 
 @st.composite

@@ -20,21 +20,22 @@ parts = st.floats(0.0, 1.0)
 
 
 @given(vectors(2), vectors(2), hundredths(0.1, 5.0), parts)
-def test_the_cycloidal_law(q0: Floats, q1: Floats, duration: float, part: float) -> None:
-    """The law agrees to a few units in the last place of its largest value."""
+def test_the_cycloidal_motion_law(q0: Floats, q1: Floats, duration: float, part: float) -> None:
+    """The motion law agrees to a few units in the last place of its largest value."""
     t = part * duration
     got = cycloidal(q0, q1, duration)(t)
     with mpmath.workdps(40):
         T, s = mpmath.mpf(duration), mpmath.mpf(t)
-        turn = 2 * mpmath.pi * s / T
-        law = float(s / T - mpmath.sin(turn) / (2 * mpmath.pi))
-        speed, change = (1 - mpmath.cos(turn)) / T, 2 * mpmath.pi * mpmath.sin(turn) / T**2
-    way = q1 - q0
-    size = np.abs(q0).max() + np.abs(way).max()
-    assert (np.abs(got.q - (q0 + way * law)) <= 8.0 * EPS * size).all()
-    assert (np.abs(got.v - way * float(speed)) <= 16.0 * EPS * np.abs(way) * 2.0 / duration).all()
-    limit = 32.0 * EPS * np.abs(way) * 2.0 * math.pi / duration**2
-    assert (np.abs(got.a - way * float(change)) <= limit).all()
+        phase = 2 * mpmath.pi * s / T
+        fraction = float(s / T - mpmath.sin(phase) / (2 * mpmath.pi))
+        s_dot, s_ddot = (1 - mpmath.cos(phase)) / T, 2 * mpmath.pi * mpmath.sin(phase) / T**2
+    displacement = q1 - q0
+    size = np.abs(q0).max() + np.abs(displacement).max()
+    assert (np.abs(got.q - (q0 + displacement * fraction)) <= 8.0 * EPS * size).all()
+    limit = 16.0 * EPS * np.abs(displacement) * 2.0 / duration
+    assert (np.abs(got.v - displacement * float(s_dot)) <= limit).all()
+    limit = 32.0 * EPS * np.abs(displacement) * 2.0 * math.pi / duration**2
+    assert (np.abs(got.a - displacement * float(s_ddot)) <= limit).all()
 
 
 def test_the_cycloid_of_the_tutorial() -> None:

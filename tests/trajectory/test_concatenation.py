@@ -18,8 +18,8 @@ def test_each_part_is_unchanged_during_its_time(drawn: list[Motion], part: float
     parts: list[Trajectory] = []
     for motion in drawn:
         begin = parts[-1].end.q[0] if parts else 0.0
-        way = motion.q1[0] - motion.q0[0]
-        parts.append(cycloidal([begin], [begin + way], motion.trajectory.duration))
+        displacement = motion.q1[0] - motion.q0[0]
+        parts.append(cycloidal([begin], [begin + displacement], motion.trajectory.duration))
     whole = concatenate(*parts)
     assert whole.duration == sum(one.duration for one in parts)
     passed = 0.0
@@ -27,8 +27,8 @@ def test_each_part_is_unchanged_during_its_time(drawn: list[Motion], part: float
         time = part * one.duration
         slip = 4.0 * np.finfo(np.float64).eps * whole.duration
         got, wanted = whole(passed + time), one(time)
-        way = np.abs(one.end.q - one.start.q)
-        top_v, top_a = 2.0 * way / one.duration, 2.0 * np.pi * way / one.duration**2
+        displacement = np.abs(one.end.q - one.start.q)
+        top_v, top_a = 2.0 * displacement / one.duration, 2.0 * np.pi * displacement / one.duration**2
         jerk = 2.0 * np.pi * top_a / one.duration
         size = 64.0 * np.finfo(np.float64).eps
         assert (np.abs(got.q - wanted.q) <= slip * top_v + size * (1.0 + np.abs(wanted.q))).all()

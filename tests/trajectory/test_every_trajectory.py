@@ -26,8 +26,8 @@ parts_of_the_duration = st.lists(st.floats(-0.5, 1.5), min_size=1, max_size=40)
 def central_difference(motion: Motion, t: Floats) -> tuple[Floats, Floats]:
     """Return the central differences of q and v over STEP to either side of t (n,)."""
     before, after = motion.trajectory(t - STEP), motion.trajectory(t + STEP)
-    way = after.q - before.q if motion.model is None else motion.model.difference(before.q, after.q)
-    return way / (2.0 * STEP), (after.v - before.v) / (2.0 * STEP)
+    displacement = after.q - before.q if motion.model is None else motion.model.difference(before.q, after.q)
+    return displacement / (2.0 * STEP), (after.v - before.v) / (2.0 * STEP)
 
 
 def smooth_times(trajectory: Trajectory, parts: list[float]) -> Floats:
@@ -96,8 +96,8 @@ def test_q_and_v_are_continuous_at_the_ends(motion: Motion) -> None:
     for end, inner in ((0.0, step), (made.duration, made.duration - step)):
         here, there = made(end), made(inner)
         limit = step * (np.abs(here.v) + np.abs(there.v)) + 64.0 * EPS * (1.0 + np.abs(here.q).max())
-        way = there.q - here.q if motion.model is None else motion.model.difference(here.q, there.q)
-        assert (np.abs(way) <= limit).all()
+        displacement = there.q - here.q if motion.model is None else motion.model.difference(here.q, there.q)
+        assert (np.abs(displacement) <= limit).all()
         size = 64.0 * EPS * (1.0 + np.abs(made(np.linspace(0.0, made.duration, 50)).v).max())
         change = step * (np.abs(here.a) + np.abs(there.a)) + size
         assert (np.abs(there.v - here.v) <= change).all()

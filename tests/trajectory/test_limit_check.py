@@ -33,8 +33,8 @@ def pendulum(limits: Limits, friction: float = 0.0) -> Model:
     return Model.build("pendulum", [Link("base"), Link("bob", body)], [hinge])
 
 
-def slow(way: float) -> dynx.trajectory.Trajectory:
-    return cycloidal([0.0], [way], 100.0)
+def slow(displacement: float) -> dynx.trajectory.Trajectory:
+    return cycloidal([0.0], [displacement], 100.0)
 
 
 def test_what_is_within_limits_passes() -> None:

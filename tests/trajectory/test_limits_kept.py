@@ -86,11 +86,11 @@ def test_the_joints_stay_on_a_straight_line(problem: tuple[Floats, Floats, Limit
         trapezoidal(q0, q1, velocity=velocity, acceleration=acceleration),
         s_curve(q0, q1, velocity=velocity, acceleration=acceleration, jerk=jerk),
     ):
-        way = motion(part * motion.duration).q - q0
+        displacement = motion(part * motion.duration).q - q0
         k = int(np.argmax(np.abs(q1 - q0)))
-        done = way[k] / (q1 - q0)[k]
+        done = displacement[k] / (q1 - q0)[k]
         size = np.abs(q0) + np.abs(q1)
-        assert (np.abs(way - done * (q1 - q0)) <= 16.0 * np.finfo(np.float64).eps * size.max()).all()
+        assert (np.abs(displacement - done * (q1 - q0)) <= 16.0 * np.finfo(np.float64).eps * size.max()).all()
 
 
 @given(problems(), hundredths(1.0, 9.0))
@@ -187,7 +187,7 @@ def test_limits_of_a_floating_base(seed: int) -> None:
     assert (np.abs(v) <= limit).all()
     assert (np.abs(a) <= 2.0 * limit).all()
     # The profile is the same for joints and for a screw motion.
-    way = model.difference(q0, q1)
-    joints = s_curve(0.0 * way, way, velocity=limit, acceleration=2.0 * limit, jerk=9.0)
+    displacement = model.difference(q0, q1)
+    joints = s_curve(0.0 * displacement, displacement, velocity=limit, acceleration=2.0 * limit, jerk=9.0)
     assert motion.duration == joints.duration
     np.testing.assert_array_equal(v, joints(times(motion)).v)

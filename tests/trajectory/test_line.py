@@ -22,9 +22,9 @@ def pose(q: Floats) -> Floats:
         return engine.forward_kinematics(q, FRAME)
 
 
-def target(way: tuple[float, float, float], angle: float) -> Floats:
+def target(displacement: tuple[float, float, float], angle: float) -> Floats:
     T = pose(REACH) @ turned(angle)
-    T[:3, 3] += way
+    T[:3, 3] += displacement
     return T
 
 
@@ -32,10 +32,10 @@ def distances_from_the_line(motion: LineTrajectory, goal: Floats, t: Floats) -> 
     """Return the distances of origin [m] and axes [rad] from the straight line."""
     T = pose(motion(t).q)
     start = pose(REACH)
-    way = goal[:3, 3] - start[:3, 3]
+    displacement = goal[:3, 3] - start[:3, 3]
     from_start = T[:, :3, 3] - start[:3, 3]
-    part = np.clip(from_start @ way / (way @ way), 0.0, 1.0)
-    off = np.linalg.norm(from_start - part[:, None] * way, axis=1)
+    part = np.clip(from_start @ displacement / (displacement @ displacement), 0.0, 1.0)
+    off = np.linalg.norm(from_start - part[:, None] * displacement, axis=1)
     # The z axis of the tool is constant, since the rotation is about it.
     tilt = np.linalg.norm(np.cross(T[:, :3, 2], start[:3, 2]), axis=1)
     return off, tilt
@@ -47,8 +47,10 @@ def distances_from_the_line(motion: LineTrajectory, goal: Floats, t: Floats) -> 
     st.integers(-10, 10).map(lambda n: n / 10),
     st.sampled_from([1e-3, 1e-5, 1e-7]),
 )
-def test_the_frame_is_on_the_line(way: tuple[float, float, float], angle: float, bound: float) -> None:
-    goal = target(way, angle)
+def test_the_frame_is_on_the_line(
+    displacement: tuple[float, float, float], angle: float, bound: float
+) -> None:
+    goal = target(displacement, angle)
     motion = line(ur5(), FRAME, REACH, goal, 2.0, deviation=bound, rotation_deviation=bound)
     assert motion.deviation <= bound
     assert motion.rotation_deviation <= bound
@@ -71,14 +73,14 @@ def test_the_motion_law_holds_along_the_line() -> None:
     assert motion.duration == law.duration
     t = np.linspace(0.0, law.duration, 33)
     start = pose(REACH)[:3, 3]
-    way = goal[:3, 3] - start
+    displacement = goal[:3, 3] - start
     s, rate, _ = law(t)
     q, v, _ = motion(t)
-    assert np.abs(pose(q)[:, :3, 3] - start - s * way).max() <= 2.0 * motion.deviation + 1e-9
+    assert np.abs(pose(q)[:, :3, 3] - start - s * displacement).max() <= 2.0 * motion.deviation + 1e-9
     with dynx.backend("pinocchio", ur5()) as engine:
         speed = engine.frame_velocity(q, v, FRAME)[:, :3]
     # The spline deviates by d within an interval of 1/n, so its slope by about n d.
-    assert np.abs(speed - rate * way).max() <= 20.0 * motion.intervals * motion.deviation
+    assert np.abs(speed - rate * displacement).max() <= 20.0 * motion.intervals * motion.deviation
 
 
 def test_too_few_joints_for_the_line_raise() -> None:

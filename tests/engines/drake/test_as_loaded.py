@@ -267,7 +267,7 @@ def test_files_that_would_end_the_process_are_not_handed_over(words: str, tmp_pa
     assert done.returncode != 0
 
 
-def test_files_that_it_refuses_are_errors_in_its_words() -> None:
+def test_files_that_drake_refuses_raise_its_message() -> None:
     model = forked()
     text = model.to_urdf()
     for spoiled, words in (
@@ -289,7 +289,7 @@ def test_what_is_no_file_is_not_handed_over(tmp_path: Path) -> None:
             LoadedDrake(path, forked())
 
 
-def test_a_robot_that_would_take_for_ever_is_refused() -> None:
+def test_a_robot_that_loads_too_slowly_is_refused() -> None:
     model = chain(MAX_LINKS)
     with pytest.raises(EngineError, match=f"has {MAX_LINKS + 1} links"):
         loaded(LoadedDrake, model).__enter__()

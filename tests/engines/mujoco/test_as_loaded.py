@@ -302,7 +302,7 @@ def test_what_is_no_file(tmp_path: Path) -> None:
             LoadedMujoco(path, forked())
 
 
-def test_chains_that_end_the_process_are_not_tried() -> None:
+def test_chains_that_crash_mujoco_are_refused() -> None:
     with pytest.raises(EngineError, match=f"links in a row.*{MAX_DEPTH}"):
         worst(chain(MAX_DEPTH, "fixed"))
 

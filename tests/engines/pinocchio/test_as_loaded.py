@@ -107,7 +107,7 @@ def test_masses_that_vanish_show_as_nan() -> None:
         assert robot.mass_matrix(np.zeros(1)).tolist() == [[0.0]]
 
 
-def test_what_it_prints_is_kept_and_not_printed(capfd: pytest.CaptureFixture[str]) -> None:
+def test_engine_output_is_captured_and_not_printed(capfd: pytest.CaptureFixture[str]) -> None:
     model = forked("fixed", LOSSES)
     text = model.to_urdf()
     spoiled = text.replace(f'value="{BODY.mass}"', 'value="heavy"', 1)
@@ -132,7 +132,7 @@ def test_a_link_that_is_not_there_has_no_pose() -> None:
         assert robot.describe().missing_links == ("tool",)
 
 
-def test_files_that_it_refuses_are_errors_in_its_words() -> None:
+def test_files_that_drake_refuses_raise_its_message() -> None:
     model = forked("fixed", LOSSES)
     for text, words in (
         (model.to_urdf().replace(' effort="9.0"', ""), "does not contain a valid URDF model"),

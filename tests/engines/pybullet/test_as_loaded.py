@@ -141,7 +141,7 @@ def test_a_state_that_overflows_is_left_behind() -> None:
         assert_alike(robot, model)
 
 
-def test_numbers_that_are_not_finite_are_not_handed_over() -> None:
+def test_numbers_that_are_not_finite_raise() -> None:
     model = forked("fixed")
     bad = np.array([np.nan, 0.0])
     fine = np.zeros(2)
@@ -157,7 +157,7 @@ def test_numbers_that_are_not_finite_are_not_handed_over() -> None:
                 call()
 
 
-def test_clients_are_given_back() -> None:
+def test_clients_are_disconnected() -> None:
     model = forked("floating")
     with loaded(LoadedPyBullet, model) as robot:
         assert isinstance(robot, LoadedPyBullet)
@@ -188,7 +188,7 @@ def test_a_load_that_fails_gives_its_client_back(monkeypatch: pytest.MonkeyPatch
     assert not any(bullet.isConnected(client) for client in made)
 
 
-def test_what_it_prints_is_kept_and_not_printed(capfd: pytest.CaptureFixture[str]) -> None:
+def test_engine_output_is_captured_and_not_printed(capfd: pytest.CaptureFixture[str]) -> None:
     model = forked("fixed")
     bare = replace(model, links=tuple(replace(link, inertial=None) for link in model.links))
     with loaded(LoadedPyBullet, bare) as robot:

@@ -58,7 +58,7 @@ def test_after_a_failed_step_the_engine_is_opened_anew() -> None:
         ('<origin xyz="', '<origin xyz="9e0 ', "centre of mass"),
     ],
 )
-def test_what_bullet_reads_otherwise_is_noticed(
+def test_values_that_bullet_misreads_raise(
     monkeypatch: pytest.MonkeyPatch, written: str, read: str, what: str
 ) -> None:
     monkeypatch.setattr(

@@ -39,7 +39,7 @@ CHANGES: dict[str, Callable[[str], str]] = {
 
 
 @pytest.mark.parametrize("reason", CHANGES)
-def test_what_crashes_it_is_not_handed_over(reason: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_files_that_crash_bullet_are_refused(reason: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(bullet, "loadURDF", lambda *args, **options: pytest.fail("Bullet was called"))
     text = CHANGES[reason](TEXT)
     assert text != TEXT
@@ -71,7 +71,7 @@ def test_frames_that_dynx_added_count_as_links(tmp_path: Path) -> None:
     require_harmless(path, model)
 
 
-def test_joints_beyond_those_it_answers_for_are_refused() -> None:
+def test_joints_beyond_the_limit_of_bullet_are_refused() -> None:
     with (
         pytest.raises(EngineError, match=f"has {MAX_JOINTS + 1} joints, fixed ones included"),
         loaded(LoadedPyBullet, chain(MAX_JOINTS + 1)),
@@ -79,7 +79,7 @@ def test_joints_beyond_those_it_answers_for_are_refused() -> None:
         pass
 
 
-def test_joints_that_it_makes_something_else_of_are_named() -> None:
+def test_joints_that_bullet_reads_as_another_type_are_named() -> None:
     model = chain(2)
     for kind, word in (("floating", "fixed"), ("planar", "planar"), ("spherical", "spherical")):
         text = model.to_urdf().replace('name="joint1" type="revolute"', f'name="joint1" type="{kind}"')
