@@ -53,8 +53,8 @@ def test_sine_and_cosine_of_one_angle_cost_once() -> None:
 
 
 def test_the_cost_matches_the_emitted_instructions() -> None:
-    write = Writer(4)
-    sines_and_cosines(write, ["%x"], fma=True)
+    write = Writer(4, fma=True)
+    sines_and_cosines(write, ["%x"])
     labels = [k for k, line in enumerate(write.lines) if not line.startswith(" ")]
     straight = write.lines[: labels[0]]  # before the branch for large angles
     assert sum("@llvm.fma" in line for line in straight) == SINE_COSINE_PAIRS

@@ -33,6 +33,6 @@ def silent_data(model: Any) -> Any:
 
 
 def silence_warnings(data: Any) -> None:
-    """Prevent MuJoCo from printing warnings, by counters that are not zero."""
+    """Prevent MuJoCo from printing warnings, by setting their counters to 1."""
     for warning in data.warning:
         warning.number = 1

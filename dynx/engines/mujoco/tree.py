@@ -1,5 +1,5 @@
-"""MuJoCo's model of a robot, built from links and joints: one body for each frame, one joint for each that
-moves.
+"""MuJoCo's model of a robot, built from links and joints: one body for each frame, one joint for each
+moving joint.
 
 MuJoCo's compiler refuses inertias that a description can hold (no mass on a moving body, a violated triangle
 inequality, a negative principal moment). So it compiles the tree with substitute inertias, and the numbers of

@@ -64,7 +64,7 @@ class PinocchioBackend(Backend):
     name: ClassVar[str] = "pinocchio"
 
     def __init__(self, model: Model, *, validate: bool = True) -> None:
-        """Raises EngineLimitError for a model that the engine would hold wrongly or that is too large."""
+        """Raises EngineLimitError for a model that the engine cannot represent or that is too large."""
         super().__init__(model, validate=validate)
         self._engine, self._frame_ids = engine_model(model)
         self._workspace = _Workspace(self._engine)

@@ -36,8 +36,8 @@ def engine_model(model: Model) -> tuple[Any, tuple[int, ...]]:
     """Build Pinocchio's own model of `model`; also return the number of each frame of `model.frame_names`.
 
     It is made once for all backends of a model, which never change it. Its coordinates are those of the tree,
-    mimic joints included. Raises EngineLimitError for a model that the engine would hold wrongly or that is
-    too large, EngineError where the engine refuses it.
+    mimic joints included. Raises EngineLimitError for a model that the engine would represent wrongly or
+    that is too large, EngineError where the engine refuses it.
     """
     nv = model.mechanism.nv
     if nv > MAX_NV:

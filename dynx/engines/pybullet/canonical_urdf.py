@@ -54,7 +54,7 @@ class BulletTree:
 
 
 def bullet_tree(mechanism: Mechanism, ballast: tuple[Ballast, ...], times: int) -> BulletTree:
-    """The tree that Bullet loads for a long-double `mechanism`, with `times` the ballast."""
+    """The tree that Bullet loads for a long-double `mechanism`, with `times` copies of the ballast."""
     root = principal_inertia(NOTHING)
     largest_moments = [0.0]
     if mechanism.floating:

@@ -1,7 +1,7 @@
 """Checks for files that are known to crash PyBullet (measured with pybullet 3.2.5 to 3.2.7).
 
-PyBullet checks nothing itself. It uses names as printf formats, an element without ``name`` or ``type`` or a
-graph that is no tree ends the process, and joint states have room for 127 joints.
+PyBullet checks nothing itself. It uses names as printf formats, crashes on an element without ``name`` or
+``type`` and on a graph that is not a tree, and has room for the states of 127 joints.
 """
 
 from __future__ import annotations

@@ -47,7 +47,7 @@ class Ballast:
     rotational: float = 0.0
 
     def add_to(self, inertia: RigidInertia, times: int) -> RigidInertia:
-        """The inertia of the body with `times` this ballast."""
+        """The inertia of the body with `times` copies of this ballast."""
         return RigidInertia(
             np.asarray(inertia.mass + times * longdouble(self.mass)),
             inertia.first_moment,

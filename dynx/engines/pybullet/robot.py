@@ -30,7 +30,7 @@ _IDENTITY = np.eye(4)
 
 
 class BulletRobot:
-    """A mechanism, with `times` the ballast, in a client of its own. Each call takes one sample."""
+    """A mechanism, with `times` copies of the ballast, in a client of its own. Each call takes one sample."""
 
     def __init__(
         self, engine: ModuleType, mechanism: Mechanism, ballast: tuple[Ballast, ...], times: int

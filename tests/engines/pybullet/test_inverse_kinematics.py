@@ -34,7 +34,7 @@ def test_bullet_s_solver_reaches_targets_nearby(name: str, base: Base, frame: st
             reached += bool(
                 np.linalg.norm(off) <= TARGET_TOLERANCE and np.linalg.norm(turned) <= TARGET_TOLERANCE
             )
-    # It has no step control and fails at times; a wrong frame or attitude would reach none.
+    # The solver has no step control and misses some targets; with a wrong frame it would miss all.
     assert reached >= 10
 
 
