@@ -162,7 +162,7 @@ class Examiner:
         self, engine: str, path: Path, case: Case, reference: ReferenceValues, describe: bool
     ) -> EngineOutput:
         try:
-            # Engines print to the streams of the process what is reported here in better order.
+            # Engines print messages that the report contains in a better order.
             with (
                 silence(),
                 np.errstate(all="ignore"),

@@ -27,7 +27,7 @@ class MassRatioExtreme(Rule):
     advice = "Attach frames without a body by fixed joints, and give every mass in kilograms."
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
-        """Moving joints between such bodies; the link named heads the lighter one."""
+        """Yield moving joints between such bodies, with the head of the lighter rigid group."""
         heads = {name: group.head for name, group in rigid_groups(case).items()}
         mass = dict.fromkeys(heads.values(), 0.0)
         for link in case.model.links:

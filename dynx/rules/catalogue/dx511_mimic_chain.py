@@ -26,7 +26,7 @@ class MimicChain(OptionalEditingRule):
     changed = "let mimic joints follow the driven joint directly, with the factors multiplied"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
-        """Mimic joints that name a mimic joint; dynx's own reading has the factors of the whole chain."""
+        """Yield mimic joints that follow a mimic joint, with the factors of the whole chain."""
         for joint in case.model.joints:
             resolved, mimic = joint.mimic, case.joints[joint.name].first("mimic")
             if resolved is None or mimic is None:

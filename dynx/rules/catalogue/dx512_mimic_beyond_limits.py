@@ -25,7 +25,7 @@ class MimicBeyondLimits(Rule):
     advice = "Give the follower the range that multiplier and offset make of the leader's."
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
-        """Followers with limits that the leader's range violates."""
+        """Yield followers with limits that the leader's range violates."""
         for joint in case.model.joints:
             if joint.mimic is None or joint.type == "continuous":
                 continue

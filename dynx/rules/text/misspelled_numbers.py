@@ -15,7 +15,7 @@ from dynx.rules.text.numeric_attributes import NumericAttribute, numeric_attribu
 
 
 class MisspelledNumberRule(EditingRule):
-    """A rule about one fault of number texts, wherever the file has numbers."""
+    """A rule about one fault in the text of a number, in every numeric attribute."""
 
     stage: ClassVar[Stage] = "reading"
     fault: ClassVar[Fault]

@@ -1,4 +1,4 @@
-"""Files as they are given: encodings, byte-order marks and line ends reach the engines and come back."""
+"""Encodings, byte-order marks and line ends of files, as engines load them and in the mended file."""
 
 from __future__ import annotations
 

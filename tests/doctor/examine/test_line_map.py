@@ -1,4 +1,4 @@
-"""Findings about a file that had to be made readable stand at the lines of the user's file."""
+"""Lines of findings in the user's file where dynx reads a mended one."""
 
 from __future__ import annotations
 

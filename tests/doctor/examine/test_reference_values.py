@@ -42,7 +42,7 @@ def test_torques_and_accelerations_fit_and_no_state_is_balanced(base: str) -> No
     reference = reference_values(model, draw_states(model, 4, 0))
     size = np.max(np.abs(reference.torque))
     assert np.max(np.abs(reference.required_torque(reference.states.a) - reference.torque)) <= BAR * size
-    # Of the robot's own size, and asking for another acceleration than that of the state.
+    # Of the robot's own magnitude, for another acceleration than that of the state.
     assert np.min(np.max(np.abs(reference.states.tau - reference.torque), axis=1)) > 1e-3 * size
     assert sorted(map(tuple, reference.states.tau)) == sorted(map(tuple, reference.torque))
 

@@ -70,7 +70,7 @@ def test_a_cause_that_explains_all_is_proved_at_each_place_with_its_own_effect()
     assert far.proved
     assert near.largest_effect is not None
     assert far.largest_effect is not None
-    # The far link slides along z and has a part of the torques alone.
+    # The far link slides along z and contributes to fewer torques.
     assert near.largest_effect.relative_error != far.largest_effect.relative_error
     assert {*near.effects, *far.effects} == {NAME}
 
