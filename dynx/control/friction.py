@@ -94,9 +94,9 @@ class JointFriction:
         if isinstance(given, bool):
             return own if given else np.zeros(model.mechanism.nv if through else model.nv)
         base = 6 if model.floating else 0
-        asked = checked_gain(name, given, model.nv - base, per="one for each joint")
+        coefficients = checked_gain(name, given, model.nv - base, per="one for each joint")
         # To the joints that own a coordinate: none to the base, and in the tree none to those that follow.
-        owns = [joint.mimic is None for joint in model.joints if joint.moves]
-        joints = np.zeros(len(owns) if through else len(asked))
-        joints[owns if through else slice(None)] = asked
+        owners = [joint.mimic is None for joint in model.joints if joint.moves]
+        joints = np.zeros(len(owners) if through else len(coefficients))
+        joints[owners if through else slice(None)] = coefficients
         return np.concatenate([np.zeros(base), joints])

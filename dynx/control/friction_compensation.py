@@ -39,7 +39,7 @@ class FrictionCompensation(Wrapper[ControllerState], pure=True):
         slip: float = SLIP,
         speed: str = "measured",
     ) -> None:
-        """Coefficients as those of `JointFriction`: by default what the model's description says."""
+        """Coefficients as those of `JointFriction`: by default those of the model's description."""
         if speed not in SPEEDS:
             raise ArgumentError(f"speed is {shown(speed)}; wanted one of {', '.join(SPEEDS)}")
         super().__init__(inner)

@@ -39,12 +39,12 @@ class Clock:
 
     @property
     def n_controls(self) -> int:
-        """How often the controller is asked."""
+        """Number of control steps."""
         return -(-self.n_steps // self.steps_per_control)
 
     @property
     def control_dt(self) -> float:
-        """The time between two answers of the controller [s]."""
+        """Time between two control steps [s]."""
         return self.steps_per_control * self.dt
 
     def times(self) -> Floats:
@@ -52,7 +52,7 @@ class Clock:
         return np.arange(self.n_steps + 1, dtype=np.float64) * self.dt
 
     def control_times(self, lead: int) -> Floats:
-        """The times of the setpoints that the controller is handed (n_controls,) [s]."""
+        """Times (n_controls,) [s] of the setpoints of the controller, `lead` control steps ahead."""
         steps = (np.arange(self.n_controls) + lead) * self.steps_per_control
         return steps.astype(np.float64) * self.dt
 

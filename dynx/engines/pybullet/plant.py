@@ -1,7 +1,7 @@
 """PyBullet's own stepper as a plant: its articulated-body algorithm and its integration scheme only.
 
-`dynx.engines.pybullet.stepping` says which features are switched off, and why. Friction, pushes and armature
-are torques from `dynx.sim.plants.disturbances`, so that they are the same in every plant.
+`dynx.engines.pybullet.stepping` lists the features that are switched off, and why. Friction, pushes and
+armature are torques from `dynx.sim.plants.disturbances`, so that they are the same in every plant.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from dynx.spatial.so3 import cross, quat_from_rotation, quat_product, rotate_bac
 class BulletPlant(Plant):
     """One robot in a Bullet world of its own, stepped by Bullet.
 
-    Mimic joints and armature are unknown to Bullet's stepper. With them the acceleration is solved from
+    Bullet's stepper has neither mimic joints nor armature. With them the acceleration is solved from
     Bullet's mass matrix and bias, and the stepper applies the torque that causes it.
     """
 

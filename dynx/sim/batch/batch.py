@@ -18,9 +18,9 @@ from dynx.control.friction import SLIP, Coefficients
 from dynx.errors import ArgumentError, shown
 from dynx.model import Model
 from dynx.model.configuration import checked_q
-from dynx.sim.batch.kernel import StepOf
-from dynx.sim.batch.loads import PLACEHOLDER, BatchLoads
-from dynx.sim.batch.part import KernelOf, Part, PartDone, PartNoise, pushing
+from dynx.sim.batch.disturbances import PLACEHOLDER, BatchDisturbances
+from dynx.sim.batch.kernel import FusedStep
+from dynx.sim.batch.part import Part, PartDone, PartNoise, StepKernels, pushing
 from dynx.sim.batch.rollouts import BatchRollouts
 from dynx.sim.batch.rows import (
     COEFFICIENTS,
@@ -132,8 +132,14 @@ def simulate_batch(
     if "q0" in own:
         stand_ins["q0"] = scenario.model.neutral()
     setup = Setup.of(replace(scenario, **stand_ins))
-    law, moved, clock, limit, noise = setup.controller, setup.model, setup.clock, setup.limit, scenario.noise
-    assert law is not None
+    controller, moved, clock, limit, noise = (
+        setup.controller,
+        setup.model,
+        setup.clock,
+        setup.limit,
+        scenario.noise,
+    )
+    assert controller is not None
     assert setup.setpoint_of is not None
     if parametric is not None and parametric.model != moved:
         wanted = scenario.model.name
@@ -146,12 +152,12 @@ def simulate_batch(
         raise ArgumentError("parameters were given without the model that they are of: dynx.parametric(...)")
     if isinstance(record_every, bool) or not isinstance(record_every, int) or record_every < 0:
         raise ArgumentError(f"record_every is {shown(record_every)}; wanted a whole number, 0 for no record")
-    loads = BatchLoads.of(moved, setup.disturbances, varied)
-    if parametric is None and not loads.rotors.any():
+    acting = BatchDisturbances.of(moved, setup.disturbances, varied)
+    if parametric is None and not acting.rotors.any():
         Solvability(moved).refuse_singular(False)
     delayed = clock.delay_steps > 0
-    step = StepOf(
-        moved, law, clock.dt, tuple(gains or ()), parametric, noise is not None, delayed, limit, loads
+    step = FusedStep(
+        moved, controller, clock.dt, tuple(gains or ()), parametric, noise is not None, delayed, limit, acting
     )
     rows = RolloutRows(rollouts)
     q, v = setup.start
@@ -166,13 +172,13 @@ def simulate_batch(
         chosen = parametric.parameters.defaults if parameters is None else parameters
         fixed["parameters"] = rows.of("parameters", chosen, len(parametric.parameters.names))
     for name, values in (gains or {}).items():
-        size = gains_of(innermost(law))[name].size
+        size = gains_of(innermost(controller))[name].size
         fixed[f"gain_{name}"] = rows.of(name, columns_of(values), size, spread=True)
     n = rows.count
     refuse_ambiguous(given, joints, n)
     start = {name: rows.spread(array) for name, array in start.items()}
     fixed = {name: rows.spread(array) for name, array in fixed.items()}
-    state = law.initial_state()
+    state = controller.initial_state()
     zeros = np.zeros((n, moved.nv))
     start |= {"worst": zeros, "squares": zeros}
     if limit is not None:
@@ -180,10 +186,10 @@ def simulate_batch(
     if state is not None:
         start["state"] = np.tile(state, (n, 1))
     deviations = None if noise is None else noise.deviations(moved.nv)
-    wrenches = loads.wrenches(clock) if loads.pushes else np.zeros((clock.n_steps, 0))
+    wrenches = acting.wrenches(clock) if acting.pushes else np.zeros((clock.n_steps, 0))
     kernels = _kernels(step, clock, wrenches)
     goals = setup.setpoint_of(clock.times()[1:]).q
-    setpoints = Setpoint(*setup.setpoint_of(clock.control_times(law.lead)))
+    setpoints = Setpoint(*setup.setpoint_of(clock.control_times(controller.lead)))
     parts = [
         Part(
             kernels,
@@ -233,10 +239,10 @@ def refuse_uncompiled(scenario: Scenario) -> None:
     require_duration(scenario)
 
 
-def _kernels(step: StepOf, clock: Clock, wrenches: Floats) -> KernelOf:
+def _kernels(step: FusedStep, clock: Clock, wrenches: Floats) -> StepKernels:
     """Kernels of the steps with and without controller and pushes, as far as they occur."""
-    asked = np.arange(clock.n_steps) % clock.steps_per_control == 0
-    kinds = set(zip(asked.tolist(), pushing(wrenches), strict=True))
+    controlled = np.arange(clock.n_steps) % clock.steps_per_control == 0
+    kinds = set(zip(controlled.tolist(), pushing(wrenches), strict=True))
     return {
         (controlled, pushed): step.kernel(controlled=controlled, pushed=pushed)
         for controlled, pushed in sorted(kinds)

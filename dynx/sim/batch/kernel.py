@@ -1,7 +1,7 @@
 """One step of a closed loop as one kernel: controller, plant and integrator, traced together.
 
 A controller is array code. Here it is run on symbols, with `dynx.rbd` in the place of its backend, and
-compiled with the dynamics of the plant: what both need, such as sines and cosines, is computed once.
+compiled with the dynamics of the plant: kind both need, such as sines and cosines, is computed once.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from dynx.control.base import Controller, Measurement, chain_of, gains_of
 from dynx.control.content import content_of
 from dynx.errors import ArgumentError, DynxError, TraceError, UnsupportedFeatureError, shown
 from dynx.model import Mechanism, Model
-from dynx.sim.batch.loads import BatchLoads
+from dynx.sim.batch.disturbances import BatchDisturbances
 from dynx.sim.batch.traced_controller import innermost, traced_controller
 from dynx.sim.loop.controller_checks import Unchanged, is_row
 from dynx.sim.plants.floating_step import floating_step
@@ -38,8 +38,8 @@ _made: dict[Hashable, Kernel] = {}
 
 
 @dataclass(frozen=True)
-class StepOf:
-    """The options that select a compiled step kernel."""
+class FusedStep:
+    """A step of a closed loop, with all options that its kernel depends on."""
 
     model: Model
     """The robot that moves."""
@@ -52,7 +52,7 @@ class StepOf:
     delayed: bool
     """Whether the controller measures an earlier state."""
     limit: Floats | None
-    loads: BatchLoads
+    disturbances: BatchDisturbances
 
     def __post_init__(self) -> None:
         inner = innermost(self.controller)
@@ -64,9 +64,9 @@ class StepOf:
                 )
         state = self.controller.initial_state()
         if state is not None and not is_row(state):
-            what = f"array {state.shape}" if isinstance(state, np.ndarray) else type(state).__name__
+            kind = f"array {state.shape}" if isinstance(state, np.ndarray) else type(state).__name__
             raise UnsupportedFeatureError(
-                f"{self.controller.name} has a state of type {what}; a batch takes an array (n,) of float64"
+                f"{self.controller.name} has a state of type {kind}; a batch takes an array (n,) of float64"
             )
 
     def kernel(self, *, controlled: bool, pushed: bool) -> Kernel:
@@ -101,16 +101,16 @@ class StepOf:
 
         def step(**given: Array) -> dict[str, Array]:
             if controlled:
-                outcome = self._commanded(controller, given)
+                results = self._commanded(controller, given)
             else:
-                outcome = {name: given[name] for name in ("state", "cut") if name in given}
-            tau = outcome["tau"] if controlled else given["tau"]
+                results = {name: given[name] for name in ("state", "cut") if name in given}
+            tau = results["tau"] if controlled else given["tau"]
             a = self._acceleration(mechanism, tau, given, pushed)
             q, v = self._moved(a, given)
             goal = given["goal"]
             error = abs(difference(q, goal) if self.model.floating else goal - q)
             worst = np.array([x.maximum(e) for x, e in zip(given["worst"], error, strict=True)])
-            return {"q": q, "v": v, "worst": worst, "squares": given["squares"] + error * error, **outcome}
+            return {"q": q, "v": v, "worst": worst, "squares": given["squares"] + error * error, **results}
 
         try:
             program = trace(step, self.sizes(controlled=controlled, pushed=pushed))
@@ -150,7 +150,7 @@ class StepOf:
             sizes["cut"] = nv
         if self.plant is not None:
             sizes["parameters"] = len(self.plant.parameters.names)
-        sizes |= self.loads.sizes(pushed=pushed)
+        sizes |= self.disturbances.sizes(pushed=pushed)
         return {name: (size,) for name, size in sizes.items()}
 
     def _commanded(self, controller: Controller[Any], given: Mapping[str, Array]) -> dict[str, Array]:
@@ -173,23 +173,23 @@ class StepOf:
             raise UnsupportedFeatureError(
                 f"the torque of {own.name} has shape {np.shape(tau)}; wanted {given['v'].shape}"
             )
-        outcome = {} if state is None else {"state": state}
+        results = {} if state is None else {"state": state}
         if self.limit is None:
-            return {"tau": tau, **outcome}
+            return {"tau": tau, **results}
         tau = clamp(tau, self.limit)
         bounded = np.isfinite(self.limit)
         cut = np.array(given["cut"])
         # Symbols also where a controller returns plain numbers.
         left = self.limit[bounded] - abs(tau[bounded] + 0.0 * cut[bounded])
         cut[bounded] = cut[bounded] + given["held_for"] * (1.0 - sign(left))
-        return {"tau": tau, "cut": cut, **outcome}
+        return {"tau": tau, "cut": cut, **results}
 
     def _acceleration(
         self, mechanism: Mechanism, tau: Array, given: Mapping[str, Array], pushed: bool
     ) -> Array:
         q, v = given["q"], given["v"]
-        tau = self.loads.added_to(tau, mechanism, q, v, given, pushed=pushed)
-        rotors = self.loads.rotors_of(given)
+        tau = self.disturbances.added_to(tau, mechanism, q, v, given, pushed=pushed)
+        rotors = self.disturbances.rotors_of(given)
         if self.plant is not None:
             return self.plant.acceleration(given["parameters"], q, v, tau, rotors)
         if rotors is None:

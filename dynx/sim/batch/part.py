@@ -46,7 +46,7 @@ class PartNoise(NamedTuple):
     v: Floats
 
 
-KernelOf = dict[tuple[bool, bool], Kernel]
+StepKernels = dict[tuple[bool, bool], Kernel]
 """Kernels by whether the controller is evaluated, and whether a push acts."""
 
 
@@ -59,7 +59,7 @@ def pushing(wrenches: Floats) -> list[bool]:
 class Part:
     """Inputs of a part as arrays and machine code, so that it can be sent to another process."""
 
-    kernels: KernelOf
+    kernels: StepKernels
     steps_per_control: int
     delay_steps: int
     """Delay of the measurements; so many states are kept."""
@@ -82,7 +82,7 @@ class Part:
 
     def __call__(self) -> PartDone:
         """Simulate the rollouts."""
-        return _Run(self).done()
+        return _Run(self).run()
 
     @cached_property
     def count(self) -> int:
@@ -131,8 +131,8 @@ class _Run:
         self._diverged = np.full(self._rows, -1.0)
         self._records: tuple[list[Floats], list[Floats], list[Floats]] = ([], [], [])
 
-    def done(self) -> PartDone:
-        """Run all steps."""
+    def run(self) -> PartDone:
+        """Take all steps."""
         part, n = self._part, self._part.count
         sets, common = len(self._sets), self._common
         for step in range(part.n_steps):
@@ -201,9 +201,9 @@ class _Run:
             "v_seen": seen["v"],
             **source,
         }
-        answers = {"tau": self._tau, **target}
+        written = {"tau": self._tau, **target}
         return kernel.bind(
-            [known[port.name] for port in kernel.inputs], [answers[port.name] for port in kernel.outputs]
+            [known[port.name] for port in kernel.inputs], [written[port.name] for port in kernel.outputs]
         )
 
     def _check(self, step: int, now: dict[str, Floats]) -> None:

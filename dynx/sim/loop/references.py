@@ -1,4 +1,4 @@
-"""What the controller is to follow, evaluated for all times before anything moves, and checked."""
+"""References of a controller, checked, and their setpoints at all control steps."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def checked_reference(model: Model, reference: Any, *, within_limits: bool) -> S
 def setpoints_of(
     setpoint_of: SetpointOf | None, clock: Clock, controller: Controller[Any] | None
 ) -> Setpoint:
-    """The setpoint of every control step, as far ahead as the controller wants it: (n_controls, ...).
+    """The setpoint of every control step, `lead` control steps ahead: (n_controls, ...).
 
     Raises ArgumentError if there is none though the controller needs one.
     """

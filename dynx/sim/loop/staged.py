@@ -96,10 +96,9 @@ class StagedLoop:
         self._state_size = 0 if self._start is None else self._start.size
         if self._state_size:
             sizes["state"] = self._state_size
-        self._asked = self._step(EngineCallTracer(sizes), asked=True)
-        self._held = (
-            self._step(EngineCallTracer(sizes), asked=False) if loop.clock.steps_per_control > 1 else None
-        )
+        self._controlled = self._step(EngineCallTracer(sizes), controlled=True)
+        always = loop.clock.steps_per_control == 1
+        self._held = None if always else self._step(EngineCallTracer(sizes), controlled=False)
         self.stopped = ""
         """Why it stopped before the end."""
 
@@ -127,22 +126,23 @@ class StagedLoop:
             held.q, held.v = record.q[k].copy(), record.v[k].copy()
             self._plant.reset(held.q, held.v)
 
-    def _step(self, tracer: EngineCallTracer, *, asked: bool) -> StagedStep:
-        """One step of the plant, and of the law if it is `asked`."""
+    def _step(self, tracer: EngineCallTracer, *, controlled: bool) -> StagedStep:
+        """One step of the plant, with the torque of the controller if it is `controlled`, else that held."""
         loop, given = self._loop, tracer.given
         results: dict[str, Array] = {}
         unsound: Any = 0.0
         tau, state = given["held"], given.get("state", self._start)
         if loop.controller is None:
             tau = np.zeros(len(tau), dtype=object)
-        elif asked:
+        elif controlled:
             q, v = given["seen_q"], given["seen_v"]
             if loop.sensors.noise is not None:
                 q, v = q + given["noise_q"], v + given["noise_v"]
             measurement = Measurement(given["t"][0], q, v)
-            law = traced_controller(loop.controller, tracer)
+            setpoint = Setpoint(*(given[name] for name in SETPOINT))
+            controller = traced_controller(loop.controller, tracer)
             try:
-                tau, state = law.torque(measurement, Setpoint(*(given[name] for name in SETPOINT)), state)
+                tau, state = controller.torque(measurement, setpoint, state)
             except Exception as error:
                 # On symbols in the place of numbers a controller of somebody else's may raise anything.
                 raise TraceError(_untraceable(loop.controller.name, error)) from error
@@ -176,7 +176,7 @@ class StagedLoop:
         nothing = [np.broadcast_to(np.zeros(x.shape[1]), (loop.clock.n_controls, x.shape[1])) for x in (q, v)]
         silence = nothing[1]
         setpoints = (nothing[0], silence, silence) if loop.controller is None else loop.setpoints
-        # A reference may hand out its columns side by side.
+        # The setpoints of a reference may lie column by column.
         rows = [array if array[:1].flags.c_contiguous else np.ascontiguousarray(array) for array in setpoints]
         arrays |= dict(zip(SETPOINT, rows, strict=True))
         arrays |= dict(zip(NOISE, loop.sensors.noise or (silence, silence), strict=True))
@@ -202,41 +202,41 @@ class StagedLoop:
         """Step to `end`, counting in the record; False where a step has to be repeated plainly."""
         first, per = record.steps, self._loop.clock.steps_per_control
         steps = np.arange(first, end)
-        walked = {name: StridedRows(array, self._row(name, steps)) for name, array in arrays.items()}
+        by_step = {name: StridedRows(array, self._row(name, steps)) for name, array in arrays.items()}
         last = first + len(steps)
-        asked = self._ready(self._asked, walked, record)
+        controlled = self._ready(self._controlled, by_step, record)
         if self._held is None:
-            return asked(first, last)
-        held = self._ready(self._held, walked, record)
+            return controlled(first, last)
+        held = self._ready(self._held, by_step, record)
         while (k := record.steps) < last:
             due = k % per == 0
-            if not (asked if due else held)(k, k + 1 if due else min(last, k - k % per + per)):
+            if not (controlled if due else held)(k, k + 1 if due else min(last, k - k % per + per)):
                 return False
         return True
 
-    def _ready(self, step: StagedStep, walked: Mapping[str, StridedRows], record: Record) -> Take:
-        """The next steps of the record, those of `walked`, as kernel and engine calls."""
+    def _ready(self, step: StagedStep, by_step: Mapping[str, StridedRows], record: Record) -> Take:
+        """The next steps of the record as kernel and engine calls, over arrays with a row `by_step`."""
         first = record.steps
-        still = np.zeros(len(walked["q"].rows), dtype=np.int64)
+        still = np.zeros(len(by_step["q"].rows), dtype=np.int64)
         places = {name: np.zeros((1, size)) for name, size in (*step.sizes.items(), ("defect", 1))}
         numbers = {name: value[None] for name, value in step.numbers.items()}
         constant = {name: StridedRows(place, still) for name, place in {**places, **numbers}.items()}
-        every = {**walked, **constant}
+        every = {**by_step, **constant}
 
-        def walked_by(kernel: Kernel) -> CallSequence:
+        def prepare(kernel: Kernel) -> CallSequence:
             inputs = [every[port.name] for port in kernel.inputs]
             return prepare_calls(kernel, inputs, [every[port.name] for port in kernel.outputs])
 
         stages: list[tuple[Callable[[int], None], range, EngineCall, list[Floats], Any, CallSequence]] = []
         for stage in step.stages:
-            calls = walked_by(stage.kernel)
+            calls = prepare(stage.kernel)
             arguments = [places[name].reshape(shape) for name, shape in stage.arguments]
             name, shape = stage.result
             found = places[name].reshape(shape)
             # A view of memory takes a row of numbers in a third of the time that an array does.
             room = found.data if found.ndim == 1 else found
             stages.append((calls.run, calls.addresses, stage.call, arguments, room, calls))
-        last = walked_by(step.last)
+        last = prepare(step.last)
         finish, finishing = last.run, last.addresses
         defect: Any = places["defect"].reshape(1).data
 

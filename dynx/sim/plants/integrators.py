@@ -36,7 +36,7 @@ State = tuple[Floats, Floats, Floats]
 class SemiImplicitEuler:
     """v' = v + h a(q, v), q' = q (+) h v': first order, and energy stays bounded where it is conserved.
 
-    A floating base moves as `floating_step` says, compiled for floats: NumPy would take twenty times as
+    A floating base moves by `floating_step`, compiled for floats: NumPy would take twenty times as
     long as the dynamics.
     """
 

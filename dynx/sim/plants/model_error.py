@@ -1,4 +1,4 @@
-"""What makes the plant another robot than the one that the controller knows: a payload, wrong masses."""
+"""Differences between the robot of the plant and the model of the controller: payloads, other masses."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ MassScale = float | Mapping[str, float]
 
 
 def plant_model(model: Model, payload: Payload | Sequence[Payload] | None, mass_scale: MassScale) -> Model:
-    """`model` with masses and inertia tensors scaled, and then the payloads welded to their frames.
+    """`model` with masses and inertia tensors scaled, and then the payloads fixed to their frames.
 
     Raises UnknownNameError for a frame or link that is not there, ArgumentError for a factor or a
     payload that cannot be.
@@ -47,10 +47,10 @@ def plant_model(model: Model, payload: Payload | Sequence[Payload] | None, mass_
         for link in model.links
     ]
     joints = list(model.joints)
-    for number, load in enumerate(payloads):
-        frame = model.frames[model.frame_index(load.frame)]
+    for number, body in enumerate(payloads):
+        frame = model.frames[model.frame_index(body.frame)]
         name = _free(f"payload {number}", {*model.frame_names, *(joint.name for joint in model.joints)})
-        links.append(Link(name, _inertial(load)))
+        links.append(Link(name, _inertial(body)))
         joints.append(Joint(name, "fixed", frame.link, name, origin=frame.placement))
     built = Model.build(model.name, links, joints, base=model.base, gravity=model.gravity, notes=model.notes)
     return replace(built, extra_frames=model.extra_frames, source=model.source)

@@ -24,7 +24,7 @@ from dynx.sim.scenario.scenario import Scenario
 from dynx.trajectory.base import Setpoint
 
 SCHEMA = "dynx.rollout/2"
-"""What the file says it is; another number means another layout."""
+"""Name of the layout of the file; another number means another layout."""
 
 ARRAYS = ("t", "q", "v", "a", "tau", "saturated", "rotors")
 REFERENCE = ("reference_q", "reference_v", "reference_a")

@@ -1,8 +1,8 @@
 """Rollouts as MCAP recordings of ROS 2 messages, for PlotJuggler, Foxglove and ``ros2 bag``.
 
-`dynx.sim.record.ros_topics` says what is on which topic. Stamps are the times of the record, from 0 s on, in
+`dynx.sim.record.ros_topics` lists the topics. Stamps are the times of the record, from 0 s on, in
 whole nanoseconds, as ROS has them. The metadata record ``dynx.rollout`` has the settings of the
-simulation and what else a `Rollout` knows: numbers and lists as JSON, text as it is.
+simulation and the other fields of a `Rollout`: numbers and lists as JSON, text as it is.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from dynx.sim.record.ros_definitions import schema_name, schema_text
 from dynx.sim.record.ros_topics import topics_of
 
 SCHEMA = "dynx.rollout.mcap/1"
-"""What the metadata record says that the recording is."""
+"""Kind of the recording, in its metadata record."""
 
 BLOCK = 1000
 """States that are encoded at a time: a long recording needs no memory of its size."""
 
 ABOUT_CHANNEL = {"offered_qos_profiles": ""}
-"""The ROS 2 profile of MCAP wants this entry; empty, it leaves the quality of service to the player."""
+"""The ROS 2 profile of MCAP requires this entry; empty, it leaves the quality of service to the player."""
 
 
 def write_mcap(rollout: RolloutData, file: BinaryIO) -> None:

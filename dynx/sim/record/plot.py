@@ -123,8 +123,8 @@ def _draw(rollout: RolloutData, column: Column, axes: Any) -> None:
 
 
 def _title(rollout: RolloutData) -> str:
-    law, plant = (rollout.settings.get(name, "none") for name in ("controller", "plant"))
-    controller = "no controller" if law == "none" else law
+    controller_name, plant = (rollout.settings.get(name, "none") for name in ("controller", "plant"))
+    controller = "no controller" if controller_name == "none" else controller_name
     return f"{rollout.model.name}: {controller}" + ("" if plant == "none" else f" on {plant}")
 
 

@@ -203,7 +203,7 @@ def _is_declared(value: Any) -> bool:
 
 
 def _controller(controller: Controller[Any], model: Model | None) -> Document | None:
-    """A controller that is registered, and the model that it knows; None for any other."""
+    """A registered controller and its model; None for any other."""
     if any(each.model != controller.model for each in chain_of(controller)):
         return None
     try:

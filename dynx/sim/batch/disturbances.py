@@ -26,7 +26,7 @@ PLACEHOLDER = 1.0
 
 
 @dataclass(frozen=True)
-class BatchLoads:
+class BatchDisturbances:
     """Friction, armature and pushes of a plant."""
 
     model: Model
@@ -38,7 +38,7 @@ class BatchLoads:
     pushes: tuple[Push, ...]
 
     @classmethod
-    def of(cls, model: Model, disturbances: Disturbances, varied: Mapping[str, Floats]) -> BatchLoads:
+    def of(cls, model: Model, disturbances: Disturbances, varied: Mapping[str, Floats]) -> BatchDisturbances:
         """Those of `disturbances`, with coefficients (n, joints) in the places of their placeholders."""
         sizes = {name: rows.shape[1] for name, rows in varied.items()}
         # A joint of the tree depends on at most one coordinate, so the armature has no other entries.
