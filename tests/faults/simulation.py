@@ -158,14 +158,6 @@ SIMULATION_FAULTS = (
         test="test_a_torque_beyond_all_numbers_is_not_cut_to_the_limits",
     ),
     Fault(
-        "batch_explicit_euler",
-        "dynx.sim.batch.kernel",
-        right="return q + self.dt * v, v",
-        wrong='return q + self.dt * given["v"], v',
-        test_file="tests/sim/batch/test_batch.py",
-        test="test_a_rollout_is_that_of_simulate",
-    ),
-    Fault(
         "batch_reuses_a_part_of_other_arguments",
         "dynx.sim.batch.store",
         right="arrays = (part.start, part.fixed, tuple(part.setpoints),",

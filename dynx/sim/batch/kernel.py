@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, fields
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -23,7 +24,7 @@ from dynx.model import Mechanism, Model
 from dynx.sim.batch.disturbances import BatchDisturbances
 from dynx.sim.batch.traced_controller import innermost, traced_controller
 from dynx.sim.loop.controller_checks import Unchanged, is_row
-from dynx.sim.plants.floating_step import floating_step
+from dynx.sim.plants.integrators import SemiImplicitEuler
 from dynx.simd.cache import load_kernel, program_recipe
 from dynx.simd.kernel import Kernel
 from dynx.simd.trace import trace
@@ -105,8 +106,10 @@ class FusedStep:
             else:
                 results = {name: given[name] for name in ("state", "cut") if name in given}
             tau = results["tau"] if controlled else given["tau"]
-            a = self._acceleration(mechanism, tau, given, pushed)
-            q, v = self._moved(a, given)
+            center = self._center(given) if self.model.floating else None
+            scheme = SemiImplicitEuler(self.model, self.dt, center)
+            accelerate = partial(self._acceleration, mechanism, given, pushed)
+            q, v, _ = scheme(accelerate, given["q"], given["v"], tau)
             goal = given["goal"]
             error = abs(difference(q, goal) if self.model.floating else goal - q)
             worst = np.array([x.maximum(e) for x, e in zip(given["worst"], error, strict=True)])
@@ -185,9 +188,14 @@ class FusedStep:
         return {"tau": tau, "cut": cut, **results}
 
     def _acceleration(
-        self, mechanism: Mechanism, tau: Array, given: Mapping[str, Array], pushed: bool
+        self,
+        mechanism: Mechanism,
+        given: Mapping[str, Array],
+        pushed: bool,
+        q: Array,
+        v: Array,
+        tau: Array,
     ) -> Array:
-        q, v = given["q"], given["v"]
         tau = self.disturbances.added_to(tau, mechanism, q, v, given, pushed=pushed)
         rotors = self.disturbances.rotors_of(given)
         if self.plant is not None:
@@ -198,14 +206,6 @@ class FusedStep:
         return solve_with_factors(
             *factorize_mass_matrix(mechanism, M), tau - evaluate_quantity(mechanism, "bias_torque", (), q, v)
         )
-
-    def _moved(self, a: Array, given: Mapping[str, Array]) -> tuple[Array, Array]:
-        """q and v at the end of the step."""
-        q, v = given["q"], given["v"]
-        if self.model.floating:
-            return floating_step(q, v, a, self.dt, self._center(given))
-        v = v + self.dt * a
-        return q + self.dt * v, v
 
     def _center(self, given: Mapping[str, Array]) -> Array:
         """The centre of mass of the root (3,)."""

@@ -8,7 +8,7 @@ the unit sphere, so a floating base needs more than adding.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from dynx.model import Model
 from dynx.sim.plants.floating_step import floating_step
 from dynx.simd.cache import load_kernel, program_recipe
 from dynx.simd.emit import Settings
-from dynx.simd.kernel import Kernel
+from dynx.simd.kernel import Kernel, Workspace
 from dynx.simd.simplify import STRICT
 from dynx.simd.target import host
 from dynx.simd.trace import trace
@@ -40,16 +40,23 @@ class SemiImplicitEuler:
     long as the dynamics.
     """
 
-    def __init__(self, model: Model, h: float) -> None:
+    def __init__(self, model: Model, h: float, center: Array | None = None) -> None:
+        """`center` (3,) [m] is the centre of mass of the root, by default that of `model`."""
         self._floating = model.floating
         self._h: Floats = np.full(model.nv, h)
         self._step = h
-        root = model.mechanism.root
-        mass = float(root.mass)
-        self._center: Floats = np.array(root.first_moment, dtype=float) / mass if mass else np.zeros(3)
-        if model.floating:
-            self._base = _base_step().workspace()
-            self._base.input_rows[3][:], self._base.input_rows[4][:] = h, self._center
+        if center is None:
+            root = model.mechanism.root
+            mass = float(root.mass)
+            center = np.array(root.first_moment, dtype=float) / mass if mass else np.zeros(3)
+        self._center = center
+
+    @cached_property
+    def _base(self) -> Workspace:
+        """Compiled `floating_step`, for floats."""
+        base = _base_step().workspace()
+        base.input_rows[3][:], base.input_rows[4][:] = self._step, self._center
+        return base
 
     def __call__(self, accelerate: Accelerate, q: Array, v: Array, *given: Any) -> State:
         """One step, for floats or for symbols."""
