@@ -73,8 +73,8 @@ def known_controller(scenario: Scenario) -> Controller[Any] | None:
     for part in (scenario.controller, scenario.reference):
         if isinstance(part, Unknown):
             raise ArgumentError(
-                f"{part.name} was read from a file, and cannot be rebuilt: before, import the module of its "
-                "class, a frozen dataclass (and register a controller), or replace it by dataclasses.replace"
+                f"{part.name} was read from a file, and cannot be rebuilt: {part.why}. Otherwise put an "
+                "object in its place by dataclasses.replace"
             )
     controller = scenario.controller
     assert not isinstance(controller, Unknown)
@@ -93,6 +93,7 @@ def clock_of(scenario: Scenario) -> Clock:
 
 def require_duration(scenario: Scenario) -> None:
     """Raise ArgumentError where neither the scenario nor its reference has a duration."""
+    known_controller(scenario)
     if scenario.duration is None and not isinstance(scenario.reference, Trajectory):
         raise ArgumentError("duration is not given, and the reference is no trajectory that has one")
 

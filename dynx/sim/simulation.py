@@ -16,7 +16,8 @@ from numpy.typing import ArrayLike
 from dynx.backends import backend
 from dynx.errors import ArgumentError, ClosedError, SimulationError, shown
 from dynx.model.configuration import checked_array
-from dynx.sim.clock import WHOLE
+from dynx.sim.clock import multiple
+from dynx.sim.loop.controller_checks import Unchanged
 from dynx.sim.loop.plain import Held, Loop
 from dynx.sim.loop.record import Record
 from dynx.sim.loop.references import setpoints_of
@@ -25,6 +26,7 @@ from dynx.sim.loop.staged import staged_loop
 from dynx.sim.loop.stops import Stops
 from dynx.sim.plants.registry import make_plant
 from dynx.sim.record.rollout import Rollout
+from dynx.sim.scenario.differences import model_difference
 from dynx.sim.scenario.documents import in_words
 from dynx.sim.scenario.scenario import Scenario
 from dynx.sim.setup import Setup
@@ -103,6 +105,7 @@ class Simulation:
             options={"method": scenario.method, "rtol": scenario.rtol, "atol": scenario.atol},
         )
         self._dt = clock.dt
+        self._watch = None if setup.controller is None else Unchanged(setup.controller)
         self._held: Held | None = None
         self._misplaced = self._closed = False
         self._executor: tuple[str, ...] = ()
@@ -144,6 +147,9 @@ class Simulation:
     def run(self, until: float | None = None, *, real_time: bool = False) -> Rollout:
         """Step to the time `until` [s], by default the end of the scenario, and return the record.
 
+        `until` is a multiple of `dt` and not before `time`. Raises ArgumentError for another one, and for a
+        controller that changed itself; DivergedError and ControlError as `step` does.
+
         With `real_time` each step waits until as much time has passed on the clock of the machine.
         Otherwise steps are compiled where that is possible; `Rollout.executor` says whether it was.
         """
@@ -151,14 +157,25 @@ class Simulation:
         if until is not None:
             if not isinstance(until, int | float) or not math.isfinite(until):
                 raise ArgumentError(f"until is {shown(until)}; wanted a time in seconds")
-            end = math.ceil(until / self._loop.clock.dt - WHOLE)
+            if round(until / self._dt) < self._record.steps:
+                raise ArgumentError(
+                    f"until is {until:.12g} s, but {self.time:.12g} s are simulated already; `restore` and "
+                    "`reset` go back"
+                )
+            end = multiple("until", until, self._dt) if until else 0
         if end is None:
             raise ArgumentError("the scenario has no duration: wanted `until`")
         if real_time:
             self._run_in_real_time(end)
         else:
             self._run(end)
+        self._refuse_changed_controller()
         return self.rollout
+
+    def _refuse_changed_controller(self) -> None:
+        """Raise ArgumentError for a controller that changed itself since this simulation was made."""
+        if self._watch is not None:
+            self._watch.refuse_changed()
 
     def _run(self, end: int) -> None:
         if end > len(self._record):
@@ -278,14 +295,22 @@ class Simulation:
         )
 
     def reset(self) -> State:
-        """Return to the start of the scenario, and forget the record."""
+        """Return to the start of the scenario, and forget the record.
+
+        Raises ArgumentError for a controller that changed itself.
+        """
+        self._refuse_changed_controller()
         self._record.steps = 0
         self._held, self._executor, self._departures = None, (), ()
         return self.state
 
     def save(self) -> Snapshot:
-        """The simulation as it is now, with its record; `restore` continues from it bit for bit."""
+        """The simulation as it is now, with its record; `restore` continues from it bit for bit.
+
+        Raises ArgumentError for a controller that changed itself.
+        """
         self._refuse_closed()
+        self._refuse_changed_controller()
         held = self._held = self._held or self._loop.start(self._record)
         return Snapshot(self.scenario, self._record.copy(), replace(held), self._executor, self._departures)
 
@@ -297,6 +322,9 @@ class Simulation:
         for a controller that changes itself.
         """
         self._refuse_closed()
+        if not isinstance(snapshot, Snapshot):
+            raise ArgumentError(f"snapshot is of type {type(snapshot).__name__}; wanted what `save` returned")
+        self._refuse_changed_controller()
         theirs, ours = snapshot.scenario, self.scenario
         robots = [(each.model.joint_names, each.model.base) for each in (theirs, ours)]
         if robots[0] != robots[1] or theirs.dt != ours.dt:
@@ -308,12 +336,12 @@ class Simulation:
         if n > len(self._record):
             self._extend(n)
         self._loop.refuse_self_changing(self._record)
-        changed = [] if theirs is ours else [each.field for each in theirs.differences(ours)]
+        changed = [] if theirs is ours else [_changed_part(each.field) for each in theirs.differences(ours)]
         self._record.take(snapshot.record, n)
         self._executor, self._departures = snapshot.executor, snapshot.departures
         held = replace(snapshot.held)
         self._plant.reset(held.q, held.v)
-        if any(name.partition(".")[0] == "controller" for name in changed):
+        if "controller" in changed:
             controller = self._setup.controller
             held.controller_state = None if controller is None else controller.initial_state()
             held.command = None
@@ -328,6 +356,11 @@ class Simulation:
         The durations may differ. Raises ArgumentError that names the field for a rollout of another
         scenario, and for one that is not of its scenario alone.
         """
+        if not isinstance(rollout, Rollout):
+            raise ArgumentError(
+                f"the rollout to resume is of type {type(rollout).__name__}; wanted a dynx.Rollout, which "
+                "dynx.Rollout.load reads from a file"
+            )
         step = len(rollout) if step is None else step
         most = len(rollout) if self.n_steps is None else min(len(rollout), self.n_steps)
         if not isinstance(step, int) or not 0 <= step <= most:
@@ -375,15 +408,21 @@ def refuse_other_scenario(rollout: Rollout, scenario: Scenario) -> None:
             f"the rollout to resume is not that of its scenario alone: it has {'; '.join(rollout.departures)}"
         )
     if then.model != scenario.model:
+        name, old, new = model_difference(then.model, scenario.model)
         raise ArgumentError(
-            f"the rollout to resume is of {shown(then.model)}, not of {shown(scenario.model)}: "
-            "their model differs"
+            f"the rollout to resume is not of this model {shown(scenario.model.name)}: it had {name} {old}; "
+            f"now it is {new}"
         )
     for name, old, new in then.differences(scenario):
         if name != "duration":
             raise ArgumentError(
                 f"the rollout to resume had {name} {in_words(old)}; now it is {in_words(new)}"
             )
+
+
+def _changed_part(field: str) -> str:
+    """The name of a part of a scenario that changed: a controller as a whole."""
+    return "controller" if field.partition(".")[0] == "controller" else field
 
 
 def _call(progress: Progress, wanted: int, taken: int) -> None:

@@ -323,3 +323,24 @@ def test_the_record_says_how_its_steps_were_computed() -> None:
 def test_the_names_are_exported() -> None:
     assert dynx.Scenario is Scenario
     assert dynx.Simulation is Simulation
+
+
+def test_run_stops_on_the_grid_and_never_goes_back() -> None:
+    with Simulation(SCENARIOS["passive"]) as simulation:
+        assert len(simulation.run(until=0.0)) == 0
+        with pytest.raises(ArgumentError, match=r"until is 0\.0015 s, which is no multiple of dt"):
+            simulation.run(until=0.0015)
+        simulation.run(until=0.02)
+        assert len(simulation.run(until=0.02)) == 20
+        for passed in (0.01, 0.0, -1.0):
+            with pytest.raises(ArgumentError, match=r"but 0\.02 s are simulated already"):
+                simulation.run(until=passed)
+
+
+def test_what_is_no_record_is_refused() -> None:
+    scenario: Any = SCENARIOS["passive"]
+    not_a_record: Any = "a.npz"
+    with pytest.raises(ArgumentError, match=r"to resume is of type str; wanted a dynx\.Rollout"):
+        simulate(scenario, resume=not_a_record)
+    with Simulation(scenario) as simulation, pytest.raises(ArgumentError, match="snapshot is of type str"):
+        simulation.restore(not_a_record)

@@ -23,7 +23,7 @@ from dynx.errors import ArgumentError, DynxError, TraceError, UnsupportedFeature
 from dynx.model import Mechanism, Model
 from dynx.sim.batch.disturbances import BatchDisturbances
 from dynx.sim.batch.traced_controller import innermost, traced_controller
-from dynx.sim.loop.controller_checks import Unchanged, is_row
+from dynx.sim.loop.controller_checks import Unchanged, defect_of_outcome, is_row
 from dynx.sim.plants.integrators import SemiImplicitEuler
 from dynx.simd.cache import load_kernel, program_recipe
 from dynx.simd.kernel import Kernel
@@ -165,7 +165,11 @@ class FusedStep:
         setpoint = Setpoint(given["q_wanted"], given["v_wanted"], given["a_wanted"])
         own = traced_controller(controller, {name: given[f"gain_{name}"] for name in self.gains})
         watch = Unchanged(own)
-        tau, state = own.torque(Measurement(given["t"][0], q, v), setpoint, given.get("state"))
+        outcome = own.torque(Measurement(given["t"][0], q, v), setpoint, given.get("state"))
+        defect = defect_of_outcome(outcome)
+        if defect:
+            raise ArgumentError(f"{own.name}: {defect}")
+        tau, state = outcome
         if watch.changed:
             raise UnsupportedFeatureError(
                 f"{watch.changed}, which a batch would do only once: let it return its state"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable, Mapping
+from contextlib import suppress
 from hashlib import sha256
 from typing import Any
 
@@ -13,6 +15,9 @@ from dynx.control.content import attributes_of
 from dynx.errors import ArgumentError, shown
 from dynx.model import Model
 from dynx.sim.clock import WHOLE, Clock
+
+MAX_DEPTH = 4
+"""Depth to which objects inside the attributes of a controller are compared."""
 
 MAX_LISTED_NUMBERS = 64
 """Size of the largest array that a record lists; it keeps a checksum of a larger one."""
@@ -61,32 +66,60 @@ def is_row(state: Any) -> bool:
     return isinstance(state, np.ndarray) and state.dtype == np.float64 and state.ndim == 1
 
 
+def defect_of_outcome(outcome: Any) -> str | None:
+    """Message for a result of `torque` that is no pair; None for a pair."""
+    if isinstance(outcome, tuple) and len(outcome) == 2:
+        return None
+    kind = f"an array of shape {outcome.shape}" if isinstance(outcome, np.ndarray) else shown(outcome)
+    return f"torque must return (tau, state), with None for the state if there is none; it returned {kind}"
+
+
 class Unchanged:
     """Detects a controller that changes itself, and so hides its state."""
 
     def __init__(self, controller: Controller[Any]) -> None:
-        self._before = [(each, _copied(attributes_of(each))) for each in chain_of(controller)]
+        self._before = [(each, _contents(each)) for each in chain_of(controller)]
 
     @property
     def changed(self) -> str | None:
         """The controller and its attribute that changed, if there is one."""
         for each, before in self._before:
-            for name, now in attributes_of(each).items():
-                if name not in before or not _same(before[name], now):
+            now = _contents(each)
+            for name in {**now, **before}:
+                if name not in before or name not in now or before[name][1] != now[name][1]:
                     return f"{each.name} changes itself (attribute {name}) when its torque is evaluated"
         return None
 
+    def refuse_changed(self) -> None:
+        """Raise ArgumentError for a controller that changed since then."""
+        if self.changed:
+            raise ArgumentError(
+                f"{self.changed}, so a rollout under it can neither be repeated nor be resumed: keep what "
+                "changes in the controller's state, which torque receives and returns"
+            )
 
-def _copied(attributes: dict[str, Any]) -> dict[str, Any]:
-    return {
-        name: value.copy() if isinstance(value, np.ndarray | list | dict | set) else value
-        for name, value in attributes.items()
-    }
+
+def _contents(controller: Controller[Any]) -> dict[str, tuple[Any, Hashable]]:
+    """Attributes of a controller and their contents; the attributes themselves keep their identity taken."""
+    return {name: (value, _content(value)) for name, value in attributes_of(controller).items()}
 
 
-def _same(before: Any, now: Any) -> bool:
-    if isinstance(now, np.ndarray) and isinstance(before, np.ndarray):
-        return before.dtype == now.dtype and before.tobytes() == now.tobytes()
-    if isinstance(now, list | dict | set):
-        return type(before) is type(now) and repr(before) == repr(now)
-    return before is now or (isinstance(now, int | float | str) and bool(before == now))
+def _content(value: Any, depth: int = 0) -> Hashable:
+    """Content of an attribute to the last bit, and the identity of an object whose content is not known."""
+    if isinstance(value, np.ndarray) and value.dtype != object:
+        return value.dtype.str, value.shape, value.tobytes()
+    if isinstance(value, float):
+        return float, value.hex()
+    if value is None or isinstance(value, bool | int | str | bytes):
+        return type(value), value
+    if depth < MAX_DEPTH and isinstance(value, list | tuple | set | frozenset):
+        return type(value), tuple(_content(each, depth + 1) for each in value)
+    if depth < MAX_DEPTH and isinstance(value, Mapping):
+        entries = ((_content(key, depth + 1), _content(each, depth + 1)) for key, each in value.items())
+        return type(value), tuple(entries)
+    foreign = type(value).__module__.partition(".")[0] not in ("dynx", "builtins")
+    # A controller inside is one of the chain, and an engine may keep what it likes.
+    if depth < MAX_DEPTH and foreign and not isinstance(value, Controller | Backend | type):
+        with suppress(TypeError):
+            return id(value), _content(attributes_of(value), depth + 1)
+    return id(value)

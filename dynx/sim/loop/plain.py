@@ -17,9 +17,9 @@ import numpy as np
 
 from dynx.control.base import Controller, Measurement
 from dynx.control.engine_motors import EngineMotor
-from dynx.errors import ArgumentError, ControlError, DivergedError, shown
+from dynx.errors import ControlError, DivergedError, SimulationError, shown
 from dynx.sim.clock import Clock
-from dynx.sim.loop.controller_checks import Unchanged
+from dynx.sim.loop.controller_checks import Unchanged, defect_of_outcome
 from dynx.sim.loop.record import Record
 from dynx.sim.loop.sensors import Sensors
 from dynx.sim.loop.stops import Stops
@@ -31,6 +31,9 @@ FLOAT64 = np.dtype(np.float64)
 
 PROGRESS_STEPS = 200
 """Steps between two calls of `progress`."""
+
+PROBE_DISPLACEMENT = 1e-3
+"""Change of each measured coordinate [rad or m] and velocity [rad/s or m/s] in a probe of a controller."""
 
 DIVERGENCE_SPEED = 1e8
 """Norm of the velocity [rad/s or m/s] from which on a simulation has diverged."""
@@ -111,10 +114,13 @@ class Loop:
                     if motors is not None:
                         command = motors.command(measurement, setpoint)
                     else:
-                        tau, state = controller.torque(measurement, setpoint, state)
+                        outcome = controller.torque(measurement, setpoint, state)
                 except Exception as error:
                     raise self._control_failed(k, record, f"{type(error).__name__}: {error}") from error
                 if motors is None:
+                    if not isinstance(outcome, tuple) or len(outcome) != 2:
+                        raise self._control_failed(k, record, str(defect_of_outcome(outcome)))
+                    tau, state = outcome
                     if type(tau) is not np.ndarray or tau.shape != shape or tau.dtype is not FLOAT64:
                         tau = self._as_torque(k, record, tau)
                     if not isfinite(sum(tau.tolist())):
@@ -133,7 +139,7 @@ class Loop:
                         plant.reset(q, v)
             except Exception as error:
                 # Also what an engine raises: its hooks are called bare (`dynx.control.dynamics`).
-                raise self._diverged(k, record, f"{type(error).__name__}: {error}") from error
+                raise self._step_failed(k, record, error) from error
             if not hypot(*v.tolist()) < DIVERGENCE_SPEED:
                 raise self._diverged(
                     k, record, f"the velocity is not finite, or its norm is above {DIVERGENCE_SPEED:g}"
@@ -163,19 +169,21 @@ class Loop:
         return np.array(array, dtype=np.float64)
 
     def refuse_self_changing(self, record: Record) -> None:
-        """Raise ArgumentError for a controller that hides its state in itself: it cannot be resumed."""
+        """Raise ArgumentError for a controller that changes itself when its torque is evaluated.
+
+        It is evaluated at the start and away from it, where its error is not zero.
+        """
         controller = self.controller
         if controller is None or isinstance(controller, EngineMotor):
             return
         watch = Unchanged(controller)
         # An error here is raised again in its step.
         with suppress(Exception):
-            measurement = self.sensors(0, record.q, record.v)
-            controller.torque(measurement, self._setpoint(0), controller.initial_state())
-        if watch.changed:
-            raise ArgumentError(
-                f"{watch.changed}, so a rollout under it cannot be resumed: return the changed state instead"
-            )
+            t, q, v = self.sensors(0, record.q, record.v)
+            beside = controller.model.integrate(q, np.full_like(v, PROBE_DISPLACEMENT))
+            for measurement in (Measurement(t, q, v), Measurement(t, beside, v + PROBE_DISPLACEMENT)):
+                controller.torque(measurement, self._setpoint(0), controller.initial_state())
+        watch.refuse_changed()
 
     def recovered_state(self, record: Record) -> Any:
         """The controller's state after the last step of `record`.
@@ -190,7 +198,11 @@ class Loop:
         for number in range(-(-record.steps // self.clock.steps_per_control)):
             step = number * self.clock.steps_per_control
             measurement = self.sensors(step, record.q, record.v)
-            _, state = self.controller.torque(measurement, self._setpoint(number), state)
+            outcome = self.controller.torque(measurement, self._setpoint(number), state)
+            defect = defect_of_outcome(outcome)
+            if defect:
+                raise self._control_failed(step, record, defect)
+            _, state = outcome
         return state
 
     def _setpoint(self, number: int) -> Setpoint:
@@ -207,6 +219,15 @@ class Loop:
             measurement = self.sensors(number * self.clock.steps_per_control, record.q, record.v)
             return none, self.controller.command(measurement, self._setpoint(number))
         return record.tau[begin - 1].copy(), None
+
+    def _step_failed(self, k: int, record: Record, error: Exception) -> SimulationError:
+        """The error of a step: of a plant of the user's own a failure, of dynx's own a divergence."""
+        kind, why = type(self.plant), f"{type(error).__name__}: {error}"
+        if kind.__module__.partition(".")[0] == "dynx":
+            return self._diverged(k, record, why)
+        t, state = k * self.clock.dt, (record.q[k].copy(), record.v[k].copy())
+        message = f"plant {kind.__name__} failed in step {k}, at {t:.6g} s: {why}"
+        return SimulationError(message, time=t, step=k, state=state)
 
     def _diverged(self, k: int, record: Record, why: str) -> DivergedError:
         t, state = k * self.clock.dt, (record.q[k].copy(), record.v[k].copy())

@@ -42,7 +42,8 @@ class Plant(ABC):
         self.model = model
         self.disturbances = disturbances
         self.substeps = substeps
-        self._dt = dt
+        self.dt = dt
+        """Step of the record [s], by which `step` moves on."""
         self._h = dt / substeps
 
     @abstractmethod

@@ -3,7 +3,7 @@
 Numbers, text, lists and arrays stand for themselves; an array of anything but float64 has its dtype beside
 it. A registered controller is its name and the arguments of its constructor, a dataclass or named tuple its
 class and its fields. An object of any other class is known by a fingerprint alone: it can be compared, not
-rebuilt.
+rebuilt. A class that is not of dynx has a checksum of its code beside it: with other code it is another one.
 """
 
 from __future__ import annotations
@@ -15,19 +15,21 @@ import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
 from hashlib import sha256
-from types import CodeType, FunctionType
+from types import FunctionType
 from typing import Any
 
 import numpy as np
 
 from dynx.backends import Backend
 from dynx.control.base import Controller, chain_of
+from dynx.control.code_content import digest_of_code, digest_of_function, is_foreign
 from dynx.control.content import attributes_of
-from dynx.control.registry import from_document, to_document
+from dynx.control.registry import controller_class, from_document, to_document
 from dynx.errors import ArgumentError, ModelError, UnknownNameError, shown
 from dynx.model import Model
 from dynx.model.loading import load
 from dynx.sim.loop.controller_checks import controller_numbers
+from dynx.trajectory.base import Trajectory
 
 MAX_WORDS_LENGTH = 80
 """Characters of a value in a message."""
@@ -40,8 +42,17 @@ Document = Any
 
 FINGERPRINT, CLASS, MODEL, ARRAY, CONTROLLER = "fingerprint", "class", "model", "array", "controller"
 
+REGISTRATION = (
+    "a controller of your own is rebuilt if its class is a frozen dataclass with a name, which an entry "
+    "point in the group dynx.controllers or dynx.control.register_controller gives it"
+)
+"""Condition on the class of a controller, for messages."""
+
 NUMBERS = "numbers"
 """Entry for the public numbers of a controller that is known by its fingerprint."""
+
+CODE, DURATION = "code", "duration"
+"""Entries for a class that is not of dynx: the checksum of its code, and the duration of a trajectory."""
 
 SAME_MODEL = {MODEL: "of the scenario"}
 """Stands for the model of the scenario inside its controller or reference."""
@@ -60,6 +71,29 @@ class Unknown:
     def numbers(self) -> dict[str, Any]:
         """Public numbers of a controller, such as gains."""
         return dict(json.loads(self.text).get(NUMBERS, {}))
+
+    @property
+    def duration(self) -> float | None:
+        """Duration of a trajectory [s]; None for anything else."""
+        seconds = json.loads(self.text).get(DURATION)
+        return None if seconds is None else float(seconds)
+
+    @property
+    def why(self) -> str:
+        """Reason why it cannot be rebuilt, and what the class lacks."""
+        document = json.loads(self.text)
+        if FINGERPRINT not in document and _has_other_code(document):
+            return "the code of its class here is not that of the file (or the file is of another Python)"
+        if CONTROLLER in document:
+            return f"no controller {shown(self.name)} is registered here: {REGISTRATION}"
+        if FINGERPRINT in document and NUMBERS in document:
+            return f"the file has only its fingerprint, because its class is not registered: {REGISTRATION}"
+        if FINGERPRINT in document:
+            return (
+                "the file has only its fingerprint, because its class is not a frozen dataclass, or its "
+                "objects have more than the fields: a class of your own that is to be rebuilt is one"
+            )
+        return "its class is not here: import the module of the class first"
 
 
 def encode(value: Any, model: Model | None = None) -> Document:
@@ -86,7 +120,7 @@ def encode(value: Any, model: Model | None = None) -> Document:
     if isinstance(value, Controller):
         document = _controller(value, model)
         if document is not None:
-            return document
+            return document | _code_of(value)
     elif isinstance(value, tuple) and hasattr(value, "_fields"):
         return _object(value, dict(zip(value._fields, value, strict=True)), model)
     elif isinstance(value, list | tuple):
@@ -97,7 +131,8 @@ def encode(value: Any, model: Model | None = None) -> Document:
         given = {each.name: getattr(value, each.name) for each in fields(value) if each.init}
         return _object(value, given, model)
     document = {FINGERPRINT: _name_of(type(value)), "sha256": _fingerprint(value, model)}
-    return document | ({NUMBERS: controller_numbers(value)} if isinstance(value, Controller) else {})
+    numbers = {NUMBERS: controller_numbers(value)} if isinstance(value, Controller) else {}
+    return document | numbers | _code_of(value)
 
 
 def decode(document: Document, model: Model | None = None) -> Any:
@@ -122,8 +157,9 @@ def in_words(document: Document) -> str:
             inside = ", ".join(f"{name} {in_words(each)}" for name, each in document["fields"].items())
             return f"{document[CLASS].rpartition(':')[2]}({inside})"
         if CONTROLLER in document:
-            given = (f"{name} {in_words(each)}" for name, each in document[CONTROLLER].items())
-            return ", ".join(given)
+            given = dict(document[CONTROLLER])
+            name = given.pop(CONTROLLER)
+            return f"{name}({', '.join(f'{key} {in_words(each)}' for key, each in given.items())})"
         if document == SAME_MODEL or MODEL in document:
             return "of the scenario's model" if document == SAME_MODEL else "of another model"
         for kind in (ARRAY, "float", "mapping"):
@@ -149,10 +185,13 @@ def _decoded(document: Document, model: Model | None) -> Any:
     if "mapping" in document:
         return {_decoded(key, model): _decoded(each, model) for key, each in document["mapping"]}
     if CONTROLLER in document:
+        name = str(document[CONTROLLER]["controller"])
+        if _has_other_code(document):
+            return Unknown(name, json.dumps(document))
         try:
             return from_document(_decoded(document[MODEL], model), document[CONTROLLER])
         except UnknownNameError:
-            return Unknown(str(document[CONTROLLER]["controller"]), json.dumps(document))
+            return Unknown(name, json.dumps(document))
     if document == SAME_MODEL and model is not None:
         return model
     if MODEL in document:
@@ -161,16 +200,39 @@ def _decoded(document: Document, model: Model | None) -> Any:
     if FINGERPRINT in document:
         return Unknown(document[FINGERPRINT].rpartition(":")[2], json.dumps(document))
     kind = _class_of(document[CLASS])
-    if kind is None:
+    if kind is None or _has_other_code(document):
         return Unknown(document[CLASS].rpartition(":")[2], json.dumps(document))
     return kind(**{name: _decoded(each, model) for name, each in document["fields"].items()})
 
 
 def _object(value: Any, given: Mapping[str, Any], model: Model | None) -> Document:
-    return {
-        CLASS: _name_of(type(value)),
-        "fields": {name: encode(each, model) for name, each in given.items()},
-    }
+    written = {name: encode(each, model) for name, each in given.items()}
+    return {CLASS: _name_of(type(value)), "fields": written} | _code_of(value)
+
+
+def _code_of(value: Any) -> dict[str, Document]:
+    """Checksum of the code of an object's class, and a trajectory's duration; nothing for a class of dynx."""
+    if not is_foreign(type(value)):
+        return {}
+    duration = {DURATION: float(value.duration)} if isinstance(value, Trajectory) else {}
+    return {CODE: digest_of_code(type(value)), **duration}
+
+
+def _present_class(document: Document) -> type | None:
+    """The class of a document in this program; None where it is not here."""
+    if CLASS in document:
+        found: type | None = _class_of(document[CLASS])
+        return found
+    try:
+        return controller_class(document[CONTROLLER]["controller"])
+    except (ArgumentError, UnknownNameError):
+        return None
+
+
+def _has_other_code(document: Document) -> bool:
+    """Whether the class of a document has other code in this program than in the file."""
+    kind = _present_class(document) if CODE in document else None
+    return kind is not None and digest_of_code(kind) != document[CODE]
 
 
 def _array(array: np.ndarray[Any, Any]) -> Document:
@@ -248,11 +310,8 @@ def _parts(value: Any) -> Iterable[Any]:
         return [_name_of(value)]
     if isinstance(value, Backend):
         return [value.name, value.model]
-    if isinstance(value, CodeType):
-        return [value.co_code, value.co_names, value.co_consts]
     if isinstance(value, FunctionType):
-        closure = [cell.cell_contents for cell in value.__closure__ or ()]
-        return [value.__qualname__, value.__code__, value.__defaults__, value.__kwdefaults__, closure]
+        return [digest_of_function(value)]
     try:
         attributes = attributes_of(value)
         reduced = value.__reduce_ex__(2)

@@ -18,6 +18,7 @@ from dynx.sim.loop.noise import Noise
 from dynx.sim.plants.disturbances import Push
 from dynx.sim.plants.model_error import MassScale, Payload
 from dynx.sim.plants.registry import default_integrator
+from dynx.sim.scenario.differences import parts_of
 from dynx.sim.scenario.documents import ARRAY, Document, Unknown, decode, encode
 from dynx.trajectory.base import Trajectory
 
@@ -107,7 +108,7 @@ class Scenario:
     def with_defaults(self) -> Scenario:
         """An equal scenario with the integrator, the control step and the duration that None stands for."""
         duration = self.duration
-        if duration is None and isinstance(self.reference, Trajectory):
+        if duration is None and isinstance(self.reference, Trajectory | Unknown):
             duration = self.reference.duration
         return replace(
             self,
@@ -212,10 +213,11 @@ def _differences(name: str, ours: Document, theirs: Document) -> list[Difference
     """The innermost entries in which two documents differ."""
     if _same(ours, theirs):
         return []
-    one, other = (each.get("fields") if isinstance(each, dict) else None for each in (ours, theirs))
-    if one is None or other is None or ours["class"] != theirs["class"] or one.keys() != other.keys():
+    one, other = parts_of(ours), parts_of(theirs)
+    if one is None or other is None or one.keys() != other.keys():
         return [Difference(name, ours, theirs)]
-    return [found for key in one for found in _differences(f"{name}.{key}", one[key], other[key])]
+    inner = [found for key in one for found in _differences(f"{name}.{key}", one[key], other[key])]
+    return inner or [Difference(name, ours, theirs)]
 
 
 def _same(one: Document, other: Document) -> bool:

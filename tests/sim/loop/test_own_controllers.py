@@ -12,7 +12,7 @@ from dynx.backends import installed_backends
 from dynx.control import PID, ComputedTorque, OpenLoop, Saturated
 from dynx.control.base import Controller, Measurement
 from dynx.errors import ArgumentError, ControlError, UnsupportedFeatureError
-from dynx.sim import Rollout, simulate, simulate_batch
+from dynx.sim import Payload, Rollout, Scenario, Simulation, simulate, simulate_batch
 from dynx.trajectory import cycloidal
 from dynx.trajectory.base import Setpoint
 from tests.sim.bars import tutorial_motion, tutorial_robot
@@ -99,35 +99,73 @@ def test_what_a_law_cannot_do_with_symbols_is_said() -> None:
 
 
 class Integrating(Controller[None]):
-    """An integral that is kept where nobody sees it."""
+    """A controller that keeps its integral in itself: by another array, in place, or in an object inside."""
 
-    def __init__(self, in_place: bool) -> None:
+    def __init__(self, kind: str) -> None:
         self.model = ARM
-        self.total = np.zeros(6)
-        self._in_place = in_place
+        self.total: Any = Total() if kind == "inside" else np.zeros(6)
+        self._kind = kind
 
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Any, None]:
         error = setpoint.q - measurement.q
-        if self._in_place:
+        if self._kind == "inside":
+            self.total.value = self.total.value + error
+            return 10.0 * error + self.total.value, None
+        if self._kind == "in place":
             self.total += error
         else:
             self.total = self.total + error
         return 10.0 * error + self.total, None
 
 
-@pytest.mark.parametrize("in_place", [True, False])
-@pytest.mark.parametrize("wrapped", [True, False])
-def test_a_law_that_changes_itself(in_place: bool, wrapped: bool) -> None:
-    def law() -> Controller[Any]:
-        inner = Integrating(in_place)
-        return Saturated(inner, limit=100.0) if wrapped else inner
+class Total:
+    """A sum in an object of its own."""
 
-    whole = simulate(ARM, law(), REST, q0=REST + 0.1, duration=0.3)
-    assert len(whole) == 300
-    with pytest.raises(ArgumentError, match=r"changes itself \(attribute total\).*cannot be resumed"):
-        simulate(ARM, law(), REST, q0=REST + 0.1, duration=0.3, resume=whole.first(20))
+    def __init__(self) -> None:
+        self.value = np.zeros(6)
+
+
+@pytest.mark.parametrize("q0", [REST, REST + 0.1])
+@pytest.mark.parametrize("kind", ["in place", "another array", "inside"])
+@pytest.mark.parametrize("wrapped", [True, False])
+def test_a_controller_that_changes_itself_is_refused_everywhere(
+    kind: str, wrapped: bool, q0: np.ndarray[Any, Any]
+) -> None:
+    def scenario() -> Scenario:
+        inner = Integrating(kind)
+        controller = Saturated(inner, limit=100.0) if wrapped else inner
+        return Scenario(ARM, controller, REST, q0=q0, payload=Payload("tool0", 1.0), duration=0.04)
+
+    error = r"changes itself \(attribute total\).*neither be repeated nor be resumed"
+    with pytest.raises(ArgumentError, match=error):
+        simulate(scenario())
+    stepped = [Simulation(scenario()) for _ in range(3)]
+    for simulation, use in zip(stepped, ("save", "reset", "run"), strict=True):
+        saved = simulation.save()
+        simulation.step(20)
+        with pytest.raises(ArgumentError, match=error):
+            getattr(simulation, use)()
+        with pytest.raises(ArgumentError, match=error):
+            simulation.restore(saved)
+    with pytest.raises(ArgumentError, match=error):
+        simulate(scenario(), resume=stepped[0].rollout)
     with pytest.raises(UnsupportedFeatureError, match=r"changes itself|cannot be fused"):
-        simulate_batch(ARM, law(), REST, q0=REST + 0.1, rollouts=4, duration=0.01)
+        simulate_batch(ARM, scenario().controller, REST, q0=q0, rollouts=4, duration=0.01)
+
+
+@pytest.mark.parametrize("torque", [REST, [0.0] * 6, (0.0,) * 6, None])
+def test_a_torque_without_a_state_is_named_as_such(torque: Any) -> None:
+    class Alone(Giving):
+        def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> Any:
+            return self._given
+
+    error = r"torque must return \(tau, state\).*it returned"
+    with pytest.raises(ControlError, match=f"controller Alone failed in step 0, at 0 s: {error}"):
+        simulate(ARM, Alone(torque), REST, duration=0.01)
+    with pytest.raises(ControlError, match=error), Simulation(Scenario(ARM, Alone(torque), REST)) as one:
+        one.step()
+    with pytest.raises(ArgumentError, match=f"Alone: {error}"):
+        simulate_batch(ARM, Alone(torque), REST, rollouts=4, duration=0.01)
 
 
 def test_a_law_without_a_model_is_told_so() -> None:

@@ -11,7 +11,14 @@ import pytest
 
 import dynx.registry as shared_registry
 from dynx.control import PositionMotor
-from dynx.errors import ArgumentError, BackendError, UnknownBackendError, UnsupportedFeatureError
+from dynx.errors import (
+    ArgumentError,
+    BackendError,
+    DivergedError,
+    SimulationError,
+    UnknownBackendError,
+    UnsupportedFeatureError,
+)
 from dynx.model import Model
 from dynx.model.loading import load
 from dynx.sim import Plant, StepResult, register_plant, simulate
@@ -33,7 +40,7 @@ class Drifting(Plant):
         self._q, self._v = q, v
 
     def step(self, t: float, tau: Floats) -> StepResult:
-        self._q = self._q + self._dt * self._v
+        self._q = self._q + self.dt * self._v
         return StepResult(self._q, self._v, 0.0 * self._v, tau)
 
     def close(self) -> None:
@@ -97,3 +104,20 @@ def test_a_name_that_nobody_provides_is_an_error() -> None:
         simulate(PENDULUM, plant="pinochio", duration=0.1)
     with pytest.raises(ArgumentError, match="no stepper here; those that have one: pybullet"):
         simulate(PENDULUM, plant="pinocchio", integrator="engine", duration=0.1)
+
+
+def test_an_error_of_a_plant_is_not_called_a_divergence() -> None:
+    class Broken(Drifting):
+        def step(self, t: float, tau: Floats) -> StepResult:
+            if t > 0.045:
+                raise ZeroDivisionError("no wind")
+            return super().step(t, tau)
+
+    register_plant("broken", lambda: Broken)
+    try:
+        with pytest.raises(SimulationError, match=r"plant Broken failed in step 5.*ZeroDiv.*wind") as caught:
+            simulate(PENDULUM, plant="broken", duration=0.1, dt=1e-2)
+        assert not isinstance(caught.value, DivergedError)
+        assert len(caught.value.rollout) == 5
+    finally:
+        registry.unregister("broken")
