@@ -26,8 +26,7 @@ from dynx.sim.loop.staged import staged_loop
 from dynx.sim.loop.stops import Stops
 from dynx.sim.plants.registry import make_plant
 from dynx.sim.record.rollout import Rollout
-from dynx.sim.scenario.differences import model_difference
-from dynx.sim.scenario.documents import in_words
+from dynx.sim.resuming import changed_parts, refuse_no_rollout, refuse_other_scenario
 from dynx.sim.scenario.scenario import Scenario
 from dynx.sim.setup import Setup
 from dynx.spatial.scalar import Floats
@@ -336,7 +335,7 @@ class Simulation:
         if n > len(self._record):
             self._extend(n)
         self._loop.refuse_self_changing(self._record)
-        changed = [] if theirs is ours else [_changed_part(each.field) for each in theirs.differences(ours)]
+        changed = [] if theirs is ours else changed_parts(theirs, ours)
         self._record.take(snapshot.record, n)
         self._executor, self._departures = snapshot.executor, snapshot.departures
         held = replace(snapshot.held)
@@ -346,7 +345,7 @@ class Simulation:
             held.controller_state = None if controller is None else controller.initial_state()
             held.command = None
         if changed:
-            self._depart(f"another {' and '.join(dict.fromkeys(changed))}")
+            self._depart(f"another {' and '.join(changed)}")
         self._held, self._misplaced = held, False
         return self.state
 
@@ -356,11 +355,7 @@ class Simulation:
         The durations may differ. Raises ArgumentError that names the field for a rollout of another
         scenario, and for one that is not of its scenario alone.
         """
-        if not isinstance(rollout, Rollout):
-            raise ArgumentError(
-                f"the rollout to resume is of type {type(rollout).__name__}; wanted a dynx.Rollout, which "
-                "dynx.Rollout.load reads from a file"
-            )
+        refuse_no_rollout(rollout)
         step = len(rollout) if step is None else step
         most = len(rollout) if self.n_steps is None else min(len(rollout), self.n_steps)
         if not isinstance(step, int) or not 0 <= step <= most:
@@ -396,33 +391,6 @@ class Simulation:
     def __repr__(self) -> str:
         model, plant = self.scenario.model.name, self.scenario.plant
         return f"<Simulation of {model} on {plant}, at {self.time:.6g} s>"
-
-
-def refuse_other_scenario(rollout: Rollout, scenario: Scenario) -> None:
-    """Raise ArgumentError where `rollout` is not of `scenario`, whose duration may be another."""
-    then = rollout.scenario
-    if then is None:
-        raise ArgumentError("the rollout to resume has no scenario, so it cannot be compared")
-    if rollout.departures:
-        raise ArgumentError(
-            f"the rollout to resume is not that of its scenario alone: it has {'; '.join(rollout.departures)}"
-        )
-    if then.model != scenario.model:
-        name, old, new = model_difference(then.model, scenario.model)
-        raise ArgumentError(
-            f"the rollout to resume is not of this model {shown(scenario.model.name)}: it had {name} {old}; "
-            f"now it is {new}"
-        )
-    for name, old, new in then.differences(scenario):
-        if name != "duration":
-            raise ArgumentError(
-                f"the rollout to resume had {name} {in_words(old)}; now it is {in_words(new)}"
-            )
-
-
-def _changed_part(field: str) -> str:
-    """The name of a part of a scenario that changed: a controller as a whole."""
-    return "controller" if field.partition(".")[0] == "controller" else field
 
 
 def _call(progress: Progress, wanted: int, taken: int) -> None:

@@ -55,7 +55,12 @@ REST = np.zeros(6)
         ({"delay": -1.0}, ArgumentError, "delay"),
         ({"substeps": 0}, ArgumentError, "substeps"),
         ({"substeps": 1.5}, ArgumentError, "substeps"),
-        ({"plant": "bulet"}, UnknownBackendError, "pybullet"),
+        ({"plant": "bulet"}, UnknownBackendError, "no plant 'bulet'.*pybullet"),
+        ({"plant": ["pybullet"]}, ArgumentError, "plant is of type list; wanted the name"),
+        ({"noise": 0.1}, ArgumentError, r"noise is '0\.1'; wanted a dynx\.Noise"),
+        ({"pushes": [1]}, ArgumentError, r"pushes is .*; wanted a Push"),
+        ({"pushes": 1}, ArgumentError, r"pushes is .*; wanted a Push"),
+        ({"payload": 2.0}, ArgumentError, r"payload is '2\.0'; wanted a Payload"),
         ({"integrator": "rk5"}, ArgumentError, "rk4"),
         ({"integrator": "engine"}, ArgumentError, "no stepper"),
         ({"integrator": "adaptive", "method": "DOP85"}, ArgumentError, "DOP853"),
@@ -210,3 +215,21 @@ def test_a_batch_has_the_defaults_of_one_rollout() -> None:
     one, batch = (inspect.signature(function).parameters for function in (simulate, simulate_batch))
     for name in (one.keys() & batch.keys()) - {"plant"}:
         assert one[name].default == batch[name].default, name
+
+
+@pytest.mark.parametrize(
+    ("options", "hint"),
+    [
+        ({"plant": np.zeros(3)}, "plant is of type ndarray"),
+        ({"plant": "pinocchio"}, "plant is 'pinocchio'; in a batch it is 'compiled'"),
+        ({"parametric": 3.0}, r"parametric is of type float; wanted dynx\.parametric"),
+        ({"noise": 0.1}, r"noise is '0\.1'; wanted a dynx\.Noise"),
+        ({"pushes": [1]}, "wanted a Push"),
+        ({"payload": 2.0}, "wanted a Payload"),
+    ],
+)
+def test_arguments_of_a_batch_have_their_types(options: dict[str, Any], hint: str) -> None:
+    with pytest.raises(ArgumentError, match=hint):
+        simulate_batch(ARM, LAW, REST, rollouts=2, duration=0.01, **options)
+    with pytest.raises(ArgumentError, match="model is 'ur5'; wanted a Model or a Scenario"):
+        simulate_batch(cast("Any", "ur5"), LAW, REST, rollouts=2, duration=0.01)

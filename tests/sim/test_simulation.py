@@ -305,7 +305,7 @@ def test_the_record_says_how_its_steps_were_computed() -> None:
         simulation.step()
         assert simulation.rollout.executor == "staged; plain: stepped by the caller"
     assert executor(position_limits=True) == "plain: position limits are not compiled"
-    assert executor(damping=1.0).startswith("plain: the plant has disturbances")
+    assert executor(damping=1.0).startswith("plain: joint friction is not compiled")
     few = staged.MIN_STEPS_TO_COMPILE
     assert executor(dt=0.01) == f"plain: fewer than {few} steps"
     assert executor(integrator="rk4") == f"plain: fewer than {4 * few} steps"

@@ -183,7 +183,7 @@ plant = stacked(
         "--plant",
         default="pinocchio",
         metavar="NAME",
-        help="Backend that moves the robot; pybullet is PyBullet's own stepper (default: pinocchio).",
+        help="Backend or plant that moves the robot; pybullet is PyBullet's stepper (default: pinocchio).",
     ),
     _seconds_option("--dt", default=1e-3, help="Time step of the record [s] (default: 0.001)."),
     click.option(

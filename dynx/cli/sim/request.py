@@ -22,6 +22,7 @@ from dynx.model.model import Base
 from dynx.sim import Noise, Payload, Push, Rollout, Scenario
 from dynx.sim.clock import Clock
 from dynx.sim.named_controllers import ControllerRequest, Gains, named_controller
+from dynx.sim.plants.registry import require_plant
 from dynx.simd.machine import MAX_MEMORY_SHARE, memory_size
 
 GAINS = ("kp", "kd", "ki", "natural_frequency", "damping_ratio", "posture_kp", "posture_kd")
@@ -60,8 +61,8 @@ def prepare(given: dict[str, Any]) -> SimulationRequest:
     """Make a scenario from the options `given` by parameter name. Raises ArgumentError for invalid ones."""
     base: Base = given["base"]
     model = load(given["robot"], base=base, lock=dict(given["lock"]), gravity=given["gravity"])
-    for engine in (given["plant"], given["backend"]):
-        backend_class(engine).require_engine()
+    require_plant(given["plant"])
+    backend_class(given["backend"]).require_engine()
     dynamics = _joint_dynamics(given)
     _refuse_ineffective_options(given, dynamics)
     motion = plan_motion(model, MotionInput.of(given))

@@ -141,6 +141,9 @@ def simulate_batch(
     )
     assert controller is not None
     assert setup.setpoint_of is not None
+    if parametric is not None and not isinstance(parametric, ParametricDynamics):
+        kind = type(parametric).__name__
+        raise ArgumentError(f"parametric is of type {kind}; wanted dynx.parametric of a model")
     if parametric is not None and parametric.model != moved:
         wanted = scenario.model.name
         if moved is not scenario.model:

@@ -59,8 +59,8 @@ def staged_loop(loop: Loop, left: int) -> StagedLoop | str:
         return f"{loop.controller.name} is a motor inside the engine"
     if not isinstance(plant, IntegratedPlant):
         return f"{type(plant).__name__} has a stepper of its own"
-    if not plant.is_array_code:
-        return "the plant has disturbances, or an integrator that is not compiled"
+    if plant.uncompiled:
+        return f"{plant.uncompiled} not compiled"
     if plant.substeps > MAX_TRACED_SUBSTEPS:
         return f"more than {MAX_TRACED_SUBSTEPS} sub-steps"
     if left < MIN_STEPS_TO_COMPILE * plant.evaluations:

@@ -191,7 +191,10 @@ def refuse_impure(controller: Controller[Any]) -> None:
     """
     for each in chain_of(controller):
         if not each.is_pure:
-            raise TraceError(f"{each.name} is not declared pure")
+            raise TraceError(
+                f"the class of {each.name} is not declared with pure=True, so its torque may do more than "
+                "compute a torque"
+            )
 
 
 def traced_controller(controller: Controller[Any], tracer: EngineCallTracer) -> Controller[Any]:

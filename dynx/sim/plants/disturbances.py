@@ -89,6 +89,16 @@ class Disturbances:
         """Whether friction or pushes add any torque."""
         return self.friction.present or bool(self.pushes)
 
+    @property
+    def names(self) -> list[str]:
+        """What there is of friction, pushes and armature, in words."""
+        present = {
+            "joint friction": self.friction.present,
+            "pushes": bool(self.pushes),
+            "armature": self.has_armature,
+        }
+        return [name for name, is_present in present.items() if is_present]
+
     def torque(self, engine: Backend, t: float, q: Floats, v: Floats) -> Floats:
         """The torque (nv,) of pushes less friction, in a step that began at `t`."""
         tau = -self.friction(v)

@@ -74,15 +74,20 @@ class IntegratedPlant(Plant):
         return StepResult(q, v, a, tau)
 
     @property
-    def is_array_code(self) -> bool:
-        """Whether a step is `advanced` over the engine's forward dynamics, for arrays of any scalar."""
+    def uncompiled(self) -> str:
+        """Subject and verb for what a compiled step does not have; empty where `advanced` is a whole step."""
+        found = self.disturbances.names
         # Floats and symbols take the flow of a floating base in other roundings.
-        schemes = SemiImplicitEuler if self.model.floating else SemiImplicitEuler | RungeKutta4
-        return self._undisturbed and isinstance(self._scheme, schemes)
+        if self.model.floating and isinstance(self._scheme, RungeKutta4):
+            found.append("the integrator rk4 with a floating base")
+        if isinstance(self._scheme, Adaptive):
+            found.append("the integrator adaptive")
+        verb = "is" if len(found) == 1 and found != ["pushes"] else "are"
+        return f"{' and '.join(found)} {verb}" if found else ""
 
     @property
     def evaluations(self) -> int:
-        """Evaluations of the acceleration in one step, where it `is_array_code`."""
+        """Evaluations of the acceleration in one step, where nothing is `uncompiled`."""
         return self.substeps * (4 if isinstance(self._scheme, RungeKutta4) else 1)
 
     def advanced(self, accelerate: Accelerate, q: Array, v: Array, tau: Array) -> State:

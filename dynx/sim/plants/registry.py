@@ -10,9 +10,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from dynx.backends import backend
+from dynx.backends import backend, backend_class, backend_names
 from dynx.backends.registry import BUILT_IN as BACKENDS
-from dynx.errors import ArgumentError, BackendError, UnknownBackendError, shown
+from dynx.errors import ArgumentError, BackendError, UnknownBackendError, nearest, shown
 from dynx.model import Model
 from dynx.registry import ClassRegistry
 from dynx.sim.plants.disturbances import Disturbances
@@ -44,6 +44,18 @@ def plant_names() -> tuple[str, ...]:
 def plant_class(name: str) -> type[Plant]:
     """The class of the plant of that name that has a stepper of its own; this imports its engine."""
     return _steppers.find(name)
+
+
+def require_plant(name: str) -> None:
+    """Raise UnknownBackendError where neither a plant nor a backend has that name.
+
+    Raises NotInstalledError where the engine of a backend is missing.
+    """
+    if name in BACKENDS or name not in plant_names():
+        known = dict.fromkeys((*backend_names(), *plant_names()))
+        if name not in known:
+            raise UnknownBackendError(f"no plant {shown(name)}{nearest(name, known)}")
+        backend_class(name).require_engine()
 
 
 def register(name: str, loader: Callable[[], type[Plant]]) -> None:
@@ -96,5 +108,11 @@ def make_plant(
                 f"the engine {shown(name)} has no stepper here; those that have one: {known}"
             ) from None
         return kind(model, disturbances, dt, substeps=substeps)
+    if name in plant_names() and name not in backend_names():
+        raise ArgumentError(
+            f"integrator is {shown(integrator)}; the plant {shown(name)} has a stepper of its own, which is "
+            f"integrator={ENGINE!r}"
+        )
+    require_plant(name)
     engine = backend(name, model, validate=False)
     return IntegratedPlant(engine, disturbances, dt, integrator=integrator, substeps=substeps, **options)

@@ -18,8 +18,19 @@ from dynx.sim.loop.noise import Noise
 from dynx.sim.plants.disturbances import Push
 from dynx.sim.plants.model_error import MassScale, Payload
 from dynx.sim.plants.registry import default_integrator
-from dynx.sim.scenario.differences import parts_of
-from dynx.sim.scenario.documents import ARRAY, Document, Unknown, decode, encode
+from dynx.sim.scenario.documents import (
+    ARRAY,
+    CLASS,
+    CODE,
+    CONTROLLER,
+    FINGERPRINT,
+    MODEL,
+    Document,
+    Unknown,
+    decode,
+    encode,
+)
+from dynx.sim.scenario.documents import NUMBERS as CONTROLLER_NUMBERS
 from dynx.trajectory.base import Trajectory
 
 SCHEMA = "dynx.scenario/1"
@@ -87,6 +98,10 @@ class Scenario:
         if not isinstance(self.controller, Controller | Unknown | None):
             kind = type(self.controller).__name__
             raise ArgumentError(f"controller is of type {kind}; wanted a controller of dynx.control")
+        if not isinstance(self.plant, str):
+            raise ArgumentError(f"plant is of type {type(self.plant).__name__}; wanted the name of a plant")
+        if not isinstance(self.noise, Noise | Unknown | None):
+            raise ArgumentError(f"noise is {shown(self.noise)}; wanted a dynx.Noise, as in Noise(v=1e-3)")
         for name in NUMBERS:
             object.__setattr__(self, name, _as_array(getattr(self, name)))
         payload = () if self.payload is None else self.payload
@@ -213,11 +228,26 @@ def _differences(name: str, ours: Document, theirs: Document) -> list[Difference
     """The innermost entries in which two documents differ."""
     if _same(ours, theirs):
         return []
-    one, other = parts_of(ours), parts_of(theirs)
+    one, other = _parts_of(ours), _parts_of(theirs)
     if one is None or other is None or one.keys() != other.keys():
         return [Difference(name, ours, theirs)]
     inner = [found for key in one for found in _differences(f"{name}.{key}", one[key], other[key])]
     return inner or [Difference(name, ours, theirs)]
+
+
+def _parts_of(document: Document) -> dict[str, Document] | None:
+    """Parts of the document of an object by name, equal names for one class; None for no object."""
+    if not isinstance(document, dict):
+        return None
+    code = {"code of the class": document[CODE]} if CODE in document else {}
+    if CLASS in document:
+        return {f"class {document[CLASS]}": True, **document["fields"], **code}
+    if CONTROLLER in document:
+        given = dict(document[CONTROLLER])
+        return {f"class {given.pop(CONTROLLER)}": True, MODEL: document.get(MODEL), **given, **code}
+    if FINGERPRINT in document:
+        return {f"class {document[FINGERPRINT]}": True, **document.get(CONTROLLER_NUMBERS, {}), **code}
+    return None
 
 
 def _same(one: Document, other: Document) -> bool:

@@ -8,8 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 import dynx.registry as shared_registry
+from dynx.cli.shell.main import cli
 from dynx.control import PositionMotor
 from dynx.errors import (
     ArgumentError,
@@ -121,3 +123,17 @@ def test_an_error_of_a_plant_is_not_called_a_divergence() -> None:
         assert len(caught.value.rollout) == 5
     finally:
         registry.unregister("broken")
+
+
+def test_the_command_line_simulates_a_plant_by_its_name(drifting: str) -> None:
+    passive = ["sim", "pendulum", "--v0", "2", "--controller", "none", "--json", "--plant"]
+    found = CliRunner().invoke(cli, [*passive, drifting])
+    assert found.exit_code == 0, found.output
+    found = CliRunner().invoke(cli, [*passive, "drift"])
+    assert found.exit_code != 0
+    assert "no plant 'drift'; did you mean 'drifting'" in found.output
+
+
+def test_a_plant_with_a_stepper_takes_no_integrator_of_dynx(drifting: str) -> None:
+    with pytest.raises(ArgumentError, match="has a stepper of its own, which is integrator='engine'"):
+        simulate(PENDULUM, plant=drifting, integrator="rk4", duration=0.1)

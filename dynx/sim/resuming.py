@@ -1,0 +1,76 @@
+"""Comparison of the scenario of a record with the one that is to continue it."""
+
+from __future__ import annotations
+
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+from dynx.errors import ArgumentError, shown
+from dynx.model import Model
+from dynx.sim.record.rollout import Rollout
+from dynx.sim.scenario.documents import in_words
+from dynx.sim.scenario.scenario import Scenario
+
+
+def refuse_no_rollout(rollout: object) -> None:
+    """Raise ArgumentError for anything but a `Rollout`, such as the name of its file."""
+    if not isinstance(rollout, Rollout):
+        raise ArgumentError(
+            f"the rollout to resume is of type {type(rollout).__name__}; wanted a dynx.Rollout, which "
+            "dynx.Rollout.load reads from a file"
+        )
+
+
+def refuse_other_scenario(rollout: Rollout, scenario: Scenario) -> None:
+    """Raise ArgumentError where `rollout` is not of `scenario`, whose duration may be another."""
+    then = rollout.scenario
+    if then is None:
+        raise ArgumentError("the rollout to resume has no scenario, so it cannot be compared")
+    if rollout.departures:
+        raise ArgumentError(
+            f"the rollout to resume is not that of its scenario alone: it has {'; '.join(rollout.departures)}"
+        )
+    if then.model != scenario.model:
+        name, old, new = model_difference(then.model, scenario.model)
+        raise ArgumentError(
+            f"the rollout to resume is not of this model {shown(scenario.model.name)}: it had {name} {old}; "
+            f"now it is {new}"
+        )
+    for name, old, new in then.differences(scenario):
+        if name != "duration":
+            raise ArgumentError(
+                f"the rollout to resume had {name} {in_words(old)}; now it is {in_words(new)}"
+            )
+
+
+def changed_parts(theirs: Scenario, ours: Scenario) -> list[str]:
+    """Names of the fields in which two scenarios differ, and of those inside; a controller is one field."""
+    names = (each.field for each in theirs.differences(ours))
+    return list(dict.fromkeys("controller" if name.startswith("controller.") else name for name in names))
+
+
+def model_difference(ours: Model, theirs: Model) -> tuple[str, str, str]:
+    """Name of the first attribute in which two models differ, and its two values."""
+    for name in ("name", "base", "gravity", "links", "joints", "extra_frames"):
+        pair = getattr(ours, name), getattr(theirs, name)
+        if pair[0] != pair[1]:
+            return _innermost(name, *pair)
+    return "model", shown(ours), shown(theirs)
+
+
+def _innermost(name: str, ours: Any, theirs: Any) -> tuple[str, str, str]:
+    """The first attribute inside two values in which they differ."""
+    if is_dataclass(ours) and type(ours) is type(theirs):
+        for each in fields(ours):
+            pair = getattr(ours, each.name), getattr(theirs, each.name)
+            if each.compare and pair[0] != pair[1]:
+                return _innermost(f"{each.name} of {name}", *pair)
+    if name in ("links", "joints", "extra_frames"):
+        known = [[each.name for each in side] for side in (ours, theirs)]
+        if known[0] != known[1]:
+            mine, its = (shown(", ".join(names)) for names in known)
+            return name, mine, its
+        word = {"links": "link", "joints": "joint", "extra_frames": "frame"}[name]
+        one, other = next(pair for pair in zip(ours, theirs, strict=True) if pair[0] != pair[1])
+        return _innermost(f"{word} {shown(one.name)}", one, other)
+    return name, str(ours), str(theirs)
