@@ -63,9 +63,12 @@ def test_commands_have_the_options() -> None:
         elif program == "pytest":
             flags = {word.partition("=")[0] for word in words if word.startswith("--dynx")}
             assert flags <= Options().flags.keys()
+        elif program == "python":
+            assert words[:2] == ["-m", "tests.mutation"]
+            assert {word for word in words if word.startswith("--")} <= {"--record", "--seed", "--count"}
         else:
             assert program == "pip"
-    assert programs == {"dynx", "pytest", "pip"}
+    assert programs == {"dynx", "pytest", "python", "pip"}
 
 
 def test_extras_exist() -> None:
