@@ -28,7 +28,7 @@ def refuse_other_scenario(rollout: Rollout, scenario: Scenario) -> None:
         raise ArgumentError("the rollout to resume has no scenario, so it cannot be compared")
     if rollout.departures:
         raise ArgumentError(
-            f"the rollout to resume is not that of its scenario alone: it has {'; '.join(rollout.departures)}"
+            f"the rollout to resume is not that of its scenario alone: {'; '.join(rollout.departures)}"
         )
     if then.model != scenario.model:
         name, old, new = model_difference(then.model, scenario.model)

@@ -146,8 +146,8 @@ class Simulation:
     def run(self, until: float | None = None, *, real_time: bool = False) -> Rollout:
         """Step to the time `until` [s], by default the end of the scenario, and return the record.
 
-        `until` is a multiple of `dt` and not before `time`. Raises ArgumentError for another one, and for a
-        controller that changed itself; DivergedError and ControlError as `step` does.
+        `until` is a multiple of `dt` and not before `time`; ArgumentError for another one. Raises
+        DivergedError and ControlError as `step` does.
 
         With `real_time` each step waits until as much time has passed on the clock of the machine.
         Otherwise steps are compiled where that is possible; `Rollout.executor` says whether it was.
@@ -168,7 +168,6 @@ class Simulation:
             self._run_in_real_time(end)
         else:
             self._run(end)
-        self._refuse_changed_controller()
         return self.rollout
 
     def _refuse_changed_controller(self) -> None:
@@ -273,7 +272,9 @@ class Simulation:
 
     @property
     def rollout(self) -> Rollout:
-        """The record so far."""
+        """The record so far; a controller that changed itself is one of its `departures`."""
+        changed = self._watch.changed if self._watch is not None else None
+        departures = self._departures if changed is None else (*self._departures, changed)
         record, setup, n = self._record.copy(), self._setup, self._record.steps
         times = self._loop.clock.times()[: n + 1]
         limit, tau = setup.limit, record.tau
@@ -290,7 +291,7 @@ class Simulation:
             setup.disturbances.armature,
             self.scenario,
             "; ".join(self._executor),
-            self._departures,
+            departures,
         )
 
     def reset(self) -> State:
