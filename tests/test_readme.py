@@ -8,6 +8,7 @@ import shlex
 import subprocess
 import sys
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
@@ -50,10 +51,12 @@ def shape(line: str) -> str:
 def test_python_blocks_run_in_order(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     registered = backend_names()
-    namespace: dict[str, object] = {"__name__": "page"}
+    # Dataclasses look their module up by name.
+    module = ModuleType("page")
+    monkeypatch.setitem(sys.modules, "page", module)
     try:
         for block in blocks("python", PAGES[page]):
-            exec(compile(block, page, "exec"), namespace)
+            exec(compile(block, page, "exec", dont_inherit=True), module.__dict__)
     finally:
         for name in set(backend_names()) - set(registered):
             unregister(name)

@@ -79,7 +79,7 @@ def test_a_view_of_a_closed_backend_refuses(validate: bool) -> None:
     view = DerivedBackend(inner, validate=validate)
     inner.close()
     for call in (view.mass_matrix, view.forward_kinematics):
-        with pytest.raises(ClosedError, match="behind reference/derived of chain was closed"):
+        with pytest.raises(ClosedError, match="the backend that reference/derived of chain uses was closed"):
             call(np.zeros(2))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from scipy.spatial.transform import Rotation
 
 from dynx.agreement.differentiation import time_derivative
@@ -17,7 +17,7 @@ from tests.contract.conftest import Make
 from tests.contract.engine_calls import ENGINE_CALLS, EngineCall, State, random_state
 from tests.contract.robots import JOINT_ORDER, LINK_ORDER, LINKS, branched, followed_elbow, mimicking
 from tests.error_bounds import ErrorBounds, samples_at
-from tests.examples import one_robot
+from tests.examples import generic_sample, one_robot
 
 BELOW = {
     "z_shoulder": {"zeta", "plate", "mid", "tool"},
@@ -105,6 +105,7 @@ def test_velocity_is_the_rate_of_the_pose(make: Make, base: str) -> None:
 
     @one_robot
     @given(samples(model))
+    @example(generic_sample(model))
     def holds(state: Sample) -> None:
         q, v, _ = state
         close = ErrorBounds(samples_at(model, q, v))
