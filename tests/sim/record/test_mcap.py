@@ -236,6 +236,7 @@ def test_a_robot_without_joints(tmp_path: Path) -> None:
 def test_long_records_are_written_block_by_block(
     arm: Rollout, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    pytest.importorskip("mcap.reader")
     arm.save(tmp_path / "at once.mcap")
     monkeypatch.setattr("dynx.sim.record.mcap_file.BLOCK", 7)
     arm.save(tmp_path / "in blocks.mcap")
