@@ -51,11 +51,14 @@ def require_plant(name: str) -> None:
 
     Raises NotInstalledError where the engine of a backend is missing.
     """
-    if name in BACKENDS or name not in plant_names():
-        known = dict.fromkeys((*backend_names(), *plant_names()))
+    # Entry points are read only for names that dynx does not have: that takes some milliseconds.
+    if name not in BACKENDS:
+        if name in plant_names():
+            return
+        known = (*backend_names(), *plant_names())
         if name not in known:
-            raise UnknownBackendError(f"no plant {shown(name)}{nearest(name, known)}")
-        backend_class(name).require_engine()
+            raise UnknownBackendError(f"no plant {shown(name)}{nearest(name, dict.fromkeys(known))}")
+    backend_class(name).require_engine()
 
 
 def register(name: str, loader: Callable[[], type[Plant]]) -> None:
@@ -75,7 +78,6 @@ def unregister(name: str) -> None:
 
 def default_integrator(name: str) -> str:
     """``engine`` for a plant with a stepper of its own, otherwise ``semi_implicit``."""
-    # Entry points are read only for names that dynx does not have: that takes some milliseconds.
     has_stepper = name in BUILT_IN if name in BACKENDS else name in _steppers.names()
     return ENGINE if has_stepper else "semi_implicit"
 
@@ -108,7 +110,7 @@ def make_plant(
                 f"the engine {shown(name)} has no stepper here; those that have one: {known}"
             ) from None
         return kind(model, disturbances, dt, substeps=substeps)
-    if name in plant_names() and name not in backend_names():
+    if name not in BACKENDS and name in plant_names() and name not in backend_names():
         raise ArgumentError(
             f"integrator is {shown(integrator)}; the plant {shown(name)} has a stepper of its own, which is "
             f"integrator={ENGINE!r}"
