@@ -30,7 +30,8 @@ def _own_controllers() -> dict[str, str]:
     """Entries of the controllers in the modules beside this one."""
     modules = (name for _, name, _ in iter_modules([str(Path(__file__).parent)]) if name != "registry")
     members = (each for name in modules for each in vars(import_module(f"dynx.control.{name}")).values())
-    kinds = [each for each in members if isinstance(each, type) and issubclass(each, Controller)]
+    # Not isinstance(each, type), which Python 3.10 affirms for aliases such as Callable[..., float].
+    kinds = [each for each in members if type(each) is type(Controller) and issubclass(each, Controller)]
     return {kind.__name__: f"{kind.__module__}:{kind.__name__}" for kind in kinds if not isabstract(kind)}
 
 
