@@ -12,7 +12,9 @@ from types import ModuleType
 
 import pytest
 
-from dynx.backends import backend_names, unregister
+from dynx import backends
+from dynx.control import registry as controllers
+from dynx.sim.plants import registry as plants
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = {
@@ -50,7 +52,12 @@ def shape(line: str) -> str:
 @pytest.mark.parametrize("page", [page for page, text in PAGES.items() if blocks("python", text)])
 def test_python_blocks_run_in_order(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    registered = backend_names()
+    registries = (
+        (backends.backend_names, backends.unregister),
+        (controllers.controller_names, controllers.unregister),
+        (plants.plant_names, plants.unregister),
+    )
+    before = [set(names()) for names, _ in registries]
     # Dataclasses look their module up by name.
     module = ModuleType("page")
     monkeypatch.setitem(sys.modules, "page", module)
@@ -58,8 +65,9 @@ def test_python_blocks_run_in_order(page: str, tmp_path: Path, monkeypatch: pyte
         for block in blocks("python", PAGES[page]):
             exec(compile(block, page, "exec", dont_inherit=True), module.__dict__)
     finally:
-        for name in set(backend_names()) - set(registered):
-            unregister(name)
+        for (names, unregister), known in zip(registries, before, strict=True):
+            for name in set(names()) - known:
+                unregister(name)
 
 
 def test_the_readme_has_python() -> None:
