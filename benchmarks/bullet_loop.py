@@ -81,7 +81,7 @@ class BulletWorld:
         return positions
 
     def run_with_numpy(self) -> Floats:
-        """The same with arrays, and with the cycloid evaluated where it is needed."""
+        """Run the loop with NumPy arrays, evaluating the cycloid in each step."""
         engine, client, arm, joints = self._engine, self.client, self.arm, self.joints
         for joint in joints:
             engine.resetJointState(arm, joint, 0.0, 0.0, physicsClientId=client)

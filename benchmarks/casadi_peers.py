@@ -95,7 +95,7 @@ class CasadiMap(CompilingPeer):
 
 
 class CasadiCode(CasadiMap):
-    """The same, with each expression written as C and compiled for this processor."""
+    """A CasADi peer whose expressions are written as C and compiled for this processor."""
 
     name = "CasADi map, C code"
 

@@ -56,7 +56,7 @@ class ClosedLoop(Simulator):
         """Positions (n_steps + 1, 6)."""
 
     def checks(self) -> Sequence[Check]:
-        """How far from the reference, and how far from the loop written by hand."""
+        """Check the tracking error, and the distance from the hand-written loop."""
         q = np.array(self.call())
         tracking = Check("tracking error [rad]", self.task.tracking_error(q), TRACKING)
         if not self.same_scheme:
@@ -131,7 +131,7 @@ class LoopByHand(ClosedLoop):
         return Q
 
     def checks(self) -> Sequence[Check]:
-        """How far from the reference: it is what others are compared with."""
+        """Check the tracking error only: the others are compared with this loop."""
         return super().checks()[:1]
 
 
@@ -144,7 +144,7 @@ def pinocchio_model(model: Model) -> Any:
 
 @cache
 def record_by_hand(task: Task) -> Floats:
-    """What the loop written by hand comes to: positions (n_steps + 1, 6)."""
+    """Positions (n_steps + 1, 6) of the hand-written loop."""
     return LoopByHand(task).call()
 
 

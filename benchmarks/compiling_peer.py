@@ -1,4 +1,4 @@
-"""What peers that compile a function of a batch have in common."""
+"""Base of peers that compile a function of a batch."""
 
 from __future__ import annotations
 

@@ -12,9 +12,9 @@ Record = Callable[[str, str, BenchmarkFixture], None]
 SECONDS = pytest.StashKey[dict[str, dict[str, float]]]()
 
 CHECKED_MORE = 2e-6
-"""What a call with its checks may cost more than the engine's own [s]."""
+"""Largest overhead of a checked call over the engine's own [s]."""
 UNCHECKED_MORE, UNCHECKED_RATIO = 0.7e-6, 1.5
-"""What a call without checks may cost more: the larger of so many seconds and so many times."""
+"""Largest overhead of an unchecked call: the larger of seconds and a factor."""
 
 
 @pytest.fixture

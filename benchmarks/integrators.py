@@ -1,4 +1,4 @@
-"""How exact the integrators of `dynx.simulate` are, measured: ``python -m benchmarks.integrators``.
+"""Measured errors of the integrators of `dynx.simulate`: ``python -m benchmarks.integrators``.
 
 - A pendulum that falls from 1 rad is at its lowest point after a quarter of its period, which is known in
   closed form at any amplitude: K(sin^2(q0 / 2)) / w0 (Landau and Lifshitz, Mechanics, section 11, problem 1).
@@ -41,7 +41,7 @@ ENERGY = 1e-10
 MOMENTUM = 1e-12
 """Change of momentum in one step [kg m/s, kg m^2/s]."""
 SPEED = (0.3, -0.2, 0.5, 1.4, -0.7, 2.6)
-"""Of the free body: linear [m/s] and angular [rad/s], in its own axes."""
+"""Initial velocity of the free body: linear [m/s] and angular [rad/s], in its own axes."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ SCHEMES = (
 )
 
 Line = tuple[str, bool]
-"""What to print, and whether it is as it should be."""
+"""Line to print, and whether its figure is within its bound."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -112,7 +112,7 @@ def quarter_period() -> float:
 
 
 def late(integrator: str, steps: int, tolerance: float) -> float:
-    """How far the quarter is off, relative to it: the angle that is left, over the speed there."""
+    """Relative error of a quarter of the period: the angle left at its end, over the speed there."""
     quarter = quarter_period()
     rollout = simulate(
         load("pendulum"),
@@ -146,7 +146,7 @@ def energies(duration: float) -> Iterator[Line]:
 
 
 def energy_drift(q: Floats, v: Floats) -> float:
-    """Of a record (n, 6) of UR5."""
+    """Largest change of energy over the largest kinetic energy, in a record (n, 6) of UR5."""
     with backend("reference", Task().model) as arm:
         kinetic = arm.kinetic_energy(q, v)
         energy = kinetic + arm.potential_energy(q)

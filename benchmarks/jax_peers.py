@@ -45,7 +45,7 @@ MOST_JOINTS = 16
 
 
 class JaxPeer(CompilingPeer):
-    """What a user of a library in JAX writes; subclasses say what that is for one sample.
+    """Batch evaluation as users of a JAX library write it; subclasses define that of one sample.
 
     Arguments are NumPy's arrays, and so is the result: what it takes to hand them over is timed. (On a
     processor JAX reads and gives such memory as it is, where it is aligned.)
@@ -81,7 +81,7 @@ class JaxPeer(CompilingPeer):
 
 
 class OnDevice(CompilingPeer):
-    """The same function on arrays that JAX holds already, the result left with it."""
+    """A JAX peer whose arguments are JAX arrays already and whose result stays one."""
 
     most_samples: ClassVar[int] = JaxPeer.most_samples
 
@@ -91,7 +91,7 @@ class OnDevice(CompilingPeer):
         self._peer = peer
 
     def supports(self, case: BenchmarkCase) -> bool:
-        """What the peer does."""
+        """Whether the peer supports the case."""
         return self._peer.supports(case)
 
     def prepare(self, case: BenchmarkCase, batch: Batch, out: Floats) -> PreparedCall:

@@ -94,7 +94,7 @@ class DynxClosedLoops(Batch):
         return self._simulated(self.size.task.duration)
 
     def checks(self) -> Sequence[Check]:
-        """How well they track, and how far they end from the loop written by hand."""
+        """Check the tracking error, and the distance of the last states from the hand-written loop."""
         done = self.call()
         apart = np.abs(done.q - record_by_hand(self.size.task)[-1])
         return [
@@ -132,7 +132,7 @@ class DynxFalls(Batch):
         return self._simulated(self.size.task.duration)
 
     def checks(self) -> Sequence[Check]:
-        """How far from the falls computed by hand."""
+        """Check the distance from the hand-computed falls."""
         return [apart_from_falls_by_hand(self.size, self.call().q)]
 
     def initial_state(self) -> Call:
@@ -157,7 +157,7 @@ class PinocchioLoops(Batch):
         self._pool = pin.ModelPool(pinocchio_model(size.task.model), threads)
 
     def call(self) -> Floats:
-        """Where the rollouts end (rollouts, 6)."""
+        """Return the last configurations (rollouts, 6)."""
         task, threads, pool = self.size.task, self.threads, self._pool
         shape = (self.rollouts, task.model.nv)
         q, v, a, tau = (np.zeros(shape) for _ in range(4))
@@ -177,7 +177,7 @@ class PinocchioLoops(Batch):
         return q
 
     def checks(self) -> Sequence[Check]:
-        """How far from the loop written by hand."""
+        """Check the distance from the hand-written loop."""
         apart = np.abs(self.call() - record_by_hand(self.size.task)[self._n_steps])
         return [Check("distance from the loop by hand [rad]", float(np.max(apart)), AGREEMENT)]
 
@@ -217,7 +217,7 @@ class MujocoRollouts(Batch):
         return self._states
 
     def checks(self) -> Sequence[Check]:
-        """How far from the falls computed by hand."""
+        """Check the distance from the hand-computed falls."""
         self._states.fill(np.nan)
         return [apart_from_falls_by_hand(self.size, self.call()[:, -1, 1 : 1 + self._nq])]
 
@@ -227,14 +227,14 @@ class MujocoRollouts(Batch):
 
 
 def apart_from_falls_by_hand(size: Size, fallen: Floats) -> Check:
-    """How far the first of the configurations (rollouts, 6) at the end are from those computed by hand."""
+    """Compare the first of the last configurations (rollouts, 6) with those computed by hand."""
     apart = float(np.max(np.abs(fallen[:COMPARED_FALLS] - falls_by_hand(size))))
     return Check("distance from the falls by hand [rad]", apart, MAX_FALL_DIFFERENCE)
 
 
 @cache
 def falls_by_hand(size: Size) -> Floats:
-    """Where the first falls end, by `pin.aba` and two sums in each step (COMPARED_FALLS, 6)."""
+    """Last configurations (COMPARED_FALLS, 6) of the first falls, by `pin.aba` and two sums in each step."""
     engine = pinocchio_model(size.task.model)
     data = engine.createData()
     fallen = size.start_of_fall(COMPARED_FALLS)

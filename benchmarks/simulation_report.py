@@ -87,7 +87,7 @@ def tables(found: Sequence[Found]) -> Iterator[str]:
 
 
 def bars(found: Sequence[Found]) -> Iterator[str]:
-    """What was set out to be reached, and whether it was."""
+    """List the goals, and whether each was reached."""
     baselines = Baselines.among(found)
     for each in found:
         ratios, threads = baselines.ratios(each), each.simulator.threads
@@ -149,12 +149,12 @@ def times(ratio: float) -> str:
 
 
 def spread(found: Found) -> str:
-    """How much the calls differed."""
+    """Format the interquartile range of the call times over their median."""
     return "" if found.call is None else f"{100.0 * found.call.spread:.0f} %"
 
 
 def start_of(found: Found) -> str:
-    """What a call costs before its first step [ms]; empty where that is nothing."""
+    """Format the time of a call before its first step [ms]; empty if there is none."""
     return "" if found.start is None else f"{1e3 * found.start.median:.1f}"
 
 

@@ -42,7 +42,7 @@ BATCH, BATCH_UNTIMED = 65536, 256
 FEW = 8
 REPETITIONS = 20
 REPETITIONS_OF_SECONDS = 5
-"""Of what takes seconds each time."""
+"""Number of repetitions of a call that takes seconds."""
 
 COMPILED_ROBOTS: dict[str, Callable[[], Model]] = {
     "ur5": lambda: load("ur5"),

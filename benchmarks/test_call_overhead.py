@@ -1,4 +1,4 @@
-"""What one call through dynx adds to the same call of Pinocchio's own binding, on UR5.
+"""Overhead of one call through dynx over the same call of Pinocchio's own binding, on UR5.
 
 ``pytest benchmarks/test_call_overhead.py`` times raw, checked and unchecked calls in one run and
 prints what dynx adds. The engine's model is read by Pinocchio's own parser.
@@ -28,7 +28,7 @@ FRAME = "tool0"
 
 @cache
 def calls() -> dict[tuple[str, str], Call]:
-    """What is timed, by (quantity, implementation); every call is at the same sample."""
+    """Calls to time, by (quantity, implementation), all at one sample."""
     model = load("ur5")
     rng = np.random.default_rng(0)
     q, v, a = model.random(rng), rng.standard_normal(model.nv), rng.standard_normal(model.nv)

@@ -22,7 +22,7 @@ END = (-1.5, -1.0, 1.0, -1.57, -1.57, -1.57)
 TRACKING = 1.3e-4
 """Largest error of a joint that this law may leave in steps of 1 ms [rad]."""
 AGREEMENT = 1e-9
-"""How far the records of two engines under the same scheme may be apart [rad]."""
+"""Largest difference between the records of two engines under one scheme [rad]."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Task:
 
     @cached_property
     def wanted(self) -> Setpoint:
-        """Where the arm should be at the beginning of each step and at the end: (n_steps + 1, 6) each."""
+        """Reference q, v, a at the start of each step and at the end: (n_steps + 1, 6) each."""
         return self.motion(np.arange(self.n_steps + 1) * DT)
 
     def law(self, backend: str = "pinocchio") -> ComputedTorque:

@@ -92,7 +92,7 @@ def both(path: str) -> tuple[str, float, float]:
 
 
 def measured(measure: Callable[[str], float], path: str) -> float:
-    """What `measure` finds, or nan where an engine cannot answer: a gap in the picture."""
+    """Return the result of `measure`, or nan (a gap in the picture) if an engine raises an error."""
     try:
         return max(measure(path), FLOOR)
     except Exception:

@@ -111,7 +111,7 @@ def summary(entries: Sequence[dict[str, Any]]) -> None:
 
 
 def counts(entries: Sequence[dict[str, Any]]) -> str:
-    """Such as ``69 files: 1 refused, 46 differ, 0 with something unexplained``."""
+    """Summarise as in ``69 files: 1 refused, 46 differ, 0 with something unexplained``."""
     refused = sum(entry["error"] is not None for entry in entries)
     different = sum(differs(entry) for entry in entries)
     large = sum(differs(entry, SMALL) for entry in entries)

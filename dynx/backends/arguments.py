@@ -107,7 +107,7 @@ class Arguments:
         if not np.isfinite(a).all():
             rows = np.argwhere(~np.isfinite(a).all(axis=-1))
             where = "at this configuration" if a.ndim == 1 else f"at sample {rows[0].tolist()}"
-            more = f" (and {len(rows) - 1} others)" if len(rows) > 1 else ""
+            more = f" (and {len(rows) - 1} more)" if len(rows) > 1 else ""
             raise SingularMassMatrixError(
                 f"the mass matrix of {self._model.name} is singular {where}{more}: "
                 "no unique acceleration exists"

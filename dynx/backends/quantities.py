@@ -59,10 +59,10 @@ class Quantity:
     """Function of `dynx.rbd`: of the mechanism, the arguments in tree coordinates, and the details."""
 
     natural_magnitude: str
-    """What errors are divided by: a name in `dynx.agreement.natural_magnitudes`."""
+    """Name of the divisor of its errors in `dynx.agreement.natural_magnitudes`."""
 
     source: str
-    """Where the equation is found."""
+    """Book or paper with the equation."""
 
     other_names: Mapping[str, str] = field(default_factory=dict)
     """Names of the quantity in other libraries."""
@@ -82,7 +82,7 @@ class Quantity:
     and errors are backward errors. Mimic joints reduce the equation instead of the result."""
 
     growth: Growth = "joints"
-    """How the number of operations grows with the robot."""
+    """Growth of the number of operations with the size of the robot."""
 
     refereed: bool = True
     """Whether `dynx agree` compares it with 50 digits."""

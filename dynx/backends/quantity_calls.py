@@ -23,7 +23,7 @@ Forces = Mapping[str, ArrayLike]
 
 
 class _Plan(NamedTuple):
-    """What one backend needs of the table to evaluate a quantity."""
+    """Parts of the table's row that one backend needs to evaluate a quantity."""
 
     hook: str
     tail: tuple[int, ...]

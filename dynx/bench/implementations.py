@@ -26,7 +26,7 @@ class PreparedCall:
 
     @property
     def calls(self) -> list[Call]:
-        """What is to be timed: the call, and its baseline if it has one."""
+        """Calls to time: the call itself, and its baseline if it has one."""
         return [self.call] if self.baseline is None else [self.call, self.baseline]
 
 

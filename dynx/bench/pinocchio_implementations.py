@@ -27,14 +27,14 @@ loop less the overhead of a call."""
 
 
 MIN_CALLS = 1024
-"""Smallest batch at which the C++ can be told from the rest of a call."""
+"""Smallest batch at which the time in C++ differs measurably from that of the rest of a call."""
 
 _ONE_JOINT_SHAPE = {"forward_kinematics": (4, 4), "jacobian": (6, 1), "mass_matrix": (1, 1)}
 """Shape of the results of a robot with one joint, where it is not (1,)."""
 
 
 class PinocchioImplementation(Implementation):
-    """What the three have in common: the engine's model, and the samples in its coordinates."""
+    """Base of the three: the engine's model, and the samples in its coordinates."""
 
     role: Role = "peer"
     version = f"pinocchio {pin.__version__}"
@@ -120,7 +120,7 @@ class PinocchioInside(PinocchioLoop):
     name = INSIDE
 
     def supports(self, case: BenchmarkCase) -> bool:
-        """Of few calls there is too little to be told from the noise."""
+        """Whether the batch has enough calls for a difference above the noise."""
         return case.batch >= MIN_CALLS and super().supports(case)
 
     def prepare(self, case: BenchmarkCase, batch: Batch, out: Floats) -> PreparedCall:
@@ -142,14 +142,14 @@ def pinocchio_implementations(model: Model, threads: int) -> Iterator[PinocchioI
 
 
 def without_mimics(model: Model) -> Model:
-    """The same mechanism with every mimic joint a joint of its own."""
+    """Free every mimic joint: return the model with each as a joint of its own."""
     if model.mechanism.coupling is None:
         return model
     return replace(model, joints=tuple(replace(joint, mimic=None) for joint in model.joints))
 
 
 def _binding_call(engine: Any, quantity: str, frame: int) -> Callable[..., Floats]:
-    """What a user of the binding writes for one sample."""
+    """Evaluate one sample as a user of the binding writes it."""
     data = engine.createData()
     rnea, aba, crba, jacobian = pin.rnea, pin.aba, pin.crba, pin.computeFrameJacobian
     forward, update, axes = pin.forwardKinematics, pin.updateFramePlacement, pin.LOCAL_WORLD_ALIGNED

@@ -23,7 +23,7 @@ SCHEMA = 1
 
 
 def document(session: Session, found: Sequence[Sequence[Measurement]], processor: str) -> BenchDocument:
-    """What a session found: one entry of `found` for each case that was measured, in order."""
+    """Assemble the document of a session: one entry of `found` for each measured case, in order."""
     plan = session.plan
     measured = {group[0].case for group in found if group}
     return {

@@ -153,7 +153,7 @@ class ParametricDynamics:
 
 
 def _program(selection: Selection, name: str, function: Callable[..., Array]) -> Program:
-    """Of the arguments of the quantity `name` and of the parameters."""
+    """Trace `function` of the arguments of the quantity `name` and of the parameters."""
     mechanism = simplify_mechanism(selection.remainder())
     shapes = argument_shapes(mechanism, QUANTITIES[name].arguments)
 
@@ -195,7 +195,7 @@ def _forward_dynamics(
 
 
 def _joint_torque(mechanism: Mechanism, joints: Array | None, v: Array, a: Array) -> Array:
-    """What damping, friction and armature take, in tree coordinates."""
+    """Torque of damping, friction and armature, in tree coordinates."""
     torque = np.zeros(len(v), dtype=object)
     if joints is None:
         return torque

@@ -183,7 +183,7 @@ class Wrapper(Controller[ControllerState]):
         self._wrap(inner)
 
     def initial_state(self) -> Any:
-        """That of the inner controller."""
+        """Return the initial state of the inner controller."""
         return self.inner.initial_state()
 
 

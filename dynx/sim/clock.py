@@ -1,4 +1,4 @@
-"""When things happen: physics steps, control steps, and how late measurements arrive."""
+"""The clock of a simulation: physics steps, control steps, and the delay of measurements."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 from dynx.errors import ArgumentError, shown
 from dynx.spatial.scalar import Floats
 
-WHOLE = 1e-9
-"""How far from a whole number a ratio of two times may be, for rounding."""
+TIME_ROUNDING = 1e-9
+"""Largest distance of a ratio of two times from a whole number that counts as rounding."""
 
 
 @dataclass(frozen=True)
@@ -67,9 +67,9 @@ def positive(name: str, seconds: object) -> float:
 
 
 def multiple(name: str, seconds: float, dt: float) -> int:
-    """How many steps of `dt` a time is, or an ArgumentError that names the nearest one that is whole."""
+    """Return the number of steps of `dt` in a time; ArgumentError with the nearest multiple if it is none."""
     steps = round(seconds / dt)
-    if steps < 1 or abs(seconds / dt - steps) > WHOLE * steps:
+    if steps < 1 or abs(seconds / dt - steps) > TIME_ROUNDING * steps:
         nearest = max(1, steps) * dt
         raise ArgumentError(
             f"{name} is {seconds:.12g} s, which is no multiple of dt = {dt:.12g} s; {nearest:.12g} s would be"

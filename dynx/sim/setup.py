@@ -33,7 +33,7 @@ class Setup:
     scenario: Scenario
     controller: Controller[Any] | None
     clock: Clock
-    """Of the scenario's duration; of one control step where it has none."""
+    """Clock over the scenario's duration, or over one control step for a scenario without one."""
     model: Model
     """The robot that moves: with its payload and its masses."""
     setpoint_of: SetpointOf | None

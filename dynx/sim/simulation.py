@@ -84,7 +84,7 @@ class Simulation:
         if not isinstance(scenario, Scenario):
             raise ArgumentError(f"scenario is of type {type(scenario).__name__}; wanted a dynx.Scenario")
         self.scenario = scenario
-        """What is simulated."""
+        """The scenario that is simulated."""
         setup = self._setup = Setup.of(scenario)
         bounded = scenario.duration is not None or isinstance(scenario.reference, Trajectory)
         self.n_steps = setup.clock.n_steps if bounded else None

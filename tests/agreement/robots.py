@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any, ClassVar
 
 import numpy as np
@@ -56,6 +57,14 @@ def massless_finger() -> Model:
     links = [Link("foot", BODY), Link("arm", BODY), Link("finger")]
     joints = [Joint("swing", "continuous", "foot", "arm"), Joint("point", "continuous", "arm", "finger")]
     return Model.build("massless_finger", links, joints)
+
+
+def massless_chain(n_joints: int) -> Model:
+    """Joints in series that move no inertia."""
+    links = [Link("foot", BODY), *(Link(f"link{k}") for k in range(n_joints))]
+    ends = pairwise(links)
+    joints = [Joint(f"joint{k}", "continuous", a.name, b.name) for k, (a, b) in enumerate(ends)]
+    return Model.build("massless_chain", links, joints)
 
 
 def rock(base: Base = "fixed") -> Model:

@@ -15,7 +15,7 @@ from dynx.model import Model
 from dynx.model.model import Base
 from dynx.reference.backend import ReferenceBackend
 from dynx.testing.strategies import models
-from tests.agreement.robots import DEFECTS, Broken, arm, massless_finger, pendulum, rock
+from tests.agreement.robots import DEFECTS, Broken, arm, massless_chain, massless_finger, pendulum, rock
 
 BASES: list[Base] = ["fixed", "floating"]
 
@@ -86,6 +86,12 @@ def test_a_singular_mass_matrix_is_refused_alike_and_noted() -> None:
     assert rows
     assert all("refused alike" in (row.note or "") for row in rows)
     assert any("point" in note and "singular" in note for note in report.notes)
+
+
+@pytest.mark.parametrize(("n_joints", "listed"), [(6, "joint5 moves"), (7, "joint5 ... moves")])
+def test_at_most_six_joints_without_inertia_are_listed(n_joints: int, listed: str) -> None:
+    notes = agree(massless_chain(n_joints), ["reference"], samples=1).notes
+    assert any(f"joint4, {listed}" in note for note in notes)
 
 
 @pytest.mark.parametrize("base", BASES)

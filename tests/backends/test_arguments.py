@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dynx.backends import Backend
+from dynx.backends.arguments import Arguments
 from dynx.engines.pinocchio.backend import PinocchioBackend
 from dynx.errors import (
     ArgumentError,
@@ -16,6 +17,7 @@ from dynx.errors import (
     DynxError,
     NotFiniteError,
     ShapeError,
+    SingularMassMatrixError,
     UnknownNameError,
 )
 from dynx.model.configuration import MAX_MAGNITUDE
@@ -258,3 +260,14 @@ def _returns_or_refuses(call: Callable[[], Floats]) -> bool:
         return call().dtype == np.float64
     except DynxError as error:
         return bool(str(error))
+
+
+@pytest.mark.parametrize(
+    ("rows", "where"),
+    [([2], r"at sample \[2\]: no"), ([1, 2], r"at sample \[1\] \(and 1 more\): no")],
+)
+def test_samples_without_an_acceleration_are_named(rows: list[int], where: str) -> None:
+    a = np.zeros((4, 3))
+    a[rows, 1] = np.nan
+    with pytest.raises(SingularMassMatrixError, match=where):
+        Arguments(chain(3)).finite_acceleration(a)

@@ -113,7 +113,7 @@ def test_without_validation_the_results_are_the_same(kind: type[Backend], base: 
 
 
 def _free(model: Model) -> tuple[Model, Floats]:
-    """The same robot with its mimic joints moving freely, and S with v of the free one = S v."""
+    """Free the mimic joints of a robot; return it, and S with v of the free robot = S v."""
     joints = [replace(joint, mimic=None) for joint in model.joints]
     free = Model.build("free", model.links, joints, base=model.base, gravity=model.gravity)
     for frame in model.extra_frames:

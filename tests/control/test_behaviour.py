@@ -1,4 +1,4 @@
-"""What the laws are for: rest without an error, no windup, compliance, stability."""
+"""Behaviour of the controllers: rest without error, no windup, compliance, stability."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the simulator is held to; the numbers are those of its specification, not of what it happens to do."""
+"""Bounds on the simulator's errors, from its specification and not from its behaviour."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ TRACKING = 1.3e-4
 EXACT_ON_BULLET = 1e-8
 """Largest error [rad] of the discrete law on PyBullet's own stepper."""
 EXACT_ON_DYNX = 1e-10
-"""The same on a stepper of dynx."""
+"""Bound on that error on an integrator of dynx."""
 PLANTS_AGREE = 1e-8
 """Relative difference of the configurations that two plants reach under the same torques."""
 ENERGY = 1e-10

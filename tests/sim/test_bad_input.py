@@ -1,4 +1,4 @@
-"""What cannot be simulated is refused by name; what fails on the way leaves what was computed."""
+"""Invalid simulations are refused by name; a failure during the run keeps the steps computed."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ from dynx.control.base import Controller, chain_of
 from dynx.control.content import attributes_of
 from dynx.errors import ArgumentError, shown
 from dynx.model import Model
-from dynx.sim.clock import WHOLE, Clock
+from dynx.sim.clock import TIME_ROUNDING, Clock
 
 MAX_DEPTH = 4
 """Depth to which objects inside the attributes of a controller are compared."""
@@ -35,7 +35,7 @@ def check_controller(model: Model, controller: Controller[Any], clock: Clock) ->
             f"the controller is one of {shown(known)}, whose joints are not those of {shown(model)}"
         )
     made_for = controller.control_dt
-    if made_for is not None and abs(made_for - clock.control_dt) > WHOLE * clock.control_dt:
+    if made_for is not None and abs(made_for - clock.control_dt) > TIME_ROUNDING * clock.control_dt:
         raise ArgumentError(
             f"{controller.name} was made for control_dt = {made_for:.12g} s; it is {clock.control_dt:.12g} s"
         )

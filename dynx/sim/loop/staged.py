@@ -100,7 +100,7 @@ class StagedLoop:
         always = loop.clock.steps_per_control == 1
         self._held = None if always else self._step(EngineCallTracer(sizes), controlled=False)
         self.stopped = ""
-        """Why it stopped before the end."""
+        """Reason for stopping before the end."""
 
     def run(self, record: Record, held: Held, end: int) -> None:
         """Step from the last state of `record` to step `end`, or until a step has to be repeated plainly."""

@@ -23,7 +23,7 @@ from dynx.errors import ArgumentError, shown
 from dynx.model import Model
 from dynx.model.configuration import checked_array
 from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED, REFERENCES
-from dynx.sim.clock import WHOLE
+from dynx.sim.clock import TIME_ROUNDING
 from dynx.spatial.scalar import Floats
 
 
@@ -59,7 +59,7 @@ class Push:
 
     def acts(self, t: Any, dt: float) -> Any:
         """Whether it acts in the steps of length `dt` that begin at `t`, a time or an array of times [s]."""
-        since = t - self.start + WHOLE * dt
+        since = t - self.start + TIME_ROUNDING * dt
         return (since >= 0.0) & (since < self.duration)
 
 
@@ -91,7 +91,7 @@ class Disturbances:
 
     @property
     def names(self) -> list[str]:
-        """What there is of friction, pushes and armature, in words."""
+        """Names of the disturbances present: joint friction, pushes, armature."""
         present = {
             "joint friction": self.friction.present,
             "pushes": bool(self.pushes),

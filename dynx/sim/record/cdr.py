@@ -49,13 +49,13 @@ class CdrMessages:
             self.put_float64s(values)
 
     def put_string(self, text: str) -> None:
-        """The same string in all messages."""
+        """Put one string into all messages."""
         encoded = text.encode()
         self.put_uint32(len(encoded) + 1)
         self._put_bytes(encoded + b"\0")
 
     def put_string_sequence(self, texts: Sequence[str]) -> None:
-        """The same sequence of strings in all messages."""
+        """Put one sequence of strings into all messages."""
         self.put_uint32(len(texts))
         for text in texts:
             self.put_string(text)

@@ -33,7 +33,7 @@ DAMAGED = (
     *(OSError, EOFError, ValueError, KeyError, RuntimeError, MemoryError),
     *(zipfile.BadZipFile, zlib.error, struct.error, tokenize.TokenError, SyntaxError),
 )
-"""What zipfile and NumPy raise for a file that is not there or was changed after it was written."""
+"""Exceptions of zipfile and NumPy for a file that is missing or was changed after it was written."""
 
 
 def save(rollout: RolloutData, path: str | os.PathLike[str]) -> None:

@@ -35,7 +35,7 @@ class Column(NamedTuple):
     q: slice
     v: slice
     units: tuple[str, str]
-    """Of positions and of efforts."""
+    """Units of positions and of efforts."""
     of_base: bool = False
     """Whether positions are in the world and all else in the axes of the base."""
 

@@ -61,7 +61,7 @@ class RolloutData:
     tau: Floats
     """Torques of the motors (n, nv) [N m or N]."""
     saturated: np.ndarray[Any, np.dtype[np.bool_]]
-    """Where a motor was at its limit (n, nv)."""
+    """True where a motor was at its limit (n, nv)."""
     reference: Setpoint | None
     """The setpoint at each time: (n + 1, nq), (n + 1, nv), (n + 1, nv)."""
     rotors: Floats
@@ -69,7 +69,7 @@ class RolloutData:
     scenario: Scenario | None = None
     """The simulation that this is the record of; None for a record made otherwise."""
     executor: str = ""
-    """How the steps were computed: ``staged``, or ``plain`` and why; more than one with semicolons."""
+    """Executor of the steps: ``staged``, or ``plain`` and why; more than one with semicolons."""
     departures: tuple[str, ...] = ()
     """Interventions by which the record is not that of its scenario alone, such as a torque of the caller."""
 

@@ -61,7 +61,7 @@ def schema_text(message: str) -> str:
 
 
 def _needed(message: str) -> list[str]:
-    """What `message` is made of, once each, in the order in which it is met."""
+    """List the message types inside `message`, each once, in order of appearance."""
     found: dict[str, None] = {}
     for line in DEFINITIONS[message].splitlines():
         kind = line.split()[0].split("[")[0]

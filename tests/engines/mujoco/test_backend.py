@@ -166,7 +166,7 @@ def test_a_mass_matrix_that_is_singular_somewhere_is_refused_there() -> None:
 
 
 def test_light_fingers_keep_their_digits() -> None:
-    """Where MuJoCo's own mass matrix loses them: its inertias are about the centre of mass of all."""
+    """MuJoCo's own mass matrix loses them, since its inertias are about the common centre of mass."""
     finger = Inertial(1e-3, Pose((0.0, 0.01, 0.0)), ixx=1e-8, iyy=1e-8, izz=1e-8)
     joints = [
         Joint("arm", "revolute", "root", "arm", axis=(0.0, 1.0, 0.0)),

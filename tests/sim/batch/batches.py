@@ -13,7 +13,7 @@ from tests.sim.bars import EXACT_ON_DYNX, apart
 
 
 def assert_same(many: BatchRollouts, row: int, one: Rollout) -> None:
-    """That row of a batch recorded at every step is this rollout, to rounding."""
+    """Assert that a row of a batch recorded at every step equals this rollout up to rounding."""
     assert apart(many.q_record[row], one.q[1:]) < EXACT_ON_DYNX
     assert apart(many.v_record[row], one.v[1:]) < EXACT_ON_DYNX
     assert apart(many.tau_record[row], one.tau) < EXACT_ON_DYNX
@@ -27,7 +27,7 @@ def assert_same(many: BatchRollouts, row: int, one: Rollout) -> None:
 def batch_and_one(
     model: Model, law: Controller[Any], reference: Any, **options: Any
 ) -> tuple[BatchRollouts, Rollout]:
-    """The same simulation as a batch of 3 and alone, and assert that they agree."""
+    """Simulate a scenario as a batch of 3 and alone, and assert that they agree."""
     one = simulate(model, law, reference, plant="compiled", **options)
     many = simulate_batch(model, law, reference, rollouts=3, record_every=1, **options)
     assert many.done.all()

@@ -150,6 +150,7 @@ def test_ctrl_c_keeps_what_is_done(
         simulate_batch(arm, law, reference, q0=starts, dt=DT, threads=1, keep=tmp_path, progress=stop)
     part = caught.value.rollouts
     assert 4 <= part.done.sum() <= 16
+    assert str(caught.value) == f"interrupted with {part.done.sum()} of 16 rollouts done"
     assert np.array_equal(part.q[part.done], whole.q[part.done])
     assert np.isnan(part.q[~part.done]).all()
     assert np.isfinite(part.quantiles()).all()

@@ -32,7 +32,7 @@ def small_parts(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def batch(executor: Executor | None, **options: Any) -> BatchRollouts:
-    """The same rollouts whoever computes them: payloads, gains and noise of their own."""
+    """A batch with its own payloads, gains and noise, to be computed by any executor."""
     arm = dynx.load("ur5")
     rng = np.random.default_rng(1)
     return simulate_batch(
@@ -69,7 +69,7 @@ def by_threads() -> BatchRollouts:
 
 @pytest.fixture(scope="module")
 def client() -> Iterator[Any]:
-    """Of a cluster of two worker processes on this machine."""
+    """Dask client of a cluster of two worker processes on this machine."""
     distributed = pytest.importorskip("distributed")
     cluster = distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None)
     with cluster, distributed.Client(cluster) as client:

@@ -89,7 +89,7 @@ def glue(*, on: bool, seen: list[bool] | None = None) -> Iterator[None]:
 
 
 def outcome(*asked: Any, **options: Any) -> tuple[Rollout, str]:
-    """What was computed, and what went wrong."""
+    """Return the record and the error."""
     try:
         return simulate(*asked, **options), ""
     except (DivergedError, ControlError) as error:

@@ -1,4 +1,4 @@
-"""What mechanics says of motions that nobody drives: energy, momentum, the period of a pendulum."""
+"""Laws of mechanics for motions without motors: energy, momentum, the period of a pendulum."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The same torques move the same robot alike in every plant that takes the same steps."""
+"""Equal torques move a robot alike in every plant with the same integration scheme."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ TEXTS = st.text(st.characters(codec="utf-8", exclude_characters="\0"), max_size=
 
 
 def decoded(message: str, data: bytes) -> Any:
-    """What mcap-ros2-support reads."""
+    """Messages as mcap-ros2-support reads them."""
     records, decoding = pytest.importorskip("mcap.records"), pytest.importorskip("mcap_ros2.decoder")
     schema = records.Schema(1, schema_text(message).encode(), "ros2msg", schema_name(message))
     return decoding.DecoderFactory().decoder_for("cdr", schema)(data)

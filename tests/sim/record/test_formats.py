@@ -55,7 +55,7 @@ def table(path: Path) -> tuple[list[str], list[list[str]]]:
 
 
 def column(path: Path, name: str) -> Floats:
-    """Of a table, without cells that are empty."""
+    """Numbers of a column of the table, without empty cells."""
     header, rows = table(path)
     cells = [row[header.index(name)] for row in rows]
     return np.array([float(cell) for cell in cells if cell])
@@ -186,7 +186,7 @@ def written(rollout: Rollout, tmp_path_factory: pytest.TempPathFactory) -> bytes
 
 
 def refused(path: Path) -> str:
-    """What `Rollout.load` says, in an error that names the file."""
+    """Return the message of the error of `Rollout.load`, which names the file."""
     with pytest.raises(ArgumentError, match=path.name) as caught:
         Rollout.load(path)
     return str(caught.value)
