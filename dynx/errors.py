@@ -256,5 +256,5 @@ TRACEBACK_VARIABLE = "DYNX_TRACEBACK"
 
 
 def traceback_wanted() -> bool:
-    """Whether `TRACEBACK_VARIABLE` turns tracebacks on."""
+    """Check whether `TRACEBACK_VARIABLE` turns tracebacks on."""
     return os.environ.get(TRACEBACK_VARIABLE, "0") not in ("", "0")

@@ -149,7 +149,7 @@ def _compare_all(
 
 
 def _compare_with_referee(samples: Samples, names: list[str], engines: list[Backend]) -> list[Comparison]:
-    """Comparisons of each backend with the referee."""
+    """Return the comparisons of each backend with the referee."""
     magnitudes = Magnitudes(samples)
     exact = BackendResults(REFEREE, Referee(samples.model), samples)
     rows = []
@@ -165,7 +165,8 @@ def _compare_with_referee(samples: Samples, names: list[str], engines: list[Back
 
 
 def _compare_with_derived(magnitudes: Magnitudes, name: str, engine: Backend) -> list[Comparison]:
-    """Comparisons of native results with those that dynx derives from the engine's poses and torques."""
+    """Return the comparisons of native results with those that dynx derives from the engine's poses and
+    torques."""
     native = native_quantities(engine)
     own = BackendResults(name, engine, magnitudes.samples)
     derived = BackendResults(DERIVED, DerivedBackend(engine), magnitudes.samples)
@@ -226,7 +227,7 @@ def _open(chosen: str | Backend, model: Model, opened: ExitStack) -> Backend:
 
 
 def _distinct_names(engines: list[Backend]) -> list[str]:
-    """The names of the engines, repeated ones numbered."""
+    """Return the names of the engines, repeated ones numbered."""
     names: list[str] = []
     for engine in engines:
         again = sum(name.partition("#")[0] == engine.name for name in names)

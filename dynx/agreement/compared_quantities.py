@@ -51,7 +51,7 @@ class ComparedQuantity:
 
 
 def compared_quantities() -> tuple[ComparedQuantity, ...]:
-    """Lines for all quantities but those that solve equations, whose errors are not differences
+    """Return the lines for all quantities but those that solve equations, whose errors are not differences
     (`dynx.agreement.solutions`)."""
     lines: list[ComparedQuantity] = []
     for quantity in QUANTITIES.values():
@@ -81,7 +81,7 @@ def _evaluation(quantity: Quantity, magnitude: NaturalMagnitude) -> Evaluate:
         return np.asarray(getattr(backend, quantity.name)(*arguments))
 
     def at_frames(backend: Any, samples: Samples) -> Array:
-        """Results (entries, samples, ...) for each entry of `frame_samples`."""
+        """Return the results (entries, samples, ...) for each entry of `frame_samples`."""
         method, results = getattr(backend, quantity.name), []
         for entry in frame_samples(magnitude.layout, samples):
             state = [getattr(samples, argument)[entry.samples] for argument in quantity.arguments]
@@ -100,8 +100,8 @@ def _component(magnitudes: Magnitudes) -> float:
 
 
 def _component_scale(magnitudes: Magnitudes) -> Floats:
-    """(n, nv): the magnitude of each torque, at least such that one rounding of the largest torque is within
-    tolerance (a joint with a point mass on its axis has torque zero as a sum of terms that large)."""
+    """Return (n, nv): the magnitude of each torque, at least such that one rounding of the largest torque is
+    within tolerance (a joint with a point mass on its axis has torque zero as a sum of terms that large)."""
     return np.maximum(magnitudes.torque, largest(magnitudes.torque) * (EPS / _component(magnitudes)))
 
 

@@ -64,7 +64,7 @@ class Verdict:
 
 
 def judge(error: Array, scale: Floats) -> Verdict:
-    """The largest error over `scale`, which broadcasts; NaN counts as infinite."""
+    """Return the largest error over `scale`, which broadcasts; NaN counts as infinite."""
     absolute = np.abs(error).astype(np.float64)
     if not absolute.size:
         return Verdict(0.0, 0.0, None)
@@ -111,13 +111,13 @@ def compare(
 
 
 def not_finite_note(*results: tuple[BackendResults, Array]) -> str | None:
-    """A note that names the backends whose results contain NaN or infinity, or None."""
+    """Return a note that names the backends whose results contain NaN or infinity, or None."""
     names = [by.name for by, result in results if not np.isfinite(result.astype(np.float64)).all()]
     return f"{' and '.join(names)}: NaN or infinity in the result" if names else None
 
 
 def pair_name(first: BackendResults, second: BackendResults) -> str:
-    """The name of a pair, such as ``pinocchio~pybullet``."""
+    """Return the name of a pair, such as ``pinocchio~pybullet``."""
     return f"{first.name}~{second.name}"
 
 
@@ -149,12 +149,12 @@ def compare_refusals(
 def failed_comparison(
     name: str, first: BackendResults, second: BackendResults, tolerance: float, note: str
 ) -> Comparison:
-    """A comparison that fails without a finite error."""
+    """Return a comparison that fails without a finite error."""
     return Comparison(name, pair_name(first, second), np.inf, np.inf, tolerance, False, note=note)
 
 
 def state(samples: Samples, k: int, frame: str | None = None, reference: str | None = None) -> WorstSample:
-    """Sample number k of `samples` as a record."""
+    """Return sample number k of `samples` as a record."""
     return WorstSample(
         index=int(samples.index[k]),
         kind=samples.kinds[k],
@@ -168,7 +168,7 @@ def state(samples: Samples, k: int, frame: str | None = None, reference: str | N
 
 
 def locate(position: tuple[int, ...] | None, layout: Layout, samples: Samples) -> WorstSample | None:
-    """The sample (and frame) of a position in a result."""
+    """Return the sample (and frame) of a position in a result."""
     if position is None:
         return None
     if layout == "samples":
@@ -180,7 +180,8 @@ def locate(position: tuple[int, ...] | None, layout: Layout, samples: Samples) -
 
 
 def _difference(one: Array, other: Array) -> Array:
-    """One minus other; exact where one of them holds 50-digit numbers, since doubles are exact in those."""
+    """Return one minus other; exact where one of them holds 50-digit numbers, since doubles are exact in
+    those."""
     if one.dtype == object or other.dtype == object:
         return np.asarray(one.astype(object) - other.astype(object))
     with np.errstate(invalid="ignore"):

@@ -23,7 +23,7 @@ MAX_REST_FREQUENCY = 1e-100
 
 
 def time_derivative(function: Callable[[Floats], Floats], frequency: Floats) -> Floats:
-    """d/dt at 0 of ``function(t)`` for n motions at once.
+    """Return d/dt at 0 of ``function(t)`` for n motions at once.
 
     `frequency` (n,) is each motion's highest angular frequency [rad/s]. `function` takes times
     (m, n), m at a time, and returns (m, n, ...); the derivative is (n, ...).

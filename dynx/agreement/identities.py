@@ -229,7 +229,7 @@ def _positive(size: Floats) -> Floats:
 
 
 def _at(samples: Samples, t: Floats) -> Floats:
-    """Configurations (m, n, nq) at times t (m, n) along the motion at the sample's velocity."""
+    """Return the configurations (m, n, nq) at times t (m, n) along the motion at the sample's velocity."""
     return samples.model.integrate(samples.q, samples.v * t[..., None])
 
 

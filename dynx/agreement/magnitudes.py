@@ -198,8 +198,8 @@ class Magnitudes:
         return np.asarray(self.bias_torque + self.sqrt_diagonal * accelerating[:, None])
 
     def solved_torque(self, a: Floats) -> Floats:
-        """(n,) Largest entry of |M| |a| + |bias| + |tau|, to which rounding errors of solving for `a` are
-        proportional; M_ii is bounded from below as in `sqrt_diagonal`."""
+        """Return (n,) the largest entry of |M| |a| + |bias| + |tau|, to which rounding errors of solving for
+        `a` are proportional; M_ii is bounded from below as in `sqrt_diagonal`."""
         M = np.abs(self.mass_matrix)
         diagonal = np.einsum("nii->ni", M)
         terms = np.einsum("nij,nj->ni", M, np.abs(a))
@@ -231,7 +231,8 @@ class Magnitudes:
         return np.asarray(np.abs(self.samples.v @ self._S.T))
 
     def _fastest(self, speeds: Floats) -> Floats:
-        """(n,) Largest sum of `speeds` (n, nv of the tree) over the joints between a body and the root."""
+        """Return (n,) the largest sum of `speeds` (n, nv of the tree) over the joints between a body and the
+        root."""
         bodies, first = len(self._mechanism.bodies), 6 if self._model.floating else 0
         between = np.zeros((bodies + 1, len(self._rotates)))
         between[:, :first] = 1.0
@@ -275,8 +276,8 @@ class Magnitudes:
 
 
 def _is_physical(inertia: RigidInertia) -> bool:
-    """Whether a rigid body can have this inertia, to within rounding: no principal moment about the centre
-    of mass is negative or larger than the other two together."""
+    """Check whether a rigid body can have this inertia, to within rounding: no principal moment about the
+    centre of mass is negative or larger than the other two together."""
     largest = float(np.max(np.abs(inertia.rotational_inertia)))
     if inertia.mass < 0.0:
         return False

@@ -37,24 +37,24 @@ class NaturalMagnitude:
 
 
 def frame_samples(layout: Layout, samples: Samples) -> tuple[FrameSamples, ...]:
-    """The entries along the first axis of layout ``every_frame`` or ``derivatives``."""
+    """Return the entries along the first axis of layout ``every_frame`` or ``derivatives``."""
     return samples.every_frame if layout == "every_frame" else samples.derivatives
 
 
 def largest(scale: Floats) -> Floats:
-    """(n, 1): the largest entry of each sample's scale (n, nv), for errors in the max norm."""
+    """Return (n, 1): the largest entry of each sample's scale (n, nv), for errors in the max norm."""
     return np.asarray(np.max(scale, axis=-1, initial=0.0, keepdims=True))
 
 
 def pose_scale(magnitudes: Magnitudes) -> Floats:
-    """(n, 1, 4, 4): 1 for rotations, the length of the robot for positions."""
+    """Return (n, 1, 4, 4): 1 for rotations, the length of the robot for positions."""
     scale = np.ones((len(magnitudes.samples), 1, 4, 4))
     scale[:, :, :3, 3] = magnitudes.length[:, None, None]
     return scale
 
 
 def mass_scale(magnitudes: Magnitudes) -> Floats:
-    """(n, nv, nv): sqrt(M_ii M_jj)."""
+    """Return (n, nv, nv): sqrt(M_ii M_jj)."""
     return np.asarray(magnitudes.sqrt_diagonal[:, :, None] * magnitudes.sqrt_diagonal[:, None, :])
 
 
@@ -64,7 +64,7 @@ def _derived_mass_scale(magnitudes: Magnitudes) -> Floats:
 
 
 def coriolis_scale(magnitudes: Magnitudes) -> Floats:
-    """(n, nv, nv): bound on m (Jp' dJp + dJp' Jp) + Jr' I dJr, from bounds on each factor.
+    """Return (n, nv, nv): bound on m (Jp' dJp + dJp' Jp) + Jr' I dJr, from bounds on each factor.
 
     The bound on M times an angular speed would not do: the lever arms of a robot that slides without
     rotating change with its speed, and these terms cancel (a point mass on the axis of a joint on a
@@ -82,7 +82,7 @@ def coriolis_scale(magnitudes: Magnitudes) -> Floats:
 
 
 def _regressor_scale(magnitudes: Magnitudes) -> Floats:
-    """(n, nv, 10 n_links): bound on the torque of a unit of each parameter, anywhere on the robot.
+    """Return (n, nv, 10 n_links): bound on the torque of a unit of each parameter, anywhere on the robot.
 
     With lever arm L, proper acceleration p and angular terms w = |alpha| + omega^2, a mass requires L p, a
     first moment L w + p, and a second moment w.
@@ -106,7 +106,7 @@ def _momentum_scale(magnitudes: Magnitudes) -> Floats:
 
 
 def _twist(layout: Layout, linear: Scale, angular: Scale) -> NaturalMagnitude:
-    """Bounds (entries, samples, 6 [, nv]) from bounds (n [, nv]) of linear and angular rows."""
+    """Return the bounds (entries, samples, 6 [, nv]) from bounds (n [, nv]) of linear and angular rows."""
 
     def scale(magnitudes: Magnitudes) -> Floats:
         rows = np.stack([linear(magnitudes)] * 3 + [angular(magnitudes)] * 3, axis=1)

@@ -51,11 +51,12 @@ class Referee:
         self._S = None if coupling is None else coupling.matrix()
 
     def forward_kinematics(self, q: ArrayLike) -> Array:
-        """T_world_frame of every frame (..., n_frames, 4, 4)."""
+        """Return T_world_frame of every frame (..., n_frames, 4, 4)."""
         return self._evaluate(kinematics.frame_placements, 3, q)
 
     def __getattr__(self, name: str) -> Callable[..., Array]:
-        """The method of `Backend` of that name, for every quantity of the table that solves no equation."""
+        """Return the method of `Backend` of that name, for every quantity of the table that solves no
+        equation."""
         if name not in QUANTITIES or QUANTITIES[name].solves:
             raise AttributeError(f"the referee does not compute {name}")
         return partial(self._quantity, QUANTITIES[name])
@@ -63,7 +64,7 @@ class Referee:
     def _quantity(
         self, quantity: Quantity, *arguments: Any, reference: str = jacobians.LOCAL_WORLD_ALIGNED
     ) -> Array:
-        """The algorithm of a quantity at its arguments and, where it is one of a frame, that frame."""
+        """Return the algorithm of a quantity at its arguments and, where it is one of a frame, that frame."""
         state, frame = arguments[: len(quantity.arguments)], arguments[len(quantity.arguments) :]
         details = quantity.implied_details(self.model)
         if quantity.of_frame:
@@ -84,7 +85,8 @@ class Referee:
         *velocities: ArrayLike,
         details: tuple[Any, ...] = (),
     ) -> Array:
-        """`algorithm` in tree coordinates, for every sample; `rank` axes of its result are no batch."""
+        """Return `algorithm` in tree coordinates, for every sample; `rank` axes of its result are no
+        batch."""
         with mpmath.mp.workdps(DIGITS):
             q, rates = exactly(q), [exactly(v) for v in velocities]
             coupling = self._mechanism.coupling
@@ -104,7 +106,7 @@ class Referee:
             return np.asarray(A @ B)
 
     def _from_poses(self, algorithm: Callable[..., Array]) -> Callable[..., Array]:
-        """`algorithm` at the poses of the bodies, which are kept: a robot has many frames."""
+        """Return `algorithm` at the poses of the bodies, which are kept: a robot has many frames."""
 
         def evaluate(mechanism: Mechanism, q: Array, *rest: Any) -> Array:
             key = tuple(np.ravel(q).tolist()), q.shape

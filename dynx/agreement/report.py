@@ -85,7 +85,7 @@ class AgreementReport:
         return tuple(comparison for comparison in self.quantities if not comparison.agree)
 
     def worst(self, quantity: str) -> float:
-        """Largest relative error of a quantity over all pairs.
+        """Return the largest relative error of a quantity over all pairs.
 
         Raises UnknownNameError for a quantity that was not compared.
         """
@@ -96,7 +96,7 @@ class AgreementReport:
         return max(found)
 
     def __str__(self) -> str:
-        """The verdict in a line, then a line for each difference, failed identity and suspect."""
+        """Return the verdict in a line, then a line for each difference, failed identity and suspect."""
         head = f"{self.robot}, {self.base} base: " if self.base else f"{self.robot}: "
         if self.error is not None:
             return f"{head}refused ({self.error.type}: {self.error.message})"
@@ -119,7 +119,7 @@ class AgreementReport:
         return f"<AgreementReport {str(self).splitlines()[0]}>"
 
     def to_dict(self) -> dict[str, Any]:
-        """One entry of ``results``, of plain numbers, strings and lists."""
+        """Return one entry of ``results``, of plain numbers, strings and lists."""
         return document_of(AgreementEntry, replace(self, seconds=round(self.seconds, 4)))
 
 
@@ -176,7 +176,7 @@ def refused_report(
     backends: Iterable[str] = (),
     seconds: float = 0.0,
 ) -> AgreementReport:
-    """The report of a robot that could not be used."""
+    """Return the report of a robot that could not be used."""
     return AgreementReport(
         robot=robot,
         source=source,
@@ -188,7 +188,7 @@ def refused_report(
 
 
 def results_document(reports: Iterable[AgreementReport], not_done: Sequence[str] = ()) -> dict[str, Any]:
-    """The JSON document of many reports, described at the head of this file.
+    """Return the JSON document of many reports, described at the head of this file.
 
     `not_done` names the robots of an interrupted run that have no report.
     """

@@ -44,13 +44,13 @@ class BackendResults:
         self._known: dict[str, Array | Refusal] = {}
 
     def of(self, name: str, evaluate: Callable[[Any, Samples], Array]) -> Array | Refusal:
-        """The result of the quantity `name`."""
+        """Return the result of the quantity `name`."""
         if name not in self._known:
             self._known[name] = self.attempt(evaluate)
         return self._known[name]
 
     def attempt(self, evaluate: Callable[[Any, Samples], Array]) -> Array | Refusal:
-        """The result of `evaluate`, not stored, or the error that it raised."""
+        """Return the result of `evaluate`, not stored, or the error that it raised."""
         try:
             return np.asarray(evaluate(self.backend, self.samples))
         except DynxError as error:

@@ -68,7 +68,7 @@ class Samples:
         return len(self.q)
 
     def take(self, chosen: list[int], references: int) -> Samples:
-        """Some of the samples, with each frame in that many references at one sample each."""
+        """Return some of the samples, with each frame in that many references at one sample each."""
         pick = np.array(chosen, dtype=np.intp)
         entries = assign_frames(self.model.frame_names, len(pick), each=1, references=references)
         return replace(
@@ -85,7 +85,8 @@ class Samples:
         )
 
     def differentiable(self, count: int) -> list[int]:
-        """Numbers of up to `count` samples near zero and in motion, to differentiate quantities at."""
+        """Return the numbers of up to `count` samples near zero and in motion, to differentiate quantities
+        at."""
         joints = self.q[:, 7 if self.model.floating else 0 :]
         near = np.max(np.abs(joints), axis=-1, initial=0.0) <= MAX_DIFFERENTIATED_POSITION
         near &= np.any(self.v != 0.0, axis=-1) & (np.array(self.kinds) != "limit")
@@ -93,7 +94,7 @@ class Samples:
 
 
 def draw_samples(model: Model, count: int, seed: int) -> Samples:
-    """`count` samples of `model`; equal arguments give equal samples."""
+    """Return `count` samples of `model`; equal arguments give equal samples."""
     if count < 1:
         raise ArgumentError(f"samples is {count}; wanted at least 1")
     if seed < 0:
@@ -147,13 +148,14 @@ def assign_frames(
 
 
 def _carried_frames(model: Model) -> list[str]:
-    """Frames that some coordinate moves; all of them if there are none."""
+    """Return the frames that some coordinate moves; all of them if there are none."""
     moved = [frame.name for frame in model.mechanism.frames if frame.body != ROOT or model.floating]
     return moved or list(model.frame_names)
 
 
 def _narrowed(lower: Floats, upper: Floats) -> tuple[Floats, Floats]:
-    """Limits narrowed to positions that are differentiated, where possible; files may have limits of 1e16."""
+    """Return the limits narrowed to positions that are differentiated, where possible; files may have limits
+    of 1e16."""
     bound = MAX_DIFFERENTIATED_POSITION
     low, high = np.maximum(lower, -bound), np.minimum(upper, bound)
     room = low <= high

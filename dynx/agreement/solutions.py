@@ -35,7 +35,8 @@ TARGETS = 2
 
 
 def regular_samples(magnitudes: Magnitudes) -> list[int]:
-    """Numbers of the samples whose mass matrix is positive definite to double precision; 0 if none is.
+    """Return the numbers of the samples whose mass matrix is positive definite to double precision; 0 if none
+    is.
 
     Where it is singular (stretched wrists of point masses) no unique acceleration exists, and rounding
     decides whether an engine detects that.
@@ -89,7 +90,7 @@ def compare_forward_dynamics(
 
 
 def _required_torque(backend: Any, samples: Samples, *, a: Array, chosen: list[int]) -> Array:
-    """The torque that the accelerations require; NaN where they are not finite."""
+    """Return the torque that the accelerations require; NaN where they are not finite."""
     if a.shape != (len(chosen), samples.model.nv) or not np.isfinite(a).all():
         return np.full((len(chosen), samples.model.nv), np.nan)
     return np.asarray(backend.inverse_dynamics(samples.q[chosen], samples.v[chosen], a))
@@ -155,14 +156,14 @@ def _poses(backend: Any, samples: Samples, *, q: Array, frame: str) -> Array:
 
 
 def deepest_frame(model: Model) -> str:
-    """The frame that the most moving joints carry; the first of them."""
+    """Return the frame that the most moving joints carry; the first of them."""
     mechanism = model.mechanism
     depths = [len(ancestry(mechanism, frame.body)) for frame in mechanism.frames]
     return model.frame_names[int(np.argmax(depths))]
 
 
 def _targets(samples: Samples) -> tuple[Floats, Floats]:
-    """Configurations within limits, and starting points some tenths of a radian away from them."""
+    """Return the configurations within limits, and starting points some tenths of a radian away from them."""
     model = samples.model
     q = samples.q[:TARGETS]
     q_target = model.clip(q)

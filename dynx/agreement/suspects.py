@@ -56,7 +56,7 @@ def _evidence(
     identities: Sequence[IdentityCheck],
     backends: Sequence[str],
 ) -> tuple[int, list[str]]:
-    """Weight of the evidence against a backend in one quantity, and its sentences.
+    """Return the weight of the evidence against a backend in one quantity, and its sentences.
 
     The weight is 3 with the referee against it, 2 with all others, 1 with its own results, 0 without any.
     """

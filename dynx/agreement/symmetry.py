@@ -16,7 +16,7 @@ ROTATION_VECTOR = (0.7, -1.1, 0.4)
 
 
 def rotate_world(model: Model) -> tuple[Model, Callable[[Floats], Floats]]:
-    """A model in the rotated world, and the map from configurations (..., nq) of `model` to its own.
+    """Return a model in the rotated world, and the map from configurations (..., nq) of `model` to its own.
 
     A floating base is rotated by its configuration; a fixed one is rigidly connected to a new root.
     """

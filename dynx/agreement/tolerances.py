@@ -46,17 +46,17 @@ TARGET_TOLERANCE = 1e-6
 
 
 def rounding(depth: int) -> float:
-    """Bound on the error of a quantity that is computed along a chain of `depth` joints."""
+    """Return the bound on the error of a quantity that is computed along a chain of `depth` joints."""
     return min(BAR, ROUNDINGS * EPS * (depth + FIXED_JOINTS))
 
 
 def component(depth: int) -> float:
-    """Bound on the error of a single torque over its own magnitude."""
+    """Return the bound on the error of a single torque over its own magnitude."""
     return min(MAX_COMPONENT_ERROR, rounding(depth) * 1e3)
 
 
 def solving() -> float:
-    """Bound on the backward error of solving for accelerations.
+    """Return the bound on the backward error of solving for accelerations.
 
     Solving with the mass matrix would cost order nv roundoffs (Higham 2002, theorem 10.4), but the
     articulated-body algorithm is not backward stable in the ratio of the masses: on a root link of
@@ -66,22 +66,25 @@ def solving() -> float:
 
 
 def eigenvalue(depth: int, nv: int) -> float:
-    """Bound on the rounding error of an eigenvalue of the mass matrix at unit diagonal: nv times the error
-    of an entry (Weyl)."""
+    """Return the bound on the rounding error of an eigenvalue of the mass matrix at unit diagonal: nv times
+    the error of an entry (Weyl)."""
     return nv * rounding(depth)
 
 
 def derivative(depth: int) -> float:
-    """Bound on the error of a numerical derivative over magnitude times frequency: Bernstein's bound on the
-    ninth derivative of a band-limited function gives the truncation, `CANCELLATION` the rounding."""
+    """Return the bound on the error of a numerical derivative over magnitude times frequency: Bernstein's
+    bound on the ninth derivative of a band-limited function gives the truncation, `CANCELLATION` the
+    rounding."""
     return STEP**ORDER * TRUNCATION + CANCELLATION * ROUNDINGS * EPS * (depth + FIXED_JOINTS) / STEP
 
 
 def singular(nv: int) -> float:
-    """Eigenvalue of the mass matrix at unit diagonal below which it is singular to double precision."""
+    """Return the eigenvalue of the mass matrix at unit diagonal below which it is singular to double
+    precision."""
     return ROUNDINGS * EPS * nv
 
 
 def target_distance(depth: int, length: float) -> float:
-    """Bound on the distance [m, rad] of a solution from its target by the poses of another engine."""
+    """Return the bound on the distance [m, rad] of a solution from its target by the poses of another
+    engine."""
     return TARGET_TOLERANCE + rounding(depth) * max(1.0, length)

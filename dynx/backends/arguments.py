@@ -45,7 +45,7 @@ class Arguments:
     # over a list, several times faster than NumPy at this size. Otherwise every entry is checked.
 
     def q(self, q: Any) -> Floats:
-        """A configuration (..., nq), finite, with a unit quaternion for a floating base."""
+        """Return a configuration (..., nq), finite, with a unit quaternion for a floating base."""
         if self.closed:
             raise ClosedError(f"this backend of {self._model.name} was closed; make a new one")
         if type(q) is np.ndarray and q.dtype is _FLOAT64 and q.shape == self._q_shape:
@@ -59,7 +59,7 @@ class Arguments:
         return checked_q(self._model, q)
 
     def v(self, v: Any, name: str = "v") -> Floats:
-        """A velocity, acceleration or torque (..., nv), finite."""
+        """Return a velocity, acceleration or torque (..., nv), finite."""
         if (
             type(v) is np.ndarray
             and v.dtype is _FLOAT64
@@ -70,7 +70,7 @@ class Arguments:
         return checked_array(name, v, self._v_shape[0])
 
     def reference(self, reference: str) -> Reference:
-        """One of the three references, or an error that lists them."""
+        """Return one of the three references, or an error that lists them."""
         try:
             return REFERENCES[reference]
         except (KeyError, TypeError):
@@ -79,7 +79,7 @@ class Arguments:
             ) from None
 
     def frames(self, frames: object) -> list[str]:
-        """The names in a sequence of frames."""
+        """Return the names in a sequence of frames."""
         if isinstance(frames, Iterable):
             return list(frames)
         raise ArgumentError(
@@ -87,7 +87,7 @@ class Arguments:
         )
 
     def wrenches(self, forces: object) -> dict[str, Floats]:
-        """The wrenches (..., 6) by the frame they act on."""
+        """Return the wrenches (..., 6) by the frame they act on."""
         if not isinstance(forces, Mapping):
             raise ArgumentError(
                 f"external_forces is of type {type(forces).__name__}; "
@@ -99,11 +99,11 @@ class Arguments:
         }
 
     def point(self, point: ArrayLike) -> Floats:
-        """A point (3,) in the axes of a frame [m]."""
+        """Return a point (3,) in the axes of a frame [m]."""
         return checked_vector("point", point)
 
     def finite_acceleration(self, a: Floats) -> Floats:
-        """The result of forward dynamics; raises SingularMassMatrixError where it is not finite."""
+        """Return the result of forward dynamics; raises SingularMassMatrixError where it is not finite."""
         if not np.isfinite(a).all():
             rows = np.argwhere(~np.isfinite(a).all(axis=-1))
             where = "at this configuration" if a.ndim == 1 else f"at sample {rows[0].tolist()}"

@@ -57,7 +57,7 @@ class Backend(QuantityCalls):
     # -- kinematics ---------------------------------------------------------------------------
 
     def forward_kinematics(self, q: ArrayLike, frame: str | Sequence[str] | None = None) -> Floats:
-        """T_world_frame (..., 4, 4) [1, m]; for several frames, or None for all, (..., n, 4, 4).
+        """Return T_world_frame (..., 4, 4) [1, m]; for several frames, or None for all, (..., n, 4, 4).
 
         Featherstone 2008, section 4.4. Elsewhere: Pinocchio `framesForwardKinematics`, Drake
         `CalcPoseInWorld`, MuJoCo `mj_kinematics`, PyBullet `getLinkState`.
@@ -82,7 +82,8 @@ class Backend(QuantityCalls):
         reference: str = LOCAL_WORLD_ALIGNED,
         point: ArrayLike | None = None,
     ) -> Floats:
-        """Geometric Jacobian J (..., 6, nv) [m/rad, 1]: J v is the velocity of `frame`, linear rows first.
+        """Return the geometric Jacobian J (..., 6, nv) [m/rad, 1]: J v is the velocity of `frame`, linear
+        rows first.
 
         Siciliano et al., eq. 3.30. Elsewhere: Pinocchio `computeFrameJacobian`, Drake
         `CalcJacobianSpatialVelocity`, MuJoCo `mj_jac`, PyBullet `calculateJacobian`.
@@ -104,7 +105,7 @@ class Backend(QuantityCalls):
         reference: str = LOCAL_WORLD_ALIGNED,
         point: ArrayLike | None = None,
     ) -> Floats:
-        """dJ/dt (..., 6, nv) [m/(rad s), 1/s] along the motion `v`.
+        """Return dJ/dt (..., 6, nv) [m/(rad s), 1/s] along the motion `v`.
 
         Siciliano et al., eq. 3.30, differentiated in time. Elsewhere: Pinocchio
         `getFrameJacobianTimeVariation`, MuJoCo `mj_jacDot`.
@@ -125,7 +126,7 @@ class Backend(QuantityCalls):
         reference: str = LOCAL_WORLD_ALIGNED,
         point: ArrayLike | None = None,
     ) -> Floats:
-        """J v (..., 6) [m/s, rad/s]: linear, then angular velocity of the frame.
+        """Return J v (..., 6) [m/s, rad/s]: linear, then angular velocity of the frame.
 
         Featherstone 2008, section 2.8. Elsewhere: Pinocchio `getFrameVelocity`, Drake
         `CalcSpatialVelocityInWorld`, MuJoCo `mj_objectVelocity`.
@@ -146,7 +147,7 @@ class Backend(QuantityCalls):
         reference: str = LOCAL_WORLD_ALIGNED,
         point: ArrayLike | None = None,
     ) -> Floats:
-        """J a + dJ/dt v (..., 6) [m/s^2, rad/s^2], the time derivative of `frame_velocity`.
+        """Return J a + dJ/dt v (..., 6) [m/s^2, rad/s^2], the time derivative of `frame_velocity`.
 
         In ``local_world_aligned`` that is the classical acceleration of the frame's origin; in
         ``local`` and ``world`` the spatial acceleration (Featherstone 2008, section 2.11). Gravity has no
@@ -165,7 +166,7 @@ class Backend(QuantityCalls):
     def inverse_kinematics(
         self, target: ArrayLike, frame: str, q0: ArrayLike | None = None, **options: Any
     ) -> IKResult:
-        """The configuration that brings `frame` to `target`; see `dynx.ik.inverse_kinematics`."""
+        """Return the configuration that brings `frame` to `target`; see `dynx.ik.inverse_kinematics`."""
         return inverse_kinematics(self, target, frame, q0, **options)
 
     # -- dynamics -----------------------------------------------------------------------------
@@ -180,7 +181,7 @@ class Backend(QuantityCalls):
         force_reference: str = LOCAL_WORLD_ALIGNED,
         joint_dynamics: bool = False,
     ) -> Floats:
-        """The torque tau (..., nv) [N m] that gives acceleration `a`: M a + bias - J' external forces.
+        """Return the torque tau (..., nv) [N m] that gives acceleration `a`: M a + bias - J' external forces.
 
         Luh, Walker and Paul 1980. Elsewhere: Pinocchio `rnea`, Drake `CalcInverseDynamics`, MuJoCo
         `mj_inverse`, PyBullet `calculateInverseDynamics`.
@@ -208,7 +209,7 @@ class Backend(QuantityCalls):
         force_reference: str = LOCAL_WORLD_ALIGNED,
         joint_dynamics: bool = False,
     ) -> Floats:
-        """The acceleration a (..., nv) [rad/s^2] that `tau` and the external forces give.
+        """Return the acceleration a (..., nv) [rad/s^2] that `tau` and the external forces give.
 
         Raises SingularMassMatrixError, which names the joints, where a joint moves no inertia.
 
@@ -231,7 +232,7 @@ class Backend(QuantityCalls):
         return self._arguments.finite_acceleration(a)
 
     def mass_matrix(self, q: ArrayLike, *, joint_dynamics: bool = False) -> Floats:
-        """Joint-space inertia matrix M (..., nv, nv) [kg m^2], symmetric.
+        """Return the joint-space inertia matrix M (..., nv, nv) [kg m^2], symmetric.
 
         Featherstone 2008, section 6.2. Elsewhere: Pinocchio `crba`, Drake `CalcMassMatrix`, MuJoCo
         `mj_fullM`, PyBullet `calculateMassMatrix`.
@@ -252,7 +253,7 @@ class Backend(QuantityCalls):
         force_reference: str = LOCAL_WORLD_ALIGNED,
         joint_dynamics: bool = False,
     ) -> Floats:
-        """C v + g (..., nv) [N m]: `inverse_dynamics` at zero acceleration.
+        """Return C v + g (..., nv) [N m]: `inverse_dynamics` at zero acceleration.
 
         Siciliano et al., section 7.1.3. Elsewhere: Pinocchio `nonLinearEffects`, MuJoCo `qfrc_bias`,
         Drake `CalcBiasTerm` less `CalcGravityGeneralizedForces`.
@@ -264,7 +265,7 @@ class Backend(QuantityCalls):
         return tau + self._joint_terms.losses(v) if joint_dynamics else tau
 
     def gravity_torque(self, q: ArrayLike) -> Floats:
-        """g (..., nv) [N m]: `inverse_dynamics` at rest, the gradient of the potential energy.
+        """Return g (..., nv) [N m]: `inverse_dynamics` at rest, the gradient of the potential energy.
 
         Siciliano et al., section 7.1.3. Elsewhere: Pinocchio `computeGeneralizedGravity`, Drake
         `CalcGravityGeneralizedForces` (with the opposite sign).
@@ -272,7 +273,7 @@ class Backend(QuantityCalls):
         return self._evaluate("gravity_torque", self._checked_q(q))
 
     def coriolis_matrix(self, q: ArrayLike, v: ArrayLike) -> Floats:
-        """C (..., nv, nv) [N m s/rad] with C v + g = bias and dM/dt - 2 C skew-symmetric.
+        """Return C (..., nv, nv) [N m s/rad] with C v + g = bias and dM/dt - 2 C skew-symmetric.
 
         Echeandia and Wensing 2021, eq. 24 (`dynx.rbd.coriolis`). Elsewhere: Pinocchio
         `computeCoriolisMatrix`.
@@ -280,7 +281,7 @@ class Backend(QuantityCalls):
         return self._evaluate("coriolis_matrix", self._checked_q(q), self._checked_v(v))
 
     def inertial_regressor(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> Floats:
-        """Y (..., nv, 10 n_links) [m/s^2, m^2/s^2, 1/s^2]: inverse dynamics is Y pi.
+        """Return Y (..., nv, 10 n_links) [m/s^2, m^2/s^2, 1/s^2]: inverse dynamics is Y pi.
 
         pi holds the ten inertial parameters of each link of `model.links`, in order and about the origin of
         the link's frame in its axes: m [kg], m cx, m cy, m cz [kg m], Ixx, Ixy, Ixz, Iyy, Iyz, Izz
@@ -294,7 +295,7 @@ class Backend(QuantityCalls):
     # -- the whole body -----------------------------------------------------------------------
 
     def center_of_mass(self, q: ArrayLike) -> Floats:
-        """Centre of mass in the world (..., 3) [m]; the base frame's origin if nothing has mass.
+        """Return the centre of mass in the world (..., 3) [m]; the base frame's origin if nothing has mass.
 
         Links fixed to the world count, as they do for the potential energy. Orin, Goswami and Lee 2013.
         Elsewhere: Pinocchio `centerOfMass` (which leaves those links out), Drake
@@ -303,7 +304,7 @@ class Backend(QuantityCalls):
         return self._evaluate("center_of_mass", self._checked_q(q))
 
     def center_of_mass_jacobian(self, q: ArrayLike) -> Floats:
-        """J (..., 3, nv) [m/rad] with J v the velocity of the centre of mass, world axes.
+        """Return J (..., 3, nv) [m/rad] with J v the velocity of the centre of mass, world axes.
 
         Orin, Goswami and Lee 2013. Elsewhere: Pinocchio `jacobianCenterOfMass`, Drake
         `CalcJacobianCenterOfMassTranslationalVelocity`, MuJoCo `mj_jacSubtreeCom`.
@@ -311,7 +312,8 @@ class Backend(QuantityCalls):
         return self._evaluate("center_of_mass_jacobian", self._checked_q(q))
 
     def centroidal_momentum(self, q: ArrayLike, v: ArrayLike) -> Floats:
-        """Linear, then angular momentum about the centre of mass (..., 6) [kg m/s, kg m^2/s], world axes.
+        """Return the linear, then angular momentum about the centre of mass (..., 6) [kg m/s, kg m^2/s],
+        world axes.
 
         Orin, Goswami and Lee 2013. Elsewhere: Pinocchio `computeCentroidalMomentum`, Drake
         `CalcSpatialMomentumInWorldAboutPoint`, MuJoCo `subtree_angmom`.
@@ -319,7 +321,7 @@ class Backend(QuantityCalls):
         return self._evaluate("centroidal_momentum", self._checked_q(q), self._checked_v(v))
 
     def kinetic_energy(self, q: ArrayLike, v: ArrayLike, *, joint_dynamics: bool = False) -> Floats:
-        """v' M v / 2 (...,) [J].
+        """Return v' M v / 2 (...,) [J].
 
         Siciliano et al., section 7.1.1. Elsewhere: Pinocchio `computeKineticEnergy`, Drake
         `CalcKineticEnergy`, MuJoCo `mj_energyVel`.
@@ -331,7 +333,7 @@ class Backend(QuantityCalls):
         return energy
 
     def potential_energy(self, q: ArrayLike) -> Floats:
-        """Energy in the field of gravity (...,) [J], zero with the mass at the world's origin.
+        """Return the energy in the field of gravity (...,) [J], zero with the mass at the world's origin.
 
         Siciliano et al., section 7.1.2. Elsewhere: Pinocchio `computePotentialEnergy`, Drake
         `CalcPotentialEnergy`, MuJoCo `mj_energyPos`.
@@ -341,7 +343,7 @@ class Backend(QuantityCalls):
     # -- terms that every engine shares -------------------------------------------------------
 
     def _force_torque(self, q: Any, tau: Any, forces: Forces, reference: str) -> Floats:
-        """J' w summed over the frames that a wrench w acts on, which broadcasts with `tau`."""
+        """Return J' w summed over the frames that a wrench w acts on, which broadcasts with `tau`."""
         wrenches = self._arguments.wrenches(forces)
         common_batch(tau, q, *wrenches.values())
         total: Any = 0.0

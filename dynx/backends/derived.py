@@ -51,7 +51,8 @@ class DerivedBackend(Backend):
 
 
 def native_quantities(backend: Backend | type[Backend]) -> frozenset[str]:
-    """Names of the quantities that a backend's engine computes itself, rather than by a derivation."""
+    """Return the names of the quantities that a backend's engine computes itself, rather than by a
+    derivation."""
     kind = backend if isinstance(backend, type) else type(backend)
     return frozenset(name for name, quantity in QUANTITIES.items() if kind._is_native(quantity))
 

@@ -37,7 +37,7 @@ class Evaluation:
         args: tuple[Any, ...] = (),
         reduce: Reduction | None = None,
     ) -> Floats:
-        """`hook(q, *velocities, *args)` for every sample of the broadcast batch.
+        """Return `hook(q, *velocities, *args)` for every sample of the broadcast batch.
 
         q (..., nq) and velocities (..., nv) are in model coordinates, the hook's in tree
         coordinates. `tail` is the shape of one result in tree coordinates; `reduce` converts it.
@@ -63,15 +63,15 @@ class Evaluation:
         return result
 
     def reduce_columns(self, result: Floats) -> Floats:
-        """A S for a torque (..., nv) or a Jacobian (..., 6, nv)."""
+        """Return A S for a torque (..., nv) or a Jacobian (..., 6, nv)."""
         return np.asarray(result @ self._S)
 
     def reduce_rows(self, result: Floats) -> Floats:
-        """S' A for a matrix (..., nv, n)."""
+        """Return S' A for a matrix (..., nv, n)."""
         return np.asarray(self._S.T @ result)
 
     def reduce_both(self, result: Floats) -> Floats:
-        """S' A S for a matrix (..., nv, nv)."""
+        """Return S' A S for a matrix (..., nv, nv)."""
         return np.asarray(self._S.T @ result @ self._S)
 
     def _one_by_one(
@@ -86,7 +86,7 @@ class Evaluation:
 
 
 def common_batch(q: Floats, *others: Floats) -> tuple[int, ...]:
-    """The leading axes that the arguments broadcast to, or a ShapeError."""
+    """Return the leading axes that the arguments broadcast to, or a ShapeError."""
     batch = q.shape[:-1]
     if all(other.shape[:-1] == batch for other in others):
         return batch
@@ -98,7 +98,8 @@ def common_batch(q: Floats, *others: Floats) -> tuple[int, ...]:
 
 
 def batch_rows(array: Floats, batch: tuple[int, ...]) -> Floats:
-    """The rows (n, size) of an array (..., size) broadcast to a batch of n, as a view where there is one."""
+    """Return the rows (n, size) of an array (..., size) broadcast to a batch of n, as a view where there is
+    one."""
     if array.shape[:-1] == batch:
         return array.reshape(prod(batch), array.shape[-1])
     if array.ndim == 1:

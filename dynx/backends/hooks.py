@@ -37,7 +37,8 @@ class EngineHooks(ABC):
     _mechanism: Mechanism
 
     def _unchecked_callable(self, quantity: str) -> Callable[..., Floats] | None:
-        """Unchecked callable for `quantity` bound to the calling thread, or None if the engine has none.
+        """Return the unchecked callable for `quantity` bound to the calling thread, or None if the engine has
+        none.
 
         For loops of one thread in which microseconds count. Exceptions of the engine are not translated.
         """
@@ -45,12 +46,12 @@ class EngineHooks(ABC):
 
     @classmethod
     def _is_native(cls, quantity: Quantity) -> bool:
-        """Whether the engine computes the quantity itself, rather than by a derivation of dynx."""
+        """Check whether the engine computes the quantity itself, rather than by a derivation of dynx."""
         derivation = getattr(EngineHooks, quantity.hook, None)
         return getattr(cls, quantity.hook, None) is not derivation
 
     def _derive(self, quantity: Quantity | str, q: Floats, *rest: Any) -> Floats:
-        """The algorithm of a quantity, at the engine's own poses of the bodies if it takes poses.
+        """Return the algorithm of a quantity, at the engine's own poses of the bodies if it takes poses.
 
         `rest` is what the algorithm takes after q: the other arguments and the details.
         """
@@ -62,34 +63,34 @@ class EngineHooks(ABC):
 
     @abstractmethod
     def _frame_placements(self, q: Floats) -> Floats:
-        """T_world_frame of every frame, (..., n_frames, 4, 4)."""
+        """Return T_world_frame of every frame, (..., n_frames, 4, 4)."""
 
     @abstractmethod
     def _inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
-        """Torque (..., nv) without external forces, damping, friction and armature."""
+        """Return the torque (..., nv) without external forces, damping, friction and armature."""
 
     # -- kinematics ---------------------------------------------------------------------------
 
     def _frame_placement(self, q: Floats, frame: int) -> Floats:
-        """T_world_frame of frame number `frame`, (..., 4, 4)."""
+        """Return T_world_frame of frame number `frame`, (..., 4, 4)."""
         return self._frame_placements(q)[..., frame, :, :]
 
     def _jacobian(self, q: Floats, frame: int, reference: Reference) -> Floats:
-        """Geometric Jacobian (..., 6, nv), linear rows first."""
+        """Return the geometric Jacobian (..., 6, nv), linear rows first."""
         return jacobians.frame_jacobian(self._mechanism, self._body_poses(q), frame, reference)
 
     def _jacobian_derivative(self, q: Floats, v: Floats, frame: int, reference: Reference) -> Floats:
-        """Time derivative of the Jacobian (..., 6, nv) along the velocity `v`."""
+        """Return the time derivative of the Jacobian (..., 6, nv) along the velocity `v`."""
         return jacobians.frame_jacobian_derivative(self._mechanism, self._body_poses(q), v, frame, reference)
 
     def _frame_velocity(self, q: Floats, v: Floats, frame: int, reference: Reference) -> Floats:
-        """J v, (..., 6)."""
+        """Return J v, (..., 6)."""
         return apply_matrix(self._jacobian(q, frame, reference), v)
 
     def _frame_acceleration(
         self, q: Floats, v: Floats, a: Floats, frame: int, reference: Reference
     ) -> Floats:
-        """J a + dJ/dt v, (..., 6)."""
+        """Return J a + dJ/dt v, (..., 6)."""
         return apply_matrix(self._jacobian(q, frame, reference), a) + apply_matrix(
             self._jacobian_derivative(q, v, frame, reference), v
         )
@@ -97,16 +98,16 @@ class EngineHooks(ABC):
     # -- dynamics -----------------------------------------------------------------------------
 
     def _bias_torque(self, q: Floats, v: Floats) -> Floats:
-        """Inverse dynamics at zero acceleration (..., nv)."""
+        """Return the inverse dynamics at zero acceleration (..., nv)."""
         return self._inverse_dynamics(q, v, np.zeros_like(v))
 
     def _gravity_torque(self, q: Floats) -> Floats:
-        """Inverse dynamics at rest (..., nv)."""
+        """Return the inverse dynamics at rest (..., nv)."""
         rest = np.zeros((*q.shape[:-1], self._mechanism.nv))
         return self._inverse_dynamics(q, rest, rest)
 
     def _mass_matrix(self, q: Floats) -> Floats:
-        """Joint-space inertia (..., nv, nv), a column for each unit acceleration."""
+        """Return the joint-space inertia (..., nv, nv), a column for each unit acceleration."""
         n = self._mechanism.nv
         rest = np.zeros((*q.shape[:-1], n))
         gravity = self._inverse_dynamics(q, rest, rest)
@@ -117,20 +118,21 @@ class EngineHooks(ABC):
         return np.asarray(0.5 * (M + np.swapaxes(M, -1, -2)))
 
     def _forward_dynamics(self, q: Floats, v: Floats, tau: Floats) -> Floats:
-        """The acceleration a (..., nv) with M a + bias = tau."""
+        """Return the acceleration a (..., nv) with M a + bias = tau."""
         return solve_mass_matrix(self._mass_matrix(q), tau - self._bias_torque(q, v))
 
     def _kinetic_energy(self, q: Floats, v: Floats) -> Floats:
-        """v' M v / 2, (...,)."""
+        """Return v' M v / 2, (...,)."""
         return np.asarray(0.5 * np.sum(v * apply_matrix(self._mass_matrix(q), v), axis=-1))
 
     def _body_poses(self, q: Floats) -> kinematics.Poses:
-        """Poses of the root and of each moving body, read off the engine's own frame placements."""
+        """Return the poses of the root and of each moving body, read off the engine's own frame
+        placements."""
         return kinematics.poses_from_frames(self._mechanism, self._frame_placements(q))
 
 
 def solve_mass_matrix(M: Floats, torque: Floats) -> Floats:
-    """a with M a = torque; raises SingularMassMatrixError where M is singular to double precision.
+    """Return a with M a = torque; raises SingularMassMatrixError where M is singular to double precision.
 
     M is scaled to a unit diagonal first. It may be indefinite: the inertias of a file are used as
     they stand, and a unique acceleration then exists all the same.
@@ -148,5 +150,5 @@ def solve_mass_matrix(M: Floats, torque: Floats) -> Floats:
 
 
 def apply_matrix(matrix: Floats, vector: ArrayLike) -> Floats:
-    """A x over batch axes, for A (..., m, n) and x (..., n)."""
+    """Return A x over batch axes, for A (..., m, n) and x (..., n)."""
     return np.asarray((matrix @ np.asarray(vector)[..., None])[..., 0])

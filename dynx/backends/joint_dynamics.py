@@ -29,10 +29,10 @@ class JointDynamicsTerms:
         self.has_rotors = bool(np.any(armature != 0.0))
 
     def losses(self, v: Any) -> Floats:
-        """Torque (..., nv) of damping and Coulomb friction at velocity v (..., nv)."""
+        """Return the torque (..., nv) of damping and Coulomb friction at velocity v (..., nv)."""
         tree = np.asarray(v) @ self._S.T
         return np.asarray((self._damping * tree + self._friction * np.sign(tree)) @ self._S)
 
     def rotor_torque(self, a: Any) -> Floats:
-        """Torque (..., nv) that accelerates the rotors by a (..., nv)."""
+        """Return the torque (..., nv) that accelerates the rotors by a (..., nv)."""
         return np.asarray(np.asarray(a) @ self.rotors)

@@ -106,7 +106,7 @@ class Quantity:
         return len(self.shape) > 1 and self.shape[-2] == "nv"
 
     def shape_of(self, model: Model, nv: int | None = None) -> tuple[int, ...]:
-        """Shape of one sample's result; in tree coordinates for the `nv` of the tree."""
+        """Return the shape of one sample's result; in tree coordinates for the `nv` of the tree."""
         extents = {
             "nv": model.nv if nv is None else nv,
             "10 n_links": 10 * len(model.links),
@@ -115,7 +115,8 @@ class Quantity:
         return tuple(n if isinstance(n, int) else extents[n] for n in self.shape)
 
     def evaluate(self, mechanism: Mechanism, q: Array, *rest: Any) -> Array:
-        """The algorithm at the tree configuration q (..., nq), with the other arguments and details."""
+        """Return the algorithm at the tree configuration q (..., nq), with the other arguments and
+        details."""
         first = kinematics.body_poses(mechanism, q) if self.takes_poses else q
         return np.asarray(self.algorithm(mechanism, first, *rest))
 

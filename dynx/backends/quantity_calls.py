@@ -45,7 +45,7 @@ class QuantityCalls(Lifecycle, EngineHooks):
         self._plans: dict[str, _Plan] = {}
 
     def _evaluate(self, name: str, q: Floats, *rates: Floats, details: tuple[Any, ...] = ()) -> Floats:
-        """The quantity `name` at checked arguments with any leading axes, in model coordinates.
+        """Return the quantity `name` at checked arguments with any leading axes, in model coordinates.
 
         `details` are the frame and the reference of a quantity of a frame.
         """

@@ -49,7 +49,7 @@ def refuse_other_than_model(model: object) -> None:
 
 
 def backend(name: str, model: Model, **options: Any) -> Backend:
-    """The backend of that name for `model`; `options` go to its constructor (``validate=False``).
+    """Return the backend of that name for `model`; `options` go to its constructor (``validate=False``).
 
     Raises UnknownBackendError for an unknown name, NotInstalledError where its engine is
     missing, EngineLimitError where the engine cannot represent the model, and ArgumentError for an
@@ -66,17 +66,17 @@ def backend(name: str, model: Model, **options: Any) -> Backend:
 
 
 def backend_class(name: str) -> type[Backend]:
-    """The class behind a name; this imports its engine."""
+    """Return the class behind a name; this imports its engine."""
     return _backends.find(name)
 
 
 def backend_names() -> tuple[str, ...]:
-    """All names of backends, dynx's own first, whether or not their engines are installed."""
+    """Return all names of backends, dynx's own first, whether or not their engines are installed."""
     return _backends.names()
 
 
 def installed_backends() -> tuple[str, ...]:
-    """The names among `backend_names` whose engines can be imported; this imports them."""
+    """Return the names among `backend_names` whose engines can be imported; this imports them."""
     return tuple(name for name in backend_names() if _is_installed(name))
 
 

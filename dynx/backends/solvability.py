@@ -37,7 +37,7 @@ class Solvability:
 
 
 def singular_coordinates(model: Model, joint_dynamics: bool = False) -> tuple[str, ...]:
-    """Names of the coordinates in the null space of M at every configuration: joints, or ``base``.
+    """Return the names of the coordinates in the null space of M at every configuration: joints, or ``base``.
 
     Determined at three random configurations, where M scaled to a unit diagonal has an eigenvalue below nv
     times the rounding error of its entries.

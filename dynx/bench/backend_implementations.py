@@ -28,7 +28,7 @@ class BackendImplementation(Implementation):
         self._engine = engine
 
     def prepare(self, case: BenchmarkCase, batch: Batch, out: Floats) -> PreparedCall:
-        """The call; the backend writes into `out` where its method takes that option."""
+        """Return the call; the backend writes into `out` where its method takes that option."""
         method: Callable[..., Floats] = getattr(self._engine, case.quantity)
         arguments: list[Any] = list(batch.arguments(case.quantity))
         frame = [batch.frame] if QUANTITIES[case.quantity].of_frame else []
@@ -45,7 +45,8 @@ class BackendImplementation(Implementation):
 
 
 def backend_implementation(model: Model, name: str, threads: int) -> BackendImplementation:
-    """The backend of that name; one that takes `threads` evaluates a batch in one call of compiled code."""
+    """Return the backend of that name; one that takes `threads` evaluates a batch in one call of compiled
+    code."""
     if "threads" not in inspect.signature(backend_class(name)).parameters:
         return BackendImplementation(backend(name, model))
     return BackendImplementation(backend(name, model, threads=threads), threads=threads, whole=True)

@@ -62,15 +62,15 @@ class Batch:
         return len(self.q)
 
     def arguments(self, quantity: str) -> tuple[Floats, ...]:
-        """The arguments of `quantity`."""
+        """Return the arguments of `quantity`."""
         return tuple(getattr(self, name) for name in QUANTITIES[quantity].arguments)
 
     def first(self, count: int) -> Batch:
-        """The first `count` samples."""
+        """Return the first `count` samples."""
         return self._replaced(slice(count))
 
     def take(self, rows: Sequence[int]) -> Batch:
-        """A copy of the samples with the given numbers."""
+        """Return a copy of the samples with the given numbers."""
         return self._replaced(list(rows))
 
     def _replaced(self, rows: slice | list[int]) -> Batch:
@@ -78,7 +78,7 @@ class Batch:
 
 
 def draw_batch(model: Model, frame: str, count: int, seed: int = 0) -> Batch:
-    """`count` samples of `model`, the same for equal arguments."""
+    """Return `count` samples of `model`, the same for equal arguments."""
     rng = np.random.default_rng(seed)
     q = np.ascontiguousarray(model.random(rng, count))
     base = 7 if model.floating else 0

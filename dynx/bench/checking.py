@@ -40,7 +40,7 @@ class Check:
 
 
 def checked_rows(count: int, seed: int = 0) -> list[int]:
-    """Numbers of the samples that are checked, of `count`."""
+    """Return the numbers of the samples that are checked, of `count`."""
     if count <= 2 * CHECKED_AT_ENDS + CHECKED_BETWEEN:
         return list(range(count))
     between = np.random.default_rng(seed).choice(count, CHECKED_BETWEEN, replace=False)
@@ -56,7 +56,7 @@ class Judge:
         self._reference = ReferenceBackend(samples.model)
 
     def check(self, name: str, results: Floats) -> Check:
-        """The largest error of results (n, ...) of the quantity `name`.
+        """Return the largest error of results (n, ...) of the quantity `name`.
 
         Raises SingularMassMatrixError where there is no unique acceleration.
         """
@@ -68,7 +68,7 @@ class Judge:
         return Check(verdict.relative, tolerances.rounding(self._magnitudes.depth))
 
     def _reference_values(self, quantity: Quantity) -> tuple[Floats, Floats]:
-        """Reference values and natural magnitudes, of one frame for a quantity of frames."""
+        """Return the reference values and natural magnitudes, of one frame for a quantity of frames."""
         frame = [self._samples.frame] if quantity.of_frame else []
         method = getattr(self._reference, quantity.name)
         magnitude = NATURAL_MAGNITUDES[quantity.natural_magnitude]

@@ -39,7 +39,7 @@ class Cost:
 
 
 def cost_of(program: Program) -> Cost:
-    """The cost of a traced program; the sine and cosine of one angle are computed together."""
+    """Return the cost of a traced program; the sine and cosine of one angle are computed together."""
     nodes = program.nodes
     uses = [0] * len(nodes)
     for index in (*(arg for node in nodes for arg in node.args), *program.results):
@@ -59,7 +59,7 @@ def cost_of(program: Program) -> Cost:
 
 
 def program_of(model: Model, quantity: str, frame: str) -> Program | None:
-    """The program that the backend `compiled` makes a kernel of, without the check of its arguments.
+    """Return the program that the backend `compiled` makes a kernel of, without the check of its arguments.
 
     None where that backend evaluates the quantity by NumPy, since its code would be too long.
     """

@@ -44,18 +44,18 @@ class Implementation(ABC):
     whole: bool
 
     def supports(self, case: BenchmarkCase) -> bool:
-        """Whether it implements this case."""
+        """Check whether it implements this case."""
         return True
 
     @abstractmethod
     def prepare(self, case: BenchmarkCase, batch: Batch, out: Floats) -> PreparedCall:
-        """The call for `case` on the samples of `batch`; it may write the results into `out` (n, ...).
+        """Return the call for `case` on the samples of `batch`; it may write the results into `out` (n, ...).
 
         Raises an error of `dynx.errors` where it cannot do this.
         """
 
     def samples(self, batch: Batch) -> Batch:
-        """The samples in the coordinates of this implementation."""
+        """Return the samples in the coordinates of this implementation."""
         return batch
 
     def close(self) -> None:  # most hold nothing

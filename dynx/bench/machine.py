@@ -56,13 +56,13 @@ def measure_peak(threads: int, repetitions: int = REPETITIONS, size: int = COPIE
 
 
 def processor_description() -> str:
-    """Name of the processor and the width of its vectors, in one line."""
+    """Return the name of the processor and the width of its vectors, in one line."""
     target = host()
     return f"{target.cpu} ({platform.machine()}), {target.lanes} doubles in a vector"
 
 
 def load() -> float | None:
-    """Load average of the last minute; None where the system does not report it."""
+    """Return the load average of the last minute; None where the system does not report it."""
     try:
         return os.getloadavg()[0]
     except (AttributeError, OSError):
@@ -70,7 +70,8 @@ def load() -> float | None:
 
 
 def chains_program(chains: int = CHAINS, links: int = CHAIN_LENGTH) -> Program:
-    """Program of interleaved chains x -> x a + b and the sum of their ends, which no optimiser can shorten.
+    """Return the program of interleaved chains x -> x a + b and the sum of their ends, which no optimiser can
+    shorten.
 
     It is built node by node, since the order matters: one link of every chain, then the next.
     """
@@ -91,7 +92,7 @@ def chains_program(chains: int = CHAINS, links: int = CHAIN_LENGTH) -> Program:
 
 
 def _copy_bandwidth(pool: ThreadPoolExecutor, threads: int, repetitions: int, size: int) -> float:
-    """Bytes read and written in a second, by the faster of a kernel that copies and NumPy."""
+    """Return the bytes read and written in a second, by the faster of a kernel that copies and NumPy."""
     rows = max(size // (8 * ROW_SIZE), threads * host().lanes)
     source, target = np.ones((rows, ROW_SIZE)), np.zeros((rows, ROW_SIZE))
     kernel = Kernel(trace(lambda x: x, {"x": (ROW_SIZE,)}))
@@ -107,7 +108,7 @@ def _copy_bandwidth(pool: ThreadPoolExecutor, threads: int, repetitions: int, si
 
 
 def _multiply_adds(pool: ThreadPoolExecutor, threads: int, repetitions: int) -> float:
-    """Products with a sum done in a second."""
+    """Return the products with a sum done in a second."""
     program = chains_program()
     kernel = Kernel(program)
     rows = threads * PEAK_SAMPLES
@@ -126,7 +127,7 @@ def _multiply_adds(pool: ThreadPoolExecutor, threads: int, repetitions: int) -> 
 
 
 def _best(pool: ThreadPoolExecutor, threads: int, rows: int, part: Part, repetitions: int) -> float:
-    """Seconds of the fastest repetition; all threads together do all rows once."""
+    """Return the seconds of the fastest repetition; all threads together do all rows once."""
     ends = [rows * k // threads for k in range(threads + 1)]
 
     def all_parts() -> None:

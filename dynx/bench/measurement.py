@@ -58,7 +58,7 @@ class Measurement:
 def measure(
     case: BenchmarkCase, implementations: Sequence[Implementation], batch: Batch, repetitions: int
 ) -> list[Measurement]:
-    """The measurements of all `implementations` that support this case, in their order.
+    """Return the measurements of all `implementations` that support this case, in their order.
 
     `batch` holds at least ``case.batch`` samples, the first of which are used.
     """
@@ -97,7 +97,7 @@ class Preparation:
         self._memory = np.empty(0)
 
     def prepare(self, implementation: Implementation, batch: Batch) -> Candidate:
-        """The implementation prepared for the samples of `batch`, if its results are right."""
+        """Return the implementation prepared for the samples of `batch`, if its results are right."""
         case, each = self._case, implementation
         own = each.samples(batch.first(case.batch))
         found = Measurement(case, each.name, each.role, each.version, each.threads, len(own))
@@ -121,7 +121,7 @@ class Preparation:
         return Candidate(replace(found, problem=problem), None)
 
     def _affordable(self, implementation: Implementation, batch: Batch) -> int:
-        """Number of samples that fit into a repetition: all of them, or a power of two."""
+        """Return the number of samples that fit into a repetition: all of them, or a power of two."""
         if len(batch) <= TRIAL_SAMPLES:
             return len(batch)
         few = batch.first(TRIAL_SAMPLES)
@@ -132,14 +132,14 @@ class Preparation:
         return len(batch) if count >= len(batch) else max(TRIAL_SAMPLES, 2 ** (count.bit_length() - 1))
 
     def _result_array(self, batch: Batch) -> Floats:
-        """An array for the results; all implementations use the same memory."""
+        """Return an array for the results; all implementations use the same memory."""
         shape = (len(batch), *QUANTITIES[self._case.quantity].shape_of(batch.model))
         if self._memory.size < prod(shape):
             self._memory = np.empty(prod(shape))
         return self._memory[: prod(shape)].reshape(shape)
 
     def _judge(self, batch: Batch) -> tuple[Judge, list[int]]:
-        """The judge of a batch, and the numbers of the samples it checks."""
+        """Return the judge of a batch, and the numbers of the samples it checks."""
         key = (batch.model, len(batch))
         if key not in self._judges:
             rows = checked_rows(len(batch))

@@ -82,7 +82,7 @@ class PinocchioBatch(PinocchioImplementation):
         return case.batch > 1 and case.quantity in self._in_parallel
 
     def prepare(self, case: BenchmarkCase, batch: Batch, out: Floats) -> PreparedCall:
-        """The call."""
+        """Return the call."""
         function = getattr(pin, self._in_parallel[case.quantity])
         columns = [each.T for each in batch.arguments(case.quantity)]
         results, threads, pool = out.T, self.threads, self._pool
@@ -104,7 +104,7 @@ class PinocchioLoop(PinocchioImplementation):
         return case.quantity in BENCHMARK_QUANTITIES
 
     def prepare(self, case: BenchmarkCase, batch: Batch, out: Floats) -> PreparedCall:
-        """The call."""
+        """Return the call."""
         frame = self._frame_ids[batch.model.frame_index(batch.frame)]
         function = _binding_call(self._engine, case.quantity, frame)
         return PreparedCall(_looped(function, case, batch, out))
@@ -124,7 +124,7 @@ class PinocchioInside(PinocchioLoop):
         return case.batch >= MIN_CALLS and super().supports(case)
 
     def prepare(self, case: BenchmarkCase, batch: Batch, out: Floats) -> PreparedCall:
-        """The call."""
+        """Return the call."""
         full = super().prepare(case, batch, out)
         engine, frame = _one_joint()
         n = len(batch)
@@ -135,7 +135,7 @@ class PinocchioInside(PinocchioLoop):
 
 
 def pinocchio_implementations(model: Model, threads: int) -> Iterator[PinocchioImplementation]:
-    """The three implementations; only the batches use threads."""
+    """Yield the three implementations; only the batches use threads."""
     yield PinocchioBatch(model, threads)
     yield PinocchioLoop(model)
     yield PinocchioInside(model)
@@ -170,7 +170,7 @@ def _binding_call(engine: Any, quantity: str, frame: int) -> Callable[..., Float
 
 
 def _looped(function: Callable[..., Floats], case: BenchmarkCase, batch: Batch, out: Floats) -> Call:
-    """`function` for every sample; for a single one nothing but the call."""
+    """Return `function` for every sample; for a single one nothing but the call."""
     rows = list(zip(*batch.arguments(case.quantity), strict=True))
     if case.batch == 1:
         sample = rows[0]
@@ -188,7 +188,7 @@ def _looped(function: Callable[..., Floats], case: BenchmarkCase, batch: Batch, 
 
 
 def _one_joint() -> tuple[Any, int]:
-    """A model of one turning joint and a frame at its end."""
+    """Return a model of one turning joint and a frame at its end."""
     engine = pin.Model()
     joint = engine.addJoint(0, pin.JointModelRZ(), pin.SE3.Identity(), "joint")
     engine.appendBodyToJoint(joint, pin.Inertia.Random(), pin.SE3.Identity())

@@ -50,7 +50,8 @@ def document(session: Session, found: Sequence[Sequence[Measurement]], processor
 def result(
     group: Sequence[Measurement], costs: Sequence[Cost | None], peaks: Mapping[int, Peak]
 ) -> BenchResult:
-    """One case and all its implementations; a ratio is the time of a peer over that of the implementation."""
+    """Return one case and all its implementations; a ratio is the time of a peer over that of the
+    implementation."""
     timed = [each for each in group if each.role == "peer"]
     peers = {each.implementation: each.times.median for each in timed if each.times is not None}
     return {
@@ -60,12 +61,12 @@ def result(
 
 
 def wrong(found: Sequence[Sequence[Measurement]]) -> list[Measurement]:
-    """The measurements of implementations with wrong results."""
+    """Return the measurements of implementations with wrong results."""
     return [each for group in found for each in group if is_wrong(each)]
 
 
 def is_wrong(measurement: Measurement) -> bool:
-    """Whether the error was outside the tolerance."""
+    """Check whether the error was outside the tolerance."""
     error, tolerance = measurement.error, measurement.tolerance
     return error is not None and tolerance is not None and not error <= tolerance
 

@@ -49,7 +49,7 @@ class Roofline:
 
 
 def roofline(cost: Cost, seconds: float, peak: Peak) -> Roofline:
-    """The roofline of a kernel that takes `seconds` for a sample of this cost."""
+    """Return the roofline of a kernel that takes `seconds` for a sample of this cost."""
     return Roofline(
         memory_share=cost.bytes / peak.copy_bandwidth / seconds,
         arithmetic_share=cost.multiply_adds / peak.multiply_adds / seconds,

@@ -62,7 +62,7 @@ def benchmark_cases(
     threads: Iterable[int] = (1,),
     least: int = MIN_BATCH_FOR_THREADS,
 ) -> tuple[BenchmarkCase, ...]:
-    """Every quantity at every batch on every number of threads, large batches first.
+    """Return every quantity at every batch on every number of threads, large batches first.
 
     Several threads only at batches of at least `least`.
     """
@@ -109,7 +109,7 @@ class Session:
         self.peaks[threads] = self._measure_peak(threads)
 
     def measure(self, case: BenchmarkCase) -> list[Measurement]:
-        """The measurements of one case.
+        """Return the measurements of one case.
 
         On several threads the backends that have one thread are left out if they are timed on one.
         """
@@ -127,7 +127,7 @@ class Session:
         return measure(case, implementations, self._batch, plan.repetitions)
 
     def cost(self, measurement: Measurement) -> Cost | None:
-        """The least cost of one sample, where the operations of the implementation are known."""
+        """Return the least cost of one sample, where the operations of the implementation are known."""
         if measurement.implementation != COMPILED:
             return None
         quantity = measurement.case.quantity
@@ -143,7 +143,7 @@ class Session:
 
 
 def all_implementations(plan: Plan, threads: int) -> list[Implementation]:
-    """The chosen or installed backends, then Pinocchio's own calls."""
+    """Return the chosen or installed backends, then Pinocchio's own calls."""
     names = installed_backends() if plan.backends is None else plan.backends
     found: list[Implementation] = []
     for name in names:
@@ -163,7 +163,8 @@ def _peers(model: Model, threads: int) -> list[Implementation]:
 
 
 def _or_unavailable(make: Callable[[], list[Implementation]], name: str, role: Role) -> list[Implementation]:
-    """The implementations, or one that raises why there are none; nothing where their engine is missing."""
+    """Return the implementations, or one that raises why there are none; nothing where their engine is
+    missing."""
     try:
         return make()
     except NotInstalledError:

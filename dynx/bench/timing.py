@@ -40,11 +40,12 @@ class Times:
         return (high - low) / self.median if self.median > 0.0 else float("inf")
 
     def less(self, other: Times) -> Times:
-        """Difference of the times in each repetition; negative where noise exceeds the difference."""
+        """Return the difference of the times in each repetition; negative where noise exceeds the
+        difference."""
         return Times(tuple(own - taken for own, taken in zip(self.seconds, other.seconds, strict=True)))
 
     def per(self, count: int) -> Times:
-        """Times divided by `count`."""
+        """Return the times divided by `count`."""
         return Times(tuple(each / count for each in self.seconds))
 
 
@@ -60,12 +61,12 @@ def interleaved(calls: Sequence[Call], repetitions: int, clock: Clock = time.per
 
 
 def once(call: Call, clock: Clock = time.perf_counter) -> float:
-    """Seconds of one call."""
+    """Return the seconds of one call."""
     return _timed(call, 1, clock)
 
 
 def _rounds(call: Call, clock: Clock) -> int:
-    """Number of repetitions of the call within one timing; determining it warms the call up."""
+    """Return the number of repetitions of the call within one timing; determining it warms the call up."""
     rounds = 1
     while True:
         taken = rounds * _timed(call, rounds, clock)

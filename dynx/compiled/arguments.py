@@ -33,7 +33,7 @@ class BatchArguments(Arguments):
             raise ClosedError(f"this backend of {self._model.name} was closed; make a new one")
 
     def q(self, q: Any) -> Floats:
-        """A configuration (..., nq), finite, with a unit quaternion for a floating base."""
+        """Return a configuration (..., nq), finite, with a unit quaternion for a floating base."""
         if not self.closed and _is_batch(q, self._q_shape) and _below(q, MAX_MAGNITUDE):
             if not self._floating:
                 return np.asarray(q)
@@ -47,13 +47,13 @@ class BatchArguments(Arguments):
         return super().q(q)
 
     def v(self, v: Any, name: str = "v") -> Floats:
-        """A velocity, acceleration or torque (..., nv), finite."""
+        """Return a velocity, acceleration or torque (..., nv), finite."""
         if _is_batch(v, self._v_shape) and _below(v, MAX_MAGNITUDE):
             return np.asarray(v)
         return super().v(v, name)
 
     def finite_acceleration(self, a: Floats) -> Floats:
-        """The result of forward dynamics; raises SingularMassMatrixError where it is not finite."""
+        """Return the result of forward dynamics; raises SingularMassMatrixError where it is not finite."""
         if _below(a, _MAX_ACCELERATION):
             return a
         return super().finite_acceleration(a)
@@ -70,7 +70,7 @@ def _is_batch(array: Any, shape: tuple[int]) -> bool:
 
 
 def _below(array: Floats, bound: float) -> bool:
-    """Whether every entry is a number of magnitude below `bound`."""
+    """Check whether every entry is a number of magnitude below `bound`."""
     if array.size < _MAX_LIST_SIZE:
         return hypot(*array.reshape(-1).tolist()) < bound
     # With a NaN both are NaN, and both comparisons are false.

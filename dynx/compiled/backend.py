@@ -87,7 +87,7 @@ class CompiledBackend(Backend):
     def forward_kinematics(
         self, q: ArrayLike, frame: str | Sequence[str] | None = None, *, out: Floats | None = None
     ) -> Floats:
-        """T_world_frame (..., 4, 4); for several frames, or None for all, (..., n, 4, 4)."""
+        """Return T_world_frame (..., 4, 4); for several frames, or None for all, (..., n, 4, 4)."""
         if frame is not None and not isinstance(frame, str):
             names = self._arguments.frames(frame)
             # Taken from all frames: a kernel for each of many possible lists would round differently.
@@ -112,7 +112,7 @@ class CompiledBackend(Backend):
         point: ArrayLike | None = None,
         out: Floats | None = None,
     ) -> Floats:
-        """J (..., 6, nv) with J v the velocity of `frame`, linear [m/s] then angular [rad/s]."""
+        """Return J (..., 6, nv) with J v the velocity of `frame`, linear [m/s] then angular [rad/s]."""
         if point is not None:
             return write_into(out, super().jacobian(q, frame, reference=reference, point=point))
         try:
@@ -134,7 +134,7 @@ class CompiledBackend(Backend):
         joint_dynamics: bool = False,
         out: Floats | None = None,
     ) -> Floats:
-        """The torque tau (..., nv) that gives acceleration `a`: M a + bias - J' external forces."""
+        """Return the torque tau (..., nv) that gives acceleration `a`: M a + bias - J' external forces."""
         if external_forces is None and not joint_dynamics:
             call = self._public_calls.get("inverse_dynamics")
             if call is None:
@@ -161,7 +161,7 @@ class CompiledBackend(Backend):
         joint_dynamics: bool = False,
         out: Floats | None = None,
     ) -> Floats:
-        """The acceleration a (..., nv) that `tau` and the external forces give.
+        """Return the acceleration a (..., nv) that `tau` and the external forces give.
 
         Raises SingularMassMatrixError, which names the joints, where a joint moves no inertia.
         """
@@ -183,7 +183,7 @@ class CompiledBackend(Backend):
         return write_into(out, a)
 
     def mass_matrix(self, q: ArrayLike, *, joint_dynamics: bool = False, out: Floats | None = None) -> Floats:
-        """M (..., nv, nv), symmetric."""
+        """Return M (..., nv, nv), symmetric."""
         call = self._public_calls.get("mass_matrix")
         if call is None:
             call = self._call_by_name("mass_matrix")
@@ -199,12 +199,12 @@ class CompiledBackend(Backend):
         return self._call_for(name, details or QUANTITIES[name].implied_details(self.model))(q, *rates)
 
     def _call_by_name(self, quantity: str) -> Call:
-        """The call of a quantity without details, stored under its name."""
+        """Return the call of a quantity without details, stored under its name."""
         self._arguments.refuse_closed()
         return self._store_call(quantity, quantity)
 
     def _store_call(self, key: object, quantity: str, details: tuple[Any, ...] = ()) -> Call:
-        """The call of a quantity, stored under `key`."""
+        """Return the call of a quantity, stored under `key`."""
         call = self._call_for(quantity, details)
         with COMPILE_LOCK:
             self._arguments.refuse_closed()
@@ -212,7 +212,7 @@ class CompiledBackend(Backend):
         return call
 
     def _call_for(self, quantity: str, details: tuple[Any, ...] = (), *, tree: bool = False) -> Call:
-        """The call of a quantity, whose kernel is compiled the first time."""
+        """Return the call of a quantity, whose kernel is compiled the first time."""
         tree = tree and not self._straight
         key = (quantity, details, tree)
         call = self._calls.get(key)

@@ -87,7 +87,7 @@ class KernelCall:
         self._workspaces = [workspace]
 
     def evaluate(self, q: Any, v: Any = _ABSENT, a: Any = _ABSENT, out: Floats | None = None) -> Floats:
-        """The result (..., *shape), in `out` if that is given.
+        """Return the result (..., *shape), in `out` if that is given.
 
         `out` is a C-contiguous float64 array of the shape of the result; what it holds after an error is
         not defined. Raises ShapeError, DTypeError or ArgumentError.
@@ -117,7 +117,7 @@ class KernelCall:
         return self._batch(tuple(x for x in (q, v, a) if x is not _ABSENT), out)
 
     def _evaluate_rows(self, workspace: Workspace, arguments: tuple[Any, ...], out: Floats | None) -> Floats:
-        """The results of a batch (n, size), copied to the workspace if it is small."""
+        """Return the results of a batch (n, size), copied to the workspace if it is small."""
         n = len(arguments[0]) if _is_float64(arguments[0], self._sizes[0]) else 0
         fits = 0 < n <= self._max_rows
         if fits:
@@ -202,7 +202,7 @@ class NumericCall:
         self._checks, self._tree, self._check_result = checks, tree, check_result
 
     def evaluate(self, q: Any, v: Any = _ABSENT, a: Any = _ABSENT, out: Floats | None = None) -> Floats:
-        """The result (..., *shape), as of `KernelCall.evaluate`."""
+        """Return the result (..., *shape), as of `KernelCall.evaluate`."""
         arguments = (x for x in (q, v, a) if x is not _ABSENT)
         arrays = [check(argument) for check, argument in zip(self._checks, arguments, strict=True)]
         batch = common_batch(*arrays)
@@ -223,7 +223,7 @@ class NumericCall:
 
 
 def write_into(out: Floats | None, result: Floats) -> Floats:
-    """`result`, or `out` filled with it if that is given."""
+    """Return `result`, or `out` filled with it if that is given."""
     if out is None:
         return result
     _checked_out(out, result.shape)[...] = result

@@ -20,13 +20,13 @@ from dynx.spatial.se3 import homogeneous
 
 
 def inverse_dynamics_derivatives(mechanism: Mechanism) -> Program:
-    """Program of q, v and a, with the outputs dtau_dq, dtau_dv and dtau_da, each (nv, nv)."""
+    """Return the program of q, v and a, with the outputs dtau_dq, dtau_dv and dtau_da, each (nv, nv)."""
     program = _differentiated_torque(mechanism)
     return trace(lambda q, v, a: _torque_derivatives(program, q, v, a), argument_shapes(mechanism, "qva"))
 
 
 def forward_dynamics_derivatives(mechanism: Mechanism) -> Program:
-    """Program of q, v and tau, with the outputs da_dq, da_dv and da_dtau, each (nv, nv)."""
+    """Return the program of q, v and tau, with the outputs da_dq, da_dv and da_dtau, each (nv, nv)."""
     program = _differentiated_torque(mechanism)
 
     def implicit_derivatives(q: Array, v: Array, tau: Array) -> dict[str, Array]:
@@ -42,7 +42,8 @@ def forward_dynamics_derivatives(mechanism: Mechanism) -> Program:
 
 
 def factors_of_mass(mechanism: Mechanism) -> Program:
-    """Program of M (nv, nv), whose output are the entries of the factors L and D that are not zero."""
+    """Return the program of M (nv, nv), whose output are the entries of the factors L and D that are not
+    zero."""
     nv, filled = filled_entries(mechanism)
 
     def factors(M: Array) -> Array:
@@ -53,7 +54,7 @@ def factors_of_mass(mechanism: Mechanism) -> Program:
 
 
 def solution_by_factors(mechanism: Mechanism) -> Program:
-    """Program of the output of `factors_of_mass` and of b (nv,), with the output M^-1 b."""
+    """Return the program of the output of `factors_of_mass` and of b (nv,), with the output M^-1 b."""
     nv, filled = filled_entries(mechanism)
 
     def solution(factors: Array, b: Array) -> Array:
@@ -66,7 +67,7 @@ def solution_by_factors(mechanism: Mechanism) -> Program:
 
 
 def acceleration(mechanism: Mechanism) -> Program:
-    """Program of q, v and tau, with the output a (nv,)."""
+    """Return the program of q, v and tau, with the output a (nv,)."""
 
     def solve(q: Array, v: Array, tau: Array) -> Array:
         return evaluate_quantity(mechanism, "forward_dynamics", (), q, v, tau)
@@ -75,7 +76,7 @@ def acceleration(mechanism: Mechanism) -> Program:
 
 
 def pose_derivative(mechanism: Mechanism, frame: int) -> Program:
-    """Program of q, with the output dT_dq (4, 4, nv) for frame number `frame`."""
+    """Return the program of q, with the output dT_dq (4, 4, nv) for frame number `frame`."""
     shapes = argument_shapes(mechanism, "qv")
 
     def pose(q: Array, d: Array) -> dict[str, Array]:
@@ -94,7 +95,7 @@ def _torque(mechanism: Mechanism, q: Array, v: Array, a: Array) -> Array:
 
 
 def _differentiated_torque(mechanism: Mechanism) -> Program:
-    """Program of the derivatives of the torque by a displacement d of q, by v and by a.
+    """Return the program of the derivatives of the torque by a displacement d of q, by v and by a.
 
     Differentiation is in reverse mode, since there are more arguments than torques.
     """
@@ -108,7 +109,8 @@ def _differentiated_torque(mechanism: Mechanism) -> Program:
 
 
 def _torque_derivatives(program: Program, q: Array, v: Array, a: Array) -> dict[str, Array]:
-    """The outputs of `_differentiated_torque` at d = 0; M is computed on one side of its diagonal only."""
+    """Return the outputs of `_differentiated_torque` at d = 0; M is computed on one side of its diagonal
+    only."""
     found = inline(program, {"q": q, "d": np.zeros(len(v)), "v": v, "a": a})
     M = np.array(found["dtau_da"])
     for i, j in zip(*np.triu_indices(len(M), 1), strict=True):

@@ -88,7 +88,7 @@ class Derivatives:
     def inverse_dynamics_derivatives(
         self, q: ArrayLike, v: ArrayLike, a: ArrayLike
     ) -> InverseDynamicsDerivatives:
-        """Derivatives of tau = M a + bias by q, v and a; the last is the mass matrix."""
+        """Return the derivatives of tau = M a + bias by q, v and a; the last is the mass matrix."""
         kernel = self._kernel("inverse_dynamics", programs.inverse_dynamics_derivatives)
         return InverseDynamicsDerivatives(
             *evaluate_kernel(kernel, self._checked(q, v, a, "a"), self._threads)
@@ -97,7 +97,8 @@ class Derivatives:
     def forward_dynamics_derivatives(
         self, q: ArrayLike, v: ArrayLike, tau: ArrayLike
     ) -> ForwardDynamicsDerivatives:
-        """Derivatives of a = M^-1 (tau - bias) by q, v and tau; the last is the inverse of the mass matrix.
+        """Return the derivatives of a = M^-1 (tau - bias) by q, v and tau; the last is the inverse of the
+        mass matrix.
 
         Raises SingularMassMatrixError, which names the joints, where a joint moves no inertia.
         """
@@ -123,14 +124,15 @@ class Derivatives:
         )
 
     def forward_kinematics_derivative(self, q: ArrayLike, frame: str) -> Floats:
-        """Derivative of T_world_frame by q (..., 4, 4, nv); the last axis counts the coordinates of v."""
+        """Return the derivative of T_world_frame by q (..., 4, 4, nv); the last axis counts the coordinates
+        of v."""
         index = self.model.frame_index(frame)
         kernel = self._kernel(("pose", index), lambda mechanism: programs.pose_derivative(mechanism, index))
         (derivative,) = evaluate_kernel(kernel, [self._arguments.q(q)], self._threads)
         return derivative
 
     def _solve(self, factors: Floats, b: Floats) -> Floats:
-        """M^-1 b for matrices b (..., nv, nv), from the factors of M."""
+        """Return M^-1 b for matrices b (..., nv, nv), from the factors of M."""
         kernel, (nv, columns) = self._kernel("solution", programs.solution_by_factors), b.shape[-2:]
         sides = np.ascontiguousarray(np.swapaxes(b, -1, -2)).reshape(-1, columns, nv)
         factors = factors.reshape(len(sides), factors.shape[-1])

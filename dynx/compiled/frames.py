@@ -48,7 +48,7 @@ class Chain:
 
 
 def chain_of(mechanism: Mechanism, quantity: str, frame: int, reference: Reference) -> Chain:
-    """The chain whose kernel computes a quantity of frame number `frame`."""
+    """Return the chain whose kernel computes a quantity of frame number `frame`."""
     body = mechanism.frames[frame].body
     shared = quantity != "jacobian" or reference != LOCAL_WORLD_ALIGNED
     if shared:
@@ -59,7 +59,7 @@ def chain_of(mechanism: Mechanism, quantity: str, frame: int, reference: Referen
 
 
 def place_of(mechanism: Mechanism, chain: Chain, frame: int, reference: Reference) -> Floats:
-    """The place (place_size,) of frame number `frame` in `reference`."""
+    """Return the place (place_size,) of frame number `frame` in `reference`."""
     fixed = mechanism.frames[frame]
     place = np.zeros(chain.place_size)
     place[_POSITION], place[_ROTATION] = fixed.p, fixed.R.ravel()
@@ -72,7 +72,7 @@ def place_of(mechanism: Mechanism, chain: Chain, frame: int, reference: Referenc
 def on_chain(
     mechanism: Mechanism, quantity: str, chain: Chain, place: Array, q: Array, *rates: Array
 ) -> Array:
-    """A quantity of the frame at `place` for one sample, in tree coordinates.
+    """Return a quantity of the frame at `place` for one sample, in tree coordinates.
 
     q (nq,), rates (nv,) and place hold numbers or symbols. Quantities are ``jacobian``,
     ``jacobian_derivative``, ``frame_velocity`` and ``frame_acceleration``.
@@ -109,7 +109,7 @@ def on_chain(
 
 
 def _carrier(mechanism: Mechanism, chain: Chain, place: Array, q: Array) -> tuple[Mechanism, Poses]:
-    """The bodies of the chain and one more, the carrier, to which the only frame is fixed.
+    """Return the bodies of the chain and one more, the carrier, to which the only frame is fixed.
 
     The carrier has the pose of the body that the frame is fixed to. Its parent is the last body and its
     joint does not move: the last column of its Jacobian is meaningless.
@@ -128,7 +128,7 @@ def _carrier(mechanism: Mechanism, chain: Chain, place: Array, q: Array) -> tupl
 
 
 def _weighted_sum(weights: Array, terms: tuple[Array, ...]) -> Array:
-    """The one of `terms` whose weight is 1."""
+    """Return the one of `terms` whose weight is 1."""
     return np.asarray(sum(weight * term for weight, term in zip(weights, terms, strict=True)))
 
 
@@ -148,7 +148,7 @@ class _Axes:
 
     @classmethod
     def of(cls, place: Array, R: Array, p: Array) -> _Axes:
-        """The axes for a frame at (R, p) in the world."""
+        """Return the axes for a frame at (R, p) in the world."""
         local, world = place[_LOCAL], place[_WORLD]
         return cls(local * R.T + (1.0 - local) * np.eye(3), world * p, local, world)
 
@@ -157,7 +157,8 @@ class _Axes:
         return np.concatenate([self.R @ (x[:3] + skew(self.p) @ x[3:]), self.R @ x[3:]])
 
     def rate(self, x: Array, dx: Array, twist: Array) -> Array:
-        """Time derivative of `motion(x)`, where `dx` is that of `x` and the frame moves with `twist`."""
+        """Return the time derivative of `motion(x)`, where `dx` is that of `x` and the frame moves with
+        `twist`."""
         omega = skew(self.rotates * twist[3:])
         linear = dx[:3] - omega @ x[:3] + skew(self.p) @ dx[3:] + skew(self.fixed * twist[:3]) @ x[3:]
         return np.concatenate([self.R @ linear, self.R @ (dx[3:] - omega @ x[3:])])

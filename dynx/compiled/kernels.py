@@ -76,7 +76,7 @@ Computation = Callable[..., Array]
 
 
 def _all_placements(mechanism: Mechanism, poses: Poses, *frames: int) -> Array:
-    """T_world_frame (..., n, 4, 4) of n frames."""
+    """Return T_world_frame (..., n, 4, 4) of n frames."""
     found = [frame_placement(mechanism, poses, frame) for frame in frames]
     shape = np.broadcast_shapes(*(T.shape for T in found))
     return np.stack([np.broadcast_to(T, shape) for T in found], axis=-3) if found else np.zeros((0, 4, 4))
@@ -94,12 +94,13 @@ _WITH_BASE_PARAMETERS = frozenset({"inverse_dynamics", "bias_torque", "gravity_t
 
 
 def kernel_quantity(name: str) -> Quantity:
-    """The table's entry for a quantity, by the name of the hook that computes it without its underscore."""
+    """Return the table's entry for a quantity, by the name of the hook that computes it without its
+    underscore."""
     return _PLACEMENTS.get(name) or QUANTITIES[name]
 
 
 def _code_size(mechanism: Mechanism, growth: Growth) -> int:
-    """Size of the code of an algorithm, in units that `MAX_CODE_SIZE` has too."""
+    """Return the size of the code of an algorithm, in units that `MAX_CODE_SIZE` has too."""
     if growth == "cubic":
         return len(mechanism.bodies) * mechanism.nv**2
     if growth == "pairs":
@@ -108,14 +109,14 @@ def _code_size(mechanism: Mechanism, growth: Growth) -> int:
 
 
 def compiles(mechanism: Mechanism, name: str) -> bool:
-    """Whether a quantity of this mechanism is compiled, rather than evaluated by NumPy."""
+    """Check whether a quantity of this mechanism is compiled, rather than evaluated by NumPy."""
     return _code_size(mechanism, kernel_quantity(name).growth) <= MAX_CODE_SIZE
 
 
 def evaluate_quantity(
     mechanism: Mechanism, name: str, details: tuple[Any, ...], q: Array, *rates: Array, tree: bool = False
 ) -> Array:
-    """A quantity on arrays (..., nq) and (..., nv) of numbers or of symbols.
+    """Return a quantity on arrays (..., nq) and (..., nv) of numbers or of symbols.
 
     They are in the coordinates of the model or, with `tree`, of the mechanism itself.
     """
@@ -142,7 +143,7 @@ def evaluate_quantity(
 def _reduced(
     mechanism: Mechanism, quantity: Quantity, in_tree: Computation, q: Array, *rates: Array
 ) -> Array:
-    """`in_tree`, a quantity in tree coordinates, evaluated in those of the model."""
+    """Return `in_tree`, a quantity in tree coordinates, evaluated in those of the model."""
     result = in_tree(*tree_coordinates(mechanism, q, *rates))
     if quantity.reduces_columns:
         result = reduce_columns(mechanism, result)
@@ -152,7 +153,7 @@ def _reduced(
 def quantity_kernel(
     mechanism: Mechanism, name: str, details: tuple[Any, ...], *, tree: bool = False
 ) -> Kernel:
-    """The kernel of a quantity, from the cache if it was compiled before."""
+    """Return the kernel of a quantity, from the cache if it was compiled before."""
 
     def result(q: Array, *rates: Array) -> Array:
         return evaluate_quantity(mechanism, name, details, q, *rates, tree=tree)
@@ -165,7 +166,7 @@ def quantity_kernel(
 
 
 def chain_kernel(mechanism: Mechanism, name: str, chain: Chain, *, tree: bool = False) -> Kernel:
-    """The kernel of a quantity for the frames of a chain; its last input is the place of one."""
+    """Return the kernel of a quantity for the frames of a chain; its last input is the place of one."""
     own = replace(mechanism, coupling=None) if tree else mechanism
 
     def result(q: Array, *rates_and_place: Array) -> Array:
@@ -186,7 +187,7 @@ def _recipe(mechanism: Mechanism, name: str, details: object, tree: bool) -> byt
 def _program(
     mechanism: Mechanism, name: str, result: Computation, *, tree: bool, **more: tuple[int, ...]
 ) -> Program:
-    """The program of `result`, of the quantity's arguments and inputs `more` that need no checking."""
+    """Return the program of `result`, of the quantity's arguments and inputs `more` that need no checking."""
     quantity = kernel_quantity(name)
 
     def result_and_defect(**inputs: Array) -> dict[str, Array]:
@@ -200,7 +201,8 @@ def _program(
 
 
 def _defect(mechanism: Mechanism, q: Array, *rates: Array) -> Array:
-    """Sum of the squares of all arguments; far above `MAX_DEFECT` if a quaternion is not of unit length."""
+    """Return the sum of the squares of all arguments; far above `MAX_DEFECT` if a quaternion is not of unit
+    length."""
     numbers = np.concatenate([q, *rates])
     total = _sum_by_pairs([x * x for x in numbers])
     if mechanism.floating:
@@ -210,7 +212,8 @@ def _defect(mechanism: Mechanism, q: Array, *rates: Array) -> Array:
 
 
 def _sum_by_pairs(terms: list[Any]) -> Any:
-    """A sum in which few additions depend on one another, so that a processor does several at a time."""
+    """Return a sum in which few additions depend on one another, so that a processor does several at a
+    time."""
     while len(terms) > 1:
         odd = terms[len(terms) // 2 * 2 :]
         terms = [a + b for a, b in zip(terms[::2], terms[1::2], strict=False)] + odd
@@ -219,7 +222,7 @@ def _sum_by_pairs(terms: list[Any]) -> Any:
 
 @cache
 def _algorithms() -> str:
-    """Hash of the source of everything that is traced."""
+    """Return the hash of the source of everything that is traced."""
     folders = [Path(str(package.__file__)).parent for package in (dynx.rbd, dynx.spatial)]
     modules = (
         dynx.model.configuration,
@@ -234,7 +237,7 @@ def _algorithms() -> str:
 
 
 def _fingerprint(mechanism: Mechanism) -> str:
-    """Hash of every field of a mechanism, numbers to the last bit."""
+    """Return the hash of every field of a mechanism, numbers to the last bit."""
     digest = sha256()
 
     def feed(value: Any) -> None:

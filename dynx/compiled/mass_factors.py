@@ -11,7 +11,7 @@ from dynx.spatial.scalar import Array
 
 
 def factorize_mass_matrix(mechanism: Mechanism, M: Array) -> Factors:
-    """Factors L and D of M, eliminated from the tips to the root.
+    """Return the factors L and D of M, eliminated from the tips to the root.
 
     Entries stay zero where two joints are on different branches (Featherstone 2008, section 6.5), so that no
     operation is spent on them.
@@ -24,12 +24,13 @@ def factorize_mass_matrix(mechanism: Mechanism, M: Array) -> Factors:
 
 
 def solve_with_factors(L: list[list[Array]], D: list[Array], b: Array) -> Array:
-    """M^-1 b for right-hand sides b (..., nv), from the factors of M."""
+    """Return M^-1 b for right-hand sides b (..., nv), from the factors of M."""
     return solve_ldl(L, D, b[..., ::-1])[..., ::-1]
 
 
 def filled_entries(mechanism: Mechanism) -> tuple[int, list[tuple[int, int]]]:
-    """nv, and the positions at which the factor L, in the order of elimination, may differ from zero."""
+    """Return nv, and the positions at which the factor L, in the order of elimination, may differ from
+    zero."""
     base = 6 if mechanism.floating else 0
     on_branch = np.zeros((mechanism.nv, mechanism.nv), dtype=bool)
     on_branch[:base] = True

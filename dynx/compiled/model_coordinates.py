@@ -11,7 +11,7 @@ from dynx.spatial.scalar import Array
 
 
 def tree_coordinates(mechanism: Mechanism, q: Array, *rates: Array) -> tuple[Array, ...]:
-    """q and velocities (or accelerations) of the model in coordinates of the tree."""
+    """Return q and velocities (or accelerations) of the model in coordinates of the tree."""
     coupling = mechanism.coupling
     if coupling is None:
         return (q, *rates)
@@ -20,13 +20,13 @@ def tree_coordinates(mechanism: Mechanism, q: Array, *rates: Array) -> tuple[Arr
 
 
 def reduce_columns(mechanism: Mechanism, A: Array) -> Array:
-    """A S: a torque (nv,) or the columns of a matrix, in the coordinates of the model."""
+    """Return a S: a torque (nv,) or the columns of a matrix, in the coordinates of the model."""
     coupling = mechanism.coupling
     return A if coupling is None else np.asarray(A @ coupling.matrix())
 
 
 def reduce_rows(mechanism: Mechanism, A: Array) -> Array:
-    """S' A: the rows of a matrix, in the coordinates of the model."""
+    """Return S' A: the rows of a matrix, in the coordinates of the model."""
     coupling = mechanism.coupling
     return A if coupling is None else np.asarray(coupling.matrix().T @ A)
 
@@ -34,7 +34,7 @@ def reduce_rows(mechanism: Mechanism, A: Array) -> Array:
 def argument_shapes(
     mechanism: Mechanism, arguments: Iterable[str], *, tree: bool = False
 ) -> dict[str, tuple[int, ...]]:
-    """Shapes of arguments such as q, v and tau in the coordinates of the model or of the tree."""
+    """Return the shapes of arguments such as q, v and tau in the coordinates of the model or of the tree."""
     coupling = None if tree else mechanism.coupling
     n = len(mechanism.bodies) if coupling is None else coupling.n_joints
     nq, nv = (n + 7, n + 6) if mechanism.floating else (n, n)

@@ -34,7 +34,7 @@ class Parameters:
     defaults: Floats
 
     def index(self, name: str) -> int:
-        """Index of a parameter on the last axis; raises UnknownNameError."""
+        """Return the index of a parameter on the last axis; raises UnknownNameError."""
         try:
             return self.names.index(name)
         except ValueError:
@@ -49,7 +49,7 @@ class ParameterValues:
     joints: Array | None
 
     def added_to(self, mechanism: Mechanism) -> Mechanism:
-        """The mechanism with these bodies rigidly connected to it."""
+        """Return the mechanism with these bodies rigidly connected to it."""
         inertia = {ROOT: mechanism.root, **{k: body.inertia for k, body in enumerate(mechanism.bodies)}}
         for number, added in self.bodies:
             frame = mechanism.frames[number]
@@ -83,7 +83,7 @@ class Selection:
         return self.links, self.payload, self.point_payload, self.joint_dynamics
 
     def parameters(self) -> Parameters:
-        """Names and defaults of the parameters."""
+        """Return the names and defaults of the parameters."""
         names: list[str] = []
         defaults: list[Floats] = []
         for link in self.links:
@@ -106,14 +106,14 @@ class Selection:
         return Parameters(tuple(names), whole)
 
     def remainder(self) -> Mechanism:
-        """The mechanism without the links whose inertia is an argument."""
+        """Return the mechanism without the links whose inertia is an argument."""
         links = [
             replace(link, inertial=None) if link.name in self.links else link for link in self.model.links
         ]
         return build_mechanism(replace(self.model, links=tuple(links)))
 
     def read(self, parameters: Array) -> ParameterValues:
-        """The values in an array (n,) of parameters."""
+        """Return the values in an array (n,) of parameters."""
         values = iter(parameters)
         bodies = [
             (self.model.frame_index(link), inertia_from_parameters(_next(values, 10))) for link in self.links

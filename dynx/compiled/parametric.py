@@ -42,7 +42,7 @@ def parametric(
     joint_dynamics: bool = False,
     threads: int | None = None,
 ) -> ParametricDynamics:
-    """The dynamics of `model` with parameters as arguments.
+    """Return the dynamics of `model` with parameters as arguments.
 
     - `links`: all ten inertial parameters of each of these links, which replace those of the model
     - `payload`: ten of a body fixed to this frame, about its origin and in its axes; zeros by default
@@ -85,14 +85,14 @@ class ParametricDynamics:
     def inverse_dynamics(
         self, q: ArrayLike, v: ArrayLike, a: ArrayLike, parameters: ArrayLike | None = None
     ) -> Floats:
-        """The torque (..., nv) that gives acceleration `a`."""
+        """Return the torque (..., nv) that gives acceleration `a`."""
         arrays = [self._arguments.q(q), self._arguments.v(v), self._arguments.v(a, "a")]
         return self._evaluate("inverse_dynamics", _inverse_dynamics, arrays, parameters)
 
     def forward_dynamics(
         self, q: ArrayLike, v: ArrayLike, tau: ArrayLike, parameters: ArrayLike | None = None
     ) -> Floats:
-        """The acceleration (..., nv) that `tau` gives, by factors of the mass matrix.
+        """Return the acceleration (..., nv) that `tau` gives, by factors of the mass matrix.
 
         Raises SingularMassMatrixError where that is singular.
         """
@@ -101,13 +101,13 @@ class ParametricDynamics:
         return self._arguments.finite_acceleration(a)
 
     def mass_matrix(self, q: ArrayLike, parameters: ArrayLike | None = None) -> Floats:
-        """M (..., nv, nv), symmetric, armature included where it is a parameter."""
+        """Return M (..., nv, nv), symmetric, armature included where it is a parameter."""
         return self._evaluate("mass_matrix", _mass_matrix, [self._arguments.q(q)], parameters)
 
     def acceleration(
         self, parameters: Array, q: Array, v: Array, tau: Array, rotors: Array | None = None
     ) -> Array:
-        """The acceleration (nv,) of one sample, for arrays of symbols in a trace.
+        """Return the acceleration (nv,) of one sample, for arrays of symbols in a trace.
 
         `rotors` (nv,) is the armature, added to the diagonal of the mass matrix.
         """
@@ -116,7 +116,7 @@ class ParametricDynamics:
         return _forward_dynamics(known.added_to(mechanism), known.joints, q, v, tau, rotors)
 
     def root(self, parameters: Array) -> RigidInertia:
-        """The inertia of the root with what is fixed to it, for an array of symbols."""
+        """Return the inertia of the root with what is fixed to it, for an array of symbols."""
         return self._selection.read(parameters).added_to(self._selection.remainder()).root
 
     def _evaluate(
@@ -195,7 +195,7 @@ def _forward_dynamics(
 
 
 def _joint_torque(mechanism: Mechanism, joints: Array | None, v: Array, a: Array) -> Array:
-    """Torque of damping, friction and armature, in tree coordinates."""
+    """Return the torque of damping, friction and armature, in tree coordinates."""
     torque = np.zeros(len(v), dtype=object)
     if joints is None:
         return torque

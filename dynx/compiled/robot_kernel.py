@@ -30,7 +30,8 @@ run about a tenth slower."""
 
 
 def robot_kernel(model: Model, purpose: object, program: Callable[[], Program]) -> Kernel:
-    """The kernel of `program`, which `model` and `purpose` determine; from the cache if it is there."""
+    """Return the kernel of `program`, which `model` and `purpose` determine; from the cache if it is
+    there."""
     content = (model.links, model.joints, model.base, model.gravity, model.extra_frames)
     recipe = repr((_algorithms(), content, purpose)).encode()
     lanes = host().lanes
@@ -40,7 +41,7 @@ def robot_kernel(model: Model, purpose: object, program: Callable[[], Program]) 
 
 
 def evaluate_kernel(kernel: Kernel, arrays: Sequence[Floats], threads: int) -> list[Floats]:
-    """The outputs (..., *shape) of a kernel for inputs (..., size) whose leading axes broadcast."""
+    """Return the outputs (..., *shape) of a kernel for inputs (..., size) whose leading axes broadcast."""
     batch = common_batch(*arrays)
     n = prod(batch)
     rows = [batch_rows(array, batch) for array in arrays]
@@ -55,7 +56,7 @@ def evaluate_kernel(kernel: Kernel, arrays: Sequence[Floats], threads: int) -> l
 
 @cache
 def _algorithms() -> str:
-    """Hash of the source of the packages that build such programs."""
+    """Return the hash of the source of the packages that build such programs."""
     packages = (dynx.rbd, dynx.spatial, dynx.model, dynx.backends, dynx.compiled)
     folders = [Path(str(package.__file__)).parent for package in packages]
     return f"{__version__} {np.__version__} {source_hash(*folders)}"

@@ -13,7 +13,8 @@ from dynx.spatial.scalar import Floats
 
 
 def simplify_mechanism(mechanism: Mechanism) -> Mechanism:
-    """The mechanism with the fewest constants: frames along the joint axes, no rounding residue in rotations.
+    """Return the mechanism with the fewest constants: frames along the joint axes, no rounding residue in
+    rotations.
 
     A right angle in a file becomes cos(pi/2) = 6e-17 where 0 was meant. Entries below half the
     spacing of doubles at 1 are smaller than the rounding errors of the entries of order 1 beside them, so
@@ -39,7 +40,7 @@ def _rounded_to_zero(R: Floats) -> Floats:
 
 
 def has_physical_inertias(mechanism: Mechanism) -> bool:
-    """Whether every body's inertia is positive semidefinite; then every mass matrix is too.
+    """Check whether every body's inertia is positive semidefinite; then every mass matrix is too.
 
     Elimination without pivoting is then as accurate as the matrix allows.
     """

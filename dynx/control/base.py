@@ -36,12 +36,12 @@ class Measurement(NamedTuple):
 
 
 def gain(unit: str) -> Any:
-    """Dataclass field for a gain: an array of numbers in `unit`, which a batch may vary."""
+    """Return the dataclass field for a gain: an array of numbers in `unit`, which a batch may vary."""
     return field(metadata={"unit": unit, "gain": True})
 
 
 def parameter(unit: str, *, argument: str | None = None) -> Any:
-    """Dataclass field for a number or an array of numbers in `unit` that is no gain.
+    """Return the dataclass field for a number or an array of numbers in `unit` that is no gain.
 
     `argument` is its name in the constructor, where that is another.
     """
@@ -81,20 +81,21 @@ class Controller(ABC, Generic[ControllerState]):
             setattr(cls, name, getattr(cls, name))
 
     def initial_state(self) -> Any:
-        """The state before the first step; None for a controller without one."""
+        """Return the state before the first step; None for a controller without one."""
         return None
 
     @abstractmethod
     def torque(
         self, measurement: Measurement, setpoint: Setpoint, state: ControllerState
     ) -> tuple[Floats, ControllerState]:
-        """The torque tau (nv,) to apply until the next control step, and the state then.
+        """Return the torque tau (nv,) to apply until the next control step, and the state then.
 
         The arrays given must not be written to; those returned must be new or never change.
         """
 
     def on(self: Self, engine: str | Backend) -> Self:
-        """The controller with its model evaluated by another backend; itself where it evaluates none."""
+        """Return the controller with its model evaluated by another backend; itself where it evaluates
+        none."""
         inner = getattr(self, "inner", None)
         return substitute(self, inner=inner.on(engine)) if isinstance(inner, Controller) else self
 
@@ -104,7 +105,8 @@ class Controller(ABC, Generic[ControllerState]):
         return type(self).__name__
 
     def content_key(self) -> tuple[Any, ...]:
-        """Key that is equal for equal controllers: their attributes, and the code of a class not of dynx.
+        """Return the key that is equal for equal controllers: their attributes, and the code of a class not
+        of dynx.
 
         Raises TypeError for attributes that cannot be compared.
         """
@@ -169,7 +171,7 @@ class ModelBased(Controller[ControllerState]):
         self._set(model=model, backend=backend, dynamics=EngineDynamics(engine_of(model, backend)))
 
     def on(self: Self, engine: str | Backend) -> Self:
-        """The controller with its model evaluated by another backend."""
+        """Return the controller with its model evaluated by another backend."""
         return substitute(self, backend=engine, dynamics=EngineDynamics(engine_of(self.model, engine)))
 
 
@@ -188,7 +190,7 @@ class Wrapper(Controller[ControllerState]):
 
 
 def chain_of(controller: Controller[Any]) -> Iterator[Controller[Any]]:
-    """A controller and those inside it, from the outermost to the innermost."""
+    """Yield a controller and those inside it, from the outermost to the innermost."""
     yield controller
     inner = getattr(controller, "inner", None)
     if isinstance(inner, Controller):
@@ -196,7 +198,7 @@ def chain_of(controller: Controller[Any]) -> Iterator[Controller[Any]]:
 
 
 def gains_of(controller: Controller[Any]) -> dict[str, Floats]:
-    """The gains that a controller declares; the public arrays of one that declares no fields."""
+    """Return the gains that a controller declares; the public arrays of one that declares no fields."""
     known = fields_of(controller)
     arrays = {name: x for name, x in attributes_of(controller).items() if isinstance(x, np.ndarray)}
     return {
@@ -207,7 +209,7 @@ def gains_of(controller: Controller[Any]) -> dict[str, Floats]:
 
 
 def substitute(controller: Self, **attributes: Any) -> Self:
-    """A copy of a controller with other attributes, which are not checked."""
+    """Return a copy of a controller with other attributes, which are not checked."""
     twin = copy.copy(controller)
     for name, value in attributes.items():
         object.__setattr__(twin, name, value)
@@ -219,7 +221,7 @@ def rebind(
     dynamics: Callable[[Dynamics], Dynamics],
     gains: Callable[[Controller[Any]], Mapping[str, Any]],
 ) -> Self:
-    """A copy of a controller, and of those inside it, over other dynamics and with other gains.
+    """Return a copy of a controller, and of those inside it, over other dynamics and with other gains.
 
     Neither is checked: they may be symbols of a trace.
     """
@@ -233,7 +235,7 @@ def rebind(
 
 
 def engine_of(model: Model, engine: str | Backend) -> Backend:
-    """The backend of that name for `model`, or `engine` itself if it is one of an equal model."""
+    """Return the backend of that name for `model`, or `engine` itself if it is one of an equal model."""
     if not isinstance(engine, Backend):
         return backend(engine, model, validate=False)
     if engine.model != model:

@@ -41,17 +41,17 @@ Seen = dict[int, tuple[int, Any]]
 
 
 def is_foreign(kind: type) -> bool:
-    """Whether a class is neither of dynx nor of a library that is known by its name."""
+    """Check whether a class is neither of dynx nor of a library that is known by its name."""
     return _is_foreign(kind.__module__)
 
 
 def digest_of_code(kind: type) -> str:
-    """Checksum of the code of a class and of its base classes that are not of dynx."""
+    """Return the checksum of the code of a class and of its base classes that are not of dynx."""
     return sha256(repr(_class(kind, {})).encode()).hexdigest()
 
 
 def digest_of_function(function: FunctionType) -> str:
-    """Checksum of the code of one function, as `digest_of_code` makes it."""
+    """Return the checksum of the code of one function, as `digest_of_code` makes it."""
     return sha256(repr(_function(function, {})).encode()).hexdigest()
 
 
@@ -61,7 +61,7 @@ def _is_foreign(module: str | None) -> bool:
 
 
 def _place(thing: Any, seen: Seen) -> str | None:
-    """Reference to a thing that was met already; a new one is noted."""
+    """Return the reference to a thing that was met already; a new one is noted."""
     if id(thing) in seen:
         return f"see {seen[id(thing)][0]}"
     seen[id(thing)] = (len(seen), thing)
@@ -83,7 +83,7 @@ def _class(kind: type, seen: Seen) -> Any:
 
 
 def _is_generated(kind: type, name: str, value: Any) -> bool:
-    """Whether a method was made by `dataclasses` from the fields, which are compared by themselves."""
+    """Check whether a method was made by `dataclasses` from the fields, which are compared by themselves."""
     if not isinstance(value, FunctionType) or "__dataclass_fields__" not in vars(kind):
         return False
     return name.startswith("__") and value.__code__.co_filename == "<string>"
@@ -115,7 +115,7 @@ def _is_filled(cell: Any) -> bool:
 
 
 def _is_compared(value: Any) -> bool:
-    """Whether a name of a module stands for a number, text, an array or a function."""
+    """Check whether a name of a module stands for a number, text, an array or a function."""
     return isinstance(value, bool | int | float | complex | str | bytes | tuple | np.ndarray | FunctionType)
 
 
@@ -137,7 +137,8 @@ def _code(code: CodeType, docstring: str | None) -> Any:
 
 
 def _value(value: Any, seen: Seen) -> Any:
-    """Content of a value that code refers to; the identity of an object that cannot be compared."""
+    """Return the content of a value that code refers to; the identity of an object that cannot be
+    compared."""
     kind = _name(type(value))
     if value is None or isinstance(value, bool | int | float | complex | str | bytes):
         return kind, repr(value)

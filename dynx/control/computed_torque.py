@@ -45,7 +45,7 @@ class ComputedTorque(ModelBased[None], pure=True):
         self._set(kp=kp, kd=kd)
 
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
-        """The torque (nv,)."""
+        """Return the torque (nv,)."""
         _, q, v = measurement
         a = commanded_acceleration(q, v, *setpoint, self.kp, self.kd)
         return self.dynamics.inverse_dynamics(q, v, a), None
@@ -54,6 +54,6 @@ class ComputedTorque(ModelBased[None], pure=True):
 def commanded_acceleration(
     q: Array, v: Array, q_wanted: Array, v_wanted: Array, a_wanted: Array, kp: Array, kd: Array
 ) -> Array:
-    """a* + kd (v* - v) + kp (q* - q), for arrays of any scalar."""
+    """Return a* + kd (v* - v) + kp (q* - q), for arrays of any scalar."""
     a: Array = a_wanted + kd * (v_wanted - v) + kp * (q_wanted - q)
     return a

@@ -13,7 +13,7 @@ from dynx.model import Model
 
 
 def content_of(thing: Any) -> Hashable:
-    """Key that is equal for two objects if and only if their contents are.
+    """Return the key that is equal for two objects if and only if their contents are.
 
     Raises TypeError for an object whose content is not known to be all that it is.
     """
@@ -36,12 +36,12 @@ def content_of(thing: Any) -> Hashable:
 
 
 def fields_of(thing: Any) -> dict[str, Field[Any]]:
-    """Dataclass fields by name; those of its base classes for an object of another class."""
+    """Return the dataclass fields by name; those of its base classes for an object of another class."""
     return {each.name: each for each in fields(thing)} if is_dataclass(thing) else {}
 
 
 def attributes_of(thing: Any) -> dict[str, Any]:
-    """The fields of a dataclass; of any other object the attributes that a copy of it would get."""
+    """Return the fields of a dataclass; of any other object the attributes that a copy of it would get."""
     kind = type(thing)
     if "__dataclass_fields__" in kind.__dict__:
         return {each.name: getattr(thing, each.name) for each in fields(thing)}

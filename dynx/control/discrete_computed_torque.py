@@ -35,13 +35,13 @@ class DiscreteComputedTorque(ModelBased[None], pure=True):
         self._set(control_dt=positive_seconds("control_dt", control_dt))
 
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
-        """The torque (nv,); the setpoint is that of the end of the step."""
+        """Return the torque (nv,); the setpoint is that of the end of the step."""
         _, q, v = measurement
         a = one_step_acceleration(q, v, setpoint.q, self.control_dt)
         return self.dynamics.inverse_dynamics(q, v, a), None
 
 
 def one_step_acceleration(q: Array, v: Array, q_next: Array, dt: Array | float) -> Array:
-    """The a with q + dt (v + dt a) = q_next, for arrays of any scalar."""
+    """Return the a with q + dt (v + dt a) = q_next, for arrays of any scalar."""
     a: Array = ((q_next - q) / dt - v) / dt
     return a

@@ -51,7 +51,7 @@ class Dynamics(ABC):
 
     @abstractmethod
     def evaluation(self, quantity: str) -> Evaluation:
-        """Callable for a quantity of that name."""
+        """Return the callable for a quantity of that name."""
 
 
 class EngineDynamics(Dynamics):
@@ -62,7 +62,8 @@ class EngineDynamics(Dynamics):
         super().__init__(backend.model)
 
     def evaluation(self, quantity: str) -> Evaluation:
-        """The engine's hook itself where it takes the model's coordinates, the backend's method otherwise."""
+        """Return the engine's hook itself where it takes the model's coordinates, the backend's method
+        otherwise."""
         backend = self.backend
         method: Evaluation = getattr(backend, quantity)
         if quantity in FRAME_QUANTITIES or not self._calls_hook(quantity):
@@ -73,17 +74,17 @@ class EngineDynamics(Dynamics):
         return hook if bare is None else partial(bare, backend)
 
     def bound_to_thread(self, quantity: str) -> Evaluation:
-        """Callable for the calling thread alone, quicker where the engine has one."""
+        """Return the callable for the calling thread alone, quicker where the engine has one."""
         quick = self.backend._unchecked_callable(quantity) if self._calls_hook(quantity) else None
         usual: Evaluation = getattr(self, quantity)
         return quick or usual
 
     def content_key(self) -> tuple[Any, ...]:
-        """Key that is equal for equal models in engines of one kind."""
+        """Return the key that is equal for equal models in engines of one kind."""
         return type(self.backend), self.backend.name, self.model
 
     def _calls_hook(self, quantity: str) -> bool:
-        """Whether the backend's method only passes its arguments to the hook of its engine."""
+        """Check whether the backend's method only passes its arguments to the hook of its engine."""
         backend, hook = self.backend, f"_{quantity}"
         unchanged = _function(backend, quantity) is getattr(Backend, quantity)
         own_hook = _function(backend, hook) is getattr(type(backend), hook)
@@ -94,5 +95,5 @@ class EngineDynamics(Dynamics):
 
 
 def _function(backend: Backend, name: str) -> object:
-    """The function behind a method; None if it was replaced on the object itself."""
+    """Return the function behind a method; None if it was replaced on the object itself."""
     return getattr(getattr(backend, name), "__func__", None)

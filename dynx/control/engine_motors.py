@@ -57,7 +57,7 @@ class EngineMotor(JointSpace[None]):
 
     @abstractmethod
     def command(self, measurement: Measurement, setpoint: Setpoint) -> MotorCommand:
-        """The command to the motors of all joints."""
+        """Return the command to the motors of all joints."""
 
     def _per_joint(self, name: str, number: ArrayLike) -> Floats:
         return checked_gain(name, number, self.n_joints, per="one for each joint")
@@ -67,7 +67,7 @@ class EngineMotor(JointSpace[None]):
 
 
 def _forces(limits: Floats | None) -> list[float] | None:
-    """Limits of the motors as the engine takes them, None for its own default."""
+    """Return the limits of the motors as the engine takes them, None for its own default."""
     if limits is None:
         return None
     finite: list[float] = np.minimum(limits, UNLIMITED_FORCE).tolist()
@@ -103,7 +103,7 @@ class PositionMotor(EngineMotor):
         )
 
     def command(self, measurement: Measurement, setpoint: Setpoint) -> MotorCommand:
-        """Position and velocity of the setpoint."""
+        """Return the position and velocity of the setpoint."""
         return MotorCommand(
             "POSITION_CONTROL",
             positions=setpoint.q[self.q_joints].tolist(),
@@ -126,7 +126,7 @@ class VelocityMotor(EngineMotor):
         self._set(force=self._limits(force))
 
     def command(self, measurement: Measurement, setpoint: Setpoint) -> MotorCommand:
-        """Velocity of the setpoint."""
+        """Return the velocity of the setpoint."""
         velocities = setpoint.v[self.v_joints].tolist()
         return MotorCommand("VELOCITY_CONTROL", velocities=velocities, forces=_forces(self.force))
 
@@ -146,7 +146,7 @@ class PDMotor(EngineMotor):
         self._set(kp=kp, kd=kd, force=self._limits(force))
 
     def command(self, measurement: Measurement, setpoint: Setpoint) -> MotorCommand:
-        """Position and velocity of the setpoint, and the gains."""
+        """Return the position and velocity of the setpoint, and the gains."""
         return MotorCommand(
             "PD_CONTROL",
             positions=setpoint.q[self.q_joints].tolist(),
@@ -173,6 +173,6 @@ class TorqueMotor(EngineMotor):
         self._wrap(inner)
 
     def command(self, measurement: Measurement, setpoint: Setpoint) -> MotorCommand:
-        """The joint torques of the inner controller."""
+        """Return the joint torques of the inner controller."""
         tau, _ = self.inner.torque(measurement, setpoint, None)
         return MotorCommand("TORQUE_CONTROL", forces=tau[self.v_joints].tolist())

@@ -78,11 +78,11 @@ class JointFriction:
         return bool(self.friction.any())
 
     def __call__(self, v: Array) -> Array:
-        """The torque (..., nv) of friction at velocity `v` (..., nv), arrays of any scalar."""
+        """Return the torque (..., nv) of friction at velocity `v` (..., nv), arrays of any scalar."""
         return self.lost(v, self.damping, self.friction)
 
     def lost(self, v: Array, damping: Array, friction: Array) -> Array:
-        """The torque (..., nv) that other coefficients, of the shape of this one's, take."""
+        """Return the torque (..., nv) that other coefficients, of the shape of this one's, take."""
         speed = v if self.to_tree is None else v @ self.to_tree.T
         lost = damping * speed
         if self._dry:

@@ -54,7 +54,7 @@ class FrictionCompensation(Wrapper[ControllerState], pure=True):
     def torque(
         self, measurement: Measurement, setpoint: Setpoint, state: ControllerState
     ) -> tuple[Floats, ControllerState]:
-        """The torque (nv,) of the inner controller plus that of friction."""
+        """Return the torque (nv,) of the inner controller plus that of friction."""
         tau, state = self.inner.torque(measurement, setpoint, state)
         return tau + self.losses(measurement.v if self.speed == "measured" else setpoint.v), state
 

@@ -11,7 +11,7 @@ from dynx.spatial.scalar import Floats
 
 
 def checked_gain(name: str, gain: ArrayLike, length: int, *, per: str = "one for each coordinate") -> Floats:
-    """`gain` as an array (length,) of finite numbers that are not negative, or a GainError.
+    """Return `gain` as an array (length,) of finite numbers that are not negative, or a GainError.
 
     Its copy cannot be written to.
     """
@@ -31,7 +31,7 @@ def checked_gain(name: str, gain: ArrayLike, length: int, *, per: str = "one for
 
 
 def positive_seconds(name: str, seconds: float) -> float:
-    """`seconds` as a float, or an ArgumentError if it is not a positive number."""
+    """Return `seconds` as a float, or an ArgumentError if it is not a positive number."""
     if not isinstance(seconds, int | float) or not 0.0 < seconds < np.inf:
         raise ArgumentError(f"{name} is {shown(seconds)}; wanted a positive number of seconds")
     return float(seconds)
@@ -44,7 +44,7 @@ def feedback_gains(
     natural_frequency: ArrayLike | None,
     damping_ratio: ArrayLike,
 ) -> tuple[Floats, Floats]:
-    """kp [1/s^2] and kd [1/s] (length,) of an error that obeys e'' + kd e' + kp e = 0.
+    """Return kp [1/s^2] and kd [1/s] (length,) of an error that obeys e'' + kd e' + kp e = 0.
 
     Either both gains, or the natural frequency w [rad/s] and the damping ratio z: kp = w^2, kd = 2 z w.
     Raises GainError for any other mixture.

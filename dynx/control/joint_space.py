@@ -34,5 +34,5 @@ class JointSpace(Controller[ControllerState]):
         return slice(6 if self.model.floating else 0, None)
 
     def all_torques(self, joint_torque: Any) -> Any:
-        """The torque (nv,) whose joint part is `joint_torque` (n,)."""
+        """Return the torque (nv,) whose joint part is `joint_torque` (n,)."""
         return np.concatenate([np.zeros(6), joint_torque]) if self.model.floating else joint_torque

@@ -35,6 +35,6 @@ class OpenLoop(Controller[None], pure=True):
         self._set(model=model, torques=table, row_dt=positive_seconds("control_dt", control_dt))
 
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
-        """The torque (nv,) of the row."""
+        """Return the torque (nv,) of the row."""
         row = round(measurement.t / self.row_dt)
         return (self.torques[row] if 0 <= row < len(self.torques) else np.zeros(self.model.nv)), None

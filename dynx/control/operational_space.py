@@ -63,7 +63,7 @@ class OperationalSpace(TaskSpace[None], pure=True):
         )
 
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
-        """The torque (nv,)."""
+        """Return the torque (nv,)."""
         _, q, v = measurement
         dynamics, frame = self.dynamics, self.frame
         error = self._error(measurement, setpoint)

@@ -31,7 +31,7 @@ class PD(JointSpace[None], pure=True):
         self._set(kp=checked_gain("kp", kp, n, per=per), kd=checked_gain("kd", kd, n, per=per))
 
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
-        """The torque (nv,)."""
+        """Return the torque (nv,)."""
         joints, rates = self.q_joints, self.v_joints
         tau = pd_torque(
             measurement.q[joints],
@@ -45,6 +45,6 @@ class PD(JointSpace[None], pure=True):
 
 
 def pd_torque(q: Array, v: Array, q_wanted: Array, v_wanted: Array, kp: Array, kd: Array) -> Array:
-    """kp (q* - q) + kd (v* - v), for arrays of any scalar."""
+    """Return kp (q* - q) + kd (v* - v), for arrays of any scalar."""
     tau: Array = kp * (q_wanted - q) + kd * (v_wanted - v)
     return tau

@@ -59,11 +59,11 @@ class PID(JointSpace[Floats], pure=True):
         self._set(control_dt=dt, tracking_time=span, limit=checked_limit(model, limit)[self.v_joints])
 
     def initial_state(self) -> Floats:
-        """An integral part of zero."""
+        """Return an integral part of zero."""
         return np.zeros(self.n_joints)
 
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: Floats) -> tuple[Floats, Floats]:
-        """The torque (nv,) within the limits, and the next integral part."""
+        """Return the torque (nv,) within the limits, and the next integral part."""
         joints, rates = self.q_joints, self.v_joints
         error = setpoint.q[joints] - measurement.q[joints]
         wanted = state + pd_torque(

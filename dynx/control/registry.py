@@ -27,7 +27,7 @@ GROUP = "dynx.controllers"
 
 
 def _own_controllers() -> dict[str, str]:
-    """Entries of the controllers in the modules beside this one."""
+    """Return the entries of the controllers in the modules beside this one."""
     modules = (name for _, name, _ in iter_modules([str(Path(__file__).parent)]) if name != "registry")
     members = (each for name in modules for each in vars(import_module(f"dynx.control.{name}")).values())
     # Not isinstance(each, type), which Python 3.10 affirms for aliases such as Callable[..., float].
@@ -48,7 +48,7 @@ unregister = _classes.unregister
 
 
 def to_document(controller: Controller[Any]) -> dict[str, Any]:
-    """The name of a controller's class and its constructor arguments, in types that JSON has.
+    """Return the name of a controller's class and its constructor arguments, in types that JSON has.
 
     Its model is left out. Numbers that are not finite are strings, such as "inf". Raises ArgumentError for
     a class that is no registered dataclass, and for an argument that cannot be written.
@@ -69,7 +69,8 @@ def to_document(controller: Controller[Any]) -> dict[str, Any]:
 
 
 def from_document(model: Model, document: Mapping[str, Any]) -> Controller[Any]:
-    """The controller of `model` that `to_document` wrote. Raises ArgumentError for any other document."""
+    """Return the controller of `model` that `to_document` wrote. Raises ArgumentError for any other
+    document."""
     arguments = {name: _read(model, value) for name, value in document.items() if name != "controller"}
     kind = controller_class(document.get("controller", ""))
     known = getattr(kind, "__dataclass_fields__", {})

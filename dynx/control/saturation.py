@@ -35,7 +35,7 @@ class Saturated(Wrapper[ControllerState], pure=True):
     def torque(
         self, measurement: Measurement, setpoint: Setpoint, state: ControllerState
     ) -> tuple[Floats, ControllerState]:
-        """The torque (nv,) of the inner controller, within the limits."""
+        """Return the torque (nv,) of the inner controller, within the limits."""
         tau, state = self.inner.torque(measurement, setpoint, state)
         return clamp(tau, self.limit), state
 
@@ -46,7 +46,8 @@ class Saturated(Wrapper[ControllerState], pure=True):
 
 
 def checked_limit(model: Model, limit: ArrayLike | None) -> Floats:
-    """Effort limits (nv,): the model's, or one number or one for each joint; LimitError where one is 0.
+    """Return the effort limits (nv,): the model's, or one number or one for each joint; LimitError where one
+    is 0.
 
     Infinite where there is none. Many descriptions say ``effort="0"`` for "not known": as a limit it
     would forbid any torque.

@@ -45,10 +45,10 @@ class Kinematics(Protocol):
         """The robot."""
 
     def forward_kinematics(self, q: Floats, frame: str) -> Floats:
-        """T_world_frame (4, 4)."""
+        """Return T_world_frame (4, 4)."""
 
     def jacobian(self, q: Floats, frame: str, *, point: Floats | None = None) -> Floats:
-        """J (6, nv), linear rows first, at the frame (or a point of it) in world axes."""
+        """Return J (6, nv), linear rows first, at the frame (or a point of it) in world axes."""
 
 
 @dataclass(frozen=True)

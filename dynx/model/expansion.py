@@ -85,7 +85,7 @@ def _is_directory(argument: str) -> bool:
 
 
 def is_library_name(argument: str) -> bool:
-    """Whether `dynx.load` would find the argument in the library."""
+    """Check whether `dynx.load` would find the argument in the library."""
     if os.sep in argument or "/" in argument:
         return False
     try:

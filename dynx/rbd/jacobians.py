@@ -65,14 +65,14 @@ def frame_jacobian_derivative(
 
 
 def frame_velocity(mechanism: Mechanism, poses: Poses, v: Array, frame: int, reference: Reference) -> Array:
-    """J v (..., 6) of frame number `frame`."""
+    """Return J v (..., 6) of frame number `frame`."""
     return _applied(frame_jacobian(mechanism, poses, frame, reference), v)
 
 
 def frame_acceleration(
     mechanism: Mechanism, poses: Poses, v: Array, a: Array, frame: int, reference: Reference
 ) -> Array:
-    """J a + dJ/dt v (..., 6) of frame number `frame`."""
+    """Return J a + dJ/dt v (..., 6) of frame number `frame`."""
     dJ = frame_jacobian_derivative(mechanism, poses, v, frame, reference)
     return _applied(frame_jacobian(mechanism, poses, frame, reference), a) + _applied(dJ, v)
 

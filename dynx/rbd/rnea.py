@@ -98,12 +98,12 @@ def inverse_dynamics(mechanism: Mechanism, q: Array, v: Array, a: Array) -> Arra
 
 
 def bias_torque(mechanism: Mechanism, q: Array, v: Array) -> Array:
-    """C v + g (..., nv): inverse dynamics at zero acceleration."""
+    """Return C v + g (..., nv): inverse dynamics at zero acceleration."""
     return inverse_dynamics(mechanism, q, v, np.zeros(v.shape))
 
 
 def gravity_torque(mechanism: Mechanism, q: Array) -> Array:
-    """g (..., nv): inverse dynamics at rest."""
+    """Return g (..., nv): inverse dynamics at rest."""
     rest = np.zeros((*q.shape[:-1], mechanism.nv))
     return inverse_dynamics(mechanism, q, rest, rest)
 

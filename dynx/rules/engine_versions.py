@@ -12,5 +12,6 @@ EVERY_ENGINE: Mapping[str, str] = MappingProxyType(
 
 
 def measured_on(*engines: str, **versions: str) -> Mapping[str, str]:
-    """`Rule.engines` for these engines, in the versions of `EVERY_ENGINE` or in `versions` of their own."""
+    """Return `Rule.engines` for these engines, in the versions of `EVERY_ENGINE` or in `versions` of their
+    own."""
     return {engine: EVERY_ENGINE[engine] for engine in engines} | versions

@@ -142,7 +142,8 @@ class Rule(ABC):
 
     @classmethod
     def trap(cls) -> str:
-        """Name of the file that shows the cause alone, in ``models/traps`` or beside the rule's module."""
+        """Return the name of the file that shows the cause alone, in ``models/traps`` or beside the rule's
+        module."""
         return f"{cls.id.lower()}_{cls.name.replace('-', '_')}.urdf"
 
 

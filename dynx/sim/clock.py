@@ -48,17 +48,18 @@ class Clock:
         return self.steps_per_control * self.dt
 
     def times(self) -> Floats:
-        """The times of all steps, the end included (n_steps + 1,) [s]."""
+        """Return the times of all steps, the end included (n_steps + 1,) [s]."""
         return np.arange(self.n_steps + 1, dtype=np.float64) * self.dt
 
     def control_times(self, lead: int) -> Floats:
-        """Times (n_controls,) [s] of the setpoints of the controller, `lead` control steps ahead."""
+        """Return the times (n_controls,) [s] of the setpoints of the controller, `lead` control steps
+        ahead."""
         steps = (np.arange(self.n_controls) + lead) * self.steps_per_control
         return steps.astype(np.float64) * self.dt
 
 
 def positive(name: str, seconds: object) -> float:
-    """A positive number of seconds as a float, or an ArgumentError."""
+    """Return a positive number of seconds as a float, or an ArgumentError."""
     if isinstance(seconds, int | float | np.integer | np.floating) and not isinstance(seconds, bool):
         number = float(seconds)
         if 0.0 < number < np.inf:

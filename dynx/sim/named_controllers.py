@@ -45,7 +45,7 @@ class Gains:
     posture_kd: ArrayLike | None = None
 
     def given(self) -> dict[str, ArrayLike]:
-        """Gains that are not None, by name."""
+        """Return the gains that are not None, by name."""
         pairs = ((field.name, getattr(self, field.name)) for field in fields(self))
         return {name: gain for name, gain in pairs if gain is not None}
 
@@ -72,11 +72,11 @@ class ControllerRequest:
         return self.model.nv - (6 if self.model.floating else 0)
 
     def rates(self, n: int | None = None) -> dict[str, Floats]:
-        """kp [1/s^2] and kd [1/s] of an error (n,), by default one for each coordinate."""
+        """Return kp [1/s^2] and kd [1/s] of an error (n,), by default one for each coordinate."""
         return self._feedback(np.ones(self.model.nv if n is None else n))
 
     def torques(self) -> dict[str, Floats]:
-        """kp [N m/rad or N/m] and kd [N m s/rad or N s/m] of the joints."""
+        """Return kp [N m/rad or N/m] and kd [N m s/rad or N s/m] of the joints."""
         return self._feedback(joint_inertia(self.model, self.start))
 
     def _feedback(self, inertia: Floats) -> dict[str, Floats]:
@@ -111,7 +111,7 @@ class NamedController:
 
 
 def joint_inertia(model: Model, q: Floats) -> Floats:
-    """Inertia (n,) [kg m^2 or kg] of each joint at `q`, with the others at rest.
+    """Return the inertia (n,) [kg m^2 or kg] of each joint at `q`, with the others at rest.
 
     With a floating base it is 1 / (M^-1)_ii, the inertia with all other coordinates free: the smallest
     possible, so that gains scaled by it do not overshoot.
@@ -125,7 +125,7 @@ def joint_inertia(model: Model, q: Floats) -> Floats:
 
 
 def named_controller(name: str, request: ControllerRequest) -> Controller[Any]:
-    """The controller of that name, one of `CONTROLLERS`.
+    """Return the controller of that name, one of `CONTROLLERS`.
 
     Raises UnknownNameError for another name, GainError for gains that the controller does not take.
     """
@@ -168,7 +168,7 @@ CONTROLLERS = NamedControllers()
 
 
 def _of_class(kind: type[Controller[Any]]) -> NamedController:
-    """A registered class, made with the gains and the other arguments that its constructor has."""
+    """Return a registered class, made with the gains and the other arguments that its constructor has."""
     parameters = signature(kind).parameters
 
     def make(request: ControllerRequest) -> Controller[Any]:

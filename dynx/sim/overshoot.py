@@ -43,7 +43,8 @@ def largest_overshoot(controller: Controller[Any] | None, q: Floats, control_dt:
 
 
 def _joint_damping(controller: Controller[Any], q: Floats) -> Floats | None:
-    """Damping of each coordinate (n,) [N m s/rad or N s/m] while the others are at rest; None without one."""
+    """Return the damping of each coordinate (n,) [N m s/rad or N s/m] while the others are at rest; None
+    without one."""
     kd = fields_of(controller).get("kd")
     if kd is not None and kd.metadata.get("unit", "").startswith("N"):
         damping: Floats = controller.kd  # type: ignore[attr-defined]

@@ -44,13 +44,14 @@ def refuse_other_scenario(rollout: Rollout, scenario: Scenario) -> None:
 
 
 def changed_parts(theirs: Scenario, ours: Scenario) -> list[str]:
-    """Names of the fields in which two scenarios differ, and of those inside; a controller is one field."""
+    """Return the names of the fields in which two scenarios differ, and of those inside; a controller is one
+    field."""
     names = (each.field for each in theirs.differences(ours))
     return list(dict.fromkeys("controller" if name.startswith("controller.") else name for name in names))
 
 
 def model_difference(ours: Model, theirs: Model) -> tuple[str, str, str]:
-    """Name of the first attribute in which two models differ, and its two values."""
+    """Return the name of the first attribute in which two models differ, and its two values."""
     for name in ("name", "base", "gravity", "links", "joints", "extra_frames"):
         pair = getattr(ours, name), getattr(theirs, name)
         if pair[0] != pair[1]:
@@ -59,7 +60,7 @@ def model_difference(ours: Model, theirs: Model) -> tuple[str, str, str]:
 
 
 def _innermost(name: str, ours: Any, theirs: Any) -> tuple[str, str, str]:
-    """The first attribute inside two values in which they differ."""
+    """Return the first attribute inside two values in which they differ."""
     if is_dataclass(ours) and type(ours) is type(theirs):
         for each in fields(ours):
             pair = getattr(ours, each.name), getattr(theirs, each.name)

@@ -66,7 +66,7 @@ class Setup:
 
 
 def known_controller(scenario: Scenario) -> Controller[Any] | None:
-    """The controller of a scenario.
+    """Return the controller of a scenario.
 
     Raises ArgumentError where controller or reference were read from a file and their class is not here.
     """
@@ -82,7 +82,7 @@ def known_controller(scenario: Scenario) -> Controller[Any] | None:
 
 
 def clock_of(scenario: Scenario) -> Clock:
-    """The clock of a scenario. Raises ArgumentError for times that are no multiples of `dt`."""
+    """Return the clock of a scenario. Raises ArgumentError for times that are no multiples of `dt`."""
     duration = scenario.duration
     if duration is None and isinstance(scenario.reference, Trajectory):
         duration = scenario.reference.duration
@@ -99,7 +99,7 @@ def require_duration(scenario: Scenario) -> None:
 
 
 def disturbances_of(scenario: Scenario, moved: Model) -> Disturbances:
-    """Friction, armature and pushes of a scenario on `moved`, the model of its plant."""
+    """Return the friction, armature and pushes of a scenario on `moved`, the model of its plant."""
     return Disturbances(
         moved,
         scenario.damping,
@@ -112,7 +112,8 @@ def disturbances_of(scenario: Scenario, moved: Model) -> Disturbances:
 
 
 def effort_limits_of(scenario: Scenario) -> Floats | None:
-    """Effort limits (nv,) of a scenario. Raises ArgumentError for limits that its motors cannot have."""
+    """Return the effort limits (nv,) of a scenario. Raises ArgumentError for limits that its motors cannot
+    have."""
     if scenario.effort_limits is False:
         return None
     if isinstance(scenario.controller, EngineMotor):

@@ -305,7 +305,7 @@ class Simulation:
         return self.state
 
     def save(self) -> Snapshot:
-        """The simulation as it is now, with its record; `restore` continues from it bit for bit.
+        """Return the simulation as it is now, with its record; `restore` continues from it bit for bit.
 
         Raises ArgumentError for a controller that changed itself.
         """

@@ -126,7 +126,7 @@ def tutorial(
     plants: tuple[str, ...] = PLANTS,
     backend: str = DYNX,
 ) -> Tutorial:
-    """The tutorial's experiments; `model` is by default the UR5 in the tutorial's gravity.
+    """Return the tutorial's experiments; `model` is by default the UR5 in the tutorial's gravity.
 
     The cycloidal motion goes from `start` (neutral by default) to `to` (by default `TO`, for an arm of six
     joints) in `duration` [s], in steps of `dt`, on `plants`; the controllers evaluate `backend`.
@@ -155,7 +155,7 @@ def tutorial(
 
 
 def _missing(plant: str) -> str | None:
-    """Reason why a plant is not available, None if it is."""
+    """Return the reason why a plant is not available, None if it is."""
     try:
         backend_class(plant).require_engine()
     except BackendError as error:

@@ -19,7 +19,7 @@ LEAST = 1e-16
 
 
 def plot_rows(rows: Sequence[Row], tutorial: Tutorial, path: str | os.PathLike[str] | None = None) -> Any:
-    """A `matplotlib.figure.Figure` with a panel for each plant; saved at `path`.
+    """Return a `matplotlib.figure.Figure` with a panel for each plant; saved at `path`.
 
     Shown is the largest error of all joints at each time. Raises NotInstalledError without matplotlib
     (``pip install 'dynx[plot]'``), ArgumentError where the file cannot be written.

@@ -184,15 +184,15 @@ class Symbol:
         return self._unary("abs")
 
     def sqrt(self) -> Symbol:
-        """Square root."""
+        """Return the square root."""
         return self._unary("sqrt")
 
     def sin(self) -> Symbol:
-        """Sine [rad]."""
+        """Return the sine [rad]."""
         return self._unary("sin")
 
     def cos(self) -> Symbol:
-        """Cosine [rad]."""
+        """Return the cosine [rad]."""
         return self._unary("cos")
 
     def exp(self) -> Symbol:
@@ -200,11 +200,11 @@ class Symbol:
         return self._unary("exp")
 
     def tanh(self) -> Symbol:
-        """Hyperbolic tangent."""
+        """Return the hyperbolic tangent."""
         return self._unary("tanh")
 
     def arctan(self) -> Symbol:
-        """Arctangent [rad], between -pi/2 and pi/2."""
+        """Return the arctangent [rad], between -pi/2 and pi/2."""
         return self._unary("arctan")
 
     def sign(self) -> Symbol:

@@ -20,37 +20,37 @@ Floats = NDArray[np.float64]
 
 
 def sin(x: Array) -> Array:
-    """Sine of each element [rad]."""
+    """Return the sine of each element [rad]."""
     return _elementwise("sin", x)
 
 
 def cos(x: Array) -> Array:
-    """Cosine of each element [rad]."""
+    """Return the cosine of each element [rad]."""
     return _elementwise("cos", x)
 
 
 def sqrt(x: Array) -> Array:
-    """Square root of each element."""
+    """Return the square root of each element."""
     return _elementwise("sqrt", x)
 
 
 def exp(x: Array) -> Array:
-    """Exponential of each element."""
+    """Return the exponential of each element."""
     return _elementwise("exp", x)
 
 
 def tanh(x: Array) -> Array:
-    """Hyperbolic tangent of each element."""
+    """Return the hyperbolic tangent of each element."""
     return _elementwise("tanh", x)
 
 
 def arctan(x: Array) -> Array:
-    """Arctangent of each element [rad], between -pi/2 and pi/2."""
+    """Return the arctangent of each element [rad], between -pi/2 and pi/2."""
     return _elementwise("arctan", x)
 
 
 def sign(x: Array) -> Array:
-    """Sign of each element: -1, 0 or 1."""
+    """Return the sign of each element: -1, 0 or 1."""
     return _elementwise("sign", x)
 
 

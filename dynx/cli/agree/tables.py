@@ -101,12 +101,12 @@ def show_summary(out: Console, summary: dict[str, int], seconds: float) -> None:
 
 
 def label(entry: Entry) -> str:
-    """The robot of an entry as one short line."""
+    """Return the robot of an entry as one short line."""
     return short_line(entry["robot"])
 
 
 def verdict(entry: Entry) -> str:
-    """``agree``, ``differ`` or ``refused``."""
+    """Return ``agree``, ``differ`` or ``refused``."""
     if entry["error"] is not None:
         return "refused"
     return "agree" if entry["agree"] else "differ"

@@ -73,7 +73,7 @@ def _ns(ns: float | None) -> str:
 
 
 def _spread(entry: Entry) -> str:
-    """Interquartile range over the median."""
+    """Return the interquartile range over the median."""
     if not entry["ns"]:
         return "-"
     low, high = entry["ns_quartiles"]

@@ -68,7 +68,7 @@ class Conclusion:
         return NEGATIVE_RESULT if any(self._fails(report) for report in reports) else DONE
 
     def _fails(self, report: DoctorReport) -> bool:
-        """Whether engines differ in a way that no baseline, read or just written, contains."""
+        """Check whether engines differ in a way that no baseline, read or just written, contains."""
         if self._baseline is not None:
             return not report.alike and bool(self._baseline.compare(report).new)
         return not report.alike and self._outputs.baseline is None

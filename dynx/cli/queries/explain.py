@@ -69,7 +69,7 @@ def _print_page(rule: Rule) -> None:
 
 
 def _facts(rule: Rule) -> Iterator[tuple[str, str]]:
-    """Facts about a rule that its page does not contain, as label and text."""
+    """Yield the facts about a rule that its page does not contain, as label and text."""
     yield "kind", rule.kind
     if rule.engines:
         yield "engines", ", ".join(f"{engine} {versions}" for engine, versions in rule.engines.items())

@@ -51,7 +51,7 @@ class LazyGroup(click.Group):
         return {each.name: each for each in entry_points(group=GROUP) if each.name not in self.table}
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """Names of the commands: the table in its order, then those of other packages by name."""
+        """Return the names of the commands: the table in its order, then those of other packages by name."""
         return [*self.table, *sorted({*self._entry_points, *self.commands} - {*self.table})]
 
     def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
@@ -113,7 +113,7 @@ def import_object(target: str) -> Any:
 
 
 def _may_have_entry_points() -> bool:
-    """Whether metadata on ``sys.path`` names the entry-point group (or may, inside an archive)."""
+    """Check whether metadata on ``sys.path`` names the entry-point group (or may, inside an archive)."""
     for folder in sys.path:
         try:
             names = os.listdir(folder or os.curdir)

@@ -66,7 +66,7 @@ def document(request: SimulationRequest, rollout: Rollout, seconds: float, ended
 
 
 def _summary(rollout: Rollout) -> Entry:
-    """Numbers of the whole robot, over all joints and times."""
+    """Return the numbers of the whole robot, over all joints and times."""
     with np.errstate(all="ignore"):
         summary = rollout.summary()
         return {
@@ -79,7 +79,7 @@ def _summary(rollout: Rollout) -> Entry:
 
 
 def _joints(model: Model, rollout: Rollout) -> list[Entry]:
-    """Entries of all coordinates of v, those of a floating base first."""
+    """Return the entries of all coordinates of v, those of a floating base first."""
     with np.errstate(all="ignore"):
         summary = rollout.summary()
     in_effect = rollout.settings.get("effort_limits")
@@ -104,20 +104,20 @@ def _joints(model: Model, rollout: Rollout) -> list[Entry]:
 
 
 def _names(model: Model) -> list[str]:
-    """Names of the coordinates of v; those of a floating base are in its own axes."""
+    """Return the names of the coordinates of v; those of a floating base are in its own axes."""
     base = ["base x", "base y", "base z", "base rx", "base ry", "base rz"] if model.floating else []
     return [*base, *model.joint_names]
 
 
 def _units(model: Model) -> list[str]:
-    """``rad`` or ``m`` for each coordinate of v."""
+    """Return ``rad`` or ``m`` for each coordinate of v."""
     kinds = {joint.name: joint.type for joint in model.joints}
     base = ["m"] * 3 + ["rad"] * 3 if model.floating else []
     return [*base, *("m" if kinds[name] == "prismatic" else "rad" for name in model.joint_names)]
 
 
 def _settings(request: SimulationRequest, rollout: Rollout) -> Entry:
-    """Settings of the record, with noise and pushes as objects, and with the armature."""
+    """Return the settings of the record, with noise and pushes as objects, and with the armature."""
     scenario, kept = request.scenario, rollout.settings
     return {
         **kept,
@@ -132,7 +132,7 @@ def _noise(noise: Noise) -> Entry:
 
 
 def _push(push: Push) -> Entry:
-    """Entry of one push; `duration` None lasts until the end."""
+    """Return the entry of one push; `duration` None lasts until the end."""
     return {
         "frame": push.frame,
         "wrench": np.asarray(push.wrench).tolist(),
@@ -143,7 +143,7 @@ def _push(push: Push) -> Entry:
 
 
 def _is_passive(request: SimulationRequest, rollout: Rollout) -> bool:
-    """Whether nothing does work on the robot, so that its energy is conserved."""
+    """Check whether nothing does work on the robot, so that its energy is conserved."""
     joints = rollout.settings["joints"]
     disturbed = any(joints["damping"]) or any(joints["friction"]) or request.scenario.pushes
     return request.controller is None and not disturbed and not request.scenario.position_limits
@@ -158,7 +158,8 @@ def _status(ended: EarlyEnd) -> str:
 
 
 def _overshoot(request: SimulationRequest, ended: EarlyEnd) -> Entry | None:
-    """Joint whose damping is unstable for the time step, where that can be the reason for divergence."""
+    """Return the joint whose damping is unstable for the time step, where that can be the reason for
+    divergence."""
     if not isinstance(ended, DivergedError):
         return None
     found = largest_overshoot(request.controller, np.asarray(request.scenario.q0), request.clock.control_dt)
@@ -166,7 +167,7 @@ def _overshoot(request: SimulationRequest, ended: EarlyEnd) -> Entry | None:
 
 
 def _error(ended: EarlyEnd) -> Entry | None:
-    """Reason why the simulation ended early, with time and state."""
+    """Return the reason why the simulation ended early, with time and state."""
     if ended is None:
         return None
     if isinstance(ended, RolloutInterrupted):

@@ -142,14 +142,15 @@ def _controller(
 
 
 def _motor_limit(model: Model, limits: Coefficients | None) -> Any:
-    """Effort limit of motors [N m or N]; None leaves it to the controller."""
+    """Return the effort limit of motors [N m or N]; None leaves it to the controller."""
     return model.effort_limit[6 if model.floating else 0 :] if limits is True else limits
 
 
 def _limits_of_motors(
     model: Model, limits: Coefficients | None, controller: Controller[Any] | None
 ) -> list[float] | None:
-    """Effort limits of PyBullet's motors; None for another controller, or for the limits of the engine."""
+    """Return the effort limits of PyBullet's motors; None for another controller, or for the limits of the
+    engine."""
     if limits is None or not isinstance(controller, EngineMotor):
         return None
     base = 6 if model.floating else 0
@@ -158,7 +159,8 @@ def _limits_of_motors(
 
 
 def _joint_dynamics(given: dict[str, Any]) -> dict[str, Any]:
-    """Damping, friction and armature of the joints; single options override ``--joint-dynamics``."""
+    """Return the damping, friction and armature of the joints; single options override
+    ``--joint-dynamics``."""
     all_of_urdf: bool = given["joint_dynamics"]
     names = ("damping", "friction", "armature")
     dynamics = {name: all_of_urdf if given[name] is None else given[name] for name in names}
@@ -189,7 +191,7 @@ def _noise(given: dict[str, Any]) -> Noise | None:
 
 
 def _gains_of(controller: Controller[Any] | None) -> dict[str, list[float]]:
-    """Gains of a controller, given or default."""
+    """Return the gains of a controller, given or default."""
     inner = _innermost(controller)
     gains = {name: getattr(inner, name, None) for name in ("kp", "ki", "kd", "stiffness", "damping")}
     return {name: gain.tolist() for name, gain in gains.items() if isinstance(gain, np.ndarray)}
@@ -200,7 +202,7 @@ def _innermost(controller: Controller[Any] | None) -> Controller[Any] | None:
 
 
 def _uses_backend(controller: Controller[Any] | None) -> bool:
-    """Whether the controller evaluates its model with a backend."""
+    """Check whether the controller evaluates its model with a backend."""
     return isinstance(_innermost(controller), ModelBased)
 
 
@@ -214,7 +216,7 @@ def _push(given: PushInput) -> Push:
 
 
 def _mass_scale(model: Model, given: tuple[tuple[str | None, float], ...]) -> float | dict[str, float]:
-    """Factor of all links, or of each link where some have their own."""
+    """Return the factor of all links, or of each link where some have their own."""
     whole = [factor for link, factor in given if link is None]
     named = [link for link, _ in given if link is not None]
     if len(whole) > 1 or len(named) > len(set(named)):

@@ -82,7 +82,7 @@ def _motion(report: Entry) -> str:
 
 
 def _joint_table(report: Entry) -> Table:
-    """Table with a line for each coordinate of v; errors are those of its position."""
+    """Return the table with a line for each coordinate of v; errors are those of its position."""
     joints: list[Entry] = report["joints"]
     right = ("max\nerror", "RMS\nerror", "max\nspeed", "max\ntorque", "torque\nlimit", "of\nlimit")
     table = Table("joint", "unit", *right, right=right, keys=1)

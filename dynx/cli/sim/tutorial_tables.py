@@ -49,7 +49,7 @@ def show(out: Console, report: Entry) -> None:
 
 
 def _problems(report: Entry) -> dict[tuple[str, str], list[str]]:
-    """Controllers without numbers, by the plants and the reason."""
+    """Return the controllers without numbers, by the plants and the reason."""
     found: dict[tuple[str, str], list[str]] = {}
     for mode in report["modes"]:
         of_mode: dict[str, list[str]] = {}

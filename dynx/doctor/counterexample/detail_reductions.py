@@ -91,7 +91,7 @@ def round_numbers(source: XmlSource, digits: int) -> Reductions:
 
 
 def complexity(word: str) -> int:
-    """Complexity of a number: 0 for zero, 1 for one, else 1 plus its significant digits."""
+    """Return the complexity of a number: 0 for zero, 1 for one, else 1 plus its significant digits."""
     value = abs(float(word))
     if value in (0.0, 1.0):
         return int(value)
@@ -153,7 +153,7 @@ def _roundings(source: XmlSource, simpler: Simpler) -> Reductions:
 
 
 def _numbers(source: XmlSource) -> Iterator[tuple[SourceElement, str, list[str]]]:
-    """Attributes that hold finite numbers and nothing else, with these numbers as text."""
+    """Yield the attributes that hold finite numbers and nothing else, with these numbers as text."""
     for element in source.root.walk():
         for attribute in element.places:
             words = element.attributes[attribute].split()

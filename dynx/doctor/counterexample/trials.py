@@ -56,7 +56,7 @@ class Trials:
         return self.error(case, state) > self.threshold and self._adds_no_cause(case)
 
     def error(self, case: Case, state: ReducibleState) -> float:
-        """Relative error, infinite for NaN; 0 where nothing was tried."""
+        """Return the relative error, infinite for NaN; 0 where nothing was tried."""
         model = self.model(case)
         if model is None:
             return 0.0
@@ -71,7 +71,7 @@ class Trials:
         return self._errors[key]
 
     def model(self, case: Case) -> Model | None:
-        """Robot in the coordinates of all its moving joints; None where dynx refuses the text."""
+        """Return the robot in the coordinates of all its moving joints; None where dynx refuses the text."""
         text = _digest(case)
         if self._last_model[0] != text:
             try:

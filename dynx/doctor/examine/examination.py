@@ -69,7 +69,8 @@ class Examination:
         )
 
     def scale(self, quantity: str, engine: str) -> float:
-        """Divisor of a deviation: the largest reference value, or the engine's largest where that is 0.
+        """Return the divisor of a deviation: the largest reference value, or the engine's largest where that
+        is 0.
 
         A backward error is relative already.
         """
@@ -95,7 +96,7 @@ class Examination:
         return _number(_largest(output.deviation.get(quantity, {})) / self.scale(quantity, engine))
 
     def errors(self, engine: str) -> dict[str, float]:
-        """`error` of every quantity that was examined; empty where the file was refused."""
+        """Return `error` of every quantity that was examined; empty where the file was refused."""
         output = self.outputs[engine]
         if output.refused is not None:
             return {}
@@ -109,8 +110,8 @@ class Examination:
         return max(self.errors(engine).values(), default=0.0)
 
     def joint_errors(self, engine: str, other: str | None = None) -> dict[str, float]:
-        """Errors of inverse dynamics joint by joint, against the reference or another engine, over the
-        joint's largest reference torque (at least 1e-9 of the largest of all)."""
+        """Return the errors of inverse dynamics joint by joint, against the reference or another engine, over
+        the joint's largest reference torque (at least 1e-9 of the largest of all)."""
         mine = self.outputs[engine].deviation.get(TORQUE, {}).get("")
         theirs = None if other is None else self.outputs[other].deviation.get(TORQUE, {}).get("")
         if mine is None or (other is not None and theirs is None):
@@ -122,7 +123,8 @@ class Examination:
         return dict(zip(coordinate_names(self.reference), ratio.tolist(), strict=True))
 
     def pair_error(self, engine: str, other: str, quantity: str) -> float:
-        """Deviation of two engines from each other, over its scale; infinite where one computed nothing."""
+        """Return the deviation of two engines from each other, over its scale; infinite where one computed
+        nothing."""
         one, two = self.outputs[engine], self.outputs[other]
         if quantity in {*one.failed, *two.failed} or one.refused or two.refused:
             return float("inf")
@@ -222,7 +224,7 @@ def _jacobian_deviation(robot: LoadedRobot, reference: ReferenceValues) -> dict[
 
 
 def _acceleration_deviation(robot: LoadedRobot, reference: ReferenceValues) -> Floats:
-    """Backward errors for the torques of the states, and for those that accelerate the other way.
+    """Return the backward errors for the torques of the states, and for those that accelerate the other way.
 
     A force that acts on one side only, such as that of a joint limit, shows in one of the two.
     """

@@ -140,7 +140,7 @@ def reference_values(model: Model, states: States) -> ReferenceValues:
 
 
 def referee_error(reference: ReferenceValues) -> float:
-    """Relative error of the reference values themselves at the first state, against 50 digits."""
+    """Return the relative error of the reference values themselves at the first state, against 50 digits."""
     if not reference.model.nv:
         return 0.0
     states, referee = reference.states, Referee(reference.model)

@@ -82,7 +82,7 @@ def _printable(value: Any) -> Any:
 
 
 def bar_position(error: float) -> float:
-    """Position of an error on its bar [%]; an error that is not finite fills it."""
+    """Return the position of an error on its bar [%]; an error that is not finite fills it."""
     if not math.isfinite(error):
         return 100.0
     power = math.log10(max(error, 10.0**LOWEST_BAR))

@@ -114,7 +114,7 @@ def _result(
 
 
 def _key(each: Finding | Unexplained | Place) -> tuple[str | None, ...]:
-    """Identity that a finding shares with its place in a baseline."""
+    """Return the identity that a finding shares with its place in a baseline."""
     if isinstance(each, Unexplained):
         return (UNEXPLAINED, None, each.joint, each.quantity)
     return (each.rule, each.link, each.joint, each.quantity if isinstance(each, Place) else None)

@@ -61,7 +61,7 @@ def largest_error(report: DoctorReport) -> float:
 
 
 def largest_quantity_error(engine: EngineResult) -> tuple[str, float] | None:
-    """Quantity with the largest error of an engine, and that error."""
+    """Return the quantity with the largest error of an engine, and that error."""
     if not engine.before:
         return None
     return max(engine.before.items(), key=lambda item: math.inf if math.isnan(item[1]) else item[1])

@@ -95,7 +95,7 @@ class Attributor:
     def _effects_of_removal(
         self, rule: Rule, found: Sequence[Detection], engines: Collection[str], states: int | None = None
     ) -> dict[str, Effect]:
-        """Effects on each engine of removing the cause at these places and nothing else."""
+        """Return the effects on each engine of removing the cause at these places and nothing else."""
         if not engines:
             return {}
         remedy = remedy_of(self.case, rule, found)
@@ -111,7 +111,7 @@ class Attributor:
     def _effects_of_reinsertion(
         self, rule: Rule, found: Sequence[Detection], engines: Sequence[str]
     ) -> dict[str, Effect]:
-        """Effects on each engine of reinserting the cause into the mended file."""
+        """Return the effects on each engine of reinserting the cause into the mended file."""
         rest: Mending = mend(self.case, [other for other in self.rules if other is not rule])
         if not rest.case.readable:
             return {}
@@ -136,7 +136,7 @@ class Attributor:
     def _effects(
         self, engines: Iterable[str], with_cause: Examination, without: Examination
     ) -> dict[str, Effect]:
-        """Effects above the tolerance."""
+        """Return the effects above the tolerance."""
         found = {name: self._effect(name, with_cause, without) for name in engines}
         return {name: effect for name, effect in found.items() if effect is not NO_EFFECT}
 
@@ -164,7 +164,8 @@ class Attributor:
         return Attribution(rule, each, dict(effects), bool(effects) and right)
 
     def _reference_of(self, remedy: Remedy) -> ReferenceValues:
-        """Reference values of the file after a remedy: the known ones where the robot is the same."""
+        """Return the reference values of the file after a remedy: the known ones where the robot is the
+        same."""
         if not remedy.changes_physics and _coordinates(remedy.case) == _coordinates(self.case):
             return self.before.reference
         # Other places may still hold text that dynx refuses, whose meaning is known too.

@@ -136,7 +136,7 @@ class DrakeBackend(Backend):
         return self._convert_to_reference(acceleration, on_robot, context, reference)
 
     def _convert_to_reference(self, motion: Floats, frame: Any, context: Any, reference: Reference) -> Floats:
-        """A spatial vector at the frame's origin, in world axes, converted to `reference`."""
+        """Return a spatial vector at the frame's origin, in world axes, converted to `reference`."""
         if reference == "local_world_aligned":
             return motion
         T = frame.CalcPoseInWorld(context)
@@ -253,8 +253,8 @@ class DrakeBackend(Backend):
 
 
 def _upright(q: Floats) -> Floats:
-    """The configuration with the base frame at that of the world, on whose pose no mass matrix or torque
-    depends.
+    """Return the configuration with the base frame at that of the world, on whose pose no mass matrix or
+    torque depends.
 
     Drake computes in world axes: rotating a slender robot there and its results back would lose the digits
     of its small moment beside its large ones.

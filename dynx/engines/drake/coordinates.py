@@ -48,7 +48,7 @@ class DrakeCoordinates:
         self._same = base is None and list(q_index) == list(range(n_q)) and list(v_index) == list(range(n_v))
 
     def attitude(self, q: Floats) -> Floats:
-        """R_world_base (3, 3); an unused empty array for a fixed base."""
+        """Return R_world_base (3, 3); an unused empty array for a fixed base."""
         if not self._floating:
             return _EMPTY
         # In Python, because NumPy takes ten times as long for arrays this small.
@@ -64,17 +64,17 @@ class DrakeCoordinates:
         )
 
     def positions(self, q: Floats) -> Floats:
-        """The plant's q at the configuration `q` of dynx."""
+        """Return the plant's q at the configuration `q` of dynx."""
         if self._same:
             return q
         return (np.append(q, 0.0) if self._pad_q else q)[self._from_q]
 
     def velocities(self, R: Floats, v: Floats) -> Floats:
-        """The plant's v at the velocity `v` of dynx."""
+        """Return the plant's v at the velocity `v` of dynx."""
         return v if self._same else self._to_plant(R, v)
 
     def accelerations(self, R: Floats, v: Floats, a: Floats) -> Floats:
-        """The plant's dv/dt at the velocity `v` and the acceleration `a` of dynx."""
+        """Return the plant's dv/dt at the velocity `v` and the acceleration `a` of dynx."""
         if self._same:
             return a
         if self._floating:
@@ -83,18 +83,19 @@ class DrakeCoordinates:
         return self._to_plant(R, a)
 
     def accelerations_back(self, R: Floats, v: Floats, vdot: Floats) -> Floats:
-        """The acceleration of dynx at the plant's dv/dt."""
+        """Return the acceleration of dynx at the plant's dv/dt."""
         a = self.forces_back(R, vdot)
         if self._floating:
             a[:3] -= _cross_product(v)
         return a
 
     def forces(self, R: Floats, tau: Floats) -> Floats:
-        """The plant's generalized force for the torque `tau` of dynx."""
+        """Return the plant's generalized force for the torque `tau` of dynx."""
         return tau if self._same else self._to_plant(R, tau)
 
     def forces_back(self, R: Floats, force: Floats) -> Floats:
-        """The torque of dynx for the plant's generalized force; also for the rows of a matrix (..., n_v)."""
+        """Return the torque of dynx for the plant's generalized force; also for the rows of a matrix (...,
+        n_v)."""
         if self._same:
             return force
         out: Floats = force[..., self._columns]
@@ -105,7 +106,7 @@ class DrakeCoordinates:
         return out
 
     def matrix_back(self, R: Floats, M: Floats) -> Floats:
-        """The mass matrix of dynx for the plant's."""
+        """Return the mass matrix of dynx for the plant's."""
         if self._same:
             return M
         return self.forces_back(R, self.forces_back(R, M).T)
@@ -117,15 +118,15 @@ class DrakeCoordinates:
 
 
 def _gather(indices: Sequence[int], length: int) -> tuple[Array, bool]:
-    """The index of the source of each of the plant's entries (one past the end for none), and whether some
-    have none."""
+    """Return the index of the source of each of the plant's entries (one past the end for none), and whether
+    some have none."""
     source = np.full(length, len(indices))
     source[list(indices)] = range(len(indices))
     return source, len(indices) != length
 
 
 def _cross_product(v: Floats) -> tuple[float, float, float]:
-    """w x u of a base velocity (u, w)."""
+    """Return w x u of a base velocity (u, w)."""
     a, b, c, x, y, z = v[:6].tolist()
     return (y * c - z * b, z * a - x * c, x * b - y * a)
 

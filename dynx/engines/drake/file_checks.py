@@ -76,7 +76,7 @@ def _fatal_faults(source: XmlSource) -> Iterator[tuple[str, int]]:
 
 
 def _begins_with_text(source: XmlSource, element: SourceElement) -> bool:
-    """Whether an element begins with text, other than blanks and comments."""
+    """Check whether an element begins with text, other than blanks and comments."""
     if element.empty:
         return False
     end = (
@@ -87,7 +87,7 @@ def _begins_with_text(source: XmlSource, element: SourceElement) -> bool:
 
 
 def _number(element: SourceElement, attribute: str, default: float) -> float:
-    """The attribute as a number; the default where it is absent or not a number."""
+    """Return the attribute as a number; the default where it is absent or not a number."""
     try:
         value = float(element.attributes.get(attribute, default))
     except ValueError:

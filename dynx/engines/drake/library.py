@@ -68,7 +68,8 @@ __all__ = [
 
 
 def drake_version() -> str:
-    """The version of the distribution, such as ``1.51.1``; ``unknown`` for one that pip did not install."""
+    """Return the version of the distribution, such as ``1.51.1``; ``unknown`` for one that pip did not
+    install."""
     try:
         return version("drake")
     except PackageNotFoundError:
@@ -76,7 +77,7 @@ def drake_version() -> str:
 
 
 def error_message(error: BaseException) -> str:
-    """Drake's message on one line of at most 400 characters, after the type of the exception."""
+    """Return Drake's message on one line of at most 400 characters, after the type of the exception."""
     words = " ".join(str(error).split())
     return f"{type(error).__name__}: {escaped(words, 400) if words else 'no message'}"
 

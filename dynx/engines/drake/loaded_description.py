@@ -12,7 +12,7 @@ from dynx.spatial.scalar import Floats
 
 
 def describe_link(body: Any, context: Any) -> LoadedInertial:
-    """The inertia of a body about its centre of mass; Drake holds it about the link's origin.
+    """Return the inertia of a body about its centre of mass; Drake holds it about the link's origin.
 
     Drake's world, which is the body of a link named ``world``, has no mass.
     """
@@ -26,7 +26,8 @@ def describe_link(body: Any, context: Any) -> LoadedInertial:
 
 
 def describe_joint(joint: Any, actuator: Any | None) -> LoadedJoint:
-    """The description of a joint that moves; effort and armature are those of its actuator, if it has one."""
+    """Return the description of a joint that moves; effort and armature are those of its actuator, if it has
+    one."""
     placement = np.array(joint.frame_on_parent().GetFixedPoseInBodyFrame().GetAsMatrix4())
     kind = str(joint.type_name())
     if joint.num_velocities() != 1:
@@ -48,7 +49,7 @@ def describe_joint(joint: Any, actuator: Any | None) -> LoadedJoint:
 
 
 def remarks(log: Iterable[str], path: str, plant: Any) -> tuple[str, ...]:
-    """Drake's log messages, each once and on one line, and the number of constraints that it made."""
+    """Return Drake's log messages, each once and on one line, and the number of constraints that it made."""
     lines = [" ".join(message.replace(f"{path}:", "line ").split()) for message in log]
     if plant.num_constraints():
         lines.append(f"{plant.num_constraints()} mimic joints are constraints")

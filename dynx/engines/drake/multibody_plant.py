@@ -55,7 +55,7 @@ class BuiltPlant:
 
 
 def build_plant(mechanism: Mechanism) -> BuiltPlant:
-    """The plant of a mechanism, with one numbered body for each of its bodies."""
+    """Return the plant of a mechanism, with one numbered body for each of its bodies."""
     plant = MultibodyPlant(time_step=0.0)
     plant.mutable_gravity_field().set_gravity_vector(np.array(mechanism.gravity))
     bodies: list[Any] = []
@@ -107,7 +107,7 @@ def build_plant(mechanism: Mechanism) -> BuiltPlant:
 
 
 def _parts(inertia: RigidInertia) -> list[Any]:
-    """Drake's inertia, or several that add up to it where it cannot be divided by its mass."""
+    """Return Drake's inertia, or several that add up to it where it cannot be divided by its mass."""
     mass = float(inertia.mass)
     if not (inertia.first_moment.any() or inertia.rotational_inertia.any()):
         return [_inertia(mass, inertia)]
@@ -120,7 +120,7 @@ def _parts(inertia: RigidInertia) -> list[Any]:
 
 
 def _inertia(mass: float, moments: RigidInertia) -> Any:
-    """Drake's inertia with this mass and the first and second moment of `moments`."""
+    """Return Drake's inertia with this mass and the first and second moment of `moments`."""
     divisor = mass or 1.0
     G = moments.rotational_inertia / divisor
     unit = UnitInertia(G[0, 0], G[1, 1], G[2, 2], G[0, 1], G[0, 2], G[1, 2])

@@ -234,7 +234,7 @@ class MujocoBackend(Backend):
         return work
 
     def _columns(self, work: _Workspace, function: Callable[..., None], point: Floats, body: int) -> Floats:
-        """A Jacobian (6, nv) by MuJoCo, with the base's velocity in base axes."""
+        """Return a Jacobian (6, nv) by MuJoCo, with the base's velocity in base axes."""
         J = np.zeros((6, self._nv))
         function(self._engine, work.data, J[:3], J[3:], point, body)
         if self._floating:

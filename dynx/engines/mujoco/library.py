@@ -22,7 +22,7 @@ is recursive, and ends the process when the stack of the thread is full (measure
 
 
 def silent_data(model: Any) -> Any:
-    """A new `MjData` of a model with warnings silenced.
+    """Return a new `MjData` of a model with warnings silenced.
 
     MuJoCo prints the first warning of each kind and writes it to a log file in the working directory; it only
     counts further ones. `mj_resetData` resets the counters: call `silence_warnings` after it.

@@ -95,7 +95,7 @@ def _joint(loaded: Any, number: int, model: Model, here: dict[str, int]) -> Load
 
 
 def _placement(loaded: Any, body: int, model: Model, here: dict[str, int]) -> Floats | None:
-    """The pose of a body in its parent link; None where MuJoCo has merged that link."""
+    """Return the pose of a body in its parent link; None where MuJoCo has merged that link."""
     child = loaded.body(body).name
     parents = [joint.parent for joint in model.joints if joint.child == child]
     if not parents:

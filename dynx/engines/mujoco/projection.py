@@ -42,13 +42,14 @@ class ProjectedDynamics:
                 body = engine.body_parentid[body]
 
     def mass_matrix(self, data: Any, R_root: Floats, p_root: Floats) -> Floats:
-        """The mass matrix (nv, nv); `data` after `mj_kinematics`, (R, p) the pose of the root."""
+        """Return the mass matrix (nv, nv); `data` after `mj_kinematics`, (R, p) the pose of the root."""
         Jp, Jr = self._jacobians(data, R_root, p_root)
         M: Floats = _gramian(Jp, np.repeat(self._mass, 3)) + _gramian(Jr, self._moments.ravel())
         return np.asarray(0.5 * (M + M.T))
 
     def torque(self, data: Any, R_root: Floats, p_root: Floats) -> Floats:
-        """The torque (nv,); `data` after `mj_rnePostConstraint`, whose accelerations are without gravity."""
+        """Return the torque (nv,); `data` after `mj_rnePostConstraint`, whose accelerations are without
+        gravity."""
         bodies = self._bodies
         # MuJoCo's velocities and spatial accelerations are about the robot's centre of mass, in world axes,
         # angular part first; here they are converted to classical ones of the body's centre of mass.
@@ -64,8 +65,8 @@ class ProjectedDynamics:
         return np.asarray(np.einsum("bij,bi->j", Jp, force) + np.einsum("bij,bi->j", Jr, moment))
 
     def _jacobians(self, data: Any, R_root: Floats, p_root: Floats) -> tuple[Floats, Floats]:
-        """Jacobians (n, 3, nv) of all bodies: velocity of the centre of mass in world axes, and angular
-        velocity in principal axes."""
+        """Return Jacobians (n, 3, nv) of all bodies: velocity of the centre of mass in world axes, and
+        angular velocity in principal axes."""
         axes, anchors = data.xaxis[self._first :], data.xanchor[self._first :]
         linear = np.where(self._hinges[:, None], 0.0, axes)
         angular = np.where(self._hinges[:, None], axes, 0.0)
@@ -82,6 +83,6 @@ class ProjectedDynamics:
 
 
 def _gramian(J: Floats, weights: Floats) -> Floats:
-    """The sum of w J' J over the rows of all bodies."""
+    """Return the sum of w J' J over the rows of all bodies."""
     rows = J.reshape(len(weights), J.shape[-1])
     return np.asarray(rows.T @ (weights[:, None] * rows))

@@ -48,7 +48,7 @@ class MujocoTree:
 
 
 def build_tree(model: Model) -> MujocoTree:
-    """The tree of a robot; raises EngineLimitError for one that is too large for MuJoCo."""
+    """Return the tree of a robot; raises EngineLimitError for one that is too large for MuJoCo."""
     mechanism = model.mechanism
     if mechanism.nv > MAX_NV:
         raise EngineLimitError(
@@ -123,7 +123,8 @@ def _write_inertias(model: Model, compiled: Any, tree: tuple[int, ...]) -> Float
 
 
 def _principal(inertial: Inertial) -> tuple[Floats, Array]:
-    """Principal moments (3,), and their axes as the columns of a rotation (3, 3), in the link frame."""
+    """Return the principal moments (3,), and their axes as the columns of a rotation (3, 3), in the link
+    frame."""
     tensor = inertial.tensor
     moments, axes = jacobi_eigen(longdouble(tensor))
     return np.asarray(moments, dtype=np.float64), _rotation(inertial.origin) @ axes

@@ -158,7 +158,7 @@ class PinocchioBackend(Backend):
     # -- dynamics -----------------------------------------------------------------------------
 
     def _unchecked_callable(self, quantity: str) -> Callable[..., Floats] | None:
-        """The binding's function itself, with the `Data` of the calling thread."""
+        """Return the binding's function itself, with the `Data` of the calling thread."""
         function = _FUNCTIONS.get(quantity)
         hook = f"_{quantity}"
         if function is None or getattr(type(self), hook) is not getattr(PinocchioBackend, hook):

@@ -26,7 +26,7 @@ WORLD = 0
 
 
 def error_message(error: BaseException) -> str:
-    """The engine's message, without the C++ signatures before and after it."""
+    """Return the engine's message, without the C++ signatures before and after it."""
     _, _, message = str(error).rpartition("message:\n")
     return f"{type(error).__name__}: {(nonblank_lines(message) or ['no message'])[0]}"
 
@@ -86,7 +86,7 @@ def _build(model: Model) -> tuple[Any, tuple[int, ...]]:
 
 
 def joint_parameters_of_links(engine: Any, links: Sequence[int]) -> tuple[list[int], Floats]:
-    """The map from inertial parameters of links to those of the joints that carry them.
+    """Return the map from inertial parameters of links to those of the joints that carry them.
 
     It consists, for each link, of the number of its joint, not counting the universe, and the matrix (10, 10)
     from its parameters in dynx's order to the joint's in the engine's order, zero for links on the universe.
@@ -111,7 +111,7 @@ def _placement(pose: Pose) -> Any:
 
 
 def _joint_model(joint: Joint) -> Any:
-    """The engine's joint; for axes along a basis vector the engine has faster code."""
+    """Return the engine's joint; for axes along a basis vector the engine has faster code."""
     prismatic = joint.type == "prismatic"
     if joint.axis == (1.0, 0.0, 0.0):
         return pin.JointModelPX() if prismatic else pin.JointModelRX()

@@ -102,7 +102,7 @@ class PyBulletBackend(Backend):
         residual: float = 1e-9,
         limits: bool = False,
     ) -> Floats:
-        """The configuration (nq,) at which Bullet's own solver (damped least squares) stops.
+        """Return the configuration (nq,) at which Bullet's own solver (damped least squares) stops.
 
         `T_world_target` (4, 4) is the wanted pose of `frame`, `q0` (nq,) the start; a floating
         base stays where `q0` has it. `residual` [m] ends the iteration; `limits` adds Bullet's
@@ -166,7 +166,7 @@ class PyBulletBackend(Backend):
         return super()._forward_dynamics(q, v, tau)
 
     def _refine(self, q: Floats, v: Floats, tau: Floats, a: Floats) -> Floats:
-        """`a` after one step of iterative refinement, where its error is due to rounding.
+        """Return `a` after one step of iterative refinement, where its error is due to rounding.
 
         Under a root much lighter than what it carries, Bullet's inversion of the base's inertia
         loses digits (ten at a ratio of 1e-6). A step that changes more is not taken: the error then

@@ -54,7 +54,7 @@ class BulletTree:
 
 
 def bullet_tree(mechanism: Mechanism, ballast: tuple[Ballast, ...], times: int) -> BulletTree:
-    """The tree that Bullet loads for a long-double `mechanism`, with `times` copies of the ballast."""
+    """Return the tree that Bullet loads for a long-double `mechanism`, with `times` copies of the ballast."""
     root = principal_inertia(NOTHING)
     largest_moments = [0.0]
     if mechanism.floating:
@@ -77,7 +77,7 @@ def bullet_tree(mechanism: Mechanism, ballast: tuple[Ballast, ...], times: int) 
 
 
 def write_bullet_urdf(tree: BulletTree) -> str:
-    """The tree as URDF text, in ASCII."""
+    """Return the tree as URDF text, in ASCII."""
     lines = ['<robot name="r">', *_link("b", tree.root.mass, np.zeros(3), np.eye(3))]
     for k, link in enumerate(tree.links):
         lines += _link(f"l{k}", link.inertia.mass, link.inertia.center, link.inertia.axes)
@@ -95,7 +95,7 @@ def write_bullet_urdf(tree: BulletTree) -> str:
 
 
 def locale_free(number: float) -> str:
-    """The shortest decimal that reads back as `number`, without a decimal point.
+    """Return the shortest decimal that reads back as `number`, without a decimal point.
 
     Bullet reads numbers in the C locale in force, in which a point may end the number.
     """

@@ -39,7 +39,7 @@ class BulletClient(BulletConnection):
         self._connect()
 
     def com_pose(self, joints: Reals, link: int) -> tuple[Reals, Reals]:
-        """Position (3,) and attitude, quat_xyzw (4,), of the inertial frame of one link."""
+        """Return the position (3,) and attitude, quat_xyzw (4,), of the inertial frame of one link."""
         self.reset_joints(joints)
         state = self.call(self.engine.getLinkState, self.body, link, 0, 1)
         return state[0], state[1]
@@ -54,7 +54,7 @@ class BulletClient(BulletConnection):
         iterations: int,
         residual: float,
     ) -> Floats:
-        """Joints (n,) at which Bullet's damped least squares stopped, from `joints`.
+        """Return the joints (n,) at which Bullet's damped least squares stopped, from `joints`.
 
         Position and attitude are those of the link's origin and principal axes. Selectively damped
         least squares is not offered: with an attitude it can end the process.

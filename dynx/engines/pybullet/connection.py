@@ -78,7 +78,8 @@ class BulletConnection(ABC):
         self._disconnect()
 
     def call(self, function: Callable[..., Any], *args: Any, **options: Any) -> Any:
-        """The result of an engine call; raises EngineError with the engine's message where it fails."""
+        """Return the result of an engine call; raises EngineError with the engine's message where it
+        fails."""
         try:
             return function(*args, physicsClientId=self._client, **options)
         except (SystemError, TypeError, ValueError, self.engine.error) as error:
@@ -95,7 +96,8 @@ class BulletConnection(ABC):
     # -- quantities ---------------------------------------------------------------------------
 
     def com_poses(self, joints: Reals) -> tuple[Floats, Floats]:
-        """Positions (n, 3) and attitudes, quat_xyzw (n, 4), of the inertial frames of all links."""
+        """Return the positions (n, 3) and attitudes, quat_xyzw (n, 4), of the inertial frames of all
+        links."""
         self.reset_joints(joints)
         if not self.links:
             return np.zeros((0, 3)), np.zeros((0, 4))
@@ -104,7 +106,7 @@ class BulletConnection(ABC):
         return np.array([state[0] for state in states]), np.array([state[1] for state in states])
 
     def jacobian(self, joints: Reals, link: int, point: Reals) -> Floats:
-        """The Jacobian (6, nv), linear rows first; columns angular base, linear base, joints.
+        """Return the Jacobian (6, nv), linear rows first; columns angular base, linear base, joints.
 
         `point` is measured from the origin of the link frame along the link's principal axes.
         """
@@ -114,12 +116,12 @@ class BulletConnection(ABC):
         return np.array([*linear, *angular])
 
     def mass_matrix(self, joints: Reals) -> Floats:
-        """The mass matrix (nv, nv); rows angular base, linear base, joints."""
+        """Return the mass matrix (nv, nv); rows angular base, linear base, joints."""
         self.check(joints)
         return np.array(self.call(self.engine.calculateMassMatrix, self.body, joints))
 
     def inverse_dynamics(self, joints: Reals, v: Reals, a: Reals, gravity: Reals) -> Floats:
-        """Force, torque (3 each, with a floating base only) and joint torques.
+        """Return the force, torque (3 each, with a floating base only) and joint torques.
 
         `v` and `a` are angular base, linear base, joints; the linear acceleration is the classical one of
         the root's centre of mass.
@@ -131,7 +133,8 @@ class BulletConnection(ABC):
         return np.array(self.call(self.engine.calculateInverseDynamics, self.body, q, v, a))
 
     def velocity_step(self, joints: Reals, v: Reals, tau: Reals, gravity: Reals) -> Floats:
-        """The change of the velocity `v` (angular base, linear base, joints) in one step of unit length.
+        """Return the change of the velocity `v` (angular base, linear base, joints) in one step of unit
+        length.
 
         `tau` is torque and force on the base (with a floating base only), then joint torques.
         """
@@ -181,7 +184,7 @@ class BulletConnection(ABC):
         self.call(self.engine.resetBasePositionAndOrientation, self.body, position, quat_xyzw)
 
     def base_pose(self) -> tuple[Reals, Reals]:
-        """Position and quat_xyzw of the root's inertial frame in Bullet's world."""
+        """Return the position and quat_xyzw of the root's inertial frame in Bullet's world."""
         position, quat = self.call(self.engine.getBasePositionAndOrientation, self.body)
         return list(position), list(quat)
 

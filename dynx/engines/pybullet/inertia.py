@@ -47,7 +47,7 @@ class Ballast:
     rotational: float = 0.0
 
     def add_to(self, inertia: RigidInertia, times: int) -> RigidInertia:
-        """The inertia of the body with `times` copies of this ballast."""
+        """Return the inertia of the body with `times` copies of this ballast."""
         return RigidInertia(
             np.asarray(inertia.mass + times * longdouble(self.mass)),
             inertia.first_moment,
@@ -56,7 +56,7 @@ class Ballast:
 
 
 def principal_inertia(inertia: RigidInertia, *, about_center: bool = False) -> PrincipalInertia:
-    """Centre of mass, principal axes and moments of a body; about its origin if it has no mass.
+    """Return the centre of mass, principal axes and moments of a body; about its origin if it has no mass.
 
     The axes are in an order that Bullet accepts, where there is one. With `about_center` Bullet has the
     body's frame at the centre of mass (as for the root), not at the joint.
@@ -85,7 +85,7 @@ _CYCLIC = ([0, 1, 2], [1, 2, 0], [2, 0, 1])
 
 
 def _accepts(mass: float, lever: Floats, moments: Floats) -> bool:
-    """Whether Bullet's inverse dynamics accepts a body with these moments about these axes.
+    """Check whether Bullet's inverse dynamics accepts a body with these moments about these axes.
 
     It requires x + y >= z and y + z >= x for the moments about the body's origin, to the last bit; it does
     not check z + x >= y (btInverseDynamics, `isValidInertiaMatrix`, where the second test repeats the first).
@@ -102,7 +102,7 @@ def _accepts(mass: float, lever: Floats, moments: Floats) -> bool:
 
 
 def ballast_for(mechanism: Mechanism) -> tuple[Ballast, ...]:
-    """The ballast that the root and each body need for Bullet to accept them; mostly none."""
+    """Return the ballast that the root and each body need for Bullet to accept them; mostly none."""
     inertias = [body.inertia for body in mechanism.bodies]
     total = sum(abs(float(inertia.mass)) for inertia in [mechanism.root, *inertias])
     unit = total / 16 if total > 0.0 else 1.0
@@ -111,7 +111,7 @@ def ballast_for(mechanism: Mechanism) -> tuple[Ballast, ...]:
 
 
 def _ballast(inertia: RigidInertia, unit: float, *, root: bool) -> Ballast:
-    """The least ballast that suffices, because subtracting it again costs digits."""
+    """Return the least ballast that suffices, because subtracting it again costs digits."""
     mass = float(inertia.mass)
     massless = mass == 0.0 and not root and not np.any(inertia.first_moment)
     needed = Ballast() if mass > 0.0 or massless else Ballast(mass=unit - mass)

@@ -48,7 +48,7 @@ class BulletInertia:
 
 @lru_cache(maxsize=CACHE_SIZE)
 def bullet_reading(inertial: Inertial) -> BulletInertia:
-    """The principal moments and axes that PyBullet's loader finds, before it checks them."""
+    """Return the principal moments and axes that PyBullet's loader finds, before it checks them."""
     tensor = inertial.tensor
     if not (inertial.ixy or inertial.ixz or inertial.iyz):
         return BulletInertia(np.diagonal(tensor).copy(), np.eye(3))
@@ -57,7 +57,7 @@ def bullet_reading(inertial: Inertial) -> BulletInertia:
 
 @lru_cache(maxsize=CACHE_SIZE)
 def diagonalisation_error(inertial: Inertial) -> float:
-    """The error of the tensor that PyBullet holds, relative to the largest moment of the file."""
+    """Return the error of the tensor that PyBullet holds, relative to the largest moment of the file."""
     held = bullet_reading(inertial)
     axes, tensor = longdouble(held.axes), longdouble(inertial.tensor)
     size = float(np.max(np.abs(tensor)))
@@ -67,7 +67,7 @@ def diagonalisation_error(inertial: Inertial) -> float:
 
 
 def tree_may_reject(inertial: Inertial, *, on_fixed_joint: bool) -> bool:
-    """Whether the inertia is so near the bound that inverse dynamics may refuse the robot.
+    """Check whether the inertia is so near the bound that inverse dynamics may refuse the robot.
 
     Bullet checks no triangle inequality for a link on a fixed joint (`on_fixed_joint`).
     """
@@ -97,7 +97,7 @@ def tree_may_reject(inertial: Inertial, *, on_fixed_joint: bool) -> bool:
 
 
 def _diagonalise(tensor: Floats) -> tuple[Floats, Floats]:
-    """Eigenvalues and eigenvectors by Jacobi's method, as in Bullet."""
+    """Return the eigenvalues and eigenvectors by Jacobi's method, as in Bullet."""
     A, V = tensor.copy(), np.eye(3)
     for step in range(30, 0, -1):
         pairs = ((0, 1, 2), (0, 2, 1), (1, 2, 0))

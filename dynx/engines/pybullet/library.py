@@ -14,7 +14,7 @@ _import_lock = Lock()
 
 
 def bullet() -> ModuleType:
-    """The module `pybullet`; raises NotInstalledError with the command that installs it."""
+    """Return the module `pybullet`; raises NotInstalledError with the command that installs it."""
     loaded = sys.modules.get("pybullet")
     if loaded is not None:
         return loaded

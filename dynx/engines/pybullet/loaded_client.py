@@ -57,18 +57,19 @@ class LoadedClient(BulletConnection):
         setting(self)
 
     def call(self, function: Callable[..., Any], *args: Any, **options: Any) -> Any:
-        """The result of an engine call; raises EngineError also where it needs a tree that Bullet refused."""
+        """Return the result of an engine call; raises EngineError also where it needs a tree that Bullet
+        refused."""
         if self._refusal is not None and function in self._needs_tree:
             # Called again, Bullet would fail again and print.
             raise EngineError(str(self._refusal)) from self._refusal
         return super().call(function, *args, **options)
 
     def dynamics(self, link: int) -> Any:
-        """`getDynamicsInfo` of a link."""
+        """Return `getDynamicsInfo` of a link."""
         return self.call(self.engine.getDynamicsInfo, self.body, link)
 
     def com_frame(self, link: int) -> Floats:
-        """T_link_com (4, 4), the inertial frame of a link as Bullet holds it."""
+        """Return T_link_com (4, 4), the inertial frame of a link as Bullet holds it."""
         info = self.dynamics(link)
         return homogeneous(rotation_from_quat(np.array(info[4])), np.array(info[3]))
 

@@ -16,7 +16,7 @@ from dynx.spatial.so3 import rotation_from_quat
 
 
 def describe_model(client: LoadedClient, model: Model, links: Mapping[str, int], base: Floats) -> LoadedModel:
-    """The description of a loaded robot.
+    """Return the description of a loaded robot.
 
     `links` maps link names to Bullet's numbers; `base` is the pose of the root link at the neutral q.
     """
@@ -45,8 +45,8 @@ def _inertial(info: Any) -> LoadedInertial:
 
 
 def _joint(engine: Any, info: Any, T_parent_com: Floats, T_child_com: Floats) -> LoadedJoint:
-    """Entries of `getJointInfo`: 13 the axis in the inertial frame of the child, 14 the joint's position
-    in that of the parent, 15 the attitude of the parent's in the child's, at value 0."""
+    """Return the entries of `getJointInfo`: 13 the axis in the inertial frame of the child, 14 the joint's
+    position in that of the parent, 15 the attitude of the parent's in the child's, at value 0."""
     position = T_parent_com[:3, :3] @ np.array(info[14]) + T_parent_com[:3, 3]
     R_child_parent = rotation_from_quat(np.array(info[15]))
     R = T_parent_com[:3, :3] @ R_child_parent.T @ T_child_com[:3, :3].T

@@ -127,7 +127,7 @@ class BulletPlant(Plant):
         return self._advance(tau)
 
     def _motor_substep(self, t: float, command: MotorCommand) -> tuple[Floats, Floats]:
-        """The acceleration, and the torque of the disturbances (nv,)."""
+        """Return the acceleration, and the torque of the disturbances (nv,)."""
         self._client.command(command)
         disturbance: Floats = np.zeros(self.model.nv)
         if self.disturbances.has_torque:
@@ -136,7 +136,7 @@ class BulletPlant(Plant):
         return self._advance(disturbance), disturbance
 
     def _tree_torque(self, q: Floats, v: Floats, a: Floats) -> Floats:
-        """The torque of every joint of the tree, mimic joints too, that gives the acceleration `a`."""
+        """Return the torque of every joint of the tree, mimic joints too, that gives the acceleration `a`."""
         coupling = self._coupling
         if coupling is None:
             return self._engine.inverse_dynamics(q, v, a)
@@ -169,7 +169,7 @@ class BulletPlant(Plant):
     # -- between Bullet's state and dynx's ------------------------------------------------------
 
     def _joints(self) -> tuple[Floats, Floats]:
-        """Positions and rates of the joints that own a coordinate."""
+        """Return the positions and rates of the joints that own a coordinate."""
         positions, rates = self._client.joint_states()
         if self._coupling is None:
             return np.array(positions), np.array(rates)
@@ -209,7 +209,7 @@ class BulletPlant(Plant):
         self._client.place(q[self._base_nq :].tolist(), v[self._base_nv :].tolist(), base)
 
     def _in_units(self, command: MotorCommand) -> MotorCommand:
-        """Forces, and the gains that are forces, in Bullet's unit of mass."""
+        """Return the forces, and the gains that are forces, in Bullet's unit of mass."""
         command = command._replace(forces=self._in_unit(command.forces))
         if command.mode != "PD_CONTROL":
             return command

@@ -59,7 +59,7 @@ class BulletRobot:
     # -- kinematics ---------------------------------------------------------------------------
 
     def frame_placements(self, q: Floats) -> Floats:
-        """T_world_frame of all frames (n, 4, 4)."""
+        """Return T_world_frame of all frames (n, 4, 4)."""
         joints = self._joints(q)
         T_world_base, T_world_C = self._base(q)
         # The root comes last, so that its index ROOT = -1 finds it.
@@ -70,7 +70,7 @@ class BulletRobot:
         return np.asarray(T[self._frame_body] @ self._offsets)
 
     def frame_placement(self, q: Floats, frame: int) -> Floats:
-        """T_world_frame of one frame (4, 4)."""
+        """Return T_world_frame of one frame (4, 4)."""
         T_world_base, T_world_C = self._base(q)
         body = self._frame_body[frame]
         if body == ROOT:
@@ -79,7 +79,7 @@ class BulletRobot:
         return np.asarray(T_world_C @ T_C_com @ self._offsets[frame])
 
     def jacobian(self, q: Floats, frame: int, reference: Reference) -> Floats:
-        """J (6, nv) of one frame, linear rows first."""
+        """Return J (6, nv) of one frame, linear rows first."""
         R_world_C = self._base(q)[1][:3, :3]
         J = self._jacobian_in_C(q, frame)
         if reference == "local":
@@ -93,7 +93,7 @@ class BulletRobot:
     # -- dynamics -----------------------------------------------------------------------------
 
     def inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
-        """tau (nv,)."""
+        """Return tau (nv,)."""
         if not v.size:
             return np.zeros(0)
         gravity = self._gravity_in_C(q)
@@ -111,7 +111,7 @@ class BulletRobot:
         return self._unit * tau
 
     def mass_matrix(self, q: Floats) -> Floats:
-        """M (nv, nv), symmetric."""
+        """Return M (nv, nv), symmetric."""
         joints = self._joints(q)
         if not (joints or self._floating):
             return np.zeros((0, 0))
@@ -122,7 +122,7 @@ class BulletRobot:
         return np.asarray(0.5 * self._unit * (M + M.T))
 
     def forward_dynamics(self, q: Floats, v: Floats, tau: Floats) -> Floats:
-        """a (nv,): the change of velocity in one step of Bullet's articulated-body algorithm."""
+        """Return a (nv,): the change of velocity in one step of Bullet's articulated-body algorithm."""
         if not v.size:
             return np.zeros(0)
         gravity = self._gravity_in_C(q)
@@ -149,7 +149,8 @@ class BulletRobot:
         iterations: int,
         residual: float,
     ) -> Floats:
-        """Joints (n,) at which Bullet's solver stopped, from those of `q`; the base stays where it is."""
+        """Return the joints (n,) at which Bullet's solver stopped, from those of `q`; the base stays where it
+        is."""
         body = self._frame_body[frame]
         if body == ROOT:
             return np.array(self._joints(q))
@@ -175,7 +176,7 @@ class BulletRobot:
         return joints
 
     def _base(self, q: Floats) -> tuple[Floats, Floats]:
-        """T_world_base and T_world_C, (4, 4) each."""
+        """Return T_world_base and T_world_C, (4, 4) each."""
         if not self._floating:
             return _IDENTITY, _IDENTITY
         T = pose_matrices(q[:3], q[3:7])
@@ -189,7 +190,7 @@ class BulletRobot:
         return numbers
 
     def _jacobian_in_C(self, q: Floats, frame: int) -> Floats:
-        """J (6, nv) of the velocity of the frame's origin, in the axes of C."""
+        """Return J (6, nv) of the velocity of the frame's origin, in the axes of C."""
         joints = self._joints(q)
         body = self._frame_body[frame]
         if body != ROOT:
@@ -214,7 +215,7 @@ class BulletRobot:
         return float64(T)
 
     def _point(self, frame: BodyFrame, root: PrincipalInertia) -> list[float]:
-        """The frame's origin along the principal axes, from the origin of its body (root: from C)."""
+        """Return the frame's origin along the principal axes, from the origin of its body (root: from C)."""
         if frame.body == ROOT:
             point = root.axes.T @ (frame.p - root.center)
         else:
@@ -224,7 +225,7 @@ class BulletRobot:
 
 
 def pose_matrices(position: ArrayLike, quat_xyzw: ArrayLike) -> Floats:
-    """Homogeneous matrices (..., 4, 4) from positions (..., 3) and unit quaternions (..., 4).
+    """Return the homogeneous matrices (..., 4, 4) from positions (..., 3) and unit quaternions (..., 4).
 
     The rotation is linear in the products of the quaternion's entries: one small matrix product,
     some ten times as fast as entry by entry.
@@ -238,7 +239,8 @@ def pose_matrices(position: ArrayLike, quat_xyzw: ArrayLike) -> Floats:
 
 
 def _products_to_rotation() -> Floats:
-    """(16, 16): from the products of x, y, z, w, row by row, to the entries of [[R - 1, 0], [0, 0]]."""
+    """Return (16, 16): from the products of x, y, z, w, row by row, to the entries of [[R - 1, 0], [0,
+    0]]."""
     K = np.zeros((4, 4, 4, 4))
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
@@ -252,7 +254,8 @@ _FROM_PRODUCTS = _products_to_rotation()
 
 
 def base_conversion(axes: Array, center: Array) -> Array:
-    """X (6, 6), for the axes (3, 3) and the origin (3,) of C in the base frame; see the module docstring."""
+    """Return X (6, 6), for the axes (3, 3) and the origin (3,) of C in the base frame; see the module
+    docstring."""
     X = np.zeros((6, 6), dtype=axes.dtype)
     X[:3, 3:] = X[3:, :3] = axes.T
     X[3:, 3:] = -axes.T @ skew(center)
@@ -260,7 +263,7 @@ def base_conversion(axes: Array, center: Array) -> Array:
 
 
 def inverse_base_conversion(axes: Array, center: Array) -> Array:
-    """The inverse of `base_conversion`."""
+    """Return the inverse of `base_conversion`."""
     X = np.zeros((6, 6), dtype=axes.dtype)
     X[3:, :3] = X[:3, 3:] = axes
     X[:3, :3] = skew(center) @ axes

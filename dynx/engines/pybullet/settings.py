@@ -52,7 +52,7 @@ def disable_limits(client: LoadedClient) -> None:
 
 
 def set_inertias(model: Model, links: Mapping[str, int]) -> Setting:
-    """Setting that restores the moments of the file where Bullet replaced them by zero."""
+    """Return the setting that restores the moments of the file where Bullet replaced them by zero."""
 
     def change(client: LoadedClient) -> None:
         for name, k in links.items():
@@ -68,7 +68,8 @@ def set_inertias(model: Model, links: Mapping[str, int]) -> Setting:
 
 
 def with_ballast(times: int) -> Setting:
-    """Setting that adds `times` the same rotational inertia s about every axis to each impossible inertia.
+    """Return the setting that adds `times` the same rotational inertia s about every axis to each impossible
+    inertia.
 
     Inverse dynamics f and the mass matrix are affine in the inertia of each link, so that
     f(I) = 2 f(I + s) - f(I + 2 s); and with s larger than any moment Bullet accepts the link.
@@ -88,5 +89,5 @@ def with_ballast(times: int) -> Setting:
 
 
 def _possible(small: float, middle: float, large: float) -> bool:
-    """Whether a body can have these principal moments, with a margin for the rounding of Bullet."""
+    """Check whether a body can have these principal moments, with a margin for the rounding of Bullet."""
     return small >= 0.0 and small + middle >= large * (1.0 + 64.0 * float(np.finfo(float).eps))

@@ -87,14 +87,14 @@ class SteppingClient(BulletClient):
         self.call(self.engine.stepSimulation)
 
     def joint_states(self) -> tuple[Reals, Reals]:
-        """Positions and velocities of all joints."""
+        """Return the positions and velocities of all joints."""
         if not self.links:
             return [], []
         states = self.call(self.engine.getJointStates, self.body, self.links)
         return [state[0] for state in states], [state[1] for state in states]
 
     def base_state(self) -> BaseState:
-        """The state of the root's inertial frame."""
+        """Return the state of the root's inertial frame."""
         linear, angular = self.call(self.engine.getBaseVelocity, self.body)
         return BaseState(*self.base_pose(), list(linear), list(angular))
 

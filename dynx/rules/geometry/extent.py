@@ -22,7 +22,7 @@ class Extent:
 
     @classmethod
     def of_points(cls, points: Iterable[Iterable[float]], radius: float = 0.0) -> Extent:
-        """Balls of one radius about the points."""
+        """Return the balls of one radius about the points."""
         array = np.array([list(point) for point in points], dtype=np.float64).reshape(-1, 3)
         return cls(array, np.full(len(array), radius))
 
@@ -50,7 +50,7 @@ class Extent:
         return (self.points - radii).min(axis=0), (self.points + radii).max(axis=0)
 
     def diagonal(self) -> float:
-        """Length of the diagonal of `box` [m]."""
+        """Return the length of the diagonal of `box` [m]."""
         low, high = self.box()
         return float(np.linalg.norm(high - low))
 

@@ -46,7 +46,8 @@ def _box(path: Path, changed: int, size: int) -> Box | None:
 
 
 def _stl_points(data: bytes) -> Floats | None:
-    """Corners of the facets. A binary file is known by its length, since some begin with "solid" too."""
+    """Return the corners of the facets. A binary file is known by its length, since some begin with "solid"
+    too."""
     if len(data) >= _STL_HEAD:
         count = int.from_bytes(data[80:84], "little")
         if len(data) == _STL_HEAD + _STL_FACET * count:

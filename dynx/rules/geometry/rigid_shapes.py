@@ -47,6 +47,6 @@ def _group_extent(case: Case, group: RigidGroup) -> Extent | None:
 
 
 def _pose(group: RigidGroup, link: str) -> Floats:
-    """T_head_link (4, 4)."""
+    """Return T_head_link (4, 4)."""
     R, p = group.poses[link]
     return homogeneous(R.astype(np.float64), p.astype(np.float64))

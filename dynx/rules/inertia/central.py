@@ -56,7 +56,8 @@ class CentralInertia:
         return np.sort(jacobi_eigen(self.tensor)[0])
 
     def principal(self, near: Vector = (0.0, 0.0, 0.0)) -> tuple[Array, Array]:
-        """Principal moments (3,) and axes (3, 3), the columns of a rotation, in the axes of the frame.
+        """Return the principal moments (3,) and axes (3, 3), the columns of a rotation, in the axes of the
+        frame.
 
         Order and directions of the axes are those nearest to the attitude `near` (rpy).
         """

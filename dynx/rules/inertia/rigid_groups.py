@@ -31,7 +31,7 @@ class RigidGroup:
     parents: dict[str, str]
 
     def pose(self, link: str, frame: str) -> tuple[Array, Array]:
-        """(R, p) of one link of the group in the frame of another."""
+        """Return (R, p) of one link of the group in the frame of another."""
         R_frame, p_frame = self.poses[frame]
         R_link, p_link = self.poses[link]
         return R_frame.T @ R_link, R_frame.T @ (p_link - p_frame)

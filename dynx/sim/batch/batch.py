@@ -243,7 +243,7 @@ def refuse_uncompiled(scenario: Scenario) -> None:
 
 
 def _kernels(step: FusedStep, clock: Clock, wrenches: Floats) -> StepKernels:
-    """Kernels of the steps with and without controller and pushes, as far as they occur."""
+    """Return the kernels of the steps with and without controller and pushes, as far as they occur."""
     controlled = np.arange(clock.n_steps) % clock.steps_per_control == 0
     kinds = set(zip(controlled.tolist(), pushing(wrenches), strict=True))
     return {

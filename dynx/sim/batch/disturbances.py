@@ -39,18 +39,20 @@ class BatchDisturbances:
 
     @classmethod
     def of(cls, model: Model, disturbances: Disturbances, varied: Mapping[str, Floats]) -> BatchDisturbances:
-        """Those of `disturbances`, with coefficients (n, joints) in the places of their placeholders."""
+        """Return those of `disturbances`, with coefficients (n, joints) in the places of their
+        placeholders."""
         sizes = {name: rows.shape[1] for name, rows in varied.items()}
         # A joint of the tree depends on at most one coordinate, so the armature has no other entries.
         rotors = disturbances.armature.diagonal().copy()
         return cls(model, disturbances.friction, rotors, sizes, disturbances.pushes)
 
     def sizes(self, *, pushed: bool) -> dict[str, int]:
-        """Inputs of the kernel for friction, armature and pushes, and their sizes."""
+        """Return the inputs of the kernel for friction, armature and pushes, and their sizes."""
         return {**self.varied, **({"wrenches": WRENCH * len(self.pushes)} if pushed else {})}
 
     def wrenches(self, clock: Clock) -> Floats:
-        """Wrenches of the pushes in each step (n_steps, 6 of each push), zero outside their time."""
+        """Return the wrenches of the pushes in each step (n_steps, 6 of each push), zero outside their
+        time."""
         times = clock.times()[:-1]
         acting = np.stack([push.acts(times, clock.dt) for push in self.pushes], axis=1)
         strength = np.array([push.wrench for push in self.pushes], dtype=np.float64)
@@ -66,7 +68,7 @@ class BatchDisturbances:
         *,
         pushed: bool,
     ) -> Array:
-        """The torque (nv,) of the motors, minus friction, plus that of the pushes."""
+        """Return the torque (nv,) of the motors, minus friction, plus that of the pushes."""
         if self.losses.present:
             damping, friction = (
                 self._in_place(name, constant, given)
@@ -80,11 +82,11 @@ class BatchDisturbances:
         return tau
 
     def rotors_of(self, given: Mapping[str, Array]) -> Array | None:
-        """Armature (nv,), None without any."""
+        """Return the armature (nv,), None without any."""
         return self._in_place("armature", self.rotors, given) if self.rotors.any() else None
 
     def _in_place(self, name: str, constant: Floats, given: Mapping[str, Array]) -> Array:
-        """Coefficients of the rollout in the places of their placeholders, or the constants."""
+        """Return the coefficients of the rollout in the places of their placeholders, or the constants."""
         if name not in self.varied:
             return constant
         found = np.zeros(len(constant), dtype=object)

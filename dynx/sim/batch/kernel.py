@@ -71,8 +71,8 @@ class FusedStep:
             )
 
     def kernel(self, *, controlled: bool, pushed: bool) -> Kernel:
-        """The kernel of a step: with the controller evaluated if `controlled`, otherwise with the last `tau`;
-        with the pushes if `pushed`.
+        """Return the kernel of a step: with the controller evaluated if `controlled`, otherwise with the last
+        `tau`; with the pushes if `pushed`.
 
         Raises UnsupportedFeatureError for a controller that branches on its measurement.
         """
@@ -88,7 +88,8 @@ class FusedStep:
         return kernel
 
     def _content(self) -> Hashable:
-        """Key of all that selects the kernel. Raises TypeError for a controller that is not declared pure."""
+        """Return the key of all that selects the kernel. Raises TypeError for a controller that is not
+        declared pure."""
         if not all(each.is_pure for each in chain_of(self.controller)):
             raise TypeError(f"{self.controller.name} is not declared pure")
         # A plant is never changed, and the key holds on to it, so its identity is enough.
@@ -131,7 +132,7 @@ class FusedStep:
         return load_kernel(program_recipe(program), lambda: program)
 
     def sizes(self, *, controlled: bool, pushed: bool) -> dict[str, tuple[int]]:
-        """Inputs of a step in their order, and their sizes."""
+        """Return the inputs of a step in their order, and their sizes."""
         nq, nv = self.model.nq, self.model.nv
         sizes = {"q": nq, "v": nv, "worst": nv, "squares": nv, "goal": nq}
         if not controlled:
@@ -157,7 +158,8 @@ class FusedStep:
         return {name: (size,) for name, size in sizes.items()}
 
     def _commanded(self, controller: Controller[Any], given: Mapping[str, Array]) -> dict[str, Array]:
-        """Torque within the limits, controller state, and number of steps with motors at their limits."""
+        """Return the torque within the limits, controller state, and number of steps with motors at their
+        limits."""
         q, v = (given["q_seen"], given["v_seen"]) if self.delayed else (given["q"], given["v"])
         if self.noisy:
             off = given["noise_q"]
@@ -212,7 +214,7 @@ class FusedStep:
         )
 
     def _center(self, given: Mapping[str, Array]) -> Array:
-        """The centre of mass of the root (3,)."""
+        """Return the centre of mass of the root (3,)."""
         root = self.model.mechanism.root if self.plant is None else self.plant.root(given["parameters"])
         mass = root.mass[()]
         if isinstance(mass, float | int) and not mass:

@@ -51,7 +51,7 @@ StepKernels = dict[tuple[bool, bool], Kernel]
 
 
 def pushing(wrenches: Floats) -> list[bool]:
-    """Whether a push acts in each step, from `Part.wrenches`."""
+    """Check whether a push acts in each step, from `Part.wrenches`."""
     return [bool(found) for found in np.count_nonzero(wrenches, axis=1)]
 
 

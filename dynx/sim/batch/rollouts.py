@@ -61,7 +61,8 @@ class BatchRollouts:
         return np.where(np.isnan(self.diverged), worst, np.where(self.done, np.inf, np.nan))
 
     def quantiles(self, levels: Sequence[float] = (0.05, 0.5, 0.95)) -> Floats:
-        """Quantiles (len(levels),) of `worst` over the rollouts that were computed; NaN if none was."""
+        """Return the quantiles (len(levels),) of `worst` over the rollouts that were computed; NaN if none
+        was."""
         worst = self.worst[self.done]
         if not len(worst):
             return np.full(len(levels), np.nan)
@@ -89,7 +90,8 @@ class BatchRollouts:
         return cls(Scenario.from_json(str(entries["scenario"])), **arrays)
 
     def plot(self, path: str | os.PathLike[str] | None = None) -> Any:
-        """A `matplotlib.figure.Figure`: how many rollouts stay below an error, and each joint's errors.
+        """Return a `matplotlib.figure.Figure`: how many rollouts stay below an error, and each joint's
+        errors.
 
         Raises NotInstalledError without matplotlib (``pip install 'dynx[plot]'``).
         """

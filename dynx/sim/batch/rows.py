@@ -26,7 +26,7 @@ PER_ROLLOUT = ("q0", "v0", *COEFFICIENTS)
 
 
 def split_rows(model: Model | Scenario, given: Mapping[str, Any]) -> tuple[Scenario, dict[str, Any]]:
-    """The scenario that all rollouts share, and the arguments with a row for each rollout, by name.
+    """Return the scenario that all rollouts share, and the arguments with a row for each rollout, by name.
 
     `given` are fields of a scenario, or what replaces those of `PER_ROLLOUT` in the one in place of a model.
     """
@@ -41,7 +41,7 @@ def split_rows(model: Model | Scenario, given: Mapping[str, Any]) -> tuple[Scena
 
 
 def joints_of(model: Model) -> int:
-    """Number of joints that have a coordinate."""
+    """Return the number of joints that have a coordinate."""
     return model.nv - (6 if model.floating else 0)
 
 
@@ -55,7 +55,8 @@ def _has_rows(name: str, value: Any, joints: int) -> bool:
 
 
 def coefficient_rows(name: str, values: ArrayLike, joints: int) -> Floats:
-    """(n, joints) of one number, or one for each joint, for every rollout. Raises GainError for others."""
+    """Return (n, joints) of one number, or one for each joint, for every rollout. Raises GainError for
+    others."""
     array = real_array(name, values)
     rows = array[:, None] if array.ndim == 1 else array
     if rows.ndim != 2 or rows.shape[1] not in (1, joints):
@@ -93,7 +94,7 @@ class RolloutRows:
         return 1 if self._asked is None else self._asked
 
     def of(self, name: str, values: ArrayLike, size: int, *, spread: bool = False) -> Floats:
-        """`values` as (size,) or (n, size), finite; `spread` lets a last axis of 1 stand for all."""
+        """Return `values` as (size,) or (n, size), finite; `spread` lets a last axis of 1 stand for all."""
         array = np.asarray(values, dtype=np.float64) if spread else checked_array(name, values, size)
         if spread and array.ndim and array.shape[-1] == 1:
             array = np.broadcast_to(array, (*array.shape[:-1], size))
@@ -109,11 +110,11 @@ class RolloutRows:
         return array
 
     def spread(self, array: Floats) -> Floats:
-        """(n, size)."""
+        """Return (n, size)."""
         return np.array(np.broadcast_to(array, (self.count, array.shape[-1])))
 
 
 def columns_of(values: ArrayLike) -> Floats:
-    """(n,) as (n, 1), (n, size) as it is."""
+    """Return (n,) as (n, 1), (n, size) as it is."""
     array = np.asarray(values, dtype=np.float64)
     return array[:, None] if array.ndim == 1 else array

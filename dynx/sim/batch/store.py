@@ -33,7 +33,7 @@ class Store:
             raise ArgumentError(f"keep is {shown(folder)}, where no folder can be made: {error}") from error
 
     def read(self, part: Part) -> PartDone | None:
-        """The outcome of a part, if it is there and complete."""
+        """Return the outcome of a part, if it is there and complete."""
         try:
             with np.load(self._path(part), allow_pickle=False) as file:
                 return PartDone(*(file[name] for name in PartDone._fields))

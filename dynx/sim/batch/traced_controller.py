@@ -27,7 +27,7 @@ class ArrayDynamics(Dynamics):
         return simplify_mechanism(self.model.mechanism)
 
     def evaluation(self, quantity: str) -> Evaluation:
-        """Function of `dynx.rbd` for the quantity."""
+        """Return the function of `dynx.rbd` for the quantity."""
         model = self.model
 
         def evaluate(*arguments: Any, reference: str = LOCAL_WORLD_ALIGNED) -> Array:
@@ -42,12 +42,13 @@ class ArrayDynamics(Dynamics):
         return evaluate
 
     def content_key(self) -> tuple[Any, ...]:
-        """Key that is equal for equal models."""
+        """Return the key that is equal for equal models."""
         return (self.model,)
 
 
 def traced_controller(controller: Controller[Any], gains: Mapping[str, Array]) -> Controller[Any]:
-    """The controller over array code in the place of an engine, with other gains in the innermost one."""
+    """Return the controller over array code in the place of an engine, with other gains in the innermost
+    one."""
     last = innermost(controller)
     return rebind(
         controller,
@@ -57,5 +58,5 @@ def traced_controller(controller: Controller[Any], gains: Mapping[str, Array]) -
 
 
 def innermost(controller: Controller[Any]) -> Controller[Any]:
-    """The controller without those that are wrapped around it."""
+    """Return the controller without those that are wrapped around it."""
     return list(chain_of(controller))[-1]

@@ -42,7 +42,8 @@ def check_controller(model: Model, controller: Controller[Any], clock: Clock) ->
 
 
 def controller_numbers(controller: Controller[Any]) -> dict[str, Any]:
-    """Public numbers of a controller and of its inner one, such as gains, in types that JSON has."""
+    """Return the public numbers of a controller and of its inner one, such as gains, in types that JSON
+    has."""
     found: dict[str, Any] = {}
     for name, value in sorted(attributes_of(controller).items()):
         if name.startswith("_"):
@@ -62,12 +63,12 @@ def controller_numbers(controller: Controller[Any]) -> dict[str, Any]:
 
 
 def is_row(state: Any) -> bool:
-    """Whether a controller's state is an array (n,) of float64, which kernels need."""
+    """Check whether a controller's state is an array (n,) of float64, which kernels need."""
     return isinstance(state, np.ndarray) and state.dtype == np.float64 and state.ndim == 1
 
 
 def defect_of_outcome(outcome: Any) -> str | None:
-    """Message for a result of `torque` that is no pair; None for a pair."""
+    """Return the message for a result of `torque` that is no pair; None for a pair."""
     if isinstance(outcome, tuple) and len(outcome) == 2:
         return None
     kind = f"an array of shape {outcome.shape}" if isinstance(outcome, np.ndarray) else shown(outcome)
@@ -100,12 +101,14 @@ class Unchanged:
 
 
 def _contents(controller: Controller[Any]) -> dict[str, tuple[Any, Hashable]]:
-    """Attributes of a controller and their contents; the attributes themselves keep their identity taken."""
+    """Return the attributes of a controller and their contents; the attributes themselves keep their identity
+    taken."""
     return {name: (value, _content(value)) for name, value in attributes_of(controller).items()}
 
 
 def _content(value: Any, depth: int = 0) -> Hashable:
-    """Content of an attribute to the last bit, and the identity of an object whose content is not known."""
+    """Return the content of an attribute to the last bit, and the identity of an object whose content is not
+    known."""
     if isinstance(value, np.ndarray) and value.dtype != object:
         return value.dtype.str, value.shape, value.tobytes()
     if isinstance(value, float):

@@ -40,7 +40,7 @@ class Noise:
     rollout: int = 0
 
     def deviations(self, nv: int) -> tuple[Floats, Floats]:
-        """Standard deviations (nv,) of q and v.
+        """Return the standard deviations (nv,) of q and v.
 
         Raises GainError for an invalid standard deviation, ArgumentError for an invalid seed or rollout.
         """
@@ -52,7 +52,7 @@ class Noise:
         return checked_gain("noise.q", self.q, nv), checked_gain("noise.v", self.v, nv)
 
     def rows(self, model: Model, n_controls: int) -> tuple[Floats, Floats]:
-        """The noise of q and of v at each control step (n_controls, nv)."""
+        """Return the noise of q and of v at each control step (n_controls, nv)."""
         deviations = self.deviations(model.nv)
         stream = NoiseStream(self.seed)
         drawn = np.empty((n_controls, 2, model.nv))

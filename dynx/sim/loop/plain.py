@@ -152,7 +152,7 @@ class Loop:
                 progress(k + 1)
 
     def _as_torque(self, k: int, record: Record, given: Any) -> Floats:
-        """The torque of a controller as a float64 array (nv,). Raises ControlError."""
+        """Return the torque of a controller as a float64 array (nv,). Raises ControlError."""
         wanted = (self.plant.model.nv,)
         try:
             array = np.asarray(given)
@@ -186,7 +186,7 @@ class Loop:
         watch.refuse_changed()
 
     def recovered_state(self, record: Record) -> Any:
-        """The controller's state after the last step of `record`.
+        """Return the controller's state after the last step of `record`.
 
         It is a function of the measurements until then, so it is not recorded but recomputed.
         """
@@ -209,7 +209,7 @@ class Loop:
         return Setpoint(*(array[number] for array in self.setpoints))
 
     def _last_command(self, record: Record) -> tuple[Floats, Any]:
-        """Torque and motor command of the last control step before the last state of `record`."""
+        """Return the torque and motor command of the last control step before the last state of `record`."""
         begin = record.steps
         none = np.zeros(self.plant.model.nv)
         if begin % self.clock.steps_per_control == 0:
@@ -221,7 +221,7 @@ class Loop:
         return record.tau[begin - 1].copy(), None
 
     def _step_failed(self, k: int, record: Record, error: Exception) -> SimulationError:
-        """The error of a step: of a plant of the user's own a failure, of dynx's own a divergence."""
+        """Return the error of a step: of a plant of the user's own a failure, of dynx's own a divergence."""
         kind, why = type(self.plant), f"{type(error).__name__}: {error}"
         if kind.__module__.partition(".")[0] == "dynx":
             return self._diverged(k, record, why)

@@ -21,7 +21,7 @@ class Record:
 
     @classmethod
     def begin(cls, q: Floats, v: Floats, n: int) -> Record:
-        """Buffers for n steps from the state (q, v)."""
+        """Return the buffers for n steps from the state (q, v)."""
         nv = len(v)
         record = cls(
             np.empty((n + 1, len(q))),
@@ -33,7 +33,7 @@ class Record:
         return record
 
     def copy(self) -> Record:
-        """The steps taken, in buffers of their own."""
+        """Return the steps taken, in buffers of their own."""
         n = self.steps
         return Record(
             self.q[: n + 1].copy(), self.v[: n + 1].copy(), self.a[:n].copy(), self.tau[:n].copy(), n
@@ -46,11 +46,11 @@ class Record:
         self.steps = n
 
     def extended(self, n: int) -> Record:
-        """The steps taken, in larger buffers for n steps."""
+        """Return the steps taken, in larger buffers for n steps."""
         larger = Record.begin(self.q[0], self.v[0], n)
         larger.take(self, self.steps)
         return larger
 
     def __len__(self) -> int:
-        """Number of steps that the buffers hold."""
+        """Return the number of steps that the buffers hold."""
         return len(self.tau)

@@ -21,7 +21,7 @@ SetpointOf = Callable[[Floats], Setpoint]
 
 
 def checked_reference(model: Model, reference: Any, *, within_limits: bool) -> SetpointOf | None:
-    """`reference` as a function of times; None stays None.
+    """Return `reference` as a function of times; None stays None.
 
     Raises ArgumentError for one of another robot, LimitError (if `within_limits`) where it leaves the
     model's limits of position or velocity.
@@ -43,7 +43,7 @@ def checked_reference(model: Model, reference: Any, *, within_limits: bool) -> S
 def setpoints_of(
     setpoint_of: SetpointOf | None, clock: Clock, controller: Controller[Any] | None
 ) -> Setpoint:
-    """The setpoint of every control step, `lead` control steps ahead: (n_controls, ...).
+    """Return the setpoint of every control step, `lead` control steps ahead: (n_controls, ...).
 
     Raises ArgumentError if there is none though the controller needs one.
     """

@@ -25,7 +25,7 @@ class Sensors:
         return self.noise is None and not self._clock.delay_steps
 
     def __call__(self, step: int, q: Floats, v: Floats) -> Measurement:
-        """The measurement at physics step `step`, from the states (n, nq), (n, nv) until then.
+        """Return the measurement at physics step `step`, from the states (n, nq), (n, nv) until then.
 
         With a delay it is the state of that long ago; before the start, the state at the start.
         """

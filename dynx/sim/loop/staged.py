@@ -51,7 +51,8 @@ NOISE = ("noise_q", "noise_v")
 
 
 def staged_loop(loop: Loop, left: int) -> StagedLoop | str:
-    """The loop in compiled stages for `left` more steps, or the reason why it has to be run plainly."""
+    """Return the loop in compiled stages for `left` more steps, or the reason why it has to be run
+    plainly."""
     plant = loop.plant
     if left < MIN_STEPS_TO_COMPILE:
         return f"fewer than {MIN_STEPS_TO_COMPILE} steps"
@@ -127,7 +128,8 @@ class StagedLoop:
             self._plant.reset(held.q, held.v)
 
     def _step(self, tracer: EngineCallTracer, *, controlled: bool) -> StagedStep:
-        """One step of the plant, with the torque of the controller if it is `controlled`, else that held."""
+        """Return one step of the plant, with the torque of the controller if it is `controlled`, else that
+        held."""
         loop, given = self._loop, tracer.given
         results: dict[str, Array] = {}
         unsound: Any = 0.0
@@ -167,7 +169,8 @@ class StagedLoop:
         return tracer.compile(results)
 
     def _arrays(self, record: Record, held: Held) -> dict[str, Floats]:
-        """Inputs and outputs of the stages by the names of their ports, a row for each (control) step."""
+        """Return the inputs and outputs of the stages by the names of their ports, a row for each (control)
+        step."""
         loop, n = self._loop, len(record)
         q, v, tau = record.q, record.v, record.tau
         arrays = {"q": q, "v": v, "seen_q": q, "seen_v": v, "next_q": q, "next_v": v}
@@ -186,7 +189,7 @@ class StagedLoop:
         return arrays
 
     def _row(self, name: str, steps: Steps) -> Steps:
-        """The row of an array that belongs to each of `steps`."""
+        """Return the row of an array that belongs to each of `steps`."""
         clock = self._loop.clock
         if name.startswith("next_"):
             return steps + 1
@@ -215,7 +218,8 @@ class StagedLoop:
         return True
 
     def _ready(self, step: StagedStep, by_step: Mapping[str, StridedRows], record: Record) -> Take:
-        """The next steps of the record as kernel and engine calls, over arrays with a row `by_step`."""
+        """Return the next steps of the record as kernel and engine calls, over arrays with a row
+        `by_step`."""
         first = record.steps
         still = np.zeros(len(by_step["q"].rows), dtype=np.int64)
         places = {name: np.zeros((1, size)) for name, size in (*step.sizes.items(), ("defect", 1))}
@@ -266,7 +270,8 @@ class StagedLoop:
 
 
 def _untraceable(name: str, error: Exception) -> str:
-    """Message for an error of a controller on symbols, with the line of its `torque` where it was raised."""
+    """Return the message for an error of a controller on symbols, with the line of its `torque` where it was
+    raised."""
     torques = [frame for frame in extract_tb(error.__traceback__) if frame.name == "torque"]
     place = f" ({Path(torques[-1].filename).name}, line {torques[-1].lineno})" if torques else ""
     return f"{name}.torque() cannot be traced: {error or type(error).__name__}{place}"

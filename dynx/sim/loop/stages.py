@@ -92,7 +92,7 @@ class EngineCallTracer:
         self.given = {name: self._symbols(name, size) for name, size in inputs.items()}
 
     def record(self, call: EngineCall, shape: Shape, *arguments: Array, guarded: bool = False) -> Array:
-        """Symbols (of `shape`) for the result of `call(*arguments)`.
+        """Return the symbols (of `shape`) for the result of `call(*arguments)`.
 
         If it is `guarded`, the step ends before a call with arguments that are not finite.
         """
@@ -110,7 +110,8 @@ class EngineCallTracer:
         return self._symbols(result, int(np.prod(shape))).reshape(shape)
 
     def number(self, value: Floats) -> Array:
-        """Symbols for numbers (n,) of a controller: controllers with other gains have the same stages."""
+        """Return the symbols for numbers (n,) of a controller: controllers with other gains have the same
+        stages."""
         name = f"number {len(self._numbers)}"
         self._numbers[name] = value
         return self._symbols(name, value.size)
@@ -122,7 +123,7 @@ class EngineCallTracer:
                 raise TraceError(f"{node.op} is not rounded as NumPy rounds it")
 
     def compile(self, results: Mapping[str, Array]) -> StagedStep:
-        """The stages, the last of which writes `results`."""
+        """Return the stages, the last of which writes `results`."""
         stages = []
         sizes = {name: len(nodes) for nodes, name in self._written.items()}
         for call, fresh, arguments, result, guarded in self._calls:
@@ -172,7 +173,7 @@ class TracedEngineCalls(Dynamics):
         super().__init__(dynamics.model)
 
     def evaluation(self, quantity: str) -> Evaluation:
-        """Callable that records an engine call and returns symbols for its result."""
+        """Return the callable that records an engine call and returns symbols for its result."""
         nv = self.model.nv
         shape = (nv, nv) if quantity == "mass_matrix" else (nv,)
 
@@ -198,7 +199,7 @@ def refuse_impure(controller: Controller[Any]) -> None:
 
 
 def traced_controller(controller: Controller[Any], tracer: EngineCallTracer) -> Controller[Any]:
-    """The controller with engine calls for its dynamics, and symbols for its gains."""
+    """Return the controller with engine calls for its dynamics, and symbols for its gains."""
 
     def symbols(each: Controller[Any]) -> dict[str, Array]:
         gains = gains_of(each).items()
@@ -208,7 +209,7 @@ def traced_controller(controller: Controller[Any], tracer: EngineCallTracer) -> 
 
 
 def _without_idle_inputs(program: Program) -> Program:
-    """The program with only those inputs that it reads."""
+    """Return the program with only those inputs that it reads."""
     read = {node.slot for node in program.nodes if node.op == "input"}
     kept: list[Port] = []
     moved: dict[int, int] = {}

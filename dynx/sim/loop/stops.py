@@ -27,7 +27,7 @@ class Stops:
         self._mass_matrix = mass_matrix
 
     def __call__(self, q: Floats, v: Floats) -> tuple[Floats, Floats] | None:
-        """The state after the impact, None if no joint is past its limits."""
+        """Return the state after the impact, None if no joint is past its limits."""
         joints = q[self._q_joints]
         held = np.clip(joints, self._lower, self._upper)
         past = np.flatnonzero(joints != held)

@@ -42,7 +42,7 @@ class Push:
     reference: str = LOCAL_WORLD_ALIGNED
 
     def checked(self, model: Model) -> Push:
-        """A copy with its wrench as an array. Raises ArgumentError for an invalid push on `model`."""
+        """Return a copy with its wrench as an array. Raises ArgumentError for an invalid push on `model`."""
         model.frame_index(self.frame)
         wrench = checked_array("wrench", self.wrench, 6)
         if wrench.ndim != 1 or self.reference not in REFERENCES:
@@ -58,7 +58,8 @@ class Push:
         return Push(self.frame, wrench, float(self.start), float(self.duration), self.reference)
 
     def acts(self, t: Any, dt: float) -> Any:
-        """Whether it acts in the steps of length `dt` that begin at `t`, a time or an array of times [s]."""
+        """Check whether it acts in the steps of length `dt` that begin at `t`, a time or an array of times
+        [s]."""
         since = t - self.start + TIME_ROUNDING * dt
         return (since >= 0.0) & (since < self.duration)
 
@@ -100,7 +101,7 @@ class Disturbances:
         return [name for name, is_present in present.items() if is_present]
 
     def torque(self, engine: Backend, t: float, q: Floats, v: Floats) -> Floats:
-        """The torque (nv,) of pushes less friction, in a step that began at `t`."""
+        """Return the torque (nv,) of pushes less friction, in a step that began at `t`."""
         tau = -self.friction(v)
         for push in self.pushes:
             if push.acts(t, self._dt):
@@ -122,7 +123,7 @@ class DisturbedAcceleration:
         return not (self._disturbances.has_torque or self._disturbances.has_armature)
 
     def __call__(self, q: Floats, v: Floats, tau: Floats, t: float) -> Floats:
-        """a (nv,) at state q, v under `tau`, in a step that began at `t`."""
+        """Return a (nv,) at state q, v under `tau`, in a step that began at `t`."""
         if self._disturbances.has_torque:
             tau = tau + self._disturbances.torque(self._engine, t, q, v)
         if not self._disturbances.has_armature:

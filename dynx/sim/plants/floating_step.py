@@ -15,7 +15,7 @@ from dynx.spatial.so3 import cross, quat_product, rotate_back, rotation_from_qua
 
 
 def floating_step(q: Array, v: Array, a: Array, h: float, center: Array) -> tuple[Array, Array]:
-    """q (nq,) and v (nv,) after a step of length `h` [s] with acceleration `a` (nv,).
+    """Return q (nq,) and v (nv,) after a step of length `h` [s] with acceleration `a` (nv,).
 
     `center` (3,) [m] is the centre of mass of the root, in the axes of the base frame.
     """

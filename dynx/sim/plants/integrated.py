@@ -19,7 +19,8 @@ SCHEMES = ("semi_implicit", "rk4", "adaptive")
 
 @lru_cache(maxsize=64)
 def _is_singular(model: Model) -> bool:
-    """Whether some joint moves no inertia; cached, because the check takes as long as some hundred steps."""
+    """Check whether some joint moves no inertia; cached, because the check takes as long as some hundred
+    steps."""
     return bool(singular_coordinates(model))
 
 
@@ -91,7 +92,7 @@ class IntegratedPlant(Plant):
         return self.substeps * (4 if isinstance(self._scheme, RungeKutta4) else 1)
 
     def advanced(self, accelerate: Accelerate, q: Array, v: Array, tau: Array) -> State:
-        """One step from q, v, with `accelerate(q, v, tau)` in the place of the engine."""
+        """Return one step from q, v, with `accelerate(q, v, tau)` in the place of the engine."""
         q, v, first = self._scheme(accelerate, q, v, tau)
         for _ in range(1, self.substeps):
             q, v, _ = self._scheme(accelerate, q, v, tau)

@@ -59,7 +59,7 @@ class SemiImplicitEuler:
         return base
 
     def __call__(self, accelerate: Accelerate, q: Array, v: Array, *given: Any) -> State:
-        """One step, for floats or for symbols."""
+        """Return one step, for floats or for symbols."""
         a = accelerate(q, v, *given)
         if self._floating:
             return self._float(q, v, a)
@@ -82,7 +82,7 @@ class SemiImplicitEuler:
 
 @cache
 def _base_step() -> Kernel:
-    """`floating_step` of a base alone, rounded as it is in every other kernel that has it."""
+    """Return `floating_step` of a base alone, rounded as it is in every other kernel that has it."""
 
     def step(q: Array, v: Array, a: Array, h: Array, center: Array) -> dict[str, Array]:
         return dict(zip(("q", "v"), floating_step(q, v, a, h[0], center), strict=True))
@@ -100,7 +100,7 @@ class _Flow:
         self.nq = model.nq
 
     def configuration(self, y: Floats) -> Floats:
-        """q with its quaternion on the unit sphere."""
+        """Return q with its quaternion on the unit sphere."""
         q = y[: self.nq]
         if self._floating:
             q = q.copy()
@@ -125,7 +125,7 @@ class RungeKutta4:
         self._h = h
 
     def __call__(self, accelerate: Accelerate, q: Floats, v: Floats, *given: Any) -> State:
-        """One step."""
+        """Return one step."""
         flow, h = self._flow, self._h
         y = np.concatenate([q, v])
         k1 = flow(accelerate, y, given)
@@ -151,7 +151,7 @@ class Adaptive:
         self._rtol, self._atol = float(rtol), float(atol)
 
     def __call__(self, accelerate: Accelerate, q: Floats, v: Floats, *given: Any) -> State:
-        """One step. Raises EngineError where the method gives up."""
+        """Return one step. Raises EngineError where the method gives up."""
         # Half a second, which only those who want it pay.
         from scipy.integrate import solve_ivp
 

@@ -33,7 +33,7 @@ MassScale = float | Mapping[str, float]
 
 
 def plant_model(model: Model, payload: Payload | Sequence[Payload] | None, mass_scale: MassScale) -> Model:
-    """`model` with masses and inertia tensors scaled, and then the payloads fixed to their frames.
+    """Return `model` with masses and inertia tensors scaled, and then the payloads fixed to their frames.
 
     Raises UnknownNameError for a frame or link that is not there, ArgumentError for a factor or a
     payload that cannot be.

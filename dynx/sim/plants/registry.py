@@ -37,12 +37,12 @@ _steppers = ClassRegistry(
 
 
 def plant_names() -> tuple[str, ...]:
-    """Names of all plants with a stepper of their own, dynx's own first."""
+    """Return the names of all plants with a stepper of their own, dynx's own first."""
     return _steppers.names()
 
 
 def plant_class(name: str) -> type[Plant]:
-    """The class of the plant of that name that has a stepper of its own; this imports its engine."""
+    """Return the class of the plant of that name that has a stepper of its own; this imports its engine."""
     return _steppers.find(name)
 
 
@@ -77,7 +77,7 @@ def unregister(name: str) -> None:
 
 
 def default_integrator(name: str) -> str:
-    """``engine`` for a plant with a stepper of its own, otherwise ``semi_implicit``."""
+    """Return ``engine`` for a plant with a stepper of its own, otherwise ``semi_implicit``."""
     has_stepper = name in BUILT_IN if name in BACKENDS else name in _steppers.names()
     return ENGINE if has_stepper else "semi_implicit"
 
@@ -92,7 +92,7 @@ def make_plant(
     substeps: int,
     options: Mapping[str, Any],
 ) -> Plant:
-    """The plant `name` under `integrator`; `options` are those of the adaptive integrator.
+    """Return the plant `name` under `integrator`; `options` are those of the adaptive integrator.
 
     Raises ArgumentError for an integrator that the plant does not have, UnknownBackendError for a name
     nobody provides, NotInstalledError where its engine is missing.

@@ -61,7 +61,7 @@ class CdrMessages:
             self.put_string(text)
 
     def encoded(self) -> list[bytes]:
-        """The messages."""
+        """Return the messages."""
         rows = np.concatenate(self._columns, axis=1)
         width, data = rows.shape[1], rows.tobytes()
         return [data[k * width : (k + 1) * width] for k in range(self._n)]

@@ -94,7 +94,7 @@ def load(path: str | os.PathLike[str]) -> dict[str, Any]:
 
 
 def _entries(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """All arrays of a ``.npz``."""
+    """Return all arrays of a ``.npz``."""
     problem = "it is no .npz file, or a part of one"
     try:
         with open(path, "rb") as raw:

@@ -54,7 +54,7 @@ def plot(rollout: RolloutData, path: str | os.PathLike[str] | None) -> Any:
 
 
 def _columns(model: Model) -> list[Column]:
-    """The position of a floating base, and the joints in equal shares."""
+    """Return the position of a floating base, and the joints in equal shares."""
     base_q, base_v = (7, 6) if model.floating else (0, 0)
     base = Column(("base x", "base y", "base z"), slice(0, 3), slice(0, 3), ("m", "N"), of_base=True)
     columns = [base] if model.floating else []
@@ -129,11 +129,11 @@ def _title(rollout: RolloutData) -> str:
 
 
 def _effort_limits(rollout: RolloutData) -> Floats:
-    """Those that cut the torques; if none did, those of the robot."""
+    """Return those that cut the torques; if none did, those of the robot."""
     cut = rollout.settings.get("effort_limits")
     return rollout.model.effort_limit if cut is None else np.asarray(cut, dtype=np.float64)
 
 
 def _plain(text: str) -> str:
-    """`text` as matplotlib shows it as it is: no formula, and no name that is left out of a legend."""
+    """Return `text` as matplotlib shows it as it is: no formula, and no name that is left out of a legend."""
     return (" " if text.startswith("_") else "") + text.replace("$", r"\$")

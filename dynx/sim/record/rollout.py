@@ -32,7 +32,8 @@ class Rollout(RolloutData):
         return cls(**load(path))
 
     def plot(self, path: str | os.PathLike[str] | None = None) -> Any:
-        """A `matplotlib.figure.Figure` of positions, errors, and torques against limits; saved at `path`.
+        """Return a `matplotlib.figure.Figure` of positions, errors, and torques against limits; saved at
+        `path`.
 
         Without a reference it has velocities for errors. A limit is drawn where a torque comes near it.
         A floating base has a column of its own: its position in the world, and its error, velocity and

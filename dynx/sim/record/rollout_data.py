@@ -74,7 +74,7 @@ class RolloutData:
     """Interventions by which the record is not that of its scenario alone, such as a torque of the caller."""
 
     def __len__(self) -> int:
-        """The number of steps."""
+        """Return the number of steps."""
         return len(self.tau)
 
     @cached_property
@@ -98,7 +98,7 @@ class RolloutData:
             return np.asarray(self.kinetic_energy + bodies.potential_energy(self.q))
 
     def summary(self) -> Summary:
-        """Errors, speeds, torques and the drift of the energy."""
+        """Return the errors, speeds, torques and the drift of the energy."""
         with np.errstate(invalid="ignore"):
             rms = np.sqrt(np.mean(self.error**2, axis=0))
         peak = float(np.max(self.kinetic_energy))
@@ -118,7 +118,7 @@ class RolloutData:
         return {} if self.scenario is None else settings_of(self.scenario)
 
     def first(self: Self, n: int) -> Self:
-        """The record of its first n steps."""
+        """Return the record of its first n steps."""
         if not 0 <= n <= len(self):
             raise ArgumentError(f"there are {len(self)} steps; wanted 0 to {len(self)} of them, not {n}")
         reference = None if self.reference is None else Setpoint(*(x[: n + 1] for x in self.reference))

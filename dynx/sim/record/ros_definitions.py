@@ -48,13 +48,13 @@ SEPARATOR = "=" * 80
 
 
 def schema_name(message: str) -> str:
-    """``package/msg/Name``, which is what ROS 2 calls a type."""
+    """Return ``package/msg/Name``, which is what ROS 2 calls a type."""
     package, name = message.split("/")
     return f"{package}/msg/{name}"
 
 
 def schema_text(message: str) -> str:
-    """The definition of `message` and, behind separators, of all that it is made of (``ros2msg``)."""
+    """Return the definition of `message` and, behind separators, of all that it is made of (``ros2msg``)."""
     needed = _needed(message)
     parts = [DEFINITIONS[message], *(f"{SEPARATOR}\nMSG: {name}\n{DEFINITIONS[name]}" for name in needed)]
     return "".join(parts)

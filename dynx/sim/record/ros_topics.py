@@ -60,7 +60,7 @@ class Topic(NamedTuple):
     encode: Encode
 
     def encoded(self, stamps: Stamps, begin: int, end: int) -> list[tuple[int, bytes]]:
-        """Those of the states `begin` to `end` (exclusive), each with the number of its state."""
+        """Return those of the states `begin` to `end` (exclusive), each with the number of its state."""
         begin, end = max(begin, self.first), min(end, self.last)
         if begin >= end:
             return []
@@ -70,7 +70,7 @@ class Topic(NamedTuple):
 
 
 def topics_of(rollout: RolloutData) -> list[Topic]:
-    """All topics of `rollout`; one that changes its layout at the last state is there twice."""
+    """Return all topics of `rollout`; one that changes its layout at the last state is there twice."""
     return [*_joint_topics(rollout), *(_base_topics(rollout) if rollout.model.floating else [])]
 
 
@@ -190,7 +190,7 @@ def _odometry(world: str, base: str, pose: Floats, velocity: Floats) -> Encode:
 
 
 def _stamped(frame: str, values: Floats) -> Encode:
-    """Two vectors with a header: a twist, an acceleration, a wrench."""
+    """Return two vectors with a header: a twist, an acceleration, a wrench."""
 
     def encode(messages: CdrMessages, stamps: Stamps, states: slice) -> None:
         _put_header(messages, stamps, frame)

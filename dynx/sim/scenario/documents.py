@@ -97,7 +97,7 @@ class Unknown:
 
 
 def encode(value: Any, model: Model | None = None) -> Document:
-    """`value` as a document; `model` is that of the scenario it belongs to."""
+    """Return `value` as a document; `model` is that of the scenario it belongs to."""
     if value is None or isinstance(value, bool | str):
         return value
     if isinstance(value, np.generic):
@@ -136,7 +136,7 @@ def encode(value: Any, model: Model | None = None) -> Document:
 
 
 def decode(document: Document, model: Model | None = None) -> Any:
-    """The value of a document that `encode` gave; `Unknown` for an object that cannot be rebuilt here.
+    """Return the value of a document that `encode` gave; `Unknown` for an object that cannot be rebuilt here.
 
     Classes are looked up in dynx and in modules that are imported already: a file imports nothing. Raises
     ArgumentError for a document of another form.
@@ -149,7 +149,7 @@ def decode(document: Document, model: Model | None = None) -> Any:
 
 
 def in_words(document: Document) -> str:
-    """A document in short, for a message."""
+    """Return a document in short, for a message."""
     if isinstance(document, dict):
         if FINGERPRINT in document:
             return f"{document[FINGERPRINT].rpartition(':')[2]} (fingerprint {document['sha256'][:8]})"
@@ -211,7 +211,8 @@ def _object(value: Any, given: Mapping[str, Any], model: Model | None) -> Docume
 
 
 def _code_of(value: Any) -> dict[str, Document]:
-    """Checksum of the code of an object's class, and a trajectory's duration; nothing for a class of dynx."""
+    """Return the checksum of the code of an object's class, and a trajectory's duration; nothing for a class
+    of dynx."""
     if not is_foreign(type(value)):
         return {}
     duration = {DURATION: float(value.duration)} if isinstance(value, Trajectory) else {}
@@ -219,7 +220,7 @@ def _code_of(value: Any) -> dict[str, Document]:
 
 
 def _present_class(document: Document) -> type | None:
-    """The class of a document in this program; None where it is not here."""
+    """Return the class of a document in this program; None where it is not here."""
     if CLASS in document:
         found: type | None = _class_of(document[CLASS])
         return found
@@ -230,7 +231,7 @@ def _present_class(document: Document) -> type | None:
 
 
 def _has_other_code(document: Document) -> bool:
-    """Whether the class of a document has other code in this program than in the file."""
+    """Check whether the class of a document has other code in this program than in the file."""
     kind = _present_class(document) if CODE in document else None
     return kind is not None and digest_of_code(kind) != document[CODE]
 
@@ -245,7 +246,7 @@ def _array(array: np.ndarray[Any, Any]) -> Document:
 
 
 def _without_infinities(entry: Any) -> Any:
-    """`entry` with text for the numbers that JSON does not have."""
+    """Return `entry` with text for the numbers that JSON does not have."""
     if isinstance(entry, list):
         return [_without_infinities(each) for each in entry]
     return repr(entry) if isinstance(entry, float) and not math.isfinite(entry) else entry
@@ -258,14 +259,14 @@ def _with_infinities(entry: Any) -> Any:
 
 
 def _is_declared(value: Any) -> bool:
-    """Whether `value` is of a class that is itself a dataclass, and has nothing beside its fields."""
+    """Check whether `value` is of a class that is itself a dataclass, and has nothing beside its fields."""
     if "__dataclass_fields__" not in vars(type(value)):
         return False
     return set(getattr(value, "__dict__", ())) <= {each.name for each in fields(value)}
 
 
 def _controller(controller: Controller[Any], model: Model | None) -> Document | None:
-    """A registered controller and its model; None for any other."""
+    """Return a registered controller and its model; None for any other."""
     if any(each.model != controller.model for each in chain_of(controller)):
         return None
     try:
@@ -279,7 +280,8 @@ def _name_of(kind: type) -> str:
 
 
 def _class_of(name: str) -> Any:
-    """The class of that name in dynx or in a module that is imported already; None where there is none."""
+    """Return the class of that name in dynx or in a module that is imported already; None where there is
+    none."""
     module, _, path = name.partition(":")
     if module.partition(".")[0] == "dynx":
         importlib.import_module(module)
@@ -293,7 +295,7 @@ def _class_of(name: str) -> Any:
 
 
 def _fingerprint(value: Any, model: Model | None) -> str:
-    """Checksum of the parts of an object, and of those of the objects in it."""
+    """Return the checksum of the parts of an object, and of those of the objects in it."""
     parts = [json.dumps(encode(part, model), sort_keys=True) for part in _parts(value)]
     # The order of a set changes from process to process.
     parts = sorted(parts) if isinstance(value, set | frozenset) else parts
@@ -301,7 +303,7 @@ def _fingerprint(value: Any, model: Model | None) -> str:
 
 
 def _parts(value: Any) -> Iterable[Any]:
-    """Code and closure of a function; of any other object all that a copy of it would get."""
+    """Return the code and closure of a function; of any other object all that a copy of it would get."""
     if isinstance(value, set | frozenset):
         return value
     if isinstance(value, bytes):

@@ -12,7 +12,7 @@ from dynx.sim.scenario.scenario import Scenario
 
 
 def scenario_of(model: Model | Scenario, controller_backend: str | None, given: dict[str, Any]) -> Scenario:
-    """The scenario of keyword arguments, or the one given instead of a model.
+    """Return the scenario of keyword arguments, or the one given instead of a model.
 
     Raises ArgumentError for arguments beside a scenario that are fields of it.
     """

@@ -121,7 +121,8 @@ class Scenario:
         return tuple(self.payload) if isinstance(self.payload, tuple) else ()
 
     def with_defaults(self) -> Scenario:
-        """An equal scenario with the integrator, the control step and the duration that None stands for."""
+        """Return an equal scenario with the integrator, the control step and the duration that None stands
+        for."""
         duration = self.duration
         if duration is None and isinstance(self.reference, Trajectory | Unknown):
             duration = self.reference.duration
@@ -133,7 +134,7 @@ class Scenario:
         )
 
     def differences(self, other: Scenario) -> list[Difference]:
-        """Fields in which `other` is another simulation; empty for an equal one."""
+        """Return the fields in which `other` is another simulation; empty for an equal one."""
         found: list[Difference] = []
         ours, theirs = self.with_defaults(), other.with_defaults()
         for name in field_names():
@@ -155,7 +156,7 @@ class Scenario:
         return hash((self.model, self.plant))
 
     def __repr__(self) -> str:
-        """The fields that are not left to their defaults."""
+        """Return the fields that are not left to their defaults."""
         shown_fields = [f"Scenario({self.model.name}"]
         for each in fields(self):
             value = getattr(self, each.name)
@@ -165,7 +166,7 @@ class Scenario:
         return ",\n    ".join(shown_fields) + ")"
 
     def to_dict(self) -> dict[str, Document]:
-        """A document of numbers and text, which `from_dict` turns back into an equal scenario.
+        """Return a document of numbers and text, which `from_dict` turns back into an equal scenario.
 
         A trajectory of your own can be rebuilt if its class is a frozen dataclass, a controller if it is
         registered besides; otherwise it is written as a fingerprint, which can only be compared.
@@ -178,7 +179,7 @@ class Scenario:
 
     @classmethod
     def from_dict(cls, document: Mapping[str, Document]) -> Scenario:
-        """The scenario of a document. Raises ArgumentError for a document of another form."""
+        """Return the scenario of a document. Raises ArgumentError for a document of another form."""
         if not isinstance(document, Mapping) or document.get("schema") != SCHEMA:
             raise ArgumentError(f"a scenario's document has schema {SCHEMA!r}; this one has not")
         given = {name: value for name, value in document.items() if name != "schema"}
@@ -192,12 +193,12 @@ class Scenario:
         return cls(model, **{name: decode(value, model) for name, value in given.items()})
 
     def to_json(self) -> str:
-        """`to_dict` as text."""
+        """Return `to_dict` as text."""
         return json.dumps(self.to_dict(), indent=1)
 
     @classmethod
     def from_json(cls, text: str) -> Scenario:
-        """The scenario of a text that `to_json` gave. Raises ArgumentError for any other text."""
+        """Return the scenario of a text that `to_json` gave. Raises ArgumentError for any other text."""
         try:
             document = json.loads(text)
         except ValueError as error:
@@ -206,12 +207,12 @@ class Scenario:
 
 
 def field_names() -> tuple[str, ...]:
-    """Names of all fields of a scenario."""
+    """Return the names of all fields of a scenario."""
     return tuple(each.name for each in fields(Scenario))
 
 
 def _as_array(value: Any) -> Any:
-    """Lists of numbers as a read-only array; anything else as it is."""
+    """Return the lists of numbers as a read-only array; anything else as it is."""
     if not isinstance(value, list | tuple | np.ndarray):
         return value
     try:
@@ -225,7 +226,7 @@ def _as_array(value: Any) -> Any:
 
 
 def _differences(name: str, ours: Document, theirs: Document) -> list[Difference]:
-    """The innermost entries in which two documents differ."""
+    """Return the innermost entries in which two documents differ."""
     if _same(ours, theirs):
         return []
     one, other = _parts_of(ours), _parts_of(theirs)
@@ -236,7 +237,8 @@ def _differences(name: str, ours: Document, theirs: Document) -> list[Difference
 
 
 def _parts_of(document: Document) -> dict[str, Document] | None:
-    """Parts of the document of an object by name, equal names for one class; None for no object."""
+    """Return the parts of the document of an object by name, equal names for one class; None for no
+    object."""
     if not isinstance(document, dict):
         return None
     code = {"code of the class": document[CODE]} if CODE in document else {}
@@ -251,7 +253,8 @@ def _parts_of(document: Document) -> dict[str, Document] | None:
 
 
 def _same(one: Document, other: Document) -> bool:
-    """Equality of documents in which True and 1 are different, and lists and arrays of numbers are not."""
+    """Return the equality of documents in which True and 1 are different, and lists and arrays of numbers are
+    not."""
     one, other = (
         each[ARRAY] if isinstance(each, dict) and each.keys() == {ARRAY} else each for each in (one, other)
     )

@@ -36,7 +36,7 @@ class Sample(NamedTuple):
 
 
 def configurations(model: Model, *, within_limits: bool = False) -> Strategy[Floats]:
-    """A configuration q (nq,) of `model`. Shrinks to the neutral one.
+    """Draw a configuration q (nq,) of `model`. Shrinks to the neutral one.
 
     A coordinate is exactly 0, at or next to a quarter turn (where arms are singular) or a limit,
     between the limits, or, unless `within_limits`, anywhere: limits bound no quantity that a
@@ -63,17 +63,17 @@ def configurations(model: Model, *, within_limits: bool = False) -> Strategy[Flo
 
 
 def velocities(model: Model, reach: float = 3.0) -> Strategy[Floats]:
-    """v (nv,) with components within `reach` [rad/s or m/s]. Shrinks to rest."""
+    """Draw v (nv,) with components within `reach` [rad/s or m/s]. Shrinks to rest."""
     return _coordinates(model, reach)
 
 
 def accelerations(model: Model, reach: float = 5.0) -> Strategy[Floats]:
-    """a (nv,), or a torque, with components within `reach`. Shrinks to zero."""
+    """Draw a (nv,), or a torque, with components within `reach`. Shrinks to zero."""
     return _coordinates(model, reach)
 
 
 def samples(model: Model) -> Strategy[Sample]:
-    """A `Sample` (q, v, a) of `model`. Shrinks to rest at the neutral configuration."""
+    """Draw a `Sample` (q, v, a) of `model`. Shrinks to rest at the neutral configuration."""
     return st.tuples(configurations(model), velocities(model), accelerations(model)).map(Sample._make)
 
 

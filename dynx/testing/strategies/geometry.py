@@ -35,19 +35,19 @@ SMALL_STEPS = (0.0, 1e-12, -1e-9, 1e-6, -1e-3)
 
 @lru_cache(maxsize=64)
 def numbers(reach: float) -> Strategy[float]:
-    """A number in [-reach, reach]: quarters of the reach, or any with nine digits. Shrinks to 0."""
+    """Draw a number in [-reach, reach]: quarters of the reach, or any with nine digits. Shrinks to 0."""
     rounded = st.integers(-4, 4).map(lambda n: n * reach / 4)
     anything = st.floats(-1.0, 1.0, allow_nan=False).map(lambda x: round(x, 9) * reach)
     return st.one_of(rounded, anything)
 
 
 def angles() -> Strategy[float]:
-    """An angle [rad] in [-pi, pi]: multiples of pi/4, or any. Shrinks to 0."""
+    """Draw an angle [rad] in [-pi, pi]: multiples of pi/4, or any. Shrinks to 0."""
     return numbers(math.pi)
 
 
 def vectors(reach: float = 1.0) -> Strategy[Vector]:
-    """Three numbers in [-reach, reach]. Shrinks to the zero vector."""
+    """Draw three numbers in [-reach, reach]. Shrinks to the zero vector."""
     return _vectors(checked_reach("reach", reach))
 
 
@@ -59,7 +59,7 @@ def _vectors(reach: float) -> Strategy[Vector]:
 
 @lru_cache(maxsize=1)
 def unit_vectors() -> Strategy[Vector]:
-    """A direction: the six along the axes, or any. Shrinks to z."""
+    """Draw a direction: the six along the axes, or any. Shrinks to z."""
     return st.one_of(
         st.sampled_from(CARDINAL_AXES),
         st.builds(_on_sphere, st.floats(0.0, 2.0, allow_nan=False), angles()),
@@ -68,7 +68,7 @@ def unit_vectors() -> Strategy[Vector]:
 
 @lru_cache(maxsize=1)
 def quaternions() -> Strategy[Floats]:
-    """A unit quaternion (x, y, z, w), either of the two of its attitude. Shrinks to the identity.
+    """Draw a unit quaternion (x, y, z, w), either of the two of its attitude. Shrinks to the identity.
 
     Among them are half turns and attitudes next to the identity and next to half turns.
     """
@@ -82,7 +82,7 @@ def quaternions() -> Strategy[Floats]:
 
 
 def poses(reach: float = 1.0) -> Strategy[Floats]:
-    """T_AB (4, 4), a position [m] within `reach` on each axis and any attitude.
+    """Draw T_AB (4, 4), a position [m] within `reach` on each axis and any attitude.
 
     Shrinks to the identity.
     """
@@ -91,13 +91,13 @@ def poses(reach: float = 1.0) -> Strategy[Floats]:
 
 @lru_cache(maxsize=8)
 def origins(reach: float = 1.0) -> Strategy[Pose]:
-    """A URDF origin: translation [m] and roll-pitch-yaw [rad]. Shrinks to the identity."""
+    """Draw a URDF origin: translation [m] and roll-pitch-yaw [rad]. Shrinks to the identity."""
     rpy = st.one_of(st.just((0.0, 0.0, 0.0)), st.tuples(angles(), angles(), angles()))
     return st.builds(Pose, vectors(reach), rpy)
 
 
 def wrenches(force: float = 10.0, moment: float = 5.0) -> Strategy[Floats]:
-    """Force [N] then moment [N m] (6,), each component within its bound. Shrinks to zero."""
+    """Draw the force [N] then moment [N m] (6,), each component within its bound. Shrinks to zero."""
     return _wrenches(checked_reach("force", force), checked_reach("moment", moment))
 
 

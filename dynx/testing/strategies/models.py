@@ -44,7 +44,7 @@ def optional(strategy: Strategy[T]) -> Strategy[T | None]:
 
 
 def _limits(reach: float) -> Strategy[Limits]:
-    """Limits that are absent, of some width, of zero width, or on one side."""
+    """Draw the limits that are absent, of some width, of zero width, or on one side."""
     ends = st.tuples(numbers(reach), numbers(reach)).map(sorted)
     finite = ends.map(lambda ends: Limits(ends[0], ends[1], velocity=2.0, effort=50.0))
     return st.one_of(
@@ -84,7 +84,7 @@ def models(
     solvable: bool = False,
     from_urdf: bool = False,
 ) -> Strategy[Model]:
-    """A random robot of `min_links` to `max_links` links, valid by construction.
+    """Draw a random robot of `min_links` to `max_links` links, valid by construction.
 
     Trees of any shape, joints in any order in the document, any axis and origin; solid and thin
     bodies, point masses, massless links; limits (of zero width, on one side, none), damping,
@@ -221,7 +221,7 @@ def _models(
 def _limbs(
     joint_types: tuple[JointType, ...], inertial: Strategy[Inertial | None], mimics: bool, locks: bool
 ) -> Strategy[_Limb]:
-    """A link at the end of a chain; shrinks to a massless link, fixed at its parent's origin."""
+    """Draw a link at the end of a chain; shrinks to a massless link, fixed at its parent's origin."""
     follow = st.tuples(st.integers(0, MAX_LINKS), RATIOS, numbers(1.0))
 
     @st.composite

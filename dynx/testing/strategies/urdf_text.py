@@ -48,7 +48,7 @@ are not well-formed XML, but every engine reads them."""
 
 
 def urdf_text(model: Model | None = None) -> Strategy[str]:
-    """URDF text of `model`, or of a random one, in any legal spelling. Shrinks to the tidy one.
+    """Draw URDF text of `model`, or of a random one, in any legal spelling. Shrinks to the tidy one.
 
     Every number is written so that it reads back as the same float, and joints keep their order, so
     ``dynx.load(text, base=model.base, gravity=model.gravity)`` gives a model equal to `model`. A
