@@ -29,6 +29,8 @@ class Element:
     attributes: dict[str, str]
     line: int
     children: list[Element] = field(default_factory=list)
+    text: str = ""
+    """Character data, where `read_xml` was given the tag in `with_text`."""
 
     def all(self, tag: str) -> list[Element]:
         """Return the child elements of that tag, in document order."""
@@ -42,28 +44,36 @@ def read_xml(
     *,
     opaque: Collection[str] = (),
     max_counts: Mapping[str, int] | None = None,
+    with_text: Collection[str] = (),
 ) -> Element:
     """Read a document and return its root element.
 
     The content of an element whose tag is in `opaque` is checked but not stored. `max_counts` limits how
-    often a tag may occur directly below the root. Notes are appended to `notes`. Raises DescriptionError for
-    text that is not XML, is truncated, has a document type, is nested deeper than MAX_DEPTH, or has more
-    elements than MAX_ELEMENTS or `max_counts` allows.
+    often a tag may occur directly below the root. Character data are stored for the tags in `with_text`,
+    which name elements without children. Notes are appended to `notes`. Raises DescriptionError for text that
+    is not XML, is truncated, has a document type, is nested deeper than MAX_DEPTH, or has more elements than
+    MAX_ELEMENTS or `max_counts` allows.
     """
     text = decode(data, source, notes) if isinstance(data, bytes) else data
     text, lines_before = strip_ends(text, notes)
-    return _TreeBuilder(source, lines_before, opaque, max_counts or {}).build(text)
+    return _TreeBuilder(source, lines_before, opaque, max_counts or {}, with_text).build(text)
 
 
 class _TreeBuilder:
     """Handlers of expat that build the tree; `lines_before` lines were removed in front of the text."""
 
     def __init__(
-        self, source: str, lines_before: int, opaque: Collection[str], max_counts: Mapping[str, int]
+        self,
+        source: str,
+        lines_before: int,
+        opaque: Collection[str],
+        max_counts: Mapping[str, int],
+        with_text: Collection[str],
     ) -> None:
         self._source, self._lines_before = source, lines_before
         self._opaque, self._remaining = frozenset(opaque), dict(max_counts)
         self._max_counts = max_counts
+        self._with_text, self._texts = frozenset(with_text), list[str]()
         self._open: list[Element] = []
         self._depth = 0
         self._opaque_depth: int | None = None
@@ -73,6 +83,8 @@ class _TreeBuilder:
         self._parser.StartElementHandler = self._start
         self._parser.EndElementHandler = self._end
         self._parser.StartDoctypeDeclHandler = self._doctype
+        if with_text:
+            self._parser.CharacterDataHandler = self._characters
 
     def build(self, text: str) -> Element:
         try:
@@ -89,6 +101,7 @@ class _TreeBuilder:
             self._parser.StartElementHandler = None
             self._parser.EndElementHandler = None
             self._parser.StartDoctypeDeclHandler = None
+            self._parser.CharacterDataHandler = None
         if self._root is None:
             raise self._error("contains no element", self._lines_before + 1)
         return self._root
@@ -115,12 +128,20 @@ class _TreeBuilder:
         self._open.append(element)
         if tag in self._opaque:
             self._opaque_depth = self._depth
+        self._texts.clear()
 
     def _end(self, tag: str) -> None:
         if self._opaque_depth is None or self._opaque_depth == self._depth:
             self._opaque_depth = None
-            self._open.pop()
+            element = self._open.pop()
+            if self._texts and not element.children and tag in self._with_text:
+                element.text = "".join(self._texts)
+        self._texts.clear()
         self._depth -= 1
+
+    def _characters(self, text: str) -> None:
+        if self._open[-1].tag in self._with_text:
+            self._texts.append(text)
 
     def _doctype(self, name: str, system: str | None, public: str | None, internal: bool) -> None:
         line = self._lines_before + self._parser.CurrentLineNumber

@@ -3,6 +3,7 @@
 Reported are meshes whose location is certain: a path relative to the description, a ``file://`` path, or a
 file in a package that was found (in the folders above the description, in ROS_PACKAGE_PATH or
 AMENT_PREFIX_PATH) but does not contain it. On a case-sensitive file system ``Base.STL`` is not ``base.stl``.
+Paths that leave the package or repository of the description are not looked at.
 
 PyBullet 3.2.7 refuses the whole file ("Cannot load URDF file") for a mesh in ``<visual>`` or in
 ``<collision>``, and so does Drake 1.51 with a scene graph; MuJoCo 4.0 does for ``<collision>`` alone, since

@@ -4,41 +4,53 @@ COLLADA 1.4.1: <unit> scales; <node>s nest, with <matrix>, <translate>, <rotate>
 document order; <instance_geometry> places a mesh. Some loaders rotate a file whose <up_axis> is not z and
 some do not, so the points of both readings are returned. A file with other elements that move points (skins,
 <lookat>, <skew>, nodes of other files) is not read, so that no box is too small.
+
+A node that places another twice, which places a third twice, and so on, is a scene of any size in a few
+lines: MAX_NODES and MAX_POINTS bound the work.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
-from xml.etree import ElementTree
 
 import numpy as np
 
+from dynx.errors import DescriptionError
+from dynx.model.xml.reading import Element, read_xml
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import rotation_about
 
+MAX_NODES = 100_000
+"""Largest number of nodes of a scene, counted as often as they are placed."""
+
+MAX_POINTS = 10_000_000
+"""Largest number of points of a scene, counted as often as they are placed."""
+
 _DEEPEST = 50
+_LARGEST_STRIDE = 1000
 _TO_Z_UP = {
     "Y_UP": ((1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0)),
     "X_UP": ((0.0, -1.0, 0.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0)),
 }
-_UNREADABLE = ("lookat", "skew", "instance_controller")
+_UNREADABLE = frozenset({"lookat", "skew", "instance_controller"})
+_MOVING = frozenset({"matrix", "translate", "rotate", "scale"})
+_WITH_TEXT = {"float_array", "up_axis", *_MOVING}
+_LAYOUT = (("stride", "1"), ("offset", "0"))
+"""Attributes of an <accessor> with their defaults."""
+
+_NUMBER = re.compile(r"\S+")
 
 
 def collada_points(data: bytes) -> Floats | None:
     """Return all points of the scene (n, 3) [m]; None where the file has elements that are not supported."""
-    # By entities a small file can grow without bound, and no mesh needs one.
-    if b"<!DOCTYPE" in data or b"<!ENTITY" in data:
-        return None
+    prefix = re.search(rb"<(\w+:)COLLADA\b", data[:1000])
+    names = "" if prefix is None else prefix.group(1).decode("ascii", "replace")
     try:
-        root = ElementTree.fromstring(data)
-    except ElementTree.ParseError:
-        return None
-    for element in root.iter():
-        _, _, element.tag = element.tag.rpartition("}")
-    scene = _Scene(root)
-    try:
+        root = read_xml(data, "<mesh>", [], with_text={f"{names}{tag}" for tag in _WITH_TEXT})
+        scene = _Scene(root)
         found = [points @ T[:3, :3].T + T[:3, 3] for points, T in scene.placed()]
-    except (_NotSupported, KeyError):
+    except (_NotSupported, DescriptionError, ValueError):
         return None
     if not found:
         return None
@@ -48,73 +60,112 @@ def collada_points(data: bytes) -> Floats | None:
 
 
 class _NotSupported(Exception):
-    """An element that is not supported."""
+    """An element that is not supported, or more of them than are read."""
 
 
 class _Scene:
-    def __init__(self, root: ElementTree.Element) -> None:
-        unit = root.find("asset/unit")
-        self.unit = float(unit.get("meter", "1")) if unit is not None else 1.0
-        self.up_axis = (root.findtext("asset/up_axis") or "Y_UP").strip()
+    def __init__(self, root: Element) -> None:
+        self._by_id: dict[str, Element] = {}
+        for element in _all_below(root):
+            element.tag = element.tag.rpartition(":")[2]
+            self._by_id.setdefault(element.attributes.get("id", ""), element)
+        unit, up_axis = _first(root, "asset", "unit"), _first(root, "asset", "up_axis")
+        self.unit = float(unit.attributes.get("meter", "1")) if unit is not None else 1.0
+        self.up_axis = ("" if up_axis is None else up_axis.text).strip() or "Y_UP"
         self._root = root
-        self._by_id = {key: element for element in root.iter() if (key := element.get("id"))}
+        self._nodes, self._points_placed = 0, 0
+        self._points_of: dict[int, Floats] = {}
 
     def placed(self) -> Iterator[tuple[Floats, Floats]]:
         """Yield the points of each mesh, and its pose (4, 4) in the scene, scale included."""
-        for scene in self._root.findall("library_visual_scenes/visual_scene"):
-            for node in scene.findall("node"):
+        for scene in _path(self._root, "library_visual_scenes", "visual_scene"):
+            for node in scene.all("node"):
                 yield from self._of_node(node, np.eye(4), 0)
 
-    def _of_node(self, node: ElementTree.Element, T: Floats, depth: int) -> Iterator[tuple[Floats, Floats]]:
-        if depth > _DEEPEST or any(node.find(tag) is not None for tag in _UNREADABLE):
+    def _of_node(self, node: Element, T: Floats, depth: int) -> Iterator[tuple[Floats, Floats]]:
+        self._nodes += 1
+        if depth > _DEEPEST or self._nodes > MAX_NODES:
             raise _NotSupported
-        for child in node:
-            T = T @ _transform(child)
-        for instance in node.findall("instance_geometry"):
-            yield self._points(self._target(instance, "url")), T
-        for instance in node.findall("instance_node"):
+        for child in node.children:
+            if child.tag in _UNREADABLE:
+                raise _NotSupported
+            if child.tag in _MOVING:
+                T = T @ _transform(child)
+        for instance in node.all("instance_geometry"):
+            points = self._points(self._target(instance, "url"))
+            self._points_placed += len(points)
+            if self._points_placed > MAX_POINTS:
+                raise _NotSupported
+            yield points, T
+        for instance in node.all("instance_node"):
             yield from self._of_node(self._target(instance, "url"), T, depth + 1)
-        for below in node.findall("node"):
+        for below in node.all("node"):
             yield from self._of_node(below, T, depth + 1)
 
-    def _points(self, geometry: ElementTree.Element) -> Floats:
-        found = []
-        for semantic in geometry.iterfind("mesh/vertices/input"):
-            if semantic.get("semantic") != "POSITION":
-                continue
-            source = self._target(semantic, "source")
-            array, accessor = source.find("float_array"), source.find("technique_common/accessor")
-            if array is None or accessor is None:
-                raise _NotSupported
-            numbers = np.array((array.text or "").split(), dtype=np.float64)
-            stride, offset = int(accessor.get("stride", "1")), int(accessor.get("offset", "0"))
-            if stride < 3:
-                raise _NotSupported
-            rows = (len(numbers) - offset) // stride
-            found.append(numbers[offset : offset + rows * stride].reshape(rows, stride)[:, :3])
-        if not found:
+    def _points(self, geometry: Element) -> Floats:
+        inputs = _path(geometry, "mesh", "vertices", "input")
+        sources = [each for each in inputs if each.attributes.get("semantic") == "POSITION"]
+        if len(sources) != 1:
             raise _NotSupported
-        return np.concatenate(found)
+        source = self._target(sources[0], "source")
+        # Many geometries may share one source.
+        if id(source) not in self._points_of:
+            self._points_of[id(source)] = _positions(source)
+        return self._points_of[id(source)]
 
-    def _target(self, element: ElementTree.Element, attribute: str) -> ElementTree.Element:
-        reference = element.get(attribute, "")
-        if not reference.startswith("#"):
+    def _target(self, element: Element, attribute: str) -> Element:
+        reference = element.attributes.get(attribute, "")
+        target = self._by_id.get(reference[1:])
+        if not reference.startswith("#") or target is None:
             raise _NotSupported
-        return self._by_id[reference[1:]]
+        return target
 
 
-def _transform(element: ElementTree.Element) -> Floats:
-    """Return the matrix (4, 4) of one element of a node; the identity for elements that move nothing."""
-    T = np.eye(4)
-    if element.tag not in ("matrix", "translate", "rotate", "scale"):
-        return T
-    numbers = np.array((element.text or "").split(), dtype=np.float64)
+def _positions(source: Element) -> Floats:
+    array, accessor = _first(source, "float_array"), _first(source, "technique_common", "accessor")
+    if array is None or accessor is None:
+        raise _NotSupported
+    numbers = _numbers(array)
+    stride, offset = (int(accessor.attributes.get(key, default)) for key, default in _LAYOUT)
+    if not (3 <= stride <= _LARGEST_STRIDE and 0 <= offset <= len(numbers)):
+        raise _NotSupported
+    rows = (len(numbers) - offset) // stride
+    return numbers[offset : offset + rows * stride].reshape(rows, stride)[:, :3]
+
+
+def _numbers(element: Element) -> Floats:
+    return np.fromiter((float(each.group()) for each in _NUMBER.finditer(element.text)), np.float64)
+
+
+def _all_below(root: Element) -> Iterator[Element]:
+    waiting = [root]
+    while waiting:
+        element = waiting.pop()
+        yield element
+        waiting.extend(element.children)
+
+
+def _path(element: Element, *tags: str) -> list[Element]:
+    found = [element]
+    for tag in tags:
+        found = [child for each in found for child in each.all(tag)]
+    return found
+
+
+def _first(element: Element, *tags: str) -> Element | None:
+    return next(iter(_path(element, *tags)), None)
+
+
+def _transform(element: Element) -> Floats:
+    """Return the matrix (4, 4) of one element that moves points."""
+    numbers = _numbers(element)
     if element.tag == "matrix":
         return numbers.reshape(4, 4)
+    T = np.eye(4)
     if element.tag == "translate":
-        T[:3, 3] = numbers
+        T[:3, 3] = numbers.reshape(3)
     elif element.tag == "scale":
-        T[:3, :3] = np.diag(numbers)
+        T[:3, :3] = np.diag(numbers.reshape(3))
     else:
         x, y, z, angle_deg = numbers.tolist()
         axis = np.array([x, y, z])

@@ -8,10 +8,17 @@ from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 from dynx.errors import DescriptionError, nearest, shown
-from dynx.model.package_paths import find_package, resolve_package
+from dynx.model.package_paths import find_package
 
 _SEARCH_PATHS = (("ROS_PACKAGE_PATH", ""), ("AMENT_PREFIX_PATH", "share"))
 """Environment variables that list folders, and where packages lie in each of these."""
+
+
+_PACKAGE_FILES = ("package.xml", "manifest.xml")
+"""Files that mark the root folder of a ROS package."""
+
+_PARTS = frozenset({"description", "model", "models", "robot", "robots", "urdf", "urdfs", "xacro"})
+"""Names of folders that by convention lie beside the folder of the meshes."""
 
 
 class MeshNotFoundError(Exception):
@@ -25,21 +32,58 @@ def find_mesh(filename: str, source: str) -> Path | None:
     AMENT_PREFIX_PATH; a package in none of them may be installed elsewhere, so the result is None. A relative
     path starts from the description's folder. Raises MeshNotFoundError where the folder is known and the
     file is not in it.
+
+    A description may come from anyone, so nothing is searched or listed outside the folder of its files (see
+    `_enclosing`) and the packages: a path that leads elsewhere, also by a symbolic link, gives None.
     """
     if not os.path.isfile(source):
         return None
-    folder = Path(source).resolve().parent
-    if filename.startswith("package://"):
-        return _in_package(filename, folder)
-    if filename.startswith("file://"):
-        path = Path(unquote(urlsplit(filename).path))
-    elif "://" in filename or "$(" in filename or not filename.strip():
+    try:
+        folder = Path(os.path.realpath(source)).parent
+        if filename.startswith("package://"):
+            return _in_package(filename, folder)
+        if filename.startswith("file://"):
+            path = Path(unquote(urlsplit(filename).path))
+        elif "://" in filename or "$(" in filename or not filename.strip():
+            return None
+        else:
+            path = folder / filename
+        return _existing(path, _enclosing(folder), shown(filename, 200))
+    except (OSError, ValueError, RuntimeError):  # a name that no file can have, or links in a circle
         return None
-    else:
-        path = folder / filename
-    if _is_file(path):
-        return path
-    raise MeshNotFoundError(f"no file {shown(filename, 200)}{_similar(path)}")
+
+
+def _existing(path: Path, root: Path, described: str) -> Path | None:
+    """Return the file of `path`; None where that is not below `root`; MeshNotFoundError without one."""
+    real = Path(os.path.realpath(path))
+    if not real.is_relative_to(root):
+        return None
+    if real.is_file():
+        return real
+    raise MeshNotFoundError(f"no file {described}{_similar(real)}")
+
+
+# A robot has dozens of meshes.
+@lru_cache(maxsize=256)
+def _enclosing(folder: Path) -> Path:
+    """Return the folder of all files that come with a description: the repository, else the package.
+
+    Without either it is the description's own folder, or the one above where the name of the folder shows
+    that it holds descriptions only.
+    """
+    above = [each for each in (folder, *folder.parents) if _is_private(each)]
+    for markers in ((".git",), _PACKAGE_FILES):
+        for each in above:
+            if any((each / marker).exists() for marker in markers):
+                return each
+    beside = folder.name.lower() in _PARTS or "urdf" in folder.name.lower()
+    return folder.parent if beside and folder.parent in above else folder
+
+
+def _is_private(folder: Path) -> bool:
+    """Whether a folder can belong to one description: not the root, a home folder, or one above it."""
+    home = Path(os.path.realpath(os.path.expanduser("~")))
+    return folder != folder.parent and not home.is_relative_to(folder)
 
 
 def _in_package(uri: str, folder: Path) -> Path | None:
@@ -48,31 +92,29 @@ def _in_package(uri: str, folder: Path) -> Path | None:
     package = _package(name, folder, tuple(elsewhere))
     if package is None:
         return None
-    try:
-        return resolve_package(uri, [package])
-    except DescriptionError:
-        raise MeshNotFoundError(
-            f"no file {shown(inside, 200)} in package {shown(name)}{_similar(package / inside)}"
-        ) from None
+    return _existing(package / inside, package, f"{shown(inside, 200)} in package {shown(name)}")
 
 
 # A description names its few packages hundreds of times.
 @lru_cache(maxsize=256)
 def _package(name: str, folder: Path, elsewhere: tuple[tuple[str, str], ...]) -> Path | None:
-    roots = [folder, *folder.parents]
-    for listed, below in elsewhere:
-        roots += [Path(entry, below) for entry in listed.split(os.pathsep) if entry]
+    """Find a package: a folder above the description, beside one of these if it is marked as a package or
+    belongs to the description, or in a folder of the environment."""
+    enclosing = _enclosing(folder)
+    for root in (folder, *folder.parents):
+        found = _found(name, [root]) if _is_private(root) else None
+        own = found is not None and (folder.is_relative_to(found) or found.is_relative_to(enclosing))
+        if found is not None and (own or any((found / marker).is_file() for marker in _PACKAGE_FILES)):
+            return found
+    listed = [Path(entry, below) for all_, below in elsewhere for entry in all_.split(os.pathsep) if entry]
+    return _found(name, listed)
+
+
+def _found(name: str, roots: list[Path]) -> Path | None:
     try:
         return find_package(name, roots)
     except DescriptionError:
         return None
-
-
-def _is_file(path: Path) -> bool:
-    try:
-        return path.is_file()
-    except (OSError, ValueError):  # a name that no file can have
-        return False
 
 
 def _similar(path: Path) -> str:

@@ -16,15 +16,21 @@ from dynx.spatial.scalar import Floats
 Box = tuple[tuple[float, float, float], tuple[float, float, float]]
 
 _STL_HEAD, _STL_FACET = 84, 50
-_STL_VERTEX = re.compile(rb"^\s*vertex\s+(\S+)\s+(\S+)\s+(\S+)", re.MULTILINE | re.IGNORECASE)
+
+# Each line is matched in time proportional to its length: a pattern must not run across lines, nor start
+# again within a run of blanks.
+_STL_VERTEX = re.compile(rb"^[ \t]*vertex[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)", re.MULTILINE | re.IGNORECASE)
 _OBJ_VERTEX = re.compile(rb"^[ \t]*v[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)", re.MULTILINE)
 
 
 def mesh_box(path: Path) -> Box | None:
-    """Return the lowest and highest corner of a mesh in its own frame, unscaled; None if it is unreadable."""
+    """Return the lowest and highest corner of a mesh in its own frame, unscaled; None if it is unreadable.
+
+    Time and memory are proportional to the size of the file, of which MAX_BYTES of `dynx.files` are read.
+    """
     try:
         status = path.stat()
-    except OSError:
+    except (OSError, ValueError):
         return None
     return _box(path, status.st_mtime_ns, status.st_size)
 
@@ -36,7 +42,8 @@ def _box(path: Path, changed: int, size: int) -> Box | None:
     if reader is None:
         return None
     try:
-        points = reader(read_file(str(path)))
+        with np.errstate(all="ignore"):
+            points = reader(read_file(str(path)))
     except (DynxError, ValueError):
         return None
     if points is None or len(points) == 0 or not np.isfinite(points).all():
@@ -54,12 +61,15 @@ def _stl_points(data: bytes) -> Floats | None:
             facet = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
             corners = np.frombuffer(data, facet, count, _STL_HEAD)["corners"]
             return corners.reshape(-1, 3).astype(np.float64)
-    return _matched(_STL_VERTEX, data) if data.lstrip()[:5].lower() == b"solid" else None
+    return _vertices(_STL_VERTEX, data) if data.lstrip()[:5].lower() == b"solid" else None
 
 
 def _obj_points(data: bytes) -> Floats | None:
-    return _matched(_OBJ_VERTEX, data)
+    return _vertices(_OBJ_VERTEX, data)
 
 
-def _matched(pattern: re.Pattern[bytes], data: bytes) -> Floats:
-    return np.array(pattern.findall(data), dtype=np.float64).reshape(-1, 3)
+def _vertices(pattern: re.Pattern[bytes], data: bytes) -> Floats:
+    """Read the three numbers of every line that matches; a carriage return ends a line as well."""
+    lines = data.replace(b"\r", b"\n")
+    found = (float(number) for match in pattern.finditer(lines) for number in match.groups())
+    return np.fromiter(found, np.float64).reshape(-1, 3)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
 
-from dynx.rules.geometry import MeshNotFoundError, find_mesh
+from dynx.rules.geometry import MeshNotFoundError, find_mesh, mesh_files
+from dynx.rules.geometry.meshes import mesh_box
 
 
 @pytest.fixture
@@ -37,7 +39,7 @@ def test_a_mesh_is_found_in_its_package_beside_the_description_and_by_its_path(r
 
 
 @pytest.mark.parametrize(
-    "name", ["package://arm_description/meshes/base.stl", "../meshes/base.stl", "file:///nowhere/base.stl"]
+    "name", ["package://arm_description/meshes/base.stl", "../meshes/base.stl", "../nowhere/base.stl"]
 )
 def test_a_mesh_that_is_not_there_is_missed_and_the_nearest_name_told(robot: Path, name: str) -> None:
     if (robot.parents[1] / "meshes/base.stl").exists():
@@ -72,7 +74,69 @@ def test_packages_of_the_environment(
         find_mesh("package://hand/b.stl", str(robot))
 
 
-def test_a_path_that_leaves_its_package_is_not_followed(robot: Path) -> None:
+@pytest.mark.parametrize(
+    "name",
+    [
+        "package://arm_description/../other.stl",
+        "package://arm_description/meshes/link.stl",
+        "package://etc/passwd",
+        "package://other_description/a.stl",
+        "../../other.stl",
+        "../../missing.stl",
+        "file:///etc/passwd",
+        "file:///nowhere/base.stl",
+        "/etc/passwd",
+        "file://[",
+        "a\0b.stl",
+        "x" * 5000,
+    ],
+)
+def test_nothing_outside_the_description_and_its_packages_is_looked_at(robot: Path, name: str) -> None:
     (robot.parents[2] / "other.stl").write_bytes(b"")
+    (robot.parents[1] / "meshes/link.stl").symlink_to(robot.parents[2] / "other.stl")
+    other = robot.parents[2] / "other_description"
+    other.mkdir()
+    (other / "a.stl").write_bytes(b"")
+    assert find_mesh(name, str(robot)) is None
+
+
+def test_packages_beside_the_description_are_found_by_their_marker(robot: Path) -> None:
+    mesh = robot.parents[2] / "hand_description/a.stl"
+    mesh.parent.mkdir()
+    mesh.write_bytes(b"")
+    name = "package://hand_description/a.stl"
+    assert find_mesh(name, str(robot)) is None
+    (mesh.parent / "package.xml").write_text("<package/>")
+    mesh_files._package.cache_clear()
+    found = find_mesh(name, str(robot))
+    assert found is not None
+    assert found.samefile(mesh)
+
+
+@pytest.mark.parametrize("marker", ["package.xml", ".git"])
+def test_paths_may_climb_within_the_package_or_repository(tmp_path: Path, marker: str) -> None:
+    robot = tmp_path / "repository/arm/v2/robot.urdf"
+    robot.parent.mkdir(parents=True)
+    robot.write_text("<robot/>")
+    mesh = tmp_path / "repository/meshes/a.stl"
+    mesh.parent.mkdir()
+    mesh.write_bytes(b"")
+    assert find_mesh("../../meshes/a.stl", str(robot)) is None
+    (tmp_path / "repository" / marker).mkdir()
+    mesh_files._enclosing.cache_clear()
+    assert find_mesh("../../meshes/a.stl", str(robot)) == mesh
     with pytest.raises(MeshNotFoundError):
-        find_mesh("package://arm_description/../other.stl", str(robot))
+        find_mesh("../../meshes/b.stl", str(robot))
+
+
+@pytest.mark.parametrize("name", ["circle/a.stl", "pipe.stl", "a/b/../../c.stl"])
+def test_names_of_no_file_are_missed(robot: Path, name: str) -> None:
+    (robot.parent / "circle").symlink_to(robot.parent / "circle")
+    os.mkfifo(robot.parent / "pipe.stl")
+    with pytest.raises(MeshNotFoundError):
+        find_mesh(name, str(robot))
+
+
+def test_a_fifo_is_not_opened(robot: Path) -> None:
+    os.mkfifo(robot.parent / "pipe.stl")
+    assert mesh_box(robot.parent / "pipe.stl") is None
