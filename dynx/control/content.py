@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable, Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import Field, fields, is_dataclass
 from functools import cached_property
 from typing import Any
@@ -10,6 +12,24 @@ from typing import Any
 import numpy as np
 
 from dynx.model import Model
+
+_entered: ContextVar[tuple[Any, ...]] = ContextVar("entered", default=())
+"""Objects whose content is being read, the outermost first."""
+
+
+@contextmanager
+def entered(thing: Any) -> Iterator[int | None]:
+    """Note that the content of `thing` is being read; give its place among those where it is already.
+
+    An object that refers to itself would otherwise be read without an end.
+    """
+    outer = _entered.get()
+    place = next((number for number, each in enumerate(outer) if each is thing), None)
+    token = _entered.set((*outer, thing))
+    try:
+        yield place
+    finally:
+        _entered.reset(token)
 
 
 def content_of(thing: Any) -> Hashable:
@@ -24,14 +44,18 @@ def content_of(thing: Any) -> Hashable:
         return kind, thing.hex()
     if isinstance(thing, np.ndarray) and thing.dtype != object:
         return kind, thing.dtype.str, thing.shape, thing.tobytes()
-    if isinstance(thing, tuple | list):
-        return kind, tuple(content_of(entry) for entry in thing)
-    if isinstance(thing, Mapping):
-        return kind, tuple((content_of(key), content_of(value)) for key, value in thing.items())
-    if hasattr(kind, "content_key"):
-        return kind, thing.content_key()
-    if is_dataclass(kind):
-        return kind, tuple(content_of(getattr(thing, each.name)) for each in fields(thing) if each.compare)
+    with entered(thing) as place:
+        if place is not None:
+            return kind, f"see {place}"
+        if isinstance(thing, tuple | list):
+            return kind, tuple(content_of(entry) for entry in thing)
+        if isinstance(thing, Mapping):
+            return kind, tuple((content_of(key), content_of(value)) for key, value in thing.items())
+        if hasattr(kind, "content_key"):
+            return kind, thing.content_key()
+        if is_dataclass(kind):
+            values = (getattr(thing, each.name) for each in fields(thing) if each.compare)
+            return kind, tuple(map(content_of, values))
     raise TypeError(f"the content of a {kind.__name__} is not known")
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from dynx import control
 from dynx.backends import backend
 from dynx.control.base import Controller
-from dynx.control.content import fields_of
+from dynx.control.content import attributes_of, fields_of
 from dynx.sim.named_controllers import joint_inertia
 from dynx.spatial.scalar import Floats
 
@@ -47,7 +47,7 @@ def _joint_damping(controller: Controller[Any], q: Floats) -> Floats | None:
     without one."""
     kd = fields_of(controller).get("kd")
     if kd is not None and kd.metadata.get("unit", "").startswith("N"):
-        damping: Floats = controller.kd  # type: ignore[attr-defined]
+        damping: Floats = attributes_of(controller)["kd"]
         return damping
     if isinstance(controller, control.Impedance):
         with backend("reference", controller.model, validate=False) as engine:

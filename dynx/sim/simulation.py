@@ -24,6 +24,7 @@ from dynx.sim.loop.references import setpoints_of
 from dynx.sim.loop.sensors import Sensors
 from dynx.sim.loop.staged import staged_loop
 from dynx.sim.loop.stops import Stops
+from dynx.sim.plants.plant import plant_errors
 from dynx.sim.plants.registry import make_plant
 from dynx.sim.record.rollout import Rollout
 from dynx.sim.resuming import changed_parts, refuse_no_rollout, refuse_other_scenario
@@ -206,7 +207,7 @@ class Simulation:
             if held is None:
                 held = self._held = self._loop.start(record)
             elif self._misplaced:
-                self._plant.reset(held.q, held.v)
+                self._loop.place(held.q, held.v)
             self._misplaced = False
             if end == record.steps + 1 and not compiled:
                 self._loop.advance(record, held, end, given)
@@ -340,7 +341,7 @@ class Simulation:
         self._record.take(snapshot.record, n)
         self._executor, self._departures = snapshot.executor, snapshot.departures
         held = replace(snapshot.held)
-        self._plant.reset(held.q, held.v)
+        self._loop.place(held.q, held.v)
         if "controller" in changed:
             controller = self._setup.controller
             held.controller_state = None if controller is None else controller.initial_state()
@@ -376,10 +377,11 @@ class Simulation:
     # -- end ----------------------------------------------------------------------------------
 
     def close(self) -> None:
-        """Release the engine; a closed simulation cannot be stepped."""
+        """Release the engine; a closed simulation cannot be stepped. Raises EngineError where that fails."""
         if not self._closed:
             self._closed = True
-            self._plant.close()
+            with plant_errors(type(self._plant), "cannot be closed"):
+                self._plant.close()
 
     def __enter__(self) -> Simulation:
         return self

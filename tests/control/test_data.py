@@ -25,7 +25,7 @@ from dynx.control.base import gain, gains_of
 from dynx.control.open_loop import OpenLoop
 from dynx.model import Model
 from dynx.model.loading import load
-from dynx.sim import simulate, simulate_batch
+from dynx.sim import Scenario, simulate, simulate_batch
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint
 from tests.control.test_controllers import LAWS
@@ -138,3 +138,21 @@ def test_controllers_with_attributes_of_their_own_compare_by_them() -> None:
     assert law == law
     assert law != Plain(law.kd)
     assert not Plain(1.0).is_pure
+
+
+class Looped(Plain):
+    """A user's controller whose attributes refer to it."""
+
+    def __init__(self, kd: Any) -> None:
+        super().__init__(kd)
+        self.owner, self.members = self, [self]
+
+
+def test_a_controller_that_refers_to_itself_is_compared() -> None:
+    one, same, other = Looped(1.0), Looped(1.0), Looped(2.0)
+    assert one == same
+    assert one != other
+    scenarios = [Scenario(ARM, each, ARM.neutral(), duration=1e-3) for each in (one, same, other)]
+    assert scenarios[0] == scenarios[1]
+    assert scenarios[0] != scenarios[2]
+    assert simulate(scenarios[0]).scenario == scenarios[0]

@@ -11,7 +11,7 @@ import numpy as np
 
 from dynx.backends import Backend
 from dynx.control.base import Controller, chain_of
-from dynx.control.content import attributes_of
+from dynx.control.content import attributes_of, entered
 from dynx.errors import ArgumentError, shown
 from dynx.model import Model
 from dynx.sim.clock import TIME_ROUNDING, Clock
@@ -49,7 +49,9 @@ def controller_numbers(controller: Controller[Any]) -> dict[str, Any]:
         if name.startswith("_"):
             continue
         if isinstance(value, Controller):
-            found[name] = {"law": value.name, **controller_numbers(value)}
+            with entered(controller), entered(value) as place:
+                inside = {} if place is not None else controller_numbers(value)
+            found[name] = {"law": value.name, **inside}
         elif isinstance(value, np.ndarray) and value.dtype.kind in "biuf":
             digest = sha256(np.ascontiguousarray(value).tobytes())
             found[name] = (

@@ -23,7 +23,7 @@ from dynx.sim.loop.controller_checks import Unchanged, defect_of_outcome
 from dynx.sim.loop.record import Record
 from dynx.sim.loop.sensors import Sensors
 from dynx.sim.loop.stops import Stops
-from dynx.sim.plants.plant import Plant
+from dynx.sim.plants.plant import Plant, is_own, plant_errors
 from dynx.spatial.scalar import Floats, clamp
 from dynx.trajectory.base import Setpoint
 
@@ -80,9 +80,14 @@ class Loop:
         """Place the plant at the last state of `record`, and recompute what the loop held there."""
         begin = record.steps
         q, v = record.q[begin].copy(), record.v[begin].copy()
-        self.plant.reset(q, v)
+        self.place(q, v)
         tau, command = self._last_command(record)
         return Held(q, v, tau, command, self.recovered_state(record))
+
+    def place(self, q: Floats, v: Floats) -> None:
+        """Make q (nq,), v (nv,) the state of the plant. Raises EngineError where its `reset` fails."""
+        with plant_errors(type(self.plant), "cannot be reset"):
+            self.plant.reset(q, v)
 
     def advance(self, record: Record, held: Held, end: int, given: Floats | None = None) -> None:
         """Step from the last state of `record` to step `end`, where the plant is placed at that state.
@@ -223,7 +228,7 @@ class Loop:
     def _step_failed(self, k: int, record: Record, error: Exception) -> SimulationError:
         """Return the error of a step: of a plant of the user's own a failure, of dynx's own a divergence."""
         kind, why = type(self.plant), f"{type(error).__name__}: {error}"
-        if kind.__module__.partition(".")[0] == "dynx":
+        if is_own(kind):
             return self._diverged(k, record, why)
         t, state = k * self.clock.dt, (record.q[k].copy(), record.v[k].copy())
         message = f"plant {kind.__name__} failed in step {k}, at {t:.6g} s: {why}"

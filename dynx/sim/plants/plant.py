@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any, ClassVar, NamedTuple
 
 from dynx.control.engine_motors import EngineMotor, MotorCommand
-from dynx.errors import UnsupportedFeatureError
+from dynx.errors import DynxError, EngineError, UnsupportedFeatureError
 from dynx.model import Model
 from dynx.sim.plants.disturbances import Disturbances
 from dynx.spatial.scalar import Floats
@@ -69,3 +71,24 @@ class Plant(ABC):
     @abstractmethod
     def close(self) -> None:
         """Release what the engine holds."""
+
+
+def is_own(kind: type[Plant]) -> bool:
+    """Whether a class of plants is one of dynx."""
+    return kind.__module__.partition(".")[0] == "dynx"
+
+
+@contextmanager
+def plant_errors(kind: type[Plant], failed: str) -> Iterator[None]:
+    """Turn an exception of a plant that is not of dynx into EngineError, which names its class.
+
+    `failed` is the verb of the message, such as ``cannot be closed``.
+    """
+    try:
+        yield
+    except DynxError:
+        raise
+    except Exception as error:
+        if is_own(kind):
+            raise
+        raise EngineError(f"plant {kind.__name__} {failed}: {type(error).__name__}: {error}") from error

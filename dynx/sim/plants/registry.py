@@ -17,7 +17,7 @@ from dynx.model import Model
 from dynx.registry import ClassRegistry
 from dynx.sim.plants.disturbances import Disturbances
 from dynx.sim.plants.integrated import SCHEMES, IntegratedPlant
-from dynx.sim.plants.plant import Plant
+from dynx.sim.plants.plant import Plant, plant_errors
 
 GROUP = "dynx.plants"
 """The entry-point group: ``name = "package.module:PlantClass"``."""
@@ -95,7 +95,7 @@ def make_plant(
     """Return the plant `name` under `integrator`; `options` are those of the adaptive integrator.
 
     Raises ArgumentError for an integrator that the plant does not have, UnknownBackendError for a name
-    nobody provides, NotInstalledError where its engine is missing.
+    nobody provides, NotInstalledError where its engine is missing, EngineError where its constructor fails.
     """
     if not isinstance(substeps, int) or isinstance(substeps, bool) or substeps < 1:
         raise ArgumentError(f"substeps is {shown(substeps)}; wanted 1 or more")
@@ -109,7 +109,8 @@ def make_plant(
             raise ArgumentError(
                 f"the engine {shown(name)} has no stepper here; those that have one: {known}"
             ) from None
-        return kind(model, disturbances, dt, substeps=substeps)
+        with plant_errors(kind, "cannot be made"):
+            return kind(model, disturbances, dt, substeps=substeps)
     if name not in BACKENDS and name in plant_names() and name not in backend_names():
         raise ArgumentError(
             f"integrator is {shown(integrator)}; the plant {shown(name)} has a stepper of its own, which is "

@@ -23,7 +23,7 @@ import numpy as np
 from dynx.backends import Backend
 from dynx.control.base import Controller, chain_of
 from dynx.control.code_content import digest_of_code, digest_of_function, is_foreign
-from dynx.control.content import attributes_of
+from dynx.control.content import attributes_of, entered
 from dynx.control.registry import controller_class, from_document, to_document
 from dynx.errors import ArgumentError, ModelError, UnknownNameError, shown
 from dynx.model import Model
@@ -296,7 +296,10 @@ def _class_of(name: str) -> Any:
 
 def _fingerprint(value: Any, model: Model | None) -> str:
     """Return the checksum of the parts of an object, and of those of the objects in it."""
-    parts = [json.dumps(encode(part, model), sort_keys=True) for part in _parts(value)]
+    with entered(value) as place:
+        if place is not None:
+            return f"see {place}"
+        parts = [json.dumps(encode(part, model), sort_keys=True) for part in _parts(value)]
     # The order of a set changes from process to process.
     parts = sorted(parts) if isinstance(value, set | frozenset) else parts
     return sha256(json.dumps(parts).encode()).hexdigest()

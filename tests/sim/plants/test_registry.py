@@ -17,6 +17,7 @@ from dynx.errors import (
     ArgumentError,
     BackendError,
     DivergedError,
+    EngineError,
     SimulationError,
     UnknownBackendError,
     UnsupportedFeatureError,
@@ -121,6 +122,20 @@ def test_an_error_of_a_plant_is_not_called_a_divergence() -> None:
             simulate(PENDULUM, plant="broken", duration=0.1, dt=1e-2)
         assert not isinstance(caught.value, DivergedError)
         assert len(caught.value.rollout) == 5
+    finally:
+        registry.unregister("broken")
+
+
+@pytest.mark.parametrize(("method", "verb"), [("__init__", "made"), ("reset", "reset"), ("close", "closed")])
+def test_an_error_outside_a_step_names_the_class_of_the_plant(method: str, verb: str) -> None:
+    def broken(*_: object, **__: object) -> None:
+        raise ZeroDivisionError("no wind")
+
+    register_plant("broken", lambda: type("Broken", (Drifting,), {method: broken}))
+    try:
+        with pytest.raises(EngineError, match=rf"plant Broken cannot be {verb}: ZeroDiv.*wind") as caught:
+            simulate(PENDULUM, plant="broken", duration=0.1, dt=1e-2)
+        assert isinstance(caught.value.__cause__, ZeroDivisionError)
     finally:
         registry.unregister("broken")
 
