@@ -38,6 +38,7 @@ MENDED = {
     "DX415": (None, None),
     "DX416": (None, None),
     "DX417": ("base", None),
+    "DX426": (None, None),
 }
 SPEC = importlib.util.find_spec("pybullet_data")
 BULLET = Path(SPEC.origin).parent if SPEC is not None and SPEC.origin else None

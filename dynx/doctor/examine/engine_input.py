@@ -3,7 +3,9 @@
 Engines search for the mesh files that a description names, each in its own way, and a description is
 often examined where they are absent. No mesh changes the dynamics of a link that states its inertia. So
 ``<visual>`` and mesh ``<collision>`` elements are removed; shapes that need no file stay, because some
-engines compute the mass of a link without ``<inertial>`` from them.
+engines compute the mass of a link without ``<inertial>`` from them. Drake also searches for the textures of
+the robot's materials: those that it finds beside the description become colours, since they are not beside
+the engine input.
 """
 
 from __future__ import annotations
@@ -14,12 +16,14 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from dynx.model.xml.source import SourceElement, XmlSource
+from dynx.rules.geometry.textures import texture_replacements
 
 
 def without_meshes(source: XmlSource) -> XmlSource:
-    """Remove visual shapes, and collision shapes that are meshes."""
+    """Remove visual shapes, collision shapes that are meshes, and textures that engines find."""
     links = source.root.all("link")
-    return source.apply(*(source.removal(shape) for link in links for shape in _mesh_shapes(link)))
+    shapes = (source.removal(shape) for link in links for shape in _mesh_shapes(link))
+    return source.apply(*shapes, *texture_replacements(source))
 
 
 @contextmanager

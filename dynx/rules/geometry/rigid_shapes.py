@@ -19,8 +19,8 @@ def group_extents(case: Case) -> Iterator[tuple[Link, Extent]]:
     """Yield each link with mass, and the extent of all shapes of its rigid group, in its link frame.
 
     Descriptions often put the shape of a part in one link and its mass in another on a fixed joint, so every
-    shape of the group counts. A link is left out where its group has no shape, or a shape of unknown size
-    (a missing mesh).
+    shape of the group counts. A link is left out where its group has no shape, only shapes of size zero, or a
+    shape of unknown size (a missing mesh).
     """
     groups = rigid_groups(case)
     known: dict[str, Extent | None] = {}
@@ -31,7 +31,7 @@ def group_extents(case: Case) -> Iterator[tuple[Link, Extent]]:
         if group.head not in known:
             known[group.head] = _group_extent(case, group)
         extent = known[group.head]
-        if extent is not None and not extent.empty:
+        if extent is not None and not extent.empty and extent.diagonal() > 0.0:
             yield link, extent.transform(inverse(_pose(group, link.name)))
 
 

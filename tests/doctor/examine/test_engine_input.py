@@ -20,6 +20,18 @@ def test_shapes_that_weigh_stay_and_files_that_may_be_missing_go() -> None:
     assert without_meshes(case.source).text == kept.source.text
 
 
+def test_a_texture_that_is_beside_the_description_becomes_a_colour(tmp_path: Path) -> None:
+    (tmp_path / "wood.png").write_bytes(b"an image")
+    material = '<material name="{0}">{1}<texture filename="{0}.png"/></material>'
+    parts = material.format("wood", ""), material.format("gone", ""), link("a")
+    case = case_of(*parts, source=tmp_path / "robot.urdf")
+    (tmp_path / "robot.urdf").write_text(case.source.text)
+    kept = without_meshes(case.source).text
+    assert 'filename="wood.png"' not in kept
+    assert '<material name="wood"><color rgba="0.5 0.5 0.5 1"/></material>' in kept
+    assert material.format("gone", "") in kept
+
+
 def test_a_file_is_written_as_it_was_read_and_is_gone_afterwards(tmp_path: Path) -> None:
     data = '<?xml version="1.0" encoding="iso-8859-1"?><robot name="é"><link name="ü"/></robot>'.encode(
         "latin-1"

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from tests.doctor.planting import dynamics, inertia, joints, text
+from tests.doctor.planting import dynamics, inertia, joints, shapes, text
 from tests.doctor.planting.site import Planter
 
 PLANTERS: dict[str, Planter] = {
-    planter.rule: planter for family in (inertia, joints, dynamics, text) for planter in family.PLANTERS
+    planter.rule: planter
+    for family in (inertia, joints, dynamics, text, shapes)
+    for planter in family.PLANTERS
 }
 
 EXEMPT: dict[str, str] = {
