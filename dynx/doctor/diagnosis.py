@@ -30,7 +30,7 @@ from dynx.doctor.report import (
     Unexplained,
 )
 from dynx.doctor.report_assembly import all_findings, first_report, run_time_calls, with_after
-from dynx.errors import ArgumentError, DynxError
+from dynx.errors import ArgumentError, DescriptionError, DynxError
 from dynx.loaded import ENGINES, installed_engines
 from dynx.model import Model
 from dynx.model.configuration import checked_base
@@ -122,7 +122,10 @@ def open_case(robot: Robot, base: Base, choices: Mapping[str, str]) -> Case:
 
 def refused_report(robot: str, error: DynxError, *, base: str | None = None) -> DoctorReport:
     """Make the report of a robot that could not be examined."""
-    return DoctorReport(robot, base=base, error=Failure(type(error).__name__, str(error)))
+    failure = Failure(type(error).__name__, str(error))
+    place = error if isinstance(error, DescriptionError) else None
+    source, line = (None, None) if place is None else (place.source, place.line)
+    return DoctorReport(robot, source=source, base=base, error=failure, error_line=line)
 
 
 def _diagnosis_of(

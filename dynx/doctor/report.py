@@ -136,6 +136,8 @@ class DoctorReport:
     pairs: tuple[PairError, ...] = ()
     model_difference: tuple[Deviation, ...] = ()
     error: Failure | None = None
+    error_line: int | None = field(default=None, compare=False)
+    """Line of the text at which the `error` is, where it is known."""
     mended: str | None = field(default=None, compare=False)
     """URDF text that the engines load alike; None where nothing had to change or no remedy helps."""
     text: str | None = field(default=None, compare=False)

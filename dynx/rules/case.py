@@ -30,8 +30,9 @@ class Case:
     @cached_property
     def reading(self) -> Model | DynxError:
         """The result of `dynx.load` on the document: a model, or the error."""
+        text = self.source.text_with_lines_before
         try:
-            return read_model(self.source.text, self.source.source, base=self.base, gravity=self.gravity)
+            return read_model(text, self.source.source, base=self.base, gravity=self.gravity)
         except DynxError as error:
             return error
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 import os
 from dataclasses import replace
 from typing import Any
 
 from dynx.doctor import DoctorReport, Finding, diagnose
-from dynx.doctor.formats import Baseline
+from dynx.doctor.formats import Baseline, wording
 from dynx.doctor.formats.baseline import Difference
+from dynx.doctor.report import Effect
 from dynx.errors import DynxError
 from dynx.model.model import Base
 from dynx.testing.robot_checks import Disagreement
@@ -39,8 +41,16 @@ def require_same_loading(plan: RobotPlan, robot: str, label: str, base: Base) ->
 
 def _difference(each: Difference, report: DoctorReport) -> list[str]:
     engines = ", ".join(sorted(each.engines))
-    lines = [f"  {each.place} ({engines}): relative error {each.relative_error:.2e}"]
+    lines = [f"  {each.place} ({engines}): {_error(each, report)}"]
     return lines + [f"    {_where(found, report)}{found.message}" for found in _findings(each, report)]
+
+
+def _error(each: Difference, report: DoctorReport) -> str:
+    if math.isfinite(each.relative_error):
+        return f"relative error {each.relative_error:.2e}"
+    effects = (found.effect for found in _findings(each, report) if found.effect is not None)
+    largest = max(effects, key=lambda effect: effect.relative_error, default=None)
+    return wording.effect(largest or Effect(each.place.quantity or "", each.relative_error))
 
 
 def _findings(each: Difference, report: DoctorReport) -> list[Finding]:

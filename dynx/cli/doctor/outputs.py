@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from dynx.cli.shell.output_file import check_writable, make_folder, require_apart
 from dynx.cli.shell.terminal import echo_json
-from dynx.doctor.formats import baseline_document, html_page, junit_xml, sarif_document
+from dynx.doctor.formats import baseline_document, html_page, junit_xml, sarif_document, wording
 from dynx.doctor.formats.baseline import Baseline
 from dynx.doctor.report import Counterexample, DoctorReport, Unexplained, results_document
 from dynx.errors import ArgumentError, shown
@@ -73,7 +73,7 @@ class Outputs:
         texts: dict[str | None, Callable[[], str]] = {
             self.html: lambda: html_page(reports, command=command, baseline=baseline),
             self.junit: lambda: junit_xml(reports, baseline),
-            self.sarif: lambda: json_text(sarif_document(reports, baseline)) + "\n",
+            self.sarif: lambda: json_text(sarif_document(reports, baseline, not_done)) + "\n",
             self.baseline: lambda: self._baseline_text(reports),
         }
         for path, text in texts.items():
@@ -115,8 +115,9 @@ def _with_state(found: Counterexample, each: Unexplained) -> str:
     lines = [
         f"{symbol} = {list(values)}" for symbol, values in (("q", found.q), ("v", found.v), ("a", found.a))
     ]
-    what = re.sub(r"[^\w ]", "_", f"{each.engine} {each.quantity}", flags=re.ASCII)
-    comment = "\n".join([f"{what}, relative error {found.relative_error:.3g} at", *lines])
+    what = wording.difference(each.quantity, found.relative_error)
+    clean = re.sub(r"[^\w %+.-]|--+", "_", f"{each.engine}: {what}", flags=re.ASCII)
+    comment = "\n".join([f"{clean} at", *lines])
     text = re.sub(r"""encoding\s*=\s*("[^"]*"|'[^']*')""", 'encoding="UTF-8"', found.urdf, count=1)
     return f"{text.rstrip()}\n<!-- {comment} -->\n".encode("ascii", "xmlcharrefreplace").decode("ascii")
 

@@ -195,9 +195,7 @@ def _show_unexplained(out: Console, report: DoctorReport, saved: Mapping[int, st
         return
     heading(out, "unexplained: no rule accounts for these differences", "bold red")
     for number, each in enumerate(report.unexplained):
-        where = "" if each.joint is None else f", largest at joint {wording.name(each.joint)}"
-        what = f"{wording.quantity(each.quantity)} of {wording.name(each.engine)}"
-        sentence(out, f"{what}: {wording.relative(each.relative_error)}{where}", 2, "red")
+        sentence(out, wording.unexplained(each), 2, "red")
         found = each.counterexample
         if found is not None:
             file = saved.get(number)
@@ -221,8 +219,14 @@ def _show_next(out: Console, report: DoctorReport, mended: str | None) -> None:
         rule = causes(report)[0].rule
         out.print(f"more about a rule: dynx explain {shlex.quote(wording.name(rule))}", style="dim")
     if not report.alike:
-        left = f"residual error after mending: {wording.relative(report.residual)}"
-        out.print(f"{left}; {report.seconds:.1f} s", style="dim")
+        out.print(f"{_residual(report)}; {report.seconds:.1f} s", style="dim")
+
+
+def _residual(report: DoctorReport) -> str:
+    """Write the error that remains after mending, and the engines that have none."""
+    missing = [each.engine for each in report.engines if each.refused_after is not None]
+    without = f" (without {', '.join(map(wording.name, missing))})" if missing else ""
+    return f"residual error after mending: {wording.relative(report.residual)}{without}"
 
 
 def _change(engine: EngineResult, key: str, tolerance: float, mended: bool) -> Text:

@@ -42,7 +42,7 @@ STEPS = (
     Step(1.0, "to 100 %", ("#bd2f2f", "#ffffff"), ("#c9403a", "#ffffff"), "heat-5"),
     Step(math.inf, "above", ("#7d1128", "#ffffff"), ("#ff8a80", "#2b0505"), "heat-6"),
 )
-NONE = Step(math.nan, "no answer", ("#3b3f45", "#ffffff"), ("#c7ccd3", "#16191d"), "heat-none")
+NONE = Step(math.nan, "no value", ("#3b3f45", "#ffffff"), ("#c7ccd3", "#16191d"), "heat-none")
 ALL_STEPS = (SAME, *STEPS, NONE)
 
 

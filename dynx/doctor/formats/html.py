@@ -65,11 +65,12 @@ def template_environment() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    words = (wording.name, wording.relative, wording.size, wording.quantity, wording.effect, wording.part)
-    environment.filters.update({each.__name__: each for each in words})
+    words = (wording.name, wording.relative, wording.quantity, wording.effect, wording.part)
+    more = (wording.unexplained, wording.finding_effect)
+    environment.filters.update({each.__name__: each for each in (*words, *more)})
     environment.filters["capitalized"] = lambda text: text[:1].upper() + text[1:]
     views: tuple[Callable[..., Any], ...] = (causes, status, step_of, bar_position, largest_error)
-    views += (engine_map, pair_map, joint_map, model_tables, changes, excerpt)
+    views += (wording.difference, engine_map, pair_map, joint_map, model_tables, changes, excerpt)
     environment.globals.update({each.__name__: each for each in views}, steps=ALL_STEPS, **LIMITS)
     return environment
 

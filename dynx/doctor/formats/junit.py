@@ -63,11 +63,10 @@ def _cases(report: DoctorReport, new: Collection[Difference] | None) -> Iterator
         yield f"{wording.name(cause.rule)} {wording.name(cause.name)}", _cause(cause, report, known=known)
     for unexplained in report.unexplained:
         quantity = wording.quantity(unexplained.quantity)
-        where = "" if unexplained.joint is None else f", worst at joint {wording.name(unexplained.joint)}"
-        error = wording.relative(unexplained.relative_error)
         known = new is not None and all(each.place.quantity != unexplained.quantity for each in new)
-        message = KNOWN if known else f"relative error {error}{where}, and no rule accounts for it"
-        yield f"unexplained: {quantity} of {unexplained.engine}", _failure(message, known=known)
+        message = KNOWN if known else f"{wording.unexplained(unexplained)}, and no rule accounts for it"
+        title = f"unexplained: {quantity} of {wording.name(unexplained.engine)}"
+        yield title, _failure(message, known=known)
 
 
 def _quantities(report: DoctorReport, *, accepted: bool) -> Iterator[tuple[str, Element | None]]:
@@ -115,4 +114,4 @@ def _place(finding: Finding, report: DoctorReport) -> str:
     where = wording.name(report.source or report.robot, 300)
     line = "" if finding.line is None else f":{finding.line}"
     message = wording.name(finding.message, 1000)
-    return f"{where}{line}: {wording.part(finding)}: {message} ({wording.effect(finding.effect)})"
+    return f"{where}{line}: {wording.part(finding)}: {message} ({wording.finding_effect(finding)})"

@@ -1,15 +1,18 @@
 """SARIF 2.1.0 (OASIS standard), which code hosts show as annotations of the lines of a file.
 
 Results are the findings; level ``error`` where engines differ, ``warning`` where they differ by rounding,
-``note`` otherwise. A finding on both bases is one result. Fingerprints do not contain the line, so that a
-finding stays the same when text is inserted above it.
+``note`` otherwise. A file that cannot be examined is a result at the line of its error. A finding on both
+bases is one result. Fingerprints do not contain the line, so that a finding stays the same when text is
+inserted above it. Code hosts need a line for every result, a description and a help text for every rule, and
+paths relative to the repository.
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Iterable, Iterator
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path, PurePath
 from typing import Any
 from urllib.parse import quote
@@ -22,25 +25,54 @@ from dynx.doctor.report import DoctorReport, Finding, Unexplained
 
 SCHEMA_URI = "https://json.schemastore.org/sarif-2.1.0.json"
 
+REFUSED = "refused"
+"""Rule of a file that cannot be examined."""
+
+MAX_RESULTS = 25_000
+"""Largest number of results; GitHub rejects a run with more."""
+
+MAX_DESCRIPTION = 1000
+"""Largest number of characters of the description of a rule; GitHub reads 1024."""
+
+ROOT_ID = "%SRCROOT%"
+"""Name of the folder to which paths are relative."""
+
 _LEVELS = ("note", "warning", "error")
 
 _FINGERPRINT = "dynxFinding/v1"
 
+_OWN_RULES = {
+    UNEXPLAINED: "Engines differ, and no rule of the catalogue accounts for it.",
+    REFUSED: "The file cannot be examined: it is not a robot description that dynx can read.",
+}
 
-def sarif_document(reports: Iterable[DoctorReport], baseline: Baseline | None = None) -> dict[str, Any]:
-    """Make the document. Differences in the baseline are marked as suppressed."""
+
+def sarif_document(
+    reports: Iterable[DoctorReport], baseline: Baseline | None = None, not_done: Sequence[str] = ()
+) -> dict[str, Any]:
+    """Make the document. Differences in the baseline are marked as suppressed.
+
+    `not_done` names the robots that an interrupted run left out.
+    """
     reports = list(reports)
     merged: dict[str, dict[str, Any]] = {}
     for report in reports:
         for result in _results(report, baseline):
             key = result["partialFingerprints"][_FINGERPRINT]
             old = merged.get(key)
-            if old is None or _LEVELS.index(result["level"]) > _LEVELS.index(old["level"]):
+            if old is None or _severity(result) > _severity(old):
                 merged[key] = result
     rules = _rules(reports)
     numbers = {rule["id"]: number for number, rule in enumerate(rules)}
     results = [{**result, "ruleIndex": numbers[result["ruleId"]]} for result in merged.values()]
-    notifications = [_notification(report) for report in reports if report.error is not None]
+    notes = [f"{wording.name(robot)} was not examined: the run was interrupted" for robot in not_done]
+    if len(results) > MAX_RESULTS:
+        notes.append(f"{len(results) - MAX_RESULTS} of {len(results)} results were left out")
+        results = sorted(results, key=_severity, reverse=True)[:MAX_RESULTS]
+    root = os.path.join(_root(), "")
+    successful = not not_done and all(report.error is None for report in reports)
+    notifications = [{"level": "warning", "message": {"text": note}} for note in notes]
+    invocation = {"executionSuccessful": successful, "toolExecutionNotifications": notifications}
     return {
         "$schema": SCHEMA_URI,
         "version": "2.1.0",
@@ -48,18 +80,33 @@ def sarif_document(reports: Iterable[DoctorReport], baseline: Baseline | None = 
             {
                 "tool": {"driver": {"name": "dynx", "semanticVersion": __version__, "rules": rules}},
                 "columnKind": "unicodeCodePoints",
-                "invocations": [{"executionSuccessful": True, "toolExecutionNotifications": notifications}],
+                "originalUriBaseIds": {ROOT_ID: {"uri": f"{Path(root).as_uri()}/"}},
+                "invocations": [invocation],
                 "results": results,
             }
         ],
     }
 
 
+def _severity(result: dict[str, Any]) -> int:
+    return _LEVELS.index(result["level"])
+
+
 def _results(report: DoctorReport, baseline: Baseline | None) -> Iterator[dict[str, Any]]:
     new = None if baseline is None else {_key(each.place) for each in baseline.compare(report).new}
+    if report.error is not None:
+        result = _refusal(report)
+        yield result if new is None else {**result, "suppressions": []}
     entries: list[Finding | Unexplained] = [*report.findings, *report.unexplained]
+    before: Counter[tuple[str | None, ...]] = Counter()
     for each in entries:
-        result = _finding(report, each) if isinstance(each, Finding) else _unexplained(report, each)
+        repetition = before[_key(each)]
+        before[_key(each)] += 1
+        result = (
+            _finding(report, each, repetition)
+            if isinstance(each, Finding)
+            else _unexplained(report, each, repetition)
+        )
         if new is not None:
             # A baseline cannot hold bad practice, which makes no check fail.
             counts = isinstance(each, Unexplained) or each.effect is not None
@@ -69,18 +116,24 @@ def _results(report: DoctorReport, baseline: Baseline | None) -> Iterator[dict[s
         yield result
 
 
-def _finding(report: DoctorReport, each: Finding) -> dict[str, Any]:
+def _refusal(report: DoctorReport) -> dict[str, Any]:
+    assert report.error is not None
+    # The place is in the result itself.
+    where = f"{report.source}:" if report.error_line is None else f"{report.source}:{report.error_line}:"
+    message = wording.name(report.error.message.removeprefix(where).strip() or report.error.type, 2000)
+    return _result(report, REFUSED, "error", message, report.error_line)
+
+
+def _finding(report: DoctorReport, each: Finding, repetition: int) -> dict[str, Any]:
     engines = f": {', '.join(each.engines)}" if each.engines else ""
-    message = (
-        f"{wording.name(each.message, 1000)} ({wording.effect(each.effect)}, {report.base} base{engines})."
-    )
+    effect = f"{wording.finding_effect(each)}, {report.base} base{engines}"
+    message = f"{wording.name(each.message, 1000)} ({effect})."
     if each.remedy is not None:
         message += f" Remedy: {wording.name(each.remedy, 1000)}"
     rule = wording.name(each.rule)
-    result = _result(report, rule, severity(each), message, each.link, each.joint)
+    identity = (each.link, each.joint, str(repetition))
+    result = _result(report, rule, severity(each), message, each.line, *identity)
     (location,) = result["locations"]
-    if each.line is not None:
-        location["physicalLocation"]["region"] = {"startLine": max(each.line, 1)}
     parts = (("link", each.link), ("joint", each.joint))
     if any(text for _, text in parts):
         location["logicalLocations"] = [
@@ -89,26 +142,24 @@ def _finding(report: DoctorReport, each: Finding) -> dict[str, Any]:
     return result
 
 
-def _unexplained(report: DoctorReport, each: Unexplained) -> dict[str, Any]:
-    where = "" if each.joint is None else f", worst at joint {wording.name(each.joint)}"
-    message = (
-        f"{wording.quantity(each.quantity)} of {each.engine} is off by "
-        f"{wording.relative(each.relative_error)}{where} ({report.base} base), and no rule accounts for it."
-    )
-    return _result(report, UNEXPLAINED, "error", message, each.quantity, each.engine)
+def _unexplained(report: DoctorReport, each: Unexplained, repetition: int) -> dict[str, Any]:
+    message = f"{wording.unexplained(each)} ({report.base} base), and no rule accounts for it."
+    identity = (each.quantity, each.engine, str(repetition))
+    return _result(report, UNEXPLAINED, "error", message, None, *identity)
 
 
 def _result(
-    report: DoctorReport, rule: str, level: str, message: str, *identity: str | None
+    report: DoctorReport, rule: str, level: str, message: str, line: int | None, *identity: str | None
 ) -> dict[str, Any]:
-    uri = artifact_uri(report)
-    parts = ["" if part is None else f"={part}" for part in (uri, rule, *identity)]
+    location = artifact_location(report)
+    parts = ["" if part is None else f"={part}" for part in (location["uri"], rule, *identity)]
     digest = hashlib.sha256("\0".join(parts).encode("utf-8", "backslashreplace")).hexdigest()[:32]
+    region = {"startLine": max(line or 1, 1)}
     return {
         "ruleId": rule,
         "level": level,
         "message": {"text": message},
-        "locations": [{"physicalLocation": {"artifactLocation": {"uri": uri}}}],
+        "locations": [{"physicalLocation": {"artifactLocation": location, "region": region}}],
         "partialFingerprints": {_FINGERPRINT: digest},
     }
 
@@ -120,17 +171,26 @@ def _key(each: Finding | Unexplained | Place) -> tuple[str | None, ...]:
     return (each.rule, each.link, each.joint, each.quantity if isinstance(each, Place) else None)
 
 
-def artifact_uri(report: DoctorReport) -> str:
-    """Return the URI of the file: relative where it is below the working directory, as code hosts require."""
+def artifact_location(report: DoctorReport) -> dict[str, str]:
+    """Return the location of the file, relative to the root where it is below that."""
     path = report.source or report.robot
-    if not os.path.exists(path):
-        return quote(wording.name(path))
+    if not os.path.isabs(path) and not os.path.exists(path):
+        return {"uri": quote(wording.name(path)), "uriBaseId": ROOT_ID}
     absolute = os.path.abspath(path)
     try:
-        relative = PurePath(os.path.relpath(absolute)).as_posix()
+        relative = PurePath(os.path.relpath(absolute, _root())).as_posix()
     except ValueError:  # another drive
-        return Path(absolute).as_uri()
-    return Path(absolute).as_uri() if relative.startswith("../") else quote(relative)
+        return {"uri": Path(absolute).as_uri()}
+    if relative.startswith("../"):
+        return {"uri": Path(absolute).as_uri()}
+    # A name of a file may hold bytes that are no text.
+    return {"uri": quote(os.fsencode(relative)), "uriBaseId": ROOT_ID}
+
+
+def _root() -> str:
+    """Return the repository of the working directory, or that directory."""
+    folder = Path.cwd()
+    return str(next((each for each in (folder, *folder.parents) if (each / ".git").exists()), folder))
 
 
 def _rules(reports: list[DoctorReport]) -> list[dict[str, Any]]:
@@ -140,29 +200,33 @@ def _rules(reports: list[DoctorReport]) -> list[dict[str, Any]]:
         for cause in causes(report):
             met.setdefault(cause.rule, (cause.name, cause.findings[0].message))
     found = [_rule(identity, name, message) for identity, (name, message) in sorted(met.items())]
-    if any(report.unexplained for report in reports):
-        text = "Engines differ, and no rule of the catalogue accounts for it."
-        found.append({"id": UNEXPLAINED, "shortDescription": {"text": text}})
-    return found
+    own = {
+        UNEXPLAINED: any(report.unexplained for report in reports),
+        REFUSED: any(report.error is not None for report in reports),
+    }
+    return found + [_described(each, each, _OWN_RULES[each]) for each in own if own[each]]
 
 
 def _rule(identity: str, name: str, message: str) -> dict[str, Any]:
-    described = {"id": wording.name(identity), "name": wording.name(name)}
     rule = catalogue_entry(identity)
     if rule is None:
-        return {**described, "shortDescription": {"text": wording.name(message, 1000)}}
+        return _described(identity, name, wording.name(message, MAX_DESCRIPTION))
     page = rule.page() or rule.title
     return {
-        **described,
-        "shortDescription": {"text": rule.title},
-        "fullDescription": {"text": f"{rule.title} {rule.advice}".strip()},
+        **_described(identity, name, rule.title),
+        "fullDescription": {"text": f"{rule.title} {rule.advice}".strip()[:MAX_DESCRIPTION]},
         "help": {"text": page, "markdown": page},
         "defaultConfiguration": {"level": "error" if rule.kind == "difference" else "note"},
         "properties": {"tags": ["urdf", rule.kind, *sorted(rule.engines)]},
     }
 
 
-def _notification(report: DoctorReport) -> dict[str, Any]:
-    assert report.error is not None
-    text = f"{wording.name(report.robot)}: {wording.name(report.error.message, 2000)}"
-    return {"level": "error", "message": {"text": text}}
+def _described(identity: str, name: str, text: str) -> dict[str, Any]:
+    described = {"text": text[:MAX_DESCRIPTION] or wording.name(identity)}
+    return {
+        "id": wording.name(identity),
+        "name": wording.name(name),
+        "shortDescription": described,
+        "fullDescription": described,
+        "help": described,
+    }

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import PurePath
 from typing import Any
 
-from dynx.doctor.report import Effect, Finding
+from dynx.doctor.report import Effect, Finding, Unexplained
 from dynx.errors import escaped
 
 NAME_LENGTH = 120
@@ -31,16 +31,16 @@ def quantity(key: str) -> str:
 
 
 def relative(error: float) -> str:
-    """Write a relative error in two digits; ``none`` where there is no value."""
+    """Write a relative error in two digits; ``no value`` where there is none."""
     if not math.isfinite(error):
-        return "none"
+        return "no value"
     return "0" if error == 0.0 else f"{error:.1e}"
 
 
 def size(error: float) -> str:
-    """Write a relative error for readers: ``1900 %``, ``6e-06``, ``no answer``."""
+    """Write a relative error for readers: ``1900 %``, ``6e-06``, ``no value``."""
     if not math.isfinite(error):
-        return "no answer"
+        return "no value"
     if error < _PERCENT or error >= 1e4:
         return "0" if error == 0.0 else f"{error:.0e}"
     percent = 100.0 * error
@@ -52,8 +52,13 @@ def effect(each: Effect | None) -> str:
     if each is None:
         return "no effect on this base"
     if not math.isfinite(each.relative_error):
-        return "the file is refused" if each.quantity == "loading" else f"no {quantity(each.quantity)}"
+        return "the file is refused" if each.quantity == "loading" else f"no valid {quantity(each.quantity)}"
     return f"{quantity(each.quantity)} off by {size(each.relative_error)}"
+
+
+def finding_effect(finding: Finding) -> str:
+    """Write the effect of a finding as `effect` does, or that it is bad practice."""
+    return "bad practice" if finding.kind == "practice" and not finding.effect else effect(finding.effect)
 
 
 def effects(finding: Finding) -> str:
@@ -71,7 +76,22 @@ def effects(finding: Finding) -> str:
 def _at_place(each: Effect) -> str:
     if math.isfinite(each.relative_error):
         return f"{size(each.relative_error)} in"
-    return "refused by" if each.quantity == "loading" else f"no {quantity(each.quantity)} in"
+    return "refused by" if each.quantity == "loading" else f"no valid {quantity(each.quantity)} in"
+
+
+def difference(key: str, error: float) -> str:
+    """Write an error of one engine: ``mass matrix off by 6e-06``, ``no valid mass matrix``, ``refused``."""
+    return "refused" if key == "loading" else effect(Effect(key, error))
+
+
+def unexplained(each: Unexplained) -> str:
+    """Write a difference without an explanation as a clause with the engine as its subject."""
+    if each.quantity == "loading":
+        return f"{name(each.engine)} refuses the file, also without the causes that are known"
+    if not math.isfinite(each.relative_error):
+        return f"{name(each.engine)} returns no valid {quantity(each.quantity)}"
+    where = "" if each.joint is None else f", most at joint {name(each.joint)}"
+    return f"{quantity(each.quantity)} of {name(each.engine)} is off by {size(each.relative_error)}{where}"
 
 
 def titles(robots: Sequence[str]) -> list[str]:

@@ -114,6 +114,11 @@ class XmlSource:
         """The document as text."""
         return self.data.decode("utf-8")
 
+    @property
+    def text_with_lines_before(self) -> str:
+        """The document after as many empty lines as the file has before it, so that line numbers agree."""
+        return "\n" * self._lines_before + self.text
+
     def to_bytes(self) -> bytes:
         """Return the document as bytes of a file, in the encoding and with the ends that it was read with.
 

@@ -129,13 +129,13 @@ def test_the_report_of_one_robot_is_in_the_order_of_importance() -> None:
         ),
         *("1.9e+01 -> 4.0e-16", "DX901 planted-cause", "2 places in pybullet, mujoco"),
         *(
-            "line 5, link tool: no mass matrix",
+            "line 5, link tool: no valid mass matrix",
             "line 3, link base: 1900 %",
             "DX902 planted-rounding",
             "(rounding)",
         ),
         *("bad practice", "DX903", "--choose DX901=keep", "p.changeDynamics(robot, link)"),
-        *("largest at joint elbow", "q = [0.5]", "--fix OUT.urdf"),
+        *("most at joint elbow", "q = [0.5]", "--fix OUT.urdf"),
     ]
     places = [text.find(words) for words in order]
     assert -1 not in places

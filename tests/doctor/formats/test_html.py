@@ -85,7 +85,7 @@ def test_the_page_of_one_robot_says_everything() -> None:
         "pinocchio 4.1.0",
     ]
     wanted += [each.call for each in report.engines]
-    wanted += ["dynx doctor arm.urdf", "seed 0", "DX903", "q = [0.5]", "no mass matrix"]
+    wanted += ["dynx doctor arm.urdf", "seed 0", "DX903", "q = [0.5]", "no valid mass matrix"]
     assert [words for words in wanted if words is None or words not in page.text] == []
 
 

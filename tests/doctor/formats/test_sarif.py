@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -13,9 +14,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dynx.doctor.formats import Baseline, sarif_document
+from dynx.doctor.formats import Baseline, sarif, sarif_document
 from dynx.doctor.formats.baseline import differences
-from dynx.doctor.report import DoctorReport
+from dynx.doctor.report import DoctorReport, Unexplained
+from dynx.doctor.task import DoctorTask, examine
 from dynx.rules.registry import all_rules
 from tests.doctor.formats.reports import alike, differing, hostile, refused
 
@@ -36,7 +38,15 @@ def require_valid(document: dict[str, Any]) -> None:
             "id", "name", "shortDescription", "fullDescription", "help", "defaultConfiguration", "properties",
         }  # fmt: skip
         for key in ("shortDescription", "fullDescription", "help"):
-            assert key not in rule or rule[key]["text"]  # 3.12.3
+            assert rule[key]["text"]  # 3.12.3; GitHub requires each of the three
+        for key in ("shortDescription", "fullDescription"):
+            assert len(rule[key]["text"]) <= 1024  # GitHub
+        assert len(rule["name"]) <= 255  # GitHub
+        assert len(rule.get("properties", {}).get("tags", [])) <= 10  # GitHub shows no more
+    root = run["originalUriBaseIds"]["%SRCROOT%"]["uri"]  # 3.14.14
+    assert root.startswith("file:///")
+    assert root.endswith("/")
+    assert len(run["results"]) <= 25_000  # GitHub
     for invocation in run["invocations"]:
         assert isinstance(invocation["executionSuccessful"], bool)  # 3.20.14
     for result in run["results"]:
@@ -44,12 +54,16 @@ def require_valid(document: dict[str, Any]) -> None:
         assert result["level"] in ("none", "note", "warning", "error")  # 3.27.10
         assert result["message"]["text"]  # 3.27.11
         assert all(isinstance(value, str) for value in result["partialFingerprints"].values())  # 3.27.17
-        for place in result["locations"]:  # 3.27.12
-            uri = place["physicalLocation"]["artifactLocation"]["uri"]  # 3.4.3: a URI reference, RFC 3986
+        assert len(result["locations"]) == 1  # 3.27.12; GitHub requires one
+        for place in result["locations"]:
+            location = place["physicalLocation"]["artifactLocation"]
+            uri = location["uri"]  # 3.4.3: a URI reference, RFC 3986
+            # A path is relative to the root, as GitHub requires, and names a scheme otherwise.
+            assert location.get("uriBaseId") == (None if uri.startswith("file:///") else "%SRCROOT%")
+            assert not uri.startswith(("/", "../"))
             assert re.fullmatch(r"[A-Za-z0-9\-._~:/?#\[\]@!$&'()*+,;=%]+", uri)
             urlsplit(uri)
-            region = place["physicalLocation"].get("region")
-            assert region is None or region["startLine"] >= 1  # 3.30.5
+            assert place["physicalLocation"]["region"]["startLine"] >= 1  # 3.30.5; GitHub requires it
             for logical in place.get("logicalLocations", ()):
                 assert logical["name"]  # 3.33.4
 
@@ -74,6 +88,7 @@ def test_levels_say_how_alarming_a_finding_is() -> None:
         ("DX902", "warning"),
         ("DX903", "note"),
         ("unexplained", "error"),
+        ("refused", "error"),
     }
 
 
@@ -114,6 +129,72 @@ def test_a_file_below_the_working_directory_is_relative(
     [one, *_] = results(differing(str(tmp_path / "other")))
     uri = one["locations"][0]["physicalLocation"]["artifactLocation"]["uri"]
     assert uri == (tmp_path / "other.urdf").as_uri()
+
+
+def test_a_file_in_a_repository_is_relative_to_its_root(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "robots"
+    folder.mkdir()
+    (tmp_path / ".git").mkdir()
+    (folder / "arm.urdf").write_text("<robot/>")
+    monkeypatch.chdir(folder)
+    [one, *_] = results(differing("arm"))
+    assert one["locations"][0]["physicalLocation"]["artifactLocation"]["uri"] == "robots/arm.urdf"
+
+
+@pytest.mark.parametrize(
+    ("text", "line"), [("<robot>\n<link></robot>", 2), ("", 1), ('<robot name="r"/>', 1), ("\n\n<a/>", 3)]
+)
+def test_a_refused_file_is_a_result_at_its_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str, line: int
+) -> None:
+    (tmp_path / "broken.urdf").write_text(text)
+    monkeypatch.chdir(tmp_path)
+    report = examine(DoctorTask("broken.urdf", "fixed"))
+    assert report.error is not None
+    document = sarif_document([report])
+    require_valid(document)
+    [run] = document["runs"]
+    [result] = run["results"]
+    assert (result["ruleId"], result["level"]) == ("refused", "error")
+    place = result["locations"][0]["physicalLocation"]
+    assert place["artifactLocation"]["uri"] == "broken.urdf"
+    assert place["region"]["startLine"] == line
+    assert "broken.urdf" not in result["message"]["text"]
+    assert run["invocations"][0]["executionSuccessful"] is False
+
+
+def test_a_run_that_was_interrupted_was_not_successful() -> None:
+    document = sarif_document([alike()], not_done=["later"])
+    require_valid(document)
+    [invocation] = document["runs"][0]["invocations"]
+    assert invocation["executionSuccessful"] is False
+    assert "later" in invocation["toolExecutionNotifications"][0]["message"]["text"]
+    [before] = sarif_document([alike()])["runs"][0]["invocations"]
+    assert before["executionSuccessful"] is True
+
+
+def test_two_findings_at_one_place_are_two_results() -> None:
+    report = differing()
+    twice = replace(report, findings=(*report.findings, replace(report.findings[-1], line=16)))
+    assert len(results(twice)) == len(results(report)) + 1
+
+
+def test_the_severe_results_remain_where_there_are_too_many(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sarif, "MAX_RESULTS", 3)
+    document = sarif_document([differing()])
+    assert [each["level"] for each in document["runs"][0]["results"]] == ["error"] * 3
+    [note] = document["runs"][0]["invocations"][0]["toolExecutionNotifications"]
+    assert note["message"]["text"] == "2 of 5 results were left out"
+
+
+def test_an_engine_that_refuses_the_file_without_a_cause_is_named() -> None:
+    missing = Unexplained("mujoco", "mass_matrix", math.inf)
+    report = replace(differing(), unexplained=(Unexplained("mujoco", "loading", math.inf), missing))
+    texts = [each["message"]["text"] for each in results(report) if each["ruleId"] == "unexplained"]
+    assert texts[0].startswith("mujoco refuses the file")
+    assert texts[1].startswith("mujoco returns no valid mass matrix")
 
 
 def test_a_rule_of_the_catalogue_brings_its_page() -> None:

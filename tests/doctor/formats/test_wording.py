@@ -18,7 +18,7 @@ from tests.doctor.formats.reports import alike, differing, refused
     ("error", "said"),
     [
         *((0.0, "0"), (3e-11, "3e-11"), (1.3e-2, "1.3 %"), (0.943, "94 %"), (19.0, "1900 %"), (1e9, "1e+09")),
-        *((math.inf, "no answer"), (math.nan, "no answer")),
+        *((math.inf, "no value"), (math.nan, "no value")),
     ],
 )
 def test_a_size_is_said_as_people_say_it(error: float, said: str) -> None:
@@ -27,7 +27,7 @@ def test_a_size_is_said_as_people_say_it(error: float, said: str) -> None:
 
 def test_an_effect_names_its_quantity() -> None:
     assert wording.effect(Effect("mass_matrix", 0.5)) == "mass matrix off by 50 %"
-    assert wording.effect(Effect("forward dynamics", math.inf)) == "no forward dynamics"
+    assert wording.effect(Effect("forward dynamics", math.inf)) == "no valid forward dynamics"
     assert wording.effect(Effect("loading", math.inf)) == "the file is refused"
 
 
