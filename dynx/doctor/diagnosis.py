@@ -14,6 +14,7 @@ from dynx.doctor.counterexample.trials import difference_of
 from dynx.doctor.examine.engine_input import without_meshes
 from dynx.doctor.examine.examination import LOADING, TORQUE, Examination, Examiner
 from dynx.doctor.examine.line_map import with_original_lines
+from dynx.doctor.examine.reference_values import ReferenceValues
 from dynx.doctor.prove.attribution import Attribution, Attributor
 from dynx.doctor.prove.mending import (
     Mending,
@@ -105,7 +106,7 @@ def compare_as_loaded(
     checked_base(base)
     try:
         case = open_case(robot, base, {})
-        before = examiner.examine(case, reference=examiner.reference(readable(case).case), describe=True)
+        before = examiner.examine(case, reference=_reference_of(readable(case).case, examiner), describe=True)
         report = first_report(case, before, tolerance)
     except DynxError as error:
         report = refused_report(str(_label(robot)), error, base=base)
@@ -138,7 +139,7 @@ def _diagnosis_of(
 ) -> DoctorReport:
     progress("loading")
     sound = readable(case).case
-    reference = examiner.reference(sound)
+    reference = _reference_of(sound, examiner)
     before = examiner.examine(case, reference=reference, describe=True)
     rules = _rules_for(examiner)
     found = with_original_lines(detections(case, rules), case.source, sound.source)
@@ -162,6 +163,15 @@ def _diagnosis_of(
         calls=run_time_calls(mended.case, examiner),
         mended=mended.case.source.text if changed else None,
     )
+
+
+def _reference_of(case: Case, examiner: Examiner) -> ReferenceValues:
+    """Compute the reference values; raises the error of the text as it is where dynx refuses that."""
+    try:
+        return examiner.reference(case)
+    except DynxError as error:
+        # Reference values are those of an edited text, whose lines are others.
+        raise (case.reading if isinstance(case.reading, DynxError) else error) from None
 
 
 def _chosen_practice(case: Case, found: Sequence[tuple[Rule, Detection]]) -> bool:

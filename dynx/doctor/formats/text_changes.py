@@ -44,11 +44,11 @@ def changes(report: DoctorReport) -> TextChanges | None:
     return TextChanges(shown, added, removed, len(lines))
 
 
-def excerpt(text: str | None, line: int | None, around: int = 2) -> list[tuple[int, str]]:
+def excerpt(report: DoctorReport, line: int | None, around: int = 2) -> list[tuple[int, str]]:
     """Return the lines about `line` with their numbers; none where the text or the line is unknown."""
-    if text is None or line is None:
+    if report.text is None or line is None:
         return []
-    lines = lines_of(text)
+    lines = lines_of(report.text if report.form is None else report.form.front + report.text)
     return [
         (number, lines[number - 1][:LONGEST_LINE] + (" ..." if len(lines[number - 1]) > LONGEST_LINE else ""))
         for number in range(max(1, line - around), min(len(lines), line + around) + 1)

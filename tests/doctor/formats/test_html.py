@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dynx.doctor.diagnosis import compare_as_loaded
 from dynx.doctor.formats import html_page, read_baseline
 from dynx.doctor.formats.heat import ALL_STEPS, SAME, Step, step_of
 from dynx.doctor.formats.html import template_environment
@@ -130,11 +131,17 @@ def test_a_very_long_name_is_cut() -> None:
 
 def test_the_marked_line_is_the_one_that_is_meant() -> None:
     for number, line in enumerate(TEXT.splitlines(), start=1):
-        assert (number, line) in excerpt(TEXT, number)
+        assert (number, line) in excerpt(differing(), number)
         finding = replace(differing().findings[0], line=number)
         page = html_page([replace(differing(), findings=(finding,))])
         here = re.findall(r'<span class="here">(<span class="line">.*?</span>.*?)</span>', page)
         assert [Page(each).text for each in here] == [f"{number}{line}"]
+
+
+def test_lines_are_those_of_the_file_also_after_empty_lines() -> None:
+    text = '\n\n<robot name="a">\n  <link name="b"/>\n</robot>\n'
+    report = compare_as_loaded(text.encode(), engines=["pinocchio"])
+    assert excerpt(report, 4, around=0) == [(4, '  <link name="b"/>')]
 
 
 @given(st.lists(st.sampled_from(["a", "\u2028", "\x0b", "\n", "\r\n", "\r"])))
