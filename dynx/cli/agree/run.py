@@ -73,7 +73,11 @@ def agreement_run(
     refusals: dict[int, DynxError] | None = None,
 ) -> AgreementRun:
     """Prepare the run of ``dynx agree``."""
-    return Run(tasks, target, refused, _problem, "comparing", refusals)
+    return Run(tasks, target, refused, _problem, _verdict, "comparing", refusals)
+
+
+def _verdict(report: AgreementReport) -> str:
+    return _problem(report) or "agree"
 
 
 def _problem(report: AgreementReport) -> str | None:

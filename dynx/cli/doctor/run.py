@@ -64,7 +64,11 @@ def doctor_run(
     refusals: dict[int, DynxError] | None = None,
 ) -> DoctorRun:
     """Prepare the run of ``dynx doctor`` or of ``dynx agree --as-loaded``."""
-    return Run(tasks, target, refused, _problem, "examining", refusals)
+    return Run(tasks, target, refused, _problem, _verdict, "examining", refusals)
+
+
+def _verdict(report: DoctorReport) -> str:
+    return report.verdict
 
 
 def _problem(report: DoctorReport) -> str | None:

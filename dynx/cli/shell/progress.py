@@ -1,10 +1,12 @@
-"""Progress bar on standard error, if that is a terminal."""
+"""Progress on standard error: a bar if that is a terminal, else lines."""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+
+import click
 
 from dynx.cli.shell.terminal import console
 
@@ -32,3 +34,11 @@ def progress_bar(total: int, done: int = 0, words: str = "", *, enabled: bool = 
     with Progress(*columns, console=screen, transient=True) as progress:
         bar = progress.add_task(words, total=total, completed=done)
         yield lambda done, words: progress.update(bar, completed=done, description=words)
+
+
+def log(line: str) -> None:
+    """Write a line at once, unless standard error is a terminal, which shows the bar."""
+    # Where standard error cannot be written, the work goes on.
+    with suppress(OSError):
+        if not sys.stderr.isatty():
+            click.echo(line, err=True)

@@ -8,9 +8,9 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Generic, Protocol, TypeVar
 
-from dynx.cli.shell.exits import complain
+from dynx.cli.shell.exits import complain, short_line
 from dynx.cli.shell.interruption import interruptible
-from dynx.cli.shell.progress import progress_bar
+from dynx.cli.shell.progress import log, progress_bar
 from dynx.cli.shell.terminal import counted
 from dynx.errors import DynxError
 from dynx.workers import Workers
@@ -23,6 +23,10 @@ class RobotTask(Protocol):
     def robot(self) -> str:
         """The robot as the user named it."""
 
+    @property
+    def base(self) -> str | None:
+        """The base of the robot, where it is chosen."""
+
 
 Task = TypeVar("Task", bound=RobotTask)
 Result = TypeVar("Result")
@@ -34,7 +38,8 @@ class Run(Generic[Task, Result]):
     ``target(task)`` runs in a worker process. ``refused(task, error)`` makes the result of a task whose
     process ended without one, and of the tasks numbered in `refusals`, which never start.
     The progress bar counts the results by ``problem(result)``, a word such as ``differ`` or None; without
-    any its text is `activity`.
+    any its text is `activity`. Where standard error is no terminal, such as the log of a CI service, each of
+    several robots gets a line with ``verdict(result)`` when it is done.
     """
 
     def __init__(
@@ -43,6 +48,7 @@ class Run(Generic[Task, Result]):
         target: Callable[[Task], Result],
         refused: Callable[[Task, DynxError], Result],
         problem: Callable[[Result], str | None],
+        verdict: Callable[[Result], str],
         activity: str,
         refusals: Mapping[int, DynxError] | None = None,
     ) -> None:
@@ -51,6 +57,7 @@ class Run(Generic[Task, Result]):
         self._target = target
         self._refused = refused
         self._problem = problem
+        self._verdict = verdict
         self._activity = activity
         self._problems: Counter[str] = Counter()
         self._results: dict[int, Result] = {}
@@ -96,8 +103,18 @@ class Run(Generic[Task, Result]):
                         result = self._refused(self.tasks[index], outcome.failure.error)
                     self.record(index, result)
                     advance(len(self._results), self._status())
+                    if show_progress and len(self.tasks) > 1:
+                        log(self._line(index))
         finally:
             self.seconds = time.perf_counter() - started
+
+    def _line(self, index: int) -> str:
+        """Write a result as one line: how many are done, the robot, and its verdict."""
+        total = len(self.tasks)
+        task = self.tasks[index]
+        base = f", {task.base} base" if len({each.base for each in self.tasks}) > 1 else ""
+        count = f"[{len(self._results)}/{total}]"
+        return f"{count} {short_line(task.robot)}{base}: {short_line(self._verdict(self._results[index]))}"
 
     def _status(self) -> str:
         return ", ".join(f"{count} {word}" for word, count in self._problems.items()) or self._activity

@@ -130,6 +130,9 @@ def test_several_robots_and_bases(arm: Path, tmp_path: Path) -> None:
         "robots": 4, "alike": 1, "explained": 1, "unexplained": 0, "refused": 2, "not_done": 0,
     }  # fmt: skip
     assert "4 robots: 1 alike, 1 explained, 0 unexplained, 2 refused" in result.stderr
+    done = {line.partition("] ")[2] for line in result.stderr.splitlines() if line.startswith("[")}
+    assert "robots/arm.urdf: engines differ, for 1 cause, all proved" in done
+    assert "robots/deep/sound.urdf: all engines load it alike" in done
     written = {str(path.relative_to(tmp_path / "mended")) for path in (tmp_path / "mended").rglob("*.urdf")}
     assert written == {"arm.urdf", os.path.join("deep", "sound.urdf")}
     copied = (tmp_path / "mended" / "deep" / "sound.urdf").read_bytes()
