@@ -19,6 +19,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from dynx.engines.decimal_point import decimal_point
 from dynx.errors import DynxError, EngineError
 from dynx.model.mechanism import ROOT
 from dynx.spatial.scalar import Floats
@@ -64,7 +65,8 @@ class BulletConnection(ABC):
             self.call(
                 self.engine.setPhysicsEngineParameter, fixedTimeStep=1.0, numSubSteps=0, enableFileCaching=0
             )
-            self._load()
+            with decimal_point():
+                self._load()
         except BaseException:
             self.close()
             raise
