@@ -26,7 +26,7 @@
     `- CompileError                 the SIMD compiler cannot compile a program
        `- TraceError                traced code branches on or converts a symbol
 
-Input of a caller never raises another exception; any other is a defect of dynx.
+Invalid input raises one of these. Any other exception is a defect of dynx.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from typing import Any, Literal, NamedTuple
 
 
 class DynxError(Exception):
-    """Root of everything dynx raises on purpose."""
+    """Root of all errors that dynx raises on purpose."""
 
 
 class ModelError(DynxError, ValueError):
@@ -62,11 +62,11 @@ class DescriptionError(ModelError):
 
 
 class UnsupportedFeatureError(DescriptionError):
-    """The description uses a feature that dynx refuses rather than drops."""
+    """The description uses a feature that dynx does not support, and does not ignore either."""
 
 
 class RobotNotFoundError(ModelError, LookupError):
-    """Neither a file nor a name of the library."""
+    """No file of that path and no robot of that name exists."""
 
 
 class ArgumentError(DynxError, ValueError):

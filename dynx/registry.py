@@ -1,11 +1,11 @@
 """Classes by name, from dynx itself, from the running program and from entry points of installed packages.
 
-A name is looked up in three places, in this order: a table of dynx's own classes (found also in a source tree
-that was never installed), the classes that a program registered, and the entry points of one group. A name
-never changes its meaning: `ClassRegistry.register` refuses a name that is taken, and an entry point with the
-name of one of dynx's own classes is ignored.
+A name is looked up in three places, in this order: a table of dynx's own classes (which needs no installed
+package), the classes that a program registered, and the entry points of one group. A name never changes its
+meaning: `ClassRegistry.register` refuses a name that is taken, and an entry point with the name of one of
+dynx's own classes is ignored.
 
-A class is imported when it is first looked up, never to list names.
+A class is imported when it is first looked up; listing names imports none.
 """
 
 from __future__ import annotations

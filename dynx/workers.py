@@ -1,9 +1,9 @@
-"""Worker processes for tasks that may crash or hang, which then costs one task and not the whole run.
+"""Worker processes for tasks that may crash or hang, so that only one task fails and not the whole run.
 
 Engines are foreign code that can end the process or never return while they hold the interpreter lock. So
-each task runs in a child process, which is reused until it ends; only the task that ended it has failed. One
-thread per child waits for it, which is portable and leaves the main thread free for Ctrl-C. Children are in a
-session of their own and do not receive Ctrl-C.
+each task runs in a child process, which is reused until it ends; only the task that ended it fails. One
+thread waits for each child, which is portable and leaves the main thread free for Ctrl-C. Children run in
+their own session and do not receive Ctrl-C.
 """
 
 from __future__ import annotations
@@ -66,8 +66,8 @@ class Outcome:
 class Workers:
     """Up to `size` processes that compute ``target(task)`` for each task.
 
-    `target` is a module-level function; tasks and values are pickled. `timeout` [s] bounds one
-    task, None does not. Use it as a context: leaving it ends the processes.
+    `target` is a module-level function; tasks and values are pickled. `timeout` [s] is the time limit of one
+    task, None for no limit. Use it as a context: leaving it ends the processes.
     """
 
     def __init__(self, target: Callable[[Any], Any], size: int, timeout: float | None = None) -> None:
@@ -150,7 +150,8 @@ class _Worker:
     """One child process, and the pipes to it."""
 
     def __init__(self, target: Callable[[Any], Any]) -> None:
-        # One thread of linear algebra each: the matrices are small and the workers are many.
+        # Each worker uses one thread for linear algebra, because matrices are small and there are many
+        # workers.
         environment = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", **os.environ}
         self._process = subprocess.Popen(
             [sys.executable, "-c", _START, *sys.path],
@@ -205,7 +206,8 @@ class _Worker:
         self._process.kill()
         self._process.wait()
         self._process.stdout.close()
-        # Closing flushes data that an ended process did not read, which fails, but the pipe is closed.
+        # Closing a pipe flushes it. That fails if the ended process has not read all data, but the pipe is
+        # closed.
         try:
             self._process.stdin.close()
         except OSError:
@@ -234,7 +236,7 @@ def serve() -> None:
 def _reply(target: Callable[[Any], Any], task: Any) -> tuple[Any] | Failure:
     try:
         return (target(task),)
-    except Exception as error:  # at the boundary of the process every exception becomes a reply
+    except Exception as error:  # Every exception becomes a reply, because it cannot leave the process.
         import traceback
 
         if traceback_wanted():

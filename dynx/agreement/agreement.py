@@ -37,11 +37,11 @@ DEFAULT_SAMPLES = 16
 DEFAULT_REFEREE_SAMPLES = 2
 
 DERIVED_SAMPLES = 2
-"""Samples at which native results are compared with derived ones: a derived mass matrix costs an
-evaluation per column."""
+"""Number of samples at which the results of an engine are compared with those derived from its poses and
+torques. It is small because a derived mass matrix takes one evaluation per column."""
 
 IDENTITY_SAMPLES = 4
-"""Samples at which identities are tested: a derivative costs eight evaluations."""
+"""Number of samples at which identities are tested, small because a derivative takes eight evaluations."""
 
 Progress = Callable[[str], None]
 
@@ -57,12 +57,12 @@ def agree(
 ) -> AgreementReport:
     """Compare the results of backends on a robot.
 
-    `model` is a `Model` or whatever `dynx.load` takes. `backends` are names (default: all that are
-    installed) or backends made of this very model, which are left open; one alone is compared with
-    the referee and with itself. Every quantity is compared pairwise at `samples` states that follow
-    from `seed`, and with the 50-digit referee at `referee_samples` of them; native results of an engine are
-    compared with derived ones; each backend is tested against the identities of mechanics.
-    `progress` is called with the name of each step.
+    `model` is a `Model` or whatever `dynx.load` takes. `backends` are names (default: all that are installed)
+    or backends made of this model, which stay open; a single one is compared with the referee and with
+    itself. Every quantity is compared pairwise at `samples` states that follow from `seed`, and with the
+    50-digit referee at `referee_samples` of them; quantities that an engine computes itself are compared with
+    those that dynx derives from its poses and its inverse dynamics; each backend is tested against the
+    identities of mechanics. `progress` is called with the name of each step.
 
     A robot that cannot be read, or that a backend refuses, gives a report with `error` set. Raises
     ArgumentError for arguments that are invalid for every robot, UnknownBackendError and
@@ -78,7 +78,7 @@ def agree(
         return refused_report(_label(model), error, backends=names, seconds=seconds)
     _require_same_model(loaded, chosen)
     try:
-        # NaN and infinity from an engine appear in the report; NumPy need not warn of them.
+        # NaN and infinity from an engine appear in the report, so NumPy's warnings are silenced.
         with ExitStack() as opened, np.errstate(all="ignore"):
             engines = [_open(each, loaded, opened) for each in chosen]
             return _compare_all(
@@ -149,7 +149,7 @@ def _compare_all(
 
 
 def _compare_with_referee(samples: Samples, names: list[str], engines: list[Backend]) -> list[Comparison]:
-    """Return the comparisons of each backend with the referee."""
+    """Compare each backend with the referee."""
     magnitudes = Magnitudes(samples)
     exact = BackendResults(REFEREE, Referee(samples.model), samples)
     rows = []
@@ -165,8 +165,7 @@ def _compare_with_referee(samples: Samples, names: list[str], engines: list[Back
 
 
 def _compare_with_derived(magnitudes: Magnitudes, name: str, engine: Backend) -> list[Comparison]:
-    """Return the comparisons of native results with those that dynx derives from the engine's poses and
-    torques."""
+    """Compare what the engine computes itself with what dynx derives from its poses and torques."""
     native = native_quantities(engine)
     own = BackendResults(name, engine, magnitudes.samples)
     derived = BackendResults(DERIVED, DerivedBackend(engine), magnitudes.samples)
@@ -227,7 +226,7 @@ def _open(chosen: str | Backend, model: Model, opened: ExitStack) -> Backend:
 
 
 def _distinct_names(engines: list[Backend]) -> list[str]:
-    """Return the names of the engines, repeated ones numbered."""
+    """Return the names of the engines; a repeated name gets a number."""
     names: list[str] = []
     for engine in engines:
         again = sum(name.partition("#")[0] == engine.name for name in names)

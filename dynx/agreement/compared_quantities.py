@@ -1,4 +1,4 @@
-"""The quantities that are compared: those of the table, and variants of some with other options.
+"""The compared quantities: those of `dynx.backends.quantities`, and variants of some with other options.
 
 They can be evaluated on any object that has the methods of `Backend`, such as the 50-digit referee.
 """
@@ -26,7 +26,8 @@ from dynx.backends.quantities import QUANTITIES, Quantity
 from dynx.spatial.scalar import Array, Floats
 
 POINT = (0.3, -0.2, 0.1)
-"""Point [m], in the axes of the frame, at which a Jacobian is compared beside the frames' origins."""
+"""Point [m], in the axes of the frame, at which a Jacobian is compared, in addition to the origins of the
+frames."""
 
 Evaluate = Callable[[Any, Samples], Array]
 
@@ -35,9 +36,10 @@ Evaluate = Callable[[Any, Samples], Array]
 class ComparedQuantity:
     """One line of the report.
 
-    `evaluate` returns the results of a backend, `scale` broadcasts against them, and `tolerance` bounds
-    their difference over scale. `native` is the quantity whose native results are compared with derived ones
-    (None: not compared), `derived_scale` their scale, and `refereed` whether the referee computes it.
+    `evaluate` returns the results of a backend, `scale` broadcasts against them, and `tolerance` bounds their
+    difference over scale. Where the engine computes the quantity called `native` itself, that result is
+    compared with the derived one, relative to `derived_scale` (None: no such comparison). `refereed` tells
+    whether the referee computes the quantity.
     """
 
     name: str
@@ -51,7 +53,7 @@ class ComparedQuantity:
 
 
 def compared_quantities() -> tuple[ComparedQuantity, ...]:
-    """Return the lines for all quantities but those that solve equations, whose errors are not differences
+    """Return all compared quantities except those that solve equations, whose errors are not differences
     (`dynx.agreement.solutions`)."""
     lines: list[ComparedQuantity] = []
     for quantity in QUANTITIES.values():
@@ -100,8 +102,9 @@ def _component(magnitudes: Magnitudes) -> float:
 
 
 def _component_scale(magnitudes: Magnitudes) -> Floats:
-    """Return (n, nv): the magnitude of each torque, at least such that one rounding of the largest torque is
-    within tolerance (a joint with a point mass on its axis has torque zero as a sum of terms that large)."""
+    """Return the magnitude (n, nv) of each torque, with a lower bound that keeps one rounding of the largest
+    torque within tolerance. (The torque of a joint with a point mass on its axis is zero, but it is a sum of
+    terms as large as the largest torque.)"""
     return np.maximum(magnitudes.torque, largest(magnitudes.torque) * (EPS / _component(magnitudes)))
 
 
@@ -166,4 +169,4 @@ _VARIANTS = {
         ),
     ),
 }
-"""Lines that follow a quantity of the table: the same method with other options or another tolerance."""
+"""Variants of a quantity of the table: the same method with other options or another tolerance."""

@@ -17,7 +17,7 @@ from dynx.spatial.scalar import Array, Floats
 
 @dataclass(frozen=True)
 class WorstSample:
-    """The sample of the largest error, with all that reproduces it."""
+    """The sample with the largest error, and everything needed to reproduce it."""
 
     index: int
     kind: str
@@ -64,7 +64,7 @@ class Verdict:
 
 
 def judge(error: Array, scale: Floats) -> Verdict:
-    """Return the largest error over `scale`, which broadcasts; NaN counts as infinite."""
+    """Return the largest error relative to `scale`, which broadcasts against it; NaN counts as infinite."""
     absolute = np.abs(error).astype(np.float64)
     if not absolute.size:
         return Verdict(0.0, 0.0, None)
@@ -128,7 +128,7 @@ def compare_refusals(
     results: Sequence[Array | Refusal],
     tolerance: float,
 ) -> Comparison | None:
-    """Compare backends of which some raised an error; None if all have results.
+    """Compare backends of which some raised an error; return None if all have results.
 
     They agree if all report a singular mass matrix.
     """
@@ -180,8 +180,8 @@ def locate(position: tuple[int, ...] | None, layout: Layout, samples: Samples) -
 
 
 def _difference(one: Array, other: Array) -> Array:
-    """Return one minus other; exact where one of them holds 50-digit numbers, since doubles are exact in
-    those."""
+    """Return `one` minus `other`. The difference is exact where one of them holds 50-digit numbers, because
+    those represent doubles exactly."""
     if one.dtype == object or other.dtype == object:
         return np.asarray(one.astype(object) - other.astype(object))
     with np.errstate(invalid="ignore"):

@@ -19,14 +19,14 @@ WEIGHTS = {1: 4.0 / 5.0, 2: -1.0 / 5.0, 3: 4.0 / 105.0, 4: -1.0 / 280.0}
 """Weight of f(k h) - f(-k h), to be divided by h."""
 
 MAX_REST_FREQUENCY = 1e-100
-"""Frequency [rad/s] up to which a robot counts as at rest: the step would overflow."""
+"""Frequency [rad/s] below which a robot counts as at rest, because the step ``STEP / W`` would overflow."""
 
 
 def time_derivative(function: Callable[[Floats], Floats], frequency: Floats) -> Floats:
-    """Return d/dt at 0 of ``function(t)`` for n motions at once.
+    """Return the time derivative of ``function(t)`` at t = 0 for n motions at once.
 
-    `frequency` (n,) is each motion's highest angular frequency [rad/s]. `function` takes times
-    (m, n), m at a time, and returns (m, n, ...); the derivative is (n, ...).
+    `frequency` (n,) is each motion's highest angular frequency [rad/s]. `function` takes m times for each
+    motion as an array (m, n), and returns (m, n, ...); the derivative is (n, ...).
     """
     step = STEP / np.where(frequency > MAX_REST_FREQUENCY, frequency, 1.0)
     multiples = [k for order in WEIGHTS for k in (order, -order)]

@@ -56,7 +56,8 @@ class Identity:
 
 
 def check_identities(name: str, backend: Backend, magnitudes: Magnitudes) -> list[IdentityCheck]:
-    """Check all identities of one backend at the samples of `magnitudes`, all `Samples.differentiable`."""
+    """Check all identities of one backend at the samples of `magnitudes`, all of which have to be
+    `Samples.differentiable`."""
     samples, checks = magnitudes.samples, []
     for identity in IDENTITIES:
         tolerance = identity.tolerance(magnitudes)
@@ -113,8 +114,8 @@ def _sum_of_torques(backend: Backend, samples: Samples, magnitudes: Magnitudes) 
     moved = apply_matrix(backend.mass_matrix(samples.q), samples.a)
     total = moved + backend.bias_torque(samples.q, samples.v)
     tau = backend.inverse_dynamics(samples.q, samples.v, samples.a)
-    lever = np.einsum("nij,nj->ni", mass_scale(magnitudes), np.abs(samples.a))
-    return total - tau, largest(magnitudes.torque + lever)
+    inertial = np.einsum("nij,nj->ni", mass_scale(magnitudes), np.abs(samples.a))
+    return total - tau, largest(magnitudes.torque + inertial)
 
 
 def _sum_of_bias(backend: Backend, samples: Samples, magnitudes: Magnitudes) -> tuple[Floats, Floats]:
@@ -125,16 +126,18 @@ def _sum_of_bias(backend: Backend, samples: Samples, magnitudes: Magnitudes) -> 
 
 
 def _momentum_of_base(backend: Backend, samples: Samples, magnitudes: Magnitudes) -> tuple[Floats, Floats]:
-    """The first six rows of M v are the momentum of the robot, about and in the base frame."""
+    """Compare the momentum with the first six rows of M v, which are the momentum in the base frame."""
     T = backend.forward_kinematics(samples.q, samples.model.root)
     R = T[:, :3, :3]
     momentum = apply_matrix(backend.mass_matrix(samples.q), samples.v)
     linear, about_base = rotate(R, momentum[:, :3]), rotate(R, momentum[:, 3:6])
     offset = backend.center_of_mass(samples.q) - T[:, :3, 3]
     expected = np.concatenate([linear, about_base - cross(offset, linear)], axis=-1)
-    flow = magnitudes.mass * magnitudes.speed
-    spin = 3.0 * flow * magnitudes.length + magnitudes.rotational_inertia * magnitudes.angular_speed
-    size = np.stack([flow] * 3 + [spin] * 3, axis=-1)
+    linear_size = magnitudes.mass * magnitudes.speed
+    angular_size = (
+        3.0 * linear_size * magnitudes.length + magnitudes.rotational_inertia * magnitudes.angular_speed
+    )
+    size = np.stack([linear_size] * 3 + [angular_size] * 3, axis=-1)
     return backend.centroidal_momentum(samples.q, samples.v) - expected, size
 
 
@@ -149,7 +152,7 @@ def _momentum_of_center(backend: Backend, samples: Samples, magnitudes: Magnitud
 
 
 def _frame_motion(backend: Backend, samples: Samples, magnitudes: Magnitudes) -> tuple[Floats, Floats]:
-    """d/dt of a pose is [[skew(omega) R, velocity], [0, 0]] with (velocity, omega) = J v."""
+    """Compare d/dt of a pose with [[skew(omega) R, velocity], [0, 0]], where (velocity, omega) = J v."""
     frames, n = samples.model.frame_names, len(samples)
     rate = time_derivative(lambda t: backend.forward_kinematics(_at(samples, t)), magnitudes.frequency)
     poses = backend.forward_kinematics(samples.q)
@@ -157,8 +160,8 @@ def _frame_motion(backend: Backend, samples: Samples, magnitudes: Magnitudes) ->
     for number, frame in enumerate(frames):
         k = number % n
         twist = backend.jacobian(samples.q[k], frame) @ samples.v[k]
-        turning = skew(twist[3:]) @ poses[k, number, :3, :3]
-        expected = np.concatenate([turning, twist[:3, None]], axis=-1)
+        rotation_rate = skew(twist[3:]) @ poses[k, number, :3, :3]
+        expected = np.concatenate([rotation_rate, twist[:3, None]], axis=-1)
         residual[k, number] = rate[k, number, :3] - expected
     size = np.ones((n, 1, 3, 4))
     size[:, 0, :, 3] = magnitudes.length[:, None]
@@ -178,7 +181,7 @@ def _gravity_potential(backend: Backend, samples: Samples, magnitudes: Magnitude
 
 
 def _power(backend: Backend, samples: Samples, magnitudes: Magnitudes) -> tuple[Floats, Floats]:
-    """d/dt (kinetic + potential energy) is the power v' tau of the torques."""
+    """Compare d/dt (kinetic + potential energy) with the power v' tau of the torques."""
     acceleration = np.sum(magnitudes.linear_column * np.abs(samples.a), axis=-1)
     relative = acceleration / np.where(magnitudes.speed > 0.0, magnitudes.speed, 1.0)
     frequency = 2.0 * (magnitudes.frequency + relative)
@@ -197,7 +200,7 @@ def _power(backend: Backend, samples: Samples, magnitudes: Magnitudes) -> tuple[
 
 
 def _passivity(backend: Backend, samples: Samples, magnitudes: Magnitudes) -> tuple[Floats, Floats]:
-    """dM/dt - 2 C is skew-symmetric: dM/dt = C + C'."""
+    """Check that dM/dt - 2 C is skew-symmetric, that is dM/dt = C + C'."""
     frequency = 2.0 * magnitudes.frequency
     rate = time_derivative(lambda t: backend.mass_matrix(_at(samples, t)), frequency)
     C = backend.coriolis_matrix(samples.q, samples.v)
@@ -208,7 +211,7 @@ def _passivity(backend: Backend, samples: Samples, magnitudes: Magnitudes) -> tu
 
 
 def _rotated_world(backend: Backend, samples: Samples, magnitudes: Magnitudes) -> tuple[Floats, Floats]:
-    """Rotating robot, world and gravity together changes no torque and no inertia."""
+    """Check that no torque and no inertia changes when robot, world and gravity are rotated together."""
     model, configurations = rotate_world(samples.model)
     q = configurations(samples.q)
     with type(backend)(model) as other:

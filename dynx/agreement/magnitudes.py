@@ -1,16 +1,16 @@
 """Magnitudes of a robot's motion, inertia and torques at given states, from which errors are scaled.
 
-An error relative to the value itself means little where the value is small because large terms
-cancel (the gravity torque of an upright arm, a torque about an axis through the centre of mass).
-The error of each quantity is therefore divided by a bound on the terms that it is summed from. The bounds
-follow from the model, the sample and the reference mass matrix, never from the compared results.
+An error relative to the value itself means little where the value is small because large terms cancel (the
+gravity torque of an upright arm, a torque about an axis through the centre of mass). The error of each
+quantity is therefore divided by a bound on the terms of its sum. The bounds follow from the model, the sample
+and the reference mass matrix, never from the compared results.
 
-Torques use the Cauchy-Schwarz inequality in the metric of the mass matrix. The torque on coordinate
-i is ``sum over bodies of <J_i, A>``, with J_i the body's twist for a unit velocity of coordinate i and A its
+Torques use the Cauchy-Schwarz inequality in the metric of the mass matrix. The torque on coordinate i is
+``sum over bodies of <J_i, A>``, with J_i the body's twist for a unit velocity of coordinate i and A its
 proper acceleration (acceleration minus gravity), weighted by inertia, so ``|tau_i| <= |J_i|_M |A|_M`` with
-``|J_i|_M = sqrt(M_ii)``, and ``|A|_M`` is at most ``sqrt(a'Ma)`` for the accelerations of the
-joints, ``|g| sqrt(m)`` for gravity. For the velocity products c it is at least ``max |c_i| / sqrt(M_ii)``,
-to which the angular speed times ``sqrt(v'Mv)`` is added, since they too may cancel.
+``|J_i|_M = sqrt(M_ii)``, and ``|A|_M`` is at most ``sqrt(a'Ma)`` for the accelerations of the joints, ``|g|
+sqrt(m)`` for gravity. For the velocity products c the bound is ``max |c_i| / sqrt(M_ii)`` plus the angular
+speed times ``sqrt(v'Mv)``, because their terms may cancel too.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ EPS = float(np.finfo(np.float64).eps)
 
 MIN_INERTIA_RATIO = 1e-2
 """Lower bound on M_ii of a rotating coordinate i, relative to the largest entry of the inertia tensor of
-all that it moves: rounding errors of the other entries reach M_ii (a rod that spins about its axis).
-Where a link's inertia is not physical, M_ii may be the difference of large terms, zero or negative; the
-bound is then that whole entry."""
+everything it moves. It is needed because rounding errors of the other entries reach M_ii (a rod that spins
+about its axis). Where a link's inertia is not physical, M_ii may be the difference of large terms, zero or
+negative; the bound is then that entry itself."""
 
 
 class Magnitudes:
@@ -120,7 +120,7 @@ class Magnitudes:
 
     @cached_property
     def frequency(self) -> Floats:
-        """(n,) Angular frequency [rad/s] to which poses are band-limited along a motion at constant v.
+        """(n,) Highest angular frequency [rad/s] of a pose along a motion at constant v.
 
         A pose is a product of sines and cosines of the joint angles between it and the root, whose
         frequencies add up; a prismatic joint counts with its speed over the length of the robot.
@@ -167,7 +167,7 @@ class Magnitudes:
 
     @cached_property
     def inertia_bound(self) -> Floats:
-        """(n, nv, nv) Bound on |M_ij| over all configurations of a robot this long."""
+        """(n, nv, nv) Bound on |M_ij| over all configurations, from the length of the robot."""
         L, A = self.linear_column, self.angular_column
         linear = self.mass * L[:, :, None] * L[:, None, :]
         return np.asarray(linear + self.rotational_inertia * A[:, :, None] * A[:, None, :])
@@ -186,7 +186,8 @@ class Magnitudes:
         Mv = np.einsum("nij,nj->ni", self.mass_matrix, self.samples.v)
         vMv = np.abs(np.sum(Mv * self.samples.v, axis=-1))
         rotating = self.angular_speed * np.sqrt(vMv)
-        # The moment v x m v of a body that slides is zero, as the difference of terms this large.
+        # The moment v x m v of a translating body is zero, but it is computed as a difference of terms this
+        # large.
         sliding = self.angular_column * vMv[:, None]
         return np.asarray(self.gravity_torque + self.sqrt_diagonal * (largest + rotating)[:, None] + sliding)
 
@@ -198,7 +199,7 @@ class Magnitudes:
         return np.asarray(self.bias_torque + self.sqrt_diagonal * accelerating[:, None])
 
     def solved_torque(self, a: Floats) -> Floats:
-        """Return (n,) the largest entry of |M| |a| + |bias| + |tau|, to which rounding errors of solving for
+        """Return the largest entry (n,) of |M| |a| + |bias| + |tau|, to which rounding errors of solving for
         `a` are proportional; M_ii is bounded from below as in `sqrt_diagonal`."""
         M = np.abs(self.mass_matrix)
         diagonal = np.einsum("nii->ni", M)
@@ -209,7 +210,7 @@ class Magnitudes:
 
     @cached_property
     def wrench_torque(self) -> Floats:
-        """(n, nv) Torque of the sample's wrench, wherever on the robot it acts."""
+        """(n, nv) Bound on the torque of the sample's wrench, whichever frame it acts on."""
         force = np.linalg.norm(self.samples.wrench[:, :3], axis=-1)[:, None]
         moment = np.linalg.norm(self.samples.wrench[:, 3:], axis=-1)[:, None]
         return np.asarray(self.linear_column * force + self.angular_column * moment)
@@ -221,7 +222,7 @@ class Magnitudes:
 
     @cached_property
     def potential_energy(self) -> Floats:
-        """(n,) All the mass at the farthest point."""
+        """(n,) Potential energy with all the mass at the point farthest from the world's origin."""
         whole = max(self.mass, abs(self._model.total_mass))
         return np.asarray(whole * self.gravity * self.length)
 
@@ -231,7 +232,7 @@ class Magnitudes:
         return np.asarray(np.abs(self.samples.v @ self._S.T))
 
     def _fastest(self, speeds: Floats) -> Floats:
-        """Return (n,) the largest sum of `speeds` (n, nv of the tree) over the joints between a body and the
+        """Return the largest sum (n,) of `speeds` (n, nv of the tree) over the joints between a body and the
         root."""
         bodies, first = len(self._mechanism.bodies), 6 if self._model.floating else 0
         between = np.zeros((bodies + 1, len(self._rotates)))

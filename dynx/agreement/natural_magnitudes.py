@@ -42,19 +42,19 @@ def frame_samples(layout: Layout, samples: Samples) -> tuple[FrameSamples, ...]:
 
 
 def largest(scale: Floats) -> Floats:
-    """Return (n, 1): the largest entry of each sample's scale (n, nv), for errors in the max norm."""
+    """Return the largest entry (n, 1) of each sample's scale (n, nv), for errors in the max norm."""
     return np.asarray(np.max(scale, axis=-1, initial=0.0, keepdims=True))
 
 
 def pose_scale(magnitudes: Magnitudes) -> Floats:
-    """Return (n, 1, 4, 4): 1 for rotations, the length of the robot for positions."""
+    """Return the scale (n, 1, 4, 4) of poses: 1 for rotations, the length of the robot for positions."""
     scale = np.ones((len(magnitudes.samples), 1, 4, 4))
     scale[:, :, :3, 3] = magnitudes.length[:, None, None]
     return scale
 
 
 def mass_scale(magnitudes: Magnitudes) -> Floats:
-    """Return (n, nv, nv): sqrt(M_ii M_jj)."""
+    """Return the scale (n, nv, nv) of mass matrices: sqrt(M_ii M_jj)."""
     return np.asarray(magnitudes.sqrt_diagonal[:, :, None] * magnitudes.sqrt_diagonal[:, None, :])
 
 
@@ -64,11 +64,11 @@ def _derived_mass_scale(magnitudes: Magnitudes) -> Floats:
 
 
 def coriolis_scale(magnitudes: Magnitudes) -> Floats:
-    """Return (n, nv, nv): bound on m (Jp' dJp + dJp' Jp) + Jr' I dJr, from bounds on each factor.
+    """Return a bound (n, nv, nv) on m (Jp' dJp + dJp' Jp) + Jr' I dJr, from bounds on each factor.
 
-    The bound on M times an angular speed would not do: the lever arms of a robot that slides without
-    rotating change with its speed, and these terms cancel (a point mass on the axis of a joint on a
-    sliding base).
+    The bound on M times an angular speed would be too small: the lever arms of a robot that translates
+    without rotating change with its speed, and these terms cancel (a point mass on the axis of a joint on a
+    translating base).
     """
     L, rate, A = magnitudes.linear_column, magnitudes.linear_column_rate, magnitudes.angular_column
     linear = magnitudes.mass * (L[:, :, None] * rate[:, None, :] + rate[:, :, None] * L[:, None, :])
@@ -82,7 +82,7 @@ def coriolis_scale(magnitudes: Magnitudes) -> Floats:
 
 
 def _regressor_scale(magnitudes: Magnitudes) -> Floats:
-    """Return (n, nv, 10 n_links): bound on the torque of a unit of each parameter, anywhere on the robot.
+    """Return a bound (n, nv, 10 n_links) on the torque of a unit of each parameter, anywhere on the robot.
 
     With lever arm L, proper acceleration p and angular terms w = |alpha| + omega^2, a mass requires L p, a
     first moment L w + p, and a second moment w.

@@ -4,8 +4,8 @@ It has the methods of a backend and returns arrays of mpmath numbers, starting f
 the description (as read into doubles). Its own rounding errors are 34 digits below those of any engine, so
 the distance of an engine from it is the engine's error.
 
-The precision is raised inside each call only; mpmath keeps it per process, so the referee is for
-one thread.
+The precision is raised inside each call only. It is a setting of the whole process in mpmath, so only one
+thread may use a referee.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ class Referee:
     def _quantity(
         self, quantity: Quantity, *arguments: Any, reference: str = jacobians.LOCAL_WORLD_ALIGNED
     ) -> Array:
-        """Return the algorithm of a quantity at its arguments and, where it is one of a frame, that frame."""
+        """Evaluate a quantity at its arguments, the last of which is a frame for a quantity of frames."""
         state, frame = arguments[: len(quantity.arguments)], arguments[len(quantity.arguments) :]
         details = quantity.implied_details(self.model)
         if quantity.of_frame:
@@ -85,8 +85,8 @@ class Referee:
         *velocities: ArrayLike,
         details: tuple[Any, ...] = (),
     ) -> Array:
-        """Return `algorithm` in tree coordinates, for every sample; `rank` axes of its result are no
-        batch."""
+        """Evaluate `algorithm` in tree coordinates for every sample; the last `rank` axes of a result are not
+        batch axes."""
         with mpmath.mp.workdps(DIGITS):
             q, rates = exactly(q), [exactly(v) for v in velocities]
             coupling = self._mechanism.coupling
@@ -97,7 +97,7 @@ class Referee:
                 q = np.concatenate([q[..., :base], joints], axis=-1)
                 rates = [v @ exactly(self._S.T) for v in rates]
             result = np.asarray(algorithm(self._mechanism, q, *rates, *details))
-            # A result that no coordinate moves lacks the batch axes.
+            # A result that depends on no coordinate lacks the batch axes.
             batch = np.broadcast_shapes(q.shape[:-1], *(v.shape[:-1] for v in rates))
             return np.array(np.broadcast_to(result, (*batch, *result.shape[result.ndim - rank :])))
 
@@ -106,7 +106,8 @@ class Referee:
             return np.asarray(A @ B)
 
     def _from_poses(self, algorithm: Callable[..., Array]) -> Callable[..., Array]:
-        """Return `algorithm` at the poses of the bodies, which are kept: a robot has many frames."""
+        """Return `algorithm` as a function of q. The poses of the bodies are stored, because they serve all
+        frames."""
 
         def evaluate(mechanism: Mechanism, q: Array, *rest: Any) -> Array:
             key = tuple(np.ravel(q).tolist()), q.shape

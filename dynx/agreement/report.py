@@ -2,8 +2,8 @@
 
     {"schema": 1, "dynx": version, "results": [...], "summary": {...}, "not_done": [...]}
 
-``summary`` counts ``robots`` that have an entry and of them ``agree``, ``differ`` and ``refused``;
-``not_done`` (0 but for an interrupted ``dynx agree``) counts those that have none.
+``summary`` counts the ``robots`` that have an entry, and those among them that ``agree``, ``differ`` and are
+``refused``; ``not_done`` counts the robots without an entry; it is 0 unless ``dynx agree`` was interrupted.
 
 One entry of ``results`` per robot:
 
@@ -119,7 +119,7 @@ class AgreementReport:
         return f"<AgreementReport {str(self).splitlines()[0]}>"
 
     def to_dict(self) -> dict[str, Any]:
-        """Return one entry of ``results``, of plain numbers, strings and lists."""
+        """Return the entry of this robot in ``results``, which has only numbers, strings and lists."""
         return document_of(AgreementEntry, replace(self, seconds=round(self.seconds, 4)))
 
 
@@ -146,7 +146,7 @@ class AgreementEntry:
 
 @dataclass(frozen=True)
 class AgreementSummary:
-    """Numbers of robots: of those with an entry, of each verdict, and of those not done."""
+    """Numbers of robots: with an entry, with each verdict, and without an entry (`not_done`)."""
 
     robots: int
     agree: int

@@ -27,7 +27,7 @@ class Refusal:
 
     @property
     def singular(self) -> bool:
-        """Whether no unique acceleration exists."""
+        """Whether the mass matrix is singular, so that no unique acceleration exists."""
         return isinstance(self.error, SingularMassMatrixError)
 
     def __str__(self) -> str:
@@ -44,19 +44,19 @@ class BackendResults:
         self._known: dict[str, Array | Refusal] = {}
 
     def of(self, name: str, evaluate: Callable[[Any, Samples], Array]) -> Array | Refusal:
-        """Return the result of the quantity `name`."""
+        """Return the result of the quantity `name`, evaluated at the first call."""
         if name not in self._known:
             self._known[name] = self.attempt(evaluate)
         return self._known[name]
 
     def attempt(self, evaluate: Callable[[Any, Samples], Array]) -> Array | Refusal:
-        """Return the result of `evaluate`, not stored, or the error that it raised."""
+        """Return the result of `evaluate` without storing it, or the error that it raised."""
         try:
             return np.asarray(evaluate(self.backend, self.samples))
         except DynxError as error:
             return Refusal(error)
         except Exception as error:
-            # A backend of another package may raise anything; the comparison must go on.
+            # A backend of another package may raise anything; the other comparisons are still made.
             broken = EngineError(f"{self.name} failed with {type(error).__name__}: {error}")
             broken.__cause__ = error
             return Refusal(broken)

@@ -1,9 +1,9 @@
 """The states at which backends are compared: the same for every backend, drawn from a seed.
 
-Kinds alternate, so that few samples include each: ``within`` the limits, ``anywhere`` in
-(-pi, pi) (so that joints whose limits have no width move too), ``straight`` (every joint at a multiple of a
-quarter turn, where arms are singular), ``limit`` (each joint at one of its limits) and ``turns``
-(angles of many turns). Half of the samples are within limits. The attitude of a floating base is random.
+Kinds alternate, so that few samples include each: ``within`` the limits, ``anywhere`` in (-pi, pi) (so that
+joints whose limits have no width move too), ``straight`` (every joint at a multiple of 90 degrees, where arms
+are singular), ``limit`` (each joint at one of its limits) and ``turns`` (angles of many full turns). Half of
+the samples are within limits. The attitude of a floating base is random.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ Indices = NDArray[np.intp]
 KINDS: tuple[Kind, ...] = ("within", "anywhere", "within", "straight", "within", "anywhere", "limit", "turns")
 
 MAX_TURNS = 50
-"""Number of turns to either side of zero that samples of kind ``turns`` reach."""
+"""Largest number of full turns, in either direction, in samples of kind ``turns``."""
 
 MAX_DIFFERENTIATED_POSITION = 2.0 * np.pi
 """Bound on the positions [rad or m] at which quantities are differentiated along a motion: the rounding of q
@@ -68,7 +68,7 @@ class Samples:
         return len(self.q)
 
     def take(self, chosen: list[int], references: int) -> Samples:
-        """Return some of the samples, with each frame in that many references at one sample each."""
+        """Return the `chosen` samples, with `references` references of each frame, each at one sample."""
         pick = np.array(chosen, dtype=np.intp)
         entries = assign_frames(self.model.frame_names, len(pick), each=1, references=references)
         return replace(
@@ -85,8 +85,8 @@ class Samples:
         )
 
     def differentiable(self, count: int) -> list[int]:
-        """Return the numbers of up to `count` samples near zero and in motion, to differentiate quantities
-        at."""
+        """Return the numbers of up to `count` samples at which quantities can be differentiated: positions
+        near zero, and in motion."""
         joints = self.q[:, 7 if self.model.floating else 0 :]
         near = np.max(np.abs(joints), axis=-1, initial=0.0) <= MAX_DIFFERENTIATED_POSITION
         near &= np.any(self.v != 0.0, axis=-1) & (np.array(self.kinds) != "limit")
@@ -103,7 +103,7 @@ def draw_samples(model: Model, count: int, seed: int) -> Samples:
     kinds = tuple(KINDS[k % len(KINDS)] for k in range(count))
     q = np.stack([_configuration(model, kind, rng) for kind in kinds])
     v, a, other_a = (rng.uniform(-2.0, 2.0, (count, model.nv)) for _ in range(3))
-    # One sample at rest: there dry friction and every velocity product must vanish.
+    # One sample is at rest, where Coulomb friction and every velocity product must vanish.
     if count >= len(KINDS):
         v[KINDS.index("straight")] = 0.0
     with ReferenceBackend(model) as reference:
@@ -133,9 +133,9 @@ def draw_samples(model: Model, count: int, seed: int) -> Samples:
 def assign_frames(
     frames: tuple[str, ...], count: int, *, each: int, references: int
 ) -> tuple[FrameSamples, ...]:
-    """Assign samples to frames in turn: `references` references of each frame, `each` samples of those.
+    """Assign samples to frames in turn: `references` references of each frame, and `each` samples to each.
 
-    Successive entries take successive samples, so that together they have all of them.
+    Successive entries take successive samples, so that together they cover all samples.
     """
     names = tuple(REFERENCES)
     entries, turn = [], 0
@@ -154,8 +154,8 @@ def _carried_frames(model: Model) -> list[str]:
 
 
 def _narrowed(lower: Floats, upper: Floats) -> tuple[Floats, Floats]:
-    """Return the limits narrowed to positions that are differentiated, where possible; files may have limits
-    of 1e16."""
+    """Return the limits, narrowed where possible to positions at which quantities can be differentiated;
+    files may have limits of 1e16."""
     bound = MAX_DIFFERENTIATED_POSITION
     low, high = np.maximum(lower, -bound), np.minimum(upper, bound)
     room = low <= high

@@ -1,7 +1,7 @@
 """Quantities that solve equations: the solution of each engine is verified by the other engine.
 
-Two accelerations, or two configurations that reach one target, may differ while both are right. The other
-engine must find that the equation is solved.
+Two accelerations, or two configurations that reach one target, may differ while both are right. So each
+engine checks that the other's solution satisfies the equation.
 """
 
 from __future__ import annotations
@@ -31,15 +31,15 @@ from dynx.spatial.scalar import Array, Floats
 from dynx.spatial.se3 import pose_error
 
 TARGETS = 2
-"""Targets of inverse kinematics; each costs hundreds of evaluations."""
+"""Number of targets of inverse kinematics, small because each takes hundreds of evaluations."""
 
 
 def regular_samples(magnitudes: Magnitudes) -> list[int]:
-    """Return the numbers of the samples whose mass matrix is positive definite to double precision; 0 if none
-    is.
+    """Return the indices of the samples whose mass matrix is positive definite to double precision, or [0] if
+    there is none.
 
-    Where it is singular (stretched wrists of point masses) no unique acceleration exists, and rounding
-    decides whether an engine detects that.
+    Where it is singular (a stretched wrist whose links are point masses) no unique acceleration exists, and
+    rounding decides whether an engine detects that.
     """
     least = tolerances.singular(magnitudes.samples.model.nv)
     return np.flatnonzero(magnitudes.lowest_eigenvalue > least).tolist() or [0]
@@ -110,8 +110,8 @@ def compare_inverse_kinematics(
 ) -> Comparison:
     """Compare the poses of the second engine at the first one's solutions with the targets, and vice versa.
 
-    Targets are poses of the deepest frame within limits, and searches start nearby. A search that reports
-    no success is no disagreement; the note counts them.
+    Targets are poses of the deepest frame within limits, and searches start nearby. A search that does not
+    reach its target is not a disagreement; the note counts such searches.
     """
     name, samples, frame = "inverse_kinematics", first.samples, deepest_frame(first.samples.model)
     tolerance = tolerances.target_distance(magnitudes.depth, float(np.max(magnitudes.length)))
@@ -156,14 +156,15 @@ def _poses(backend: Any, samples: Samples, *, q: Array, frame: str) -> Array:
 
 
 def deepest_frame(model: Model) -> str:
-    """Return the frame that the most moving joints carry; the first of them."""
+    """Return the first of the frames with the most moving joints between them and the root."""
     mechanism = model.mechanism
     depths = [len(ancestry(mechanism, frame.body)) for frame in mechanism.frames]
     return model.frame_names[int(np.argmax(depths))]
 
 
 def _targets(samples: Samples) -> tuple[Floats, Floats]:
-    """Return the configurations within limits, and starting points some tenths of a radian away from them."""
+    """Return target configurations within limits, and starting points some tenths of a radian away from
+    them."""
     model = samples.model
     q = samples.q[:TARGETS]
     q_target = model.clip(q)

@@ -22,11 +22,12 @@ class Suspect:
 def find_suspects(
     quantities: Sequence[Comparison], identities: Sequence[IdentityCheck], backends: Sequence[str]
 ) -> tuple[Suspect, ...]:
-    """Name, for each quantity whose results differ, the backends with the strongest evidence against them.
+    """Find, for each quantity whose results differ, the backends with the strongest evidence against them.
 
-    The strongest evidence is an error against the 50-digit referee; then that a backend differs from all
-    others while they agree; then that it differs from its own derivation or breaks an identity of
-    mechanics. Without any evidence all backends that differ are named.
+    The strongest evidence is an error against the 50-digit referee. Next comes a backend that differs from
+    all others while they agree, then one that differs from what is derived from its own poses and inverse
+    dynamics, or that breaks an identity of mechanics. Without any evidence all backends that differ are
+    named.
     """
     suspects = []
     for quantity in dict.fromkeys(comparison.quantity for comparison in quantities):
@@ -58,7 +59,8 @@ def _evidence(
 ) -> tuple[int, list[str]]:
     """Return the weight of the evidence against a backend in one quantity, and its sentences.
 
-    The weight is 3 with the referee against it, 2 with all others, 1 with its own results, 0 without any.
+    The weight is 3 if it differs from the referee, 2 if from all other backends, 1 if from what is derived
+    from its own results, 0 without evidence.
     """
     weight, reasons = 0, []
     against = [c for c in rows if name in c.names and not c.agree]

@@ -12,7 +12,7 @@ from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import quat_exp, quat_product, rotate, rotation_from_quat, rpy_from_rotation
 
 ROTATION_VECTOR = (0.7, -1.1, 0.4)
-"""Rotation of the world [rad], about an oblique axis so that exchanged axes show."""
+"""Rotation of the world [rad], about an oblique axis, so that exchanged axes show."""
 
 
 def rotate_world(model: Model) -> tuple[Model, Callable[[Floats], Floats]]:

@@ -21,12 +21,12 @@ long arm has the rounding errors of the arm's acceleration, so its relative erro
 torque by the ratio of its distance from the arm's axis to its radius of gyration."""
 
 ROUNDINGS = 32
-"""Rounding errors, in units of the roundoff, that one joint adds: a rotation (three products and two sums an
-entry) applied to motions outward and to wrenches inward, the rounding of sine and cosine, and the merging of
-fixed joints, each once in either engine."""
+"""Rounding errors that one joint adds, in units of the roundoff. They come from a rotation (three products
+and two sums per entry) applied to twists outward and to wrenches inward, from sine and cosine, and from the
+merging of fixed joints, in each of the two compared engines."""
 
 FIXED_JOINTS = 4
-"""Number of joints that the rounding errors of base pose, frame offset and inertia count as."""
+"""Number of joints whose rounding errors equal those of base pose, frame offset and inertia."""
 
 STEP = 1.0 / 16.0
 """Step of a numerical derivative times the highest angular frequency in the function (see
@@ -36,10 +36,11 @@ ORDER = 8
 """Order of the central difference."""
 
 TRUNCATION = 1.0 / 630.0
-"""The difference of order 8 misses h^8 f^(9) / 630 (Fornberg 1988, table 1)."""
+"""Truncation error of the central difference of order 8, in units of h^8 f^(9) (Fornberg 1988, table 1)."""
 
 CANCELLATION = 2.1
-"""Sum of the absolute weights of that difference: the factor on a rounding error, over h."""
+"""Sum of the absolute weights of that difference: rounding errors of the function are multiplied by it and
+divided by h."""
 
 TARGET_TOLERANCE = 1e-6
 """Distance [m, rad] within which a target is reached, the default of `dynx.ik`."""
@@ -59,8 +60,8 @@ def solving() -> float:
     """Return the bound on the backward error of solving for accelerations.
 
     Solving with the mass matrix would cost order nv roundoffs (Higham 2002, theorem 10.4), but the
-    articulated-body algorithm is not backward stable in the ratio of the masses: on a root link of
-    1e-4 kg it loses three digits. So this is the promised bound itself.
+    articulated-body algorithm is not backward stable in the ratio of the masses: with a root link of 1e-4 kg
+    it loses three digits. The tolerance is therefore the promised bound.
     """
     return BAR
 

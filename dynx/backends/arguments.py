@@ -32,7 +32,7 @@ _FLOAT64 = np.dtype(np.float64)
 
 
 class Arguments:
-    """The checks of one model's arguments, which also raise ClosedError once the backend is closed."""
+    """Checks of the arguments of one model's backend, which raise ClosedError once the backend is closed."""
 
     def __init__(self, model: Model) -> None:
         self.closed = False
@@ -41,8 +41,9 @@ class Arguments:
         self._q_shape = (model.nq,)
         self._v_shape = (model.nv,)
 
-    # The norm of a vector is below a bound only if every entry is, and none is NaN: one C loop
-    # over a list, several times faster than NumPy at this size. Otherwise every entry is checked.
+    # The norm of a vector is below a bound only if every entry is, and no entry is NaN. One C loop over a
+    # list computes it several times faster than NumPy at this size. If the norm is too large, every entry is
+    # checked.
 
     def q(self, q: Any) -> Floats:
         """Return a configuration (..., nq), finite, with a unit quaternion for a floating base."""
@@ -70,7 +71,7 @@ class Arguments:
         return checked_array(name, v, self._v_shape[0])
 
     def reference(self, reference: str) -> Reference:
-        """Return one of the three references, or an error that lists them."""
+        """Return one of the three references; raise an error that lists them for any other."""
         try:
             return REFERENCES[reference]
         except (KeyError, TypeError):
@@ -87,7 +88,7 @@ class Arguments:
         )
 
     def wrenches(self, forces: object) -> dict[str, Floats]:
-        """Return the wrenches (..., 6) by the frame they act on."""
+        """Return the wrenches (..., 6) by the name of the frame on which each acts."""
         if not isinstance(forces, Mapping):
             raise ArgumentError(
                 f"external_forces is of type {type(forces).__name__}; "

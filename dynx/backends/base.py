@@ -1,8 +1,8 @@
 """The interface of every backend, written out: one method for each quantity of the table.
 
-The four calls that control loops make thousands of times a second (forward kinematics of one frame,
-Jacobian, inverse dynamics, mass matrix) go to the engine's hook in a straight line when there is one
-sample and no mimic joint. All others go through `QuantityCalls`.
+The four calls that control loops make thousands of times a second (forward kinematics of one frame, Jacobian,
+inverse dynamics, mass matrix) call the engine's hook directly when there is one sample and the model has no
+mimic joint. All other calls go through `QuantityCalls`.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from dynx.spatial.scalar import Floats
 
 
 class Backend(QuantityCalls):
-    """A robot in one engine: the same methods, conventions and results whichever engine computes them.
+    """A robot in one engine, with the same methods, conventions and results for every engine.
 
     Arrays are float64 and take leading batch axes, which broadcast: q (..., nq), v, a, tau
     (..., nv). One sample in, one sample out. SI units. Poses are T_world_frame (..., 4, 4).
@@ -35,23 +35,23 @@ class Backend(QuantityCalls):
     `point` (3,) [m], in the frame's axes, moves the origin of the first two.
 
     `joint_dynamics=True` adds the armature, viscous damping and Coulomb friction of the joints, which every
-    backend computes alike: ``armature * a + damping * v + friction * sign(v)`` to the torque, armature to
-    the diagonal of the mass matrix. The default is the rigid bodies alone.
+    backend computes alike: ``armature * a + damping * v + friction * sign(v)`` to the torque, armature to the
+    diagonal of the mass matrix. By default only the rigid bodies count.
 
-    `external_forces` maps frame names to wrenches (..., 6), force [N] then moment [N m], that act
-    on the robot, expressed at and in `force_reference` as a Jacobian is.
+    `external_forces` maps frame names to wrenches (..., 6), force [N] then moment [N m], that act on the
+    robot; `force_reference` names their point and axes as `reference` does for a Jacobian.
 
-    Torques are generalised forces: [N m] of a joint that turns, [N] of one that slides, and the force and
-    the moment at the base frame's origin, in its axes, for a floating base. `dynx.backends.quantities` is
-    the table of all quantities.
+    Torques are generalised forces: [N m] for a revolute joint, [N] for a prismatic one, and for a floating
+    base the force and the moment at the base frame's origin, in its axes. `dynx.backends.quantities` is the
+    table of all quantities.
 
-    A batch is a Python loop over the engine's calls unless the class is `vectorized`; in the backend
-    ``reference`` NumPy evaluates it whole. The backend ``compiled`` gives the same numbers for batches, to
-    rounding, on UR5 at least about 60 times as fast (to one significant figure, ``dynx bench ur5 --batch
-    65536 --threads 1``; docs/bench.md recommends a backend for each use).
+    A batch is a Python loop over the engine's calls unless the class is `vectorized`; NumPy evaluates a batch
+    of the backend ``reference`` at once. The backend ``compiled`` gives the same numbers to rounding, and
+    evaluates a batch for UR5 at least about 60 times as fast (``dynx bench ur5 --batch 65536 --threads 1``;
+    docs/bench.md recommends a backend for each use).
 
-    Raises errors of `dynx.errors` only. With ``validate=False`` the arguments must be float64
-    arrays of the right shape and are not checked; a wrong one then gives an undefined result.
+    Raises errors of `dynx.errors` only. With ``validate=False`` arguments are not checked: they must be
+    float64 arrays of the right shape, and the result for any other is undefined.
     """
 
     # -- kinematics ---------------------------------------------------------------------------
@@ -65,7 +65,7 @@ class Backend(QuantityCalls):
         known: Any = self._arguments.q(q) if self._validate else q
         if isinstance(frame, str):
             index = self._index(frame)
-            if self._straight and known.ndim == 1:
+            if self._uncoupled and known.ndim == 1:
                 return self._frame_placement(known, index)
             return self._evaluation(self._frame_placement, (4, 4), known, args=(index,))
         placements = self._evaluation(self._frame_placements, (len(self._frame_index), 4, 4), known)
@@ -91,7 +91,7 @@ class Backend(QuantityCalls):
         known: Any = self._arguments.q(q) if self._validate else q
         axes: Any = self._arguments.reference(reference) if self._validate else reference
         index = self._index(frame)
-        if self._straight and point is None and known.ndim == 1:
+        if self._uncoupled and point is None and known.ndim == 1:
             return self._jacobian(known, index, axes)
         J = self._evaluate("jacobian", known, details=(index, axes))
         return J if point is None else self._at_point(J, None, known, None, frame, axes, point)
@@ -149,10 +149,10 @@ class Backend(QuantityCalls):
     ) -> Floats:
         """Return J a + dJ/dt v (..., 6) [m/s^2, rad/s^2], the time derivative of `frame_velocity`.
 
-        In ``local_world_aligned`` that is the classical acceleration of the frame's origin; in
-        ``local`` and ``world`` the spatial acceleration (Featherstone 2008, section 2.11). Gravity has no
-        part in it. Elsewhere: Pinocchio `getFrameClassicalAcceleration`, Drake
-        `CalcSpatialAccelerationInWorld`, MuJoCo `mj_objectAcceleration` (which adds gravity).
+        In ``local_world_aligned`` that is the classical acceleration of the frame's origin; in ``local`` and
+        ``world`` the spatial acceleration (Featherstone 2008, section 2.11). Gravity is not included.
+        Elsewhere: Pinocchio `getFrameClassicalAcceleration`, Drake `CalcSpatialAccelerationInWorld`, MuJoCo
+        `mj_objectAcceleration` (which adds gravity).
         """
         q, v, axes = self._checked_q(q), self._checked_v(v), self._checked_reference(reference)
         a = self._checked_v(a, "a")
@@ -189,14 +189,18 @@ class Backend(QuantityCalls):
         known: Any = self._arguments.q(q) if self._validate else q
         velocity: Any = self._arguments.v(v) if self._validate else v
         acceleration: Any = self._arguments.v(a, "a") if self._validate else a
-        if self._straight and known.ndim == 1 and velocity.ndim == 1 and acceleration.ndim == 1:
+        if self._uncoupled and known.ndim == 1 and velocity.ndim == 1 and acceleration.ndim == 1:
             tau = self._inverse_dynamics(known, velocity, acceleration)
         else:
             tau = self._evaluate("inverse_dynamics", known, velocity, acceleration)
         if external_forces is not None:
             tau = tau - self._force_torque(known, tau, external_forces, force_reference)
         if joint_dynamics:
-            tau = tau + self._joint_terms.losses(velocity) + self._joint_terms.rotor_torque(acceleration)
+            tau = (
+                tau
+                + self._joint_terms.friction_torque(velocity)
+                + self._joint_terms.armature_torque(acceleration)
+            )
         return tau
 
     def forward_dynamics(
@@ -211,7 +215,7 @@ class Backend(QuantityCalls):
     ) -> Floats:
         """Return the acceleration a (..., nv) [rad/s^2] that `tau` and the external forces give.
 
-        Raises SingularMassMatrixError, which names the joints, where a joint moves no inertia.
+        Raises SingularMassMatrixError, which names the joints, if nothing that a joint moves has inertia.
 
         Featherstone 2008, section 7.3. Elsewhere: Pinocchio `aba`, Drake
         `get_generalized_acceleration_output_port`, MuJoCo `mj_forward`.
@@ -223,8 +227,8 @@ class Backend(QuantityCalls):
         if external_forces is not None:
             tau = tau + self._force_torque(q, tau, external_forces, force_reference)
         if joint_dynamics:
-            tau = tau - self._joint_terms.losses(v)
-        if self._straight and not (joint_dynamics and self._joint_terms.has_rotors):
+            tau = tau - self._joint_terms.friction_torque(v)
+        if self._uncoupled and not (joint_dynamics and self._joint_terms.has_armature):
             a = self._evaluate("forward_dynamics", q, v, tau)
         else:
             M = self.mass_matrix(q, joint_dynamics=joint_dynamics)
@@ -238,11 +242,11 @@ class Backend(QuantityCalls):
         `mj_fullM`, PyBullet `calculateMassMatrix`.
         """
         known: Any = self._arguments.q(q) if self._validate else q
-        if self._straight and known.ndim == 1:
+        if self._uncoupled and known.ndim == 1:
             M = self._mass_matrix(known)
         else:
             M = self._evaluate("mass_matrix", known)
-        return M + self._joint_terms.rotors if joint_dynamics else M
+        return M + self._joint_terms.armature if joint_dynamics else M
 
     def bias_torque(
         self,
@@ -255,14 +259,14 @@ class Backend(QuantityCalls):
     ) -> Floats:
         """Return C v + g (..., nv) [N m]: `inverse_dynamics` at zero acceleration.
 
-        Siciliano et al., section 7.1.3. Elsewhere: Pinocchio `nonLinearEffects`, MuJoCo `qfrc_bias`,
-        Drake `CalcBiasTerm` less `CalcGravityGeneralizedForces`.
+        Siciliano et al., section 7.1.3. Elsewhere: Pinocchio `nonLinearEffects`, MuJoCo `qfrc_bias`, Drake
+        `CalcBiasTerm` minus `CalcGravityGeneralizedForces`.
         """
         q, v = self._checked_q(q), self._checked_v(v)
         tau = self._evaluate("bias_torque", q, v)
         if external_forces is not None:
             tau = tau - self._force_torque(q, tau, external_forces, force_reference)
-        return tau + self._joint_terms.losses(v) if joint_dynamics else tau
+        return tau + self._joint_terms.friction_torque(v) if joint_dynamics else tau
 
     def gravity_torque(self, q: ArrayLike) -> Floats:
         """Return g (..., nv) [N m]: `inverse_dynamics` at rest, the gradient of the potential energy.
@@ -284,10 +288,10 @@ class Backend(QuantityCalls):
         """Return Y (..., nv, 10 n_links) [m/s^2, m^2/s^2, 1/s^2]: inverse dynamics is Y pi.
 
         pi holds the ten inertial parameters of each link of `model.links`, in order and about the origin of
-        the link's frame in its axes: m [kg], m cx, m cy, m cz [kg m], Ixx, Ixy, Ixz, Iyy, Iyz, Izz
-        [kg m^2] (`dynx.inertial_parameters` gives the model's own). Links that no coordinate moves have
-        zeros. Atkeson, An and Hollerbach 1986. Elsewhere: Pinocchio `computeJointTorqueRegressor`, which
-        orders the tensor otherwise.
+        the link's frame in its axes: m [kg], m cx, m cy, m cz [kg m], Ixx, Ixy, Ixz, Iyy, Iyz, Izz [kg m^2]
+        (`dynx.inertial_parameters` gives the model's own). The columns of links that no coordinate moves are
+        zero. Atkeson, An and Hollerbach 1986. Elsewhere: Pinocchio `computeJointTorqueRegressor`, which
+        orders the entries of the tensor differently.
         """
         q, v, a = self._checked_q(q), self._checked_v(v), self._checked_v(a, "a")
         return self._evaluate("inertial_regressor", q, v, a)
@@ -329,11 +333,11 @@ class Backend(QuantityCalls):
         q, v = self._checked_q(q), self._checked_v(v)
         energy = self._evaluate("kinetic_energy", q, v)
         if joint_dynamics:
-            energy = energy + 0.5 * np.sum(v * self._joint_terms.rotor_torque(v), axis=-1)
+            energy = energy + 0.5 * np.sum(v * self._joint_terms.armature_torque(v), axis=-1)
         return energy
 
     def potential_energy(self, q: ArrayLike) -> Floats:
-        """Return the energy in the field of gravity (...,) [J], zero with the mass at the world's origin.
+        """Return the energy in the field of gravity (...,) [J], which is zero for mass at the world's origin.
 
         Siciliano et al., section 7.1.2. Elsewhere: Pinocchio `computePotentialEnergy`, Drake
         `CalcPotentialEnergy`, MuJoCo `mj_energyPos`.
@@ -343,7 +347,8 @@ class Backend(QuantityCalls):
     # -- terms that every engine shares -------------------------------------------------------
 
     def _force_torque(self, q: Any, tau: Any, forces: Forces, reference: str) -> Floats:
-        """Return J' w summed over the frames that a wrench w acts on, which broadcasts with `tau`."""
+        """Return the sum of J' w over the wrenches w and the frames on which they act; wrenches broadcast
+        with `tau`."""
         wrenches = self._arguments.wrenches(forces)
         common_batch(tau, q, *wrenches.values())
         total: Any = 0.0

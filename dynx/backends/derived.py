@@ -16,16 +16,17 @@ from dynx.spatial.scalar import Floats
 
 
 class DerivedBackend(Backend):
-    """`inner` reduced to its frame placements and its inverse dynamics; all else is derived.
+    """View of the backend `inner` that uses only its frame placements and inverse dynamics; all else is
+    derived.
 
-    Its name is that of `inner` with ``/derived``. It borrows `inner`: closing the view leaves the
-    backend open, and a view of a closed backend refuses as that backend does.
+    Its name is that of `inner` with ``/derived``. Closing this view leaves `inner` open; once `inner` is
+    closed, the view raises ClosedError as `inner` does.
     """
 
     name: ClassVar[str] = "derived"
 
     def __init__(self, inner: Backend, *, validate: bool = True) -> None:
-        # Class attributes of other backends; here they depend on `inner`.
+        # Other backends have these as class attributes; here they depend on `inner`.
         vars(self).update(name=f"{inner.name}/derived", vectorized=inner.vectorized)
         super().__init__(inner.model, validate=validate)
         self.inner = inner

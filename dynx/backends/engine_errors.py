@@ -1,4 +1,4 @@
-"""The exceptions of a foreign engine as errors of dynx, for the hooks of its backend."""
+"""Translation of a foreign engine's exceptions into errors of dynx, for the hooks of its backend."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def engine_errors(
 ) -> Callable[[Hook], Hook]:
     """Make a decorator of hooks that turns `failures` into EngineError with the engine's `message`.
 
-    A backend that another thread closes during a call may fail in any way, which raises ClosedError.
+    If another thread closed the backend during the call, any failure raises ClosedError.
     """
 
     def decorate(hook: Hook) -> Hook:

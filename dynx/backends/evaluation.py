@@ -1,8 +1,8 @@
 """Evaluation of an engine's hook at samples with any leading axes, reduced by mimic joints.
 
-Mimic joints are a linear map v_tree = S v (`dynx.model.mechanism.Coupling`). By virtual work, torques
-are mapped back by S', Jacobians and matrices by S. So every engine gives the reduced dynamics although it
-only models the tree without mimic joints.
+Mimic joints are a linear map v_tree = S v (`dynx.model.mechanism.Coupling`). By virtual work, torques are
+mapped back by S', Jacobians and matrices by S. So every engine gives the reduced dynamics, although its own
+model has all moving joints and no mimic joints.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ Reduction = Callable[[Floats], Floats]
 
 
 class Evaluation:
-    """Evaluates hooks of an engine for one model, batch by batch."""
+    """Evaluator of an engine's hooks on batches of samples of one model."""
 
     def __init__(self, mechanism: Mechanism, *, vectorized: bool) -> None:
         self._vectorized = vectorized
@@ -37,7 +37,7 @@ class Evaluation:
         args: tuple[Any, ...] = (),
         reduce: Reduction | None = None,
     ) -> Floats:
-        """Return `hook(q, *velocities, *args)` for every sample of the broadcast batch.
+        """Evaluate `hook(q, *velocities, *args)` for every sample of the broadcast batch.
 
         q (..., nq) and velocities (..., nv) are in model coordinates, the hook's in tree
         coordinates. `tail` is the shape of one result in tree coordinates; `reduce` converts it.
@@ -54,7 +54,7 @@ class Evaluation:
         if self._vectorized or not batch:
             result = np.asarray(hook(*samples, *args))
             if result.shape != shape:
-                # A result that no coordinate moves may lack the batch axes.
+                # A result that depends on no coordinate may lack the batch axes.
                 result = np.array(np.broadcast_to(result, shape))
         else:
             result = self._one_by_one(hook, shape, samples, args)
@@ -86,7 +86,7 @@ class Evaluation:
 
 
 def common_batch(q: Floats, *others: Floats) -> tuple[int, ...]:
-    """Return the leading axes that the arguments broadcast to, or a ShapeError."""
+    """Return the leading axes to which the arguments broadcast. Raises ShapeError if they do not."""
     batch = q.shape[:-1]
     if all(other.shape[:-1] == batch for other in others):
         return batch
@@ -98,8 +98,8 @@ def common_batch(q: Floats, *others: Floats) -> tuple[int, ...]:
 
 
 def batch_rows(array: Floats, batch: tuple[int, ...]) -> Floats:
-    """Return the rows (n, size) of an array (..., size) broadcast to a batch of n, as a view where there is
-    one."""
+    """Return the rows (n, size) of an array (..., size) broadcast to a batch of n, as a view where
+    possible."""
     if array.shape[:-1] == batch:
         return array.reshape(prod(batch), array.shape[-1])
     if array.ndim == 1:

@@ -1,13 +1,13 @@
 """The hooks of an engine, and the derivation of every quantity that the engine does not compute itself.
 
-A backend implements two hooks, the placements of all frames and inverse dynamics; every other quantity
-is derived from those two: by a method here or, for a quantity without one, by its algorithm at the poses
-of the bodies, which are read off the placements. A hook that a backend defines under the name of
+A backend implements two hooks, the placements of all frames and inverse dynamics; every other quantity is
+derived from those two: by a method here or, for a quantity without one, by its algorithm evaluated at the
+poses of the bodies, which follow from the placements. A hook that a backend defines under the name of
 `Quantity.hook` replaces the derivation.
 
-Hooks work in tree coordinates (every moving joint, mimic joints included; see `dynx.model.mechanism`) and
-receive float64 arrays that were checked: one sample or, if `vectorized` is set, any leading batch axes.
-The caller may overwrite those arrays once the hook has returned, and may keep and change the result.
+Hooks work in tree coordinates (one for every moving joint, mimic joints included; see `dynx.model.mechanism`)
+and receive checked float64 arrays: one sample or, if `vectorized` is set, any leading batch axes. The caller
+may overwrite those arrays after the hook has returned, and may keep and change the result.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class EngineHooks(ABC):
         """Return the unchecked callable for `quantity` bound to the calling thread, or None if the engine has
         none.
 
-        For loops of one thread in which microseconds count. Exceptions of the engine are not translated.
+        It saves microseconds in loops of one thread. Exceptions of the engine are not translated.
         """
         return None
 
@@ -51,9 +51,9 @@ class EngineHooks(ABC):
         return getattr(cls, quantity.hook, None) is not derivation
 
     def _derive(self, quantity: Quantity | str, q: Floats, *rest: Any) -> Floats:
-        """Return the algorithm of a quantity, at the engine's own poses of the bodies if it takes poses.
+        """Evaluate the algorithm of a quantity, at the engine's own poses of the bodies if it takes poses.
 
-        `rest` is what the algorithm takes after q: the other arguments and the details.
+        `rest` has the arguments of the algorithm after q: velocities and the like, then the details.
         """
         known = QUANTITIES[quantity] if isinstance(quantity, str) else quantity
         first = self._body_poses(q) if known.takes_poses else q
@@ -126,16 +126,16 @@ class EngineHooks(ABC):
         return np.asarray(0.5 * np.sum(v * apply_matrix(self._mass_matrix(q), v), axis=-1))
 
     def _body_poses(self, q: Floats) -> kinematics.Poses:
-        """Return the poses of the root and of each moving body, read off the engine's own frame
+        """Return the poses of the root and of each moving body, from the engine's own frame
         placements."""
         return kinematics.poses_from_frames(self._mechanism, self._frame_placements(q))
 
 
 def solve_mass_matrix(M: Floats, torque: Floats) -> Floats:
-    """Return a with M a = torque; raises SingularMassMatrixError where M is singular to double precision.
+    """Solve M a = torque for a. Raises SingularMassMatrixError where M is singular to double precision.
 
-    M is scaled to a unit diagonal first. It may be indefinite: the inertias of a file are used as
-    they stand, and a unique acceleration then exists all the same.
+    M is scaled to a unit diagonal first. It may be indefinite, because the inertias of a file are used as
+    they are; a unique acceleration still exists then.
     """
     diagonal = np.abs(np.diagonal(M, axis1=-2, axis2=-1))
     size = np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
@@ -145,10 +145,10 @@ def solve_mass_matrix(M: Floats, torque: Floats) -> Floats:
         if np.all(smallest > M.shape[-1] * np.finfo(np.float64).eps):
             return np.asarray(np.linalg.solve(scaled, (torque / size)[..., None])[..., 0] / size)
     except np.linalg.LinAlgError:
-        pass  # NaN or infinity in M: no acceleration either.
+        pass  # NaN or infinity in M also means that there is no acceleration.
     raise SingularMassMatrixError("the mass matrix is singular: no unique acceleration exists")
 
 
 def apply_matrix(matrix: Floats, vector: ArrayLike) -> Floats:
-    """Return A x over batch axes, for A (..., m, n) and x (..., n)."""
+    """Return the products A x over batch axes, for A (..., m, n) and x (..., n)."""
     return np.asarray((matrix @ np.asarray(vector)[..., None])[..., 0])

@@ -25,14 +25,14 @@ class JointDynamicsTerms:
         armature = np.array(base + [d.armature for d in moving])
         coupling = model.mechanism.coupling
         self._S = np.eye(len(armature)) if coupling is None else coupling.matrix()
-        self.rotors: Floats = self._S.T @ np.diag(armature) @ self._S
-        self.has_rotors = bool(np.any(armature != 0.0))
+        self.armature: Floats = self._S.T @ np.diag(armature) @ self._S
+        self.has_armature = bool(np.any(armature != 0.0))
 
-    def losses(self, v: Any) -> Floats:
+    def friction_torque(self, v: Any) -> Floats:
         """Return the torque (..., nv) of damping and Coulomb friction at velocity v (..., nv)."""
         tree = np.asarray(v) @ self._S.T
         return np.asarray((self._damping * tree + self._friction * np.sign(tree)) @ self._S)
 
-    def rotor_torque(self, a: Any) -> Floats:
-        """Return the torque (..., nv) that accelerates the rotors by a (..., nv)."""
-        return np.asarray(np.asarray(a) @ self.rotors)
+    def armature_torque(self, a: Any) -> Floats:
+        """Return the torque (..., nv) of the armature at acceleration a (..., nv)."""
+        return np.asarray(np.asarray(a) @ self.armature)

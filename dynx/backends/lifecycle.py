@@ -12,9 +12,9 @@ Self = TypeVar("Self", bound="Lifecycle")
 
 
 class Lifecycle:
-    """Opened by its constructor, closed by `close` or the end of a ``with``; pickled by its recipe.
+    """Base of backends that the constructor opens, and `close` or the end of a ``with`` block closes.
 
-    A pickle holds the model and the options, not the engine: the copy makes an engine of its own.
+    A pickle holds the model and the options but not the engine; the unpickled copy creates its own engine.
     """
 
     name: ClassVar[str]
@@ -32,7 +32,7 @@ class Lifecycle:
         self.model = model
         self._arguments = arguments
         self._options: dict[str, Any] = {"validate": validate}
-        # True also once the backend is closed, so that the checks raise ClosedError.
+        # `close` sets this to True, so that the checks run and raise ClosedError.
         self._validate = validate
 
     @property

@@ -1,8 +1,9 @@
 """The table of quantities: everything that dynx computes of a robot, each described once.
 
-The evaluation of calls (`dynx.backends.base`), the derivations (`dynx.backends.hooks`), the compiled
-kernels, the benchmark, the 50-digit referee, the comparison of `dynx agree` and the tests of the contract
-read this table. A test holds the methods of `Backend`, which are written out for their users, to it.
+This table is the source for the evaluation of calls (`dynx.backends.base`), the derivations
+(`dynx.backends.hooks`), the compiled kernels, the benchmark, the 50-digit referee, the comparison of `dynx
+agree` and the contract tests. The methods of `Backend` are written out for their users; a test compares them
+with the table.
 """
 
 from __future__ import annotations
@@ -23,15 +24,15 @@ Argument = Literal["q", "v", "a", "tau"]
 """q (..., nq) is a configuration; v, a and tau (..., nv) a velocity, an acceleration and a torque."""
 
 Growth = Literal["joints", "pairs", "cubic"]
-"""Operations of an algorithm grow with the number of joints, with the number of pairs of joints of which
-one carries the other, or with the number of bodies times nv squared."""
+"""Growth of the number of operations of an algorithm: with the number of joints; with the number of pairs of
+joints on one path to the root; or with the number of bodies times nv squared."""
 
 Extent = int | Literal["nv", "10 n_links", "n_frames"]
 """Length of an axis of a result: a number, nv, ten for every link of the model, or one for every frame."""
 
 
 def no_details(model: Model) -> tuple[Any, ...]:
-    """No further arguments."""
+    """Return no further arguments (see `Quantity.implied_details`)."""
     return ()
 
 
@@ -39,8 +40,8 @@ def no_details(model: Model) -> tuple[Any, ...]:
 class Quantity:
     """A quantity of a robot: a method of `Backend`, its result, and the algorithm that computes it.
 
-    Mimic joints reduce a result by virtual work: with v_tree = S v, an axis of length "nv" that comes
-    last is multiplied by S from the right, one before the last by S' from the left.
+    Mimic joints reduce a result by virtual work: with v_tree = S v, the last axis is multiplied by S from the
+    right if its length is "nv", and the axis before it by S' from the left.
     """
 
     name: str
@@ -53,13 +54,14 @@ class Quantity:
     """Shape of one sample's result."""
 
     unit: str
-    """Unit of the entries; where joints slide, m stands for rad."""
+    """Unit of the entries for revolute joints; for prismatic joints read m instead of rad."""
 
     algorithm: Algorithm
-    """Function of `dynx.rbd`: of the mechanism, the arguments in tree coordinates, and the details."""
+    """Function of `dynx.rbd`. Its arguments are the mechanism, the arrays in tree coordinates, and the
+    details: further arguments, such as the number of a frame."""
 
     natural_magnitude: str
-    """Name of the divisor of its errors in `dynx.agreement.natural_magnitudes`."""
+    """Name of the bound in `dynx.agreement.natural_magnitudes` by which errors are divided."""
 
     source: str
     """Book or paper with the equation."""
@@ -71,15 +73,16 @@ class Quantity:
     """Keyword options of the method."""
 
     of_frame: bool = False
-    """Whether the quantity belongs to a frame; the details are then its number and, if it is among the
-    options, the reference."""
+    """Whether the quantity belongs to a frame. The details are then the number of the frame and, if the
+    method has that option, the reference."""
 
     takes_poses: bool = True
     """Whether the algorithm takes the poses of the bodies (`dynx.rbd.kinematics.Poses`) in place of q."""
 
     solves: bool = False
-    """Whether the result solves an equation of motion with the mass matrix: in some states there is none,
-    and errors are backward errors. Mimic joints reduce the equation instead of the result."""
+    """Whether the result is the solution of an equation with the mass matrix. Where the mass matrix is
+    singular there is no result; errors are backward errors; and mimic joints reduce the equation instead of
+    the result."""
 
     growth: Growth = "joints"
     """Growth of the number of operations with the size of the robot."""
@@ -88,7 +91,7 @@ class Quantity:
     """Whether `dynx agree` compares it with 50 digits."""
 
     implied_details: Callable[[Model], tuple[Any, ...]] = no_details
-    """Details that follow from the model."""
+    """Function that returns the details that follow from the model."""
 
     @property
     def hook(self) -> str:
@@ -115,7 +118,7 @@ class Quantity:
         return tuple(n if isinstance(n, int) else extents[n] for n in self.shape)
 
     def evaluate(self, mechanism: Mechanism, q: Array, *rest: Any) -> Array:
-        """Return the algorithm at the tree configuration q (..., nq), with the other arguments and
+        """Evaluate the algorithm at the configuration q (..., nq) of the tree, with the other arguments and
         details."""
         first = kinematics.body_poses(mechanism, q) if self.takes_poses else q
         return np.asarray(self.algorithm(mechanism, first, *rest))

@@ -1,4 +1,4 @@
-"""From a call in model coordinates to the engine's hook of a quantity, as its table entry describes it."""
+"""Evaluation of a call in model coordinates by the engine's hook, as the table of quantities describes it."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Forces = Mapping[str, ArrayLike]
 
 
 class _Plan(NamedTuple):
-    """Parts of the table's row that one backend needs to evaluate a quantity."""
+    """The entry of a quantity in the table, prepared for one backend."""
 
     hook: str
     tail: tuple[int, ...]
@@ -32,20 +32,21 @@ class _Plan(NamedTuple):
 
 
 class QuantityCalls(Lifecycle, EngineHooks):
-    """Checks of arguments, evaluation of quantities, and the terms that are the same for every engine."""
+    """Base of backends: checks of arguments, evaluation of quantities, and the terms shared by all
+    engines."""
 
     def __init__(self, model: Model, *, validate: bool = True) -> None:
         super().__init__(model, Arguments(model), validate=validate)
         self._mechanism = model.mechanism
         self._evaluation = Evaluation(self._mechanism, vectorized=self.vectorized)
-        self._straight = self._mechanism.coupling is None
+        self._uncoupled = self._mechanism.coupling is None
         self._joint_terms = JointDynamicsTerms(model)
         self._solvability = Solvability(model)
         self._frame_index = {name: index for index, name in enumerate(model.frame_names)}
         self._plans: dict[str, _Plan] = {}
 
     def _evaluate(self, name: str, q: Floats, *rates: Floats, details: tuple[Any, ...] = ()) -> Floats:
-        """Return the quantity `name` at checked arguments with any leading axes, in model coordinates.
+        """Evaluate the quantity `name` at checked arguments with any leading axes, in model coordinates.
 
         `details` are the frame and the reference of a quantity of a frame.
         """

@@ -1,7 +1,7 @@
 """Backends by name: those of dynx, of the running program, and of installed packages (`dynx.registry`).
 
-A package offers its backend by an entry point in the group ``dynx.backends``. Engines are imported when a
-backend of theirs is first used, never to list names.
+A package offers its backend by an entry point in the group ``dynx.backends``. An engine is imported when its
+backend is first used; listing names imports none.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ def backend(name: str, model: Model, **options: Any) -> Backend:
 
 
 def backend_class(name: str) -> type[Backend]:
-    """Return the class behind a name; this imports its engine."""
+    """Return the backend class of a name; this imports its engine."""
     return _backends.find(name)
 
 

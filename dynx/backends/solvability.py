@@ -1,7 +1,7 @@
-"""Detection of robots whose mass matrix is singular at every configuration, and of the joints to blame.
+"""Detection of robots whose mass matrix is singular at every configuration, and of the joints that cause it.
 
-A joint that moves no inertia makes it singular. Engines then return NaN, zero or garbage; every backend of
-dynx raises the same error.
+A joint makes it singular if nothing that it moves has inertia. Engines then return NaN, zero or garbage;
+every backend of dynx raises the same error.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def singular_coordinates(model: Model, joint_dynamics: bool = False) -> tuple[st
         S = coupling.matrix()
         M = S.T @ M @ S
     if joint_dynamics:
-        M = M + JointDynamicsTerms(model).rotors
+        M = M + JointDynamicsTerms(model).armature
     always = set.intersection(*(set(_null_coordinates(each)) for each in M))
     base = 6 if model.floating else 0
     names = ["base" if k < base else model.joint_names[k - base] for k in sorted(always)]

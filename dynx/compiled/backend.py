@@ -66,7 +66,7 @@ class CompiledBackend(Backend):
         self._arguments = BatchArguments(model)
         self._simplified = simplify_mechanism(self._mechanism)
         self._all_frames = tuple(range(len(self._frame_index)))
-        self._eliminates = self._straight or has_physical_inertias(self._mechanism)
+        self._eliminates = self._uncoupled or has_physical_inertias(self._mechanism)
         self._calls: dict[object, Call] = {}
         self._chain_kernels: dict[object, Kernel] = {}
         # The calls again, by the arguments of the public methods, which saves looking up names.
@@ -189,7 +189,7 @@ class CompiledBackend(Backend):
             call = self._call_by_name("mass_matrix")
         M = call(q, out=out)
         if joint_dynamics:
-            M += self._joint_terms.rotors
+            M += self._joint_terms.armature
         return M
 
     # -- kernels ------------------------------------------------------------------------------
@@ -213,7 +213,7 @@ class CompiledBackend(Backend):
 
     def _call_for(self, quantity: str, details: tuple[Any, ...] = (), *, tree: bool = False) -> Call:
         """Return the call of a quantity, whose kernel is compiled the first time."""
-        tree = tree and not self._straight
+        tree = tree and not self._uncoupled
         key = (quantity, details, tree)
         call = self._calls.get(key)
         if call is None:

@@ -105,15 +105,15 @@ class ParametricDynamics:
         return self._evaluate("mass_matrix", _mass_matrix, [self._arguments.q(q)], parameters)
 
     def acceleration(
-        self, parameters: Array, q: Array, v: Array, tau: Array, rotors: Array | None = None
+        self, parameters: Array, q: Array, v: Array, tau: Array, armature: Array | None = None
     ) -> Array:
         """Return the acceleration (nv,) of one sample, for arrays of symbols in a trace.
 
-        `rotors` (nv,) is the armature, added to the diagonal of the mass matrix.
+        `armature` (nv,) is the armature, added to the diagonal of the mass matrix.
         """
         known = self._selection.read(parameters)
         mechanism = simplify_mechanism(self._selection.remainder())
-        return _forward_dynamics(known.added_to(mechanism), known.joints, q, v, tau, rotors)
+        return _forward_dynamics(known.added_to(mechanism), known.joints, q, v, tau, armature)
 
     def root(self, parameters: Array) -> RigidInertia:
         """Return the inertia of the root with what is fixed to it, for an array of symbols."""
@@ -186,11 +186,11 @@ def _forward_dynamics(
     q: Array,
     v: Array,
     tau: Array,
-    rotors: Array | None = None,
+    armature: Array | None = None,
 ) -> Array:
     bias = _inverse_dynamics(mechanism, joints, q, v, np.zeros(len(v)))
     M = _mass_matrix(mechanism, joints, q)
-    L, D = factorize_mass_matrix(mechanism, M if rotors is None else M + np.diag(rotors))
+    L, D = factorize_mass_matrix(mechanism, M if armature is None else M + np.diag(armature))
     return solve_with_factors(L, D, tau - bias)
 
 

@@ -79,15 +79,16 @@ class JointFriction:
 
     def __call__(self, v: Array) -> Array:
         """Return the torque (..., nv) of friction at velocity `v` (..., nv), arrays of any scalar."""
-        return self.lost(v, self.damping, self.friction)
+        return self.torque_for(v, self.damping, self.friction)
 
-    def lost(self, v: Array, damping: Array, friction: Array) -> Array:
-        """Return the torque (..., nv) that other coefficients, of the shape of this one's, take."""
+    def torque_for(self, v: Array, damping: Array, friction: Array) -> Array:
+        """Return the torque (..., nv) of friction with other coefficients, of the same shapes as those
+        here."""
         speed = v if self.to_tree is None else v @ self.to_tree.T
-        lost = damping * speed
+        torque = damping * speed
         if self._dry:
-            lost = lost + friction * (tanh(speed / self.slip) if self.slip else sign(speed))
-        return np.asarray(lost if self.to_tree is None else lost @ self.to_tree)
+            torque = torque + friction * (tanh(speed / self.slip) if self.slip else sign(speed))
+        return np.asarray(torque if self.to_tree is None else torque @ self.to_tree)
 
     @staticmethod
     def _coefficients(name: str, given: Coefficients, own: Floats, model: Model, through: bool) -> Floats:

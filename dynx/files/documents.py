@@ -1,7 +1,8 @@
 """JSON documents: built from typed classes, read into them strictly, and described by JSON Schema.
 
 Each document has one class that declares its keys and types. A number that is not finite is written as null,
-because JSON has none: so every number of a schema may be null. This is the only module that uses msgspec.
+because JSON cannot express it; so every number in a schema may be null. This is the only module that uses
+msgspec.
 """
 
 from __future__ import annotations
@@ -48,7 +49,7 @@ def json_text(document: object) -> str:
 def read_document(text: str, document_class: type[T]) -> T:
     """Read JSON into `document_class`; ArgumentError names the key whose value has another type.
 
-    Keys that the class does not have are ignored.
+    Unknown keys are ignored.
     """
     import msgspec
 
@@ -63,7 +64,7 @@ def read_document(text: str, document_class: type[T]) -> T:
 def json_schema(document_class: type[Any], title: str, *, omits_defaults: bool = False) -> dict[str, Any]:
     """Describe the documents of `document_class` by a JSON Schema that allows no other keys.
 
-    Every key is required, but where `omits_defaults` those that have a default may be left out.
+    Every key is required. With `omits_defaults`, keys that have a default may be absent.
     """
     import msgspec
 
@@ -72,7 +73,7 @@ def json_schema(document_class: type[Any], title: str, *, omits_defaults: bool =
 
 
 def _strict_schema(part: Any, omits_defaults: bool) -> Any:
-    """Let every number be null, forbid keys that are not listed, and leave out the defaults of Python."""
+    """Allow null for every number, forbid keys that are not listed, and remove Python's default values."""
     if isinstance(part, list):
         return [_strict_schema(each, omits_defaults) for each in part]
     if not isinstance(part, dict):

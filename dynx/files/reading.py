@@ -1,4 +1,4 @@
-"""Safe reading of a file named by the user: a regular file of bounded size, without waiting."""
+"""Safe reading of a file named by the user, which has to be a regular file of limited size."""
 
 from __future__ import annotations
 
@@ -18,7 +18,8 @@ def read_file(path: str) -> bytes:
     device, a file that may not be read, or one above MAX_BYTES.
     """
     try:
-        # Checked before it is opened, because opening a device can act on it and opening a FIFO waits.
+        # The type is checked before the file is opened, because opening a device can have effects and opening
+        # a FIFO blocks.
         _require_regular(os.stat(path), path)
         flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
         descriptor = os.open(path, flags)
@@ -30,7 +31,7 @@ def read_file(path: str) -> bytes:
     except DescriptionError:
         raise
     except (OSError, ValueError) as error:
-        # ValueError: a path with a null character, which no system call accepts.
+        # Python raises ValueError for a path with a null character.
         reason = getattr(error, "strerror", None) or str(error)
         raise DescriptionError(f"cannot be read: {reason}", source=printable(path)) from None
     if len(data) > MAX_BYTES:

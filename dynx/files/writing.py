@@ -1,4 +1,4 @@
-"""Writing a file atomically: the whole content, or nothing under its name."""
+"""Atomic writing of files: the file gets its name only when its content is complete."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from dynx.errors import ArgumentError, shown
 def atomic_file(path: str | os.PathLike[str], mode: int = 0o666) -> Iterator[BinaryIO]:
     """Open a file for writing that gets its name when the block ends without an error.
 
-    Until then it has another name in the same folder. If the disk is full, or anything else ends the
-    block early, it is deleted and what was there before stays. A link is followed, and the permissions
-    of a file that is replaced are kept; `mode` gives those of a new one, less the umask of the process.
-    A named pipe or a device is written directly. Raises ArgumentError where the system refuses.
+    Until then it has another name in the same folder. If the block fails, for example because the disk is
+    full, that file is deleted and an existing file stays as it was. Symbolic links are followed. A replaced
+    file keeps its permissions; a new one gets `mode` minus the umask of the process. A named pipe or a device
+    is written directly. Raises ArgumentError if the file cannot be written.
     """
     target = Path(os.path.realpath(path))
     partial = target.with_name(f".dynx-{secrets.token_hex(8)}.part")
@@ -59,7 +59,8 @@ def write_text(path: str | os.PathLike[str], text: str) -> None:
 
 
 def _require_reader(path: str, flags: int) -> int:
-    """Open a file; OSError ENXIO for a named pipe without a reader, for which `open` would wait forever."""
+    """Open a file; raise OSError ENXIO for a named pipe without a reader, on which `open` would block
+    forever."""
     try:
         descriptor = os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
     except OSError as error:

@@ -1,8 +1,8 @@
-"""The model difference: numbers that an engine holds after loading and that are not those of the file.
+"""The model difference: properties that differ between an engine's model and the file that it loaded.
 
-A `Model` stands for the file, since its numbers are those of the document. Where an engine merges links that
-fixed joints connect, merged inertias are compared. Equivalent forms are no deviation: an absent limit may be
-infinite, 1e8 or not given, and a revolute joint without limits may be continuous.
+A `Model` represents the file, because it has the same numbers. Where an engine merges links that fixed joints
+connect, merged inertias are compared. Equivalent forms are not deviations: an absent limit may be infinite,
+1e8 or missing, and a revolute joint without limits may be continuous.
 """
 
 from __future__ import annotations
@@ -50,8 +50,8 @@ Row = tuple[str, str, str, Any, Any]
 def model_difference(model: Model, loaded: Iterable[LoadedModel]) -> tuple[Deviation, ...]:
     """Every deviation of the engines from `model`, engine by engine, links before joints.
 
-    The inertia of the root link of a fixed base is left out: nothing depends on it, and some engines drop
-    it. `model` has the base with which the engines loaded the file.
+    The inertia of the root link of a fixed base is not compared: no result depends on it, and some engines
+    drop it. `model` has the base with which the engines loaded the file.
     """
     return tuple(Deviation(each.engine, *row) for each in loaded for row in _rows(model, each))
 
@@ -106,7 +106,7 @@ def _inertial(
     reach: float,
 ) -> Iterator[tuple[str, Any, Any]]:
     own = held[link]
-    # A merged link that the engine also holds by itself is compared there, and not once more here.
+    # A merged link that also has an entry of its own in the engine is compared in that entry only.
     instead = {name: held[name] for name in own.merged if name in held}
     wanted = merged_inertial(model, placements, link, own.merged, instead)
     if _differ(wanted.mass, own.mass):
@@ -136,7 +136,7 @@ def _joint(joint: Joint, held: LoadedJoint, reach: float) -> Iterator[tuple[str,
         yield from _ends(joint, held.limits)
     for property in ("velocity", "effort"):
         file, value = getattr(joint.limits, property), getattr(held, property)
-        # For a limit that the file does not give, engines hold a very large number or 0.
+        # For a limit that is absent in the file, engines hold a very large number or 0.
         free = abs(file) >= NO_LIMIT and value is not None and (value == 0.0 or abs(value) >= NO_LIMIT)
         if value is not None and not free and _differ(file, value):
             yield property, _number(file), _number(value)

@@ -51,7 +51,7 @@ def merged_inertial(
     mass = sum(part.mass for part in parts)
     center = sum((part.mass * part.center for part in parts), np.zeros(3))
     center = center / mass if mass else center
-    # About the common centre from the start, so that nothing large cancels.
+    # The sum is formed about the common centre of mass, so that no large terms cancel.
     inertia = np.zeros((3, 3))
     for part in parts:
         arm = part.center - center

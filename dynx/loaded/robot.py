@@ -20,15 +20,15 @@ Self = TypeVar("Self", bound="LoadedRobot")
 class LoadedRobot(ABC):
     """A URDF file as one engine loads it, with results in the coordinates of dynx.
 
-    `model` defines the coordinates: its base, its gravity, its joints (all that move: give a model
-    whose mimic joints were set free) and its links. It names and orders, and never corrects what the
-    engine loaded. Coordinates of the engine that the model lacks are held at zero.
+    `model` defines the coordinates: its base, its gravity, its links and its moving joints (mimic joints have
+    to be set free in it). It gives names and order only; what the engine loaded is not corrected by it.
+    Coordinates that the engine has and the model lacks are held at zero.
 
     Each method takes one sample: q (nq,), v, a, tau (nv,), float64 and finite. Results are not checked:
     NaN from an engine is returned.
 
-    Raises EngineError where the engine refuses the file (with the engine's message), where it would
-    crash on it (without giving it the file), or where it lacks a joint of `model`.
+    Raises EngineError if the engine refuses the file (with the engine's message), if it lacks a joint of
+    `model`, and if it would crash on the file (which is then not passed to the engine).
     """
 
     name: ClassVar[str]
@@ -39,7 +39,7 @@ class LoadedRobot(ABC):
 
     @abstractmethod
     def __init__(self, path: Path, model: Model, calls: Collection[str] = ()) -> None:
-        """Load the file; `calls` are ids of `CALLS` to apply afterwards, others are ignored."""
+        """Load the file; `calls` are ids of `CALLS` to apply afterwards; unknown ids are ignored."""
 
     @classmethod
     @abstractmethod
@@ -83,7 +83,7 @@ class LoadedRobot(ABC):
     def _solved_acceleration(self, q: Floats, v: Floats, tau: Floats) -> Floats:
         """a (nv,) from the engine's mass matrix and inverse dynamics; NaN where the matrix is singular.
 
-        For an engine whose own forward dynamics would let a joint move that the model lacks.
+        This replaces an engine's own forward dynamics where that would move a joint which the model lacks.
         """
         bias = self.inverse_dynamics(q, v, np.zeros_like(v))
         try:

@@ -1,7 +1,7 @@
 """The backend `reference`: the algorithms of `dynx.rbd` on float64, whole batches at a time.
 
-Written for clarity and accuracy; a call costs milliseconds, a batch of a thousand some ten times that.
-It holds no engine and no state, so it is safe to use from any number of threads.
+It is written for clarity and accuracy: a call takes milliseconds, a batch of a thousand about ten times as
+long. It has neither an engine nor state, so any number of threads may use it.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from dynx.spatial.scalar import Floats
 class ReferenceBackend(Backend):
     """`dynx.rbd` evaluated on float64; see `Backend` for the interface.
 
-    A batch is evaluated by NumPy, whole. The backend ``compiled`` gives the same numbers, to rounding,
-    about 300 times as fast: inverse dynamics of UR5, one thread, to one significant figure
-    (``dynx bench ur5 --batch 65536 --threads 1``; other quantities are in docs/bench.md).
+    NumPy evaluates a batch at once. The backend ``compiled`` gives the same numbers to rounding, about 300
+    times as fast for the inverse dynamics of UR5 on one thread (``dynx bench ur5 --batch 65536 --threads 1``;
+    other quantities are in docs/bench.md).
     """
 
     name: ClassVar[str] = "reference"

@@ -156,7 +156,7 @@ def simulate_batch(
     if isinstance(record_every, bool) or not isinstance(record_every, int) or record_every < 0:
         raise ArgumentError(f"record_every is {shown(record_every)}; wanted a whole number, 0 for no record")
     acting = BatchDisturbances.of(moved, setup.disturbances, varied)
-    if parametric is None and not acting.rotors.any():
+    if parametric is None and not acting.armature.any():
         Solvability(moved).refuse_singular(False)
     delayed = clock.delay_steps > 0
     step = FusedStep(

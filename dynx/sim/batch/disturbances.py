@@ -30,8 +30,8 @@ class BatchDisturbances:
     """Friction, armature and pushes of a plant."""
 
     model: Model
-    losses: JointFriction
-    rotors: Floats
+    joint_friction: JointFriction
+    armature: Floats
     """Armature (nv,) [kg m^2 or kg], added to the diagonal of the mass matrix."""
     varied: Mapping[str, int]
     """Number of joints of the coefficients that differ from rollout to rollout, by name."""
@@ -43,8 +43,8 @@ class BatchDisturbances:
         placeholders."""
         sizes = {name: rows.shape[1] for name, rows in varied.items()}
         # A joint of the tree depends on at most one coordinate, so the armature has no other entries.
-        rotors = disturbances.armature.diagonal().copy()
-        return cls(model, disturbances.friction, rotors, sizes, disturbances.pushes)
+        armature = disturbances.armature.diagonal().copy()
+        return cls(model, disturbances.friction, armature, sizes, disturbances.pushes)
 
     def sizes(self, *, pushed: bool) -> dict[str, int]:
         """Return the inputs of the kernel for friction, armature and pushes, and their sizes."""
@@ -69,21 +69,24 @@ class BatchDisturbances:
         pushed: bool,
     ) -> Array:
         """Return the torque (nv,) of the motors, minus friction, plus that of the pushes."""
-        if self.losses.present:
+        if self.joint_friction.present:
             damping, friction = (
                 self._in_place(name, constant, given)
-                for name, constant in (("damping", self.losses.damping), ("friction", self.losses.friction))
+                for name, constant in (
+                    ("damping", self.joint_friction.damping),
+                    ("friction", self.joint_friction.friction),
+                )
             )
-            tau = tau - self.losses.lost(v, damping, friction)
+            tau = tau - self.joint_friction.torque_for(v, damping, friction)
         if pushed:
             for push, wrench in zip(self.pushes, given["wrenches"].reshape(-1, WRENCH), strict=True):
                 details = (self.model.frame_index(push.frame), push.reference)
                 tau = tau + evaluate_quantity(mechanism, "jacobian", details, q).T @ wrench
         return tau
 
-    def rotors_of(self, given: Mapping[str, Array]) -> Array | None:
+    def armature_of(self, given: Mapping[str, Array]) -> Array | None:
         """Return the armature (nv,), None without any."""
-        return self._in_place("armature", self.rotors, given) if self.rotors.any() else None
+        return self._in_place("armature", self.armature, given) if self.armature.any() else None
 
     def _in_place(self, name: str, constant: Floats, given: Mapping[str, Array]) -> Array:
         """Return the coefficients of the rollout in the places of their placeholders, or the constants."""

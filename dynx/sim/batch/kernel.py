@@ -203,12 +203,12 @@ class FusedStep:
         tau: Array,
     ) -> Array:
         tau = self.disturbances.added_to(tau, mechanism, q, v, given, pushed=pushed)
-        rotors = self.disturbances.rotors_of(given)
+        armature = self.disturbances.armature_of(given)
         if self.plant is not None:
-            return self.plant.acceleration(given["parameters"], q, v, tau, rotors)
-        if rotors is None:
+            return self.plant.acceleration(given["parameters"], q, v, tau, armature)
+        if armature is None:
             return evaluate_quantity(mechanism, "forward_dynamics", (), q, v, tau)
-        M = evaluate_quantity(mechanism, "mass_matrix", (), q) + np.diag(rotors)
+        M = evaluate_quantity(mechanism, "mass_matrix", (), q) + np.diag(armature)
         return solve_with_factors(
             *factorize_mass_matrix(mechanism, M), tau - evaluate_quantity(mechanism, "bias_torque", (), q, v)
         )

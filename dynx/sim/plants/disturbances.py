@@ -135,7 +135,7 @@ class DisturbedAcceleration:
 
 def _armature_matrix(model: Model, armature: Coefficients) -> Floats:
     if isinstance(armature, bool):
-        return JointDynamicsTerms(model).rotors if armature else np.zeros((model.nv, model.nv))
+        return JointDynamicsTerms(model).armature if armature else np.zeros((model.nv, model.nv))
     base = 6 if model.floating else 0
     joints = checked_gain("armature", armature, model.nv - base, per="one for each joint")
     return np.diag(np.concatenate([np.zeros(base), joints]))
