@@ -10,12 +10,13 @@ from dynx.errors import ArgumentError, shown
 from dynx.spatial.scalar import Floats
 
 TIME_ROUNDING = 1e-9
-"""Largest distance of a ratio of two times from a whole number that counts as rounding."""
+"""Tolerance within which the ratio of two times counts as a whole number."""
 
 
 @dataclass(frozen=True)
 class Clock:
-    """Steps of `dt` [s], counted and never added up, so that step k is at k dt to rounding."""
+    """Time steps of `dt` [s]. The time of step k is computed as k dt, so that rounding errors do not add
+    up."""
 
     dt: float
     n_steps: int
@@ -24,7 +25,8 @@ class Clock:
 
     @classmethod
     def of(cls, dt: float, duration: float, control_dt: float | None, delay: float) -> Clock:
-        """Raises ArgumentError for times that are none, or no multiples of `dt`."""
+        """Make a clock. Raises ArgumentError for invalid times and for times that are not multiples of
+        `dt`."""
         dt = positive("dt", dt)
         duration = positive("duration", duration)
         control = dt if control_dt is None else positive("control_dt", control_dt)
@@ -48,18 +50,17 @@ class Clock:
         return self.steps_per_control * self.dt
 
     def times(self) -> Floats:
-        """Return the times of all steps, the end included (n_steps + 1,) [s]."""
+        """Return the times (n_steps + 1,) [s] of all steps, including the end."""
         return np.arange(self.n_steps + 1, dtype=np.float64) * self.dt
 
     def control_times(self, lead: int) -> Floats:
-        """Return the times (n_controls,) [s] of the setpoints of the controller, `lead` control steps
-        ahead."""
+        """Return the times (n_controls,) [s] of the setpoints, which are `lead` control steps ahead."""
         steps = (np.arange(self.n_controls) + lead) * self.steps_per_control
         return steps.astype(np.float64) * self.dt
 
 
 def positive(name: str, seconds: object) -> float:
-    """Return a positive number of seconds as a float, or an ArgumentError."""
+    """Return a positive number of seconds as a float. Raises ArgumentError for anything else."""
     if isinstance(seconds, int | float | np.integer | np.floating) and not isinstance(seconds, bool):
         number = float(seconds)
         if 0.0 < number < np.inf:
@@ -68,11 +69,13 @@ def positive(name: str, seconds: object) -> float:
 
 
 def multiple(name: str, seconds: float, dt: float) -> int:
-    """Return the number of steps of `dt` in a time; ArgumentError with the nearest multiple if it is none."""
+    """Return the number of steps of `dt` in a time. Raises ArgumentError, which names the nearest multiple,
+    if the time is not a multiple of `dt`."""
     steps = round(seconds / dt)
     if steps < 1 or abs(seconds / dt - steps) > TIME_ROUNDING * steps:
         nearest = max(1, steps) * dt
         raise ArgumentError(
-            f"{name} is {seconds:.12g} s, which is no multiple of dt = {dt:.12g} s; {nearest:.12g} s would be"
+            f"{name} is {seconds:.12g} s, which is not a multiple of dt = {dt:.12g} s; "
+            f"the nearest one is {nearest:.12g} s"
         )
     return steps

@@ -1,8 +1,8 @@
-"""Controllers by name, with gains that suit any robot, for the command line and the tutorial.
+"""Controllers by name, with default gains that suit any robot, for the command line and the tutorial.
 
-Gains in N m depend on the inertia of a joint. By default they are those of an error that obeys
-e'' + kd e' + kp e = 0 with kp = 400 and kd = 40 (natural frequency 20 rad/s, critically damped), times the
-inertia that each joint sees at the start: the diagonal of the mass matrix there.
+The default gains make the error obey e'' + kd e' + kp e = 0 with kp = 400 and kd = 40 (natural frequency 20
+rad/s, critically damped). For controllers whose gains are in N m, they are multiplied by the inertia of each
+joint at the start, the diagonal of the mass matrix.
 """
 
 from __future__ import annotations
@@ -32,8 +32,9 @@ NATURAL_FREQUENCY = 20.0
 class Gains:
     """Gains of a controller: one number or one for each joint, None for the default.
 
-    `kp` alone comes with the `kd` of `damping_ratio`. For controllers with gains in N m, `natural_frequency`
-    is that of each joint alone, with its inertia at the start. `ki` is by default kp^2 / (2 kd).
+    If only `kp` is given, `kd` follows from `damping_ratio`. For controllers with gains in N m,
+    `natural_frequency` is that of each joint alone with its inertia at the start. `ki` is by default kp^2 /
+    (2 kd).
     """
 
     kp: ArrayLike | None = None
@@ -54,8 +55,8 @@ class Gains:
 class ControllerRequest:
     """Arguments from which a named controller is made.
 
-    Gains in N m are scaled by the inertia at `start` (nq,). `limit` is the effort limit of the motors
-    [N m or N], for PID and PyBullet's motors; `frame` is that of the task-space controllers.
+    Gains in N m are scaled by the inertia at `start` (nq,). `limit` is the effort limit of the motors [N m or
+    N], for PID and PyBullet's motors; `frame` is the frame of task-space controllers.
     """
 
     model: Model
@@ -104,7 +105,7 @@ class NamedController:
     what: str
     """The control law in a few words."""
     takes: tuple[str, ...]
-    """Names of the `Gains` that it takes."""
+    """Names of the fields of `Gains` that it takes."""
     make: Callable[[ControllerRequest], Controller[Any]]
     controls: Literal["joints", "frame"] = "joints"
     """Whether it acts on the joints or on a frame."""
@@ -159,7 +160,7 @@ class NamedControllers(Mapping[str, NamedController]):
         return sum(1 for _ in self)
 
     def __contains__(self, name: object) -> bool:
-        # Entry points are read only for other names: that takes some milliseconds.
+        # Entry points are read only for other names, because reading them takes some milliseconds.
         return name in BUILT_IN or name in tuple(self)
 
 
@@ -168,7 +169,8 @@ CONTROLLERS = NamedControllers()
 
 
 def _of_class(kind: type[Controller[Any]]) -> NamedController:
-    """Return a registered class, made with the gains and the other arguments that its constructor has."""
+    """Make the entry of a registered class, whose constructor gets the gains and the other arguments that
+    it declares."""
     parameters = signature(kind).parameters
 
     def make(request: ControllerRequest) -> Controller[Any]:
@@ -283,4 +285,4 @@ BUILT_IN: dict[str, NamedController] = {
         "spring and damper of a frame", ("kp", "kd", "posture_kd"), _impedance, "frame"
     ),
 }
-"""Controllers of dynx, those that know least of the robot first and those of a frame last."""
+"""Controllers of dynx: first those that need least knowledge of the robot, last those of a frame."""

@@ -23,7 +23,7 @@ from dynx.trajectory.base import Trajectory
 
 
 class RolloutInterrupted(KeyboardInterrupt):
-    """Ctrl-C in a simulation; `rollout` is the record until then."""
+    """Interruption of a simulation by Ctrl-C; `rollout` is the record until then."""
 
     def __init__(self, rollout: Rollout, wanted: int) -> None:
         super().__init__(f"interrupted after {len(rollout)} of {wanted} steps")
@@ -63,45 +63,46 @@ def simulate(
     step: int | None = None,
     progress: Progress | None = None,
 ) -> Rollout:
-    """Let `model` move under `controller` along `reference`, and record it.
+    """Simulate `model` under `controller` along `reference`, and return the record.
 
-    The first argument may also be a `Scenario`, which has all that follows but `resume`, `step` and
-    `progress`; the arguments here are its fields.
+    The first argument may also be a `Scenario`. Its fields are the other arguments except `resume`, `step`
+    and `progress`, which are then the only ones that can be given.
 
-    The engine of the plant and that of the controller (``controller_backend``, otherwise its own) are
-    chosen apart, so the effect of an error of one can be studied.
+    The plant and the controller can use different engines (``controller_backend`` replaces the controller's
+    own), so that the effect of an error in one of them can be studied.
 
-    **What moves.** `plant` names a backend. ``plant="pybullet"`` is PyBullet's own stepper; any other
-    is a backend's forward dynamics under an `integrator` of dynx: ``semi_implicit`` (the default: v then
-    q, the scheme of Bullet), ``rk4``, or ``adaptive`` (SciPy's `method` with `rtol`, `atol`).
-    ``plant="pybullet", integrator="rk4"`` is PyBullet's forward dynamics under RK4.
-    `controller` None is a robot without motors. `reference` is a trajectory, one configuration (nq,) to
-    hold, or None. The start is `q0`, `v0`, or where the reference begins, or the neutral configuration.
+    **Plant.** ``plant="pybullet"`` is PyBullet's own stepper. Any other name is a backend whose forward
+    dynamics an `integrator` of dynx integrates: ``semi_implicit`` (the default: v then q, the scheme of
+    Bullet), ``rk4``, or ``adaptive`` (SciPy's `method` with `rtol`, `atol`). ``plant="pybullet",
+    integrator="rk4"`` is PyBullet's forward dynamics under RK4. Without a controller (None) the robot has no
+    motors. `reference` is a trajectory, one configuration (nq,) to hold, or None. The initial state is `q0`,
+    `v0`; by default the start of the reference, or the neutral configuration.
 
     **Time** [s]. `dt` is the step of the record; the plant takes `substeps` steps in each. The controller
-    runs every `control_dt` (by default `dt`), its torque is held in between, and it measures the state of
-    `delay` ago (before the start: the state at the start). `duration` is by default the reference's.
-    All are multiples of `dt`.
+    runs every `control_dt` (by default `dt`), and its torque is held in between. It measures the state as it
+    was `delay` earlier, or the initial state if that is before the start. The default `duration` is that of
+    the reference. All times are multiples of `dt`.
 
-    **Joints**, alike in every plant: `damping`, dry `friction` (over the speed `friction_slip`, see
-    `JointFriction`) and `armature`, each True for those of the description, one number or one for each
-    joint; `effort_limits`, True for the model's, saturate torques and are recorded; `position_limits` are
-    stops without a bounce (`Stops`); `pushes` are external wrenches.
+    **Joints**, the same in every plant: `damping`, dry `friction` (over the speed `friction_slip`, see
+    `JointFriction`) and `armature`, each True for those of the description, one number or one for each joint;
+    `effort_limits`, True for the model's, saturate torques and are recorded; `position_limits` are inelastic
+    stops (`Stops`); `pushes` are external wrenches.
 
-    **Model error.** A `payload`, and `mass_scale` for all links or some, are the plant's and not the
-    controller's; `noise` is on the measurements.
+    **Model error.** The plant has a `payload` and masses scaled by `mass_scale` (all links, or some) that the
+    controller does not know; `noise` is added to the measurements.
 
-    **Resuming.** With `resume` the first `step` steps (by default all) are taken from that record, and
-    the rest is computed: the outcome is that of one run, to the last bit. The record's scenario must be
-    equal to this one in every field but `duration`. A controller must keep its state in what it returns.
+    **Resuming.** With `resume` the first `step` steps (by default all) are taken from that record and the
+    rest is computed, with the same result as one run, to the last bit. The record's scenario must be equal to
+    this one in every field but `duration`. The controller must have no other state than the one that it
+    returns.
 
-    **Long runs.** `progress` is called now and then with the steps taken and that of all. Ctrl-C raises
-    RolloutInterrupted, which has the record until then in ``.rollout`` and can be resumed.
+    **Long runs.** `progress` is called regularly with the number of steps taken and the total number. Ctrl-C
+    raises RolloutInterrupted, which has the record until then in ``.rollout`` and can be resumed.
 
-    Raises ArgumentError for a scenario that cannot be simulated, or another one than that of the record
-    to resume; LimitError for a reference outside the limits of position and velocity (unless
-    `check_reference` is False) or an effort limit of 0; DivergedError and ControlError in a step, with
-    the record until then in ``error.rollout``.
+    Raises ArgumentError for a scenario that cannot be simulated, or that differs from the scenario of the
+    record to resume; LimitError for a reference outside the limits of position and velocity (unless
+    `check_reference` is False) or an effort limit of 0; DivergedError and ControlError in a step, with the
+    record until then in ``error.rollout``.
     """
     given: dict[str, Any] = {
         name: value

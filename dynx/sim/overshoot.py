@@ -17,8 +17,8 @@ from dynx.spatial.scalar import Floats
 class Overshoot(NamedTuple):
     """The joint with the largest ratio kd dt / inertia, and that ratio.
 
-    A joint alone obeys v' = v (1 - kd dt / inertia) in each control step: above 1 the velocity changes
-    sign, above 2 it grows.
+    The velocity of a single joint changes in each control step to v' = v (1 - kd dt / inertia). If the ratio
+    is above 1 it changes sign, above 2 it also grows.
     """
 
     joint: str
@@ -43,8 +43,8 @@ def largest_overshoot(controller: Controller[Any] | None, q: Floats, control_dt:
 
 
 def _joint_damping(controller: Controller[Any], q: Floats) -> Floats | None:
-    """Return the damping of each coordinate (n,) [N m s/rad or N s/m] while the others are at rest; None
-    without one."""
+    """Return the damping gain of each coordinate (n,) [N m s/rad or N s/m] while the others are at rest;
+    None for a controller without one."""
     kd = fields_of(controller).get("kd")
     if kd is not None and kd.metadata.get("unit", "").startswith("N"):
         damping: Floats = attributes_of(controller)["kd"]

@@ -1,4 +1,4 @@
-"""Comparison of the scenario of a record with the one that is to continue it."""
+"""Comparison of a record's scenario with the scenario that shall continue it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from dynx.sim.scenario.documents import in_words
 from dynx.sim.scenario.scenario import Scenario
 
 
-def refuse_no_rollout(rollout: object) -> None:
+def require_rollout(rollout: object) -> None:
     """Raise ArgumentError for anything but a `Rollout`, such as the name of its file."""
     if not isinstance(rollout, Rollout):
         raise ArgumentError(
@@ -22,13 +22,14 @@ def refuse_no_rollout(rollout: object) -> None:
 
 
 def refuse_other_scenario(rollout: Rollout, scenario: Scenario) -> None:
-    """Raise ArgumentError where `rollout` is not of `scenario`, whose duration may be another."""
+    """Raise ArgumentError if the scenario of `rollout` differs from `scenario` in anything but the
+    duration."""
     then = rollout.scenario
     if then is None:
         raise ArgumentError("the rollout to resume has no scenario, so it cannot be compared")
     if rollout.departures:
         raise ArgumentError(
-            f"the rollout to resume is not that of its scenario alone: {'; '.join(rollout.departures)}"
+            f"the rollout to resume does not follow from its scenario alone: {'; '.join(rollout.departures)}"
         )
     if then.model != scenario.model:
         name, old, new = model_difference(then.model, scenario.model)
@@ -44,14 +45,14 @@ def refuse_other_scenario(rollout: Rollout, scenario: Scenario) -> None:
 
 
 def changed_parts(theirs: Scenario, ours: Scenario) -> list[str]:
-    """Return the names of the fields in which two scenarios differ, and of those inside; a controller is one
-    field."""
+    """Return the names of the fields in which two scenarios differ, with the fields inside them; a
+    controller is one field."""
     names = (each.field for each in theirs.differences(ours))
     return list(dict.fromkeys("controller" if name.startswith("controller.") else name for name in names))
 
 
 def model_difference(ours: Model, theirs: Model) -> tuple[str, str, str]:
-    """Return the name of the first attribute in which two models differ, and its two values."""
+    """Return the first attribute in which two models differ, as its name and its two values."""
     for name in ("name", "base", "gravity", "links", "joints", "extra_frames"):
         pair = getattr(ours, name), getattr(theirs, name)
         if pair[0] != pair[1]:
@@ -60,7 +61,7 @@ def model_difference(ours: Model, theirs: Model) -> tuple[str, str, str]:
 
 
 def _innermost(name: str, ours: Any, theirs: Any) -> tuple[str, str, str]:
-    """Return the first attribute inside two values in which they differ."""
+    """Find the innermost attribute in which two values differ."""
     if is_dataclass(ours) and type(ours) is type(theirs):
         for each in fields(ours):
             pair = getattr(ours, each.name), getattr(theirs, each.name)

@@ -1,4 +1,5 @@
-"""The checked parts of a scenario that every executor needs: clock, plant model, reference, limits, start."""
+"""The checked parts of a scenario that every executor needs: clock, model of the plant, reference, limits,
+initial state."""
 
 from __future__ import annotations
 
@@ -35,7 +36,7 @@ class Setup:
     clock: Clock
     """Clock over the scenario's duration, or over one control step for a scenario without one."""
     model: Model
-    """The robot that moves: with its payload and its masses."""
+    """The robot of the plant, with payload and scaled masses."""
     setpoint_of: SetpointOf | None
     disturbances: Disturbances
     limit: Floats | None
@@ -45,7 +46,7 @@ class Setup:
 
     @classmethod
     def of(cls, scenario: Scenario) -> Setup:
-        """Check a scenario. Raises ArgumentError, LimitError and GainError for what cannot be simulated."""
+        """Check a scenario. Raises ArgumentError, LimitError or GainError if it cannot be simulated."""
         controller = known_controller(scenario)
         clock = clock_of(scenario)
         moved = plant_model(scenario.model, scenario.payloads, scenario.mass_scale)
@@ -61,20 +62,20 @@ class Setup:
 
     @property
     def integrator(self) -> str:
-        """Name of the integrator, also where the scenario leaves it to the plant."""
+        """Name of the integrator; the default of the plant if the scenario has none."""
         return self.scenario.integrator or default_integrator(self.scenario.plant)
 
 
 def known_controller(scenario: Scenario) -> Controller[Any] | None:
     """Return the controller of a scenario.
 
-    Raises ArgumentError where controller or reference were read from a file and their class is not here.
+    Raises ArgumentError if controller or reference were read from a file and cannot be rebuilt.
     """
     for part in (scenario.controller, scenario.reference):
         if isinstance(part, Unknown):
             raise ArgumentError(
-                f"{part.name} was read from a file, and cannot be rebuilt: {part.why}. Otherwise put an "
-                "object in its place by dataclasses.replace"
+                f"{part.name} was read from a file, and cannot be rebuilt: {part.why}. Otherwise replace "
+                "it with dataclasses.replace"
             )
     controller = scenario.controller
     assert not isinstance(controller, Unknown)
@@ -95,7 +96,7 @@ def require_duration(scenario: Scenario) -> None:
     """Raise ArgumentError where neither the scenario nor its reference has a duration."""
     known_controller(scenario)
     if scenario.duration is None and not isinstance(scenario.reference, Trajectory):
-        raise ArgumentError("duration is not given, and the reference is no trajectory that has one")
+        raise ArgumentError("duration is not given, and the reference is not a trajectory with a duration")
 
 
 def disturbances_of(scenario: Scenario, moved: Model) -> Disturbances:

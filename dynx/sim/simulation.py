@@ -17,8 +17,8 @@ from dynx.backends import backend
 from dynx.errors import ArgumentError, ClosedError, SimulationError, shown
 from dynx.model.configuration import checked_array
 from dynx.sim.clock import multiple
-from dynx.sim.loop.controller_checks import Unchanged
-from dynx.sim.loop.plain import Held, Loop
+from dynx.sim.loop.controller_checks import ControllerWatch
+from dynx.sim.loop.plain import Loop, LoopState
 from dynx.sim.loop.record import Record
 from dynx.sim.loop.references import setpoints_of
 from dynx.sim.loop.sensors import Sensors
@@ -27,17 +27,17 @@ from dynx.sim.loop.stops import Stops
 from dynx.sim.plants.plant import plant_errors
 from dynx.sim.plants.registry import make_plant
 from dynx.sim.record.rollout import Rollout
-from dynx.sim.resuming import changed_parts, refuse_no_rollout, refuse_other_scenario
+from dynx.sim.resuming import changed_parts, refuse_other_scenario, require_rollout
 from dynx.sim.scenario.scenario import Scenario
 from dynx.sim.setup import Setup
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Trajectory
 
 Progress = Callable[[int, int], object]
-"""Called with the number of steps taken and that of all."""
+"""Called with the number of steps taken and the total number."""
 
 MIN_BUFFER_STEPS = 1024
-"""Steps that fit into the first buffers of a simulation without a duration."""
+"""Number of steps that fit into the first buffers of a simulation without a duration."""
 
 
 class State(NamedTuple):
@@ -50,11 +50,12 @@ class State(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Snapshot:
-    """A simulation at one moment, with its record until then; `Simulation.restore` returns to it."""
+    """State of a simulation at one moment, with its record until then, to which `Simulation.restore`
+    returns."""
 
     scenario: Scenario
     record: Record
-    held: Held
+    loop_state: LoopState
     executor: tuple[str, ...]
     departures: tuple[str, ...]
 
@@ -65,22 +66,22 @@ class Snapshot:
 
 
 class Simulation:
-    """One scenario, in steps of the caller's own.
+    """One scenario, simulated step by step by the caller.
 
         with dynx.Simulation(scenario) as simulation:
             while simulation.time < 2.0:
                 simulation.step()
                 print(simulation.state.q)
 
-    Equal steps give equal bits: those of `dynx.simulate` on the same scenario, whoever steps and how many
-    steps at a time. All states are recorded (`rollout`). The engine of the plant stays open until `close`,
-    which the end of a ``with`` block calls.
+    The results are those of `dynx.simulate` on the same scenario, bit for bit, however many steps are taken
+    at a time. All states are recorded (`rollout`). The engine of the plant stays open until `close`, which
+    the end of a ``with`` block calls.
     """
 
     def __init__(self, scenario: Scenario, *, progress: Progress | None = None) -> None:
-        """Raises as `dynx.simulate` does for a scenario that cannot be simulated.
+        """Raises the errors of `dynx.simulate` for a scenario that cannot be simulated.
 
-        `progress` is called now and then in `run`.
+        `run` calls `progress` regularly.
         """
         if not isinstance(scenario, Scenario):
             raise ArgumentError(f"scenario is of type {type(scenario).__name__}; wanted a dynx.Scenario")
@@ -105,9 +106,9 @@ class Simulation:
             options={"method": scenario.method, "rtol": scenario.rtol, "atol": scenario.atol},
         )
         self._dt = clock.dt
-        self._watch = None if setup.controller is None else Unchanged(setup.controller)
-        self._held: Held | None = None
-        self._misplaced = self._closed = False
+        self._watch = None if setup.controller is None else ControllerWatch(setup.controller)
+        self._loop_state: LoopState | None = None
+        self._plant_needs_reset = self._closed = False
         self._executor: tuple[str, ...] = ()
         self._departures: tuple[str, ...] = ()
         try:
@@ -128,7 +129,7 @@ class Simulation:
         """Take `n` steps of `dt`, and return the state after them.
 
         `tau` (nv,) [N m or N] replaces the torque of the controller, which is not evaluated in these steps;
-        effort limits hold for it, and it is held until the next control step. Raises DivergedError and
+        effort limits apply to it, and it is held until the next control step. Raises DivergedError and
         ControlError, with the record so far in ``error.rollout``.
         """
         if n != 1 and (not isinstance(n, int | np.integer) or n < 1):
@@ -138,20 +139,20 @@ class Simulation:
             given = checked_array("tau", tau, self._setup.model.nv).copy()
             if given.ndim != 1:
                 raise ArgumentError(f"tau has shape {given.shape}; wanted ({self._setup.model.nv},)")
-            self._depart("torques of the caller")
+            self._note_departure("torques of the caller")
         self._note("plain: stepped by the caller")
         end = self._record.steps + int(n)
-        held = self._advance(end, given)
-        return State(end * self._dt, held.q.copy(), held.v.copy())
+        loop_state = self._advance(end, given)
+        return State(end * self._dt, loop_state.q.copy(), loop_state.v.copy())
 
     def run(self, until: float | None = None, *, real_time: bool = False) -> Rollout:
         """Step to the time `until` [s], by default the end of the scenario, and return the record.
 
-        `until` is a multiple of `dt` and not before `time`; ArgumentError for another one. Raises
+        `until` must be a multiple of `dt` and not before `time`, or ArgumentError is raised. Raises
         DivergedError and ControlError as `step` does.
 
-        With `real_time` each step waits until as much time has passed on the clock of the machine.
-        Otherwise steps are compiled where that is possible; `Rollout.executor` says whether it was.
+        With `real_time` each step waits until as much time has passed on the clock of the machine. Otherwise
+        steps are compiled if possible; `Rollout.executor` tells whether they were.
         """
         end = self.n_steps
         if until is not None:
@@ -159,7 +160,7 @@ class Simulation:
                 raise ArgumentError(f"until is {shown(until)}; wanted a time in seconds")
             if round(until / self._dt) < self._record.steps:
                 raise ArgumentError(
-                    f"until is {until:.12g} s, but {self.time:.12g} s are simulated already; `restore` and "
+                    f"until is {until:.12g} s, but {self.time:.12g} s have been simulated; `restore` and "
                     "`reset` go back"
                 )
             end = multiple("until", until, self._dt) if until else 0
@@ -196,47 +197,47 @@ class Simulation:
             if ahead > 0.0:
                 time.sleep(ahead)
 
-    def _advance(self, end: int, given: Floats | None, *, compiled: bool = False) -> Held:
+    def _advance(self, end: int, given: Floats | None, *, compiled: bool = False) -> LoopState:
         self._refuse_closed()
         record = self._record
         if end > len(record):
             self._extend(end)
             record = self._record
-        held = self._held
+        loop_state = self._loop_state
         try:
-            if held is None:
-                held = self._held = self._loop.start(record)
-            elif self._misplaced:
-                self._loop.place(held.q, held.v)
-            self._misplaced = False
+            if loop_state is None:
+                loop_state = self._loop_state = self._loop.start(record)
+            elif self._plant_needs_reset:
+                self._loop.place(loop_state.q, loop_state.v)
+            self._plant_needs_reset = False
             if end == record.steps + 1 and not compiled:
-                self._loop.advance(record, held, end, given)
-                return held
-            # A state that runs away is found by the loop, whose error says more than NumPy's warnings. For
-            # a single step, silencing them would take longer than all else beside the step itself.
+                self._loop.advance(record, loop_state, end, given)
+                return loop_state
+            # The loop detects a diverging state, and its error tells more than NumPy's warnings, which are
+            # therefore silenced. Not for a single step, where silencing would add too much time.
             with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
                 if compiled:
-                    self._advance_staged(record, held, end)
+                    self._advance_staged(record, loop_state, end)
                 if record.steps < end:
-                    self._loop.advance(record, held, end, given)
+                    self._loop.advance(record, loop_state, end, given)
         except BaseException as error:
-            # The plant may be in the middle of a step: it is placed anew before the next one.
-            self._misplaced = True
+            # The plant may be in the middle of a step, so it is reset before the next one.
+            self._plant_needs_reset = True
             if isinstance(error, SimulationError):
                 error.rollout = self.rollout
             raise
-        return held
+        return loop_state
 
-    def _advance_staged(self, record: Record, held: Held, end: int) -> None:
+    def _advance_staged(self, record: Record, loop_state: LoopState, end: int) -> None:
         """Take as many steps to `end` as the staged executor can, and note which executor computed them."""
-        made = staged_loop(self._loop, end - record.steps)
-        if isinstance(made, str):
-            self._note(f"plain: {made}")
+        staged = staged_loop(self._loop, end - record.steps)
+        if isinstance(staged, str):
+            self._note(f"plain: {staged}")
             return
         self._note("staged")
-        made.run(record, held, end)
+        staged.run(record, loop_state, end)
         if record.steps < end:
-            self._note(f"plain from step {record.steps}: {made.stopped}")
+            self._note(f"plain from step {record.steps}: {staged.stopped}")
 
     def _refuse_closed(self) -> None:
         if self._closed:
@@ -246,12 +247,12 @@ class Simulation:
         if executor not in self._executor:
             self._executor = (*self._executor, executor)
 
-    def _depart(self, how: str) -> None:
+    def _note_departure(self, how: str) -> None:
         if not any(each.startswith(how) for each in self._departures):
             self._departures = (*self._departures, f"{how} from step {self._record.steps}")
 
     def _extend(self, end: int) -> None:
-        """Make room for the steps until `end`, and twice as many as there was."""
+        """Extend the buffers to hold the steps until `end`, at least to twice their size."""
         clock = replace(self._loop.clock, n_steps=max(end, 2 * len(self._record)))
         self._record = self._record.extended(clock.n_steps)
         setpoints = setpoints_of(self._setup.setpoint_of, clock, self._setup.controller)
@@ -296,31 +297,33 @@ class Simulation:
         )
 
     def reset(self) -> State:
-        """Return to the start of the scenario, and forget the record.
+        """Return to the start of the scenario, and discard the record.
 
         Raises ArgumentError for a controller that changed itself.
         """
         self._refuse_changed_controller()
         self._record.steps = 0
-        self._held, self._executor, self._departures = None, (), ()
+        self._loop_state, self._executor, self._departures = None, (), ()
         return self.state
 
     def save(self) -> Snapshot:
-        """Return the simulation as it is now, with its record; `restore` continues from it bit for bit.
+        """Return a snapshot of the simulation and its record, from which `restore` continues bit for bit.
 
         Raises ArgumentError for a controller that changed itself.
         """
         self._refuse_closed()
         self._refuse_changed_controller()
-        held = self._held = self._held or self._loop.start(self._record)
-        return Snapshot(self.scenario, self._record.copy(), replace(held), self._executor, self._departures)
+        loop_state = self._loop_state = self._loop_state or self._loop.start(self._record)
+        return Snapshot(
+            self.scenario, self._record.copy(), replace(loop_state), self._executor, self._departures
+        )
 
     def restore(self, snapshot: Snapshot) -> State:
         """Continue from a snapshot of this simulation or of another of the same robot and `dt`.
 
-        In another scenario, such as one with another controller, that controller begins with its initial
-        state at its next control step. Raises ArgumentError for a snapshot of another robot or `dt`, and
-        for a controller that changes itself.
+        If this simulation has another controller than the snapshot, the controller starts from its initial
+        state at the next control step. Raises ArgumentError for a snapshot of another robot or `dt`, and for
+        a controller that changes itself.
         """
         self._refuse_closed()
         if not isinstance(snapshot, Snapshot):
@@ -340,30 +343,30 @@ class Simulation:
         changed = [] if theirs is ours else changed_parts(theirs, ours)
         self._record.take(snapshot.record, n)
         self._executor, self._departures = snapshot.executor, snapshot.departures
-        held = replace(snapshot.held)
-        self._loop.place(held.q, held.v)
+        loop_state = replace(snapshot.loop_state)
+        self._loop.place(loop_state.q, loop_state.v)
         if "controller" in changed:
             controller = self._setup.controller
-            held.controller_state = None if controller is None else controller.initial_state()
-            held.command = None
+            loop_state.controller_state = None if controller is None else controller.initial_state()
+            loop_state.command = None
         if changed:
-            self._depart(f"another {' and '.join(changed)}")
-        self._held, self._misplaced = held, False
+            self._note_departure(f"another {' and '.join(changed)}")
+        self._loop_state, self._plant_needs_reset = loop_state, False
         return self.state
 
     def take_over(self, rollout: Rollout, step: int | None = None) -> None:
         """Continue from `step` of a rollout of an equal scenario, by default its last.
 
-        The durations may differ. Raises ArgumentError that names the field for a rollout of another
-        scenario, and for one that is not of its scenario alone.
+        The durations may differ. Raises ArgumentError for a rollout of another scenario, with the name of the
+        field that differs, and for a rollout with `departures`.
         """
-        refuse_no_rollout(rollout)
+        require_rollout(rollout)
         step = len(rollout) if step is None else step
         most = len(rollout) if self.n_steps is None else min(len(rollout), self.n_steps)
         if not isinstance(step, int) or not 0 <= step <= most:
             wanted = "any number" if self.n_steps is None else self.n_steps
             raise ArgumentError(
-                f"step is {shown(step)}; the rollout to resume has {len(rollout)} and this one {wanted}"
+                f"step is {shown(step)}; the rollout to resume has {len(rollout)} steps and this one {wanted}"
             )
         theirs = Record(rollout.q, rollout.v, rollout.a, rollout.tau)
         if step:
@@ -372,7 +375,7 @@ class Simulation:
         if step > len(self._record):
             self._extend(step)
         self._record.take(theirs, step)
-        self._held, self._executor, self._departures = None, (), ()
+        self._loop_state, self._executor, self._departures = None, (), ()
 
     # -- end ----------------------------------------------------------------------------------
 

@@ -1,4 +1,4 @@
-"""The experiments that this project grew from: one arm, one motion, every mode of control, on two plants.
+"""The tutorial's experiments: one arm, one motion, every mode of control, on two plants.
 
 A six-axis arm goes along a cycloidal motion of 2 s in PyBullet, in steps of 1 ms, under a gravity of
 9.8 m/s^2: by the engine's position and velocity motors, by feed-forward torque, and by computed torque with
@@ -34,12 +34,12 @@ from dynx.trajectory import Trajectory, check, cycloidal
 
 ROBOT = "ur5"
 TO = (-1.5, -1.0, 1.0, -1.57, -1.57, -1.57)
-"""Goal of the motion of a six-axis arm [rad]; it begins at 0."""
+"""Final configuration [rad] of the motion of a six-axis arm, which begins at 0."""
 DURATION, DT, GRAVITY = 2.0, 1e-3, (0.0, 0.0, -9.8)
 BULLET, DYNX = PLANTS = ("pybullet", "pinocchio")
 """PyBullet's own stepper, and dynx's semi-implicit Euler over Pinocchio's forward dynamics."""
 MODES = tuple(name for name, law in BUILT_IN.items() if law.controls == "joints")
-"""All modes, those that know least of the robot first."""
+"""All modes of control; those that need least knowledge of the robot come first."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,8 @@ class Tutorial:
     backend: str = DYNX
 
     def rows(self) -> Iterator[Row]:
-        """Simulate row by row; the outcome of a mode that is not available has the reason."""
+        """Simulate and yield the rows one by one; the outcome of a mode that is not available has the
+        reason."""
         missing = {plant: _missing(plant) for plant in self.plants}
         for mode in MODES:
             yield Row(
@@ -126,10 +127,10 @@ def tutorial(
     plants: tuple[str, ...] = PLANTS,
     backend: str = DYNX,
 ) -> Tutorial:
-    """Return the tutorial's experiments; `model` is by default the UR5 in the tutorial's gravity.
+    """Prepare the tutorial's experiments; `model` is by default the UR5 with the tutorial's gravity.
 
     The cycloidal motion goes from `start` (neutral by default) to `to` (by default `TO`, for an arm of six
-    joints) in `duration` [s], in steps of `dt`, on `plants`; the controllers evaluate `backend`.
+    joints) in `duration` [s], in steps of `dt`, on `plants`; the controllers compute with `backend`.
 
     Raises ArgumentError for an invalid motion, LimitError for one outside the robot's limits of
     position and velocity, UnsupportedFeatureError for a floating base, BackendError for a backend that
@@ -137,13 +138,13 @@ def tutorial(
     """
     robot = load(ROBOT, gravity=GRAVITY) if model is None else model
     if robot.floating:
-        raise UnsupportedFeatureError(f"the tutorial is one of arms, and {robot.name} has a floating base")
+        raise UnsupportedFeatureError(f"the tutorial needs a fixed base, and {robot.name} has a floating one")
     begin: Floats | ArrayLike = robot.neutral() if start is None else start
     if to is None:
         if robot.nq != len(TO):
             raise ArgumentError(
-                f"the tutorial's motion is one of {len(TO)} coordinates and {robot.name} has {robot.nq}; "
-                "say where it is to go"
+                f"the tutorial's motion has {len(TO)} coordinates and {robot.name} has {robot.nq}; "
+                "give the final configuration as `to`"
             )
         to = TO
     motion = cycloidal(begin, to, duration, model=robot)

@@ -1,4 +1,4 @@
-"""The errors of all modes of control over time, on one page."""
+"""Plot of the errors of all modes of control over time."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from dynx.files.figures import new_figure, save_figure
 from dynx.sim.tutorial import BULLET, Row, Tutorial
 
 STYLES = ("-", "--", "-.", ":")
-"""Told apart without colour too."""
+"""Line styles, so that curves can be distinguished without colour."""
 
 LEAST = 1e-16
-"""Errors below it are drawn there: they are rounding, and a logarithm has no zero."""
+"""Smallest error on the logarithmic axis; smaller ones are rounding errors and are drawn there."""
 
 
 def plot_rows(rows: Sequence[Row], tutorial: Tutorial, path: str | os.PathLike[str] | None = None) -> Any:
-    """Return a `matplotlib.figure.Figure` with a panel for each plant; saved at `path`.
+    """Plot the errors in a panel for each plant, save the figure at `path` and return it.
 
-    Shown is the largest error of all joints at each time. Raises NotInstalledError without matplotlib
+    The curves show the largest error of all joints at each time. Raises NotInstalledError without matplotlib
     (``pip install 'dynx[plot]'``), ArgumentError where the file cannot be written.
     """
     figure = new_figure(7.0, 2.0 + 3.2 * len(tutorial.plants))

@@ -28,8 +28,7 @@ A motion planned up to a limit meets it only to rounding.
 """
 
 Excess = tuple[Literal["position", "velocity", "effort"], Floats, Floats, Floats]
-"""A quantity, its values (n, nv), the nearest limit of each, and the amount by which they exceed it.
-"""
+"""A quantity, its values (n, nv), the nearest limit of each, and the amount by which they exceed it."""
 
 
 def check(

@@ -152,7 +152,7 @@ SIMULATION_FAULTS = (
     Fault(
         "staged_loop_clamps_an_overflowed_torque",
         "dynx.sim.loop.staged",
-        right="np.array([v @ v + unsound], dtype=object)",
+        right="np.array([v @ v + excess], dtype=object)",
         wrong="np.array([v @ v], dtype=object)",
         test_file="tests/sim/loop/test_staged.py",
         test="test_a_torque_beyond_all_numbers_is_not_cut_to_the_limits",

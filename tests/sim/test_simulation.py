@@ -328,12 +328,12 @@ def test_the_names_are_exported() -> None:
 def test_run_stops_on_the_grid_and_never_goes_back() -> None:
     with Simulation(SCENARIOS["passive"]) as simulation:
         assert len(simulation.run(until=0.0)) == 0
-        with pytest.raises(ArgumentError, match=r"until is 0\.0015 s, which is no multiple of dt"):
+        with pytest.raises(ArgumentError, match=r"until is 0\.0015 s, which is not a multiple of dt"):
             simulation.run(until=0.0015)
         simulation.run(until=0.02)
         assert len(simulation.run(until=0.02)) == 20
         for passed in (0.01, 0.0, -1.0):
-            with pytest.raises(ArgumentError, match=r"but 0\.02 s are simulated already"):
+            with pytest.raises(ArgumentError, match=r"but 0\.02 s have been simulated"):
                 simulation.run(until=passed)
 
 

@@ -134,7 +134,7 @@ def test_another_robot_goes_where_it_is_told() -> None:
 def test_motions_that_cannot_be_had() -> None:
     with pytest.raises(ArgumentError, match="6 coordinates and panda has"):
         tutorial(load("panda"))
-    with pytest.raises(UnsupportedFeatureError, match="solo has a floating base"):
+    with pytest.raises(UnsupportedFeatureError, match="solo has a floating one"):
         tutorial(load("solo12", base="floating"))
     with pytest.raises(ShapeError):
         tutorial(to=[1.0, 2.0])

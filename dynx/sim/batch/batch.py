@@ -20,7 +20,7 @@ from dynx.model import Model
 from dynx.model.configuration import checked_q
 from dynx.sim.batch.disturbances import PLACEHOLDER, BatchDisturbances
 from dynx.sim.batch.kernel import FusedStep
-from dynx.sim.batch.part import Part, PartDone, PartNoise, StepKernels, pushing
+from dynx.sim.batch.part import Part, PartNoise, PartOutcome, StepKernels, pushing
 from dynx.sim.batch.rollouts import BatchRollouts
 from dynx.sim.batch.rows import (
     COEFFICIENTS,
@@ -45,15 +45,15 @@ from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint, Trajectory
 
 PART = 1024
-"""Rollouts in one part: few enough that their state stays in the caches, and enough to outweigh the start of
-a call. Results do not depend on it."""
+"""Number of rollouts in one part: small enough that their state stays in the processor's caches, and large
+enough that starting a call costs little. Results do not depend on it."""
 
 Progress = Callable[[int, int], object]
-"""Called with the number of finished rollouts and that of all."""
+"""Called with the number of finished rollouts and the total number."""
 
 
 class BatchInterrupted(KeyboardInterrupt):
-    """Ctrl-C in a batch; `rollouts` has those that were finished."""
+    """Interruption of a batch by Ctrl-C; `rollouts` has the finished ones."""
 
     def __init__(self, rollouts: BatchRollouts) -> None:
         super().__init__(f"interrupted with {int(np.sum(rollouts.done))} of {len(rollouts)} rollouts done")
@@ -95,33 +95,34 @@ def simulate_batch(
     """Simulate many rollouts of `model` under `controller` along `reference`, by semi-implicit Euler.
 
     Controller, dynamics and integrator are compiled into one kernel, with one rollout in each vector lane.
-    Arguments that differ from rollout to rollout have one row for each:
+    These arguments may have one row for each rollout:
 
-    - `parameters` (n, p) of `parametric`, a `dynx.parametric` of the model: payloads, inertias, damping,
-      dry friction (with the jump of ``sign(v)``) and armature that the controller does not know of
+    - `parameters` (n, p) of `parametric`, a `dynx.parametric` of the model: payloads, inertias, damping, dry
+      friction (discontinuous at zero velocity, as ``sign(v)``) and armature that the controller does not know
     - `gains`: arrays (n,) or (n, size) by the name of a gain of the controller, as ``{"kp": ...}``
-    - `damping`, `friction`, `armature` (n,), (n, 1) or (n, joints); a number, numbers (joints,) or True
-      mean for all rollouts what they mean in `simulate`
-    - `q0` (n, nq), `v0` (n, nv); one row is for all. By default the start of the reference, and at rest
-      where `q0` is given
-    - `noise` of the measurements: rollout k has that of ``simulate`` with ``Noise(..., rollout=k)``
+    - `damping`, `friction`, `armature` (n,), (n, 1) or (n, joints); a number, numbers (joints,) or True hold
+      for all rollouts, as in `simulate`
+    - `q0` (n, nq), `v0` (n, nv); one row holds for all rollouts. The default is the start of the reference,
+      and rest if `q0` is given
+    - `noise` of the measurements: rollout k has the noise of ``simulate`` with ``Noise(..., rollout=k)``
 
-    `rollouts` is n, where no argument has n rows. Times [s], `delay`, `noise`, `friction_slip`,
-    `effort_limits`, `payload`, `mass_scale` and `pushes` are those of `simulate`. A `parametric` beside
-    a payload or scaled masses is one of ``plant_model(model, payload, mass_scale)``. With `record_every`
-    k every k-th state is kept.
+    `rollouts` is the number n of rollouts; it is needed if no argument has n rows. Times [s], `delay`,
+    `noise`, `friction_slip`, `effort_limits`, `payload`, `mass_scale` and `pushes` are those of `simulate`.
+    With a payload or scaled masses, `parametric` has to be made from ``plant_model(model, payload,
+    mass_scale)``. With `record_every` = k every k-th state is recorded.
 
-    The first argument may also be a `Scenario` on the plant ``compiled``, beside which only what may differ
-    from rollout to rollout is given. `BatchRollouts.scenario` is the one that all rollouts share.
+    The first argument may also be a `Scenario` on the plant ``compiled``; then only arguments that may differ
+    between rollouts can be given besides. `BatchRollouts.scenario` is the scenario that all rollouts share.
 
-    Parts are done by `threads` threads (None: all processors) or by any `executor`, also one of
-    processes or of a cluster; results are the same bit for bit. With `keep`, a folder, each part is
-    stored there when it is done, and a run that is started again with the same arguments goes on from
-    there. Ctrl-C raises BatchInterrupted, which has what was done. `progress` is called after each part.
+    The batch is divided into parts, which run on `threads` threads (None: one per processor) or in any
+    `concurrent.futures` `executor`, such as one of processes or of a cluster; results are the same bit for
+    bit. `keep` is a folder in which each finished part is stored; a run that is started again with the same
+    arguments continues from there. Ctrl-C raises BatchInterrupted, which has the finished rollouts.
+    `progress` is called after each part.
 
     Raises ArgumentError, GainError, LimitError, SingularMassMatrixError as `simulate` does, and
-    UnsupportedFeatureError for controllers that branch on their measurement. A rollout that diverges does
-    not stop the others: `BatchRollouts.diverged` has its time.
+    UnsupportedFeatureError for controllers that branch on their measurement. A rollout that diverges does not
+    stop the others: `BatchRollouts.diverged` has the time of divergence.
     """
     given = {name: value for name, value in locals().items() if name in field_names() and name != "model"}
     scenario, own = split_rows(model, given)
@@ -183,15 +184,15 @@ def simulate_batch(
     fixed = {name: rows.spread(array) for name, array in fixed.items()}
     state = controller.initial_state()
     zeros = np.zeros((n, moved.nv))
-    start |= {"worst": zeros, "squares": zeros}
+    start |= {"max_error": zeros, "squared_errors": zeros}
     if limit is not None:
-        start["cut"] = zeros
+        start["steps_at_limit"] = zeros
     if state is not None:
         start["state"] = np.tile(state, (n, 1))
     deviations = None if noise is None else noise.deviations(moved.nv)
     wrenches = acting.wrenches(clock) if acting.pushes else np.zeros((clock.n_steps, 0))
-    kernels = _kernels(step, clock, wrenches)
-    goals = setup.setpoint_of(clock.times()[1:]).q
+    kernels = _step_kernels(step, clock, wrenches)
+    references = setup.setpoint_of(clock.times()[1:]).q
     setpoints = Setpoint(*setup.setpoint_of(clock.control_times(controller.lead)))
     parts = [
         Part(
@@ -203,7 +204,7 @@ def simulate_batch(
             {name: array[first : first + PART] for name, array in start.items()},
             {name: array[first : first + PART] for name, array in fixed.items()},
             setpoints,
-            goals,
+            references,
             wrenches,
             None
             if noise is None or deviations is None
@@ -213,13 +214,13 @@ def simulate_batch(
         for first in range(0, n, PART)
     ]
     store = None if keep is None else Store(keep, scenario)
-    done: dict[int, PartDone] = {}
+    done: dict[int, PartOutcome] = {}
 
     def outcome() -> BatchRollouts:
-        return _joined(scenario, clock, parts, done, record_every)
+        return _batch_rollouts(scenario, clock, parts, done, record_every)
 
     try:
-        _work(parts, done, checked_threads(threads), executor, store, progress, n)
+        _run_parts(parts, done, checked_threads(threads), executor, store, progress, n)
     except KeyboardInterrupt:
         raise BatchInterrupted(outcome()) from None
     return outcome()
@@ -242,8 +243,9 @@ def refuse_uncompiled(scenario: Scenario) -> None:
     require_duration(scenario)
 
 
-def _kernels(step: FusedStep, clock: Clock, wrenches: Floats) -> StepKernels:
-    """Return the kernels of the steps with and without controller and pushes, as far as they occur."""
+def _step_kernels(step: FusedStep, clock: Clock, wrenches: Floats) -> StepKernels:
+    """Return the kernels of a step with and without controller and pushes, for the combinations that
+    occur."""
     controlled = np.arange(clock.n_steps) % clock.steps_per_control == 0
     kinds = set(zip(controlled.tolist(), pushing(wrenches), strict=True))
     return {
@@ -252,18 +254,18 @@ def _kernels(step: FusedStep, clock: Clock, wrenches: Floats) -> StepKernels:
     }
 
 
-def _work(
+def _run_parts(
     parts: list[Part],
-    done: dict[int, PartDone],
+    done: dict[int, PartOutcome],
     threads: int,
     executor: Executor | None,
     store: Store | None,
     progress: Progress | None,
     n: int,
 ) -> None:
-    """Do all parts that are not stored; `done` is filled as they end."""
+    """Run all parts that are not stored yet; `done` is filled as they finish."""
 
-    def finished(number: int, outcome: PartDone) -> None:
+    def finished(number: int, outcome: PartOutcome) -> None:
         done[number] = outcome
         if progress is not None:
             progress(sum(parts[k].count for k in done), n)
@@ -276,7 +278,7 @@ def _work(
         else:
             finished(number, kept)
     pool = ThreadPoolExecutor(threads, thread_name_prefix="dynx batch") if executor is None else executor
-    futures: dict[Future[PartDone], int] = {}
+    futures: dict[Future[PartOutcome], int] = {}
     try:
         for number in left:
             futures[pool.submit(parts[number])] = number
@@ -301,23 +303,23 @@ def _work(
                     store.write(parts[number], future.result())
 
 
-def _joined(
-    scenario: Scenario, clock: Clock, parts: list[Part], done: dict[int, PartDone], record_every: int
+def _batch_rollouts(
+    scenario: Scenario, clock: Clock, parts: list[Part], done: dict[int, PartOutcome], record_every: int
 ) -> BatchRollouts:
     kept = clock.n_steps // record_every if record_every else 0
     nq, nv = scenario.model.nq, scenario.model.nv
 
-    def nothing(count: int) -> PartDone:
+    def nothing(count: int) -> PartOutcome:
         q, row, undone = (
             np.full((count, nq), np.nan),
             np.full((count, nv), np.nan),
             np.full(count, -1.0),
         )
         q_record, record = np.full((count, kept, nq), np.nan), np.full((count, kept, nv), np.nan)
-        return PartDone(q, row, row, row, undone, q_record, record, record, row)
+        return PartOutcome(q, row, row, row, undone, q_record, record, record, row)
 
     outcomes = [done.get(number, nothing(part.count)) for number, part in enumerate(parts)]
-    whole = PartDone(*(np.concatenate(arrays) for arrays in zip(*outcomes, strict=True)))
+    whole = PartOutcome(*(np.concatenate(arrays) for arrays in zip(*outcomes, strict=True)))
     finished = np.concatenate([np.full(part.count, k in done) for k, part in enumerate(parts)])
     diverged = np.where(whole.diverged < 0, np.nan, whole.diverged * clock.dt)
     times = clock.times()[record_every::record_every] if record_every else np.zeros(0)

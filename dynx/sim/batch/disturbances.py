@@ -1,7 +1,7 @@
 """Friction, armature and pushes of many rollouts, on symbols.
 
-They are those of one rollout (`dynx.sim.plants.disturbances`). Coefficients of joints may differ
-from rollout to rollout; those are inputs of the kernel, all others are constants in it.
+They mean the same as for one rollout (`dynx.sim.plants.disturbances`). Coefficients of joints that differ
+between rollouts are inputs of the kernel; all others are constants in it.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ WRENCH = 6
 """Size of the wrench of one push."""
 
 PLACEHOLDER = 1.0
-"""Coefficient in `Disturbances` where each rollout has its own, which is an input of the kernel."""
+"""Value in `Disturbances` of a coefficient that each rollout has as an input of the kernel."""
 
 
 @dataclass(frozen=True)
@@ -34,15 +34,15 @@ class BatchDisturbances:
     armature: Floats
     """Armature (nv,) [kg m^2 or kg], added to the diagonal of the mass matrix."""
     varied: Mapping[str, int]
-    """Number of joints of the coefficients that differ from rollout to rollout, by name."""
+    """Number of joints with a coefficient that differs between rollouts, by the name of the coefficient."""
     pushes: tuple[Push, ...]
 
     @classmethod
     def of(cls, model: Model, disturbances: Disturbances, varied: Mapping[str, Floats]) -> BatchDisturbances:
-        """Return those of `disturbances`, with coefficients (n, joints) in the places of their
+        """Make the disturbances of a batch; `varied` has the coefficients (n, joints) that replace
         placeholders."""
         sizes = {name: rows.shape[1] for name, rows in varied.items()}
-        # A joint of the tree depends on at most one coordinate, so the armature has no other entries.
+        # Each joint depends on at most one coordinate, so the armature matrix is diagonal.
         armature = disturbances.armature.diagonal().copy()
         return cls(model, disturbances.friction, armature, sizes, disturbances.pushes)
 
@@ -51,8 +51,8 @@ class BatchDisturbances:
         return {**self.varied, **({"wrenches": WRENCH * len(self.pushes)} if pushed else {})}
 
     def wrenches(self, clock: Clock) -> Floats:
-        """Return the wrenches of the pushes in each step (n_steps, 6 of each push), zero outside their
-        time."""
+        """Return the wrenches of the pushes in each step (n_steps, 6 per push), zero while a push does not
+        act."""
         times = clock.times()[:-1]
         acting = np.stack([push.acts(times, clock.dt) for push in self.pushes], axis=1)
         strength = np.array([push.wrench for push in self.pushes], dtype=np.float64)
@@ -68,7 +68,7 @@ class BatchDisturbances:
         *,
         pushed: bool,
     ) -> Array:
-        """Return the torque (nv,) of the motors, minus friction, plus that of the pushes."""
+        """Return `tau` minus the torque of friction plus the torque of the pushes (nv,)."""
         if self.joint_friction.present:
             damping, friction = (
                 self._in_place(name, constant, given)
@@ -85,11 +85,11 @@ class BatchDisturbances:
         return tau
 
     def armature_of(self, given: Mapping[str, Array]) -> Array | None:
-        """Return the armature (nv,), None without any."""
+        """Return the armature (nv,), or None if it is zero."""
         return self._in_place("armature", self.armature, given) if self.armature.any() else None
 
     def _in_place(self, name: str, constant: Floats, given: Mapping[str, Array]) -> Array:
-        """Return the coefficients of the rollout in the places of their placeholders, or the constants."""
+        """Replace placeholders by the coefficients of the rollout; constants stay."""
         if name not in self.varied:
             return constant
         found = np.zeros(len(constant), dtype=object)

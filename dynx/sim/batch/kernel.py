@@ -1,7 +1,7 @@
 """One step of a closed loop as one kernel: controller, plant and integrator, traced together.
 
-A controller is array code. Here it is run on symbols, with `dynx.rbd` in the place of its backend, and
-compiled with the dynamics of the plant: kind both need, such as sines and cosines, is computed once.
+A controller is array code. Here it runs on symbols, with `dynx.rbd` in place of its backend, and is compiled
+together with the dynamics of the plant: what both need, such as sines and cosines, is computed once.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from dynx.errors import ArgumentError, DynxError, TraceError, UnsupportedFeature
 from dynx.model import Mechanism, Model
 from dynx.sim.batch.disturbances import BatchDisturbances
 from dynx.sim.batch.traced_controller import innermost, traced_controller
-from dynx.sim.loop.controller_checks import Unchanged, defect_of_outcome, is_row
+from dynx.sim.loop.controller_checks import ControllerWatch, defect_of_outcome, is_row
 from dynx.sim.plants.integrators import SemiImplicitEuler
 from dynx.simd.cache import load_kernel, program_recipe
 from dynx.simd.kernel import Kernel
@@ -33,7 +33,7 @@ from dynx.spatial.scalar import Array, Floats, clamp, sign
 from dynx.trajectory.base import Setpoint
 
 MAX_CACHED_KERNELS = 32
-"""Number of kernels kept for later batches in this process."""
+"""Number of kernels that this process keeps for later batches."""
 
 _made: dict[Hashable, Kernel] = {}
 
@@ -47,11 +47,11 @@ class FusedStep:
     controller: Controller[Any]
     dt: float
     gains: tuple[str, ...]
-    """Names of the gains that each rollout has of its own."""
+    """Names of the gains that differ between rollouts."""
     plant: ParametricDynamics | None
     noisy: bool
     delayed: bool
-    """Whether the controller measures an earlier state."""
+    """Whether measurements are delayed."""
     limit: Floats | None
     disturbances: BatchDisturbances
 
@@ -71,8 +71,8 @@ class FusedStep:
             )
 
     def kernel(self, *, controlled: bool, pushed: bool) -> Kernel:
-        """Return the kernel of a step: with the controller evaluated if `controlled`, otherwise with the last
-        `tau`; with the pushes if `pushed`.
+        """Return the kernel of a step, which evaluates the controller if `controlled` and holds the last
+        torque otherwise, and includes the pushes if `pushed`.
 
         Raises UnsupportedFeatureError for a controller that branches on its measurement.
         """
@@ -88,11 +88,11 @@ class FusedStep:
         return kernel
 
     def _content(self) -> Hashable:
-        """Return the key of all that selects the kernel. Raises TypeError for a controller that is not
-        declared pure."""
+        """Return a key of everything that the kernel depends on. Raises TypeError for a controller that is
+        not declared pure."""
         if not all(each.is_pure for each in chain_of(self.controller)):
             raise TypeError(f"{self.controller.name} is not declared pure")
-        # A plant is never changed, and the key holds on to it, so its identity is enough.
+        # A plant is immutable and the key keeps a reference to it, so its identity suffices.
         others = (each.name for each in fields(self) if each.name not in ("controller", "plant"))
         own = content_of([getattr(self, name) for name in others])
         return own, content_of(traced_controller(self.controller, {})), self.plant
@@ -105,68 +105,75 @@ class FusedStep:
             if controlled:
                 results = self._commanded(controller, given)
             else:
-                results = {name: given[name] for name in ("state", "cut") if name in given}
+                results = {name: given[name] for name in ("state", "steps_at_limit") if name in given}
             tau = results["tau"] if controlled else given["tau"]
             center = self._center(given) if self.model.floating else None
             scheme = SemiImplicitEuler(self.model, self.dt, center)
             accelerate = partial(self._acceleration, mechanism, given, pushed)
             q, v, _ = scheme(accelerate, given["q"], given["v"], tau)
-            goal = given["goal"]
-            error = abs(difference(q, goal) if self.model.floating else goal - q)
-            worst = np.array([x.maximum(e) for x, e in zip(given["worst"], error, strict=True)])
-            return {"q": q, "v": v, "worst": worst, "squares": given["squares"] + error * error, **results}
+            q_reference = given["q_reference"]
+            error = abs(difference(q, q_reference) if self.model.floating else q_reference - q)
+            max_error = np.array([x.maximum(e) for x, e in zip(given["max_error"], error, strict=True)])
+            return {
+                "q": q,
+                "v": v,
+                "max_error": max_error,
+                "squared_errors": given["squared_errors"] + error * error,
+                **results,
+            }
 
         try:
             program = trace(step, self.sizes(controlled=controlled, pushed=pushed))
         except TraceError as error:
             raise UnsupportedFeatureError(
-                f"{self.controller.name} cannot be fused with the plant: it branches on a value: {error}"
+                f"{self.controller.name} cannot be compiled together with the plant: "
+                f"it branches on a value: {error}"
             ) from error
         except DynxError:
             raise
         except Exception as error:
             raise UnsupportedFeatureError(
-                f"{self.controller.name} cannot be fused with the plant: run on symbols in the place of "
-                f"numbers it failed with {type(error).__name__}: {error}"
+                f"{self.controller.name} cannot be compiled together with the plant: with symbols instead "
+                f"of numbers it raised {type(error).__name__}: {error}"
             ) from error
         return load_kernel(program_recipe(program), lambda: program)
 
     def sizes(self, *, controlled: bool, pushed: bool) -> dict[str, tuple[int]]:
         """Return the inputs of a step in their order, and their sizes."""
         nq, nv = self.model.nq, self.model.nv
-        sizes = {"q": nq, "v": nv, "worst": nv, "squares": nv, "goal": nq}
+        sizes = {"q": nq, "v": nv, "max_error": nv, "squared_errors": nv, "q_reference": nq}
         if not controlled:
             sizes["tau"] = nv
         else:
             sizes |= {"q_wanted": nq, "v_wanted": nv, "a_wanted": nv, "t": 1}
             if self.delayed:
-                sizes |= {"q_seen": nq, "v_seen": nv}
+                sizes |= {"q_measured": nq, "v_measured": nv}
             if self.noisy:
                 sizes |= {"noise_q": nv, "noise_v": nv}
             known = gains_of(innermost(self.controller))
             sizes |= {f"gain_{name}": known[name].size for name in self.gains}
             if self.limit is not None:
-                sizes["held_for"] = 1
+                sizes["steps_held"] = 1
         state = self.controller.initial_state()
         if state is not None:
             sizes["state"] = state.size
         if self.limit is not None:
-            sizes["cut"] = nv
+            sizes["steps_at_limit"] = nv
         if self.plant is not None:
             sizes["parameters"] = len(self.plant.parameters.names)
         sizes |= self.disturbances.sizes(pushed=pushed)
         return {name: (size,) for name, size in sizes.items()}
 
     def _commanded(self, controller: Controller[Any], given: Mapping[str, Array]) -> dict[str, Array]:
-        """Return the torque within the limits, controller state, and number of steps with motors at their
+        """Return the torque within the limits, the controller state, and the number of steps at the effort
         limits."""
-        q, v = (given["q_seen"], given["v_seen"]) if self.delayed else (given["q"], given["v"])
+        q, v = (given["q_measured"], given["v_measured"]) if self.delayed else (given["q"], given["v"])
         if self.noisy:
             off = given["noise_q"]
             q, v = integrate(q, off) if self.model.floating else q + off, v + given["noise_v"]
         setpoint = Setpoint(given["q_wanted"], given["v_wanted"], given["a_wanted"])
         own = traced_controller(controller, {name: given[f"gain_{name}"] for name in self.gains})
-        watch = Unchanged(own)
+        watch = ControllerWatch(own)
         outcome = own.torque(Measurement(given["t"][0], q, v), setpoint, given.get("state"))
         defect = defect_of_outcome(outcome)
         if defect:
@@ -174,7 +181,7 @@ class FusedStep:
         tau, state = outcome
         if watch.changed:
             raise UnsupportedFeatureError(
-                f"{watch.changed}, which a batch would do only once: let it return its state"
+                f"{watch.changed}; a batch would repeat only the first change: let torque return its state"
             )
         if state is not None and "state" not in given:
             raise UnsupportedFeatureError(f"{own.name} returns a state, but its initial_state() returns None")
@@ -187,11 +194,11 @@ class FusedStep:
             return {"tau": tau, **results}
         tau = clamp(tau, self.limit)
         bounded = np.isfinite(self.limit)
-        cut = np.array(given["cut"])
-        # Symbols also where a controller returns plain numbers.
-        left = self.limit[bounded] - abs(tau[bounded] + 0.0 * cut[bounded])
-        cut[bounded] = cut[bounded] + given["held_for"] * (1.0 - sign(left))
-        return {"tau": tau, "cut": cut, **results}
+        steps_at_limit = np.array(given["steps_at_limit"])
+        # A controller may return plain numbers; the kernel needs symbols.
+        left = self.limit[bounded] - abs(tau[bounded] + 0.0 * steps_at_limit[bounded])
+        steps_at_limit[bounded] = steps_at_limit[bounded] + given["steps_held"] * (1.0 - sign(left))
+        return {"tau": tau, "steps_at_limit": steps_at_limit, **results}
 
     def _acceleration(
         self,

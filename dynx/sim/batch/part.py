@@ -1,4 +1,4 @@
-"""Part of a batch: some of its rollouts from start to end, as work for any thread or process."""
+"""Part of a batch: some of its rollouts from start to end, which any thread or process can simulate."""
 
 from __future__ import annotations
 
@@ -15,24 +15,24 @@ from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint
 
 STEPS_BETWEEN_CHECKS = 100
-"""Steps between two checks for rollouts that diverged."""
+"""Number of steps between two checks for divergence."""
 
 DIVERGENCE_BOUND = 1e8
-"""Coordinate [rad or m] or speed [rad/s or m/s] from which on a rollout has diverged."""
+"""Coordinate [rad or m] or speed [rad/s or m/s] above which a rollout counts as diverged."""
 
 
-class PartDone(NamedTuple):
+class PartOutcome(NamedTuple):
     """The outcome of `count` rollouts."""
 
     q: Floats  # (count, nq), at the end
     v: Floats  # (count, nv), at the end
     max_error: Floats  # (count, nv)
     rms_error: Floats  # (count, nv)
-    diverged: Floats  # (count,), the step by which it was noticed, or -1
+    diverged: Floats  # (count,), the step of the check that found it, or -1
     q_record: Floats  # (count, kept, nq)
     v_record: Floats  # (count, kept, nv)
     tau_record: Floats  # (count, kept, nv)
-    saturated: Floats  # (count, nv), the share of steps with the motor at its limit
+    saturated: Floats  # (count, nv), the share of steps at the effort limit
 
 
 class PartNoise(NamedTuple):
@@ -47,7 +47,7 @@ class PartNoise(NamedTuple):
 
 
 StepKernels = dict[tuple[bool, bool], Kernel]
-"""Kernels by whether the controller is evaluated, and whether a push acts."""
+"""Kernels by two conditions: the controller is evaluated, a push acts."""
 
 
 def pushing(wrenches: Floats) -> list[bool]:
@@ -62,26 +62,27 @@ class Part:
     kernels: StepKernels
     steps_per_control: int
     delay_steps: int
-    """Delay of the measurements; so many states are kept."""
+    """Delay of the measurements [steps], for which as many states are kept."""
     n_steps: int
     dt: float
     start: dict[str, Floats]
-    """State at the beginning, arrays (count, size): q and v, maximum error and sum of squared errors of each
-    coordinate (``worst``, ``squares``), the controller state (``state``), and the number of steps with the
-    motor at its limit (``cut``)."""
+    """Initial state as arrays (count, size): q and v, maximum error and sum of squared errors of each
+    coordinate (``max_error``, ``squared_errors``), the controller state (``state``), and the number of
+    steps at the effort limit (``steps_at_limit``)."""
     fixed: dict[str, Floats]
     """Constant inputs: parameters and gains (count, size)."""
     setpoints: Setpoint
-    """Setpoints of the control steps, (n_controls, nq) and (n_controls, nv) twice."""
-    goals: Floats
+    """Setpoints of the control steps: position (n_controls, nq), velocity and acceleration (n_controls,
+    nv)."""
+    references: Floats
     """Reference configuration after each step (n_steps, nq)."""
     wrenches: Floats
-    """Wrenches of the pushes in each step (n_steps, 6 of each push)."""
+    """Wrenches of the pushes in each step (n_steps, 6 per push)."""
     noise: PartNoise | None
     record_every: int
 
-    def __call__(self) -> PartDone:
-        """Simulate the rollouts."""
+    def __call__(self) -> PartOutcome:
+        """Simulate the rollouts of the part."""
         return _Run(self).run()
 
     @cached_property
@@ -93,18 +94,19 @@ class Part:
 class _Run:
     """Buffers of a part while it runs: the state is read from one set and written to the next.
 
-    The number of sets grows with the delay, so that nothing is copied for a late measurement. All sets begin
-    as the start, which is measured before the first step.
+    There are enough sets for the delay, so that delayed measurements need no copies. All sets start with the
+    initial state, which is what the controller measures until the delay has passed.
     """
 
     def __init__(self, part: Part) -> None:
         self._part = part
-        # A kernel needs at least a full vector of samples; the last one is repeated.
+        # A kernel needs at least a full vector of samples, so the last rollout is repeated.
         self._rows = max(part.count, *(kernel.image.lanes for kernel in part.kernels.values()))
         nv = int(part.start["v"].shape[1])
         self._tau = np.zeros((self._rows, nv))
         start = {name: self._padded(array) for name, array in part.start.items()}
-        # The rest of the state needs two sets, which take turns as well if the number of sets is even.
+        # The rest of the state needs two sets, which alternate in step with the others if their number is
+        # even.
         sets = 2 * ((part.delay_steps + 3) // 2)
         pair = (start, {name: array.copy() for name, array in start.items()})
         self._sets = [
@@ -112,8 +114,8 @@ class _Run:
             for k in range(sets)
         ]
         self._fixed = {name: self._padded(array) for name, array in part.fixed.items()}
-        widths: dict[str, int] = {**dict.fromkeys(("v_wanted", "a_wanted"), nv), "t": 1, "held_for": 1}
-        widths |= dict.fromkeys(("q_wanted", "goal"), int(part.goals.shape[1]))
+        widths: dict[str, int] = {**dict.fromkeys(("v_wanted", "a_wanted"), nv), "t": 1, "steps_held": 1}
+        widths |= dict.fromkeys(("q_wanted", "q_reference"), int(part.references.shape[1]))
         widths["wrenches"] = int(part.wrenches.shape[1])
         self._common = {name: np.zeros((1, width)) for name, width in widths.items()}
         self._pushing = pushing(part.wrenches)
@@ -131,7 +133,7 @@ class _Run:
         self._diverged = np.full(self._rows, -1.0)
         self._records: tuple[list[Floats], list[Floats], list[Floats]] = ([], [], [])
 
-    def run(self) -> PartDone:
+    def run(self) -> PartOutcome:
         """Take all steps."""
         part, n = self._part, self._part.count
         sets, common = len(self._sets), self._common
@@ -139,7 +141,7 @@ class _Run:
             number, rest = divmod(step, part.steps_per_control)
             if rest == 0:
                 self._set_control(number)
-            common["goal"][0] = part.goals[step]
+            common["q_reference"][0] = part.references[step]
             pushed = self._pushing[step]
             if pushed:
                 common["wrenches"][0] = part.wrenches[step]
@@ -156,16 +158,18 @@ class _Run:
             np.stack(kept, axis=1) if kept else np.zeros((n, 0, array.shape[1]))
             for kept, array in zip(self._records, (last["q"], last["v"], self._tau), strict=True)
         )
-        return PartDone(
+        return PartOutcome(
             q=last["q"][:n].copy(),
             v=last["v"][:n].copy(),
-            max_error=last["worst"][:n].copy(),
-            rms_error=np.sqrt(last["squares"][:n] / part.n_steps),
+            max_error=last["max_error"][:n].copy(),
+            rms_error=np.sqrt(last["squared_errors"][:n] / part.n_steps),
             diverged=self._diverged[:n].copy(),
             q_record=q,
             v_record=v,
             tau_record=tau,
-            saturated=last["cut"][:n] / part.n_steps if "cut" in last else np.zeros((n, self._tau.shape[1])),
+            saturated=last["steps_at_limit"][:n] / part.n_steps
+            if "steps_at_limit" in last
+            else np.zeros((n, self._tau.shape[1])),
         )
 
     def _set_control(self, number: int) -> None:
@@ -174,12 +178,12 @@ class _Run:
             self._common[name][0] = rows[number]
         first = number * part.steps_per_control
         self._common["t"][0, 0] = first * part.dt
-        self._common["held_for"][0, 0] = min(part.steps_per_control, part.n_steps - first)
+        self._common["steps_held"][0, 0] = min(part.steps_per_control, part.n_steps - first)
         if part.noise is not None:
             self._draw(number, part.noise)
 
     def _draw(self, number: int, noise: PartNoise) -> None:
-        """Set the noise at a control step; that of a block of steps is drawn together."""
+        """Set the noise of a control step; noise is drawn for a block of steps at once."""
         step = number % BLOCK_STEPS
         if step == 0:
             left = -(-self._part.n_steps // self._part.steps_per_control) - number
@@ -191,14 +195,14 @@ class _Run:
     def _bound(self, kernel: Kernel, turn: int) -> Callable[[], None]:
         sets = len(self._sets)
         source, target = self._sets[turn], self._sets[(turn + 1) % sets]
-        seen = self._sets[(turn - self._part.delay_steps) % sets]
+        measured = self._sets[(turn - self._part.delay_steps) % sets]
         known = {
             **self._fixed,
             **self._noise,
             **{name: np.broadcast_to(row, (self._rows, row.size)) for name, row in self._common.items()},
             "tau": self._tau,
-            "q_seen": seen["q"],
-            "v_seen": seen["v"],
+            "q_measured": measured["q"],
+            "v_measured": measured["v"],
             **source,
         }
         written = {"tau": self._tau, **target}

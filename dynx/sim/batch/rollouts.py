@@ -24,22 +24,22 @@ SCHEMA = "dynx.rollouts/2"
 class BatchRollouts:
     """The outcome of n rollouts, one in each row; rows that were not computed are NaN.
 
-    Errors are those of the configuration at the ends of all steps, `model.difference` to the reference there.
-    The record has the states after every `record_every` steps, and the torque that led there.
+    Errors are `model.difference` from the configuration at the end of each step to the reference there. The
+    record has the states after every `record_every` steps, and the torque of the step before.
     """
 
-    scenario: Scenario  # that all rollouts share; arguments with a row for each rollout are not in it
+    scenario: Scenario  # shared by all rollouts, without the arguments that have a row for each rollout
     q: Floats  # (n, nq), at the end
     v: Floats  # (n, nv), at the end
     max_error: Floats  # (n, nv)
     rms_error: Floats  # (n, nv)
-    diverged: Floats  # (n,), the time [s] by which a rollout was seen to diverge; NaN if it did not
+    diverged: Floats  # (n,), the time [s] of the check that found divergence; NaN if there was none
     done: Any  # (n,) bool
     t: Floats  # (kept,), the times of the record [s]
     q_record: Floats  # (n, kept, nq)
     v_record: Floats  # (n, kept, nv)
     tau_record: Floats  # (n, kept, nv)
-    saturated: Floats  # (n, nv), the share of steps with the motor at its limit
+    saturated: Floats  # (n, nv), the share of steps at the effort limit
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -61,8 +61,8 @@ class BatchRollouts:
         return np.where(np.isnan(self.diverged), worst, np.where(self.done, np.inf, np.nan))
 
     def quantiles(self, levels: Sequence[float] = (0.05, 0.5, 0.95)) -> Floats:
-        """Return the quantiles (len(levels),) of `worst` over the rollouts that were computed; NaN if none
-        was."""
+        """Return the quantiles (len(levels),) of `worst` over the computed rollouts; NaN if there are
+        none."""
         worst = self.worst[self.done]
         if not len(worst):
             return np.full(len(levels), np.nan)
@@ -90,8 +90,8 @@ class BatchRollouts:
         return cls(Scenario.from_json(str(entries["scenario"])), **arrays)
 
     def plot(self, path: str | os.PathLike[str] | None = None) -> Any:
-        """Return a `matplotlib.figure.Figure`: how many rollouts stay below an error, and each joint's
-        errors.
+        """Plot the share of rollouts below each error, and the errors of each joint; return the `matplotlib`
+        figure.
 
         Raises NotInstalledError without matplotlib (``pip install 'dynx[plot]'``).
         """

@@ -1,4 +1,4 @@
-"""Inputs of a batch that may have a row for each rollout."""
+"""Inputs of a batch that may have one row for each rollout."""
 
 from __future__ import annotations
 
@@ -17,18 +17,19 @@ from dynx.sim.scenario.scenario import Scenario
 from dynx.spatial.scalar import Floats
 
 PLANT = "compiled"
-"""The plant of `dynx.simulate` that a batch runs on."""
+"""Name of the plant of `dynx.simulate` whose results a batch gives."""
 
 COEFFICIENTS = ("damping", "friction", "armature")
 
 PER_ROLLOUT = ("q0", "v0", *COEFFICIENTS)
-"""Fields of a scenario that a batch may have a row of for each rollout."""
+"""Fields of a scenario that may have one row for each rollout of a batch."""
 
 
 def split_rows(model: Model | Scenario, given: Mapping[str, Any]) -> tuple[Scenario, dict[str, Any]]:
     """Return the scenario that all rollouts share, and the arguments with a row for each rollout, by name.
 
-    `given` are fields of a scenario, or what replaces those of `PER_ROLLOUT` in the one in place of a model.
+    `given` are fields of a scenario. If `model` is a scenario, they replace its fields, and only those of
+    `PER_ROLLOUT` may be given.
     """
     own = {name: given[name] for name in PER_ROLLOUT if given[name] is not None and given[name] is not False}
     fixed = {name: value for name, value in given.items() if name not in PER_ROLLOUT}
@@ -55,8 +56,8 @@ def _has_rows(name: str, value: Any, joints: int) -> bool:
 
 
 def coefficient_rows(name: str, values: ArrayLike, joints: int) -> Floats:
-    """Return (n, joints) of one number, or one for each joint, for every rollout. Raises GainError for
-    others."""
+    """Return the coefficients of each rollout (n, joints), from one number or one for each joint per rollout.
+    Raises GainError for invalid coefficients."""
     array = real_array(name, values)
     rows = array[:, None] if array.ndim == 1 else array
     if rows.ndim != 2 or rows.shape[1] not in (1, joints):
@@ -80,7 +81,7 @@ def refuse_ambiguous(given: Mapping[str, Any], joints: int, n: int) -> None:
 
 
 class RolloutRows:
-    """Arrays with one row for each rollout, and the number of rollouts that follows from them."""
+    """Checks of arrays with one row for each rollout, which determine the number of rollouts."""
 
     def __init__(self, asked: int | None) -> None:
         if asked is not None and (isinstance(asked, bool) or not isinstance(asked, int) or asked < 1):
@@ -90,11 +91,12 @@ class RolloutRows:
 
     @property
     def count(self) -> int:
-        """The number; 1 where no argument has several rows."""
+        """Number of rollouts; 1 where no argument has several rows."""
         return 1 if self._asked is None else self._asked
 
     def of(self, name: str, values: ArrayLike, size: int, *, spread: bool = False) -> Floats:
-        """Return `values` as (size,) or (n, size), finite; `spread` lets a last axis of 1 stand for all."""
+        """Return `values` as a finite array (size,) or (n, size); with `spread`, a last axis of length 1
+        holds for all."""
         array = np.asarray(values, dtype=np.float64) if spread else checked_array(name, values, size)
         if spread and array.ndim and array.shape[-1] == 1:
             array = np.broadcast_to(array, (*array.shape[:-1], size))
@@ -110,11 +112,11 @@ class RolloutRows:
         return array
 
     def spread(self, array: Floats) -> Floats:
-        """Return (n, size)."""
+        """Return `array` with one row for each rollout (n, size)."""
         return np.array(np.broadcast_to(array, (self.count, array.shape[-1])))
 
 
 def columns_of(values: ArrayLike) -> Floats:
-    """Return (n,) as (n, 1), (n, size) as it is."""
+    """Return an array (n,) as a column (n, 1); an array (n, size) stays as it is."""
     array = np.asarray(values, dtype=np.float64)
     return array[:, None] if array.ndim == 1 else array

@@ -15,15 +15,15 @@ from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED
 from dynx.spatial.scalar import Array
 
 FRAME_FUNCTIONS = {"forward_kinematics": "frame_placement"}
-"""Names of `dynx.compiled.kernels` for quantities of a frame, where they are others."""
+"""Names in `dynx.compiled.kernels` of quantities of a frame that have another name there."""
 
 
 class ArrayDynamics(Dynamics):
-    """Dynamics evaluated by the array code of `dynx.rbd`, for symbols as for numbers."""
+    """Dynamics evaluated by the array code of `dynx.rbd`, on symbols or on numbers."""
 
     @cached_property
     def _mechanism(self) -> Mechanism:
-        # Many batches find their kernels in the cache and evaluate nothing.
+        # Computed on first use: a batch whose kernels are cached evaluates nothing.
         return simplify_mechanism(self.model.mechanism)
 
     def evaluation(self, quantity: str) -> Evaluation:
@@ -47,8 +47,8 @@ class ArrayDynamics(Dynamics):
 
 
 def traced_controller(controller: Controller[Any], gains: Mapping[str, Array]) -> Controller[Any]:
-    """Return the controller over array code in the place of an engine, with other gains in the innermost
-    one."""
+    """Return the controller with array code in place of its engine, and with other gains in its innermost
+    controller."""
     last = innermost(controller)
     return rebind(
         controller,
@@ -58,5 +58,5 @@ def traced_controller(controller: Controller[Any], gains: Mapping[str, Array]) -
 
 
 def innermost(controller: Controller[Any]) -> Controller[Any]:
-    """Return the controller without those that are wrapped around it."""
+    """Return the controller without any wrapping controllers."""
     return list(chain_of(controller))[-1]

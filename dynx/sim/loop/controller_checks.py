@@ -1,4 +1,4 @@
-"""Checks of a controller before and while it is simulated, and its numbers for the record."""
+"""Checks of a controller before and during a simulation, and its numbers for the record."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ MAX_LISTED_NUMBERS = 64
 
 
 def check_controller(model: Model, controller: Controller[Any], clock: Clock) -> None:
-    """Refuse a controller of another robot, or made for another control step, by an ArgumentError."""
+    """Raise ArgumentError for a controller of another robot or one made for another control step."""
     known = getattr(controller, "model", None)
     if not isinstance(known, Model):
         raise ArgumentError(
@@ -65,20 +65,20 @@ def controller_numbers(controller: Controller[Any]) -> dict[str, Any]:
 
 
 def is_row(state: Any) -> bool:
-    """Check whether a controller's state is an array (n,) of float64, which kernels need."""
+    """Check whether a controller's state is an array (n,) of float64, as kernels require."""
     return isinstance(state, np.ndarray) and state.dtype == np.float64 and state.ndim == 1
 
 
 def defect_of_outcome(outcome: Any) -> str | None:
-    """Return the message for a result of `torque` that is no pair; None for a pair."""
+    """Describe what is wrong with a result of `torque` that is not a pair; return None for a pair."""
     if isinstance(outcome, tuple) and len(outcome) == 2:
         return None
     kind = f"an array of shape {outcome.shape}" if isinstance(outcome, np.ndarray) else shown(outcome)
     return f"torque must return (tau, state), with None for the state if there is none; it returned {kind}"
 
 
-class Unchanged:
-    """Detects a controller that changes itself, and so hides its state."""
+class ControllerWatch:
+    """Detector of controllers that change their own attributes, so that their state is hidden."""
 
     def __init__(self, controller: Controller[Any]) -> None:
         self._before = [(each, _contents(each)) for each in chain_of(controller)]
@@ -94,23 +94,22 @@ class Unchanged:
         return None
 
     def refuse_changed(self) -> None:
-        """Raise ArgumentError for a controller that changed since then."""
+        """Raise ArgumentError for a controller that changed since this object was made."""
         if self.changed:
             raise ArgumentError(
-                f"{self.changed}, so a rollout under it can neither be repeated nor be resumed: keep what "
+                f"{self.changed}, so a rollout with it can be neither repeated nor resumed: keep what "
                 "changes in the controller's state, which torque receives and returns"
             )
 
 
 def _contents(controller: Controller[Any]) -> dict[str, tuple[Any, Hashable]]:
-    """Return the attributes of a controller and their contents; the attributes themselves keep their identity
-    taken."""
+    """Return the attributes of a controller with their contents. Keeping the attributes prevents that
+    Python reuses their identity."""
     return {name: (value, _content(value)) for name, value in attributes_of(controller).items()}
 
 
 def _content(value: Any, depth: int = 0) -> Hashable:
-    """Return the content of an attribute to the last bit, and the identity of an object whose content is not
-    known."""
+    """Return the exact content of an attribute; for an object of unknown content, its identity."""
     if isinstance(value, np.ndarray) and value.dtype != object:
         return value.dtype.str, value.shape, value.tobytes()
     if isinstance(value, float):
@@ -123,7 +122,7 @@ def _content(value: Any, depth: int = 0) -> Hashable:
         entries = ((_content(key, depth + 1), _content(each, depth + 1)) for key, each in value.items())
         return type(value), tuple(entries)
     foreign = type(value).__module__.partition(".")[0] not in ("dynx", "builtins")
-    # A controller inside is one of the chain, and an engine may keep what it likes.
+    # An inner controller is checked by itself, and an engine may change its own state.
     if depth < MAX_DEPTH and foreign and not isinstance(value, Controller | Backend | type):
         with suppress(TypeError):
             return id(value), _content(attributes_of(value), depth + 1)

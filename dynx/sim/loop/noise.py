@@ -1,7 +1,7 @@
-"""Measurement noise: one stream of normal numbers for each rollout, whoever draws it.
+"""Measurement noise: one stream of normal numbers for each rollout.
 
-The numbers are a function of the seed, the rollout and the control step. So a rollout of a batch has the
-same noise in any partition of the batch, on any processor and thread, and when it is simulated alone.
+The numbers depend only on the seed, the rollout and the control step. So a rollout of a batch has the same
+noise in any partition of the batch, on any processor and thread, and when it is simulated alone.
 """
 
 from __future__ import annotations
@@ -18,20 +18,21 @@ from dynx.model import Model
 from dynx.spatial.scalar import Floats
 
 BLOCK_STEPS = 64
-"""Control steps whose noise follows from one state of the generator."""
+"""Number of control steps whose noise is drawn from one state of the generator."""
 
 MAX_ROLLOUT = 2**63 - 1
-"""Largest number of a rollout: half of a word of the generator's key, so that a batch can count on."""
+"""Largest number of a rollout: half of the range of a word of the generator's key, so that the numbers of
+a batch, which follow it, still fit."""
 
 
 @dataclass(frozen=True)
 class Noise:
     """Gaussian noise on measurements: standard deviations of `q` [rad or m] and `v`, and a seed.
 
-    One number, or one for each coordinate (nv,); that of a floating base's pose is a displacement along
-    its own axes. Equal seeds give equal noise, in every plant. `rollout` is the number of the rollout in a
-    batch whose noise this is, and in a batch that of its first rollout: ``Noise(..., rollout=17)`` gives one
-    rollout the noise of rollout 17 of a batch with the same seed.
+    A standard deviation is one number, or one for each coordinate (nv,); for the pose of a floating base it
+    is a displacement along the axes of the base. Equal seeds give equal noise in every plant. ``Noise(...,
+    rollout=17)`` gives a single rollout the noise of rollout 17 of a batch with the same seed; for a batch,
+    `rollout` is the number of its first rollout.
     """
 
     q: ArrayLike = 0.0
@@ -64,13 +65,14 @@ class Noise:
 class NoiseStream:
     """Standard normal numbers by Philox4x64 (Salmon et al., Parallel Random Numbers, 2011).
 
-    Its key is the seed and the number of the rollout, its counter begins at the block of control steps.
+    The key of the generator is the seed and the number of the rollout; its counter is the block of control
+    steps.
     """
 
     def __init__(self, seed: int) -> None:
         self._bits: Any = np.random.Philox(0)
         self._normal = np.random.Generator(self._bits).standard_normal
-        # The setter copies these arrays, so one dictionary serves all states.
+        # The setter copies these arrays, so one dictionary can be reused for all states.
         self._key = np.array([np.random.SeedSequence(seed).generate_state(1, np.uint64)[0], 0])
         self._counter = np.zeros(4, dtype=np.uint64)
         self._state: dict[str, Any] = {
@@ -81,7 +83,8 @@ class NoiseStream:
         }
 
     def draw(self, rollout: int, control_step: int, numbers: Floats) -> None:
-        """Fill `numbers` (n, 2, nv) from `control_step` on, where a block begins; n is at most its length."""
+        """Fill `numbers` (n, 2, nv) from `control_step` on, which must be the first of a block; n is at
+        most `BLOCK_STEPS`."""
         self._key[1], self._counter[3] = rollout, control_step // BLOCK_STEPS
         self._bits.state = self._state
         self._normal(out=numbers)

@@ -1,7 +1,7 @@
 """The plain executor of a closed loop: measure, compute the torque, clamp it, step the plant, record.
 
-Arguments are checked before (`dynx.sim.setup`); the loop itself finds a torque that is not finite and a state
-that runs away.
+Arguments were checked before (`dynx.sim.setup`); the loop itself detects torques that are not finite and
+divergence of the state.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from dynx.control.base import Controller, Measurement
 from dynx.control.engine_motors import EngineMotor
 from dynx.errors import ControlError, DivergedError, SimulationError, shown
 from dynx.sim.clock import Clock
-from dynx.sim.loop.controller_checks import Unchanged, defect_of_outcome
+from dynx.sim.loop.controller_checks import ControllerWatch, defect_of_outcome
 from dynx.sim.loop.record import Record
 from dynx.sim.loop.sensors import Sensors
 from dynx.sim.loop.stops import Stops
@@ -30,18 +30,19 @@ from dynx.trajectory.base import Setpoint
 FLOAT64 = np.dtype(np.float64)
 
 PROGRESS_STEPS = 200
-"""Steps between two calls of `progress`."""
+"""Number of steps between two calls of `progress`."""
 
 PROBE_DISPLACEMENT = 1e-3
-"""Change of each measured coordinate [rad or m] and velocity [rad/s or m/s] in a probe of a controller."""
+"""Displacement of measured coordinates [rad or m] and velocities [rad/s or m/s] at which a controller is
+evaluated to see whether it changes itself."""
 
 DIVERGENCE_SPEED = 1e8
-"""Norm of the velocity [rad/s or m/s] from which on a simulation has diverged."""
+"""Norm of the velocity [rad/s or m/s] above which a simulation counts as diverged."""
 
 
 @dataclass
-class Held:
-    """State of a loop between two steps; its arrays are replaced, never written to."""
+class LoopState:
+    """State of a loop between two steps. Its arrays are replaced, never modified."""
 
     q: Floats
     v: Floats
@@ -69,46 +70,46 @@ class Loop:
 
     @cached_property
     def _constants(self) -> tuple[Any, ...]:
-        """Local variables of `advance`, which takes one step in some microseconds."""
+        """Values that `advance` needs as local variables, because a step takes only some microseconds."""
         motors = self.controller if isinstance(self.controller, EngineMotor) else None
         sensors = None if self.sensors.plain else self.sensors
         setpoints = list(map(Setpoint, *self.setpoints))
         nv = self.plant.model.nv
         return self.clock.steps_per_control, self.clock.dt, sensors, motors, setpoints, (nv,)
 
-    def start(self, record: Record) -> Held:
-        """Place the plant at the last state of `record`, and recompute what the loop held there."""
+    def start(self, record: Record) -> LoopState:
+        """Reset the plant to the last state of `record`, and recompute the state of the loop there."""
         begin = record.steps
         q, v = record.q[begin].copy(), record.v[begin].copy()
         self.place(q, v)
         tau, command = self._last_command(record)
-        return Held(q, v, tau, command, self.recovered_state(record))
+        return LoopState(q, v, tau, command, self.recovered_state(record))
 
     def place(self, q: Floats, v: Floats) -> None:
         """Make q (nq,), v (nv,) the state of the plant. Raises EngineError where its `reset` fails."""
         with plant_errors(type(self.plant), "cannot be reset"):
             self.plant.reset(q, v)
 
-    def advance(self, record: Record, held: Held, end: int, given: Floats | None = None) -> None:
-        """Step from the last state of `record` to step `end`, where the plant is placed at that state.
+    def advance(self, record: Record, loop_state: LoopState, end: int, given: Floats | None = None) -> None:
+        """Step from the last state of `record`, which the plant must be in, to step `end`.
 
         The torque `given` (nv,) replaces that of the controller, which is then not evaluated. Raises
-        DivergedError and ControlError; `record` and `held` are then those after the last whole step, as
-        they are after a Ctrl-C.
+        DivergedError and ControlError. After an error or Ctrl-C, `record` and `loop_state` are those of the
+        last complete step.
         """
         plant, controller = self.plant, self.controller
         per_control, dt, sensors, motors, setpoints, shape = self._constants
         Q, V, A, applied = record.q, record.v, record.a, record.tau
         begin = record.steps
-        q, v = held.q, held.v
-        tau, command, state = held.tau, held.command, held.controller_state
+        q, v = loop_state.q, loop_state.v
+        tau, command, state = loop_state.tau, loop_state.command, loop_state.controller_state
         limit, stops = self.limit, self.stops
         step, progress, next_call = plant.step, self.progress, begin
-        # The step of the next control step; none without a controller.
+        # Number of the step at which the controller is evaluated next; -1 if it never is.
         due = -1 if controller is None or given is not None else -(-begin // per_control) * per_control
         if given is not None:
             tau, command = given if limit is None else clamp(given, limit), None
-            held.tau, held.command = tau, None
+            loop_state.tau, loop_state.command = tau, None
         for k in range(begin, end):
             t = k * dt
             if k == due and controller is not None:
@@ -143,7 +144,8 @@ class Loop:
                         q, v = stopped
                         plant.reset(q, v)
             except Exception as error:
-                # Also what an engine raises: its hooks are called bare (`dynx.control.dynamics`).
+                # This includes the engine's own exceptions, because its hooks are called directly
+                # (`dynx.control.dynamics`).
                 raise self._step_failed(k, record, error) from error
             if not hypot(*v.tolist()) < DIVERGENCE_SPEED:
                 raise self._diverged(
@@ -151,7 +153,13 @@ class Loop:
                 )
             applied[k], A[k], Q[k + 1], V[k + 1] = tau, a, q, v
             record.steps = k + 1
-            held.q, held.v, held.tau, held.command, held.controller_state = q, v, tau, command, state
+            loop_state.q, loop_state.v, loop_state.tau, loop_state.command, loop_state.controller_state = (
+                q,
+                v,
+                tau,
+                command,
+                state,
+            )
             if progress is not None and k >= next_call:
                 next_call = k + PROGRESS_STEPS
                 progress(k + 1)
@@ -176,13 +184,13 @@ class Loop:
     def refuse_self_changing(self, record: Record) -> None:
         """Raise ArgumentError for a controller that changes itself when its torque is evaluated.
 
-        It is evaluated at the start and away from it, where its error is not zero.
+        It is evaluated at the start and at a displaced state, where the tracking error is not zero.
         """
         controller = self.controller
         if controller is None or isinstance(controller, EngineMotor):
             return
-        watch = Unchanged(controller)
-        # An error here is raised again in its step.
+        watch = ControllerWatch(controller)
+        # An error here will be raised again when the step is taken.
         with suppress(Exception):
             t, q, v = self.sensors(0, record.q, record.v)
             beside = controller.model.integrate(q, np.full_like(v, PROBE_DISPLACEMENT))
@@ -193,7 +201,7 @@ class Loop:
     def recovered_state(self, record: Record) -> Any:
         """Return the controller's state after the last step of `record`.
 
-        It is a function of the measurements until then, so it is not recorded but recomputed.
+        It depends only on the measurements until then, so it is recomputed instead of recorded.
         """
         if self.controller is None:
             return None
@@ -226,7 +234,7 @@ class Loop:
         return record.tau[begin - 1].copy(), None
 
     def _step_failed(self, k: int, record: Record, error: Exception) -> SimulationError:
-        """Return the error of a step: of a plant of the user's own a failure, of dynx's own a divergence."""
+        """Return the error of a step: a failure for a plant of the user, divergence for one of dynx."""
         kind, why = type(self.plant), f"{type(error).__name__}: {error}"
         if is_own(kind):
             return self._diverged(k, record, why)

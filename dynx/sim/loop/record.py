@@ -11,7 +11,8 @@ from dynx.spatial.scalar import Floats
 
 @dataclass
 class Record:
-    """States at n + 1 times, what acted in the n steps between, and the number of steps taken."""
+    """States at n + 1 times, torques and accelerations of the n steps between, and the number of steps
+    taken."""
 
     q: Floats
     v: Floats
@@ -21,7 +22,7 @@ class Record:
 
     @classmethod
     def begin(cls, q: Floats, v: Floats, n: int) -> Record:
-        """Return the buffers for n steps from the state (q, v)."""
+        """Make buffers for n steps from the state (q, v)."""
         nv = len(v)
         record = cls(
             np.empty((n + 1, len(q))),
@@ -33,7 +34,7 @@ class Record:
         return record
 
     def copy(self) -> Record:
-        """Return the steps taken, in buffers of their own."""
+        """Return a copy of the steps taken."""
         n = self.steps
         return Record(
             self.q[: n + 1].copy(), self.v[: n + 1].copy(), self.a[:n].copy(), self.tau[:n].copy(), n
@@ -46,7 +47,7 @@ class Record:
         self.steps = n
 
     def extended(self, n: int) -> Record:
-        """Return the steps taken, in larger buffers for n steps."""
+        """Return a copy of the steps taken, in buffers for n steps."""
         larger = Record.begin(self.q[0], self.v[0], n)
         larger.take(self, self.steps)
         return larger

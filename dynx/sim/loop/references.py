@@ -21,10 +21,10 @@ SetpointOf = Callable[[Floats], Setpoint]
 
 
 def checked_reference(model: Model, reference: Any, *, within_limits: bool) -> SetpointOf | None:
-    """Return `reference` as a function of times; None stays None.
+    """Return `reference` as a function of time; None stays None.
 
-    Raises ArgumentError for one of another robot, LimitError (if `within_limits`) where it leaves the
-    model's limits of position or velocity.
+    Raises ArgumentError for the reference of another robot, and LimitError (if `within_limits`) where it
+    violates position or velocity limits of the model.
     """
     if reference is None:
         return None
@@ -45,7 +45,7 @@ def setpoints_of(
 ) -> Setpoint:
     """Return the setpoint of every control step, `lead` control steps ahead: (n_controls, ...).
 
-    Raises ArgumentError if there is none though the controller needs one.
+    Raises ArgumentError if there is no reference and the controller needs one.
     """
     n = clock.n_controls
     if controller is None:
@@ -61,7 +61,7 @@ def setpoints_of(
 
 
 def _held(model: Model, q: Any, within_limits: bool) -> SetpointOf:
-    """A configuration for ever."""
+    """Return the reference that stays at the configuration `q`."""
     held = checked_q(model, q, "reference")
     if held.ndim != 1:
         raise ArgumentError(f"reference has shape {held.shape}; wanted a trajectory or ({model.nq},)")

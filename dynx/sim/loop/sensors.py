@@ -21,13 +21,13 @@ class Sensors:
 
     @property
     def plain(self) -> bool:
-        """Whether the state itself is what is measured."""
+        """Whether measurements have neither delay nor noise."""
         return self.noise is None and not self._clock.delay_steps
 
     def __call__(self, step: int, q: Floats, v: Floats) -> Measurement:
         """Return the measurement at physics step `step`, from the states (n, nq), (n, nv) until then.
 
-        With a delay it is the state of that long ago; before the start, the state at the start.
+        With a delay it is the state at the earlier time, or the initial state while the delay has not passed.
         """
         seen = max(step - self._clock.delay_steps, 0)
         measurement = Measurement(step * self._clock.dt, q[seen], v[seen])

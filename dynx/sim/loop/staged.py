@@ -1,8 +1,8 @@
 """The staged executor of a closed loop: steps in compiled stages between engine calls.
 
-It gives the record of `dynx.sim.loop.plain` to the last bit, in two thirds of the time: engine calls are all
-that is left to Python. At a result that is not finite, a state that runs away or an error of an engine it
-stops before the step, which the plain executor repeats and reports.
+It gives the record of `dynx.sim.loop.plain` to the last bit, in two thirds of the time: only the engine calls
+are left to Python. If a result is not finite, the state diverges or an engine raises an error, it stops
+before that step; the plain executor then repeats the step and reports the error.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from dynx.control.base import Measurement
 from dynx.control.engine_motors import EngineMotor
 from dynx.errors import CompileError, TraceError
 from dynx.sim.loop.controller_checks import is_row
-from dynx.sim.loop.plain import DIVERGENCE_SPEED, Held, Loop
+from dynx.sim.loop.plain import DIVERGENCE_SPEED, Loop, LoopState
 from dynx.sim.loop.record import Record
 from dynx.sim.loop.stages import EngineCall, EngineCallTracer, StagedStep, refuse_impure, traced_controller
 from dynx.sim.plants.integrated import IntegratedPlant
@@ -30,7 +30,7 @@ from dynx.spatial.scalar import Array, Floats, clamp
 from dynx.trajectory.base import Setpoint
 
 MIN_STEPS_TO_COMPILE = 256
-"""Number of steps from which on tracing saves time."""
+"""Smallest number of steps for which tracing saves time."""
 
 MAX_CHUNK_STEPS = 4096
 """Largest number of steps whose kernel calls are prepared together."""
@@ -39,20 +39,21 @@ PROGRESS_INTERVAL = 0.1
 """Time between two calls of `progress` [s]."""
 
 MAX_TRACED_SUBSTEPS = 16
-"""Largest number of sub-steps that are traced one after another."""
+"""Largest number of sub-steps in one traced step."""
 
 Steps = NDArray[np.int64]
 
-Take = Callable[[int, int], bool]
-"""Takes the steps from one to before another and counts them; False if something was wrong in one."""
+TakeSteps = Callable[[int, int], bool]
+"""Function that takes the steps from the first number to before the second and counts them; it returns
+False if a step has to be repeated by the plain executor."""
 
 SETPOINT = ("q_wanted", "v_wanted", "a_wanted")
 NOISE = ("noise_q", "noise_v")
 
 
 def staged_loop(loop: Loop, left: int) -> StagedLoop | str:
-    """Return the loop in compiled stages for `left` more steps, or the reason why it has to be run
-    plainly."""
+    """Compile the loop into stages for `left` more steps; if that is impossible or too slow, return the
+    reason."""
     plant = loop.plant
     if left < MIN_STEPS_TO_COMPILE:
         return f"fewer than {MIN_STEPS_TO_COMPILE} steps"
@@ -79,14 +80,15 @@ def staged_loop(loop: Loop, left: int) -> StagedLoop | str:
 
 
 class StagedLoop:
-    """A step in stages, once with the controller evaluated and once with its torque held from before."""
+    """A loop in compiled stages: one step that evaluates the controller, and one that holds its last
+    torque."""
 
     def __init__(self, loop: Loop, plant: IntegratedPlant) -> None:
         """Raises CompileError for a controller that cannot be traced."""
         self._loop, self._plant = loop, plant
         nq, nv = plant.model.nq, plant.model.nv
-        sizes = dict.fromkeys(("v", "held", "seen_v", *SETPOINT, *NOISE), nv) | {"t": 1}
-        sizes |= dict.fromkeys(("q", "seen_q", "q_wanted"), nq)
+        sizes = dict.fromkeys(("v", "last_tau", "measured_v", *SETPOINT, *NOISE), nv) | {"t": 1}
+        sizes |= dict.fromkeys(("q", "measured_q", "q_wanted"), nq)
         if loop.controller is not None:
             refuse_impure(loop.controller)
         if any(array.dtype != np.float64 for array in loop.setpoints):
@@ -99,20 +101,21 @@ class StagedLoop:
             sizes["state"] = self._state_size
         self._controlled = self._step(EngineCallTracer(sizes), controlled=True)
         always = loop.clock.steps_per_control == 1
-        self._held = None if always else self._step(EngineCallTracer(sizes), controlled=False)
+        self._holding_step = None if always else self._step(EngineCallTracer(sizes), controlled=False)
         self.stopped = ""
         """Reason for stopping before the end."""
 
-    def run(self, record: Record, held: Held, end: int) -> None:
-        """Step from the last state of `record` to step `end`, or until a step has to be repeated plainly."""
+    def run(self, record: Record, loop_state: LoopState, end: int) -> None:
+        """Step from the last state of `record` to step `end`, or until a step has to be repeated by the
+        plain executor."""
         begin = record.steps
         self._plant.reset(record.q[begin], record.v[begin])
-        arrays = self._arrays(record, held)
+        arrays = self._arrays(record, loop_state)
         chunk = min(MIN_STEPS_TO_COMPILE, MAX_CHUNK_STEPS)
         try:
             while record.steps < end:
                 first, started = record.steps, perf_counter()
-                if not self._chunk(record, arrays, min(end, first + chunk)):
+                if not self._take_chunk(record, arrays, min(end, first + chunk)):
                     break
                 if self._loop.progress is not None:
                     self._loop.progress(record.steps)
@@ -121,23 +124,23 @@ class StagedLoop:
         finally:
             k = record.steps
             if k > begin:
-                held.tau = record.tau[k - 1].copy()
+                loop_state.tau = record.tau[k - 1].copy()
                 if self._state_size:
-                    held.controller_state = arrays["state"][k].copy()
-            held.q, held.v = record.q[k].copy(), record.v[k].copy()
-            self._plant.reset(held.q, held.v)
+                    loop_state.controller_state = arrays["state"][k].copy()
+            loop_state.q, loop_state.v = record.q[k].copy(), record.v[k].copy()
+            self._plant.reset(loop_state.q, loop_state.v)
 
     def _step(self, tracer: EngineCallTracer, *, controlled: bool) -> StagedStep:
-        """Return one step of the plant, with the torque of the controller if it is `controlled`, else that
-        held."""
+        """Compile one step of the plant, which evaluates the controller if `controlled` and holds its last
+        torque otherwise."""
         loop, given = self._loop, tracer.given
         results: dict[str, Array] = {}
-        unsound: Any = 0.0
-        tau, state = given["held"], given.get("state", self._start)
+        excess: Any = 0.0
+        tau, state = given["last_tau"], given.get("state", self._start)
         if loop.controller is None:
             tau = np.zeros(len(tau), dtype=object)
         elif controlled:
-            q, v = given["seen_q"], given["seen_v"]
+            q, v = given["measured_q"], given["measured_v"]
             if loop.sensors.noise is not None:
                 q, v = q + given["noise_q"], v + given["noise_v"]
             measurement = Measurement(given["t"][0], q, v)
@@ -146,13 +149,14 @@ class StagedLoop:
             try:
                 tau, state = controller.torque(measurement, setpoint, state)
             except Exception as error:
-                # On symbols in the place of numbers a controller of somebody else's may raise anything.
-                raise TraceError(_untraceable(loop.controller.name, error)) from error
+                # A user's controller may raise anything when it gets symbols instead of numbers.
+                raise TraceError(_trace_failure(loop.controller.name, error)) from error
             tracer.refuse_inexact_rounding()
             if tau.shape != given["v"].shape:
                 raise TraceError(f"the torque has shape {tau.shape}")
-            # The sum that the plain loop looks at: a torque beyond all numbers is none, though it is cut.
-            unsound = 0.0 * sum(tau.tolist(), 0.0)
+            # The plain loop tests the same sum: an overflowed torque is an error even if clamping would make
+            # it finite.
+            excess = 0.0 * sum(tau.tolist(), 0.0)
             if loop.limit is not None:
                 tau = clamp(tau, loop.limit)
 
@@ -165,66 +169,69 @@ class StagedLoop:
         results |= {"tau": tau, "a": a, "next_q": q, "next_v": v}
         if self._state_size and state is not None:
             results["next_state"] = state
-        results["defect"] = np.array([v @ v + unsound], dtype=object)
+        results["defect"] = np.array([v @ v + excess], dtype=object)
         return tracer.compile(results)
 
-    def _arrays(self, record: Record, held: Held) -> dict[str, Floats]:
-        """Return the inputs and outputs of the stages by the names of their ports, a row for each (control)
-        step."""
+    def _arrays(self, record: Record, loop_state: LoopState) -> dict[str, Floats]:
+        """Return the inputs and outputs of the stages by the names of their ports, with one row for each
+        step or control step."""
         loop, n = self._loop, len(record)
         q, v, tau = record.q, record.v, record.tau
-        arrays = {"q": q, "v": v, "seen_q": q, "seen_v": v, "next_q": q, "next_v": v}
-        arrays |= {"held": tau, "tau": tau, "a": record.a}
+        arrays = {"q": q, "v": v, "measured_q": q, "measured_v": v, "next_q": q, "next_v": v}
+        arrays |= {"last_tau": tau, "tau": tau, "a": record.a}
         arrays["t"] = loop.clock.times()[:, None]
         nothing = [np.broadcast_to(np.zeros(x.shape[1]), (loop.clock.n_controls, x.shape[1])) for x in (q, v)]
-        silence = nothing[1]
-        setpoints = (nothing[0], silence, silence) if loop.controller is None else loop.setpoints
-        # The setpoints of a reference may lie column by column.
+        zeros = nothing[1]
+        setpoints = (nothing[0], zeros, zeros) if loop.controller is None else loop.setpoints
+        # The setpoints of a reference may be stored column by column.
         rows = [array if array[:1].flags.c_contiguous else np.ascontiguousarray(array) for array in setpoints]
         arrays |= dict(zip(SETPOINT, rows, strict=True))
-        arrays |= dict(zip(NOISE, loop.sensors.noise or (silence, silence), strict=True))
+        arrays |= dict(zip(NOISE, loop.sensors.noise or (zeros, zeros), strict=True))
         if self._state_size:
             arrays["state"] = arrays["next_state"] = state = np.empty((n + 1, self._state_size))
-            state[record.steps] = held.controller_state
+            state[record.steps] = loop_state.controller_state
         return arrays
 
     def _row(self, name: str, steps: Steps) -> Steps:
-        """Return the row of an array that belongs to each of `steps`."""
+        """Return the index of the row that each of `steps` uses in the array `name`."""
         clock = self._loop.clock
         if name.startswith("next_"):
             return steps + 1
-        if name == "held":
+        if name == "last_tau":
             return np.maximum(steps - 1, 0)
-        if name in ("seen_q", "seen_v"):
+        if name in ("measured_q", "measured_v"):
             return np.maximum(steps - clock.delay_steps, 0)
         if name in SETPOINT or name in NOISE:
             return steps // clock.steps_per_control
         return steps
 
-    def _chunk(self, record: Record, arrays: Mapping[str, Floats], end: int) -> bool:
-        """Step to `end`, counting in the record; False where a step has to be repeated plainly."""
+    def _take_chunk(self, record: Record, arrays: Mapping[str, Floats], end: int) -> bool:
+        """Step to `end` and count the steps in the record; return False where a step has to be repeated by
+        the plain executor."""
         first, per = record.steps, self._loop.clock.steps_per_control
         steps = np.arange(first, end)
         by_step = {name: StridedRows(array, self._row(name, steps)) for name, array in arrays.items()}
         last = first + len(steps)
-        controlled = self._ready(self._controlled, by_step, record)
-        if self._held is None:
+        controlled = self._prepared_steps(self._controlled, by_step, record)
+        if self._holding_step is None:
             return controlled(first, last)
-        held = self._ready(self._held, by_step, record)
+        holding = self._prepared_steps(self._holding_step, by_step, record)
         while (k := record.steps) < last:
             due = k % per == 0
-            if not (controlled if due else held)(k, k + 1 if due else min(last, k - k % per + per)):
+            if not (controlled if due else holding)(k, k + 1 if due else min(last, k - k % per + per)):
                 return False
         return True
 
-    def _ready(self, step: StagedStep, by_step: Mapping[str, StridedRows], record: Record) -> Take:
-        """Return the next steps of the record as kernel and engine calls, over arrays with a row
-        `by_step`."""
+    def _prepared_steps(
+        self, step: StagedStep, by_step: Mapping[str, StridedRows], record: Record
+    ) -> TakeSteps:
+        """Prepare the kernel and engine calls of the next steps; `by_step` has the rows of each array that
+        the steps use."""
         first = record.steps
-        still = np.zeros(len(by_step["q"].rows), dtype=np.int64)
+        first_rows = np.zeros(len(by_step["q"].rows), dtype=np.int64)
         places = {name: np.zeros((1, size)) for name, size in (*step.sizes.items(), ("defect", 1))}
         numbers = {name: value[None] for name, value in step.numbers.items()}
-        constant = {name: StridedRows(place, still) for name, place in {**places, **numbers}.items()}
+        constant = {name: StridedRows(place, first_rows) for name, place in {**places, **numbers}.items()}
         every = {**by_step, **constant}
 
         def prepare(kernel: Kernel) -> CallSequence:
@@ -237,9 +244,9 @@ class StagedLoop:
             arguments = [places[name].reshape(shape) for name, shape in stage.arguments]
             name, shape = stage.result
             found = places[name].reshape(shape)
-            # A view of memory takes a row of numbers in a third of the time that an array does.
-            room = found.data if found.ndim == 1 else found
-            stages.append((calls.run, calls.addresses, stage.call, arguments, room, calls))
+            # Assigning to a memory view takes a third of the time of assigning to an array.
+            memory = found.data if found.ndim == 1 else found
+            stages.append((calls.run, calls.addresses, stage.call, arguments, memory, calls))
         last = prepare(step.last)
         finish, finishing = last.run, last.addresses
         defect: Any = places["defect"].reshape(1).data
@@ -269,7 +276,7 @@ class StagedLoop:
         return take
 
 
-def _untraceable(name: str, error: Exception) -> str:
+def _trace_failure(name: str, error: Exception) -> str:
     """Return the message for an error of a controller on symbols, with the line of its `torque` where it was
     raised."""
     torques = [frame for frame in extract_tb(error.__traceback__) if frame.name == "torque"]

@@ -1,9 +1,9 @@
 """A step of a closed loop, compiled in stages between the engine calls.
 
-A controller and an integrator take some ten operations on small arrays, for each of which NumPy needs half
-a microsecond: more than the dynamics themselves. Here the step is traced on symbols. An engine call ends a
-stage; its result is an input of the next one. Stages are compiled without fast-math (no contraction, no
-reordering), so that their results are those of NumPy, bit for bit.
+A controller and an integrator do about ten operations on small arrays. NumPy needs half a microsecond for
+each, together more than the dynamics take. Here the step is traced on symbols. An engine call ends a stage;
+its result is an input of the next one. Stages are compiled without fast-math (no contraction, no reordering),
+so that their results are those of NumPy, bit for bit.
 """
 
 from __future__ import annotations
@@ -32,15 +32,16 @@ Shape = tuple[int, ...]
 Nodes = tuple[int, ...]
 
 EngineCall = Callable[..., Floats]
-"""Arrays in, one array out."""
+"""Function of arrays that returns one array."""
 
 EXACTLY_ROUNDED = frozenset(
     {"input", "constant", "add", "sub", "mul", "div", "neg", "abs", "sqrt", "min", "max"}
 )
-"""Operations with the same bits in NumPy and in a kernel: those that IEEE 754 rounds correctly."""
+"""Operations whose results have the same bits in NumPy and in a kernel, because IEEE 754 requires correct
+rounding."""
 
 MAX_CACHED_STAGES = 128
-"""Number of kernels of stages kept for later simulations in this process."""
+"""Number of kernels of stages that this process keeps for later simulations."""
 
 _made: dict[bytes, Kernel] = {}
 
@@ -50,7 +51,8 @@ class Stage:
     """A stage of a step, which ends with an engine call."""
 
     kernel: Kernel
-    """Writes the arguments and, if they are guarded, the defect: 0 if they are finite, otherwise NaN."""
+    """Kernel that writes the arguments and, if they are guarded, the defect: 0 if they are finite,
+    otherwise NaN."""
     call: EngineCall
     arguments: tuple[tuple[str, Shape], ...]
     """Arrays that this stage or an earlier one wrote, and their shapes."""
@@ -73,7 +75,7 @@ class StagedStep:
 class _TracedCall(NamedTuple):
     call: EngineCall
     fresh: dict[str, Nodes]
-    """Arguments that no earlier call had."""
+    """Arguments that are new in this call."""
     arguments: tuple[tuple[str, Shape], ...]
     result: tuple[str, Shape]
     guarded: bool
@@ -92,9 +94,9 @@ class EngineCallTracer:
         self.given = {name: self._symbols(name, size) for name, size in inputs.items()}
 
     def record(self, call: EngineCall, shape: Shape, *arguments: Array, guarded: bool = False) -> Array:
-        """Return the symbols (of `shape`) for the result of `call(*arguments)`.
+        """Record `call(*arguments)` and return symbols of `shape` for its result.
 
-        If it is `guarded`, the step ends before a call with arguments that are not finite.
+        With `guarded`, the step stops before the call if an argument is not finite.
         """
         fresh: dict[str, Nodes] = {}
         named = []
@@ -110,20 +112,21 @@ class EngineCallTracer:
         return self._symbols(result, int(np.prod(shape))).reshape(shape)
 
     def number(self, value: Floats) -> Array:
-        """Return the symbols for numbers (n,) of a controller: controllers with other gains have the same
+        """Return symbols for numbers (n,) of a controller, so that controllers with other gains share the
         stages."""
         name = f"number {len(self._numbers)}"
         self._numbers[name] = value
         return self._symbols(name, value.size)
 
     def refuse_inexact_rounding(self) -> None:
-        """Raise TraceError if what was traced so far is not rounded in a kernel as in NumPy."""
+        """Raise TraceError if an operation that was traced so far rounds differently in a kernel and in
+        NumPy."""
         for node in self._graph.nodes:
             if node.op not in EXACTLY_ROUNDED:
                 raise TraceError(f"{node.op} is not rounded as NumPy rounds it")
 
     def compile(self, results: Mapping[str, Array]) -> StagedStep:
-        """Return the stages, the last of which writes `results`."""
+        """Compile the stages, the last of which writes `results`."""
         stages = []
         sizes = {name: len(nodes) for nodes, name in self._written.items()}
         for call, fresh, arguments, result, guarded in self._calls:
@@ -164,7 +167,7 @@ class EngineCallTracer:
 
 
 class TracedEngineCalls(Dynamics):
-    """Dynamics of a controller in a trace, where each evaluation becomes an engine call."""
+    """Dynamics of a controller that is traced: each evaluation is recorded as an engine call."""
 
     def __init__(self, tracer: EngineCallTracer, dynamics: Dynamics) -> None:
         if not isinstance(dynamics, EngineDynamics):
@@ -188,7 +191,7 @@ class TracedEngineCalls(Dynamics):
 def refuse_impure(controller: Controller[Any]) -> None:
     """Raise TraceError for a controller that may do anything besides returning its torque.
 
-    Whatever else it did, such as counting its calls, would be done once in the trace and never again.
+    Other effects, such as counting its calls, would happen once during tracing and not in the steps.
     """
     for each in chain_of(controller):
         if not each.is_pure:
@@ -209,7 +212,7 @@ def traced_controller(controller: Controller[Any], tracer: EngineCallTracer) -> 
 
 
 def _without_idle_inputs(program: Program) -> Program:
-    """Return the program with only those inputs that it reads."""
+    """Remove the inputs that the program does not read."""
     read = {node.slot for node in program.nodes if node.op == "input"}
     kept: list[Port] = []
     moved: dict[int, int] = {}

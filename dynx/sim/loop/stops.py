@@ -11,15 +11,15 @@ from dynx.spatial.scalar import Floats
 
 
 class Stops:
-    """An inelastic impact of the joints that went past their limits, after each step of the plant.
+    """Inelastic impact, after each step of the plant, of the joints that passed their limits.
 
-    The joint is put back to its limit, and a velocity outwards becomes zero by an impulse in that joint
-    alone: v+ = v - M^-1 E (E' M^-1 E)^-1 E' v, which moves the other joints as the masses have it. An
-    impulse never pulls: joints that leave by themselves are let go.
+    The joint is set to its limit. An impulse in that joint alone makes its outward velocity zero and changes
+    the velocities of the other joints according to the mass matrix: v+ = v - M^-1 E (E' M^-1 E)^-1 E' v. An
+    impulse only pushes inwards, so a joint that already moves away from its limit gets none.
     """
 
     def __init__(self, model: Model, mass_matrix: Callable[[Floats], Floats]) -> None:
-        """`mass_matrix` is M (nv, nv) of the plant, rotors included."""
+        """`mass_matrix` returns M (nv, nv) of the plant with its armature."""
         base_q, base_v = (7, 6) if model.floating else (0, 0)
         self._q_joints, self._v_joints = slice(base_q, None), slice(base_v, None)
         self._base = base_v
@@ -27,7 +27,7 @@ class Stops:
         self._mass_matrix = mass_matrix
 
     def __call__(self, q: Floats, v: Floats) -> tuple[Floats, Floats] | None:
-        """Return the state after the impact, None if no joint is past its limits."""
+        """Return the state after the impact, or None if no joint is beyond its limits."""
         joints = q[self._q_joints]
         held = np.clip(joints, self._lower, self._upper)
         past = np.flatnonzero(joints != held)

@@ -1,7 +1,7 @@
 """Joint friction, external wrenches and armature of a plant.
 
-One text for every plant: friction and wrenches become, as a function of time and state, a torque that is
-added to that of the motors, so a push or a damper means the same to every engine and every integrator.
+Every plant uses this code: friction and wrenches become a torque, as a function of time and state, which is
+added to that of the motors. So a push or a damper has the same effect in every engine and every integrator.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ from dynx.spatial.scalar import Floats
 class Push:
     """A wrench (6,), force [N] then moment [N m], on `frame` from `start` [s] for `duration` [s].
 
-    Expressed at and in `reference`, as `external_forces` of a backend are. It acts in the physics steps
-    that begin in its time.
+    `reference` names the point and the axes of the wrench, as for `external_forces` of a backend. The push
+    acts in those physics steps that begin while it lasts.
     """
 
     frame: str
@@ -65,7 +65,8 @@ class Push:
 
 
 class Disturbances:
-    """All that acts on the joints of a plant besides its motors, from the arguments of `dynx.simulate`."""
+    """Friction, armature and pushes that act on a plant besides its motors, from the arguments of
+    `dynx.simulate`."""
 
     def __init__(
         self,
@@ -101,7 +102,7 @@ class Disturbances:
         return [name for name, is_present in present.items() if is_present]
 
     def torque(self, engine: Backend, t: float, q: Floats, v: Floats) -> Floats:
-        """Return the torque (nv,) of pushes less friction, in a step that began at `t`."""
+        """Return the torque (nv,) of pushes minus that of friction, in a step that began at `t`."""
         tau = -self.friction(v)
         for push in self.pushes:
             if push.acts(t, self._dt):
@@ -110,7 +111,7 @@ class Disturbances:
 
 
 class DisturbedAcceleration:
-    """The acceleration of a plant under a torque: one backend's forward dynamics, with the disturbances."""
+    """Acceleration of a plant under a torque: forward dynamics of a backend, with the disturbances."""
 
     def __init__(self, engine: Backend, disturbances: Disturbances) -> None:
         self.dynamics = EngineDynamics(engine)
@@ -119,11 +120,11 @@ class DisturbedAcceleration:
 
     @property
     def is_undisturbed(self) -> bool:
-        """Whether it is the backend's forward dynamics and nothing else."""
+        """Whether there are no disturbances, so that it is the backend's forward dynamics alone."""
         return not (self._disturbances.has_torque or self._disturbances.has_armature)
 
     def __call__(self, q: Floats, v: Floats, tau: Floats, t: float) -> Floats:
-        """Return a (nv,) at state q, v under `tau`, in a step that began at `t`."""
+        """Return the acceleration (nv,) at state q, v under `tau`, in a step that began at `t`."""
         if self._disturbances.has_torque:
             tau = tau + self._disturbances.torque(self._engine, t, q, v)
         if not self._disturbances.has_armature:

@@ -1,8 +1,8 @@
 """A step of semi-implicit Euler with a floating base, for arrays of any scalar.
 
-The base moves as Bullet has it (btMultiBody): the step is taken by the centre of mass of the root and by its
-angular velocity, both along the axes of the world. Those axes do not turn, so a body that nothing touches
-keeps its linear momentum exactly.
+The base moves as in Bullet (btMultiBody): Euler's method is applied to the velocity of the root's centre of
+mass and to its angular velocity, both in world axes. Because those axes do not rotate, a free body keeps its
+linear momentum exactly.
 """
 
 from __future__ import annotations
@@ -21,7 +21,8 @@ def floating_step(q: Array, v: Array, a: Array, h: float, center: Array) -> tupl
     """
     R, w = rotation_from_quat(q[3:7]), v[3:6]
     lever = cross(w, center)
-    # The classical acceleration of the centre of mass: v is in axes that turn with the base.
+    # The classical acceleration of the centre of mass, because v is expressed in axes that rotate with the
+    # base.
     rising = a[:3] + cross(w, v[:3]) + cross(a[3:6], center) + cross(w, lever)
     linear = R @ (v[:3] + lever + h * rising)
     angular = R @ (w + h * a[3:6])

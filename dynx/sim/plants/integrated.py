@@ -19,8 +19,8 @@ SCHEMES = ("semi_implicit", "rk4", "adaptive")
 
 @lru_cache(maxsize=64)
 def _is_singular(model: Model) -> bool:
-    """Check whether some joint moves no inertia; cached, because the check takes as long as some hundred
-    steps."""
+    """Check whether the mass matrix is singular because nothing that a joint moves has inertia. The answer
+    is cached, because the check takes as long as some hundred steps."""
     return bool(singular_coordinates(model))
 
 
@@ -62,7 +62,7 @@ class IntegratedPlant(Plant):
         self._singular = not disturbances.has_armature and _is_singular(engine.model)
 
     def reset(self, q: Floats, v: Floats) -> None:
-        """Make this the state. Raises SingularMassMatrixError where it has no acceleration."""
+        """Set the state. Raises SingularMassMatrixError where the acceleration is not unique."""
         if self._singular:
             self._engine.forward_dynamics(q, v, 0.0 * v)
         self._q, self._v = q, v
@@ -76,9 +76,9 @@ class IntegratedPlant(Plant):
 
     @property
     def uncompiled(self) -> str:
-        """Subject and verb for what a compiled step does not have; empty where `advanced` is a whole step."""
+        """Name of the feature that cannot be compiled; empty if `advanced` is the complete step."""
         found = self.disturbances.names
-        # Floats and symbols take the flow of a floating base in other roundings.
+        # For a floating base, floats and symbols are rounded differently.
         if self.model.floating and isinstance(self._scheme, RungeKutta4):
             found.append("the integrator rk4 with a floating base")
         if isinstance(self._scheme, Adaptive):
@@ -88,11 +88,11 @@ class IntegratedPlant(Plant):
 
     @property
     def evaluations(self) -> int:
-        """Evaluations of the acceleration in one step, where nothing is `uncompiled`."""
+        """Number of evaluations of the acceleration in one step that can be compiled."""
         return self.substeps * (4 if isinstance(self._scheme, RungeKutta4) else 1)
 
     def advanced(self, accelerate: Accelerate, q: Array, v: Array, tau: Array) -> State:
-        """Return one step from q, v, with `accelerate(q, v, tau)` in the place of the engine."""
+        """Take one step from q, v, with `accelerate(q, v, tau)` in place of the engine."""
         q, v, first = self._scheme(accelerate, q, v, tau)
         for _ in range(1, self.substeps):
             q, v, _ = self._scheme(accelerate, q, v, tau)

@@ -1,8 +1,8 @@
-"""From an acceleration to the next state: semi-implicit Euler, Runge-Kutta 4, SciPy's adaptive methods.
+"""Integrators: semi-implicit Euler, Runge-Kutta 4 and SciPy's adaptive methods.
 
-Each takes one step of length h from the state (q, v) under a constant torque, and is a function of what it
-is given and of nothing else. `accelerate(q, v, *given)` is the acceleration. A quaternion is a point of
-the unit sphere, so a floating base needs more than adding.
+Each takes one step of length h from the state (q, v) under a constant torque, and depends on its arguments
+alone. `accelerate(q, v, *given)` returns the acceleration. The quaternion of a floating base is a point of
+the unit sphere, so increments cannot simply be added to it.
 """
 
 from __future__ import annotations
@@ -34,10 +34,11 @@ State = tuple[Floats, Floats, Floats]
 
 
 class SemiImplicitEuler:
-    """v' = v + h a(q, v), q' = q (+) h v': first order, and energy stays bounded where it is conserved.
+    """Integrator v' = v + h a(q, v), q' = q (+) h v' of first order. The energy of a conservative system
+    stays bounded.
 
-    A floating base moves by `floating_step`, compiled for floats: NumPy would take twenty times as
-    long as the dynamics.
+    A floating base moves by `floating_step`, which is compiled for floats, because NumPy would take twenty
+    times as long as the dynamics.
     """
 
     def __init__(self, model: Model, h: float, center: Array | None = None) -> None:
@@ -59,7 +60,7 @@ class SemiImplicitEuler:
         return base
 
     def __call__(self, accelerate: Accelerate, q: Array, v: Array, *given: Any) -> State:
-        """Return one step, for floats or for symbols."""
+        """Take one step, on floats or on symbols."""
         a = accelerate(q, v, *given)
         if self._floating:
             return self._float(q, v, a)
@@ -82,7 +83,8 @@ class SemiImplicitEuler:
 
 @cache
 def _base_step() -> Kernel:
-    """Return `floating_step` of a base alone, rounded as it is in every other kernel that has it."""
+    """Compile `floating_step` of a base alone, with the same rounding as in every other kernel that
+    contains it."""
 
     def step(q: Array, v: Array, a: Array, h: Array, center: Array) -> dict[str, Array]:
         return dict(zip(("q", "v"), floating_step(q, v, a, h[0], center), strict=True))
@@ -93,7 +95,7 @@ def _base_step() -> Kernel:
 
 
 class _Flow:
-    """The rate of change of the state y = (q, v), where a quaternion may be off its sphere in between."""
+    """Time derivative of the state y = (q, v); between steps its quaternion need not be of unit length."""
 
     def __init__(self, model: Model) -> None:
         self._floating = model.floating
@@ -137,7 +139,8 @@ class RungeKutta4:
 
 
 class Adaptive:
-    """Error-controlled steps within each step of the plant, by `scipy.integrate.solve_ivp`."""
+    """Integrator with error-controlled steps within each step of the plant, by
+    `scipy.integrate.solve_ivp`."""
 
     def __init__(self, model: Model, h: float, *, method: str, rtol: float, atol: float) -> None:
         self._flow = _Flow(model)
@@ -152,7 +155,7 @@ class Adaptive:
 
     def __call__(self, accelerate: Accelerate, q: Floats, v: Floats, *given: Any) -> State:
         """Return one step. Raises EngineError where the method gives up."""
-        # Half a second, which only those who want it pay.
+        # Imported here because the import takes half a second.
         from scipy.integrate import solve_ivp
 
         flow, y = self._flow, np.concatenate([q, v])

@@ -1,4 +1,4 @@
-"""Differences between the robot of the plant and the model of the controller: payloads, other masses."""
+"""Differences between the robot of the plant and the model of the controller: payloads and scaled masses."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from dynx.model.elements import Inertial, Joint, Link, Pose
 
 @dataclass(frozen=True)
 class Payload:
-    """A rigid body in the robot's hand.
+    """A rigid body fixed to a frame of the robot.
 
-    `mass` [kg], `center` (3,) [m] of mass in the axes of `frame`, central `inertia` (3, 3) [kg m^2] in
-    those axes too; a point by default.
+    `mass` is in kg, `center` (3,) [m] is the centre of mass in `frame`, and `inertia` (3, 3) [kg m^2] the
+    tensor about it in the axes of `frame`. The default is a point mass.
     """
 
     frame: str
@@ -33,10 +33,9 @@ MassScale = float | Mapping[str, float]
 
 
 def plant_model(model: Model, payload: Payload | Sequence[Payload] | None, mass_scale: MassScale) -> Model:
-    """Return `model` with masses and inertia tensors scaled, and then the payloads fixed to their frames.
+    """Scale the masses and inertia tensors of `model`, then fix the payloads to their frames.
 
-    Raises UnknownNameError for a frame or link that is not there, ArgumentError for a factor or a
-    payload that cannot be.
+    Raises UnknownNameError for an unknown frame or link, ArgumentError for an invalid factor or payload.
     """
     payloads = [] if payload is None else [payload] if isinstance(payload, Payload) else list(payload)
     if not payloads and mass_scale == 1.0:
@@ -81,7 +80,7 @@ def _inertial(payload: Payload) -> Inertial:
     x, y, z = checked_vector("center", payload.center).tolist()
     tensor = np.zeros((3, 3)) if payload.inertia is None else checked_array("inertia", payload.inertia, 3)
     if tensor.shape != (3, 3) or not np.array_equal(tensor, tensor.T):
-        raise ArgumentError("the inertia of a payload is no symmetric matrix (3, 3)")
+        raise ArgumentError("the inertia of a payload is not a symmetric matrix (3, 3)")
     (ixx, ixy, ixz), (_, iyy, iyz), (_, _, izz) = tensor.tolist()
     return Inertial(float(payload.mass), Pose((x, y, z)), ixx, ixy, ixz, iyy, iyz, izz)
 

@@ -1,4 +1,4 @@
-"""The interface of a plant: a robot in motion, which a torque moves on by one step."""
+"""The interface of a plant: a robot in motion, which advances by one step under a torque."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ from dynx.spatial.scalar import Floats
 
 
 class StepResult(NamedTuple):
-    """The state after a step, and what acted as the step began."""
+    """The state after a step, and the acceleration and torque at its beginning."""
 
     q: Floats
     """Configuration (nq,) after the step."""
     v: Floats
     """Velocity (nv,) after the step."""
     a: Floats
-    """Acceleration (nv,) as the step began."""
+    """Acceleration (nv,) at the beginning of the step."""
     tau: Floats
-    """Torque (nv,) of the motors as the step began [N m or N]."""
+    """Torque (nv,) of the motors at the beginning of the step [N m or N]."""
     contacts: tuple[Any, ...] = ()
-    """Contacts in the step; no plant of dynx has any yet."""
+    """Contacts during the step; no plant of dynx has contacts yet."""
 
 
 class Plant(ABC):
-    """A robot in motion. A step depends on the state and on its arguments, and on nothing before.
+    """A robot in motion. A step depends on the state and on its arguments only, not on earlier steps.
 
     A plant of your own is a subclass with this constructor. `dynx.sim.register_plant` adds it under a
     name, and a package offers it by an entry point in the group ``dynx.plants``.
@@ -54,14 +54,14 @@ class Plant(ABC):
 
     @abstractmethod
     def step(self, t: float, tau: Floats) -> StepResult:
-        """Move on by `dt` from time `t` [s] under the torque `tau` (nv,) of the motors."""
+        """Advance by `dt` from time `t` [s] under the torque `tau` (nv,) of the motors."""
 
     def step_motors(self, t: float, command: MotorCommand) -> StepResult:
-        """Move on by `dt` under the engine's own motors; the result has the torque that they gave."""
+        """Advance by `dt` under the engine's own motors; the result has their torque."""
         raise UnsupportedFeatureError(f"{type(self).__name__} has no motors of its own")
 
     def refuse(self, controller: object) -> None:
-        """Raise UnsupportedFeatureError for a controller that this plant cannot obey."""
+        """Raise UnsupportedFeatureError for a controller that this plant cannot run with."""
         if isinstance(controller, EngineMotor) and MotorCommand not in self.motor_commands:
             raise UnsupportedFeatureError(
                 f"{controller.name} is a motor inside PyBullet, so it runs with plant='pybullet' and "

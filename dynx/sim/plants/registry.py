@@ -1,7 +1,7 @@
 """Plants by name: engines with a stepper of their own, and every backend under an integrator of dynx.
 
-Steppers are registered as backends are (`dynx.registry`): by a table here, by `register`, or by entry
-points in the group ``dynx.plants`` of installed packages. Such a class is made as
+Plants with a stepper of their own are found as backends are (`dynx.registry`): in a table here, by
+`register`, or by entry points in the group ``dynx.plants`` of installed packages. Their class is called as
 ``Class(model, disturbances, dt, substeps=n)``.
 """
 
@@ -51,7 +51,8 @@ def require_plant(name: str) -> None:
 
     Raises NotInstalledError where the engine of a backend is missing.
     """
-    # Entry points are read only for names that dynx does not have: that takes some milliseconds.
+    # Entry points are read only for names that dynx does not have, because reading them takes some
+    # milliseconds.
     if name not in BACKENDS:
         if name in plant_names():
             return
@@ -92,10 +93,10 @@ def make_plant(
     substeps: int,
     options: Mapping[str, Any],
 ) -> Plant:
-    """Return the plant `name` under `integrator`; `options` are those of the adaptive integrator.
+    """Make the plant `name` with `integrator`; `options` are those of the adaptive integrator.
 
-    Raises ArgumentError for an integrator that the plant does not have, UnknownBackendError for a name
-    nobody provides, NotInstalledError where its engine is missing, EngineError where its constructor fails.
+    Raises ArgumentError for an integrator that the plant does not have, UnknownBackendError for an unknown
+    name, NotInstalledError where its engine is missing, EngineError where its constructor fails.
     """
     if not isinstance(substeps, int) or isinstance(substeps, bool) or substeps < 1:
         raise ArgumentError(f"substeps is {shown(substeps)}; wanted 1 or more")

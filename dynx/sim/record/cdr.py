@@ -1,10 +1,9 @@
-"""Many messages of one type in CDR, the encoding of ROS 2, all at once.
+"""Encoding of many messages of one type in CDR, the encoding of ROS 2.
 
-The messages of a recording differ in their numbers and not in their layout, so each field is a column of
-bytes with one row for each message. The encoding is XCDR1 in little-endian order: a number lies at a
-multiple of its size, counted from behind the four bytes that name the encoding; a string is its length
-with the closing zero, and its UTF-8 bytes; a sequence is its length and its elements (DDS-XTypes 1.3,
-section 7.4.3).
+The messages of a recording have different numbers but the same layout, so each field is a column of bytes
+with one row for each message. The encoding is XCDR1 in little-endian order. After four bytes that name the
+encoding, each number is aligned to a multiple of its size; a string is its length including the terminating
+zero, then its UTF-8 bytes; a sequence is its length, then its elements (DDS-XTypes 1.3, section 7.4.3).
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ from numpy.typing import ArrayLike
 from dynx.spatial.scalar import Floats
 
 LITTLE_ENDIAN = b"\x00\x01\x00\x00"
-"""The four bytes in front: plain CDR, little-endian."""
+"""The first four bytes of a message: plain CDR, little-endian."""
 
 
 class CdrMessages:
@@ -31,21 +30,22 @@ class CdrMessages:
         self._size = 0  # the header does not count for alignment
 
     def put_int32(self, values: ArrayLike) -> None:
-        """`values` () or (n,)."""
+        """Append an int32 field: `values` (), or (n,) for n messages."""
         self._put_numbers(np.asarray(values), "<i4")
 
     def put_uint32(self, values: ArrayLike) -> None:
-        """`values` () or (n,)."""
+        """Append a uint32 field: `values` (), or (n,) for n messages."""
         self._put_numbers(np.asarray(values), "<u4")
 
     def put_float64s(self, values: Floats) -> None:
-        """The k numbers of `values` (n, k), or (k,) for all, as k fields or an array of fixed length."""
+        """Append k numbers, as k fields or an array of fixed length: `values` (n, k), or (k,) for all
+        messages."""
         self._put_numbers(np.broadcast_to(values, (self._n, values.shape[-1])), "<f8")
 
     def put_float64_sequence(self, values: Floats) -> None:
-        """A sequence of the k numbers of `values` (n, k)."""
+        """Append a sequence of k numbers: `values` (n, k)."""
         self.put_uint32(values.shape[-1])
-        if values.shape[-1]:  # what is not there is not aligned either
+        if values.shape[-1]:  # An empty sequence has no padding.
             self.put_float64s(values)
 
     def put_string(self, text: str) -> None:
@@ -61,7 +61,7 @@ class CdrMessages:
             self.put_string(text)
 
     def encoded(self) -> list[bytes]:
-        """Return the messages."""
+        """Return the encoded messages."""
         rows = np.concatenate(self._columns, axis=1)
         width, data = rows.shape[1], rows.tobytes()
         return [data[k * width : (k + 1) * width] for k in range(self._n)]

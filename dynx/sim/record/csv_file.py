@@ -11,10 +11,10 @@ The first line names the columns, in this order; ``c`` stands for each coordinat
 | `a:c`, `tau:c` | acceleration and torque in the step that starts at this time | per second squared; N m, N |
 | `saturated:c` | 1 if the motor was at its limit in that step, otherwise 0 | |
 
-Coordinates have the names of their joints. A floating base comes first: `x y z qx qy qz qw` in positions
-(of the base frame in the world, quaternion xyzw) and `vx vy vz wx wy wz` in rates (in the base frame).
-The last state begins no step: its last columns are empty. Numbers are the shortest text that gives the
-same float64 again. Text is UTF-8, and a name with a comma or a quote in it stands in quotes (RFC 4180).
+Coordinates have the names of their joints. A floating base comes first: `x y z qx qy qz qw` in positions (of
+the base frame in the world, quaternion xyzw) and `vx vy vz wx wy wz` in rates (in the base frame). No step
+begins at the last state, so its last columns are empty. Numbers are the shortest text that reads back as the
+same float64. Text is UTF-8, and a name with a comma or a quote in it stands in quotes (RFC 4180).
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from dynx.sim.record.rollout_data import RolloutData
 
 
 def write_csv(rollout: RolloutData, file: BinaryIO) -> None:
-    """A row for each state, with what acted from then on beside it."""
+    """Write one row for each state, with the torque and acceleration of the step that begins there."""
     model = rollout.model
     positions = [*(["x", "y", "z", "qx", "qy", "qz", "qw"] if model.floating else []), *model.joint_names]
     rates = [*(["vx", "vy", "vz", "wx", "wy", "wz"] if model.floating else []), *model.joint_names]

@@ -1,4 +1,4 @@
-"""Rollouts in files: which format a name stands for, and NumPy's ``.npz``, which `load` reads again."""
+"""Files of rollouts: the format follows from the suffix; `load` reads NumPy's ``.npz``."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from dynx.sim.scenario.scenario import Scenario
 from dynx.trajectory.base import Setpoint
 
 SCHEMA = "dynx.rollout/2"
-"""Name of the layout of the file; another number means another layout."""
+"""Name and version of the layout of the file."""
 
 ARRAYS = ("t", "q", "v", "a", "tau", "saturated", "rotors")
 REFERENCE = ("reference_q", "reference_v", "reference_a")
@@ -33,11 +33,11 @@ DAMAGED = (
     *(OSError, EOFError, ValueError, KeyError, RuntimeError, MemoryError),
     *(zipfile.BadZipFile, zlib.error, struct.error, tokenize.TokenError, SyntaxError),
 )
-"""Exceptions of zipfile and NumPy for a file that is missing or was changed after it was written."""
+"""Exceptions of zipfile and NumPy for a missing or damaged file."""
 
 
 def save(rollout: RolloutData, path: str | os.PathLike[str]) -> None:
-    """Write `rollout` in the format that the name ends with: all of it, or nothing under that name.
+    """Write `rollout` atomically, in the format of the suffix of `path`.
 
     Raises ArgumentError for another format or a file that cannot be written, NotInstalledError where
     the format needs a package that is missing.
@@ -53,12 +53,14 @@ def save(rollout: RolloutData, path: str | os.PathLike[str]) -> None:
 def load(path: str | os.PathLike[str]) -> dict[str, Any]:
     """Read the fields of a rollout from a ``.npz`` of `save`. Raises ArgumentError for any other file.
 
-    The model comes back from the URDF text in the file; arrays are read without unpickling anything.
+    The model is read from the URDF text in the file; no array is unpickled.
     """
     name = os.fspath(path)
     entries = _entries(path)
     if str(entries.get("schema")) != SCHEMA:
-        raise ArgumentError(f"{name} does not say {SCHEMA!r}, so it is no rollout of this version")
+        raise ArgumentError(
+            f"{name} does not have the schema {SCHEMA!r}, so it is not a rollout of this version"
+        )
     missing = [entry for entry in (*ARRAYS, "robot") if entry not in entries]
     if missing:
         raise ArgumentError(f"{name} lacks {', '.join(missing)}")
@@ -94,8 +96,8 @@ def load(path: str | os.PathLike[str]) -> dict[str, Any]:
 
 
 def _entries(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """Return all arrays of a ``.npz``."""
-    problem = "it is no .npz file, or a part of one"
+    """Read all arrays of a ``.npz``."""
+    problem = "it is not a .npz file, or it is truncated"
     try:
         with open(path, "rb") as raw:
             if zipfile.is_zipfile(raw):
@@ -122,7 +124,7 @@ def _write_npz(rollout: RolloutData, file: BinaryIO) -> None:
     arrays: dict[str, Any] = {name: getattr(rollout, name) for name in ARRAYS}
     if rollout.reference is not None:
         arrays.update(zip(REFERENCE, rollout.reference, strict=True))
-    # The energy is for readers without dynx; `load` computes it again.
+    # The energy is for programs without dynx; `load` computes it again.
     np.savez(file, schema=SCHEMA, robot=json.dumps(robot), energy=rollout.energy, **arrays)
 
 
@@ -131,4 +133,4 @@ WRITERS: dict[str, Callable[[RolloutData, BinaryIO], None]] = {
     ".csv": write_csv,
     ".mcap": write_mcap,
 }
-"""By the end of the name."""
+"""Writers by suffix."""

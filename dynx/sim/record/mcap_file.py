@@ -1,8 +1,8 @@
 """Rollouts as MCAP recordings of ROS 2 messages, for PlotJuggler, Foxglove and ``ros2 bag``.
 
-`dynx.sim.record.ros_topics` lists the topics. Stamps are the times of the record, from 0 s on, in
-whole nanoseconds, as ROS has them. The metadata record ``dynx.rollout`` has the settings of the
-simulation and the other fields of a `Rollout`: numbers and lists as JSON, text as it is.
+`dynx.sim.record.ros_topics` lists the topics. Time stamps are the times of the record, starting at 0 s, in
+whole nanoseconds as in ROS. The metadata record ``dynx.rollout`` has the settings of the simulation and the
+other fields of a `Rollout`: numbers and lists as JSON, text as it is.
 """
 
 from __future__ import annotations
@@ -19,17 +19,18 @@ from dynx.sim.record.ros_definitions import schema_name, schema_text
 from dynx.sim.record.ros_topics import topics_of
 
 SCHEMA = "dynx.rollout.mcap/1"
-"""Kind of the recording, in its metadata record."""
+"""Name and version of the layout, in the metadata record."""
 
 BLOCK = 1000
-"""States that are encoded at a time: a long recording needs no memory of its size."""
+"""Number of states that are encoded together; it limits the memory that a long recording needs."""
 
 ABOUT_CHANNEL = {"offered_qos_profiles": ""}
-"""The ROS 2 profile of MCAP requires this entry; empty, it leaves the quality of service to the player."""
+"""Entry that the ROS 2 profile of MCAP requires; an empty one leaves the quality of service to the player."""
 
 
 def write_mcap(rollout: RolloutData, file: BinaryIO) -> None:
-    """Record `rollout`. Raises NotInstalledError without mcap (``pip install 'dynx[mcap]'``)."""
+    """Write `rollout` as a recording. Raises NotInstalledError without mcap (``pip install
+    'dynx[mcap]'``)."""
     try:
         from mcap.writer import Writer
     except ImportError as error:

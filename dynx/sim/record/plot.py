@@ -1,8 +1,8 @@
-"""A rollout on one page: where the joints went, what was missing, what the motors gave.
+"""Plot of a rollout on one page: positions, errors, and torques.
 
-Where nothing was wanted, the velocities stand in the place of the errors.
+Without a reference, velocities are shown instead of errors.
 
-Robots of many joints get several columns, so that no panel has more curves than can be told apart.
+Robots with many joints get several columns, so that the curves in each panel can be distinguished.
 """
 
 from __future__ import annotations
@@ -19,17 +19,19 @@ from dynx.sim.record.rollout_data import RolloutData
 from dynx.spatial.scalar import Floats
 
 STYLES = ("-", "--", "-.", ":")
-"""With the ten colours of matplotlib they are twenty kinds of curves, told apart without colour too."""
+"""Line styles. Together with matplotlib's ten colours they give distinguishable curves, also in print
+without colour."""
 
 PER_COLUMN = 12
-"""Curves in one panel at most."""
+"""Largest number of curves in one panel."""
 
 NEAR = 0.5
-"""Share of an effort limit from which on it is drawn: one far above the curves would flatten them."""
+"""Share of an effort limit that a torque must reach for the limit to be drawn; one far above the curves
+would flatten them."""
 
 
 class Column(NamedTuple):
-    """Coordinates that share panels: their names, and where they are in q and in v."""
+    """Coordinates that share panels: their names, and their indices in q and in v."""
 
     labels: tuple[str, ...]
     q: slice
@@ -37,7 +39,8 @@ class Column(NamedTuple):
     units: tuple[str, str]
     """Units of positions and of efforts."""
     of_base: bool = False
-    """Whether positions are in the world and all else in the axes of the base."""
+    """Whether this is the column of a floating base: its position is in the world, all else in its own
+    axes."""
 
 
 def plot(rollout: RolloutData, path: str | os.PathLike[str] | None) -> Any:
@@ -54,7 +57,7 @@ def plot(rollout: RolloutData, path: str | os.PathLike[str] | None) -> Any:
 
 
 def _columns(model: Model) -> list[Column]:
-    """Return the position of a floating base, and the joints in equal shares."""
+    """Return the columns: one for a floating base, and the joints in equal shares."""
     base_q, base_v = (7, 6) if model.floating else (0, 0)
     base = Column(("base x", "base y", "base z"), slice(0, 3), slice(0, 3), ("m", "N"), of_base=True)
     columns = [base] if model.floating else []
@@ -77,7 +80,7 @@ def _draw(rollout: RolloutData, column: Column, axes: Any) -> None:
     positions, middle, efforts = axes
     t, (length, force) = rollout.t, column.units
     q = rollout.q[:, column.q]
-    # What acts in a step acts until its end.
+    # A torque is held until the end of its step.
     tau = np.concatenate([rollout.tau, rollout.tau[-1:]])[:, column.v]
     limits = _effort_limits(rollout)[column.v]
     curves, limit = {}, None
@@ -129,11 +132,12 @@ def _title(rollout: RolloutData) -> str:
 
 
 def _effort_limits(rollout: RolloutData) -> Floats:
-    """Return those that cut the torques; if none did, those of the robot."""
+    """Return the effort limits at which torques were saturated; if there were none, those of the robot."""
     cut = rollout.settings.get("effort_limits")
     return rollout.model.effort_limit if cut is None else np.asarray(cut, dtype=np.float64)
 
 
 def _plain(text: str) -> str:
-    """Return `text` as matplotlib shows it as it is: no formula, and no name that is left out of a legend."""
+    """Escape `text` so that matplotlib shows it literally: neither as a formula nor hidden from the
+    legend."""
     return (" " if text.startswith("_") else "") + text.replace("$", r"\$")

@@ -20,14 +20,14 @@ Self = TypeVar("Self", bound="RolloutData")
 
 
 class Summary(NamedTuple):
-    """Errors, speeds, torques and energy of a rollout; errors (nv,) are NaN where there was no reference."""
+    """Errors, speeds, torques and energy of a rollout; errors (nv,) are NaN without a reference."""
 
     rms_error: Floats
     max_error: Floats
     max_speed: Floats
     max_torque: Floats
     energy_drift: float
-    """The largest change of the energy since the start, over the largest kinetic energy."""
+    """Largest change of the energy since the start, divided by the largest kinetic energy."""
     saturated: float
     """Share of the steps in which some motor was at its limit."""
 
@@ -42,14 +42,15 @@ class Summary(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class RolloutData:
-    """n steps of a robot in motion: states at n + 1 times, and what acted between them.
+    """n steps of a robot in motion: states at n + 1 times, and torques and accelerations between them.
 
     Row k of `a`, `tau` and `saturated` belongs to the step from ``t[k]`` to ``t[k + 1]``: the torque that
-    acted on the plant, the acceleration as the step began, and where a motor was at its limit.
+    acted on the plant, the acceleration at the beginning of the step, and whether each motor was at its
+    limit.
     """
 
     model: Model
-    """The robot that moved: that of the plant, with its payload and its masses."""
+    """The robot of the plant, with payload and scaled masses."""
     t: Floats
     """Times (n + 1,) [s]."""
     q: Floats
@@ -67,11 +68,12 @@ class RolloutData:
     rotors: Floats
     """Armature (nv, nv), zero unless the scenario has some."""
     scenario: Scenario | None = None
-    """The simulation that this is the record of; None for a record made otherwise."""
+    """The simulation whose record this is; None for a record made in another way."""
     executor: str = ""
-    """Executor of the steps: ``staged``, or ``plain`` and why; more than one with semicolons."""
+    """Executor of the steps: ``staged``, or ``plain`` with the reason; several are separated by
+    semicolons."""
     departures: tuple[str, ...] = ()
-    """Interventions by which the record is not that of its scenario alone, such as a torque of the caller."""
+    """Interventions that make the record differ from its scenario, such as torques given by the caller."""
 
     def __len__(self) -> int:
         """Return the number of steps."""
@@ -86,19 +88,19 @@ class RolloutData:
 
     @cached_property
     def kinetic_energy(self) -> Floats:
-        """Kinetic energy of the links and the rotors (n + 1,) [J]."""
+        """Kinetic energy of the links and the armature (n + 1,) [J]."""
         with backend("reference", self.model) as bodies:
             turning = 0.5 * np.einsum("ki,ij,kj->k", self.v, self.rotors, self.v)
             return np.asarray(bodies.kinetic_energy(self.q, self.v) + turning)
 
     @cached_property
     def energy(self) -> Floats:
-        """Kinetic and potential energy (n + 1,) [J], whichever engine moved the robot."""
+        """Sum of kinetic and potential energy (n + 1,) [J], computed by dynx for every plant."""
         with backend("reference", self.model) as bodies:
             return np.asarray(self.kinetic_energy + bodies.potential_energy(self.q))
 
     def summary(self) -> Summary:
-        """Return the errors, speeds, torques and the drift of the energy."""
+        """Summarise errors, speeds, torques and the drift of the energy."""
         with np.errstate(invalid="ignore"):
             rms = np.sqrt(np.mean(self.error**2, axis=0))
         peak = float(np.max(self.kinetic_energy))
@@ -114,13 +116,13 @@ class RolloutData:
 
     @cached_property
     def settings(self) -> dict[str, Any]:
-        """The scenario in short, as numbers and text; empty without one."""
+        """The main settings of the scenario, as numbers and text; empty without a scenario."""
         return {} if self.scenario is None else settings_of(self.scenario)
 
     def first(self: Self, n: int) -> Self:
         """Return the record of its first n steps."""
         if not 0 <= n <= len(self):
-            raise ArgumentError(f"there are {len(self)} steps; wanted 0 to {len(self)} of them, not {n}")
+            raise ArgumentError(f"n is {n}; wanted 0 to {len(self)}, the number of steps")
         reference = None if self.reference is None else Setpoint(*(x[: n + 1] for x in self.reference))
         states = {name: getattr(self, name)[: n + 1] for name in ("t", "q", "v")}
         steps = {name: getattr(self, name)[:n] for name in ("a", "tau", "saturated")}

@@ -1,6 +1,6 @@
-"""Definitions of the ROS 2 messages that a recording uses, as a recording has to contain them.
+"""Definitions of the ROS 2 messages of a recording, which every recording contains.
 
-They are those of ROS 2 common_interfaces and rcl_interfaces without their comments, the same from Humble
+They are copied from ROS 2 common_interfaces and rcl_interfaces without comments, and are the same from Humble
 to Rolling.
 """
 
@@ -42,19 +42,21 @@ DEFINITIONS = {
         "builtin_interfaces/Duration time_from_start\n"
     ),
 }
-"""Each message by ``package/Name``; a field of a type of the same package is written without it."""
+"""Definition of each message by ``package/Name``. A field type of the same package is written without the
+package."""
 
 SEPARATOR = "=" * 80
 
 
 def schema_name(message: str) -> str:
-    """Return ``package/msg/Name``, which is what ROS 2 calls a type."""
+    """Return the name of a type in ROS 2, ``package/msg/Name``."""
     package, name = message.split("/")
     return f"{package}/msg/{name}"
 
 
 def schema_text(message: str) -> str:
-    """Return the definition of `message` and, behind separators, of all that it is made of (``ros2msg``)."""
+    """Return the definition of `message` and, after separators, of all message types inside it (format
+    ``ros2msg``)."""
     needed = _needed(message)
     parts = [DEFINITIONS[message], *(f"{SEPARATOR}\nMSG: {name}\n{DEFINITIONS[name]}" for name in needed)]
     return "".join(parts)

@@ -11,8 +11,8 @@
 | `/error` | sensor_msgs/JointState | `position` is the reference minus the position |
 | `/robot_description` | std_msgs/String | the simulated robot as URDF, once, at the beginning |
 
-A floating base adds, with its pose in the frame ``world`` (``map``, where that is the root link itself)
-and all else in the axes of the root link:
+A floating base adds these topics. Its pose is in the frame ``world`` (``map`` if the root link is called
+``world``), all else in the axes of the root link:
 
 | topic | type | content |
 |---|---|---|
@@ -24,9 +24,9 @@ and all else in the axes of the root link:
 | `/base/reference_acceleration` | geometry_msgs/AccelStamped | likewise |
 | `/base/error` | geometry_msgs/TwistStamped | the displacement [m, rad] from the base to the reference |
 
-Every number is the float64 of the record. What acts from one state to the next is stamped with the time
-at which it begins, so the last state has no effort. Joints that follow others are not listed: the
-description says how they follow.
+Every number is the float64 of the record. The torque of a step is stamped with the time at which the step
+begins, so the last state has no effort. Mimic joints are not listed, because the description defines how they
+follow others.
 """
 
 from __future__ import annotations
@@ -41,13 +41,13 @@ from dynx.sim.record.rollout_data import RolloutData
 from dynx.spatial.scalar import Floats
 
 NO_VALUES = np.zeros((0, 0))
-"""In place of a field of a joint state that is left out."""
+"""Empty field of a joint state."""
 
 Stamps = np.ndarray[Any, np.dtype[np.int64]]
 """Times in nanoseconds."""
 
 Encode = Callable[[CdrMessages, Stamps, slice], None]
-"""Appends all fields of the messages at a slice of the states, of which the stamps are given."""
+"""Function that appends all fields of the messages for a slice of the states, whose stamps are given."""
 
 
 class Topic(NamedTuple):
@@ -60,7 +60,8 @@ class Topic(NamedTuple):
     encode: Encode
 
     def encoded(self, stamps: Stamps, begin: int, end: int) -> list[tuple[int, bytes]]:
-        """Return those of the states `begin` to `end` (exclusive), each with the number of its state."""
+        """Return the messages of the states `begin` to `end` (exclusive), each with the number of its
+        state."""
         begin, end = max(begin, self.first), min(end, self.last)
         if begin >= end:
             return []
@@ -70,7 +71,7 @@ class Topic(NamedTuple):
 
 
 def topics_of(rollout: RolloutData) -> list[Topic]:
-    """Return all topics of `rollout`; one that changes its layout at the last state is there twice."""
+    """Return all topics of `rollout`; one whose layout differs at the last state appears twice."""
     return [*_joint_topics(rollout), *(_base_topics(rollout) if rollout.model.floating else [])]
 
 
@@ -190,7 +191,7 @@ def _odometry(world: str, base: str, pose: Floats, velocity: Floats) -> Encode:
 
 
 def _stamped(frame: str, values: Floats) -> Encode:
-    """Return two vectors with a header: a twist, an acceleration, a wrench."""
+    """Encode messages of two vectors with a header: a twist, an acceleration or a wrench."""
 
     def encode(messages: CdrMessages, stamps: Stamps, states: slice) -> None:
         _put_header(messages, stamps, frame)

@@ -1,4 +1,4 @@
-"""A scenario in short: the numbers and the text that a report or a recording shows of it."""
+"""Main settings of a scenario, as numbers and text for reports and recordings."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from dynx.sim.setup import clock_of, disturbances_of, effort_limits_of
 
 
 def settings_of(scenario: Scenario) -> dict[str, Any]:
-    """Return the plant, controller, times, limits, friction, noise and pushes of a scenario, as JSON has
-    them."""
+    """Return plant, controller, times, limits, friction, noise and pushes of a scenario, in types that
+    JSON has."""
     controller, clock, limit = scenario.controller, clock_of(scenario), effort_limits_of(scenario)
     moved = plant_model(scenario.model, scenario.payloads, scenario.mass_scale)
     disturbances = disturbances_of(scenario, moved)

@@ -1,7 +1,7 @@
 """Tracking errors of a rollout: of its joints, of its floating base, and of a frame.
 
-Joints are kept apart from bodies, and positions of a body from its rotation: the maximum of metres and
-radians together means nothing.
+Errors of joints, of positions and of rotations are summarised separately, because a maximum over metres and
+radians has no meaning.
 """
 
 from __future__ import annotations
@@ -19,7 +19,8 @@ Entry = dict[str, Any]
 
 
 def joint_error(rollout: Rollout) -> Entry:
-    """Summarise the error over all joints and times; None for each number without a reference or joints."""
+    """Summarise the error over all joints and times; each number is None without a reference or without
+    joints."""
     base = 6 if rollout.model.floating else 0
     error = np.abs(rollout.error[:, base:])
     if rollout.reference is None or error.size == 0:
@@ -53,7 +54,8 @@ def frame_error(rollout: Rollout, frame: str | None) -> Entry | None:
 
 
 def _body_error(t: Floats, position: Floats, rotation: Floats) -> Entry:
-    """Summarise the norms of both errors (n + 1, 3): [m], and [rad] as the angle of a rotation vector."""
+    """Summarise the norms of the position errors (n + 1, 3) [m] and of the rotation vectors (n + 1, 3)
+    [rad]."""
     return {
         name: {
             "max": float(norm.max()),

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Any, Literal, TypedDict
 
 Numbers = bool | float | list[Any] | dict[str, Any] | None
-"""One number, an array, or whether the values of the URDF are taken."""
+"""One number, an array, or true for the values of the URDF."""
 
 
 class ScenarioDocument(TypedDict):

@@ -1,9 +1,10 @@
 """Parts of a scenario as JSON documents, and back: exact to the last bit.
 
-Numbers, text, lists and arrays stand for themselves; an array of anything but float64 has its dtype beside
-it. A registered controller is its name and the arguments of its constructor, a dataclass or named tuple its
-class and its fields. An object of any other class is known by a fingerprint alone: it can be compared, not
-rebuilt. A class that is not of dynx has a checksum of its code beside it: with other code it is another one.
+Numbers, text, lists and arrays are written as they are; an array that is not float64 also has its dtype. A
+registered controller is written as its name and the arguments of its constructor, a dataclass or named tuple
+as its class and its fields. An object of any other class is written as a fingerprint alone: it can be
+compared but not rebuilt. A class that is not part of dynx also has a checksum of its code; if the code has
+changed, it counts as another class.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ from dynx.sim.loop.controller_checks import controller_numbers
 from dynx.trajectory.base import Trajectory
 
 MAX_WORDS_LENGTH = 80
-"""Characters of a value in a message."""
+"""Largest number of characters of a value in a message."""
 
 JSON_KINDS = "biufU"
 """Kinds of NumPy's types whose elements JSON can hold."""
@@ -49,18 +50,18 @@ REGISTRATION = (
 """Condition on the class of a controller, for messages."""
 
 NUMBERS = "numbers"
-"""Entry for the public numbers of a controller that is known by its fingerprint."""
+"""Entry for the public numbers of a controller that is written as a fingerprint."""
 
 CODE, DURATION = "code", "duration"
 """Entries for a class that is not of dynx: the checksum of its code, and the duration of a trajectory."""
 
 SAME_MODEL = {MODEL: "of the scenario"}
-"""Stands for the model of the scenario inside its controller or reference."""
+"""Value that represents the scenario's model inside its controller or reference."""
 
 
 @dataclass(frozen=True)
 class Unknown:
-    """A controller or a reference of a scenario from a file, whose class cannot be rebuilt here."""
+    """A controller or a reference from a scenario file that cannot be rebuilt in this program."""
 
     name: str
     """Name of its class."""
@@ -93,11 +94,11 @@ class Unknown:
                 "the file has only its fingerprint, because its class is not a frozen dataclass, or its "
                 "objects have more than the fields: a class of your own that is to be rebuilt is one"
             )
-        return "its class is not here: import the module of the class first"
+        return "its class does not exist here: import its module first"
 
 
 def encode(value: Any, model: Model | None = None) -> Document:
-    """Return `value` as a document; `model` is that of the scenario it belongs to."""
+    """Convert `value` to a document; `model` is the model of its scenario."""
     if value is None or isinstance(value, bool | str):
         return value
     if isinstance(value, np.generic):
@@ -136,10 +137,10 @@ def encode(value: Any, model: Model | None = None) -> Document:
 
 
 def decode(document: Document, model: Model | None = None) -> Any:
-    """Return the value of a document that `encode` gave; `Unknown` for an object that cannot be rebuilt here.
+    """Return the value of a document that `encode` made; `Unknown` for an object that cannot be rebuilt here.
 
-    Classes are looked up in dynx and in modules that are imported already: a file imports nothing. Raises
-    ArgumentError for a document of another form.
+    Classes are looked up in dynx and in modules that are already imported; a file cannot cause an import.
+    Raises ArgumentError for a document of another form.
     """
     try:
         return _decoded(document, model)
@@ -149,7 +150,7 @@ def decode(document: Document, model: Model | None = None) -> Any:
 
 
 def in_words(document: Document) -> str:
-    """Return a document in short, for a message."""
+    """Describe a document in a few words, for a message."""
     if isinstance(document, dict):
         if FINGERPRINT in document:
             return f"{document[FINGERPRINT].rpartition(':')[2]} (fingerprint {document['sha256'][:8]})"
@@ -211,8 +212,8 @@ def _object(value: Any, given: Mapping[str, Any], model: Model | None) -> Docume
 
 
 def _code_of(value: Any) -> dict[str, Document]:
-    """Return the checksum of the code of an object's class, and a trajectory's duration; nothing for a class
-    of dynx."""
+    """Return the checksum of the code of an object's class, and the duration of a trajectory; empty for a
+    class of dynx."""
     if not is_foreign(type(value)):
         return {}
     duration = {DURATION: float(value.duration)} if isinstance(value, Trajectory) else {}
@@ -220,7 +221,7 @@ def _code_of(value: Any) -> dict[str, Document]:
 
 
 def _present_class(document: Document) -> type | None:
-    """Return the class of a document in this program; None where it is not here."""
+    """Return the class of a document in this program; None if it does not exist here."""
     if CLASS in document:
         found: type | None = _class_of(document[CLASS])
         return found
@@ -231,7 +232,7 @@ def _present_class(document: Document) -> type | None:
 
 
 def _has_other_code(document: Document) -> bool:
-    """Check whether the class of a document has other code in this program than in the file."""
+    """Check whether the code of a document's class differs between this program and the file."""
     kind = _present_class(document) if CODE in document else None
     return kind is not None and digest_of_code(kind) != document[CODE]
 
@@ -246,7 +247,7 @@ def _array(array: np.ndarray[Any, Any]) -> Document:
 
 
 def _without_infinities(entry: Any) -> Any:
-    """Return `entry` with text for the numbers that JSON does not have."""
+    """Replace the numbers that JSON does not have by text."""
     if isinstance(entry, list):
         return [_without_infinities(each) for each in entry]
     return repr(entry) if isinstance(entry, float) and not math.isfinite(entry) else entry
@@ -259,14 +260,15 @@ def _with_infinities(entry: Any) -> Any:
 
 
 def _is_declared(value: Any) -> bool:
-    """Check whether `value` is of a class that is itself a dataclass, and has nothing beside its fields."""
+    """Check whether the class of `value` is a dataclass itself, and `value` has no attributes besides its
+    fields."""
     if "__dataclass_fields__" not in vars(type(value)):
         return False
     return set(getattr(value, "__dict__", ())) <= {each.name for each in fields(value)}
 
 
 def _controller(controller: Controller[Any], model: Model | None) -> Document | None:
-    """Return a registered controller and its model; None for any other."""
+    """Convert a registered controller to a document; return None for any other controller."""
     if any(each.model != controller.model for each in chain_of(controller)):
         return None
     try:
@@ -280,7 +282,7 @@ def _name_of(kind: type) -> str:
 
 
 def _class_of(name: str) -> Any:
-    """Return the class of that name in dynx or in a module that is imported already; None where there is
+    """Return the class of that name in dynx or in a module that is already imported; None if there is
     none."""
     module, _, path = name.partition(":")
     if module.partition(".")[0] == "dynx":
@@ -295,7 +297,7 @@ def _class_of(name: str) -> Any:
 
 
 def _fingerprint(value: Any, model: Model | None) -> str:
-    """Return the checksum of the parts of an object, and of those of the objects in it."""
+    """Return the checksum of the parts of an object, and of the objects in it."""
     with entered(value) as place:
         if place is not None:
             return f"see {place}"
@@ -306,7 +308,7 @@ def _fingerprint(value: Any, model: Model | None) -> str:
 
 
 def _parts(value: Any) -> Iterable[Any]:
-    """Return the code and closure of a function; of any other object all that a copy of it would get."""
+    """Return the code and closure of a function; for any other object, everything that a copy of it gets."""
     if isinstance(value, set | frozenset):
         return value
     if isinstance(value, bytes):
@@ -321,7 +323,8 @@ def _parts(value: Any) -> Iterable[Any]:
         attributes = attributes_of(value)
         reduced = value.__reduce_ex__(2)
     except TypeError:
-        # An object that cannot be copied is known by its class, and by its name if it has one, as ufuncs do.
+        # An object that cannot be copied is represented by its class, and by its name if it has one, as
+        # ufuncs do.
         return [getattr(value, "__name__", None)]
     if isinstance(reduced, str):
         return [reduced]

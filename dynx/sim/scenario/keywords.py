@@ -12,9 +12,9 @@ from dynx.sim.scenario.scenario import Scenario
 
 
 def scenario_of(model: Model | Scenario, controller_backend: str | None, given: dict[str, Any]) -> Scenario:
-    """Return the scenario of keyword arguments, or the one given instead of a model.
+    """Return the scenario of keyword arguments, or the scenario given instead of a model.
 
-    Raises ArgumentError for arguments beside a scenario that are fields of it.
+    Raises ArgumentError if an argument is given that is a field of the given scenario.
     """
     if isinstance(model, Scenario):
         refuse_beside_scenario({**given, "controller_backend": controller_backend})
@@ -28,12 +28,13 @@ def scenario_of(model: Model | Scenario, controller_backend: str | None, given: 
 
 
 def refuse_beside_scenario(given: Mapping[str, Any]) -> None:
-    """Raise ArgumentError for an argument that is given though a scenario has a field of that name."""
+    """Raise ArgumentError for an argument that is also a field of the given scenario."""
     for name, value in given.items():
         known = Scenario.__dataclass_fields__.get(name)
         default = None if known is None else known.default
         plain = type(value) is type(default) and isinstance(value, str | float | int | tuple)
         if value is not default and not (plain and value == default):
             raise ArgumentError(
-                f"{name} is given beside a scenario, which has its own: change it by dataclasses.replace"
+                f"{name} is given in addition to a scenario, which has a field "
+                "of that name: change it by dataclasses.replace"
             )

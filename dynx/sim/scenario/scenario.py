@@ -34,7 +34,7 @@ from dynx.sim.scenario.documents import NUMBERS as CONTROLLER_NUMBERS
 from dynx.trajectory.base import Trajectory
 
 SCHEMA = "dynx.scenario/1"
-"""Name of the form of a scenario's document; another number means another form."""
+"""Name and version of the layout of a scenario's document."""
 
 NUMBERS = ("reference", "q0", "v0", "damping", "friction", "armature", "effort_limits")
 """Fields that may be given as lists of numbers, and are kept as arrays."""
@@ -44,24 +44,25 @@ class Difference(NamedTuple):
     """A field in which two scenarios differ, and the two values."""
 
     field: str
-    """Its name; that of a field inside it has a dot, as in ``noise.seed``."""
+    """Its name; for a field inside another field with a dot, as in ``noise.seed``."""
     ours: Any
     theirs: Any
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Scenario:
-    """All of one simulation: what `dynx.simulate` and `dynx.simulate_batch` run, and what a record keeps.
+    """Complete description of one simulation, which `dynx.simulate` and `dynx.simulate_batch` run and a
+    record contains.
 
-    The fields are the arguments of `dynx.simulate` and mean what is written there. Two scenarios are equal if
-    all fields are, element by element, with the defaults filled in. ``dataclasses.replace`` changes one
-    field; `to_json` and `from_json` keep every bit. A field is checked when a simulation is made of it.
+    The fields are the arguments of `dynx.simulate`, which documents them. Two scenarios are equal if all
+    fields are, element by element, with the defaults filled in. ``dataclasses.replace`` changes one field;
+    `to_json` and `from_json` keep every bit. A field is checked when a simulation is made of it.
     """
 
     model: Model
     """The robot as the controller knows it."""
     controller: Controller[Any] | Unknown | None = None
-    """None for a robot without motors; `Unknown` only in a scenario from a file."""
+    """None for a robot without motors; `Unknown` only in a scenario that was read from a file."""
     reference: Trajectory | ArrayLike | Unknown | None = None
     _: KW_ONLY
     plant: str = "pinocchio"
@@ -73,7 +74,7 @@ class Scenario:
     dt: float = 1e-3
     """Step of the record [s]."""
     duration: float | None = None
-    """Time to simulate [s]; by default that of the reference. A `Simulation` needs none."""
+    """Time to simulate [s]; by default the duration of the reference. A `Simulation` does not need it."""
     control_dt: float | None = None
     """Step of the controller [s]; by default `dt`."""
     delay: float = 0.0
@@ -121,8 +122,8 @@ class Scenario:
         return tuple(self.payload) if isinstance(self.payload, tuple) else ()
 
     def with_defaults(self) -> Scenario:
-        """Return an equal scenario with the integrator, the control step and the duration that None stands
-        for."""
+        """Return an equal scenario in which the defaults replace None for integrator, control step and
+        duration."""
         duration = self.duration
         if duration is None and isinstance(self.reference, Trajectory | Unknown):
             duration = self.reference.duration
@@ -134,7 +135,7 @@ class Scenario:
         )
 
     def differences(self, other: Scenario) -> list[Difference]:
-        """Return the fields in which `other` is another simulation; empty for an equal one."""
+        """Return the fields in which `other` differs; empty for an equal scenario."""
         found: list[Difference] = []
         ours, theirs = self.with_defaults(), other.with_defaults()
         for name in field_names():
@@ -156,7 +157,7 @@ class Scenario:
         return hash((self.model, self.plant))
 
     def __repr__(self) -> str:
-        """Return the fields that are not left to their defaults."""
+        """Show the fields that differ from their defaults."""
         shown_fields = [f"Scenario({self.model.name}"]
         for each in fields(self):
             value = getattr(self, each.name)
@@ -166,10 +167,11 @@ class Scenario:
         return ",\n    ".join(shown_fields) + ")"
 
     def to_dict(self) -> dict[str, Document]:
-        """Return a document of numbers and text, which `from_dict` turns back into an equal scenario.
+        """Convert to a document of numbers and text, from which `from_dict` makes an equal scenario.
 
-        A trajectory of your own can be rebuilt if its class is a frozen dataclass, a controller if it is
-        registered besides; otherwise it is written as a fingerprint, which can only be compared.
+        A trajectory of your own can be rebuilt if its class is a frozen dataclass, and a controller of your
+        own if its class is registered too. Otherwise it is written as a fingerprint, which can only be
+        compared.
         """
         document: dict[str, Document] = {"schema": SCHEMA, "model": encode(self.model)}
         for name in field_names():
@@ -179,9 +181,9 @@ class Scenario:
 
     @classmethod
     def from_dict(cls, document: Mapping[str, Document]) -> Scenario:
-        """Return the scenario of a document. Raises ArgumentError for a document of another form."""
+        """Return the scenario of a document. Raises ArgumentError for a document of another layout."""
         if not isinstance(document, Mapping) or document.get("schema") != SCHEMA:
-            raise ArgumentError(f"a scenario's document has schema {SCHEMA!r}; this one has not")
+            raise ArgumentError(f"a scenario's document has schema {SCHEMA!r}; this one does not")
         given = {name: value for name, value in document.items() if name != "schema"}
         names = field_names()
         for name in given:
@@ -198,11 +200,11 @@ class Scenario:
 
     @classmethod
     def from_json(cls, text: str) -> Scenario:
-        """Return the scenario of a text that `to_json` gave. Raises ArgumentError for any other text."""
+        """Return the scenario of a text that `to_json` wrote. Raises ArgumentError for any other text."""
         try:
             document = json.loads(text)
         except ValueError as error:
-            raise ArgumentError(f"the text is no JSON: {error}") from error
+            raise ArgumentError(f"the text is not JSON: {error}") from error
         return cls.from_dict(document)
 
 
@@ -212,7 +214,7 @@ def field_names() -> tuple[str, ...]:
 
 
 def _as_array(value: Any) -> Any:
-    """Return the lists of numbers as a read-only array; anything else as it is."""
+    """Convert lists of numbers to a read-only array; return anything else unchanged."""
     if not isinstance(value, list | tuple | np.ndarray):
         return value
     try:
@@ -226,7 +228,7 @@ def _as_array(value: Any) -> Any:
 
 
 def _differences(name: str, ours: Document, theirs: Document) -> list[Difference]:
-    """Return the innermost entries in which two documents differ."""
+    """Yield the innermost entries in which two documents differ."""
     if _same(ours, theirs):
         return []
     one, other = _parts_of(ours), _parts_of(theirs)
@@ -237,8 +239,8 @@ def _differences(name: str, ours: Document, theirs: Document) -> list[Difference
 
 
 def _parts_of(document: Document) -> dict[str, Document] | None:
-    """Return the parts of the document of an object by name, equal names for one class; None for no
-    object."""
+    """Return the parts of an object's document by name, with the same names for all objects of a class;
+    None for a document that is not of an object."""
     if not isinstance(document, dict):
         return None
     code = {"code of the class": document[CODE]} if CODE in document else {}
@@ -253,8 +255,7 @@ def _parts_of(document: Document) -> dict[str, Document] | None:
 
 
 def _same(one: Document, other: Document) -> bool:
-    """Return the equality of documents in which True and 1 are different, and lists and arrays of numbers are
-    not."""
+    """Compare documents: True and 1 are different, but lists and arrays of equal numbers are the same."""
     one, other = (
         each[ARRAY] if isinstance(each, dict) and each.keys() == {ARRAY} else each for each in (one, other)
     )

@@ -28,7 +28,7 @@ from dynx.model import Model
 from dynx.sim import Noise, Payload, simulate
 from dynx.sim.batch import batch as batch_module
 from dynx.sim.batch.batch import BatchInterrupted, simulate_batch
-from dynx.sim.batch.part import Part, PartDone
+from dynx.sim.batch.part import Part, PartOutcome
 from dynx.sim.batch.rollouts import BatchRollouts
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint, Trajectory
@@ -160,7 +160,7 @@ def test_ctrl_c_keeps_what_is_done(
     computed: list[int] = []
     does = Part.__call__
 
-    def counted(part: Part) -> PartDone:
+    def counted(part: Part) -> PartOutcome:
         computed.append(part.count)
         return does(part)
 

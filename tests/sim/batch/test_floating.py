@@ -20,7 +20,7 @@ from dynx.errors import DivergedError
 from dynx.model import Model
 from dynx.sim import BatchRollouts, Noise, Payload, Push, simulate, simulate_batch
 from dynx.sim.batch import batch as batch_module
-from dynx.sim.batch.part import Part, PartDone
+from dynx.sim.batch.part import Part, PartOutcome
 from dynx.sim.plants.floating_step import floating_step
 from dynx.spatial import so3
 from dynx.spatial.scalar import Floats
@@ -181,7 +181,7 @@ def test_who_computes_it_and_a_stop_on_the_way_change_nothing(
     computed: list[int] = []
     does = Part.__call__
 
-    def counted(part: Part) -> PartDone:
+    def counted(part: Part) -> PartOutcome:
         computed.append(part.count)
         return does(part)
 

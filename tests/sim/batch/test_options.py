@@ -183,7 +183,7 @@ def test_where_the_limits_cut_is_counted(arm: Model) -> None:
     assert np.any(found.saturated == 1.0)
     assert np.any(found.saturated == 0.0)
     assert not held(arm, effort_limits=1e6).saturated.any()
-    # 50 steps are no multiple of 7: the last torque acts in one step only.
+    # 50 steps are not a multiple of 7: the last torque acts in one step only.
     last = held(arm, effort_limits=limit, control_dt=7e-3)
     assert np.all(last.saturated <= 1.0)
 
@@ -205,7 +205,7 @@ def test_what_no_option_can_be_is_refused(arm: Model) -> None:
     law = GravityCompensatedPD(arm, kp=60, kd=6)
     six = np.full(6, 0.1)
     bad: list[tuple[type[Exception], str, dict[str, Any]]] = [
-        (ArgumentError, "no multiple", {"delay": 1.5e-3}),
+        (ArgumentError, "not a multiple", {"delay": 1.5e-3}),
         (ArgumentError, "delay", {"delay": -1.0}),
         (GainError, "damping has shape", {"damping": np.zeros((3, 4))}),
         (GainError, "friction has shape", {"friction": np.zeros((3, 6, 1))}),

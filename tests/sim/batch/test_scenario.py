@@ -97,7 +97,7 @@ def test_what_a_batch_does_not_have_is_refused_by_name(change: dict[str, Any], n
 )
 @pytest.mark.parametrize("run", [simulate, simulate_batch])
 def test_what_the_scenario_has_is_not_given_beside_it(run: Any, given: dict[str, Any]) -> None:
-    with pytest.raises(ArgumentError, match=f"{next(iter(given))} is given beside a scenario"):
+    with pytest.raises(ArgumentError, match=f"{next(iter(given))} is given in addition to a scenario"):
         run(SCENARIO, **given)
 
 

@@ -204,7 +204,7 @@ def test_a_part_of_a_file(written: bytes, tmp_path: Path) -> None:
     path = tmp_path / "part.npz"
     for length in range(0, len(written), 97):
         path.write_bytes(written[:length])
-        assert "no .npz file, or a part of one" in refused(path)
+        assert "not a .npz file, or it is truncated" in refused(path)
 
 
 def test_damaged_files_are_refused_or_whole(written: bytes, rollout: Rollout, tmp_path: Path) -> None:
