@@ -1,8 +1,8 @@
-"""Checks of batches without temporary arrays.
+"""Checks of the arguments of batches without temporary arrays.
 
-The checks of `Arguments` make several passes and temporary arrays, which takes longer than a kernel. Here the
-largest and the smallest entry show whether all are finite and not too large; only if they are not, the checks
-of `Arguments` follow, which name the invalid entry.
+The checks of `Arguments` read the data several times and make temporary arrays, which takes longer than a
+kernel. Here only the largest and the smallest entry are tested; if they are not finite or too large, the
+checks of `Arguments` follow, which name the invalid entry.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _MAX_LIST_SIZE = 64
 """Size up to which a C loop over a Python list is faster than NumPy."""
 
 _MAX_ACCELERATION = 1e300
-"""Bound above which accelerations are checked one by one."""
+"""Magnitude above which accelerations are checked one by one."""
 
 
 class BatchArguments(Arguments):
@@ -73,5 +73,5 @@ def _below(array: Floats, bound: float) -> bool:
     """Check whether every entry is a number of magnitude below `bound`."""
     if array.size < _MAX_LIST_SIZE:
         return hypot(*array.reshape(-1).tolist()) < bound
-    # With a NaN both are NaN, and both comparisons are false.
+    # If any entry is NaN, minimum and maximum are NaN, and both comparisons are false.
     return bool(np.max(array) < bound and np.min(array) > -bound)

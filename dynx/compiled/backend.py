@@ -1,11 +1,10 @@
 """The backend `compiled`: `dynx.rbd` traced for one robot and compiled for this processor.
 
-Every quantity becomes a kernel when it is first needed, with the robot's constants folded in
-(`dynx.compiled.kernels`; one kernel serves many frames, see `dynx.compiled.frames`).
-Batches are evaluated several samples at a time and on several threads. Compiled kernels are
-kept in a cache (`dynx.simd.cache`).
+Every quantity is compiled into a kernel when it is first needed, with the robot's numbers as constants
+(`dynx.compiled.kernels`; one kernel serves many frames, see `dynx.compiled.frames`). Batches are evaluated
+several samples at a time and on several threads. Compiled kernels are kept in a cache (`dynx.simd.cache`).
 
-Safe to use from several threads, which may share one backend and its kernels.
+Several threads may share one backend and its kernels.
 """
 
 from __future__ import annotations
@@ -45,12 +44,12 @@ Call = Callable[..., Floats]
 class CompiledBackend(Backend):
     """Kernels of `dynx.rbd` behind the interface of `Backend`.
 
-    `threads` bounds how many threads one batch is split over; None stands for all processors. Results
-    are the same bit for bit whatever their number.
+    A batch is split over at most `threads` threads; None stands for one per processor. Results are the same
+    bit for bit for any number of threads.
 
-    `forward_kinematics`, `jacobian`, `inverse_dynamics`, `forward_dynamics` and `mass_matrix` take
-    `out`, a C-contiguous float64 array of the shape of the result, which they fill and return; what it
-    holds after an error is not defined.
+    `forward_kinematics`, `jacobian`, `inverse_dynamics`, `forward_dynamics` and `mass_matrix` take `out`, a
+    C-contiguous float64 array of the shape of the result, which they fill and return; its content after an
+    error is undefined.
     """
 
     name: ClassVar[str] = "compiled"
@@ -69,7 +68,7 @@ class CompiledBackend(Backend):
         self._eliminates = self._uncoupled or has_physical_inertias(self._mechanism)
         self._calls: dict[object, Call] = {}
         self._chain_kernels: dict[object, Kernel] = {}
-        # The calls again, by the arguments of the public methods, which saves looking up names.
+        # The same calls under the arguments of the public methods, which saves looking up names.
         self._public_calls: dict[object, Call] = {}
 
     @property
@@ -78,7 +77,7 @@ class CompiledBackend(Backend):
         return f"dynx {__version__}, {compiler_version()}, {host().cpu}"
 
     def _release(self) -> None:
-        # Calls in progress on other threads keep their kernels until they return.
+        # Calls in progress on other threads keep a reference to their kernels until they return.
         with COMPILE_LOCK:
             self._public_calls, self._calls, self._chain_kernels = {}, {}, {}
 
@@ -90,7 +89,8 @@ class CompiledBackend(Backend):
         """Return T_world_frame (..., 4, 4); for several frames, or None for all, (..., n, 4, 4)."""
         if frame is not None and not isinstance(frame, str):
             names = self._arguments.frames(frame)
-            # Taken from all frames: a kernel for each of many possible lists would round differently.
+            # The poses are selected from those of all frames, because a kernel for each list of frames would
+            # round differently.
             of_all = self._call_for("frame_placements", self._all_frames)
             return write_into(out, of_all(q)[..., [self._index(name) for name in names], :, :])
         call = self._public_calls.get(("forward_kinematics", frame))
@@ -163,7 +163,7 @@ class CompiledBackend(Backend):
     ) -> Floats:
         """Return the acceleration a (..., nv) that `tau` and the external forces give.
 
-        Raises SingularMassMatrixError, which names the joints, where a joint moves no inertia.
+        Raises SingularMassMatrixError, which names the joints, if nothing that a joint moves has inertia.
         """
         if external_forces is None and not joint_dynamics and self._eliminates:
             call = self._public_calls.get("forward_dynamics")
@@ -217,7 +217,7 @@ class CompiledBackend(Backend):
         key = (quantity, details, tree)
         call = self._calls.get(key)
         if call is None:
-            # A fork waits for this lock, so that it is free in the child.
+            # A fork acquires this lock first, so that it is free in the child.
             with COMPILE_LOCK:
                 self._arguments.refuse_closed()
                 call = self._calls.get(key)
@@ -263,7 +263,7 @@ class CompiledBackend(Backend):
 
     @classmethod
     def _is_native(cls, quantity: Quantity) -> bool:
-        """Every quantity has a kernel."""
+        """Return True, because every quantity has a kernel."""
         return True
 
     def _frame_placement(self, q: Floats, frame: int) -> Floats:

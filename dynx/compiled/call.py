@@ -1,7 +1,7 @@
 """Calls of kernels with arguments of any leading axes, whose results have the same leading axes.
 
-One sample is copied into a workspace, evaluated and copied out, which together costs about a
-microsecond. A batch is read where it lies.
+A single sample is copied into a workspace, evaluated and copied out, which takes about a microsecond. A batch
+is read in place.
 """
 
 from __future__ import annotations
@@ -20,10 +20,12 @@ from dynx.simd.kernel import Kernel, Workspace
 from dynx.spatial.scalar import Floats
 
 Check = Callable[..., Floats]
-"""Converts an argument to a float64 array (..., size), or raises an error that says what is wrong with it."""
+"""Function that converts an argument to a float64 array (..., size), or raises an error that describes
+what is wrong."""
 
 MAX_COPIED_SAMPLES = 256
-"""Largest batch that is copied to the workspace; for more, looking up the addresses of arrays is faster."""
+"""Largest batch that is copied to the workspace; for larger ones, looking up the addresses of arrays is
+faster."""
 
 MAX_COPIED_SIZE = 16384
 """Largest size of one array of such a batch."""
@@ -32,16 +34,16 @@ _FLOAT64 = np.dtype(np.float64)
 _ABSENT = object()
 
 _NOT_ONE_SAMPLE = (TypeError, ValueError, NotImplementedError, BufferError)
-"""Exceptions of a memory view for anything but one sample of float64."""
+"""Exceptions that a memory view raises for anything but one sample of float64."""
 
 
 class KernelCall:
     """A quantity of one robot, evaluated by its kernel.
 
-    `checks` are those of the arguments, in their order. They are called only for arguments that are no
-    float64 arrays, or whose defect shows an invalid sample. `place`, if given, is a last input of the kernel,
-    the same for all samples. `check_result` raises for results that are not finite; it is called where the
-    defect is too large although the arguments are valid.
+    `checks` are the checks of the arguments, in order. They are called only for arguments that are not
+    float64 arrays, or if the kernel's defect shows an invalid sample. `place`, if given, is the last input of
+    the kernel, the same for all samples. `check_result` raises for results that are not finite; it is called
+    if the defect is too large although the arguments are valid.
     """
 
     __slots__ = (
@@ -82,15 +84,15 @@ class KernelCall:
         workspace = self._workspace()
         self._first, self._second, self._third = (*workspace.input_slices, slice(0), slice(0))[:3]
         self._defect = workspace.output_slices[1].start
-        # A list that calls pop from and append to, rather than one workspace for each thread: this is safe
-        # even where a signal handler or a destructor calls in the middle of a call.
+        # Calls take a workspace from this list and return it. Unlike one workspace per thread, this is safe
+        # even if a signal handler or a destructor makes a call during another call.
         self._workspaces = [workspace]
 
     def evaluate(self, q: Any, v: Any = _ABSENT, a: Any = _ABSENT, out: Floats | None = None) -> Floats:
         """Return the result (..., *shape), in `out` if that is given.
 
-        `out` is a C-contiguous float64 array of the shape of the result; what it holds after an error is
-        not defined. Raises ShapeError, DTypeError or ArgumentError.
+        `out` is a C-contiguous float64 array of the shape of the result; its content after an error is
+        undefined. Raises ShapeError, DTypeError or ArgumentError.
         """
         try:
             workspace = self._workspaces.pop()
@@ -117,7 +119,7 @@ class KernelCall:
         return self._batch(tuple(x for x in (q, v, a) if x is not _ABSENT), out)
 
     def _evaluate_rows(self, workspace: Workspace, arguments: tuple[Any, ...], out: Floats | None) -> Floats:
-        """Return the results of a batch (n, size), copied to the workspace if it is small."""
+        """Evaluate a batch and return its results (n, size); a small batch is copied to the workspace."""
         n = len(arguments[0]) if _is_float64(arguments[0], self._sizes[0]) else 0
         fits = 0 < n <= self._max_rows
         if fits:
@@ -128,7 +130,7 @@ class KernelCall:
                 rows[:n] = array
         if fits:
             workspace.run_rows(n)
-            # Not negative, so that the sum is below the bound only if each is, and none is NaN.
+            # Defects are not negative, so the sum is below the bound only if each one is and none is NaN.
             if sum(workspace.output_rows[1][:n, 0].tolist()) < MAX_DEFECT or self._unchecked:
                 if out is None:
                     out = workspace.output_rows[0][:n].copy()
@@ -154,7 +156,7 @@ class KernelCall:
         shape = (*batch, *self._shape)
         result = np.empty(shape) if out is None else _checked_out(out, shape)
         if out is not None and any(np.may_share_memory(out, array) for array in arrays):
-            # The arguments are needed once more if they have to be checked.
+            # The arguments are needed again if they have to be checked.
             result = np.empty(shape)
         defect = self._evaluate(arrays, batch, result)
         if not self._unchecked and not defect.max(initial=0.0) < MAX_DEFECT:
@@ -162,7 +164,7 @@ class KernelCall:
                 checked = [check(array) for array, check in zip(arrays, self._checks, strict=True)]
                 if any(new is not old for new, old in zip(checked, arrays, strict=True)):
                     self._evaluate(checked, batch, result)
-            # Without validation an argument that is not finite spoils the results of its own sample only.
+            # Without validation, an argument that is not finite affects the results of its own sample only.
             valid = self._validate or all(np.isfinite(x).all() for x in arrays)
             if self._check_result is not None and valid:
                 self._check_result(result)
@@ -202,7 +204,7 @@ class NumericCall:
         self._checks, self._tree, self._check_result = checks, tree, check_result
 
     def evaluate(self, q: Any, v: Any = _ABSENT, a: Any = _ABSENT, out: Floats | None = None) -> Floats:
-        """Return the result (..., *shape), as of `KernelCall.evaluate`."""
+        """Return the result (..., *shape), as `KernelCall.evaluate` does."""
         arguments = (x for x in (q, v, a) if x is not _ABSENT)
         arrays = [check(argument) for check, argument in zip(self._checks, arguments, strict=True)]
         batch = common_batch(*arrays)
@@ -212,7 +214,7 @@ class NumericCall:
             found = evaluate_quantity(
                 self._mechanism, self._quantity, self._details, *spread, tree=self._tree
             )
-        # A result that no coordinate moves lacks the batch axes.
+        # A result that depends on no coordinate lacks the batch axes.
         own = len(kernel_quantity(self._quantity).shape)
         shape = (*batch, *found.shape[found.ndim - own :])
         whole = found.shape == shape and found.flags.c_contiguous and found.flags.writeable
@@ -223,7 +225,7 @@ class NumericCall:
 
 
 def write_into(out: Floats | None, result: Floats) -> Floats:
-    """Return `result`, or `out` filled with it if that is given."""
+    """Return `result`; if `out` is given, copy the result into it and return `out`."""
     if out is None:
         return result
     _checked_out(out, result.shape)[...] = result

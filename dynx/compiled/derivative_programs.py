@@ -42,8 +42,7 @@ def forward_dynamics_derivatives(mechanism: Mechanism) -> Program:
 
 
 def factors_of_mass(mechanism: Mechanism) -> Program:
-    """Return the program of M (nv, nv), whose output are the entries of the factors L and D that are not
-    zero."""
+    """Return the program of M (nv, nv) with the non-zero entries of the factors L and D as output."""
     nv, filled = filled_entries(mechanism)
 
     def factors(M: Array) -> Array:
@@ -54,7 +53,7 @@ def factors_of_mass(mechanism: Mechanism) -> Program:
 
 
 def solution_by_factors(mechanism: Mechanism) -> Program:
-    """Return the program of the output of `factors_of_mass` and of b (nv,), with the output M^-1 b."""
+    """Return the program of the output of `factors_of_mass` and b (nv,), with the output M^-1 b."""
     nv, filled = filled_entries(mechanism)
 
     def solution(factors: Array, b: Array) -> Array:
@@ -97,7 +96,7 @@ def _torque(mechanism: Mechanism, q: Array, v: Array, a: Array) -> Array:
 def _differentiated_torque(mechanism: Mechanism) -> Program:
     """Return the program of the derivatives of the torque by a displacement d of q, by v and by a.
 
-    Differentiation is in reverse mode, since there are more arguments than torques.
+    Reverse mode is used, because there are more arguments than torques.
     """
 
     def torque(q: Array, d: Array, v: Array, a: Array) -> dict[str, Array]:
@@ -109,8 +108,7 @@ def _differentiated_torque(mechanism: Mechanism) -> Program:
 
 
 def _torque_derivatives(program: Program, q: Array, v: Array, a: Array) -> dict[str, Array]:
-    """Return the outputs of `_differentiated_torque` at d = 0; M is computed on one side of its diagonal
-    only."""
+    """Return the outputs of `_differentiated_torque` at d = 0; only one triangle of M is computed."""
     found = inline(program, {"q": q, "d": np.zeros(len(v)), "v": v, "a": a})
     M = np.array(found["dtau_da"])
     for i, j in zip(*np.triu_indices(len(M), 1), strict=True):

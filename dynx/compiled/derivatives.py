@@ -1,16 +1,16 @@
-"""Derivatives of the dynamics and of poses, exact, compiled for one robot.
+"""Exact derivatives of the dynamics and of poses, compiled for one robot.
 
-The graph of the algorithm itself is differentiated (`dynx.simd.differentiate`), so there is no step to choose
-and no second source that could differ from the first. With mimic joints the derivative is that of the reduced
-robot.
+The graph of the algorithm itself is differentiated (`dynx.simd.differentiate`), so there is no step size, and
+no second implementation that could differ from the first. With mimic joints, derivatives are by the
+coordinates of the model.
 
 Forward dynamics is differentiated by the implicit function theorem: at a = FD(q, v, tau) the torque
 ID(q, v, a) stays tau, so
 
     da/dq = -M^-1 dID/dq,    da/dv = -M^-1 dID/dv,    da/dtau = M^-1.
 
-That is as exact as differentiating the articulated-body algorithm, whose graph gives several times the
-code (`tests/compiled/test_derivatives.py` holds the ratio): the inverse of M is shared by all columns.
+That is as exact as differentiating the articulated-body algorithm, but takes several times less code
+(`tests/compiled/test_derivatives.py` measures the ratio), because all columns share the inverse of M.
 """
 
 from __future__ import annotations
@@ -35,8 +35,9 @@ from dynx.simd.threads import checked_threads
 from dynx.spatial.scalar import Floats
 
 MAX_NV_OF_ONE_KERNEL = 12
-"""Degrees of freedom up to which one kernel computes all derivatives of forward dynamics; its code grows with
-their cube. Above, systems of equations are solved one right-hand side after the other."""
+"""Largest number of degrees of freedom for which one kernel computes all derivatives of forward dynamics;
+its code grows with the cube of that number. For larger robots, the equations are solved one right-hand
+side at a time."""
 
 MIN_SAMPLES_BY_COLUMN = 64
 """Smallest number of samples at which systems of equations are solved column by column for all samples at
@@ -62,16 +63,16 @@ class ForwardDynamicsDerivatives(NamedTuple):
 class Derivatives:
     """Partial derivatives for one robot, of single samples and of batches.
 
-    Arrays are float64 with leading batch axes that broadcast, as in `Backend`. A derivative by q is one
-    by a displacement d (nv,) in the coordinates of v: f(model.integrate(q, d)) at d = 0. With a floating
-    base these are translation and rotation in the axes of the base; without one, plain partial
-    derivatives. Units are those of the one over those of the other.
+    Arrays are float64 with leading batch axes that broadcast, as in `Backend`. The derivative of f by q is
+    that of f(model.integrate(q, d)) by the displacement d (nv,) at d = 0. For a floating base d is a
+    translation and a rotation in the axes of the base; for joints these are ordinary partial derivatives. The
+    unit is that of f divided by that of the variable.
 
     Damping, friction, armature and external forces are not included.
 
-    `threads` bounds how many threads a batch is split over; None stands for all processors. Kernels are
-    compiled when they are first asked for and kept in the cache of `dynx.simd.cache`. Safe to use from
-    several threads; pickled by its recipe. Raises errors of `dynx.errors` only.
+    A batch is split over at most `threads` threads; None stands for one per processor. Kernels are compiled
+    when they are first needed and kept in the cache of `dynx.simd.cache`. Several threads may share an
+    object; pickling keeps the model and the options. Raises errors of `dynx.errors` only.
     """
 
     def __init__(self, model: Model, *, threads: int | None = None) -> None:
@@ -100,7 +101,7 @@ class Derivatives:
         """Return the derivatives of a = M^-1 (tau - bias) by q, v and tau; the last is the inverse of the
         mass matrix.
 
-        Raises SingularMassMatrixError, which names the joints, where a joint moves no inertia.
+        Raises SingularMassMatrixError, which names the joints, if nothing that a joint moves has inertia.
         """
         arrays = self._checked(q, v, tau, "tau")
         self._solvability.refuse_singular(joint_dynamics=False)
@@ -132,7 +133,7 @@ class Derivatives:
         return derivative
 
     def _solve(self, factors: Floats, b: Floats) -> Floats:
-        """Return M^-1 b for matrices b (..., nv, nv), from the factors of M."""
+        """Solve M x = b for matrices b (..., nv, nv), from the factors of M."""
         kernel, (nv, columns) = self._kernel("solution", programs.solution_by_factors), b.shape[-2:]
         sides = np.ascontiguousarray(np.swapaxes(b, -1, -2)).reshape(-1, columns, nv)
         factors = factors.reshape(len(sides), factors.shape[-1])

@@ -1,9 +1,9 @@
 """Quantities of frames, written so that one kernel serves all frames of a chain of bodies.
 
-A *chain* is the bodies between the root and one of them. The last input of its kernel, the *place*, selects
-a frame and is the same for every sample of a call: the frame's pose in its body, the reference, and a
+A *chain* consists of the bodies between the root and one body. The last input of its kernel, the *place*,
+selects a frame and is the same for every sample of a call: the frame's pose in its body, the reference, and a
 *weight* for the root and each body of the chain, 1 for the body that the frame is fixed to and 0 for the
-others. Properties of the bodies are summed over the chain with these weights; all but one of them are zero,
+others. Properties of the bodies are summed over the chain with these weights. All but one of them are zero,
 so the sum is exact.
 
 The Jacobian in `local_world_aligned`, which is used most, has a kernel for each body, without weights.
@@ -27,15 +27,15 @@ from dynx.spatial.scalar import Array, Floats
 from dynx.spatial.so3 import skew
 
 _POSITION, _ROTATION, _LOCAL, _WORLD, _WEIGHTS = slice(0, 3), slice(3, 12), 12, 13, slice(14, None)
-"""Parts of a place. Of `_LOCAL` and `_WORLD` at most one is 1; none for `local_world_aligned`."""
+"""Parts of a place. At most one of `_LOCAL` and `_WORLD` is 1; both are 0 for `local_world_aligned`."""
 
 
 @dataclass(frozen=True)
 class Chain:
     """Bodies from the root outwards, each the child of the one before it.
 
-    With `shared`, the kernel serves frames on all of them and on the root, in every reference; without,
-    those on the last body (on the root if there is none), in `local_world_aligned`.
+    With `shared`, the kernel serves frames on all of these bodies and on the root, in every reference.
+    Without it, it serves frames on the last body (or on the root), in `local_world_aligned` only.
     """
 
     bodies: tuple[int, ...]
@@ -43,7 +43,7 @@ class Chain:
 
     @property
     def place_size(self) -> int:
-        """Numbers of a place."""
+        """Number of entries of a place."""
         return _WEIGHTS.start + (len(self.bodies) + 1 if self.shared else 0)
 
 
@@ -72,7 +72,7 @@ def place_of(mechanism: Mechanism, chain: Chain, frame: int, reference: Referenc
 def on_chain(
     mechanism: Mechanism, quantity: str, chain: Chain, place: Array, q: Array, *rates: Array
 ) -> Array:
-    """Return a quantity of the frame at `place` for one sample, in tree coordinates.
+    """Evaluate a quantity of the frame at `place` for one sample, in tree coordinates.
 
     q (nq,), rates (nv,) and place hold numbers or symbols. Quantities are ``jacobian``,
     ``jacobian_derivative``, ``frame_velocity`` and ``frame_acceleration``.
@@ -82,7 +82,7 @@ def on_chain(
     own_v = [*range(base_v), *(base_v + body for body in chain.bodies)]
     moves = np.ones(len(own_v))
     if chain.shared:
-        # A joint moves the frames on its child body and on those further out.
+        # A joint moves the frames on its child body and on all bodies beyond it.
         weights = place[_WEIGHTS]
         moves = np.array([1.0] * base_v + [np.sum(weights[k:]) for k in range(1, len(weights))])
 
@@ -111,8 +111,8 @@ def on_chain(
 def _carrier(mechanism: Mechanism, chain: Chain, place: Array, q: Array) -> tuple[Mechanism, Poses]:
     """Return the bodies of the chain and one more, the carrier, to which the only frame is fixed.
 
-    The carrier has the pose of the body that the frame is fixed to. Its parent is the last body and its
-    joint does not move: the last column of its Jacobian is meaningless.
+    The carrier has the pose of the body that the frame is fixed to. Its parent is the last body; its joint
+    does not move, so the last column of its Jacobian has no meaning.
     """
     bodies = tuple(replace(mechanism.bodies[body], parent=k - 1) for k, body in enumerate(chain.bodies))
     last = len(bodies)
@@ -128,7 +128,7 @@ def _carrier(mechanism: Mechanism, chain: Chain, place: Array, q: Array) -> tupl
 
 
 def _weighted_sum(weights: Array, terms: tuple[Array, ...]) -> Array:
-    """Return the one of `terms` whose weight is 1."""
+    """Return the term whose weight is 1."""
     return np.asarray(sum(weight * term for weight, term in zip(weights, terms, strict=True)))
 
 
@@ -148,17 +148,17 @@ class _Axes:
 
     @classmethod
     def of(cls, place: Array, R: Array, p: Array) -> _Axes:
-        """Return the axes for a frame at (R, p) in the world."""
+        """Make the axes for a frame at (R, p) in the world."""
         local, world = place[_LOCAL], place[_WORLD]
         return cls(local * R.T + (1.0 - local) * np.eye(3), world * p, local, world)
 
     def motion(self, x: Array) -> Array:
-        """Transform motions (6,) or (6, n) of the frame from `local_world_aligned`."""
+        """Transform twists (6,) or (6, n) of the frame from `local_world_aligned`."""
         return np.concatenate([self.R @ (x[:3] + skew(self.p) @ x[3:]), self.R @ x[3:]])
 
     def rate(self, x: Array, dx: Array, twist: Array) -> Array:
-        """Return the time derivative of `motion(x)`, where `dx` is that of `x` and the frame moves with
-        `twist`."""
+        """Return the time derivative of `motion(x)`; `dx` is the time derivative of `x`, and `twist` the
+        velocity of the frame."""
         omega = skew(self.rotates * twist[3:])
         linear = dx[:3] - omega @ x[:3] + skew(self.p) @ dx[3:] + skew(self.fixed * twist[:3]) @ x[3:]
         return np.concatenate([self.R @ linear, self.R @ (dx[3:] - omega @ x[3:])])

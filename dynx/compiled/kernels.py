@@ -1,16 +1,16 @@
 """Kernels of quantities: the algorithms of `dynx.rbd`, traced for one robot and compiled.
 
-A kernel has the arguments of its quantity as inputs and two outputs: the result, and a ``defect`` that is
-below `MAX_DEFECT` exactly if the arguments are finite, not too large, and of unit length where they are a
-quaternion, and the result is finite where it might not be. So arguments are checked while they are in the
-processor's registers anyway.
+A kernel has the arguments of its quantity as inputs and two outputs: the result, and a ``defect``. The defect
+is below `MAX_DEFECT` exactly if the arguments are finite and not too large, quaternions have unit length, and
+a result that could be infinite is finite. So arguments are checked while they are in the processor's
+registers.
 
 Mimic joints are part of the traced program: inputs are coordinates of the model, or with ``tree=True`` those
 of the tree.
 
-Placements of frames have the frames folded in as constants, for most programs use one frame. Other
-quantities of frames have kernels that many frames share (`dynx.compiled.frames`). The kernel is determined by
-the call alone, so no result depends on earlier calls.
+In kernels of frame placements the frames are constants, because most programs use one frame. Kernels of other
+quantities of frames are shared by many frames (`dynx.compiled.frames`). The call alone determines the kernel,
+so no result depends on earlier calls.
 """
 
 from __future__ import annotations
@@ -59,15 +59,15 @@ MAX_DEFECT = MAX_MAGNITUDE**2
 """Bound on the defect of a sample with valid arguments."""
 
 MAX_RESULT = 1e300
-"""Bound on the accelerations of quantities that solve; those of robots are smaller."""
+"""Bound on the results of quantities that solve an equation; accelerations of robots are smaller."""
 
 MAX_CODE_SIZE = 1000
-"""Bound on the size of a quantity's code (`_code_size`): some 20 seconds of compiling. NumPy evaluates
-what is larger."""
+"""Largest size of a quantity's code (`_code_size`), which takes about 20 seconds to compile. NumPy
+evaluates quantities with larger code."""
 
 SEGMENT_OF_CUBIC_CODE = 600
-"""Length of the segments (`dynx.simd.emit`) of code of cubic size: two thirds of the time to
-compile, and as fast to within an eighth."""
+"""Length of the segments (`dynx.simd.emit`) of code that grows with the cube of the number of joints.
+Shorter segments save a third of the compile time and cost at most an eighth of the speed."""
 
 ON_CHAINS = frozenset({"jacobian", "jacobian_derivative", "frame_velocity", "frame_acceleration"})
 """Quantities whose kernels serve many frames."""
@@ -87,10 +87,10 @@ _PLACEMENTS = {
     "frame_placement": _PLACEMENT,
     "frame_placements": replace(_PLACEMENT, algorithm=_all_placements, shape=("n_frames", 4, 4)),
 }
-"""Forward kinematics of one frame and of several, by the names of their hooks."""
+"""Entries of forward kinematics for one frame and for several, by the names of their hooks."""
 
 _WITH_BASE_PARAMETERS = frozenset({"inverse_dynamics", "bias_torque", "gravity_torque"})
-"""Quantities that are computed from the base parameters of the inertias, in fewer operations."""
+"""Quantities that take fewer operations when they are computed from the base inertial parameters."""
 
 
 def kernel_quantity(name: str) -> Quantity:
@@ -100,7 +100,7 @@ def kernel_quantity(name: str) -> Quantity:
 
 
 def _code_size(mechanism: Mechanism, growth: Growth) -> int:
-    """Return the size of the code of an algorithm, in units that `MAX_CODE_SIZE` has too."""
+    """Return the size of the code of an algorithm, in the units of `MAX_CODE_SIZE`."""
     if growth == "cubic":
         return len(mechanism.bodies) * mechanism.nv**2
     if growth == "pairs":
@@ -116,7 +116,7 @@ def compiles(mechanism: Mechanism, name: str) -> bool:
 def evaluate_quantity(
     mechanism: Mechanism, name: str, details: tuple[Any, ...], q: Array, *rates: Array, tree: bool = False
 ) -> Array:
-    """Return a quantity on arrays (..., nq) and (..., nv) of numbers or of symbols.
+    """Evaluate a quantity on arrays (..., nq) and (..., nv) of numbers or of symbols.
 
     They are in the coordinates of the model or, with `tree`, of the mechanism itself.
     """
@@ -124,7 +124,7 @@ def evaluate_quantity(
     if tree:
         mechanism = replace(mechanism, coupling=None)
     if quantity.solves and mechanism.coupling is not None:
-        # The inertia that the drivers feel is not that of a tree.
+        # With mimic joints the reduced equations are not those of a tree.
         v, tau = rates
         M = evaluate_quantity(mechanism, "mass_matrix", (), q)
         return np.asarray(
@@ -143,7 +143,7 @@ def evaluate_quantity(
 def _reduced(
     mechanism: Mechanism, quantity: Quantity, in_tree: Computation, q: Array, *rates: Array
 ) -> Array:
-    """Return `in_tree`, a quantity in tree coordinates, evaluated in those of the model."""
+    """Evaluate `in_tree`, which computes a quantity in tree coordinates, in those of the model."""
     result = in_tree(*tree_coordinates(mechanism, q, *rates))
     if quantity.reduces_columns:
         result = reduce_columns(mechanism, result)
@@ -187,7 +187,8 @@ def _recipe(mechanism: Mechanism, name: str, details: object, tree: bool) -> byt
 def _program(
     mechanism: Mechanism, name: str, result: Computation, *, tree: bool, **more: tuple[int, ...]
 ) -> Program:
-    """Return the program of `result`, of the quantity's arguments and inputs `more` that need no checking."""
+    """Return the program of `result`, whose inputs are the quantity's arguments and the inputs `more`,
+    which are not checked."""
     quantity = kernel_quantity(name)
 
     def result_and_defect(**inputs: Array) -> dict[str, Array]:
@@ -212,8 +213,8 @@ def _defect(mechanism: Mechanism, q: Array, *rates: Array) -> Array:
 
 
 def _sum_by_pairs(terms: list[Any]) -> Any:
-    """Return a sum in which few additions depend on one another, so that a processor does several at a
-    time."""
+    """Add terms in pairs, so that few additions depend on one another and the processor can do several at
+    once."""
     while len(terms) > 1:
         odd = terms[len(terms) // 2 * 2 :]
         terms = [a + b for a, b in zip(terms[::2], terms[1::2], strict=False)] + odd
@@ -251,7 +252,7 @@ def _fingerprint(mechanism: Mechanism) -> str:
             for each in value:
                 feed(each)
         else:
-            # Another kind of field than a dataclass would raise here, rather than be left out.
+            # A field of another kind raises here, so that none is left out.
             for field in fields(value):
                 feed(getattr(value, field.name))
 

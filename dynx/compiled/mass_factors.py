@@ -1,4 +1,5 @@
-"""Solution of equations with the mass matrix in a kernel, which keeps the sparsity of the tree's branches."""
+"""Solution of equations with the mass matrix in a kernel, exploiting the sparsity due to branches of the
+tree."""
 
 from __future__ import annotations
 
@@ -11,7 +12,7 @@ from dynx.spatial.scalar import Array
 
 
 def factorize_mass_matrix(mechanism: Mechanism, M: Array) -> Factors:
-    """Return the factors L and D of M, eliminated from the tips to the root.
+    """Factorise M into L and D by elimination from the tips to the root.
 
     Entries stay zero where two joints are on different branches (Featherstone 2008, section 6.5), so that no
     operation is spent on them.
@@ -24,13 +25,13 @@ def factorize_mass_matrix(mechanism: Mechanism, M: Array) -> Factors:
 
 
 def solve_with_factors(L: list[list[Array]], D: list[Array], b: Array) -> Array:
-    """Return M^-1 b for right-hand sides b (..., nv), from the factors of M."""
+    """Solve M x = b for right-hand sides b (..., nv), from the factors of M."""
     return solve_ldl(L, D, b[..., ::-1])[..., ::-1]
 
 
 def filled_entries(mechanism: Mechanism) -> tuple[int, list[tuple[int, int]]]:
-    """Return nv, and the positions at which the factor L, in the order of elimination, may differ from
-    zero."""
+    """Return nv, and the positions of the entries of L that may differ from zero, in the order of
+    elimination."""
     base = 6 if mechanism.floating else 0
     on_branch = np.zeros((mechanism.nv, mechanism.nv), dtype=bool)
     on_branch[:base] = True

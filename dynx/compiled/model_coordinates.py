@@ -11,7 +11,7 @@ from dynx.spatial.scalar import Array
 
 
 def tree_coordinates(mechanism: Mechanism, q: Array, *rates: Array) -> tuple[Array, ...]:
-    """Return q and velocities (or accelerations) of the model in coordinates of the tree."""
+    """Convert q and velocities (or accelerations) from the coordinates of the model to those of the tree."""
     coupling = mechanism.coupling
     if coupling is None:
         return (q, *rates)
@@ -20,7 +20,7 @@ def tree_coordinates(mechanism: Mechanism, q: Array, *rates: Array) -> tuple[Arr
 
 
 def reduce_columns(mechanism: Mechanism, A: Array) -> Array:
-    """Return a S: a torque (nv,) or the columns of a matrix, in the coordinates of the model."""
+    """Return A S: a torque (nv,) or the columns of a matrix, in the coordinates of the model."""
     coupling = mechanism.coupling
     return A if coupling is None else np.asarray(A @ coupling.matrix())
 

@@ -16,7 +16,7 @@ from dynx.spatial.scalar import Array, Floats
 from dynx.spatial.so3 import skew
 
 POINT = ("mass", "cx", "cy", "cz")
-"""Parameters of a point payload: mass [kg] and centre [m] in the axes of the frame that carries it."""
+"""Parameters of a point payload: mass [kg] and centre of mass [m] in the axes of its frame."""
 
 JOINT = ("damping", "friction", "armature")
 """Parameters of a joint: [N m s] or [N s/m], [N m] or [N], [kg m^2] or [kg]."""
@@ -26,8 +26,8 @@ JOINT = ("damping", "friction", "armature")
 class Parameters:
     """The parameters of a robot that are arguments.
 
-    `names` are such as ``forearm.m``, ``tool0.payload.mcx``, ``tool0.point.mass`` and
-    ``elbow.damping``; `defaults` (n,) are the model's own, zeros for a payload.
+    `names` are for example ``forearm.m``, ``tool0.payload.mcx``, ``tool0.point.mass`` and ``elbow.damping``;
+    `defaults` (n,) are the model's own, zeros for a payload.
     """
 
     names: tuple[str, ...]
@@ -43,7 +43,8 @@ class Parameters:
 
 @dataclass(frozen=True)
 class ParameterValues:
-    """Bodies to add to the mechanism, by the number of the frame that carries them, and joints (n, 3)."""
+    """Bodies to add to the mechanism, by the number of the frame to which they are fixed, and damping,
+    friction and armature of the joints (n, 3)."""
 
     bodies: tuple[tuple[int, RigidInertia], ...]
     joints: Array | None
@@ -79,7 +80,7 @@ class Selection:
 
     @property
     def choices(self) -> tuple[object, ...]:
-        """All fields but the model."""
+        """All fields except the model."""
         return self.links, self.payload, self.point_payload, self.joint_dynamics
 
     def parameters(self) -> Parameters:

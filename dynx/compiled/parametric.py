@@ -1,4 +1,4 @@
-"""Dynamics whose chosen parameters are arguments, one set for each sample, rather than constants.
+"""Dynamics with chosen parameters as arguments, one set per sample, instead of constants.
 
 For Monte Carlo studies, identification, and robots that grasp objects: the kernel is compiled once, and every
 sample of a batch may have its own inertias, payload or joint friction.
@@ -45,12 +45,13 @@ def parametric(
     """Return the dynamics of `model` with parameters as arguments.
 
     - `links`: all ten inertial parameters of each of these links, which replace those of the model
-    - `payload`: ten of a body fixed to this frame, about its origin and in its axes; zeros by default
-    - `point_payload`: mass and centre of mass in the axes of this frame, of a body without extent
+    - `payload`: ten inertial parameters of a body fixed to this frame, about its origin and in its axes;
+      zeros by default
+    - `point_payload`: mass and position of a point mass fixed to this frame, in its axes
     - `joint_dynamics`: damping, dry friction and armature of every moving joint
 
-    `threads` bounds how many threads a batch is split over; None stands for all processors. Raises
-    UnknownNameError for a link or frame that is not there, ArgumentError for a link named twice.
+    A batch is split over at most `threads` threads; None stands for one per processor. Raises
+    UnknownNameError for an unknown link or frame, ArgumentError for a link named twice.
     """
     refuse_other_than_model(model)
     if isinstance(links, str):
@@ -63,16 +64,17 @@ class ParametricDynamics:
     """Inverse and forward dynamics and the mass matrix of one robot, as functions of its parameters.
 
     Arrays are float64 with leading batch axes that broadcast: q (..., nq), v, a, tau (..., nv) and
-    `parameters` (..., n) in the order of ``self.parameters.names``; without them the model's own are
-    used. Mass and inertia may take any values, even impossible ones. Where joint dynamics are
-    parameters they are part of every result: the torque is that of the rigid bodies, plus
-    ``armature a + damping v + friction sign(v)`` of every joint, with sign(0) = 0.
+    `parameters` (..., n) in the order of ``self.parameters.names``; the default is the model's own
+    parameters. Mass and inertia may have any values, even physically impossible ones. If joint dynamics are
+    parameters, they are included in every result: the torque is that of the rigid bodies, plus ``armature a +
+    damping v + friction sign(v)`` of every joint, with sign(0) = 0.
 
-    Safe to use from several threads; pickled by its recipe. Raises errors of `dynx.errors` only.
+    Several threads may share an object; pickling keeps the model and the options. Raises errors of
+    `dynx.errors` only.
     """
 
     def __init__(self, selection: Selection, *, threads: int | None = None) -> None:
-        """As `parametric` makes it. Raises ArgumentError for an invalid number of threads."""
+        """Called by `parametric`. Raises ArgumentError for an invalid number of threads."""
         self.model = selection.model
         self.parameters: Parameters = selection.parameters()
         self._selection = selection
@@ -94,7 +96,7 @@ class ParametricDynamics:
     ) -> Floats:
         """Return the acceleration (..., nv) that `tau` gives, by factors of the mass matrix.
 
-        Raises SingularMassMatrixError where that is singular.
+        Raises SingularMassMatrixError where the mass matrix is singular.
         """
         arrays = [self._arguments.q(q), self._arguments.v(v), self._arguments.v(tau, "tau")]
         a = self._evaluate("forward_dynamics", _forward_dynamics, arrays, parameters)
@@ -109,14 +111,14 @@ class ParametricDynamics:
     ) -> Array:
         """Return the acceleration (nv,) of one sample, for arrays of symbols in a trace.
 
-        `armature` (nv,) is the armature, added to the diagonal of the mass matrix.
+        `armature` (nv,) is added to the diagonal of the mass matrix.
         """
         known = self._selection.read(parameters)
         mechanism = simplify_mechanism(self._selection.remainder())
         return _forward_dynamics(known.added_to(mechanism), known.joints, q, v, tau, armature)
 
     def root(self, parameters: Array) -> RigidInertia:
-        """Return the inertia of the root with what is fixed to it, for an array of symbols."""
+        """Return the inertia of the root and everything fixed to it, for an array of symbols."""
         return self._selection.read(parameters).added_to(self._selection.remainder()).root
 
     def _evaluate(
@@ -207,7 +209,7 @@ def _joint_torque(mechanism: Mechanism, joints: Array | None, v: Array, a: Array
 
 
 def _sign(x: Any) -> Any:
-    # A mimic joint with multiplier 0 has a constant for its speed.
+    # The speed of a mimic joint with multiplier 0 is a constant.
     return np.sign(x) if isinstance(x, (int, float)) else x.sign()
 
 

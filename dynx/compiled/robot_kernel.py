@@ -25,8 +25,8 @@ from dynx.simd.target import host
 from dynx.spatial.scalar import Floats
 
 MAX_NV_OF_LONG_SEGMENTS = 16
-"""Degrees of freedom above which code is divided into shorter segments, which compile in half the time and
-run about a tenth slower."""
+"""Number of degrees of freedom above which code is divided into shorter segments, which take half the time
+to compile and run about a tenth slower."""
 
 
 def robot_kernel(model: Model, purpose: object, program: Callable[[], Program]) -> Kernel:
@@ -41,7 +41,8 @@ def robot_kernel(model: Model, purpose: object, program: Callable[[], Program]) 
 
 
 def evaluate_kernel(kernel: Kernel, arrays: Sequence[Floats], threads: int) -> list[Floats]:
-    """Return the outputs (..., *shape) of a kernel for inputs (..., size) whose leading axes broadcast."""
+    """Evaluate a kernel on inputs (..., size) whose leading axes broadcast; return its outputs (...,
+    *shape)."""
     batch = common_batch(*arrays)
     n = prod(batch)
     rows = [batch_rows(array, batch) for array in arrays]

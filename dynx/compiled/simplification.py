@@ -13,16 +13,15 @@ from dynx.spatial.scalar import Floats
 
 
 def simplify_mechanism(mechanism: Mechanism) -> Mechanism:
-    """Return the mechanism with the fewest constants: frames along the joint axes, no rounding residue in
-    rotations.
+    """Reduce the number of constants of a mechanism: align frames with the joint axes, and remove rounding
+    residues from rotations.
 
-    A right angle in a file becomes cos(pi/2) = 6e-17 where 0 was meant. Entries below half the
-    spacing of doubles at 1 are smaller than the rounding errors of the entries of order 1 beside them, so
-    zeroing them changes a rotation by no more than its own rounding errors; but each would cost a
-    multiplication wherever it is used.
+    A right angle in a file gives cos(pi/2) = 6e-17 instead of 0. Entries below half the spacing of doubles at
+    1 are smaller than the rounding errors of neighbouring entries of order 1. Setting them to zero changes a
+    rotation by no more than its rounding errors, and saves a multiplication wherever they are used.
 
-    Inverse dynamics takes the inertias by base parameters as well (`dynx.rbd.base_parameters`). Forward
-    dynamics does not: it would be a tenth faster and, on some robots, a hundred times less accurate.
+    Inverse dynamics also uses base parameters (`dynx.rbd.base_parameters`). Forward dynamics does not: it
+    would be a tenth faster but, on some robots, a hundred times less accurate.
     """
     return _zero_rounding_residue(align_frames(_zero_rounding_residue(mechanism)))
 

@@ -1,4 +1,5 @@
-"""Controllers, one per file: frozen dataclasses with a torque of measurement, setpoint and state."""
+"""Controllers, one per file: frozen dataclasses that compute a torque from measurement, setpoint and
+state."""
 
 from dynx.control.base import Controller, Measurement, ModelBased
 from dynx.control.computed_torque import ComputedTorque

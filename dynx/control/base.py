@@ -1,7 +1,7 @@
 """Controllers: functions of a measurement, a setpoint and the controller's state.
 
 The state is an argument of `torque` and part of its result: equal arguments give equal torques, whatever was
-evaluated before. So a rollout can be resumed at any step, replayed, and shared out among processes.
+evaluated before. So a rollout can be resumed at any step, replayed, and distributed over processes.
 """
 
 from __future__ import annotations
@@ -36,14 +36,15 @@ class Measurement(NamedTuple):
 
 
 def gain(unit: str) -> Any:
-    """Return the dataclass field for a gain: an array of numbers in `unit`, which a batch may vary."""
+    """Return the dataclass field for a gain: an array of numbers in `unit`, which may differ between the
+    rollouts of a batch."""
     return field(metadata={"unit": unit, "gain": True})
 
 
 def parameter(unit: str, *, argument: str | None = None) -> Any:
-    """Return the dataclass field for a number or an array of numbers in `unit` that is no gain.
+    """Return the dataclass field for a number or an array of numbers in `unit` that is not a gain.
 
-    `argument` is its name in the constructor, where that is another.
+    `argument` is its name in the constructor, if that differs.
     """
     return field(metadata={"unit": unit, "argument": argument})
 
@@ -51,32 +52,34 @@ def parameter(unit: str, *, argument: str | None = None) -> Any:
 class Controller(ABC, Generic[ControllerState]):
     """A controller of one robot; `ControllerState` is the type of its state (None for most).
 
-    A controller of your own is a subclass with `torque`, and `initial_state` where it has a state: best a
-    frozen dataclass, which compares, prints and is serialised by its fields. A controller whose torque it
-    changes is its `inner`, and what it evaluates of its model its `dynamics`. It must not change itself.
-    Several threads may share one if they may share its backend.
+    A controller of your own is a subclass with `torque`, and with `initial_state` if it has a state. It is
+    best a frozen dataclass, which is compared, printed and serialised by its fields. If it modifies the
+    torque of another controller, that is its attribute `inner`; if it evaluates its model, it does so by its
+    attribute `dynamics`. It must not change its own attributes. Several threads may share it if they may
+    share its backend.
     """
 
     lead: int = 0
-    """Control steps from the measurement to the setpoint that the controller is given."""
+    """Number of control steps by which the setpoint is ahead of the measurement."""
 
     needs_setpoint: bool = True
-    """Whether the controller reads its setpoint; one that does not runs without a reference."""
+    """Whether the controller uses its setpoint; one that does not runs without a reference."""
 
     control_dt: float | None = None
     """The control step that the controller was made for [s], where it matters."""
 
     model: Model
-    """The robot as the controller knows it; that of the plant may be another."""
+    """The robot as the controller knows it; the model of the plant may differ."""
 
     is_pure: bool = False
     """Whether `torque` and `initial_state` are array code that depends on fields and arguments alone."""
 
     def __init_subclass__(cls, *, pure: bool = False, **options: Any) -> None:
-        """`pure` promises `is_pure` for this class, not for its subclasses: those may do anything."""
+        """Set `is_pure` for this class to `pure`. Subclasses do not inherit it, because they may do
+        anything."""
         super().__init_subclass__(**options)
         cls.is_pure = pure
-        # The methods below hold for dataclasses too, which generate others unless a class has its own.
+        # `dataclass` generates its own versions of these methods unless a class defines them.
         for name in ("__eq__", "__hash__", "__repr__"):
             setattr(cls, name, getattr(cls, name))
 
@@ -90,12 +93,11 @@ class Controller(ABC, Generic[ControllerState]):
     ) -> tuple[Floats, ControllerState]:
         """Return the torque tau (nv,) to apply until the next control step, and the state then.
 
-        The arrays given must not be written to; those returned must be new or never change.
+        The given arrays must not be modified; returned arrays must be new or never change.
         """
 
     def on(self: Self, engine: str | Backend) -> Self:
-        """Return the controller with its model evaluated by another backend; itself where it evaluates
-        none."""
+        """Return a controller whose model another backend evaluates; `self` if it evaluates no model."""
         inner = getattr(self, "inner", None)
         return substitute(self, inner=inner.on(engine)) if isinstance(inner, Controller) else self
 
@@ -105,8 +107,8 @@ class Controller(ABC, Generic[ControllerState]):
         return type(self).__name__
 
     def content_key(self) -> tuple[Any, ...]:
-        """Return the key that is equal for equal controllers: their attributes, and the code of a class not
-        of dynx.
+        """Return the key that is equal for equal controllers: their attributes, and the code of a class
+        outside dynx.
 
         Raises TypeError for attributes that cannot be compared.
         """
@@ -149,9 +151,9 @@ class Controller(ABC, Generic[ControllerState]):
 
 @dataclass(frozen=True)
 class ModelBased(Controller[ControllerState]):
-    """A controller that evaluates the dynamics of its model by a backend.
+    """A controller that evaluates the dynamics of its model with a backend.
 
-    It commands every coordinate, so a floating base, which no motor moves, is refused.
+    It commands every coordinate, so a floating base, which has no motor, is refused.
     """
 
     model: Model
@@ -171,13 +173,13 @@ class ModelBased(Controller[ControllerState]):
         self._set(model=model, backend=backend, dynamics=EngineDynamics(engine_of(model, backend)))
 
     def on(self: Self, engine: str | Backend) -> Self:
-        """Return the controller with its model evaluated by another backend."""
+        """Return a controller whose model another backend evaluates."""
         return substitute(self, backend=engine, dynamics=EngineDynamics(engine_of(self.model, engine)))
 
 
 @dataclass(frozen=True)
 class Wrapper(Controller[ControllerState]):
-    """A controller that changes the torque of another."""
+    """A controller that modifies the torque of another one."""
 
     inner: Controller[ControllerState]
 
@@ -190,7 +192,7 @@ class Wrapper(Controller[ControllerState]):
 
 
 def chain_of(controller: Controller[Any]) -> Iterator[Controller[Any]]:
-    """Yield a controller and those inside it, from the outermost to the innermost."""
+    """Yield a controller and its inner controllers, from the outermost to the innermost."""
     yield controller
     inner = getattr(controller, "inner", None)
     if isinstance(inner, Controller):
@@ -198,7 +200,8 @@ def chain_of(controller: Controller[Any]) -> Iterator[Controller[Any]]:
 
 
 def gains_of(controller: Controller[Any]) -> dict[str, Floats]:
-    """Return the gains that a controller declares; the public arrays of one that declares no fields."""
+    """Return the gains that a controller declares; for a controller without declared fields, its public
+    arrays."""
     known = fields_of(controller)
     arrays = {name: x for name, x in attributes_of(controller).items() if isinstance(x, np.ndarray)}
     return {
@@ -209,7 +212,7 @@ def gains_of(controller: Controller[Any]) -> dict[str, Floats]:
 
 
 def substitute(controller: Self, **attributes: Any) -> Self:
-    """Return a copy of a controller with other attributes, which are not checked."""
+    """Copy a controller with some attributes replaced, without checking them."""
     twin = copy.copy(controller)
     for name, value in attributes.items():
         object.__setattr__(twin, name, value)
@@ -221,7 +224,7 @@ def rebind(
     dynamics: Callable[[Dynamics], Dynamics],
     gains: Callable[[Controller[Any]], Mapping[str, Any]],
 ) -> Self:
-    """Return a copy of a controller, and of those inside it, over other dynamics and with other gains.
+    """Copy a controller and its inner controllers with other dynamics and other gains.
 
     Neither is checked: they may be symbols of a trace.
     """
@@ -235,11 +238,12 @@ def rebind(
 
 
 def engine_of(model: Model, engine: str | Backend) -> Backend:
-    """Return the backend of that name for `model`, or `engine` itself if it is one of an equal model."""
+    """Return the backend of that name for `model`, or `engine` itself if it is a backend of an equal
+    model."""
     if not isinstance(engine, Backend):
         return backend(engine, model, validate=False)
     if engine.model != model:
-        raise ArgumentError(f"the backend is one of {shown(engine.model)}; wanted one of {shown(model)}")
+        raise ArgumentError(f"the backend is for {shown(engine.model)}; wanted one for {shown(model)}")
     return engine
 
 

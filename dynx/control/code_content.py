@@ -1,8 +1,8 @@
-"""Content of the code of a class that is not of dynx: two classes with equal code compute the same.
+"""Content of the code of a class outside dynx, by which classes are compared: equal code computes the same.
 
-The code of a class is the bytecode of its methods, with constants, default values, the values of enclosing
-functions and the module's numbers and functions that it names. Line numbers, file names and docstrings do not
-count. Bytecode depends on the version of Python, so code of two versions is unequal.
+The content is the bytecode of the methods with their constants, default values, the values of enclosing
+functions, and the numbers and functions of the module that they use. Line numbers, file names and docstrings
+are ignored. Bytecode depends on the version of Python, so code of two versions is never equal.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ import numpy as np
 from dynx.control.content import attributes_of
 
 PROCESS = uuid.uuid4().hex
-"""Stands for this process in the identity of an object that cannot be compared by its content."""
+"""Identifier of this process, which is part of the identity of objects that cannot be compared by content."""
 
 LIBRARIES = frozenset({"dynx", "numpy", "scipy"})
-"""Packages, besides the standard library, whose classes and functions are known by their names."""
+"""Packages, besides the standard library, whose classes and functions are identified by name."""
 
 IGNORED = frozenset(
     {
@@ -33,20 +33,20 @@ IGNORED = frozenset(
         *("__static_attributes__", "__annotate__", "__annotate_func__", "__annotations_cache__"),
     }
 )
-"""Attributes of a class that are no code of its own."""
+"""Attributes of a class that are not its code."""
 
 
 Seen = dict[int, tuple[int, Any]]
-"""Classes, functions and objects that were met already, with their numbers, by identity."""
+"""Classes, functions and objects visited so far, by identity, each with its number."""
 
 
 def is_foreign(kind: type) -> bool:
-    """Check whether a class is neither of dynx nor of a library that is known by its name."""
+    """Check whether a class belongs neither to dynx nor to one of `LIBRARIES`."""
     return _is_foreign(kind.__module__)
 
 
 def digest_of_code(kind: type) -> str:
-    """Return the checksum of the code of a class and of its base classes that are not of dynx."""
+    """Return the checksum of the code of a class and of its base classes outside dynx."""
     return sha256(repr(_class(kind, {})).encode()).hexdigest()
 
 
@@ -61,7 +61,7 @@ def _is_foreign(module: str | None) -> bool:
 
 
 def _place(thing: Any, seen: Seen) -> str | None:
-    """Return the reference to a thing that was met already; a new one is noted."""
+    """Return a reference to an object visited before; record a new object."""
     if id(thing) in seen:
         return f"see {seen[id(thing)][0]}"
     seen[id(thing)] = (len(seen), thing)
@@ -83,7 +83,7 @@ def _class(kind: type, seen: Seen) -> Any:
 
 
 def _is_generated(kind: type, name: str, value: Any) -> bool:
-    """Check whether a method was made by `dataclasses` from the fields, which are compared by themselves."""
+    """Check whether `dataclasses` generated a method from the fields, which are compared separately."""
     if not isinstance(value, FunctionType) or "__dataclass_fields__" not in vars(kind):
         return False
     return name.startswith("__") and value.__code__.co_filename == "<string>"
@@ -115,7 +115,7 @@ def _is_filled(cell: Any) -> bool:
 
 
 def _is_compared(value: Any) -> bool:
-    """Check whether a name of a module stands for a number, text, an array or a function."""
+    """Check whether a value of a module is compared: numbers, text, arrays and functions are."""
     return isinstance(value, bool | int | float | complex | str | bytes | tuple | np.ndarray | FunctionType)
 
 
@@ -137,8 +137,8 @@ def _code(code: CodeType, docstring: str | None) -> Any:
 
 
 def _value(value: Any, seen: Seen) -> Any:
-    """Return the content of a value that code refers to; the identity of an object that cannot be
-    compared."""
+    """Return the content of a value that code refers to; for an object that cannot be compared, its
+    identity."""
     kind = _name(type(value))
     if value is None or isinstance(value, bool | int | float | complex | str | bytes):
         return kind, repr(value)

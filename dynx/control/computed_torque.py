@@ -1,4 +1,4 @@
-"""Computed torque: inverse dynamics of an acceleration that leads the error to zero."""
+"""Computed torque: inverse dynamics of an acceleration that makes the error converge to zero."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from dynx.trajectory.base import Setpoint
 class ComputedTorque(ModelBased[None], pure=True):
     """tau = ID(q, v, a* + kd (v* - v) + kp (q* - q)).
 
-    With the right model the error of each coordinate obeys e'' + kd e' + kp e = 0, independent of the others
-    (Spong, Hutchinson and Vidyasagar, Robot Modeling and Control, section 8.3). In steps of dt the error does
-    not vanish: about dt a* kd / (2 kp) remains, which `DiscreteComputedTorque` removes.
+    With an exact model the error of each coordinate obeys e'' + kd e' + kp e = 0, independent of the others
+    (Spong, Hutchinson and Vidyasagar, Robot Modeling and Control, section 8.3). In discrete time an error of
+    about dt a* kd / (2 kp) remains, which `DiscreteComputedTorque` removes.
     """
 
     kp: Floats = gain("1/s^2")

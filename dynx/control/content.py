@@ -1,4 +1,4 @@
-"""Content of an object to the last bit, as a key to compare and look up by."""
+"""Exact content of an object, as a key for comparison and lookup."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def entered(thing: Any) -> Iterator[int | None]:
 def content_of(thing: Any) -> Hashable:
     """Return the key that is equal for two objects if and only if their contents are.
 
-    Raises TypeError for an object whose content is not known to be all that it is.
+    Raises TypeError for an object that may have more content than is known.
     """
     kind = type(thing)
     if thing is None or kind in (bool, int, str, Model):
@@ -60,12 +60,13 @@ def content_of(thing: Any) -> Hashable:
 
 
 def fields_of(thing: Any) -> dict[str, Field[Any]]:
-    """Return the dataclass fields by name; those of its base classes for an object of another class."""
+    """Return the dataclass fields by name; for an object whose class is not a dataclass, those of its base
+    classes."""
     return {each.name: each for each in fields(thing)} if is_dataclass(thing) else {}
 
 
 def attributes_of(thing: Any) -> dict[str, Any]:
-    """Return the fields of a dataclass; of any other object the attributes that a copy of it would get."""
+    """Return the fields of a dataclass; for any other object, the attributes that a copy of it gets."""
     kind = type(thing)
     if "__dataclass_fields__" in kind.__dict__:
         return {each.name: getattr(thing, each.name) for each in fields(thing)}

@@ -1,4 +1,4 @@
-"""Computed torque for a plant that moves in steps: the inverse of its integration step."""
+"""Computed torque for a plant in discrete time: the inverse of its integration step."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from dynx.trajectory.base import Setpoint
 
 @dataclass(frozen=True)
 class DiscreteComputedTorque(ModelBased[None], pure=True):
-    """The torque with which one step of semi-implicit Euler ends at the next setpoint, exactly.
+    """Torque with which one step of semi-implicit Euler ends exactly at the next setpoint.
 
-    The step v' = v + dt a, q' = q + dt v', which Bullet takes and dynx by default, is solved for a:
-    a = ((q* - q) / dt - v) / dt with q* wanted at the end of the step. The tracking error is round-off;
-    an error that was there is gone after one step, with whatever torque that takes, and speeds follow
-    the secants of the reference.
+    The step of Bullet, and dynx's default, is v' = v + dt a, q' = q + dt v'. Solved for a it gives a = ((q* -
+    q) / dt - v) / dt, where q* is the setpoint at the end of the step. The tracking error is then round-off.
+    An initial error is removed in one step, however large the torque, and velocities are the difference
+    quotients of the reference.
 
-    It is exact while the control step is the physics step, and for rigid bodies: with friction wrap it in
-    `FrictionCompensation`. Another plant (RK4, sub-steps) leaves an error of the order of dt.
+    It is exact if the control step equals the physics step and there is no friction; with friction wrap it in
+    `FrictionCompensation`. With another plant (RK4, sub-steps) an error of the order of dt remains.
     """
 
     control_dt: float = parameter("s")
@@ -42,6 +42,6 @@ class DiscreteComputedTorque(ModelBased[None], pure=True):
 
 
 def one_step_acceleration(q: Array, v: Array, q_next: Array, dt: Array | float) -> Array:
-    """Return the a with q + dt (v + dt a) = q_next, for arrays of any scalar."""
+    """Solve q + dt (v + dt a) = q_next for a, for arrays of any scalar type."""
     a: Array = ((q_next - q) / dt - v) / dt
     return a

@@ -1,8 +1,8 @@
-"""Dynamics of one robot at one sample: what a controller or a plant evaluates in each step.
+"""Dynamics of one robot at one sample, which a controller or a plant evaluates in each step.
 
-Nothing is checked: arrays are of the right shape and type, in the coordinates of the model. `Backend`'s
-own methods check their arguments, broadcast batch axes and expand mimic joints, which would take half of the
-time in a loop of ten microseconds a step.
+Arguments are not checked: arrays must have the right shape and type, in the coordinates of the model. The
+methods of `Backend` check their arguments, broadcast batch axes and expand mimic joints, which would take
+half of the time in a loop of ten microseconds per step.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from dynx.backends import Backend
 from dynx.model import Model
 
 Evaluation = Callable[..., Any]
-"""Arrays in, one array out; the quantities of a frame take its name after the arrays."""
+"""Function of arrays that returns one array; quantities of a frame take its name after the arrays."""
 
 QUANTITIES = ("inverse_dynamics", "forward_dynamics", "bias_torque", "gravity_torque", "mass_matrix")
 FRAME_QUANTITIES = ("forward_kinematics", "jacobian", "jacobian_derivative", "frame_acceleration")
@@ -62,19 +62,20 @@ class EngineDynamics(Dynamics):
         super().__init__(backend.model)
 
     def evaluation(self, quantity: str) -> Evaluation:
-        """Return the engine's hook itself where it takes the model's coordinates, the backend's method
-        otherwise."""
+        """Return the engine's hook itself if its coordinates are those of the model, otherwise the
+        backend's method."""
         backend = self.backend
         method: Evaluation = getattr(backend, quantity)
         if quantity in FRAME_QUANTITIES or not self._calls_hook(quantity):
             return method
         hook: Evaluation = getattr(backend, f"_{quantity}")
-        # The loop maps the engine's exceptions for a whole step, so the wrapper that maps them is left out.
+        # The wrapper that translates the engine's exceptions is left out, because the loop translates them
+        # for the whole step.
         bare = getattr(hook, "__wrapped__", None)
         return hook if bare is None else partial(bare, backend)
 
     def bound_to_thread(self, quantity: str) -> Evaluation:
-        """Return the callable for the calling thread alone, quicker where the engine has one."""
+        """Return a callable for the calling thread alone, which some engines make faster."""
         quick = self.backend._unchecked_callable(quantity) if self._calls_hook(quantity) else None
         usual: Evaluation = getattr(self, quantity)
         return quick or usual
@@ -95,5 +96,5 @@ class EngineDynamics(Dynamics):
 
 
 def _function(backend: Backend, name: str) -> object:
-    """Return the function behind a method; None if it was replaced on the object itself."""
+    """Return the function of a method; None if an attribute of the object itself replaces it."""
     return getattr(getattr(backend, name), "__func__", None)

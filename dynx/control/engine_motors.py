@@ -1,7 +1,7 @@
 """The motors inside PyBullet, as controllers for its plant alone.
 
-They are constraints of its solver, which finds their torque within the step. So they return a `MotorCommand`,
-and their `torque` raises.
+They are constraints of PyBullet's solver, which determines their torque during the step. So they return a
+`MotorCommand`, and their `torque` raises an error.
 """
 
 from __future__ import annotations
@@ -27,7 +27,8 @@ UNLIMITED_FORCE = 1e30
 
 
 class MotorCommand(NamedTuple):
-    """Arguments of `setJointMotorControlArray`: one number per joint each, None for the engine's default."""
+    """Arguments of `setJointMotorControlArray`, each with one number per joint; None for the engine's
+    default."""
 
     mode: str
     positions: list[float] | None = None
@@ -50,7 +51,8 @@ class EngineMotor(JointSpace[None]):
         super().__init__(model)
 
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
-        """Raises UnsupportedFeatureError: the engine's solver finds the torque, within its step."""
+        """Raise UnsupportedFeatureError, because the engine's solver determines the torque during the
+        step."""
         raise UnsupportedFeatureError(
             f"{self.name} is a motor inside PyBullet, so it runs with plant='pybullet' only"
         )
@@ -67,7 +69,7 @@ class EngineMotor(JointSpace[None]):
 
 
 def _forces(limits: Floats | None) -> list[float] | None:
-    """Return the limits of the motors as the engine takes them, None for its own default."""
+    """Convert the limits of the motors to the form that the engine takes; None for its default."""
     if limits is None:
         return None
     finite: list[float] = np.minimum(limits, UNLIMITED_FORCE).tolist()
@@ -76,10 +78,10 @@ def _forces(limits: Floats | None) -> list[float] | None:
 
 @dataclass(frozen=True)
 class PositionMotor(EngineMotor):
-    """POSITION_CONTROL: each step ends at v = kd v* + kp (q* - q) / dt, if the force suffices.
+    """PyBullet's POSITION_CONTROL: each step ends at v = kd v* + kp (q* - q) / dt, if the force suffices.
 
-    `position_gain` and `velocity_gain` are fractions of an error that one step removes, with the engine's
-    defaults 0.1 and 1.
+    `position_gain` and `velocity_gain` are the fractions of the errors that one step removes; the engine's
+    defaults are 0.1 and 1.
     """
 
     position_gain: Floats = gain("")
@@ -116,7 +118,7 @@ class PositionMotor(EngineMotor):
 
 @dataclass(frozen=True)
 class VelocityMotor(EngineMotor):
-    """VELOCITY_CONTROL: each step ends at the velocity of the setpoint, if the force suffices."""
+    """PyBullet's VELOCITY_CONTROL: each step ends at the velocity of the setpoint, if the force suffices."""
 
     force: Floats | None = parameter("N m or N")
 
@@ -133,14 +135,15 @@ class VelocityMotor(EngineMotor):
 
 @dataclass(frozen=True)
 class PDMotor(EngineMotor):
-    """PD_CONTROL: tau = kp (q* - q) + kd (v* - v), computed inside the engine."""
+    """PyBullet's PD_CONTROL: tau = kp (q* - q) + kd (v* - v), computed inside the engine."""
 
     kp: Floats = gain("N m/rad or N/m")
     kd: Floats = gain("N m s/rad or N s/m")
     force: Floats | None = parameter("N m or N")
 
     def __init__(self, model: Model, *, kp: ArrayLike, kd: ArrayLike, force: ArrayLike | None = None) -> None:
-        """`kp` [N m/rad] and `kd` [N m s/rad], one number or one for each joint; `force` the most."""
+        """`kp` [N m/rad] and `kd` [N m s/rad] are one number or one for each joint; `force` [N m or N] is
+        the largest force of a motor."""
         super().__init__(model)
         kp, kd = self._per_joint("kp", kp), self._per_joint("kd", kd)
         self._set(kp=kp, kd=kd, force=self._limits(force))
@@ -159,9 +162,9 @@ class PDMotor(EngineMotor):
 
 @dataclass(frozen=True)
 class TorqueMotor(EngineMotor):
-    """TORQUE_CONTROL: the torque of another controller, given to the engine's motors unchanged.
+    """PyBullet's TORQUE_CONTROL: the torque of another controller, passed to the engine's motors unchanged.
 
-    The plant does so with any controller; with this class all four modes have a name.
+    The plant does the same with any controller; this class exists so that all four modes have a name.
     """
 
     model: Model = field(init=False)

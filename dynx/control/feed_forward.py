@@ -33,7 +33,7 @@ class FeedForward(ModelBased[None], pure=True):
         kd: ArrayLike = 0.0,
         backend: str | Backend = "pinocchio",
     ) -> None:
-        """Gains as those of `PD`; none by default."""
+        """Gains `kp` and `kd` are those of `PD`; by default there are none."""
         super().__init__(model, backend)
         self._set(kp=checked_gain("kp", kp, model.nv), kd=checked_gain("kd", kd, model.nv))
 

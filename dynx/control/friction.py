@@ -20,18 +20,18 @@ MIN_SLIP = 1e-9
 """Smallest slip speed above 0 [rad/s or m/s]; the division overflows for smaller ones."""
 
 Coefficients = bool | ArrayLike
-"""True for those of the description, False for none, one number, or one for each joint with a coordinate."""
+"""Coefficients: True for those of the description, False for zero, one number, or one for each joint with
+a coordinate."""
 
 
 @dataclass(frozen=True, eq=False)
 class JointFriction:
-    """The torque that damping and dry friction take: d v + f tanh(v / slip), of each joint.
+    """Torque of damping and dry friction, which opposes the motion of each joint: d v + f tanh(v / slip).
 
-    With `slip` 0 it is d v + f sign(v), what ``joint_dynamics=True`` means in every backend. Such a jump
-    makes any integrator oscillate around rest: within one step the friction moves the joint back
-    further than it came. With a slope over the speed `slip` it does not, as long as
-    dt f / (M slip) stays below 2.
-    A mimic joint's coefficients act on its driver through its multiplier.
+    With `slip` 0 it is d v + f sign(v), as with ``joint_dynamics=True`` in every backend. That discontinuity
+    makes any integrator oscillate around rest, because within one step the friction moves the joint back
+    further than it came. A slope over the speed `slip` prevents this as long as dt f / (M slip) stays below
+    2. A mimic joint's coefficients act on its driver through its multiplier.
     """
 
     model: Model
@@ -39,21 +39,21 @@ class JointFriction:
     friction: Floats
     slip: float
     to_tree: Floats | None
-    """From the model's coordinates to those of the tree's joints, in which coefficients then are."""
+    """Matrix from the model's coordinates to those of the tree, to which the coefficients then belong."""
 
     def __init__(
         self, model: Model, damping: Coefficients = True, friction: Coefficients = True, slip: float = SLIP
     ) -> None:
-        """`damping` [N m s/rad or N s/m] and `friction` [N m or N] of the joints or given.
+        """`damping` [N m s/rad or N s/m] and `friction` [N m or N] of the joints; see `Coefficients`.
 
-        Raises GainError for coefficients, ArgumentError for a slip speed, that cannot be used.
+        Raises GainError for invalid coefficients, ArgumentError for an invalid slip speed.
         """
         if not isinstance(slip, int | float) or not (slip == 0.0 or MIN_SLIP <= slip < np.inf):
             raise ArgumentError(f"slip is {shown(slip)}; wanted a speed: 0, or {MIN_SLIP:g} or more")
         moving = [joint.dynamics for joint in model.joints if joint.moves]
         of_model = damping is True, friction is True
         coupling = model.mechanism.coupling
-        # The description's are those of the tree's joints, given ones those of the coordinates.
+        # The coefficients of the description belong to the joints of the tree, given ones to the coordinates.
         through = coupling is not None and any(of_model)
         base = [0.0] * (6 if model.floating else 0)
         own_damping = np.array(base + [joint.damping for joint in moving])
@@ -96,7 +96,7 @@ class JointFriction:
             return own if given else np.zeros(model.mechanism.nv if through else model.nv)
         base = 6 if model.floating else 0
         coefficients = checked_gain(name, given, model.nv - base, per="one for each joint")
-        # To the joints that own a coordinate: none to the base, and in the tree none to those that follow.
+        # Given coefficients apply to joints that own a coordinate, not to the base or to mimic joints.
         owners = [joint.mimic is None for joint in model.joints if joint.moves]
         joints = np.zeros(len(owners) if through else len(coefficients))
         joints[owners if through else slice(None)] = coefficients

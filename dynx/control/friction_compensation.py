@@ -17,11 +17,11 @@ SPEEDS = ("measured", "setpoint")
 
 @dataclass(frozen=True)
 class FrictionCompensation(Wrapper[ControllerState], pure=True):
-    """tau = inner torque + d v + f tanh(v / slip), with v measured or of the setpoint.
+    """Torque of another controller plus d v + f tanh(v / slip), where v is measured or that of the setpoint.
 
-    With the measured speed the friction of a plant cancels exactly, if the coefficients are those of the
-    plant; with noise, or with friction overestimated, the joint may become unstable. With the speed of the
-    setpoint it cannot.
+    With the measured speed the friction of a plant is cancelled exactly if the coefficients are those of the
+    plant, but noise or overestimated friction may make the joint unstable. The speed of the setpoint cannot
+    make it unstable.
     """
 
     damping: bool | Floats = parameter("N m s/rad or N s/m")
@@ -39,7 +39,7 @@ class FrictionCompensation(Wrapper[ControllerState], pure=True):
         slip: float = SLIP,
         speed: str = "measured",
     ) -> None:
-        """Coefficients as those of `JointFriction`: by default those of the model's description."""
+        """The coefficients are those of `JointFriction`; by default those of the model's description."""
         if speed not in SPEEDS:
             raise ArgumentError(f"speed is {shown(speed)}; wanted one of {', '.join(SPEEDS)}")
         super().__init__(inner)
@@ -60,7 +60,7 @@ class FrictionCompensation(Wrapper[ControllerState], pure=True):
 
     @property
     def name(self) -> str:
-        """Name of the inner controller, and that friction is compensated."""
+        """Name of the inner controller, followed by a word for the compensation."""
         return f"{self.inner.name}, friction compensated"
 
 

@@ -13,7 +13,7 @@ from dynx.spatial.scalar import Floats
 def checked_gain(name: str, gain: ArrayLike, length: int, *, per: str = "one for each coordinate") -> Floats:
     """Return `gain` as an array (length,) of finite numbers that are not negative, or a GainError.
 
-    Its copy cannot be written to.
+    The array is a read-only copy.
     """
     try:
         array = real_array(name, gain)
@@ -46,8 +46,8 @@ def feedback_gains(
 ) -> tuple[Floats, Floats]:
     """Return kp [1/s^2] and kd [1/s] (length,) of an error that obeys e'' + kd e' + kp e = 0.
 
-    Either both gains, or the natural frequency w [rad/s] and the damping ratio z: kp = w^2, kd = 2 z w.
-    Raises GainError for any other mixture.
+    Arguments are either both gains, or the natural frequency w [rad/s] and the damping ratio z: kp = w^2, kd
+    = 2 z w. Raises GainError for any other combination.
     """
     if natural_frequency is not None:
         if kp is not None or kd is not None:

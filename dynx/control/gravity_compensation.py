@@ -17,7 +17,7 @@ from dynx.trajectory.base import Setpoint
 
 @dataclass(frozen=True)
 class GravityCompensatedPD(ModelBased[None], pure=True):
-    """PD control that rests at its setpoint without an error, since gravity is compensated.
+    """PD control with gravity compensation, so that there is no error at rest.
 
     Globally asymptotically stable for a constant setpoint (Takegaki and Arimoto 1981; Siciliano et al.,
     Robotics, section 8.5.1).
@@ -29,7 +29,7 @@ class GravityCompensatedPD(ModelBased[None], pure=True):
     def __init__(
         self, model: Model, *, kp: ArrayLike, kd: ArrayLike, backend: str | Backend = "pinocchio"
     ) -> None:
-        """Gains as those of `PD`."""
+        """Gains are those of `PD`."""
         super().__init__(model, backend)
         self._set(kp=checked_gain("kp", kp, model.nv), kd=checked_gain("kd", kd, model.nv))
 

@@ -19,7 +19,7 @@ from dynx.trajectory.base import Setpoint
 class Impedance(TaskSpace[None], pure=True):
     """tau = J' (K e + D e') + g(q) - B v, without shaping the inertia.
 
-    Passive with a reference at rest: it gives no energy to its environment (Hogan 1985; Siciliano et
+    It is passive for a reference at rest: it supplies no energy to its environment (Hogan 1985; Siciliano et
     al., Robotics, section 9.2). A steady force F displaces the frame by F / K.
     """
 
@@ -39,8 +39,8 @@ class Impedance(TaskSpace[None], pure=True):
     ) -> None:
         """`stiffness` K [N/m, N m/rad] and `damping` D [N s/m, N m s/rad] along the world's axes.
 
-        (6,), linear then angular, or one number; `joint_damping` B (nv,) damps the motion that leaves the
-        frame at rest. Raises GainError, UnknownNameError for the frame.
+        (6,), linear then angular, or one number; `joint_damping` B (nv,) damps motions that do not move the
+        frame. Raises GainError, UnknownNameError for the frame.
         """
         super().__init__(model, frame, backend)
         per = "linear then angular"

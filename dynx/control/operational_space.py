@@ -1,4 +1,5 @@
-"""Operational-space control: a frame follows its reference as a unit mass would, the rest keeps a posture."""
+"""Operational-space control: a frame tracks its reference with linear error dynamics, and the remaining
+freedom keeps a posture."""
 
 from __future__ import annotations
 
@@ -22,10 +23,10 @@ from dynx.trajectory.base import Setpoint
 class OperationalSpace(TaskSpace[None], pure=True):
     """Computed torque in the space of a frame (Khatib 1987; Siciliano et al., Robotics, section 8.6.2).
 
-    The frame's error e obeys e'' + kd e' + kp e = 0. Joint accelerations that leave the frame alone move
-    the posture to the setpoint, by the projector of the dynamically consistent inverse
-    J# = M^-1 J' (J M^-1 J' + damping^2)^-1. `damping` keeps the torque finite near singular postures, at
-    the price of an error there.
+    The frame's error e obeys e'' + kd e' + kp e = 0. Joint accelerations that do not accelerate the frame
+    move the posture to the setpoint, by the projector of the dynamically consistent inverse J# = M^-1 J' (J
+    M^-1 J' + damping^2)^-1. `damping` keeps the torque finite near singular postures, where it causes an
+    error.
     """
 
     kp: Floats = gain("1/s^2")

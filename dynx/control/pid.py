@@ -22,8 +22,8 @@ class PID(JointSpace[Floats], pure=True):
     """tau = kp e + kd e' + z with z' = ki e, saturated at the effort limits.
 
     Anti-windup by back-calculation (Astrom and Murray, Feedback Systems, section 11.4): the torque beyond the
-    limits is fed back into z with the time constant `tracking_time`, so z stays within what the motors can
-    give. The state is z (n,) [N m or N], the integral part of the torque.
+    limits is fed back into z with the time constant `tracking_time`, so z stays within the range of the
+    motors. The state is z (n,) [N m or N], the integral part of the torque.
     """
 
     kp: Floats = gain("N m/rad or N/m")
@@ -59,7 +59,7 @@ class PID(JointSpace[Floats], pure=True):
         self._set(control_dt=dt, tracking_time=span, limit=checked_limit(model, limit)[self.v_joints])
 
     def initial_state(self) -> Floats:
-        """Return an integral part of zero."""
+        """Return the integral part 0."""
         return np.zeros(self.n_joints)
 
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: Floats) -> tuple[Floats, Floats]:
@@ -75,7 +75,7 @@ class PID(JointSpace[Floats], pure=True):
             self.kd,
         )
         tau = clamp(wanted, self.limit)
-        # A share above 1 would overshoot the torque that was cut off.
+        # A factor above 1 would overcompensate the torque beyond the limits.
         share = min(1.0, self.control_dt / self.tracking_time)
         integral = state + self.control_dt * self.ki * error + share * (tau - wanted)
         return self.all_torques(tau), integral

@@ -30,7 +30,8 @@ def _own_controllers() -> dict[str, str]:
     """Return the entries of the controllers in the modules beside this one."""
     modules = (name for _, name, _ in iter_modules([str(Path(__file__).parent)]) if name != "registry")
     members = (each for name in modules for each in vars(import_module(f"dynx.control.{name}")).values())
-    # Not isinstance(each, type), which Python 3.10 affirms for aliases such as Callable[..., float].
+    # `isinstance(each, type)` would not do, because it is true in Python 3.10 for aliases such as
+    # Callable[..., float].
     kinds = [each for each in members if type(each) is type(Controller) and issubclass(each, Controller)]
     return {kind.__name__: f"{kind.__module__}:{kind.__name__}" for kind in kinds if not isabstract(kind)}
 
@@ -50,8 +51,8 @@ unregister = _classes.unregister
 def to_document(controller: Controller[Any]) -> dict[str, Any]:
     """Return the name of a controller's class and its constructor arguments, in types that JSON has.
 
-    Its model is left out. Numbers that are not finite are strings, such as "inf". Raises ArgumentError for
-    a class that is no registered dataclass, and for an argument that cannot be written.
+    The model is not included. Numbers that are not finite are strings, such as "inf". Raises ArgumentError
+    for a class that is not a registered dataclass, and for an argument that cannot be written.
     """
     kind, known = type(controller), fields_of(controller)
     names = controller_names() if kind.__name__ not in BUILT_IN else (kind.__name__, *controller_names())

@@ -19,7 +19,7 @@ from dynx.trajectory.base import Setpoint
 class Saturated(Wrapper[ControllerState], pure=True):
     """Another controller's torque, saturated at the limits of the motors.
 
-    `dynx.simulate(..., effort_limits=True)` saturates in the plant instead, and records where.
+    `dynx.simulate(..., effort_limits=True)` saturates in the plant instead, and records at which steps.
     """
 
     limit: Floats = parameter("N m or N")
@@ -41,7 +41,7 @@ class Saturated(Wrapper[ControllerState], pure=True):
 
     @property
     def name(self) -> str:
-        """Name of the inner controller, and that its torque is saturated."""
+        """Name of the inner controller, followed by a word for the saturation."""
         return f"{self.inner.name}, saturated"
 
 
@@ -49,7 +49,7 @@ def checked_limit(model: Model, limit: ArrayLike | None) -> Floats:
     """Return the effort limits (nv,): the model's, or one number or one for each joint; LimitError where one
     is 0.
 
-    Infinite where there is none. Many descriptions say ``effort="0"`` for "not known": as a limit it
+    A missing limit is infinite. Many descriptions write ``effort="0"`` for an unknown limit; as a limit it
     would forbid any torque.
     """
     base = 6 if model.floating else 0

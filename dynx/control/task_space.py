@@ -30,8 +30,8 @@ class TaskError(NamedTuple):
 class TaskSpace(ModelBased[ControllerState]):
     """A controller of one frame.
 
-    The setpoint is in joint space as for every controller; that of the frame is the pose, velocity and
-    acceleration that the frame has there.
+    The setpoint is in joint space, as for every controller. The setpoint of the frame follows from it by
+    forward kinematics: pose, velocity and acceleration.
     """
 
     frame: str

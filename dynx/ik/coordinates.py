@@ -12,7 +12,8 @@ from dynx.spatial.scalar import Floats
 FULL_TURN = 2.0 * math.pi
 
 _FULL_TURN_TOLERANCE = 1e-8
-"""A range at most this much [rad] short of 2 pi counts as a full turn, since files round their limits."""
+"""Tolerance [rad] by which a range may be smaller than 2 pi and still count as a full turn, because files
+round limits."""
 
 _DEFAULT_RANGE = {"prismatic": 1.0}
 """Half the range [m] searched for a prismatic joint without limits; for angles it is pi [rad]."""
@@ -25,8 +26,8 @@ class FrameCoordinates:
 
     They are a list of floats: with a floating base its six, relative to the current base pose (a body twist
     for unit time), then the joints between root and frame, in the order of q. Angles whose range is a full
-    turn have infinite bounds here; after the search they are brought back into their limits, as near as
-    possible to the initial configuration. Coordinates of other branches of the tree never change.
+    turn have infinite bounds here; after the search they are shifted by full turns into their limits, as near
+    as possible to the initial configuration. Coordinates of other branches of the tree never change.
     """
 
     def __init__(self, model: Model, frame: str) -> None:
@@ -43,7 +44,7 @@ class FrameCoordinates:
         self._low, self._high = model.lower[self._in_q], model.upper[self._in_q]
         drivers = {joint.mimic.joint for joint in model.joints if joint.mimic is not None}
         kinds = [model.coordinate_joints[k] for k in joints]
-        # A joint that drives others is not periodic, since its followers keep moving.
+        # A joint that drives mimic joints is not periodic, because those keep moving.
         rotates = np.array([j.type != "prismatic" and j.name not in drivers for j in kinds], dtype=bool)
         full_range = self._high - self._low >= FULL_TURN - _FULL_TURN_TOLERANCE
         self._periodic = np.flatnonzero(rotates & full_range).tolist()

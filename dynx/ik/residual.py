@@ -1,7 +1,7 @@
 """Error between a frame and its target, in plain floats.
 
-One sample of six numbers is too small for array code to pay: this arithmetic on floats takes a third of the
-time of its NumPy equivalent, and it is evaluated at every step of the solver.
+Array code does not pay for one sample of six numbers: this arithmetic on floats takes a third of the time of
+its NumPy equivalent. It is evaluated at every step of the solver.
 """
 
 from __future__ import annotations

@@ -51,8 +51,8 @@ def inverse_kinematics(
     configuration). Angles whose range is a full turn are returned nearest to q0.
 
     `method` is ``"dynx"`` (see `dynx.ik.search`) or ``"engine"``: the backend's own solver, without restarts.
-    Both are judged by forward kinematics: a target that is not reached is no error, but a result with
-    `success` False and the best q found.
+    The result of either is checked by forward kinematics. If the target is not reached, no error is raised;
+    the result has `success` False and the best q found.
 
     Raises UnknownNameError for the frame; ArgumentError (ShapeError, DTypeError, NotFiniteError) for an
     invalid argument, and for method ``"engine"`` if the backend has no solver of its own.

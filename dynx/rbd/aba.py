@@ -81,7 +81,8 @@ class ArticulatedInertia:
 def forward_dynamics(mechanism: Mechanism, q: Array, v: Array, tau: Array) -> Array:
     """Return the acceleration (..., nv) caused by `tau` (..., nv), in tree coordinates.
 
-    q is (..., nq), v is (..., nv). A joint that moves no inertia causes a division by zero.
+    q is (..., nq), v is (..., nv). Raises no error for a singular mass matrix: if nothing that a joint moves
+    has inertia, it divides by zero.
     """
     bodies, zero = mechanism.bodies, 0 * v
     root = root_motion(mechanism, q, v, zero)
@@ -89,7 +90,7 @@ def forward_dynamics(mechanism: Mechanism, q: Array, v: Array, tau: Array) -> Ar
     for index, body in enumerate(bodies):
         placement = Placement.of(body, joint_value(mechanism, q, index))
         speed = joint_value(mechanism, v, index)
-        # The velocity-product acceleration c: that of the body while parent and joint have none.
+        # c is the velocity-product acceleration: that of the body when parent and joint do not accelerate.
         motion = child_motion(body, placement, motions[body.parent + 1], speed, 0 * speed)
         placements.append(placement)
         velocity_products.append((motion.proper_acceleration, motion.alpha))

@@ -36,7 +36,7 @@ TENSOR_ENTRIES = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 def inertial_regressor(
     mechanism: Mechanism, poses: Poses, v: Array, a: Array, frames: Sequence[int]
 ) -> Array:
-    """Return Y (..., nv, 10 n) in tree coordinates, for a rigid body fixed to each of n `frames` (convert).
+    """Return Y (..., nv, 10 n) in tree coordinates, for one rigid body fixed to each of n `frames`.
 
     Columns of bodies that no coordinate moves are zero.
     """

@@ -18,7 +18,8 @@ from dynx.spatial.scalar import Array, arctan, cos, sign, sin, sqrt
 from dynx.spatial.so3 import quat_product, rotate, rotate_back, rotation_from_quat, skew
 
 TINY = 1e-300
-"""Added to squared angles [rad^2] before division; any angle that matters absorbs it in rounding."""
+"""Term added to squared angles [rad^2] before division; rounding absorbs it unless the angle is extremely
+small."""
 
 
 def quat_exp(rotation_vector: Array) -> Array:
@@ -31,9 +32,9 @@ def quat_log(quat_xyzw: Array) -> Array:
     """Return the rotation vector [rad] (..., 3), of norm at most pi, of a quaternion of any non-zero norm."""
     vector, w = quat_xyzw[..., :3], quat_xyzw[..., 3:]
     norm = _positive_norm(vector)
-    # Through a quarter of the rotation angle, whose tangent is finite.
+    # The formula uses a quarter of the rotation angle, whose tangent is finite.
     angle = 4.0 * arctan(norm / (abs(w) + sqrt(norm * norm + w * w)))
-    # The sign of w, and 1 where w is 0.
+    # This is the sign of w, but 1 where w is 0.
     sign_of_w = sign(sign(w) + 0.5)
     return np.asarray(sign_of_w * (angle / norm) * vector)
 
@@ -112,7 +113,7 @@ def _scaled_quat(R: Array) -> Array:
     for i in range(3):
         row = [m[i][j] + m[j][i] for j in range(3)]
         row[i] = 1.0 + 2.0 * m[i][i] - trace
-        # 1 where component i is larger than those before it, otherwise 0.
+        # `larger` is 1 where component i is larger than those before it, otherwise 0.
         larger = sign(row[i] - largest)
         larger = 0.5 * (larger + abs(larger))
         products_i = np.concatenate([*row, differences[i]], axis=-1)

@@ -140,7 +140,7 @@ def test_any_engine_may_answer(engine: str) -> None:
 
 
 def test_a_backend_of_another_robot_is_refused() -> None:
-    with pytest.raises(ArgumentError, match="the backend is one of"):
+    with pytest.raises(ArgumentError, match="the backend is for"):
         ComputedTorque(load("panda"), kp=1.0, kd=1.0, backend=ENGINE)
 
 
