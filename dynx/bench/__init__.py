@@ -1,7 +1,8 @@
-"""Benchmarks of every backend and its peers on the user's own machine and robot, results checked first.
+"""Benchmarks of all backends and of other libraries on the user's machine and robot; results are checked
+first.
 
-`Plan` says what is timed and `Session` does it; `document` makes plain numbers of what it found.
-`dynx bench` is the command, docs/bench.md the page.
+A `Plan` lists what is timed, a `Session` times it, and `document` converts the measurements to JSON values.
+The command is `dynx bench`; docs/bench.md describes it.
 """
 
 from dynx.bench.cases import BenchmarkCase

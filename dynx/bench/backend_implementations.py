@@ -1,4 +1,4 @@
-"""Backends of dynx as implementations, called as a user calls them."""
+"""Implementations by the backends of dynx, called as users call them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from dynx.spatial.scalar import Floats
 
 
 class BackendImplementation(Implementation):
-    """A backend with its checks of arguments."""
+    """Implementation by a backend of dynx, including its checks of arguments."""
 
     role: Role = "backend"
 

@@ -1,4 +1,4 @@
-"""Benchmark cases: a quantity, the number of samples and of threads; and the samples themselves."""
+"""Benchmark cases, which consist of a quantity and the numbers of samples and threads; and the samples."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ MAX_POSITION = 2.0 * np.pi
 class BenchmarkCase:
     """`quantity` at `batch` samples in one call; a batch of 1 is one sample without a batch axis.
 
-    `threads` bounds the threads that an implementation uses.
+    `threads` is the largest number of threads that an implementation uses.
     """
 
     quantity: str
@@ -88,7 +88,7 @@ def draw_batch(model: Model, frame: str, count: int, seed: int = 0) -> Batch:
 
 
 def require_memory(model: Model, case: BenchmarkCase) -> None:
-    """Raise ArgumentError for a batch whose arrays exceed the share of memory that a batch may take."""
+    """Raise ArgumentError for a batch whose arrays need more than the share of memory allowed for a batch."""
     # Two arrays of results: one that all implementations share, and one that a backend makes itself.
     state = np.dtype(np.float64).itemsize * (model.nq + 3 * model.nv)
     result = np.dtype(np.float64).itemsize * prod(QUANTITIES[case.quantity].shape_of(model))

@@ -1,7 +1,8 @@
 """Check of an implementation's results against the backend `reference`, before it is timed.
 
-The tolerance is that of `dynx agree`: errors are relative to the natural magnitude of the quantity. An
-acceleration is checked by its backward error, the torque that it takes by inverse dynamics.
+The tolerance is that of `dynx agree`: errors are relative to the natural magnitude of the quantity.
+Accelerations are checked by their backward error: the torque that inverse dynamics computes for them, minus
+the given torque.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from dynx.reference.backend import ReferenceBackend
 from dynx.spatial.scalar import Floats
 
 CHECKED_AT_ENDS, CHECKED_BETWEEN = 16, 224
-"""Number of samples that are checked at each end of a batch, where groups of samples are incomplete, and in
+"""Number of samples that are checked at each end of a batch, where vectors may be incomplete, and in
 between."""
 
 
@@ -40,7 +41,7 @@ class Check:
 
 
 def checked_rows(count: int, seed: int = 0) -> list[int]:
-    """Return the numbers of the samples that are checked, of `count`."""
+    """Return the indices of the samples to check, out of `count`."""
     if count <= 2 * CHECKED_AT_ENDS + CHECKED_BETWEEN:
         return list(range(count))
     between = np.random.default_rng(seed).choice(count, CHECKED_BETWEEN, replace=False)
@@ -48,7 +49,7 @@ def checked_rows(count: int, seed: int = 0) -> list[int]:
 
 
 class Judge:
-    """Checks results at given samples."""
+    """Checker of results at given samples."""
 
     def __init__(self, samples: Batch) -> None:
         self._samples = samples
@@ -84,8 +85,8 @@ class Judge:
         self._reference.forward_dynamics(state.q, state.v, state.tau)
         if not np.isfinite(a).all():
             return Check(float("inf"), tolerances.solving())
-        taken = self._reference.inverse_dynamics(state.q, state.v, a)
-        verdict = judge(taken - state.tau, self._magnitudes.solved_torque(a)[:, None])
+        required = self._reference.inverse_dynamics(state.q, state.v, a)
+        verdict = judge(required - state.tau, self._magnitudes.solved_torque(a)[:, None])
         return Check(verdict.relative, tolerances.solving())
 
 

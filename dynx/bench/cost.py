@@ -14,11 +14,11 @@ from dynx.simd.trace import trace
 from dynx.simd.trigonometry import COS, HALF_PI, SIN
 
 SINE_COSINE_PAIRS = 1 + len(HALF_PI) + (len(SIN) - 1) + 1 + (len(COS) + 1)
-"""Multiply-adds in the sine and cosine of one angle: the nearest quarter turn, the reduction, and
-the two polynomials (`dynx.simd.trigonometry`)."""
+"""Number of multiply-adds in the sine and cosine of one angle: the nearest multiple of pi/2, the
+reduction, and the two polynomials (`dynx.simd.trigonometry`)."""
 
 SINE_COSINE_SINGLES = 3
-"""Sums and products beside those multiply-adds: the quarter turn as a number, r^2, and r^3."""
+"""Number of sums and products besides those multiply-adds: the multiple of pi/2 as a number, r^2, and r^3."""
 
 _SUMS = frozenset({"add", "sub"})
 _NOT_COUNTED = frozenset({"input", "constant", "sin", "cos", "neg", "abs"})
@@ -28,9 +28,9 @@ _NOT_COUNTED = frozenset({"input", "constant", "sin", "cos", "neg", "abs"})
 class Cost:
     """The cost of one sample.
 
-    `bytes` are those of the inputs and outputs, each moved once. `operations` are sums, products,
-    quotients and roots. `multiply_adds` counts instructions if every product that only one sum uses is
-    fused with it; a sum or product without a partner counts as one.
+    `bytes` are those of the inputs and outputs, each moved once. `operations` are sums, products, quotients
+    and roots. `multiply_adds` counts instructions, where a product that only one sum uses is fused with that
+    sum, and any other sum or product counts as one.
     """
 
     bytes: int
@@ -59,9 +59,10 @@ def cost_of(program: Program) -> Cost:
 
 
 def program_of(model: Model, quantity: str, frame: str) -> Program | None:
-    """Return the program that the backend `compiled` makes a kernel of, without the check of its arguments.
+    """Return the program that the backend `compiled` compiles for a quantity, without the check of its
+    arguments.
 
-    None where that backend evaluates the quantity by NumPy, since its code would be too long.
+    Return None if that backend evaluates the quantity with NumPy because its code would be too long.
     """
     mechanism, number = simplify_mechanism(model.mechanism), model.frame_index(frame)
     described = QUANTITIES[quantity]

@@ -6,7 +6,7 @@ from typing import Literal, TypedDict
 
 
 class BenchCase(TypedDict):
-    """A quantity, the samples in one call, and the threads of what has threads."""
+    """A quantity, the number of samples in one call, and the number of threads."""
 
     quantity: str
     batch: int
@@ -14,7 +14,7 @@ class BenchCase(TypedDict):
 
 
 class BenchPeak(TypedDict):
-    """Measured limits of the machine on so many threads: copying [B/s], multiply-adds [1/s]."""
+    """Measured limits of the machine on a number of threads: copying [B/s] and multiply-adds [1/s]."""
 
     threads: int
     copy_bandwidth: float
@@ -22,7 +22,7 @@ class BenchPeak(TypedDict):
 
 
 class BenchRoofline(TypedDict):
-    """Bytes and operations of one sample, and the shares of both peaks that its time comes to."""
+    """Bytes and operations of one sample, and the fractions of both peaks that its time corresponds to."""
 
     bytes: int
     operations: int
@@ -33,8 +33,8 @@ class BenchRoofline(TypedDict):
 
 
 class BenchWay(TypedDict):
-    """One implementation: its error, the median and quartiles of the time of one sample [ns], and how many
-    times faster it is than each peer; times are null where `problem` says why it was not timed."""
+    """One implementation: its error, the median and quartiles of the time per sample [ns], and its speed
+    relative to each peer. If it was not timed, times are null and `problem` is the reason."""
 
     way: str
     role: str
@@ -57,7 +57,8 @@ class BenchResult(BenchCase):
 
 
 class BenchDocument(TypedDict):
-    """The document; `load` is how busy the machine was, `not_done` what an interrupted run left out."""
+    """The document; `load` is the load average before the run, `not_done` the cases that an interrupted
+    run left out."""
 
     schema: int
     dynx: str

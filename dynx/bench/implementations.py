@@ -1,4 +1,4 @@
-"""Implementations of benchmark cases: a backend of dynx, or another library beside it."""
+"""Implementations of benchmark cases, by a backend of dynx or by another library."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ Role = Literal["backend", "peer"]
 class PreparedCall:
     """A call of one implementation with its arguments prepared.
 
-    `call()` does the whole batch and returns the results (n, ...). `baseline`, where there is one, is
-    what every call does besides the case that is to be measured: its time is taken away.
+    `call()` evaluates the whole batch and returns the results (n, ...). `baseline`, if given, does the part
+    of each call that shall not be measured; its time is subtracted.
     """
 
     call: Call
@@ -33,8 +33,9 @@ class PreparedCall:
 class Implementation(ABC):
     """An implementation of quantities that can be timed.
 
-    `threads` is how many it uses. `whole` says that it takes a batch in one call of compiled code;
-    others are called once for each sample, or need much memory, and may be timed at fewer samples.
+    `threads` is the number of threads that it uses. `whole` is true if it evaluates a batch in one call of
+    compiled code; others are called once for each sample, or need much memory, and may be timed at fewer
+    samples.
     """
 
     name: str
@@ -51,13 +52,13 @@ class Implementation(ABC):
     def prepare(self, case: BenchmarkCase, batch: Batch, out: Floats) -> PreparedCall:
         """Return the call for `case` on the samples of `batch`; it may write the results into `out` (n, ...).
 
-        Raises an error of `dynx.errors` where it cannot do this.
+        Raises an error of `dynx.errors` if that is impossible.
         """
 
     def samples(self, batch: Batch) -> Batch:
         """Return the samples in the coordinates of this implementation."""
         return batch
 
-    def close(self) -> None:  # most hold nothing
-        """Release what is held."""
+    def close(self) -> None:
+        """Release resources."""
         return

@@ -1,7 +1,7 @@
 """Measured peaks of this machine: the bandwidth of copying memory, and the rate of multiply-adds.
 
-Both are the best of some repetitions, since they bound what the machine can do; the times of
-kernels are medians, since users get those. Several threads each work on a part of their own.
+Both are the best of some repetitions, because they are limits of the machine; the times of kernels are
+medians, because those are what users observe. Each thread works on its own part.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ ROW_SIZE = 8
 """Number of doubles in a row of the copied array."""
 
 CHAINS = 12
-"""Number of independent chains of multiply-adds: enough to hide the latency of each, few enough to fit, with
-factor and term, into sixteen vector registers."""
+"""Number of independent chains of multiply-adds: enough to hide the latency of each, and few enough to fit
+into sixteen vector registers together with factor and addend."""
 
 CHAIN_LENGTH = 64
 """Number of successive multiply-adds in each chain."""
@@ -46,7 +46,7 @@ Part = Callable[[int, int], object]
 
 
 def measure_peak(threads: int, repetitions: int = REPETITIONS, size: int = COPIED_BYTES) -> Peak:
-    """Measure the peaks on a number of threads; `size` [B] is that of the array that is copied."""
+    """Measure the peaks on a number of threads; `size` [B] is the size of the array that is copied."""
     with ThreadPoolExecutor(threads) as pool:
         return Peak(
             threads,
@@ -73,7 +73,7 @@ def chains_program(chains: int = CHAINS, links: int = CHAIN_LENGTH) -> Program:
     """Return the program of interleaved chains x -> x a + b and the sum of their ends, which no optimiser can
     shorten.
 
-    It is built node by node, since the order matters: one link of every chain, then the next.
+    It is built node by node, because the order matters: one link of every chain, then the next link.
     """
     inputs = [Node("input", slot=k) for k in range(chains + 2)]
     nodes, ends = list(inputs), list(range(chains))
@@ -92,7 +92,8 @@ def chains_program(chains: int = CHAINS, links: int = CHAIN_LENGTH) -> Program:
 
 
 def _copy_bandwidth(pool: ThreadPoolExecutor, threads: int, repetitions: int, size: int) -> float:
-    """Return the bytes read and written in a second, by the faster of a kernel that copies and NumPy."""
+    """Return the number of bytes read and written per second, by a copying kernel or by NumPy, whichever
+    is faster."""
     rows = max(size // (8 * ROW_SIZE), threads * host().lanes)
     source, target = np.ones((rows, ROW_SIZE)), np.zeros((rows, ROW_SIZE))
     kernel = Kernel(trace(lambda x: x, {"x": (ROW_SIZE,)}))
@@ -108,11 +109,12 @@ def _copy_bandwidth(pool: ThreadPoolExecutor, threads: int, repetitions: int, si
 
 
 def _multiply_adds(pool: ThreadPoolExecutor, threads: int, repetitions: int) -> float:
-    """Return the products with a sum done in a second."""
+    """Return the number of multiply-adds per second."""
     program = chains_program()
     kernel = Kernel(program)
     rows = threads * PEAK_SAMPLES
-    # One row stands for all: what is measured is arithmetic, not reading. 0.5 x + 1 stays between 1 and 2.
+    # One row is read repeatedly, because arithmetic is to be measured, not reading. 0.5 x + 1 stays between 1
+    # and 2.
     inputs = [
         np.broadcast_to(np.full(port.size, value), (rows, port.size))
         for port, value in zip(program.inputs, (1.5, 0.5, 1.0), strict=True)
@@ -127,7 +129,7 @@ def _multiply_adds(pool: ThreadPoolExecutor, threads: int, repetitions: int) -> 
 
 
 def _best(pool: ThreadPoolExecutor, threads: int, rows: int, part: Part, repetitions: int) -> float:
-    """Return the seconds of the fastest repetition; all threads together do all rows once."""
+    """Return the time of the fastest repetition [s], in which all threads together process all rows once."""
     ends = [rows * k // threads for k in range(threads + 1)]
 
     def all_parts() -> None:

@@ -1,4 +1,5 @@
-"""Measurement of one case: every implementation is checked, then those within tolerance are timed in turn."""
+"""Measurement of one case: every implementation is checked, and those within tolerance are timed
+alternately."""
 
 from __future__ import annotations
 
@@ -19,18 +20,16 @@ from dynx.model import Model
 from dynx.spatial.scalar import Floats
 
 TRIAL_SAMPLES = 64
-"""Number of samples from which the speed of an implementation without batches is estimated."""
+"""Number of samples from which the speed of an implementation that is not `whole` is estimated."""
 
 TRIAL_COUNT = 3
-"""Number of estimates of that speed; the fastest counts."""
+"""Number of estimates of that speed, the fastest of which is used."""
 
 MAX_REPETITION_TIME = 0.02
-"""Longest time of one repetition of such an implementation [s]; it is timed at fewer samples otherwise."""
+"""Longest time [s] of one repetition of such an implementation; a slower one is timed at fewer samples."""
 
 
-LOST_IN_NOISE = (
-    "lost in the noise: in a quarter of the repetitions a call took no longer than one without the work"
-)
+LOST_IN_NOISE = "not measurable: in a quarter of the repetitions a call took no longer than its overhead"
 """Problem of a measurement whose time is not above that of its baseline."""
 
 
@@ -38,9 +37,9 @@ LOST_IN_NOISE = (
 class Measurement:
     """Result of one implementation of a case.
 
-    `times` are those of one sample, None where the implementation was not timed; `problem` then says why.
-    `samples` is the number of samples in a call, `error` the largest one found before the timing, over
-    the natural magnitude of the quantity.
+    `times` are the times of one sample, or None if the implementation was not timed; `problem` is then the
+    reason. `samples` is the number of samples in a call, `error` the largest error found before the timing,
+    relative to the natural magnitude of the quantity.
     """
 
     case: BenchmarkCase
@@ -58,7 +57,7 @@ class Measurement:
 def measure(
     case: BenchmarkCase, implementations: Sequence[Implementation], batch: Batch, repetitions: int
 ) -> list[Measurement]:
-    """Return the measurements of all `implementations` that support this case, in their order.
+    """Measure all `implementations` that support this case; results have their order.
 
     `batch` holds at least ``case.batch`` samples, the first of which are used.
     """
@@ -70,7 +69,7 @@ def measure(
 
 
 class Candidate(NamedTuple):
-    """An implementation that was checked; `ready` is its prepared call, None if it will not be timed."""
+    """A checked implementation; `ready` is its prepared call, or None if it will not be timed."""
 
     found: Measurement
     ready: PreparedCall | None
@@ -89,7 +88,7 @@ def _timed(candidate: Candidate, times: Iterator[Times]) -> Measurement:
 
 
 class Preparation:
-    """Prepares implementations for one case, and checks them."""
+    """Preparation and check of the implementations of one case."""
 
     def __init__(self, case: BenchmarkCase) -> None:
         self._case = case
@@ -97,17 +96,18 @@ class Preparation:
         self._memory = np.empty(0)
 
     def prepare(self, implementation: Implementation, batch: Batch) -> Candidate:
-        """Return the implementation prepared for the samples of `batch`, if its results are right."""
+        """Prepare an implementation for the samples of `batch`, and check its results."""
         case, each = self._case, implementation
         own = each.samples(batch.first(case.batch))
         found = Measurement(case, each.name, each.role, each.version, each.threads, len(own))
         try:
             if not implementation.whole:
-                own = own.first(self._affordable(implementation, own))
+                own = own.first(self._timed_samples(implementation, own))
                 found = replace(found, samples=len(own))
             out = self._result_array(own)
             ready = implementation.prepare(case, own, out)
-            # Results that an implementation omits must not be those of another.
+            # Filled with NaN, so that results which an implementation does not write are not those of another
+            # one.
             out.fill(np.nan)
             results = np.reshape(np.asarray(ready.call()), out.shape)
             judge, rows = self._judge(own)
@@ -120,7 +120,7 @@ class Preparation:
         problem = f"wrong result, not timed: error {check.error:.1e}, tolerance {check.tolerance:.1e}"
         return Candidate(replace(found, problem=problem), None)
 
-    def _affordable(self, implementation: Implementation, batch: Batch) -> int:
+    def _timed_samples(self, implementation: Implementation, batch: Batch) -> int:
         """Return the number of samples that fit into a repetition: all of them, or a power of two."""
         if len(batch) <= TRIAL_SAMPLES:
             return len(batch)

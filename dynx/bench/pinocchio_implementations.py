@@ -1,8 +1,8 @@
-"""Pinocchio itself as a peer: its C++ batches, its binding in a loop, and the C++ within the binding.
+"""Pinocchio itself for comparison: its C++ batches, its binding in a loop, and the C++ part of the binding.
 
 The engine's model is the one of the backend `pinocchio` (the same links and joints, see
-`dynx.engines.pinocchio.engine_model`). To the engine a mimic joint is one more coordinate, so a robot
-that has some is given to it with those joints set free, at the same states.
+`dynx.engines.pinocchio.engine_model`). In the engine's model a mimic joint has a coordinate of its own, so
+the engine gets a robot without mimic constraints, at the same states.
 """
 
 from __future__ import annotations
@@ -22,19 +22,19 @@ from dynx.model import Model
 from dynx.spatial.scalar import Floats
 
 BATCH, LOOP, INSIDE = "pinocchio C++ batch", "pinocchio binding", "pinocchio C++ call"
-"""Names of the three: `rneaInParallel` and `abaInParallel`, a Python loop over the binding, and the same
-loop less the overhead of a call."""
+"""Names of the three implementations: `rneaInParallel` and `abaInParallel`, a Python loop over the
+binding, and the same loop minus the overhead of a call."""
 
 
 MIN_CALLS = 1024
-"""Smallest batch at which the time in C++ differs measurably from that of the rest of a call."""
+"""Smallest batch at which the time in C++ can be separated from the overhead of a call."""
 
 _ONE_JOINT_SHAPE = {"forward_kinematics": (4, 4), "jacobian": (6, 1), "mass_matrix": (1, 1)}
 """Shape of the results of a robot with one joint, where it is not (1,)."""
 
 
 class PinocchioImplementation(Implementation):
-    """Base of the three: the engine's model, and the samples in its coordinates."""
+    """Base of the three implementations: the engine's model, and the samples in its coordinates."""
 
     role: Role = "peer"
     version = f"pinocchio {pin.__version__}"
@@ -46,9 +46,10 @@ class PinocchioImplementation(Implementation):
         self._engine, self._frame_ids = engine_model(self.model)
 
     def samples(self, batch: Batch) -> Batch:
-        """With mimic joints as coordinates of their own, at the same state.
+        """Return the same states with mimic joints as coordinates of their own.
 
-        Each torque is distributed over the joints that follow one coordinate so that it does the same work.
+        Each torque is distributed over the joints that depend on one coordinate so that the virtual work is
+        the same.
         """
         coupling = batch.model.mechanism.coupling
         if coupling is None:
@@ -62,7 +63,7 @@ class PinocchioImplementation(Implementation):
 class PinocchioBatch(PinocchioImplementation):
     """`rneaInParallel` and `abaInParallel`: OpenMP threads over the columns of column-major matrices.
 
-    A row-major array of samples is, transposed, such a matrix: nothing has to be rearranged.
+    The transpose of a row-major array of samples is such a matrix, so nothing has to be rearranged.
     """
 
     name = BATCH
@@ -78,7 +79,7 @@ class PinocchioBatch(PinocchioImplementation):
         self._pool = pin.ModelPool(self._engine, threads)
 
     def supports(self, case: BenchmarkCase) -> bool:
-        """The two that Pinocchio offers, for more than one sample."""
+        """Check whether it is one of the two quantities of Pinocchio's batches, with more than one sample."""
         return case.batch > 1 and case.quantity in self._in_parallel
 
     def prepare(self, case: BenchmarkCase, batch: Batch, out: Floats) -> PreparedCall:
@@ -100,7 +101,7 @@ class PinocchioLoop(PinocchioImplementation):
     name = LOOP
 
     def supports(self, case: BenchmarkCase) -> bool:
-        """The quantities that are timed by default."""
+        """Check whether the quantity is one that is timed by default."""
         return case.quantity in BENCHMARK_QUANTITIES
 
     def prepare(self, case: BenchmarkCase, batch: Batch, out: Floats) -> PreparedCall:
@@ -111,10 +112,10 @@ class PinocchioLoop(PinocchioImplementation):
 
 
 class PinocchioInside(PinocchioLoop):
-    """The C++ within those calls: the same loop, less a loop over a model of one joint.
+    """The C++ part of those calls: the time of the same loop minus that of a loop over a model of one joint.
 
-    Both convert arguments and results, look up the overload, and write one row; what the second does
-    besides is one joint's share of the work, by which this is too short rather than too long.
+    Both loops convert arguments and results, look up the overload, and write one row. The second also
+    computes one joint, so this time is too short by that part.
     """
 
     name = INSIDE
@@ -142,14 +143,14 @@ def pinocchio_implementations(model: Model, threads: int) -> Iterator[PinocchioI
 
 
 def without_mimics(model: Model) -> Model:
-    """Free every mimic joint: return the model with each as a joint of its own."""
+    """Return the model without mimic constraints: each mimic joint becomes an independent joint."""
     if model.mechanism.coupling is None:
         return model
     return replace(model, joints=tuple(replace(joint, mimic=None) for joint in model.joints))
 
 
 def _binding_call(engine: Any, quantity: str, frame: int) -> Callable[..., Floats]:
-    """Evaluate one sample as a user of the binding writes it."""
+    """Return a function that evaluates one sample as users of the binding do."""
     data = engine.createData()
     rnea, aba, crba, jacobian = pin.rnea, pin.aba, pin.crba, pin.computeFrameJacobian
     forward, update, axes = pin.forwardKinematics, pin.updateFramePlacement, pin.LOCAL_WORLD_ALIGNED
@@ -170,13 +171,13 @@ def _binding_call(engine: Any, quantity: str, frame: int) -> Callable[..., Float
 
 
 def _looped(function: Callable[..., Floats], case: BenchmarkCase, batch: Batch, out: Floats) -> Call:
-    """Return `function` for every sample; for a single one nothing but the call."""
+    """Return a call of `function` for every sample; for a single sample without a loop."""
     rows = list(zip(*batch.arguments(case.quantity), strict=True))
     if case.batch == 1:
         sample = rows[0]
         return lambda: function(*sample)
 
-    # Of a robot with one joint the binding returns its Jacobian as a vector.
+    # For a robot with one joint the binding returns the Jacobian as a vector.
     results = out[..., 0] if out.shape[1:] == (6, 1) else out
 
     def call() -> Floats:
@@ -188,7 +189,7 @@ def _looped(function: Callable[..., Floats], case: BenchmarkCase, batch: Batch, 
 
 
 def _one_joint() -> tuple[Any, int]:
-    """Return a model of one turning joint and a frame at its end."""
+    """Return a model of one revolute joint with a frame at its end."""
     engine = pin.Model()
     joint = engine.addJoint(0, pin.JointModelRZ(), pin.SE3.Identity(), "joint")
     engine.appendBodyToJoint(joint, pin.Inertia.Random(), pin.SE3.Identity())

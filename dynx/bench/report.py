@@ -1,4 +1,4 @@
-"""The results of a session as one document: plain numbers, fit for JSON (docs/bench.md describes it)."""
+"""The results of a session as a JSON document, which docs/bench.md describes."""
 
 from __future__ import annotations
 
@@ -50,8 +50,8 @@ def document(session: Session, found: Sequence[Sequence[Measurement]], processor
 def result(
     group: Sequence[Measurement], costs: Sequence[Cost | None], peaks: Mapping[int, Peak]
 ) -> BenchResult:
-    """Return one case and all its implementations; a ratio is the time of a peer over that of the
-    implementation."""
+    """Return the entry of one case with all its implementations; a ratio is the time of a peer divided by
+    that of the implementation."""
     timed = [each for each in group if each.role == "peer"]
     peers = {each.implementation: each.times.median for each in timed if each.times is not None}
     return {
@@ -66,7 +66,7 @@ def wrong(found: Sequence[Sequence[Measurement]]) -> list[Measurement]:
 
 
 def is_wrong(measurement: Measurement) -> bool:
-    """Check whether the error was outside the tolerance."""
+    """Check whether the error exceeds the tolerance."""
     error, tolerance = measurement.error, measurement.tolerance
     return error is not None and tolerance is not None and not error <= tolerance
 

@@ -29,7 +29,7 @@ class Peak:
 
 @dataclass(frozen=True)
 class Roofline:
-    """The shares of both peaks that a kernel reaches, and which one bounds it.
+    """The shares of both peaks that a kernel reaches, and the one that limits it.
 
     The share of memory may exceed 1 where a batch fits into the caches, which are faster.
     """

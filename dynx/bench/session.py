@@ -19,7 +19,7 @@ from dynx.model import Model
 from dynx.spatial.scalar import Floats
 
 BATCHES = (1, 8, 65536)
-"""Default batches: a control loop, a few candidates, many samples."""
+"""Default batch sizes: one sample as in a control loop, a few, and very many."""
 
 REPETITIONS, QUICK_REPETITIONS = 20, 5
 
@@ -27,12 +27,13 @@ MIN_BATCH_FOR_THREADS = 1024
 """Smallest batch that is timed on several threads by default."""
 
 COMPILED = "compiled"
-"""The backend whose programs `dynx.bench.cost` counts."""
+"""Name of the backend whose operations `dynx.bench.cost` counts."""
 
 
 @dataclass(frozen=True)
 class Plan:
-    """Cases to time on one robot. `frame` is that of kinematics; None for `backends` means all."""
+    """Cases to time on one robot. Quantities of frames are timed at `frame`; None for `backends` means
+    all."""
 
     model: Model
     frame: str
@@ -43,9 +44,9 @@ class Plan:
 
     def __post_init__(self) -> None:
         if not self.cases:
-            raise ArgumentError("a plan without cases: there is nothing to time")
+            raise ArgumentError("the plan has no cases, so there is nothing to time")
         if not self.model.nv:
-            raise ArgumentError(f"{self.model.name} has no coordinates: there is nothing to time")
+            raise ArgumentError(f"{self.model.name} has no coordinates, so there is nothing to time")
         self.model.frame_index(self.frame)
         for case in self.cases:
             require_memory(self.model, case)
@@ -62,9 +63,9 @@ def benchmark_cases(
     threads: Iterable[int] = (1,),
     least: int = MIN_BATCH_FOR_THREADS,
 ) -> tuple[BenchmarkCase, ...]:
-    """Return every quantity at every batch on every number of threads, large batches first.
+    """Combine every quantity, batch and number of threads, large batches first.
 
-    Several threads only at batches of at least `least`.
+    Batches smaller than `least` are not combined with several threads.
     """
     return tuple(
         BenchmarkCase(quantity, batch, count)
@@ -76,9 +77,9 @@ def benchmark_cases(
 
 
 class Session:
-    """Measures a plan, one case at a time. Use it as a context: leaving it closes the backends.
+    """Measurement of a plan, one case at a time. The end of a ``with`` block closes the backends.
 
-    `load` is how busy the machine was before (`dynx.bench.machine.load`).
+    `load` is the load average before the measurement (`dynx.bench.machine.load`).
     """
 
     def __init__(
@@ -105,13 +106,13 @@ class Session:
                 implementation.close()
 
     def measure_machine(self, threads: int) -> None:
-        """Measure the peaks on so many threads; they are then in `peaks`."""
+        """Measure the peaks on a number of threads and store them in `peaks`."""
         self.peaks[threads] = self._measure_peak(threads)
 
     def measure(self, case: BenchmarkCase) -> list[Measurement]:
-        """Return the measurements of one case.
+        """Measure one case.
 
-        On several threads the backends that have one thread are left out if they are timed on one.
+        With several threads, backends that use one thread are left out if the plan also times them on one.
         """
         plan = self.plan
         if case.threads not in self._implementations:
@@ -127,7 +128,7 @@ class Session:
         return measure(case, implementations, self._batch, plan.repetitions)
 
     def cost(self, measurement: Measurement) -> Cost | None:
-        """Return the least cost of one sample, where the operations of the implementation are known."""
+        """Return the least cost of one sample; None if the operations of the implementation are not known."""
         if measurement.implementation != COMPILED:
             return None
         quantity = measurement.case.quantity
@@ -143,7 +144,7 @@ class Session:
 
 
 def all_implementations(plan: Plan, threads: int) -> list[Implementation]:
-    """Return the chosen or installed backends, then Pinocchio's own calls."""
+    """Return the implementations by the chosen or installed backends, then those by Pinocchio itself."""
     names = installed_backends() if plan.backends is None else plan.backends
     found: list[Implementation] = []
     for name in names:
@@ -163,8 +164,8 @@ def _peers(model: Model, threads: int) -> list[Implementation]:
 
 
 def _or_unavailable(make: Callable[[], list[Implementation]], name: str, role: Role) -> list[Implementation]:
-    """Return the implementations, or one that raises why there are none; nothing where their engine is
-    missing."""
+    """Return the implementations; an empty list if their engine is missing, and a placeholder with the
+    reason if they cannot be made."""
     try:
         return make()
     except NotInstalledError:
@@ -174,7 +175,7 @@ def _or_unavailable(make: Callable[[], list[Implementation]], name: str, role: R
 
 
 class _Unavailable(Implementation):
-    """Placeholder of implementations that cannot hold this robot."""
+    """Placeholder for implementations that do not support this robot."""
 
     version = ""
     threads = 1

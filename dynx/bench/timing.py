@@ -1,4 +1,4 @@
-"""Times of several calls, interleaved so that other programs on the machine slow all of them alike."""
+"""Times of several calls, interleaved so that other programs on the machine slow all of them equally."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Call = Callable[[], Any]
 Clock = Callable[[], float]
 
 MIN_TIMING_SECONDS = 1e-3
-"""Shortest duration of one timing [s]: a shorter call is repeated within it."""
+"""Shortest duration of one timing [s]; shorter calls are repeated."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Times:
 
     @property
     def spread(self) -> float:
-        """Distance of the quartiles over the median."""
+        """Interquartile range divided by the median."""
         low, high = self.quartiles
         return (high - low) / self.median if self.median > 0.0 else float("inf")
 
@@ -50,7 +50,7 @@ class Times:
 
 
 def interleaved(calls: Sequence[Call], repetitions: int, clock: Clock = time.perf_counter) -> list[Times]:
-    """Time each call: every repetition makes all of them, each time with another one first."""
+    """Time each call. Every repetition makes all calls, starting with a different one each time."""
     rounds = [_rounds(call, clock) for call in calls]
     found: list[list[float]] = [[] for _ in calls]
     for repetition in range(repetitions):
@@ -61,12 +61,13 @@ def interleaved(calls: Sequence[Call], repetitions: int, clock: Clock = time.per
 
 
 def once(call: Call, clock: Clock = time.perf_counter) -> float:
-    """Return the seconds of one call."""
+    """Return the duration of one call [s]."""
     return _timed(call, 1, clock)
 
 
 def _rounds(call: Call, clock: Clock) -> int:
-    """Return the number of repetitions of the call within one timing; determining it warms the call up."""
+    """Return the number of repetitions of the call within one timing. Determining it also warms up the
+    call."""
     rounds = 1
     while True:
         taken = rounds * _timed(call, rounds, clock)

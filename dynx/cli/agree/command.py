@@ -14,12 +14,12 @@ from dynx.cli.shell.options import model_options, name_list, run_options
     "--backends",
     type=name_list,
     metavar="A,B,C",
-    help="Backends to compare, or with --as-loaded engines (default: all that are installed).",
+    help="Backends to compare; with --as-loaded, engines (default: all that are installed).",
 )
 @click.option(
     "--as-loaded",
     is_flag=True,
-    help="Comparison of the engines when each loads the file itself.",
+    help="Compare the engines as each loads the file itself.",
 )
 @model_options
 @click.option(

@@ -42,7 +42,7 @@ def agree(
     if as_loaded:
         if lock:
             raise click.UsageError("--lock changes the robot, and --as-loaded compares files as they are")
-        # Importing the doctor would take a third of the start of every other comparison.
+        # Importing the doctor here would take a third of the time that other comparisons need to start.
         compare: Callable[..., int] = import_object("dynx.cli.doctor.as_loaded:compare")
         return compare(
             robots,
@@ -57,7 +57,7 @@ def agree(
         )
     if json_path is not None and json_path != "-":
         check_writable(json_path)
-    for name in backends or ():  # once, rather than as a refusal of every robot
+    for name in backends or ():  # Checked once, so that an error is not reported for every robot.
         backend_class(name)
     inputs = expand(robots)
     if json_path is not None:
@@ -90,7 +90,7 @@ def _report(run: AgreementRun, json_path: str | None, quiet: bool) -> int:
     """Write the document, the tables and the errors; return the exit code."""
     document = results_document(run.results, run.not_done)
     entries: list[dict[str, Any]] = document["results"]
-    # The document comes first: a pipe that closes while the table is written must not lose it.
+    # The document is written first, so that it is not lost if a pipe closes while the table is written.
     if json_path == "-":
         echo_json(document)
     elif json_path is not None:

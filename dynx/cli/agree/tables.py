@@ -22,9 +22,9 @@ Check = dict[str, Any]
 _TITLES: dict[str | None, str] = {
     None: "largest difference between two engines",
     "referee": "error against the referee (50 digits)",
-    "derived": "native result against the one derived from poses and inverse dynamics",
+    "derived": "result of the engine itself against the one derived from its poses and inverse dynamics",
 }
-"""Titles of the tables by the reference in a pair; None where both are backends."""
+"""Titles of the tables by the reference of a pair; None for pairs of two backends."""
 
 _ITERATIVE_QUANTITY = "inverse_kinematics"
 """Quantity found by iteration: its error is the tolerance of the iteration, not rounding."""
@@ -139,7 +139,7 @@ def _reference(check: Check) -> str | None:
 
 
 def _heading(pair: str) -> str:
-    """Write a pair of backends in two lines; of a pair with a reference only the backend."""
+    """Write a pair of backends in two lines; for a pair with a reference, write only the backend."""
     first, _, partner = pair.partition("~")
     return first if not partner or partner in _TITLES else f"{first}\n~{partner}"
 
@@ -186,7 +186,7 @@ def _error(error: float | None, agree: bool) -> str:
 
 
 def _digits(error: float | None) -> str:
-    """Write the number of decimal digits that agree, at most the 16 of a double."""
+    """Write the number of agreeing decimal digits, at most 16, the precision of a double."""
     if error is None or math.isnan(error):
         return "-"
     if error == 0.0:

@@ -17,7 +17,7 @@ from dynx.cli.shell.options import frame_option, json_flag, model_options, name_
     multiple=True,
     metavar="NAME",
     help="Quantity to time, such as inverse_dynamics or mass_matrix; may be given several times "
-    "(default: poses, Jacobian, inverse and forward dynamics, mass matrix; a wrong name lists all).",
+    "(default: poses, Jacobian, inverse and forward dynamics, mass matrix; a wrong name prints a list).",
 )
 @click.option(
     "--batch",
@@ -32,7 +32,7 @@ from dynx.cli.shell.options import frame_option, json_flag, model_options, name_
     type=click.IntRange(min=1),
     multiple=True,
     metavar="N",
-    help="Number of threads, for implementations that use several; may be given several times "
+    help="Number of threads of implementations that can use several; may be given several times "
     "(default: 1, and one per processor).",
 )
 @click.option(
@@ -43,7 +43,7 @@ from dynx.cli.shell.options import frame_option, json_flag, model_options, name_
 @click.option(
     "--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of the random samples."
 )
-@click.option("--quick", is_flag=True, help="5 repetitions instead of 20.")
+@click.option("--quick", is_flag=True, help="Run with 5 repetitions instead of 20.")
 @json_flag
 @runs("dynx.cli.bench.run:bench")
 def bench() -> None:

@@ -15,7 +15,7 @@ from dynx.cli.shell.terminal import counted
 Entry = Mapping[str, Any]
 
 MAX_IDLE_LOAD = 0.5
-"""Load average before the run [processes] up to which the machine counts as idle."""
+"""Largest load average before the run [processes] at which the machine counts as idle."""
 
 
 def show(out: Console, report: Entry) -> None:

@@ -40,7 +40,9 @@ from dynx.cli.shell.options import choice_pair, name_list, run_options
     "may be given several times.",
 )
 @click.option("--fix", "fix", metavar="OUT", help="File for the mended URDF; for several robots a directory.")
-@click.option("--in-place", is_flag=True, help="Mended descriptions in place of the files that were read.")
+@click.option(
+    "--in-place", is_flag=True, help="Overwrite the files that were read with the mended descriptions."
+)
 @click.option(
     "--json", "json_path", metavar="FILE", help="File for the reports as JSON; - is standard output."
 )

@@ -1,4 +1,4 @@
-"""Conclusion of `dynx doctor` when the robots are examined: files, tables, errors, exit code."""
+"""Conclusion of `dynx doctor` after the examination: files, tables, errors, exit code."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _MAX_DIFFERENCES = 6
 
 
 class Conclusion:
-    """The reports of a run, and where their files go.
+    """The reports of a run, and the paths of their files.
 
     `targets` has the file for the mended description of each input (which is one per task where any is
     not None), `folder` is for counterexamples, `engines` are those that the user chose.
@@ -54,7 +54,7 @@ class Conclusion:
     def reach(self, *, quiet: bool) -> int:
         """Write and show everything; return the exit code."""
         reports = self._run.results
-        # First the files: a pipe that closes while the table is written must not lose them.
+        # Files are written first, so that they are not lost if a pipe closes while the table is written.
         self._outputs.write(reports, self._run.not_done, self._baseline, command())
         mended = self._mend()
         saved = [self._save_counterexamples(report) for report in reports]

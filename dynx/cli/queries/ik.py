@@ -56,7 +56,7 @@ def ik(target: Numbers, frame: str | None, q: Numbers, as_json: bool, **robot: A
 
 
 def _outcome(result: dict[str, Any]) -> str:
-    """Check whether the target was reached, the errors, and the effort of the search."""
+    """State whether the target was reached, the errors, and the number of iterations and restarts."""
     error = f"{result['position_error']:.3g} m"
     if result["rotation_error"] is not None:
         error += f" and {result['rotation_error']:.3g} rad"

@@ -1,12 +1,10 @@
 """Exit codes of the command line, and the conversion of an error into one line and a code.
 
-0    success: engines agree, the target was reached, the simulation reached its end
-1    negative result: engines differ, the target was not reached, the simulation diverged
-2    some input cannot be used (commands for several robots still process the others)
-70   a defect of dynx
-74   standard output cannot be written, because the disk is full, say (EX_IOERR of sysexits.h)
-130  interrupted by Ctrl-C; 143 terminated
-141  the reader of standard output closed it, as `head` does (128 + SIGPIPE)
+0    success: engines agree, the target was reached, the simulation reached its end 1    negative result:
+engines differ, the target was not reached, the simulation diverged 2    some input cannot be used (commands
+for several robots still process the others) 70   a defect of dynx 74   standard output cannot be written, for
+example because the disk is full (EX_IOERR of sysexits.h) 130  interrupted by Ctrl-C; 143 terminated 141  the
+reader of standard output closed it, as `head` does (128 + SIGPIPE)
 """
 
 from __future__ import annotations
@@ -26,7 +24,7 @@ from dynx.errors import DynxError, traceback_wanted
 DONE, NEGATIVE_RESULT, BAD_INPUT, DEFECT, NOT_WRITTEN, INTERRUPTED, PIPE_CLOSED = 0, 1, 2, 70, 74, 130, 141
 
 _WRITING_FAILED = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF}
-"""Errors of writing to an open stream; an error of opening a file has its name instead."""
+"""Error numbers of writing to an open stream. (Errors of opening a file are reported with its name.)"""
 
 
 def one_line(text: object) -> str:
@@ -43,7 +41,7 @@ def short_line(text: object) -> str:
 
 def complain(message: str) -> None:
     """Write `message` to standard error, as one line."""
-    # Where standard error cannot be written, the exit code remains.
+    # If standard error cannot be written, the exit code still reports the error.
     with suppress(OSError):
         click.echo(f"dynx: error: {one_line(message)}", err=True)
 

@@ -47,7 +47,7 @@ COMMANDS = {
 
 
 class CommandLine(LazyGroup):
-    """The group of commands: every error below it leaves as one line and an exit code."""
+    """The group of commands, which turns every error into one line and an exit code."""
 
     def make_context(self, *args: Any, **extra: Any) -> click.Context:
         """Read the options of the group; ``--help`` and ``--version`` already write here."""

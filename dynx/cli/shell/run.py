@@ -123,7 +123,7 @@ class Run(Generic[Task, Result]):
 def carry_out(
     run: Run[Any, Any], jobs: int | None, timeout: float, quiet: bool, conclude: Callable[[], int]
 ) -> int:
-    """Carry out a run and ``conclude()`` it, also after Ctrl-C; return the exit code.
+    """Run the tasks, then call ``conclude()``, also after Ctrl-C; return its exit code.
 
     `jobs` None means one per processor; `timeout` 0 means no time limit.
     """

@@ -11,17 +11,18 @@ from rich.text import Text
 Cell = str | Text
 
 _GAP, _NARROW_GAP = 3, 2
-"""Blanks between two columns in a table that fits and in one that does not; one precedes the first."""
+"""Number of blanks between two columns in a table that fits and in one that does not; one blank precedes
+the first column."""
 
 _MAX_KEY_FRACTION = 0.4
-"""Width of a key as a fraction of the table's, in a table that does not fit: wider keys are wrapped."""
+"""Largest width of a key, as a fraction of the width of a table that does not fit; wider keys are wrapped."""
 
 
 class Table:
     """A table in the one style of dynx, for ``Console.print``.
 
-    A table too wide is printed in blocks of columns, one below the other, each with the first `keys`
-    columns again, as Octave prints wide matrices. Without `keys` it is never divided. Columns named in
+    A table that is too wide is printed in blocks of columns, one below the other, each of which repeats the
+    first `keys` columns, as Octave prints wide matrices. Without `keys` it is never divided. Columns named in
     `right` are aligned right.
     """
 
@@ -67,7 +68,8 @@ class Table:
                 yield from self._row(row, block, widths, gap)
 
     def _blocks(self, widths: Sequence[int], width: int, gap: int) -> list[list[int]]:
-        """Return the columns of each block: besides the keys at least one, and half of `width` for them."""
+        """Divide the columns into blocks. Each has the keys and at least one other column, for which half
+        of `width` is reserved."""
         keys = list(range(self._keys))
         if not keys:
             return [list(range(len(widths)))]

@@ -10,7 +10,7 @@ from dynx.cli.shell.terminal import number
 Entry = dict[str, Any]
 
 _MAX_LISTED = 3
-"""Number of links, payloads or pushes up to which each is named; more are counted."""
+"""Largest number of links, payloads or pushes that are named; if there are more, they are counted."""
 
 
 def deviations(report: Entry) -> str:

@@ -79,7 +79,7 @@ def _summary(rollout: Rollout) -> Entry:
 
 
 def _joints(model: Model, rollout: Rollout) -> list[Entry]:
-    """Return the entries of all coordinates of v, those of a floating base first."""
+    """Return the entries of all coordinates of v; those of a floating base come first."""
     with np.errstate(all="ignore"):
         summary = rollout.summary()
     in_effect = rollout.settings.get("effort_limits")

@@ -65,7 +65,7 @@ class FinalState(TypedDict):
 
 
 class SimDocument(TypedDict):
-    """One simulation: its options and its results; `settings` are those of the record."""
+    """One simulation with its options and results; `settings` are the main settings of its scenario."""
 
     schema: int
     dynx: str

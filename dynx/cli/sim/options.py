@@ -122,7 +122,7 @@ motion = stacked(
     click.option(
         "--ignore-limits",
         is_flag=True,
-        help="Permission for a motion that violates the robot's position or velocity limits.",
+        help="Allow a motion that violates the robot's position or velocity limits.",
     ),
 )
 
@@ -155,8 +155,8 @@ controller = stacked(
     _gain_option(
         "--natural-frequency",
         help="Natural frequency of the error dynamics [rad/s], instead of --kp and --kd (default: 20, so "
-        "that kp is 400 and kd 40; controllers with gains in N m multiply these by the inertia of each "
-        "joint at the start).",
+        "that kp is 400 and kd 40). Gains in N m are these numbers times the inertia of each joint at the "
+        "start.",
     ),
     _gain_option("--damping-ratio", help="Damping ratio of the error dynamics (1 = critical; default: 1)."),
     _gain_option(
@@ -303,7 +303,7 @@ results = stacked(
     click.option(
         "--resume",
         metavar="FILE.npz",
-        help="Record of the same simulation, whose steps are taken over and continued.",
+        help="Record of an earlier run of the same simulation, which is continued.",
     ),
     click.option(
         "--resume-step",

@@ -37,10 +37,11 @@ REQUIRED_OPTION = {
     "seed": "--noise-q or --noise-v",
     "resume_step": "--resume",
 }
-"""Options that have an effect only with another."""
+"""Options that have an effect only together with another option."""
 
 STEP_BYTES = 2000
-"""Approximate memory of a step besides its record: setpoints, and temporary arrays of the summary."""
+"""Approximate memory [bytes] that a step needs besides its record: setpoints, and temporary arrays of the
+summary."""
 
 
 @dataclass(frozen=True)
@@ -149,8 +150,8 @@ def _motor_limit(model: Model, limits: Coefficients | None) -> Any:
 def _limits_of_motors(
     model: Model, limits: Coefficients | None, controller: Controller[Any] | None
 ) -> list[float] | None:
-    """Return the effort limits of PyBullet's motors; None for another controller, or for the limits of the
-    engine."""
+    """Return the effort limits of PyBullet's motors; None for any other controller, and for the default of
+    the engine."""
     if limits is None or not isinstance(controller, EngineMotor):
         return None
     base = 6 if model.floating else 0

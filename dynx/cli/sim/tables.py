@@ -17,10 +17,10 @@ from dynx.cli.sim.deviations import deviations, value_range
 Entry = dict[str, Any]
 
 KINETIC_ENERGY_AT_REST = 1e-20
-"""Kinetic energy [J] that is rounding alone: at most 1e-10 m/s for each kilogram."""
+"""Kinetic energy [J] below which the robot counts as at rest: at most 1e-10 m/s for each kilogram."""
 
 PLAIN_RANGE = (1e-3, 1e5)
-"""Range of a column's largest number in which the column is written without exponents."""
+"""Range of the largest number of a column that is written without exponents."""
 
 _STEPPERS = {
     "engine": "its own stepper",
@@ -164,7 +164,7 @@ def error_text(error: float | None) -> str:
 
 
 def column_text(values: Sequence[float]) -> list[str]:
-    """Write the numbers of a column with as many decimals as give the largest four digits."""
+    """Write the numbers of a column with the number of decimals that gives the largest one four digits."""
     largest = max(values, default=0.0)
     if largest == 0.0:
         return ["0"] * len(values)
