@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 MAX_MAGNITUDE = 1e70
 """Bound on the magnitude of the entries of an array.
 
-A moment is a product of two lengths, two speeds and a mass; the bound keeps it from overflowing, which would
-make an engine silently return infinity or NaN.
+A moment is a product of two lengths, two speeds and a mass. The bound prevents its overflow, with which an
+engine would silently return infinity or NaN.
 """
 
 
@@ -210,7 +210,8 @@ def clip(model: Model, q: ArrayLike) -> Floats:
 
 
 def _sampling_range(low: float, high: float, default_range: float) -> tuple[float, float]:
-    """Return the limits; a missing one is `default_range` from 0, or twice that from the other limit."""
+    """Return the limits. A missing limit is placed `default_range` from 0, or twice that from the other
+    limit."""
     bounded_below, bounded_above = low > -MAX_MAGNITUDE, high < MAX_MAGNITUDE
     if bounded_below and bounded_above:
         return low, high

@@ -165,7 +165,7 @@ class Frame:
 
 @dataclass(frozen=True)
 class Note:
-    """A remark on an ambiguity in the description and on how it was read."""
+    """A remark on an ambiguity in the description and how it was interpreted."""
 
     message: str
     line: int | None = None

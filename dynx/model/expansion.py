@@ -15,10 +15,9 @@ ALL = "all"
 
 @dataclass(frozen=True)
 class RobotInput:
-    """One robot: the argument for `dynx.load`, or the error where there is none.
+    """One robot: the argument for `dynx.load`, or an error.
 
-    `folder` is the directory argument below which the file was found, None where the robot itself was
-    the argument.
+    `folder` is the directory argument in which the file was found; None if the robot itself was the argument.
     """
 
     robot: str
@@ -45,7 +44,7 @@ def expand(arguments: Sequence[str]) -> list[RobotInput]:
 
 
 def refusals(inputs: Sequence[RobotInput]) -> dict[int, DynxError]:
-    """Return the errors of the inputs that are no robots, by their position."""
+    """Return the errors of the inputs that have no robot, by their position."""
     return {index: each.refusal for index, each in enumerate(inputs) if each.refusal is not None}
 
 

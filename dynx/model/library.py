@@ -20,9 +20,9 @@ from dynx.errors import RobotNotFoundError, nearest, shown
 EXAMPLE_ROBOT_DATA = "example-robot-data"
 DYNX_MODELS = "dynx"
 TRAPS = "traps"
-"""Folder among the models of dynx whose files each show one cause of disagreement."""
+"""Folder of dynx's models whose files each contain one cause of disagreement between engines."""
 
-# The loaders' short names that differ from the stem of the file, by the file they load.
+# Short names of loaders that differ from the stem of the file, by file.
 _LOADER_NAMES = {
     "alexander_description/urdf/alexander_v1.lowerBodyOnly.urdf": "alexander",
     "anymal_b_simple_description/robots/anymal-kinova.urdf": "anymal_kinova",

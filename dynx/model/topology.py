@@ -11,7 +11,7 @@ from dynx.model.elements import Joint, Link, Mimic, Note
 from dynx.model.locking import lock_joint
 
 MAX_LINKS = 10_000
-"""Largest number of links, more than any robot has; a longer file would overflow an engine's recursion."""
+"""Largest number of links, more than any robot has; larger files would overflow the stack of an engine."""
 
 
 def depth_first(links: list[Link], joints: list[Joint], source: str) -> tuple[list[Link], list[Joint]]:

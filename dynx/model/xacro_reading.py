@@ -28,7 +28,7 @@ def expand_xacro(path: str, package_dirs: Iterable[StrPath] = ()) -> bytes:
     Raises NotInstalledError without xacro, DescriptionError if the expansion fails or takes longer than
     `TIMEOUT`. Line numbers of the text differ from those of the file.
     """
-    read_file(path)  # raises for a FIFO or a directory, on which xacro would block
+    read_file(path)  # Raises for a FIFO or a directory, which xacro would block on.
     if importlib.util.find_spec("xacro") is None:
         raise NotInstalledError(
             f"{printable(path)} is a xacro file and the package xacro is not installed; "

@@ -4,7 +4,8 @@
 - `dynx.testing.plugin`: the same for ``pytest --dynx-robot my.urdf``, without a test file
 - `dynx.testing.strategies`: Hypothesis strategies for robots and states (the extra ``testing``)
 
-Importing it imports neither Hypothesis nor an engine, because pytest does so in every run for the plugin.
+Importing this package imports neither Hypothesis nor an engine, because pytest imports it in every run for
+the plugin.
 """
 
 from __future__ import annotations

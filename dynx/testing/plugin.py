@@ -4,8 +4,8 @@ Each robot and base becomes one test per quantity and per identity that `dynx.ag
 no test file is needed. ``--dynx-as-loaded`` adds one test in which every engine loads the file itself
 (`dynx.diagnose`). In an ini file, ``dynx_robots`` lists robots for every run. See ``docs/testing.md``.
 
-pytest imports this module in every run wherever dynx is installed, so it imports nothing that takes time and
-does nothing without its options.
+pytest imports this module in every run if dynx is installed, so it imports nothing slow and does nothing
+without its options.
 """
 
 from __future__ import annotations
@@ -97,7 +97,7 @@ def pytest_report_header(config: pytest.Config) -> str | None:
 def pytest_make_collect_report(
     collector: pytest.Collector,
 ) -> Generator[None, pytest.CollectReport, pytest.CollectReport]:
-    """Append the robots to what the session collects from files."""
+    """Append the robots to the items that the session collects from files."""
     report = yield
     if isinstance(collector, pytest.Session) and report.passed:
         plan = collector.config.stash.get(_PLAN, None)

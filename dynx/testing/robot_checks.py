@@ -1,7 +1,7 @@
 """Checks of a robot: each quantity and each identity of `dynx.agree`.
 
-The agreement of a robot on a base is measured once in a run of pytest, for all its tests; a test reads its
-part, and reports where engines differ so that it can be reproduced.
+The agreement of a robot on a base is measured once per run of pytest. Each test reads its part of the report,
+and shows how to reproduce a difference.
 """
 
 from __future__ import annotations

@@ -77,7 +77,7 @@ class Trajectory(ABC):
         times = checked_entries("t", real_array("t", t))
         flat = times.ravel()
         q, v, a = self.inside(np.clip(flat, 0.0, self.duration))
-        # Masks are applied only if needed: most calls lie between the ends.
+        # Masks are applied only if needed, because most times lie between the ends.
         early, late = flat <= 0.0, flat >= self.duration
         if early.any() or late.any():
             q, v, a = np.array(q), np.array(v), np.array(a)

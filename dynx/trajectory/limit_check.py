@@ -19,7 +19,7 @@ SAMPLES = 500
 """Number of evenly spaced times that are checked, besides both sides of every knot."""
 
 REFINEMENT_SAMPLES = 16
-"""Number of further times on either side of each worst time."""
+"""Number of further times on either side of the time of each largest excess."""
 
 RELATIVE_TOLERANCE = 1e-12
 """A limit is violated if exceeded by more than this fraction of it, or of the largest value of the joint.
@@ -58,14 +58,14 @@ def violations(
     joint_dynamics: bool = False,
     backend: str | Backend = "pinocchio",
 ) -> list[LimitViolation]:
-    """List every limit of position, velocity and effort that the motion violates, each joint at its worst
-    time.
+    """List every limit of position, velocity and effort that the motion violates, for each joint at the time
+    of its largest excess.
 
     Effort is computed by inverse dynamics along the motion (including damping, friction and armature with
     `joint_dynamics`) by `backend`, a name or a backend of the model. With a floating base inverse dynamics
     assumes a wrench on the base that no actuator exerts, so the effort is that of a robot held by its base.
-    ``effort=False`` skips it. The motion is checked at 500 times, at both sides of each knot of the
-    trajectory, and at more times around the worst of them.
+    ``effort=False`` skips it. The motion is checked at 500 times, on both sides of each knot of the
+    trajectory, and at more times around the largest excesses.
 
     Raises ShapeError if the trajectory does not fit the model.
     """

@@ -38,7 +38,7 @@ def trapezoidal(
 ) -> Trajectory:
     """Return a motion from rest at `q0` to rest at `q1` with a trapezoidal velocity profile.
 
-    `velocity` and `acceleration` are limits, one number or (nv,), infinite for none; the default of
+    `velocity` and `acceleration` are limits, one number or (nv,); infinity means no limit. The default of
     `velocity` is the limit of the `model`. The motion is the fastest on the straight line, so that some joint
     is at a limit at any time, or it takes `duration` [s] if that is longer (time is then scaled uniformly). A
     floating base needs the `model` and moves along one screw axis.
@@ -96,17 +96,20 @@ def s_curve(
 def _trajectory_of_phases(
     ends: Ends, spans: tuple[float, ...], rates: tuple[float, ...], order: int, duration: float | None
 ) -> Trajectory:
-    """Return the motion of these phases, slowed down uniformly to take `duration`."""
+    """Return the motion of these phases, uniformly slowed down to take `duration`; the derivative of
+    `order` is `rates` in them."""
     shortest = sum(spans)
     if not MIN_DURATION <= shortest <= MAX_DURATION:
         raise TrajectoryError(
-            f"within the limits it takes {shortest:g} s; "
+            f"within the limits the motion takes {shortest:g} s; "
             f"wanted between {MIN_DURATION:g} and {MAX_DURATION:g} s"
         )
     if duration is not None:
         T = checked_duration(duration)
         if T / shortest < 1.0 - LIMIT_MARGIN:
-            raise TrajectoryError(f"duration is {T:g}; within the limits it takes at least {shortest:.9g} s")
+            raise TrajectoryError(
+                f"duration is {T:g}; within the limits the motion takes at least {shortest:.9g} s"
+            )
         factor = max(1.0, T / shortest)
         spans = tuple(span * factor for span in spans)
         rates = tuple(rate / factor**order for rate in rates)
@@ -116,7 +119,8 @@ def _trajectory_of_phases(
 
 
 def _at_rest(ends: Ends, T: float, curve: PiecewisePolynomial) -> Trajectory:
-    """Return the motion with v exactly 0 at both ends, and a of the first and the last phase there."""
+    """Return the motion. Its velocity at both ends is exactly 0, its acceleration that of the first and of
+    the last phase."""
     rest = np.zeros(ends.nv)
     acceleration = 2.0 * curve.coefficients[0, 2]
     if curve.coefficients.shape[1] == 4:

@@ -69,7 +69,7 @@ def time_optimal(
         raise ArgumentError("q0 and q1 are the same, at the same velocity; no motion is needed")
     if not MIN_DURATION <= duration <= MAX_DURATION:
         raise TrajectoryError(
-            f"it takes {duration:g} s; wanted between {MIN_DURATION:g} and {MAX_DURATION:g} s"
+            f"the motion takes {duration:g} s; wanted between {MIN_DURATION:g} and {MAX_DURATION:g} s"
         )
     phases = [list(_phases(profile, duration)) for profile in found.profiles[0]]
     return ends.trajectory(duration, _common_breaks(phases, duration), begin, finish)

@@ -121,7 +121,7 @@ def test_models() -> None:
         ),
         ({"velocity": None}, ArgumentError, "neither velocity nor a model"),
         ({"acceleration": "fast"}, DTypeError, "acceleration has dtype"),
-        ({"duration": 0.1}, TrajectoryError, "duration is 0.1; within the limits it takes at least"),
+        ({"duration": 0.1}, TrajectoryError, "duration is 0.1; within the limits the motion takes at least"),
         ({"duration": -1.0}, ArgumentError, "duration is '-1.0'; wanted a positive number"),
     ],
 )

@@ -3,12 +3,12 @@
 The plant is made body by body from the moving bodies of the `Model` (`multibody_plant`), without Drake's file
 reader. It has no geometry, actuators, damping or limits and is continuous.
 
-Safe to use from several threads: the plant is never changed after it is made, and each thread has a context
-of its own, made on its first call. Calls hold the GIL, so threads give no speed.
+Several threads may use it: the plant is never changed after it is made, and each thread has its own context,
+made on its first call. Calls hold the GIL, so threads do not make it faster.
 
 Jacobian derivatives and Coriolis matrices are derived: Drake has J v and dJ/dt v, not dJ/dt. Forward dynamics
-is Drake's articulated-body algorithm; where that raises because a body's inertia is not positive (a file may
-state one, and the mass matrix may still be regular), it is solved from the mass matrix.
+is Drake's articulated-body algorithm. If that raises because a body's inertia is not positive definite (which
+a file may state, and the mass matrix may still be regular), the acceleration is solved from the mass matrix.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ class DrakeBackend(Backend):
         except DynxError:
             raise
         except DRAKE_FAILURES as error:
-            raise EngineError(f"drake cannot hold {model.name}: {error_message(error)}") from error
+            raise EngineError(f"drake cannot represent {model.name}: {error_message(error)}") from error
         self._coordinates = self._built.coordinates
         self._world = self._plant.world_frame()
         self._gravity: Floats = np.array(model.gravity)
@@ -83,7 +83,7 @@ class DrakeBackend(Backend):
         return f"drake {drake_version()}"
 
     def _release(self) -> None:
-        # Calls that other threads are in keep their own reference until they end.
+        # Calls in progress in other threads keep their own reference until they return.
         del self._workspace, self._torque, self._acceleration, self._world, self._plant, self._built
 
     # -- kinematics ---------------------------------------------------------------------------
@@ -128,7 +128,8 @@ class DrakeBackend(Backend):
         J = self._plant.CalcJacobianSpatialVelocity(context, _V, on_robot, _ORIGIN, world, world)
         bias = self._plant.CalcBiasSpatialAcceleration(context, _V, on_robot, _ORIGIN, world, world)
         wanted = self._coordinates.accelerations(R, v, a)
-        # Drake returns the classical acceleration of the origin; the spatial one leaves out w x v.
+        # Drake returns the classical acceleration of the origin; the spatial acceleration does not include w
+        # x v.
         acceleration = _linear_first(J @ wanted + bias.get_coeffs())
         if reference != "local_world_aligned":
             velocity = on_robot.CalcSpatialVelocityInWorld(context)
@@ -136,7 +137,7 @@ class DrakeBackend(Backend):
         return self._convert_to_reference(acceleration, on_robot, context, reference)
 
     def _convert_to_reference(self, motion: Floats, frame: Any, context: Any, reference: Reference) -> Floats:
-        """Return a spatial vector at the frame's origin, in world axes, converted to `reference`."""
+        """Convert a spatial vector at the frame's origin, in world axes, to `reference`."""
         if reference == "local_world_aligned":
             return motion
         T = frame.CalcPoseInWorld(context)
@@ -151,7 +152,7 @@ class DrakeBackend(Backend):
     @_convert_errors
     def _inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
         if self.model.floating:
-            # An acceleration opposite to gravity stands in for gravity; see `_upright`.
+            # Gravity is replaced by an opposite acceleration of the base; see `_upright`.
             a = a.copy()
             a[:3] -= self._gravity @ self._coordinates.attitude(q)
             context, R = self._set_state(_upright(q), v)
@@ -171,7 +172,7 @@ class DrakeBackend(Backend):
         try:
             vdot = self._acceleration.Eval(context)
         except RuntimeError:
-            # A joint carries an inertia that is not positive; see the module docstring.
+            # The inertia that a joint moves is not positive; see the module docstring.
             return super()._forward_dynamics(q, v, tau)
         return self._coordinates.accelerations_back(R, v, vdot)
 
@@ -179,7 +180,7 @@ class DrakeBackend(Backend):
     def _mass_matrix(self, q: Floats) -> Floats:
         context, R = self._set_positions(_upright(q) if self.model.floating else q)
         plant = self._plant
-        # The composite inertia of a body in counterweighted parts cannot be divided by its mass.
+        # The composite inertia of a body made of parts with opposite masses cannot be divided by its mass.
         compute = (
             plant.CalcMassMatrixViaInverseDynamics if self._built.counterweighted else plant.CalcMassMatrix
         )
@@ -253,11 +254,11 @@ class DrakeBackend(Backend):
 
 
 def _upright(q: Floats) -> Floats:
-    """Return the configuration with the base frame at that of the world, on whose pose no mass matrix or
-    torque depends.
+    """Return the configuration with the base frame at the world frame. Mass matrix and torques do not depend
+    on the pose of the base.
 
-    Drake computes in world axes: rotating a slender robot there and its results back would lose the digits
-    of its small moment beside its large ones.
+    Drake computes in world axes. Rotating the inertia of a slender robot into them and results back would
+    lose digits of its smallest moment.
     """
     q = q.copy()
     q[:7] = _AT_WORLD

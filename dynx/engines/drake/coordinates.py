@@ -24,9 +24,10 @@ _ANGULAR_THEN_LINEAR = (3, 4, 5, 0, 1, 2)
 class DrakeCoordinates:
     """The map between the tree coordinates of dynx and those of a plant, one sample at a time.
 
-    `q_index` and `v_index` are the plant's indices of the joints of dynx, in tree order; `n_q` and `n_v` the
-    sizes of the plant's q and v, in which entries unknown to dynx are zero; `base` the index of the floating
-    base in both, or None for a fixed base. Methods take as R the result of `attitude` at the configuration.
+    `q_index` and `v_index` are the plant's indices of the joints of dynx, in tree order. `n_q` and `n_v` are
+    the sizes of the plant's q and v, in which entries that dynx does not have are zero. `base` is the index
+    of the floating base in both, or None for a fixed base. The argument R of methods is the result of
+    `attitude` at the configuration.
     """
 
     def __init__(
@@ -51,7 +52,7 @@ class DrakeCoordinates:
         """Return R_world_base (3, 3); an unused empty array for a fixed base."""
         if not self._floating:
             return _EMPTY
-        # In Python, because NumPy takes ten times as long for arrays this small.
+        # Written in plain Python, because NumPy takes ten times as long for such small arrays.
         x, y, z, w = q[3:7].tolist()
         xx, yy, zz, xy, xz, yz = x * x, y * y, z * z, x * y, x * z, y * z
         wx, wy, wz = w * x, w * y, w * z
@@ -118,15 +119,15 @@ class DrakeCoordinates:
 
 
 def _gather(indices: Sequence[int], length: int) -> tuple[Array, bool]:
-    """Return the index of the source of each of the plant's entries (one past the end for none), and whether
-    some have none."""
+    """Return, for each entry of the plant, the index of the entry of dynx (one past the end if there is
+    none), and whether some entries have none."""
     source = np.full(length, len(indices))
     source[list(indices)] = range(len(indices))
     return source, len(indices) != length
 
 
 def _cross_product(v: Floats) -> tuple[float, float, float]:
-    """Return w x u of a base velocity (u, w)."""
+    """Return w x u for a base velocity (u, w)."""
     a, b, c, x, y, z = v[:6].tolist()
     return (y * c - z * b, z * a - x * c, x * b - y * a)
 

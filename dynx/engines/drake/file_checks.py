@@ -58,7 +58,7 @@ def _fatal_faults(source: XmlSource) -> Iterator[tuple[str, int]]:
         yield "the robot's name is empty", root.line
     for transmission in root.all("transmission"):
         kind = transmission.first("type")
-        # Drake does not check whether there is any text.
+        # Drake does not check whether the element has text.
         if kind is not None and "type" not in transmission.attributes and not _begins_with_text(source, kind):
             yield "the <type> of a <transmission> has no text", kind.line
     for joint in root.all("joint"):

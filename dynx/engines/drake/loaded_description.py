@@ -12,7 +12,7 @@ from dynx.spatial.scalar import Floats
 
 
 def describe_link(body: Any, context: Any) -> LoadedInertial:
-    """Return the inertia of a body about its centre of mass; Drake holds it about the link's origin.
+    """Return the inertia of a body about its centre of mass. Drake stores it about the link's origin.
 
     Drake's world, which is the body of a link named ``world``, has no mass.
     """

@@ -33,7 +33,7 @@ from dynx.spatial.scalar import Array, Floats
 from dynx.spatial.se3 import homogeneous
 
 MAX_RATIO = 1e150
-"""Length [m], or squared radius of gyration [m^2], whose products may overflow if it is larger."""
+"""Bound on a length [m] and on a squared radius of gyration [m^2], above which products may overflow."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +107,7 @@ def build_plant(mechanism: Mechanism) -> BuiltPlant:
 
 
 def _parts(inertia: RigidInertia) -> list[Any]:
-    """Return Drake's inertia, or several that add up to it where it cannot be divided by its mass."""
+    """Return Drake's inertia, or several that add up to it if it cannot be divided by its mass."""
     mass = float(inertia.mass)
     if not (inertia.first_moment.any() or inertia.rotational_inertia.any()):
         return [_inertia(mass, inertia)]

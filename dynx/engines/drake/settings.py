@@ -1,4 +1,4 @@
-"""Remedies at run time: settings of a robot that Drake has loaded."""
+"""Remedies at run time: settings applied to a robot that Drake has loaded."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ CALLS: Mapping[str, str] = {
 }
 
 NEGLIGIBLE_MASS = 2.0**-200
-"""Mass [kg] of a link for which the file states an inertia and no mass: a power of two, so that dividing by
-it is exact, and so small that its weight is lost in rounding."""
+"""Mass [kg] of a link for which the file states an inertia and no mass: a power of two, so that dividing
+by it is exact, and so small that its weight is below rounding."""
 
 
 def set_before_finalize(plant: Any, calls: Collection[str]) -> None:

@@ -6,8 +6,8 @@ idle. Mass matrix and torques are computed from MuJoCo's poses, axes, accelerati
 `mj_crb` and `mj_rne` lose digits (`projection`). Tree coordinates are MuJoCo's own except for a floating
 base: its quaternion is (w, x, y, z), and its linear velocity is in world axes.
 
-Safe to use from several threads: the engine's workspace (`MjData`) exists once per thread, made on the
-thread's first call. MuJoCo releases the GIL in its calls.
+Several threads may use it: each has its own workspace of the engine (`MjData`), made on its first call.
+MuJoCo releases the GIL in its calls.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ class MujocoBackend(Backend):
         except DynxError:
             raise
         except Exception as error:
-            raise EngineError(f"mujoco cannot hold {model.name}: {_message(error)}") from error
+            raise EngineError(f"mujoco cannot represent {model.name}: {_message(error)}") from error
         self._nv = self._mechanism.nv
         self._floating = model.floating
         self._dynamics = ProjectedDynamics(self._engine, floating=model.floating)
@@ -84,7 +84,7 @@ class MujocoBackend(Backend):
         return f"mujoco {mujoco.__version__}"
 
     def _release(self) -> None:
-        # Calls that other threads are in keep their own reference until they end.
+        # Calls in progress in other threads keep their own reference until they return.
         del self._workspace, self._engine
 
     # -- kinematics ---------------------------------------------------------------------------

@@ -29,7 +29,7 @@ FLOATING = (
     "spec.worldbody.first_body().add_freejoint()\n"
     "model = spec.compile()"
 )
-"""The documented way to let a URDF float: MuJoCo's reader has no option for it."""
+"""The documented lines that give a URDF a floating base, for which MuJoCo's reader has no option."""
 
 
 def load_file(path: Path, model: Model, calls: Collection[str]) -> Any:

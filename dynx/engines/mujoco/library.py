@@ -9,7 +9,8 @@ from dynx.errors import NotInstalledError
 try:
     import mujoco
 except (ImportError, AttributeError, OSError, RuntimeError) as error:
-    # The last three come from the setup of its renderer: a wrong MUJOCO_GL, missing libraries.
+    # The last three are raised while its renderer is set up, because of a wrong MUJOCO_GL or missing
+    # libraries.
     raise NotInstalledError(
         f"the engine 'mujoco' needs MuJoCo: pip install 'dynx[mujoco]' ({error})"
     ) from error
@@ -17,8 +18,8 @@ except (ImportError, AttributeError, OSError, RuntimeError) as error:
 __all__ = ["MAX_DEPTH", "mujoco", "silence_warnings", "silent_data"]
 
 MAX_DEPTH = 1000
-"""Largest depth of a tree of links for MuJoCo. Its compiler has a limit of 1,024 bodies; its reader of files
-is recursive, and ends the process when the stack of the thread is full (measured, 4.0)."""
+"""Largest depth of a tree of links for MuJoCo. Its compiler has a limit of 1,024 bodies, and its file
+reader is recursive and ends the process if the stack of the thread overflows (measured, 4.0)."""
 
 
 def silent_data(model: Any) -> Any:

@@ -1,12 +1,12 @@
 """Mass matrix and torques projected from MuJoCo's kinematics, because those of MuJoCo lose digits.
 
 MuJoCo refers the inertia of every body to the centre of mass of the whole robot. For a finger of mass m at a
-distance d from there, m d^2 is added to an inertia that may be a thousandth of it, and later subtracted
-(`mj_crb`, `mj_rne`): on robots with hands the entries of its matrix are off by 1e-12 of sqrt(M_ii M_jj)
-(MuJoCo 4.0), and the torque about an axis through a point mass, which is zero, comes out as a rounding error
-of the largest torque. Here M is the sum of m Jp' Jp + Jr' I Jr over the bodies (Siciliano et al., Robotics,
-eq. 7.32) and the torque the sum of Jp' m (a - g) + Jr' (I dw + w x I w) (Newton and Euler, projected as in
-Kane's method), with lever arms from joint to body, not from a distant point.
+distance d from there, m d^2 is added to an inertia that may be a thousand times smaller, and later subtracted
+(`mj_crb`, `mj_rne`). On robots with hands the entries of its mass matrix have errors of 1e-12 relative to
+sqrt(M_ii M_jj) (MuJoCo 4.0), and the torque about an axis through a point mass, which should be zero, is a
+rounding error of the largest torque. Here M is the sum of m Jp' Jp + Jr' I Jr over the bodies (Siciliano et
+al., Robotics, eq. 7.32) and the torque the sum of Jp' m (a - g) + Jr' (I dw + w x I w) (Newton and Euler,
+projected as in Kane's method), with lever arms from joint to body, not from a distant point.
 """
 
 from __future__ import annotations
@@ -42,14 +42,15 @@ class ProjectedDynamics:
                 body = engine.body_parentid[body]
 
     def mass_matrix(self, data: Any, R_root: Floats, p_root: Floats) -> Floats:
-        """Return the mass matrix (nv, nv); `data` after `mj_kinematics`, (R, p) the pose of the root."""
+        """Return the mass matrix (nv, nv), after `mj_kinematics` on `data`; (R, p) is the pose of the
+        root."""
         Jp, Jr = self._jacobians(data, R_root, p_root)
         M: Floats = _gramian(Jp, np.repeat(self._mass, 3)) + _gramian(Jr, self._moments.ravel())
         return np.asarray(0.5 * (M + M.T))
 
     def torque(self, data: Any, R_root: Floats, p_root: Floats) -> Floats:
-        """Return the torque (nv,); `data` after `mj_rnePostConstraint`, whose accelerations are without
-        gravity."""
+        """Return the torque (nv,), after `mj_rnePostConstraint` on `data`, whose accelerations do not
+        include gravity."""
         bodies = self._bodies
         # MuJoCo's velocities and spatial accelerations are about the robot's centre of mass, in world axes,
         # angular part first; here they are converted to classical ones of the body's centre of mass.

@@ -3,10 +3,10 @@ moving joint.
 
 MuJoCo's compiler refuses inertias that a description can hold (no mass on a moving body, a violated triangle
 inequality, a negative principal moment). So it compiles the tree with substitute inertias, and the numbers of
-the description are written into the compiled model: the algorithms accept any inertia, since they are affine
-in it. Of the fields that the compiler derives from inertias, the algorithms used here read only
-`body_subtreemass`, which is written too. The substitutes lie off the body frames, so that the compiler does
-not simplify bodies with a diagonal inertia.
+the description are then written into the compiled model. The algorithms accept any inertia, because their
+results are affine in it. Of the fields that the compiler derives from inertias, the algorithms used here read
+only `body_subtreemass`, which is also overwritten. The substitutes have another pose than the body frames, so
+that the compiler does not simplify bodies with a diagonal inertia.
 """
 
 from __future__ import annotations
@@ -39,7 +39,8 @@ ROOT = 1
 class MujocoTree:
     """MuJoCo's compiled model, and MuJoCo's body for each frame of `Model.frames`.
 
-    `masses_add`: MuJoCo's own centres of mass are right, because there is mass and none is negative.
+    `masses_add` is true if MuJoCo's own centres of mass are right, because the total mass is positive and no
+    mass is negative.
     """
 
     model: Any
@@ -48,7 +49,8 @@ class MujocoTree:
 
 
 def build_tree(model: Model) -> MujocoTree:
-    """Return the tree of a robot; raises EngineLimitError for one that is too large for MuJoCo."""
+    """Return the MuJoCo's tree of a robot. Raises EngineLimitError for a robot that is too large for
+    MuJoCo."""
     mechanism = model.mechanism
     if mechanism.nv > MAX_NV:
         raise EngineLimitError(
@@ -62,7 +64,7 @@ def build_tree(model: Model) -> MujocoTree:
     numbers = {name: str(number) for number, name in enumerate(model.frame_names)}
     root = _body(spec.worldbody, numbers[model.root], Pose())
     if model.floating:
-        # Alignment would move the body frame to the centre of mass.
+        # Aligning would move the body frame to the centre of mass.
         root.add_freejoint(align=False)
     bodies, depths = {model.root: root}, {model.root: 1}
     for joint in model.joints:

@@ -4,12 +4,11 @@ The engine's model is built from the links and joints of the `Model`, so Pinocch
 inertias, independently of `dynx.model.mechanism`. Coordinates need no conversion: Pinocchio's free-flyer has
 the conventions of dynx, and tree coordinates are added in the same depth-first order.
 
-Safe to use from several threads: the engine's workspace (`Data`) exists once per thread, made on the thread's
-first call. A `Data` takes 64 nv^3 bytes (measured, Pinocchio 4.1: 0.5 GB at 200 degrees of freedom), hence
-`MAX_NV`.
+Several threads may use it: each has its own workspace of the engine (`Data`), made on its first call. A
+`Data` takes 64 nv^3 bytes (measured, Pinocchio 4.1: 0.5 GB at 200 degrees of freedom), hence `MAX_NV`.
 
-Every array that the binding returns is a copy which the caller owns (a test proves it), and its mass matrix
-is symmetric: the binding fills the triangle that CRBA leaves out.
+Every array that the binding returns is a copy which the caller owns (a test proves it). Its mass matrix is
+symmetric, because the binding fills the triangle that CRBA does not compute.
 """
 
 from __future__ import annotations
@@ -73,10 +72,10 @@ class PinocchioBackend(Backend):
             "local": pin.LOCAL,
             "world": pin.WORLD,
         }
-        # At one degree of freedom the binding returns Jacobians as vectors; without any, its
-        # derivative of a Jacobian ends the process.
+        # With one degree of freedom the binding returns Jacobians as vectors; with none, its derivative of a
+        # Jacobian ends the process.
         self._nv = self._mechanism.nv
-        # The engine's whole-body quantities leave out bodies that cannot move.
+        # The engine's whole-body quantities do not include bodies that cannot move.
         at_rest = self._engine.inertias[WORLD]
         self._rest_mass = float(at_rest.mass)
         self._rest_moment: Floats = self._rest_mass * np.array(at_rest.lever)
@@ -91,11 +90,12 @@ class PinocchioBackend(Backend):
 
     @cached_property
     def _link_parameters(self) -> tuple[list[int], Floats]:
-        """Computed for the first regressor, because it takes as long as the rest of the constructor."""
+        """Parameters that `joint_parameters_of_links` maps, computed when a regressor is first needed,
+        because that takes as long as the constructor."""
         return joint_parameters_of_links(self._engine, self._frame_ids[: len(self.model.links)])
 
     def _release(self) -> None:
-        # Calls that other threads are in keep their own reference until they end.
+        # Calls in progress in other threads keep their own reference until they return.
         del self._workspace, self._engine
 
     # -- kinematics ---------------------------------------------------------------------------
@@ -145,8 +145,8 @@ class PinocchioBackend(Backend):
         engine, data, frame = self._engine, self._workspace.data, self._frame_ids[frame]
         pin.forwardKinematics(engine, data, q, v, a)
         pin.updateFramePlacement(engine, data, frame)
-        # d(J v)/dt is the classical acceleration where the origin moves with the frame and the
-        # axes stand still, the spatial one in the other two references.
+        # d(J v)/dt is the classical acceleration if the origin moves with the frame and the axes do not
+        # rotate, and the spatial acceleration in the other two references.
         function = (
             pin.getFrameClassicalAcceleration
             if reference == "local_world_aligned"

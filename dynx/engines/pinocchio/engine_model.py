@@ -35,22 +35,22 @@ def error_message(error: BaseException) -> str:
 def engine_model(model: Model) -> tuple[Any, tuple[int, ...]]:
     """Build Pinocchio's own model of `model`; also return the number of each frame of `model.frame_names`.
 
-    It is made once for all backends of a model, which never change it. Its coordinates are those of the tree,
-    mimic joints included. Raises EngineLimitError for a model that the engine would represent wrongly or
-    that is too large, EngineError where the engine refuses it.
+    All backends of a model share it and never change it. Its coordinates are those of the tree, mimic joints
+    included. Raises EngineLimitError for a model that the engine would represent wrongly or that is too
+    large, EngineError where the engine refuses it.
     """
     nv = model.mechanism.nv
     if nv > MAX_NV:
         raise EngineLimitError(
             f"{model.name} has {nv} degrees of freedom; the backend 'pinocchio' "
-            f"takes at most {MAX_NV}, for the engine's memory grows with their cube"
+            f"takes at most {MAX_NV}, because the engine's memory grows with their cube"
         )
     try:
         return _build(model)
     except DynxError:
         raise
     except Exception as error:
-        raise EngineError(f"pinocchio cannot hold {model.name}: {error_message(error)}") from error
+        raise EngineError(f"pinocchio cannot represent {model.name}: {error_message(error)}") from error
 
 
 def _build(model: Model) -> tuple[Any, tuple[int, ...]]:
@@ -60,13 +60,13 @@ def _build(model: Model) -> tuple[Any, tuple[int, ...]]:
     carrier = WORLD
     if model.floating:
         carrier = engine.addJoint(WORLD, pin.JointModelFreeFlyer(), pin.SE3.Identity(), ":base")
-    # For each link, the engine's joint that carries it, and its pose in that joint's frame.
+    # For each link, the engine's joint that moves it, and its pose in that joint's frame.
     placements = {model.root: (carrier, pin.SE3.Identity())}
     for index, joint in enumerate(model.joints):
         carrier, T_carrier_parent = placements[joint.parent]
         T_carrier_joint = T_carrier_parent * _placement(joint.origin)
         if joint.moves:
-            # Numbered, so that no name clashes with one of the engine's own.
+            # Frames get numbers as names, so that no name clashes with one of the engine's own.
             name = f"{index}:{joint.name}"
             number = engine.addJoint(carrier, _joint_model(joint), T_carrier_joint, name)
             placements[joint.child] = (number, pin.SE3.Identity())
@@ -86,7 +86,7 @@ def _build(model: Model) -> tuple[Any, tuple[int, ...]]:
 
 
 def joint_parameters_of_links(engine: Any, links: Sequence[int]) -> tuple[list[int], Floats]:
-    """Return the map from inertial parameters of links to those of the joints that carry them.
+    """Return the map from inertial parameters of links to those of the engine's joints that move them.
 
     It consists, for each link, of the number of its joint, not counting the universe, and the matrix (10, 10)
     from its parameters in dynx's order to the joint's in the engine's order, zero for links on the universe.
@@ -124,10 +124,11 @@ def _joint_model(joint: Joint) -> Any:
 
 
 def _add_inertia(engine: Any, carrier: int, T_carrier_link: Any, inertial: Inertial, link: str) -> None:
-    """Add a link's inertia to the joint that carries it."""
+    """Add a link's inertia to the joint that moves it."""
     if inertial.mass < 0.0:
         raise EngineLimitError(
-            f"link {shown(link)} has mass {inertial.mass}; the backend 'pinocchio' cannot hold a negative one"
+            f"link {shown(link)} has mass {inertial.mass}; "
+            "the backend 'pinocchio' cannot represent a negative one"
         )
     # The constructor refuses a tensor that no body can have; the attributes accept it.
     own = pin.Inertia.Zero()
@@ -148,7 +149,7 @@ def _is_zero(inertia: Any) -> bool:
 
 
 def _refuse_light_groups(engine: Any) -> None:
-    """Raise EngineLimitError for a joint that carries several bodies with a negligible total mass."""
+    """Raise EngineLimitError for a joint that moves several bodies of negligible total mass."""
     own = [float(inertia.mass) for inertia in engine.inertias]
     carried = list(own)
     for joint in range(len(own) - 1, WORLD, -1):

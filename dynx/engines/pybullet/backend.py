@@ -39,14 +39,14 @@ MAX_RESIDUAL = 1e-9
 class PyBulletBackend(Backend):
     """PyBullet behind the interface of `Backend`; at most 121 moving joints.
 
-    Forward dynamics is Bullet's own stepper: what one step adds to the velocity, refined once where
-    it lost digits. It is solved from mass matrix and bias instead where Bullet cannot hold an inertia
-    as it stands (see `ballast`), and where the step left a velocity exactly as it was: the stepper
-    does not move a joint that carries less than 2.2e-16 kg m^2 (or kg).
+    Forward dynamics is Bullet's own stepper: the change of velocity in one step, refined once where digits
+    were lost. It is solved from mass matrix and bias instead if Bullet cannot represent an inertia (see
+    `ballast`), or if the step left a velocity exactly unchanged, because the stepper does not move a joint
+    with less than 2.2e-16 kg m^2 (or kg).
 
-    Threads may share a backend: a lock admits one call at a time (Bullet would hold the GIL anyway).
-    Each backend has a Bullet client of its own, two where there is ballast; Bullet has 1,024 clients,
-    some 30 MB each, so close a backend after use. It is pickled as its model and options.
+    Threads may share a backend; a lock admits one call at a time (Bullet would hold the GIL anyway). Each
+    backend has its own Bullet client, or two with ballast. Bullet has at most 1,024 clients of about 30 MB
+    each, so close a backend after use. A pickle holds the model and the options.
 
     A batch is a Python loop over the engine's calls. For batches the backend ``compiled`` gives the same
     numbers, to rounding, about 300 times as fast: inverse dynamics of UR5, one thread, to one significant
@@ -104,11 +104,11 @@ class PyBulletBackend(Backend):
     ) -> Floats:
         """Return the configuration (nq,) at which Bullet's own solver (damped least squares) stops.
 
-        `T_world_target` (4, 4) is the wanted pose of `frame`, `q0` (nq,) the start; a floating
-        base stays where `q0` has it. `residual` [m] ends the iteration; `limits` adds Bullet's
-        null-space task. The result often misses the target and may violate the limits: check it
-        by `forward_kinematics`, as `inverse_kinematics` does. Mimic joints are solved for as if free,
-        then brought to the nearest configuration (least squares).
+        `T_world_target` (4, 4) is the wanted pose of `frame`, `q0` (nq,) the start; a floating base keeps its
+        pose in `q0`. `residual` [m] ends the iteration; `limits` adds Bullet's null-space task. The result
+        often misses the target and may violate the limits: check it by `forward_kinematics`, as
+        `inverse_kinematics` does. Mimic joints are treated as independent, and the solution is projected to
+        the nearest configuration (least squares).
         """
         q0 = self._arguments.q(q0)
         index = self._index(frame)
@@ -166,11 +166,12 @@ class PyBulletBackend(Backend):
         return super()._forward_dynamics(q, v, tau)
 
     def _refine(self, q: Floats, v: Floats, tau: Floats, a: Floats) -> Floats:
-        """Return `a` after one step of iterative refinement, where its error is due to rounding.
+        """Refine `a` by one step of iterative refinement, if its error is due to rounding.
 
-        Under a root much lighter than what it carries, Bullet's inversion of the base's inertia
-        loses digits (ten at a ratio of 1e-6). A step that changes more is not taken: the error then
-        has another cause, which refinement must not hide. Raises EngineError where too few digits are left.
+        If the root is much lighter than the rest of the robot, Bullet's inversion of the base's inertia loses
+        digits (ten at a ratio of 1e-6). A refinement that changes the result by more than `MAX_REFINEMENT` is
+        not applied, because the error then has another cause, which refinement must not hide. Raises
+        EngineError if too few digits are left.
         """
         residual = tau - self._inverse_dynamics(q, v, a)
         if np.max(np.abs(residual), initial=0.0) <= MIN_RESIDUAL_TO_REFINE * np.max(np.abs(tau), initial=0.0):
@@ -178,7 +179,7 @@ class PyBulletBackend(Backend):
         refined = self._robot().forward_dynamics(q, v, tau + residual)
         if np.max(np.abs(refined - a)) <= MAX_REFINEMENT * np.max(np.abs(a)):
             return refined
-        # Weight and velocity products may cancel, so their bound stands in for them.
+        # Weight and velocity products may cancel, so a bound on them is used as the scale.
         speed, gravity = np.max(np.abs(v)), np.linalg.norm(self._mechanism.gravity)
         inertia = np.abs(self._mass_matrix(q))
         unbalanced = np.max(inertia) * (speed + speed**2 + gravity)

@@ -1,12 +1,12 @@
 """The canonical URDF that Bullet loads instead of the user's file.
 
-Moving bodies only, with fixed joints merged; generated ASCII names (`b`, then `l0`, `j0`, ...); unit axes;
-short lines; no shapes, limits, damping or meshes. Principal moments are written as zero: Bullet replaces
-moments that fail its checks, so they are set after loading (`BulletClient`).
+It has the moving bodies only, with fixed joints merged, generated ASCII names (`b`, then `l0`, `j0`, ...),
+unit axes and short lines, and no shapes, limits, damping or meshes. Principal moments are written as zero and
+set after loading (`BulletClient`), because Bullet replaces moments that fail its checks.
 
-The root link's frame is the root's inertial frame (centre of mass, principal axes), because Bullet's inverse
-dynamics, mass matrix and Jacobian are expressed there and nowhere else. With a fixed base the root has no
-inertia and the frame is the base frame.
+The root link's frame is the root's inertial frame (centre of mass, principal axes), because Bullet expresses
+inverse dynamics, mass matrix and Jacobian in that frame only. With a fixed base the root has no inertia and
+the frame is the base frame.
 """
 
 from __future__ import annotations
@@ -40,11 +40,11 @@ class BulletLink:
 
 @dataclass(frozen=True)
 class BulletTree:
-    """A mechanism in Bullet's terms: the root's inertial frame, and links that start from it.
+    """A mechanism in Bullet's conventions: the root's inertial frame, and links placed relative to it.
 
-    Masses and moments are those of the mechanism divided by `unit`, a power of two [kg]. Bullet's
-    checks compare with absolute numbers, about 1e-15, and refuse a possible body of 10 kg that rotates
-    about an axis 1 m away; it passes in units in which no moment exceeds 1. Forces have the same factor.
+    Masses and moments are those of the mechanism divided by `unit`, a power of two [kg]. Bullet's checks use
+    absolute tolerances of about 1e-15, and refuse a physical body of 10 kg that rotates about an axis 1 m
+    away. They accept it in units in which no moment exceeds 1. Forces are scaled by the same factor.
     """
 
     floating: bool
@@ -87,7 +87,7 @@ def write_bullet_urdf(tree: BulletTree) -> str:
             f'<child link="l{k}"/>',
             _origin(link.p, link.R),
             f'<axis xyz="{_vector(link.axis)}"/>',
-            # A prismatic joint must have limits; lower above upper means unlimited.
+            # Bullet requires limits of a prismatic joint; a lower limit above the upper one means unlimited.
             '<limit lower="1" upper="-1" effort="0" velocity="0"/>',
             "</joint>",
         ]

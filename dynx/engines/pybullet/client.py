@@ -17,17 +17,18 @@ from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import rotation_from_quat
 
 MAX_JOINTS = 121
-"""Bullet's state has room for 128 numbers, 7 of them for a base even where that is fixed: from the
-122nd on joints read 0, and above 128 inverse dynamics is silently wrong (pybullet 3.2.7)."""
+"""Largest number of moving joints. Bullet's state has room for 128 numbers, 7 of them for the base even if
+it is fixed: joints from the 122nd on are read as 0, and above 128 inverse dynamics is silently wrong
+(pybullet 3.2.7)."""
 
 
 class BulletClient(BulletConnection):
-    """A Bullet world that holds one robot, without motors, limits, damping or a limit of speeds."""
+    """A Bullet world with one robot, without motors, joint limits, damping or a speed limit."""
 
     not_finite_error: ClassVar[type[DynxError]] = NotFiniteError
 
     def __init__(self, engine: ModuleType, tree: BulletTree, robot: str) -> None:
-        """Raises EngineLimitError for a robot that Bullet cannot hold, EngineError if it fails."""
+        """Raises EngineLimitError for a robot that Bullet cannot represent, EngineError if Bullet fails."""
         if len(tree.links) > MAX_JOINTS:
             raise EngineLimitError(
                 f"{robot} has {len(tree.links)} moving joints; Bullet supports at most {MAX_JOINTS}"
@@ -54,7 +55,7 @@ class BulletClient(BulletConnection):
         iterations: int,
         residual: float,
     ) -> Floats:
-        """Return the joints (n,) at which Bullet's damped least squares stopped, from `joints`.
+        """Return the joints (n,) at which Bullet's damped least squares stopped, starting from `joints`.
 
         Position and attitude are those of the link's origin and principal axes. Selectively damped
         least squares is not offered: with an attitude it can end the process.
@@ -104,11 +105,12 @@ class BulletClient(BulletConnection):
         self._verify()
 
     def _set_inertia(self, link: int, moments: Floats) -> None:
-        # Before the first inverse dynamics: the tree that is made then ignores later changes.
+        # This must precede the first inverse dynamics, whose tree ignores later changes.
         self.call(self.engine.changeDynamics, self.body, link, localInertiaDiagonal=moments.tolist())
 
     def _verify(self) -> None:
-        """Raise EngineError unless Bullet holds what was written: it misreads numbers and drops inertias."""
+        """Raise EngineError unless Bullet has the values that were written, because it can misread numbers
+        and drop inertias."""
         if self.call(self.engine.getNumJoints, self.body) != len(self.links):
             self._misread("the number of joints")
         if self.floating:
@@ -123,7 +125,7 @@ class BulletClient(BulletConnection):
         self._verify_placements()
         if self.links or self.floating:
             rest = [0.0] * (len(self.links) + (6 if self.floating else 0))
-            # Makes the tree of the inverse dynamics, or fails where Bullet refuses an inertia.
+            # This makes the tree of the inverse dynamics, or fails if Bullet refuses an inertia.
             self.inverse_dynamics([0.0] * len(self.links), rest, rest, ORIGIN)
 
     def _verify_inertia(self, link: int, mass: float, moments: Floats) -> None:
@@ -145,10 +147,10 @@ class BulletClient(BulletConnection):
 
     def _expect(self, property: str, link: int, found: Any, written: Any) -> None:
         written = np.asarray(written, dtype=np.float64)
-        # A misread number is off in its leading digits; this is no measure of accuracy.
+        # A misread number differs in its leading digits, so a coarse comparison is enough.
         tolerance = 1e-6 * max(1.0, float(np.max(np.abs(written))))
         if not np.allclose(found, written, rtol=1e-6, atol=tolerance):
             self._misread(f"{property} of link {link}")
 
     def _misread(self, subject: str) -> None:
-        raise EngineError(f"Bullet does not hold {subject} of {self._robot} as it was written")
+        raise EngineError(f"Bullet has not read {subject} of {self._robot} as it was written")

@@ -1,11 +1,12 @@
 """A Bullet client with one robot in it, and the engine calls that dynx makes.
 
-Everything is in Bullet's terms: its world is the inertial frame of the root (centre of mass, principal axes),
-joints and links have Bullet's numbers, and joint values are lists of floats. The module receives `pybullet`
-as an argument and does not import it.
+Everything is in Bullet's conventions: its world is the inertial frame of the root (centre of mass, principal
+axes), joints and links have Bullet's indices, and joint values are lists of floats. The module receives
+`pybullet` as an argument and does not import it.
 
-Each robot has a client of its own, because Bullet caches the tree of its inverse dynamics by the address of a
-body and keeps it when the body is removed: a later robot at that address would get the torques of the former.
+Each robot has its own client, because Bullet caches the tree of its inverse dynamics by the address of a
+body, even after the body is removed: a later robot at the same address would get the torques of the earlier
+one.
 """
 
 from __future__ import annotations
@@ -57,7 +58,7 @@ class BulletConnection(ABC):
         self._client = int(self.engine.connect(self.engine.DIRECT))
         if self._client < 0:
             raise EngineError("Bullet has no client left (1,024 at most); close backends that are not needed")
-        # Called too when the connection is garbage-collected.
+        # Also called when the connection is garbage-collected.
         self._disconnect = weakref.finalize(self, _disconnect, self.engine, self._client)
         self._gravity: Reals = []
         self._at_origin = False
@@ -80,7 +81,7 @@ class BulletConnection(ABC):
         self._disconnect()
 
     def call(self, function: Callable[..., Any], *args: Any, **options: Any) -> Any:
-        """Return the result of an engine call; raises EngineError with the engine's message where it
+        """Call the engine and return the result. Raises EngineError with the engine's message if the call
         fails."""
         try:
             return function(*args, physicsClientId=self._client, **options)
@@ -103,7 +104,8 @@ class BulletConnection(ABC):
         self.reset_joints(joints)
         if not self.links:
             return np.zeros((0, 3)), np.zeros((0, 4))
-        # Entries 0 and 1 only: the pose of the link frame, 4 and 5, is rounded to single precision.
+        # Only entries 0 and 1 are used: the pose of the link frame in entries 4 and 5 is rounded to single
+        # precision.
         states = self.call(self.engine.getLinkStates, self.body, self.links, 0, 1)
         return np.array([state[0] for state in states]), np.array([state[1] for state in states])
 
@@ -128,7 +130,7 @@ class BulletConnection(ABC):
         `v` and `a` are angular base, linear base, joints; the linear acceleration is the classical one of
         the root's centre of mass.
         """
-        # The root stands upright at the origin, since Bullet misreads attitudes about several axes.
+        # The root is at the identity, because Bullet misreads attitudes about several axes.
         q = [*ORIGIN, *_UPRIGHT, *joints] if self.floating else joints
         self.check(joints, v, a, gravity)
         self.set_gravity(gravity)
@@ -160,7 +162,7 @@ class BulletConnection(ABC):
             self._reopen()
             raise
         if not isfinite(sum(after)):
-            # A state that is not finite stays in the world whatever is reset afterwards.
+            # A state that is not finite would persist in the world, whatever is reset afterwards.
             self._reopen()
         return np.subtract(after, v)
 
@@ -180,7 +182,7 @@ class BulletConnection(ABC):
             )
 
     def place_base(self, position: Reals, quat_xyzw: Reals) -> None:
-        """Put the root's inertial frame at a pose in Bullet's world."""
+        """Set the pose of the root's inertial frame in Bullet's world."""
         self.check(position, quat_xyzw)
         self._at_origin = False
         self.call(self.engine.resetBasePositionAndOrientation, self.body, position, quat_xyzw)
@@ -219,8 +221,10 @@ class BulletConnection(ABC):
             self.control_motors(self.engine.VELOCITY_CONTROL, forces=[0.0] * len(self.moving))
 
     def disable_damping(self) -> None:
-        """Switch off the damping of the base and the limit of joint speeds, which are not part of a robot."""
-        # In a call of its own: together with a setting of a link Bullet would apply that to the root.
+        """Switch off the damping of the base and the limit of joint speeds, which do not come from the
+        file."""
+        # This needs a separate call: together with a setting of a link, Bullet would apply that setting to
+        # the root.
         options = {"linearDamping": 0.0, "angularDamping": 0.0, "maxJointVelocity": 1e300}
         self.call(self.engine.changeDynamics, self.body, ROOT, **options)
 

@@ -1,6 +1,6 @@
 """Checks for files that are known to crash PyBullet (measured with pybullet 3.2.5 to 3.2.7).
 
-PyBullet checks nothing itself. It uses names as printf formats, crashes on an element without ``name`` or
+PyBullet itself checks nothing. It uses names as printf formats, crashes on an element without ``name`` or
 ``type`` and on a graph that is not a tree, and has room for the states of 127 joints.
 """
 

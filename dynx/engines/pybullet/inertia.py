@@ -1,13 +1,13 @@
-"""Rigid-body inertia in the form Bullet takes: mass, centre of mass, principal moments and axes.
+"""Rigid-body inertia in Bullet's form: mass, centre of mass, principal moments and axes.
 
 Bullet's own diagonalisation stops at a relative 1e-6, and its checks fail because of rounding. So inertias
 are merged and diagonalised here, in NumPy's long double, and Bullet receives moments and axes.
 
-Bullet also refuses some inertias that a description can hold: a negative principal moment, a rod or a point
-that meets a triangle inequality with equality, a mass that is not positive on a floating root (which it then
-fixes to the world), a first moment without a mass. Inverse dynamics f and the mass matrix are affine in the
-inertia of every body, so such a body gets *ballast* s, once and twice: f(I) = 2 f(I + s) - f(I + 2
-s).
+Bullet also refuses some inertias that a description may contain: a negative principal moment, a rod or a
+point that meets a triangle inequality with equality, a mass that is not positive on a floating root (which it
+then fixes to the world), a first moment without a mass. Inverse dynamics f and the mass matrix are affine in
+the inertia of every body, so such a body gets *ballast*, an additional inertia s, once and twice: f(I) = 2
+f(I + s) - f(I + 2 s).
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ from dynx.spatial.so3 import skew
 class PrincipalInertia:
     """A rigid body by its centre of mass and principal axes, in long double.
 
-    `axes` (3, 3) has the principal axes as columns, in the axes of the body frame (right-handed);
-    `moments` (3,) [kg m^2] belong to them. `accepted`: Bullet's inverse dynamics takes the
-    body with its axes in this order.
+    `axes` (3, 3) has the principal axes as columns, in the axes of the body frame (right-handed); `moments`
+    (3,) [kg m^2] belong to them. `accepted` is true if Bullet's inverse dynamics accepts the body with its
+    axes in this order.
     """
 
     mass: float
@@ -41,7 +41,8 @@ class PrincipalInertia:
 
 @dataclass(frozen=True)
 class Ballast:
-    """Mass [kg] at the body's origin, and rotational inertia [kg m^2], the same about every axis."""
+    """Additional mass [kg] at the body's origin and rotational inertia [kg m^2], the same about every
+    axis."""
 
     mass: float = 0.0
     rotational: float = 0.0
@@ -69,13 +70,13 @@ def principal_inertia(inertia: RigidInertia, *, about_center: bool = False) -> P
         arm = skew(center)
         second = second + longdouble(inertia.mass) * (arm @ arm)
     values, axes = jacobi_eigen(second)
-    # A point mass has no moments, but merging leaves rounding errors of either sign. Negative ones
-    # below the rounding of float64 in the moments about the origin stand for zero.
+    # A point mass has no moments, but merging leaves rounding errors of either sign. Negative moments below
+    # the rounding errors of float64 in the moments about the origin are set to zero.
     noise = 4 * FLOAT64_EPS * _size(inertia.rotational_inertia)
     values = np.where((values < 0) & (values >= -noise), 0, values)
     moments = np.asarray(values, dtype=np.float64)
     lever = np.zeros(3) if about_center else np.asarray(axes.T @ center, dtype=np.float64)
-    # Cyclic orders keep the axes right-handed; the first leaves an aligned body as it is.
+    # Cyclic orders keep the axes right-handed; the first one leaves an aligned body unchanged.
     orders = [order for order in _CYCLIC if _accepts(mass, lever[order], moments[order])]
     order = (orders or _CYCLIC)[0]
     return PrincipalInertia(mass, center, axes[:, order], moments[order], accepted=bool(orders))
@@ -89,10 +90,10 @@ def _accepts(mass: float, lever: Floats, moments: Floats) -> bool:
 
     It requires x + y >= z and y + z >= x for the moments about the body's origin, to the last bit; it does
     not check z + x >= y (btInverseDynamics, `isValidInertiaMatrix`, where the second test repeats the first).
-    The result for equality must not depend on Bullet's rounding.
+    So the result for equality must not depend on Bullet's rounding.
     """
     squares = mass * lever * lever
-    # Terms that are lost in the rounding of the others.
+    # These terms are below the rounding errors of the others.
     squares[squares <= FLOAT64_EPS**2 * np.max(squares)] = 0.0
     x, y, z = moments + (np.sum(squares) - squares)
     # With the centre of mass on one of the axes both sides add the same number.
@@ -102,7 +103,7 @@ def _accepts(mass: float, lever: Floats, moments: Floats) -> bool:
 
 
 def ballast_for(mechanism: Mechanism) -> tuple[Ballast, ...]:
-    """Return the ballast that the root and each body need for Bullet to accept them; mostly none."""
+    """Return the ballast that the root and each body need so that Bullet accepts them; most need none."""
     inertias = [body.inertia for body in mechanism.bodies]
     total = sum(abs(float(inertia.mass)) for inertia in [mechanism.root, *inertias])
     unit = total / 16 if total > 0.0 else 1.0
@@ -111,7 +112,7 @@ def ballast_for(mechanism: Mechanism) -> tuple[Ballast, ...]:
 
 
 def _ballast(inertia: RigidInertia, unit: float, *, root: bool) -> Ballast:
-    """Return the least ballast that suffices, because subtracting it again costs digits."""
+    """Return the least ballast that suffices, because subtracting it again loses digits."""
     mass = float(inertia.mass)
     massless = mass == 0.0 and not root and not np.any(inertia.first_moment)
     needed = Ballast() if mass > 0.0 or massless else Ballast(mass=unit - mass)

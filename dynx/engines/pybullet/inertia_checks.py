@@ -23,13 +23,13 @@ _STOP_RATIO = 1e-6
 """Ratio of the largest off-diagonal entry to the trace below which the next rotation is the last."""
 
 _ABSOLUTE = 5 * FLOAT64_EPS
-"""Tolerance by which a leading minor may be negative, in all units [powers of kg m^2]."""
+"""Tolerance by which a leading minor may be negative, whatever its unit [a power of kg m^2]."""
 
 _ROUNDING = 8 * FLOAT64_EPS
 """Bound on the rounding of a sum of a few products, relative to the largest."""
 
 CACHE_SIZE = 4096
-"""Number of cached inertials: rules check every link again after every remedy."""
+"""Number of cached inertials. Rules check every link again after every remedy."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +67,8 @@ def diagonalisation_error(inertial: Inertial) -> float:
 
 
 def tree_may_reject(inertial: Inertial, *, on_fixed_joint: bool) -> bool:
-    """Check whether the inertia is so near the bound that inverse dynamics may refuse the robot.
+    """Check whether an inertia is so near the bound of the triangle inequality that Bullet's inverse dynamics
+    may refuse the robot.
 
     Bullet checks no triangle inequality for a link on a fixed joint (`on_fixed_joint`).
     """

@@ -1,4 +1,4 @@
-"""The only import of PyBullet, at its first use and without the line that PyBullet prints."""
+"""The only import of PyBullet, at first use, without the line that PyBullet prints."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """A robot in Bullet, loaded from the user's file.
 
-Settings that do not come from the file are those of rigid-body dynamics: no motors, no damping of the base,
-no limit of speeds, steps of unit length. Joint damping and joint limits of the file stay as loaded.
+Settings that do not come from the file are set for rigid-body dynamics: no motors, no damping of the base, no
+speed limit, steps of unit length. Joint damping and joint limits of the file stay as loaded.
 """
 
 from __future__ import annotations
@@ -52,20 +52,20 @@ class LoadedClient(BulletConnection):
         """Whether the base moves: Bullet holds a root without mass still."""
 
     def apply(self, setting: Setting) -> None:
-        """Change a setting, now and whenever the client is opened again."""
+        """Change a setting now, and again whenever the client is reopened."""
         self._settings.append(setting)
         setting(self)
 
     def call(self, function: Callable[..., Any], *args: Any, **options: Any) -> Any:
-        """Return the result of an engine call; raises EngineError also where it needs a tree that Bullet
-        refused."""
+        """Call the engine and return the result. Raises EngineError also if the call needs a tree that
+        Bullet refused to make."""
         if self._refusal is not None and function in self._needs_tree:
-            # Called again, Bullet would fail again and print.
+            # A second call would fail again and print messages.
             raise EngineError(str(self._refusal)) from self._refusal
         return super().call(function, *args, **options)
 
     def dynamics(self, link: int) -> Any:
-        """Return `getDynamicsInfo` of a link."""
+        """Call `getDynamicsInfo` for a link."""
         return self.call(self.engine.getDynamicsInfo, self.body, link)
 
     def com_frame(self, link: int) -> Floats:
@@ -74,7 +74,8 @@ class LoadedClient(BulletConnection):
         return homogeneous(rotation_from_quat(np.array(info[4])), np.array(info[3]))
 
     def make_tree(self) -> None:
-        """Make the tree of Bullet's inverse dynamics; if Bullet refuses, calls that need it will raise."""
+        """Make the tree of Bullet's inverse dynamics. If Bullet refuses, calls that need the tree will
+        raise an error."""
         rest = [0.0] * (len(self.moving) + (6 if self.floating else 0))
         if not rest:
             return
@@ -100,7 +101,7 @@ class LoadedClient(BulletConnection):
         if self._path is not None:
             self._load_from(self._path)
             return
-        # The file may be gone by now.
+        # The file may have been deleted since.
         with TemporaryDirectory(prefix="dynx-", ignore_cleanup_errors=True) as folder:
             path = Path(folder) / "robot.urdf"
             path.write_bytes(self._file)

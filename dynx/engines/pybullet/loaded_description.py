@@ -20,7 +20,7 @@ def describe_model(client: LoadedClient, model: Model, links: Mapping[str, int],
 
     `links` maps link names to Bullet's numbers; `base` is the pose of the root link at the neutral q.
     """
-    # Bullet's frame of a link is its inertial frame.
+    # Bullet's frame of a link is the inertial frame.
     com = {k: client.com_frame(k) for k in links.values()}
     joints = {}
     for k, info in enumerate(client.joints):
@@ -45,8 +45,9 @@ def _inertial(info: Any) -> LoadedInertial:
 
 
 def _joint(engine: Any, info: Any, T_parent_com: Floats, T_child_com: Floats) -> LoadedJoint:
-    """Return the entries of `getJointInfo`: 13 the axis in the inertial frame of the child, 14 the joint's
-    position in that of the parent, 15 the attitude of the parent's in the child's, at value 0."""
+    """Describe a joint from `getJointInfo`: entry 13 is the axis in the inertial frame of the child, 14
+    the joint's position in the inertial frame of the parent, and 15 the attitude of the latter in the
+    former at value 0."""
     position = T_parent_com[:3, :3] @ np.array(info[14]) + T_parent_com[:3, 3]
     R_child_parent = rotation_from_quat(np.array(info[15]))
     R = T_parent_com[:3, :3] @ R_child_parent.T @ T_child_com[:3, :3].T

@@ -29,7 +29,7 @@ from dynx.spatial.so3 import cross, quat_from_rotation, quat_product, rotate_bac
 
 
 class BulletPlant(Plant):
-    """One robot in a Bullet world of its own, stepped by Bullet.
+    """One robot in its own Bullet world, stepped by Bullet.
 
     Bullet's stepper has neither mimic joints nor armature. With them the acceleration is solved from
     Bullet's mass matrix and bias, and the stepper applies the torque that causes it.
@@ -91,8 +91,8 @@ class BulletPlant(Plant):
     def step_motors(self, t: float, command: MotorCommand) -> StepResult:
         """Take one step with Bullet's motors.
 
-        Their torque (nv,) in the first sub-step is that of inverse dynamics less that of the
-        disturbances: Bullet's own report leaves out PD_CONTROL.
+        The torque (nv,) of the motors in the first sub-step is computed by inverse dynamics minus the
+        disturbances, because Bullet's own report does not include PD_CONTROL.
         """
         command = self._in_units(command)
         q, v = self._q, self._v
@@ -103,7 +103,8 @@ class BulletPlant(Plant):
         return StepResult(self._q, self._v, first, tau)
 
     def refuse(self, controller: object) -> None:
-        """Refuse an engine motor together with armature, which Bullet's motors lack."""
+        """Raise UnsupportedFeatureError for an engine motor together with armature, which Bullet's motors
+        do not support."""
         if isinstance(controller, EngineMotor) and self.disturbances.has_armature:
             raise UnsupportedFeatureError(
                 f"{controller.name} is a motor inside PyBullet, without armature; use a torque controller"
@@ -136,7 +137,8 @@ class BulletPlant(Plant):
         return self._advance(disturbance), disturbance
 
     def _tree_torque(self, q: Floats, v: Floats, a: Floats) -> Floats:
-        """Return the torque of every joint of the tree, mimic joints too, that gives the acceleration `a`."""
+        """Return the torque of every joint of the tree, including mimic joints, that gives the
+        acceleration `a`."""
         coupling = self._coupling
         if coupling is None:
             return self._engine.inverse_dynamics(q, v, a)
@@ -157,7 +159,7 @@ class BulletPlant(Plant):
         self._client.advance()
         after = self._client.base_state()
         joints, rates = self._joints()
-        # The acceleration at the beginning, from that of the root's centre of mass.
+        # The acceleration at the beginning of the step follows from that of the root's centre of mass.
         alpha = rotate_back(R, np.subtract(after.angular, before.angular) / h)
         acceleration = rotate_back(R, np.subtract(after.linear, before.linear) / h)
         w = v[3:6]
@@ -177,7 +179,7 @@ class BulletPlant(Plant):
 
     def _base_coordinates(self, base: BaseState, joints: Floats, rates: Floats) -> tuple[Floats, Floats]:
         quat = quat_product(np.array(base.quat_xyzw), self._axes_back)
-        # Bullet may change the sign of the quaternion; keep the sign nearer to the last one.
+        # Bullet may change the sign of the quaternion; the sign nearer to the previous one is kept.
         quat /= np.copysign(np.sqrt(quat.dot(quat)), quat.dot(self._q[3:7]))
         R = rotation_from_quat(quat)
         w = rotate_back(R, np.array(base.angular))

@@ -1,9 +1,9 @@
 """A robot in Bullet, with arguments and results in the conventions of dynx.
 
-Bullet's world is here the inertial frame C of the root (centre of mass, principal axes), at every instant:
-the base never moves in Bullet, gravity is rotated instead, and the pose of the base is composed in NumPy.
-That is exact at every attitude, which Bullet's own decoding of the attitude is not, and one conversion, X,
-serves every quantity:
+At every instant, Bullet's world is the inertial frame C of the root (centre of mass, principal axes): the
+base never moves in Bullet, gravity is rotated instead, and the pose of the base is composed in NumPy. Unlike
+Bullet's own decoding of the attitude, that is exact at every attitude, and one conversion X serves every
+quantity:
 
     (angular, linear) of C  =  X (linear, angular) of the base frame.
 
@@ -30,12 +30,13 @@ _IDENTITY = np.eye(4)
 
 
 class BulletRobot:
-    """A mechanism, with `times` copies of the ballast, in a client of its own. Each call takes one sample."""
+    """A mechanism, with `times` copies of the ballast, in its own Bullet client. Each call takes one
+    sample."""
 
     def __init__(
         self, engine: ModuleType, mechanism: Mechanism, ballast: tuple[Ballast, ...], times: int
     ) -> None:
-        """`mechanism` was merged in long double; Bullet gets it rounded once."""
+        """`mechanism` was merged in long double, and is rounded only once, when Bullet gets it."""
         tree = bullet_tree(mechanism, ballast, times)
         self._floating = mechanism.floating
         self._gravity: Floats = float64(mechanism.gravity)
@@ -62,7 +63,7 @@ class BulletRobot:
         """Return T_world_frame of all frames (n, 4, 4)."""
         joints = self._joints(q)
         T_world_base, T_world_C = self._base(q)
-        # The root comes last, so that its index ROOT = -1 finds it.
+        # The root comes last, so that the index ROOT = -1 selects it.
         T = np.zeros((len(joints) + 1, 4, 4))
         T[-1] = T_world_base
         if joints:
@@ -149,8 +150,8 @@ class BulletRobot:
         iterations: int,
         residual: float,
     ) -> Floats:
-        """Return the joints (n,) at which Bullet's solver stopped, from those of `q`; the base stays where it
-        is."""
+        """Return the joints (n,) at which Bullet's solver stopped, starting from `q`; the base does not
+        move."""
         body = self._frame_body[frame]
         if body == ROOT:
             return np.array(self._joints(q))
@@ -215,7 +216,8 @@ class BulletRobot:
         return float64(T)
 
     def _point(self, frame: BodyFrame, root: PrincipalInertia) -> list[float]:
-        """Return the frame's origin along the principal axes, from the origin of its body (root: from C)."""
+        """Return the frame's origin relative to the origin of its body (for the root: of C), along the
+        principal axes."""
         if frame.body == ROOT:
             point = root.axes.T @ (frame.p - root.center)
         else:
@@ -227,8 +229,8 @@ class BulletRobot:
 def pose_matrices(position: ArrayLike, quat_xyzw: ArrayLike) -> Floats:
     """Return the homogeneous matrices (..., 4, 4) from positions (..., 3) and unit quaternions (..., 4).
 
-    The rotation is linear in the products of the quaternion's entries: one small matrix product,
-    some ten times as fast as entry by entry.
+    The rotation is linear in the products of the quaternion's entries, so one small matrix product computes
+    it about ten times as fast as entry by entry.
     """
     quat = np.asarray(quat_xyzw, dtype=np.float64)
     products = quat[..., :, None] * quat[..., None, :]
@@ -239,8 +241,8 @@ def pose_matrices(position: ArrayLike, quat_xyzw: ArrayLike) -> Floats:
 
 
 def _products_to_rotation() -> Floats:
-    """Return (16, 16): from the products of x, y, z, w, row by row, to the entries of [[R - 1, 0], [0,
-    0]]."""
+    """Return the matrix (16, 16) from the products of x, y, z, w, row by row, to the entries of [[R - 1,
+    0], [0, 0]]."""
     K = np.zeros((4, 4, 4, 4))
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3

@@ -1,4 +1,4 @@
-"""Remedies at run time: settings of a robot that PyBullet has loaded."""
+"""Remedies at run time: settings applied to a robot that PyBullet has loaded."""
 
 from __future__ import annotations
 
@@ -68,8 +68,8 @@ def set_inertias(model: Model, links: Mapping[str, int]) -> Setting:
 
 
 def with_ballast(times: int) -> Setting:
-    """Return the setting that adds `times` the same rotational inertia s about every axis to each impossible
-    inertia.
+    """Return the setting that adds `times` times a rotational inertia s, the same about every axis, to each
+    impossible inertia.
 
     Inverse dynamics f and the mass matrix are affine in the inertia of each link, so that
     f(I) = 2 f(I + s) - f(I + 2 s); and with s larger than any moment Bullet accepts the link.
@@ -80,7 +80,7 @@ def with_ballast(times: int) -> Setting:
             moments = client.dynamics(k)[2]
             if (k == ROOT and not client.floating) or _possible(*sorted(moments)):
                 continue
-            # A power of two, so that adding it costs the fewest digits.
+            # A power of two, so that adding it loses the fewest digits.
             s = 2.0 ** np.ceil(np.log2(2.0 * max(map(abs, moments))))
             loaded = [float(moment + times * s) for moment in moments]
             client.call(client.engine.changeDynamics, client.body, k, localInertiaDiagonal=loaded)

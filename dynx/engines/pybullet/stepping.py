@@ -1,12 +1,12 @@
 """A robot that moves in Bullet's world: state in, one step of Bullet's stepper, state out.
 
-As in `dynx.engines.pybullet.connection` everything is in Bullet's terms, but a floating base moves through
-the world. Its state is the pose of the root's inertial frame C, and the velocity of C's origin and of C,
-along the axes of the world.
+As in `dynx.engines.pybullet.connection` everything is in Bullet's conventions, but here a floating base moves
+through the world. Its state is the pose of the root's inertial frame C, and the velocity of C's origin and of
+C, along the axes of the world.
 
 **The trap.** Bullet gives every joint of a loaded robot a velocity motor that holds it at speed 0, and
 POSITION_CONTROL or VELOCITY_CONTROL leave one active when they are no longer called. A torque that is
-commanded afterwards is added to that of the motor, which cancels it: the arm stands still, without any
+commanded afterwards is added to that of the motor, which cancels it: the arm does not move, and there is no
 message. A motor is released by VELOCITY_CONTROL with a force of 0; `BulletClient` does so when it opens, and
 `SteppingClient.apply` whenever torques follow a motor. Bullet also damps the base (0.04 of its speed per
 second), damps joints as in the URDF, and limits speeds to 100: dynx switches all of that off.
@@ -64,7 +64,7 @@ class SteppingClient(BulletClient):
         self.add_torques(torques)
 
     def command(self, command: MotorCommand) -> None:
-        """Set the motors of all joints, which hold until the next command or `apply`."""
+        """Set the motors of all joints, which stay active until the next command or `apply`."""
         if command.mode not in MODES:
             raise ArgumentError(f"mode is {shown(command.mode)}; wanted one of {', '.join(MODES)}")
         given = {

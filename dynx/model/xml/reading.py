@@ -97,7 +97,8 @@ class _TreeBuilder:
             line = self._lines_before + text.count("\n", 0, error.start) + 1
             raise self._error("contains half of a surrogate pair, which is not a character", line) from None
         finally:
-            # The handlers are methods of this object: the reference cycle would keep both alive.
+            # The handlers are methods of this object; without this, the reference cycle would keep both
+            # alive.
             self._parser.StartElementHandler = None
             self._parser.EndElementHandler = None
             self._parser.StartDoctypeDeclHandler = None

@@ -34,7 +34,7 @@ class Span:
 
 @dataclass(eq=False, repr=False)
 class SourceElement:
-    """An element with the span of all of it, and of each attribute with the white space before it."""
+    """An element with its span, and the span of each attribute including the white space before it."""
 
     tag: str
     attributes: dict[str, str]
@@ -103,7 +103,8 @@ class XmlSource:
         self.data = text.encode("utf-8")
 
     def _with_data(self, data: bytes) -> XmlSource:
-        """Return the same document with other text, which is well-formed by construction and not checked."""
+        """Return the document with new text, which is not checked because edits of well-formed text are
+        well-formed."""
         new = object.__new__(XmlSource)
         new.data, new.source, new.form = data, self.source, self.form
         new._lines_before = self._lines_before
@@ -120,7 +121,8 @@ class XmlSource:
         return "\n" * self._lines_before + self.text
 
     def to_bytes(self) -> bytes:
-        """Return the document as bytes of a file, in the encoding and with the ends that it was read with.
+        """Return the document as bytes of a file, with the encoding, byte-order mark and trailing characters
+        with which it was read.
 
         A document read from text has the encoding that it declares, or else UTF-8.
         """
@@ -246,7 +248,8 @@ class _SourceParser:
         try:
             self._parser.Parse(self._data, True)
         finally:
-            # The handlers are methods of this object: the reference cycle would keep both alive.
+            # The handlers are methods of this object; without this, the reference cycle would keep both
+            # alive.
             self._parser.StartElementHandler = None
             self._parser.EndElementHandler = None
         assert self._root is not None

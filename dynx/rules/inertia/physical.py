@@ -33,7 +33,8 @@ ROUNDING = 16.0 * FLOAT64_EPS
 """Bound on the rounding of a tensor relative to its largest moment; `dynx.load` uses the same bound."""
 
 _ROTATION_ROUNDING = 4.0 * FLOAT64_EPS
-"""Relative rounding of the moments of a rotated tensor; MuJoCo refused tensors at 0 to 2 eps."""
+"""Relative rounding of the moments of a rotated tensor. MuJoCo refused tensors whose triangle inequality
+held with a margin of 0 to 2 eps."""
 
 _MARGIN = 16.0 * FLOAT64_EPS
 """Relative distance from the bound at which corrected moments are placed."""
@@ -50,7 +51,7 @@ def principal_moments(inertial: Inertial) -> Array:
 
 @lru_cache(maxsize=CACHE_SIZE)
 def fault_beyond_rounding(inertial: Inertial) -> Fault | None:
-    """Find the fault of an inertial by more than rounding; None also for a tensor too small to matter."""
+    """Find the fault of an inertial, if it exceeds rounding; None also for a tensor too small to matter."""
     size = float(np.max(np.abs(inertial.tensor)))
     if inertial.mass == 0.0 or size < MIN_MOMENT:
         return None

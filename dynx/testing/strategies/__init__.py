@@ -8,14 +8,14 @@
         model = data.draw(models(max_links=5, solvable=True))
         q, v, a = data.draw(samples(model))
 
-What is drawn is valid by construction, never by filtering, so no health check fires and every
-failing example shrinks. Shrink targets: a model shrinks to the fewest links in a chain with a fixed
-base, standard gravity, fixed or revolute joints about z at the parent's origin, round numbers, no
-mimic joint, no limits and no dynamics; a configuration to the neutral one; velocities and wrenches to
-zero; poses to the identity; text to the tidy spelling.
+Drawn values are valid by construction, not by filtering, so no health check of Hypothesis fails and every
+failing example shrinks. Shrink targets: a model shrinks to the fewest links in a chain with a fixed base,
+standard gravity, fixed or revolute joints about z at the parent's origin, round numbers, no mimic joint, no
+limits and no dynamics; a configuration to the neutral one; velocities and wrenches to zero; poses to the
+identity; text to the plainest spelling.
 
-Every argument is checked when the strategy is made, not when it is drawn from; a wrong one raises
-an error of `dynx.errors`.
+Arguments are checked when a strategy is made, not when it is drawn from; an invalid one raises an error of
+`dynx.errors`.
 """
 
 from importlib.util import find_spec

@@ -24,7 +24,7 @@ from dynx.testing.strategies.geometry import (
 
 RIGHT_ANGLES = tuple(n * math.pi / 2 for n in (0, 1, -1, 2, -2))
 MAX_ANGLE = 20.0
-"""Largest angle [rad] of a joint without limits: some turns either way."""
+"""Largest angle [rad] of a joint without limits: about three turns in either direction."""
 
 
 class Sample(NamedTuple):
@@ -38,9 +38,9 @@ class Sample(NamedTuple):
 def configurations(model: Model, *, within_limits: bool = False) -> Strategy[Floats]:
     """Draw a configuration q (nq,) of `model`. Shrinks to the neutral one.
 
-    A coordinate is exactly 0, at or next to a quarter turn (where arms are singular) or a limit,
-    between the limits, or, unless `within_limits`, anywhere: limits bound no quantity that a
-    backend computes. A floating base has any attitude, half turns and their neighbours among them.
+    A coordinate is exactly 0, at or next to a quarter turn (where arms are singular) or a limit, between the
+    limits or, unless `within_limits`, anywhere, because backends compute beyond limits too. A floating base
+    has any attitude, including half turns and attitudes next to them.
     """
     checked_model(model)
     if not isinstance(within_limits, bool):

@@ -26,11 +26,11 @@ CARDINAL_AXES: tuple[Vector, ...] = (
     (0.0, -1.0, 0.0),
 )
 SMALL_STEPS = (0.0, 1e-12, -1e-9, 1e-6, -1e-3)
-"""Distances from a singular attitude or posture at which cancellation shows in different digits."""
+"""Distances from a singular attitude or posture, at which cancellation affects different digits."""
 
 
-# Making a strategy, which Hypothesis then validates, takes longer than drawing from it, and composite
-# strategies use the same few repeatedly: those are cached.
+# These strategies are cached, because composite strategies use them repeatedly, and making and validating a
+# strategy takes longer than drawing from it.
 
 
 @lru_cache(maxsize=64)

@@ -27,8 +27,8 @@ def inertials(kind: Kind = "physical") -> Strategy[Inertial | None]:
     - ``"any"``: also tensors that no body can have, with negative principal moments or a broken
       triangle inequality
 
-    A body is given by its mass and its radii of gyration along three axes that are then turned, so
-    that the tensor is physical by construction, to rounding.
+    A body is drawn as its mass and its radii of gyration along three rotated axes, so that the tensor is
+    physical by construction, up to rounding.
     """
     if kind not in KINDS:
         raise UnknownNameError(f"kind is {shown(kind)}{nearest(str(kind), KINDS)}")

@@ -26,9 +26,10 @@ T = TypeVar("T")
 BaseChoice = Literal["fixed", "floating", "either"]
 JOINT_TYPES: tuple[JointType, ...] = get_args(JointType)
 MAX_LINKS = 64
-"""Largest number of links; larger robots find no more defects and take much longer."""
+"""Largest number of links. Larger robots find no further defects and take much longer."""
 
-# Names as files have them: plain, the world as root, links and joints alike, with slashes, not ASCII.
+# Patterns of names in real files: plain, with the world as root, equal for links and joints, with slashes,
+# not ASCII.
 NAMINGS = (
     ("link{}", "joint{}"),
     ("world", "link{}", "joint{}"),
@@ -44,7 +45,7 @@ def optional(strategy: Strategy[T]) -> Strategy[T | None]:
 
 
 def _limits(reach: float) -> Strategy[Limits]:
-    """Draw the limits that are absent, of some width, of zero width, or on one side."""
+    """Draw the limits that are absent, of some width, of zero width, or one-sided."""
     ends = st.tuples(numbers(reach), numbers(reach)).map(sorted)
     finite = ends.map(lambda ends: Limits(ends[0], ends[1], velocity=2.0, effort=50.0))
     return st.one_of(
@@ -56,14 +57,15 @@ def _limits(reach: float) -> Strategy[Limits]:
     )
 
 
-# Made once: making a strategy takes longer than drawing from it.
+# These are made once, because making a strategy takes longer than drawing from it.
 ORIGINS, AXES, BACK = origins(), unit_vectors(), st.integers(0, MAX_LINKS)
 FRAMES = st.lists(st.tuples(st.integers(0, MAX_LINKS), origins(0.5)), max_size=2)
 GRAVITIES = st.just(STANDARD_GRAVITY) | vectors(10.0)
 RATIOS = st.sampled_from((1.0, -1.0, 0.5, 2.0, 0.0)) | numbers(3.0)
 LIMITS: dict[JointType, Strategy[Limits]] = {
     "revolute": _limits(3.0),
-    # Drawn and dropped, so that every moving joint takes equally many choices and shrinks to the first.
+    # This is drawn for every joint even if it is not used, so that all joints make the same number of choices
+    # and shrink to the first type.
     "continuous": _limits(3.0).map(lambda dropped: Limits()),
     "prismatic": _limits(1.0),
 }
@@ -177,7 +179,7 @@ def _models(
     inertial: Strategy[Inertial | None],
     from_urdf: bool,
 ) -> Model:
-    # What belongs to one link is drawn together, so that shrinking can take out a link at once.
+    # Everything that belongs to one link is drawn together, so that shrinking can remove a link at once.
     limbs = draw(st.lists(limb, min_size=min_links - 1, max_size=max_links - 1))
     *root_name, link_name, joint_name = draw(st.sampled_from(NAMINGS))
     names = [*root_name, *(link_name.format(k) for k in range(len(root_name), len(limbs) + 1))]
@@ -229,7 +231,7 @@ def _limbs(
         kind = draw(st.sampled_from(joint_types))
         common = draw(inertial), kind, draw(BACK), draw(ORIGINS)
         if kind == "fixed":
-            # It has neither limits nor dynamics, and its axis means nothing.
+            # A fixed joint has neither limits nor dynamics, and its axis has no meaning.
             return _Limb(*common, (1.0, 0.0, 0.0), Limits(), JointDynamics(), None, None)
         return _Limb(
             *common,
@@ -244,7 +246,8 @@ def _limbs(
 
 
 def _with_mimics(joints: list[Joint], mimics: list[tuple[int, float, float] | None]) -> list[Joint]:
-    """Let some joints follow others. A driver comes earlier in `joints` or is free, so no cycle can form."""
+    """Make some joints mimic others. A driver comes earlier in `joints` or is independent, so no cycle can
+    form."""
     moving = [k for k, joint in enumerate(joints) if joint.moves]
     followers = [k for k in moving if mimics[k] is not None]
     if len(followers) == len(moving):

@@ -43,12 +43,12 @@ SPELLINGS = (
     "missing_meshes",
     "axis_of_fixed_joint",
 )
-"""Deviations of real files from tidy text. Leading blank lines before a declaration and undeclared prefixes
-are not well-formed XML, but every engine reads them."""
+"""Deviations of real files from the plainest text. Leading blank lines before a declaration and undeclared
+prefixes are not well-formed XML, but every engine reads them."""
 
 
 def urdf_text(model: Model | None = None) -> Strategy[str]:
-    """Draw URDF text of `model`, or of a random one, in any legal spelling. Shrinks to the tidy one.
+    """Draw URDF text of `model`, or of a random one, in any legal spelling. Shrinks to the plainest one.
 
     Every number is written so that it reads back as the same float, and joints keep their order, so
     ``dynx.load(text, base=model.base, gravity=model.gravity)`` gives a model equal to `model`. A
@@ -152,7 +152,7 @@ def _limit(joint: Joint, spellings: set[str]) -> list[_Element]:
 
 
 def _dynamics(joint: Joint, spellings: set[str]) -> list[_Element]:
-    # URDF has no armature, so it is written only where there is some.
+    # URDF has no armature, so the extension is written only for a joint that has one.
     always = ("damping", "friction") if "explicit_defaults" in spellings else ()
     values = ((name, getattr(joint.dynamics, name)) for name in ("damping", "friction", "armature"))
     given = [(name, value) for name, value in values if value or name in always]

@@ -311,7 +311,7 @@ def test_what_the_engine_raises_becomes_an_engine_error(
         engine.inverse_dynamics(np.zeros(2), np.zeros(2), np.zeros(2))
     assert type(caught.value.__cause__) is raised
     monkeypatch.setattr(mujoco, "MjData", fail)
-    with pytest.raises(EngineError, match="mujoco cannot hold chain"):
+    with pytest.raises(EngineError, match="mujoco cannot represent chain"):
         MujocoBackend(chain(2))
 
 

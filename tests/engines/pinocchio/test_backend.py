@@ -194,7 +194,7 @@ def test_a_failure_to_build_is_an_engine_error(monkeypatch: pytest.MonkeyPatch) 
 
     engine_model.cache_clear()
     monkeypatch.setattr(pin, "Model", fail)
-    with pytest.raises(EngineError, match="pinocchio cannot hold chain: RuntimeError: no message"):
+    with pytest.raises(EngineError, match="pinocchio cannot represent chain: RuntimeError: no message"):
         PinocchioBackend(chain(2))
 
 

@@ -64,7 +64,7 @@ def test_values_that_bullet_misreads_raise(
     monkeypatch.setattr(
         bullet_client, "write_bullet_urdf", lambda tree: write_bullet_urdf(tree).replace(written, read)
     )
-    with pytest.raises(EngineError, match=f"does not hold .*{what}"):
+    with pytest.raises(EngineError, match=f"has not read .*{what}"):
         PyBulletBackend(pair(BOX, BOX, "fixed"))
 
 
@@ -76,7 +76,7 @@ def test_inertia_that_bullet_drops_is_noticed(monkeypatch: pytest.MonkeyPatch) -
         change(*args, **options)
 
     monkeypatch.setattr(bullet, "changeDynamics", forgetful)
-    with pytest.raises(EngineError, match="does not hold the inertia of link 0 of pair"):
+    with pytest.raises(EngineError, match="has not read the inertia of link 0 of pair"):
         PyBulletBackend(pair(BOX, BOX, "fixed"))
 
 

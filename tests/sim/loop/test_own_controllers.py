@@ -137,7 +137,7 @@ def test_a_controller_that_changes_itself_is_recorded_and_not_repeated(
         controller = Saturated(inner, limit=100.0) if wrapped else inner
         return Scenario(ARM, controller, REST, q0=q0, payload=Payload("tool0", 1.0), duration=0.04)
 
-    error = r"changes itself \(attribute total\).*neither be repeated nor be resumed"
+    error = r"changes itself \(attribute total\).*neither repeated nor resumed"
     rollout = simulate(scenario())
     assert ["changes itself (attribute total)" in each for each in rollout.departures] == [True]
     with pytest.raises(ArgumentError, match=r"does not follow from its scenario alone|changes itself"):
