@@ -313,10 +313,9 @@ class Simulation:
         """
         self._refuse_closed()
         self._refuse_changed_controller()
-        loop_state = self._loop_state = self._loop_state or self._loop.start(self._record)
-        return Snapshot(
-            self.scenario, self._record.copy(), replace(loop_state), self._executor, self._departures
-        )
+        self._loop_state = self._loop_state or self._loop.start(self._record)
+        record, state = self._record.copy(), replace(self._loop_state)
+        return Snapshot(self.scenario, record, state, self._executor, self._departures)
 
     def restore(self, snapshot: Snapshot) -> State:
         """Continue from a snapshot of this simulation or of another of the same robot and `dt`.
