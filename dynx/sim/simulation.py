@@ -50,8 +50,7 @@ class State(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Snapshot:
-    """State of a simulation at one moment, with its record until then, to which `Simulation.restore`
-    returns."""
+    """State and record of a simulation at one moment, to which `Simulation.restore` returns."""
 
     scenario: Scenario
     record: Record
@@ -249,7 +248,7 @@ class Simulation:
 
     def _note_departure(self, how: str) -> None:
         if not any(each.startswith(how) for each in self._departures):
-            self._departures = (*self._departures, f"{how} from step {self._record.steps}")
+            self._departures += (f"{how} from step {self._record.steps}",)
 
     def _extend(self, end: int) -> None:
         """Extend the buffers to hold the steps until `end`, at least to twice their size."""
@@ -297,10 +296,7 @@ class Simulation:
         )
 
     def reset(self) -> State:
-        """Return to the start of the scenario, and discard the record.
-
-        Raises ArgumentError for a controller that changed itself.
-        """
+        """Return to the start and discard the record. Raises ArgumentError for a controller that changed."""
         self._refuse_changed_controller()
         self._record.steps = 0
         self._loop_state, self._executor, self._departures = None, (), ()
