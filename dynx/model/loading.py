@@ -116,16 +116,25 @@ def read_model(
     A robot without a name in the text is called `name`. The other arguments and errors are those of `load`.
     """
     content = read_urdf(data, source)
-    model = Model.build(
-        content.name or name or "robot",
-        content.links,
-        content.joints,
-        base=base or "fixed",
-        gravity=STANDARD_GRAVITY if gravity is None else gravity,
-        lock=lock,
-        notes=content.notes,
-        source=source,
-    )
+    try:
+        model = Model.build(
+            content.name or name or "robot",
+            content.links,
+            content.joints,
+            base=base or "fixed",
+            gravity=STANDARD_GRAVITY if gravity is None else gravity,
+            lock=lock,
+            notes=content.notes,
+            source=source,
+        )
+    except DescriptionError as error:
+        if content.unread is None:
+            raise
+        raise DescriptionError(
+            f"{content.unread.message} (read without it: {error.message})",
+            source=source,
+            line=content.unread.line,
+        ) from None
     for frame in content.frames:
         if frame.link not in model.frame_names:
             raise DescriptionError(

@@ -38,6 +38,8 @@ MENDED = {
     "DX415": (None, None),
     "DX416": (None, None),
     "DX417": ("base", None),
+    "DX418": (None, "elbow"),
+    "DX419": (None, "elbow"),
     "DX426": (None, None),
 }
 SPEC = importlib.util.find_spec("pybullet_data")

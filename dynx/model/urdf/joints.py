@@ -7,6 +7,7 @@ import sys
 
 from dynx.errors import nearest, shown
 from dynx.model.elements import INFINITY, Joint, JointDynamics, JointType, Limits, Mimic, Vector
+from dynx.model.urdf.origins import read_origin
 from dynx.model.urdf.values import Reading
 from dynx.model.xml.reading import Element
 
@@ -42,7 +43,7 @@ def read_joint(element: Element, reading: Reading, floating_is_base: bool = Fals
         reading.name(reading.required(element, role, what), "link", f"<{role}> of {what}")
         for role in ("parent", "child")
     )
-    origin = reading.origin(element, what)
+    origin = read_origin(element, what, reading)
     locked = element.all(LOCKED_TAG)
     if kind == "fixed" and not locked:
         return Joint(name, kind, parent, child, origin, line=element.line)

@@ -6,6 +6,7 @@ import numpy as np
 
 from dynx.errors import shown
 from dynx.model.elements import Inertial, Link
+from dynx.model.urdf.origins import read_origin
 from dynx.model.urdf.values import Reading
 from dynx.model.xml.reading import Element
 
@@ -38,7 +39,7 @@ def _read_inertial(element: Element, link: str, reading: Reading) -> Inertial:
         raise reading.error(mass_element, f"the mass of {what} is {mass}; wanted at least 0")
     tensor = reading.required(element, "inertia", f"<inertial> of {what}")
     moments = {name: reading.number(tensor, name, what) for name in _MOMENTS}
-    inertial = Inertial(mass, reading.origin(element, what), **moments, line=element.line)
+    inertial = Inertial(mass, read_origin(element, what, reading), **moments, line=element.line)
     fault = inertia_fault(inertial)
     if fault is not None:
         reading.note(tensor, f"the inertia of {what} {fault}; it is used as stated")

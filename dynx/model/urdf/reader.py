@@ -14,6 +14,7 @@ from dynx.model.elements import Frame, Joint, Link, Note
 from dynx.model.topology import MAX_LINKS
 from dynx.model.urdf.joints import FRAME_TAG, read_joint
 from dynx.model.urdf.links import read_link
+from dynx.model.urdf.origins import reads_quaternions
 from dynx.model.urdf.values import Reading, name_fault
 from dynx.model.xml.reading import Element, read_xml
 
@@ -32,6 +33,8 @@ class UrdfContent:
     joints: list[Joint]
     frames: list[Frame]
     notes: list[Note]
+    unread: Note | None
+    """The first ignored element that may hold links or joints; it explains why the parts form no tree."""
 
 
 def read_urdf(data: str | bytes, source: str) -> UrdfContent:
@@ -43,7 +46,7 @@ def read_urdf(data: str | bytes, source: str) -> UrdfContent:
     notes: list[Note] = []
     max_counts = {"link": MAX_LINKS, "joint": MAX_LINKS}
     root = read_xml(data, source, notes, opaque=_OPAQUE, max_counts=max_counts)
-    reading = Reading(source, notes)
+    reading = Reading(source, notes, reads_quaternions(root.attributes.get("version")))
     _require_robot(root, reading)
     reading.ignore_unknown(root, _KNOWN)
     link_elements, joint_elements = root.all("link"), root.all("joint")
@@ -59,24 +62,27 @@ def read_urdf(data: str | bytes, source: str) -> UrdfContent:
     names = {frame.name for frame in frames}
     links = [link for link in links if link.name not in names]
     reading.note_ignored()
-    return UrdfContent(_robot_name(root, reading), links, joints, frames, notes)
+    return UrdfContent(_robot_name(root, reading), links, joints, frames, notes, _unread_part(root))
 
 
 def _require_robot(root: Element, reading: Reading) -> None:
     if root.tag != "robot":
         other = {"sdf": " (SDF is not read)", "mujoco": " (MJCF is not read)"}.get(root.tag, "")
         raise reading.error(root, f"the root element is <{escaped(root.tag)}>; wanted <robot>{other}")
+
+
+def _unread_part(root: Element) -> Note | None:
     for child in root.children:
         if child.tag.startswith("xacro:"):
-            raise reading.unsupported(
-                child,
+            message = (
                 f"<{escaped(child.tag)}> is xacro that was not expanded; expand the file, or load it "
-                "under its name in .xacro with the extra 'xacro' installed",
+                "under its name in .xacro with the extra 'xacro' installed"
             )
+            return Note(message, child.line)
         if child.tag.lower() in ("link", "joint") and child.tag not in ("link", "joint"):
-            raise reading.error(
-                child, f"unknown element <{child.tag}>{nearest(child.tag, ['link', 'joint'])}"
-            )
+            message = f"unknown element <{child.tag}>{nearest(child.tag, ['link', 'joint'])}"
+            return Note(message, child.line)
+    return None
 
 
 def _robot_name(root: Element, reading: Reading) -> str | None:

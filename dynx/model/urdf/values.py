@@ -1,4 +1,4 @@
-"""Strict readers of URDF attributes (names, numbers, vectors, poses), with the line in each error."""
+"""Strict readers of URDF attributes (names, numbers, vectors), with the line in each error."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from dynx.errors import DescriptionError, UnsupportedFeatureError, escaped, shown
-from dynx.model.elements import ZERO, Note, Pose, Vector
+from dynx.model.elements import Note, Vector
 from dynx.model.xml.reading import Element
 
 MAX_NAME = 1000
@@ -17,14 +17,21 @@ MAX_NAME = 1000
 
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _NOT_IN_XML = "\ufffe\uffff"
+_XACRO = "; xacro did not expand it"
+_WHY_IGNORED = {"loop_joint": "; the loop that it closes stays open"}
+_COUNTS = {3: "three", 4: "four"}
 
 
 @dataclass
 class Reading:
-    """State of reading one document: its source, and the notes for the user."""
+    """State of reading one document: its source, and the notes for the user.
+
+    `quaternions` says whether the version of its robot gives ``quat_xyzw`` a meaning.
+    """
 
     source: str
     notes: list[Note] = field(default_factory=list)
+    quaternions: bool = False
     _ignored: dict[tuple[str, str], tuple[int, int]] = field(default_factory=dict)
 
     def error(self, element: Element, message: str) -> DescriptionError:
@@ -50,9 +57,9 @@ class Reading:
         """Convert the counts of `ignore_unknown` to notes."""
         for (inside, tag), (count, line) in self._ignored.items():
             times = "" if count == 1 else f" ({count} times)"
-            self.notes.append(
-                Note(f"unknown element <{escaped(tag)}> in <{inside}> was ignored{times}", line)
-            )
+            why = _WHY_IGNORED.get(tag, _XACRO if tag.startswith("xacro:") else "")
+            message = f"unknown element <{escaped(tag)}> in <{inside}> was ignored{times}{why}"
+            self.notes.append(Note(message, line))
 
     def only(self, parent: Element, tag: str) -> Element | None:
         """Return the element of that tag, or None; the first, with a note, if there are several."""
@@ -72,7 +79,9 @@ class Reading:
         """Return a required attribute; raise an error if it is missing."""
         value = element.attributes.get(name)
         if value is None:
-            raise self.error(element, f"<{element.tag}> of {what} has no attribute {name}")
+            others = ", ".join(map(shown, list(element.attributes)[:3]))
+            hint = f"; it has {others}" if others else ""
+            raise self.error(element, f"<{element.tag}> of {what} has no attribute {name}{hint}")
         return value
 
     def name(self, element: Element, attribute: str, what: str) -> str:
@@ -97,24 +106,17 @@ class Reading:
 
     def vector(self, element: Element, attribute: str, what: str) -> Vector:
         """Return a required attribute of three finite numbers; raise an error otherwise."""
-        text = self.attribute(element, attribute, what)
-        words = text.split()
-        wanted = "three numbers separated by white space"
-        if len(words) != 3:
-            raise self._unreadable(element, attribute, text, what, wanted)
-        x, y, z = (self._parsed(element, attribute, word, what, wanted, text) for word in words)
+        x, y, z = self.numbers(element, attribute, what, 3)
         return (x, y, z)
 
-    def origin(self, parent: Element, what: str) -> Pose:
-        """Return the pose in ``<origin>``; missing or empty attributes are zero."""
-        element = self.only(parent, "origin")
-        if element is None:
-            return Pose()
-        parts = {}
-        for attribute in ("xyz", "rpy"):
-            text = element.attributes.get(attribute)
-            parts[attribute] = ZERO if not (text and text.strip()) else self.vector(element, attribute, what)
-        return Pose(parts["xyz"], parts["rpy"])
+    def numbers(self, element: Element, attribute: str, what: str, count: int) -> tuple[float, ...]:
+        """Return a required attribute of `count` finite numbers; raise an error otherwise."""
+        text = self.attribute(element, attribute, what)
+        words = text.split()
+        wanted = f"{_COUNTS[count]} numbers separated by white space"
+        if len(words) != count:
+            raise self._unreadable(element, attribute, text, what, wanted)
+        return tuple(self._parsed(element, attribute, word, what, wanted, text) for word in words)
 
     def _parsed(
         self, element: Element, attribute: str, word: str, what: str, wanted: str, text: str | None = None
@@ -131,7 +133,7 @@ class Reading:
     ) -> DescriptionError:
         hint = ""
         if "${" in text or "$(" in text:
-            hint = "; this is xacro that was not expanded"
+            hint = "; this is xacro that was not expanded: expand the file with xacro"
         elif "," in text:
             hint = "; decimals take a point, and numbers are separated by white space"
         message = f"{attribute} in <{element.tag}> of {what} is {shown(text)}; wanted {wanted}{hint}"

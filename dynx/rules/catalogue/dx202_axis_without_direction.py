@@ -2,7 +2,8 @@
 
 ``<axis xyz="0 0 0"/>`` and ``<axis/>`` define no direction of motion. Exporters write the first for fixed
 joints, where it is ignored; once the type is changed to ``revolute`` it matters. A joint without any
-``<axis>`` is fine: URDF's default (1, 0, 0) is used by all engines alike.
+``<axis>`` is fine: URDF's default (1, 0, 0) is used by all engines alike. A direction in an attribute that is
+not ``xyz`` is DX218.
 
 - Pinocchio 4.1 loads it. The joint has a coordinate that moves nothing: its row and column of the mass matrix
   are zero, and forward dynamics gives NaN.
@@ -17,6 +18,7 @@ What to do: write the direction. The file does not contain it, so ``dynx doctor 
 from collections.abc import Iterable
 
 from dynx.rules import EVERY_ENGINE, Case, Correction, EditingRule, correction
+from dynx.rules.joints.axes import misspelled_direction
 from dynx.rules.joints.elements import SINGLE, elements_in_joints
 from dynx.rules.text.number_text import is_number
 
@@ -34,6 +36,8 @@ class AxisWithoutDirection(EditingRule):
     def corrections(self, case: Case) -> Iterable[Correction]:
         """Axes of revolute, continuous and prismatic joints."""
         for joint, axis in elements_in_joints(case, "axis", SINGLE):
+            if misspelled_direction(axis) is not None:
+                continue
             words = axis.attributes.get("xyz", "").split()
             if any(not is_number(word) or float(word) != 0.0 for word in words):
                 continue

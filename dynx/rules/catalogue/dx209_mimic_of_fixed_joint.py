@@ -22,6 +22,7 @@ from dynx.model.elements import Joint
 from dynx.model.xml.source import Edit, SourceElement
 from dynx.rules import Case, Correction, EditingRule, correction, measured_on
 from dynx.rules.joints.elements import SINGLE, elements_in_joints
+from dynx.rules.text.attributes import orientation_edits
 from dynx.rules.text.number_text import decimal
 
 
@@ -58,5 +59,5 @@ class MimicOfFixedJoint(EditingRule):
             words = " ".join(f'{name}="{text}"' for name, text in texts.items())
             yield source.insertion(element, f"<origin {words}/>", first=True)
         else:
-            for name, text in texts.items():
-                yield source.attribute_edit(origin, name, text)
+            yield source.attribute_edit(origin, "xyz", texts["xyz"])
+            yield from orientation_edits(source, origin, joint.origin.rpy)

@@ -7,13 +7,16 @@ version of the format.
 - PyBullet 3.2.7, MuJoCo 4.0 and Drake 1.51 ignore it.
 
 What to do: remove the attribute, or write ``version="1.0"``. ``dynx doctor --fix`` removes it; without it a
-file counts as version 1.0.
+file counts as version 1.0. Where an origin has a quaternion, which URDF has from version 1.1 on, and the
+version is a later one, it writes ``version="1.2"`` instead.
 """
 
 from collections.abc import Iterable
 
 from dynx.errors import shown
+from dynx.model.urdf.origins import reads_quaternions
 from dynx.rules import Case, Correction, EditingRule, correction, measured_on
+from dynx.rules.text.quaternions import origins_with_quaternion
 
 _KNOWN = ("1.0", "1.1", "1.2")
 
@@ -22,12 +25,17 @@ class UnknownUrdfVersion(EditingRule):
     stage = "reading"
     advice = "Remove the attribute version, or write 1.0."
     engines = measured_on("pinocchio")
-    changed = "removed the version of the robot"
+    changed = "removed or corrected the version of the robot"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
         """Yield the root element."""
         root = case.source.root
         version = root.attributes.get("version")
         if root.tag == "robot" and version is not None and version not in _KNOWN:
-            edit = case.source.attribute_removal(root, "version")
+            newer = reads_quaternions(version) and any(origins_with_quaternion(case))
+            edit = (
+                case.source.attribute_edit(root, "version", _KNOWN[-1])
+                if newer
+                else case.source.attribute_removal(root, "version")
+            )
             yield correction(root, f"<robot> has version {shown(version)}", edit)

@@ -27,7 +27,7 @@ _ELEMENTS = {
 _ATTRIBUTES = {
     "link": ("name",),
     "joint": ("name", "type"),
-    "origin": ("xyz", "rpy"),
+    "origin": ("xyz", "rpy", "quat_xyzw"),
     "mass": ("value",),
     "inertia": MOMENTS,
     "axis": ("xyz",),

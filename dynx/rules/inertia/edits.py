@@ -5,6 +5,7 @@ from __future__ import annotations
 from dynx.model.elements import Inertial
 from dynx.model.xml.source import Edit, SourceElement, XmlSource
 from dynx.rules.case import Case
+from dynx.rules.text.attributes import orientation_edits
 from dynx.rules.text.number_text import decimal
 from dynx.rules.text.numeric_attributes import MOMENTS
 
@@ -27,9 +28,12 @@ def inertial_edits(source: XmlSource, link: SourceElement, old: Inertial | None,
         wanted = getattr(new.origin, name)
         if wanted == getattr(old.origin, name):
             continue
-        text = " ".join(map(decimal, wanted))
-        if origin is not None:
-            edits.append(source.attribute_edit(origin, name, text))
+        if origin is None:
+            continue
+        if name == "rpy":
+            edits += orientation_edits(source, origin, wanted)
+        else:
+            edits.append(source.attribute_edit(origin, name, " ".join(map(decimal, wanted))))
     if origin is None and new.origin != old.origin:
         edits.append(source.insertion(element, _origin_text(new), first=True))
     mass, tensor = element.first("mass"), element.first("inertia")

@@ -1,12 +1,13 @@
-"""Values of attributes of a source element, read as `dynx.load` reads them."""
+"""Values of attributes of a source element, read as `dynx.load` reads them, and edits of orientations."""
 
 from __future__ import annotations
 
 from dynx.model.elements import Pose, Vector
+from dynx.model.urdf.origins import QUATERNION, read_origin, reads_quaternions
 from dynx.model.urdf.values import Reading
 from dynx.model.xml.reading import Element
-from dynx.model.xml.source import SourceElement
-from dynx.rules.text.number_text import is_number
+from dynx.model.xml.source import Edit, SourceElement, XmlSource
+from dynx.rules.text.number_text import decimal, is_number
 
 
 def number_of(element: SourceElement, attribute: str) -> float | None:
@@ -35,7 +36,24 @@ def vector_of(element: SourceElement, attribute: str) -> Vector | None:
 def origin_of(parent: SourceElement) -> Pose:
     """Return the pose in the ``<origin>`` of an element; absent and empty attributes are zero."""
     origins = [_plain(child) for child in parent.all("origin")]
-    return Reading("<string>").origin(Element(parent.tag, {}, parent.line, origins), "this file")
+    reading = Reading("<string>", quaternions=quaternions_count(parent))
+    return read_origin(Element(parent.tag, {}, parent.line, origins), "this file", reading)
+
+
+def quaternions_count(element: SourceElement) -> bool:
+    """Check whether the robot of an element states a version of URDF that has ``quat_xyzw``."""
+    root = element
+    while root.parent is not None:
+        root = root.parent
+    return reads_quaternions(root.attributes.get("version"))
+
+
+def orientation_edits(source: XmlSource, origin: SourceElement, rpy: Vector) -> list[Edit]:
+    """Return the edits that give an ``<origin>`` these angles, in place of a quaternion if it has one."""
+    edits = [source.attribute_edit(origin, "rpy", " ".join(map(decimal, rpy)))]
+    if QUATERNION in origin.attributes:
+        edits.append(source.attribute_removal(origin, QUATERNION))
+    return edits
 
 
 def _plain(element: SourceElement) -> Element:

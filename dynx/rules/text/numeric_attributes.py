@@ -59,7 +59,7 @@ def numeric_attributes(source: XmlSource) -> Iterator[NumericAttribute]:
             yield from _of_link(part)
         elif part.tag == "joint":
             yield from _below(part, _IN_JOINT)
-            # No engine reads the axis of these joints.
+            # MuJoCo alone reads the axis of these joints, see DX219.
             if part.attributes.get("type") not in _WITHOUT_AXIS:
                 yield from _below(part, {"axis": {"xyz": 3}})
 

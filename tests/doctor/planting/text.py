@@ -205,6 +205,8 @@ def material_twice(site: Site) -> PlantedDefect:
 
 def unknown_version(site: Site) -> PlantedDefect:
     """A version that URDF does not have."""
+    if "version" in site.source.root.attributes:
+        raise CannotPlant("has a version")
     version = site.rng.choice(["2.0", "1.4.2", "3"])
     return site.defect(
         "DX416", site.source.attribute_edit(site.source.root, "version", version), sign="<robot"

@@ -74,6 +74,7 @@ PLAIN = load(joint('<origin xyz="1 2 3" rpy="0.1 0.2 0.3"/><axis xyz="0 0 1"/>')
 UNTIDY: dict[str, tuple[str, str]] = {
     "undeclared prefixes": ('<drake:x y:z="1"/>', "unknown element <drake:x> in <joint> was ignored"),
     "an unknown element": ("<speed_of_light c='3'/>", "unknown element <speed_of_light>"),
+    "left-over xacro": ("<xacro:x/>", "unknown element <xacro:x> in <joint> was ignored; xacro did not"),
     "comments": ("<!-- <axis xyz='1 0 0'/> -->", ""),
     "sensor calibration": ("<calibration rising='0'/><safety_controller k_velocity='1'/>", ""),
     "text between": ("stray text", ""),
@@ -110,6 +111,26 @@ def test_numbers_and_white_space_in_any_notation(vector: str) -> None:
 @pytest.mark.parametrize("origin", ["", "<origin/>", '<origin xyz="" rpy=" "/>', '<origin xyz="0 0 0"/>'])
 def test_an_origin_that_is_absent_or_empty_is_the_identity(origin: str) -> None:
     assert load(joint(origin)).joints[0].origin == Pose()
+
+
+def test_an_empty_vector_of_an_origin_is_noted() -> None:
+    assert "line 5: xyz in <origin> of joint 'j' is empty; it is read as zero" in messages(
+        load(joint('<origin xyz=" "/>'))
+    )
+
+
+@pytest.mark.parametrize(
+    ("element", "note"),
+    [
+        ('<xacro:property name="p" value="1"/>', "<xacro:property> in <robot> was ignored; xacro did not"),
+        ("<Link/>", "<Link> in <robot> was ignored"),
+        ('<loop_joint name="l"/>', "<loop_joint> in <robot> was ignored; the loop that it closes stays open"),
+    ],
+)
+def test_elements_that_engines_skip_are_skipped_with_a_note(element: str, note: str) -> None:
+    model = load(robot(f'<link name="a"/>{element}'))
+    assert model == load(robot('<link name="a"/>'))
+    assert note in messages(model)
 
 
 def test_elements_of_other_programs_are_skipped() -> None:

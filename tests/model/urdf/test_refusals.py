@@ -141,9 +141,32 @@ def test_joints_of_several_degrees_of_freedom_raise(kind: str) -> None:
     assert caught.value.line is not None
 
 
-def test_unexpanded_xacro_is_refused_by_name() -> None:
-    with pytest.raises(UnsupportedFeatureError, match="<xacro:include> is xacro that was not expanded"):
-        load(robot('<xacro:include filename="x"/><link name="a"/>'))
+@pytest.mark.parametrize(
+    ("inside", "message"),
+    [
+        ("", "the robot has no link"),
+        ('<link name="a"/><link name="b"/>', "2 links have no parent"),
+        (
+            '<link name="a"/><joint name="j" type="fixed"><parent link="a"/><child link="b"/></joint>',
+            "child of joint 'j' is 'b', which is not a link",
+        ),
+    ],
+)
+@pytest.mark.parametrize(
+    ("element", "reason"),
+    [
+        ('<xacro:include filename="x"/>', "<xacro:include> is xacro that was not expanded"),
+        ('<Link name="b"/>', "unknown element <Link>; did you mean 'link'?"),
+    ],
+)
+def test_parts_that_form_no_tree_are_blamed_on_an_unread_element(
+    inside: str, message: str, element: str, reason: str
+) -> None:
+    with pytest.raises(DescriptionError) as caught:
+        load(robot(f"{inside}\n{element}"))
+    assert caught.value.line == 3
+    assert reason in str(caught.value)
+    assert message in str(caught.value)
 
 
 def test_a_chain_of_a_hundred_thousand_links_is_refused_quickly() -> None:

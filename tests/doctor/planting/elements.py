@@ -1,0 +1,90 @@
+"""Planters of elements and attributes that some engines read and others skip or refuse."""
+
+from __future__ import annotations
+
+import math
+
+from tests.doctor.planting.inertia import has_link
+from tests.doctor.planting.joints import moving
+from tests.doctor.planting.site import CannotPlant, PlantedDefect, Planter, Site
+
+
+def axis_misspelled(site: Site) -> PlantedDefect:
+    """The letters of xyz exchanged, in capitals, or the name of another attribute."""
+    joint, element = site.pick_joint(moving, "joint that moves")
+    name = site.rng.choice(["xzy", "zyx", "XYZ", "rpy", "value"])
+    words = " ".join(map(repr, joint.axis))
+    axis = element.first("axis")
+    text = f'<axis {name}="{words}"/>'
+    edit = site.source.insertion(element, text) if axis is None else site.source.replacement(axis, text)
+    return site.defect("DX218", edit, joint=joint.name)
+
+
+def axis_of_fixed_joint(site: Site) -> PlantedDefect:
+    """What a template leaves in a fixed joint."""
+    joint, element = site.pick_joint(lambda each: each.type == "fixed", "fixed joint")
+    text = site.rng.choice(["<axis/>", '<axis xyz=""/>', '<axis xyz="none"/>', '<axis xyz="0, 0, 1"/>'])
+    axis = element.first("axis")
+    edit = site.source.insertion(element, text) if axis is None else site.source.replacement(axis, text)
+    return site.defect("DX219", edit, joint=joint.name)
+
+
+def loop_joint(site: Site) -> PlantedDefect:
+    """A strut of a parallel mechanism, as Isaac Sim writes it."""
+    first, _ = site.pick_link(lambda each: True, "link")
+    text = (
+        f'<loop_joint name="strut" type="spherical">\n  <link1 link="{first}" xyz="0 0 0" rpy="0 0 0"/>\n'
+        f'  <link2 link="{site.model.root}" xyz="0 0 0.1" rpy="0 0 0"/>\n</loop_joint>'
+    )
+    edit = site.source.insertion(site.source.root, text)
+    return site.defect("DX220", edit, sign="loop_joint")
+
+
+def world_not_declared(site: Site) -> PlantedDefect:
+    """A robot mounted on Drake's world."""
+    if has_link(site, "world") or not site.free(site.model.root):
+        raise CannotPlant("has a world, or the root is taken")
+    text = (
+        '<joint name="mount" type="fixed">\n  <origin xyz="0.1 0.2 0.3" rpy="0 0 0.5"/>\n'
+        f'  <parent link="world"/>\n  <child link="{site.model.root}"/>\n</joint>'
+    )
+    edit = site.source.insertion(site.source.root, text)
+    return site.defect("DX221", edit, joint="mount", touched=[site.model.root])
+
+
+def quaternion(site: Site) -> PlantedDefect:
+    """An orientation as URDF 1.2 writes it, of length 1 or not."""
+    size = site.rng.choice([1.0, 2.0])
+    parts = [site.rng.uniform(0.2, 1.0) * site.rng.choice([-1.0, 1.0]) for _ in range(4)]
+    length = math.hypot(*parts) / size
+    words = " ".join(repr(part / length) for part in parts)
+    return _with_origin(site, "DX418", f'quat_xyzw="{words}"')
+
+
+def unreadable_quaternion(site: Site) -> PlantedDefect:
+    """A quaternion beside rpy, of three numbers, or with commas."""
+    both = 'rpy="0.1 0.2 0.3" quat_xyzw="0 0 0 1"'
+    wrong = [both, 'quat_xyzw="0 0 1"', 'quat_xyzw=""', 'quat_xyzw="0,0,1,1"']
+    return _with_origin(site, "DX419", site.rng.choice(wrong))
+
+
+def _with_origin(site: Site, rule: str, orientation: str) -> PlantedDefect:
+    """Give a joint that moves another origin, in a robot of URDF 1.2."""
+    if "version" in site.source.root.attributes:
+        raise CannotPlant("has a version")
+    joint, element = site.pick_joint(moving, "joint that moves")
+    origin, text = element.first("origin"), f'<origin xyz="0.1 0.02 0.3" {orientation}/>'
+    source = site.source
+    edit = source.insertion(element, text) if origin is None else source.replacement(origin, text)
+    version = source.attribute_edit(source.root, "version", "1.2")
+    return site.defect(rule, version, edit, joint=joint.name)
+
+
+PLANTERS = (
+    Planter("DX218", axis_misspelled),
+    Planter("DX219", axis_of_fixed_joint),
+    Planter("DX220", loop_joint),
+    Planter("DX221", world_not_declared, ("fixed",)),
+    Planter("DX418", quaternion),
+    Planter("DX419", unreadable_quaternion),
+)
