@@ -1,54 +1,21 @@
 """Examine every file of example-robot-data and pybullet_data as engines load it; write real_robots.md.
 
-    python docs/survey.py [--only erd|pybullet] [--engines a,b] [--jobs N] [--mended FOLDER]
+    python -m docs.survey [--only erd|pybullet] [--engines a,b] [--jobs N] [--json OUT] [--mended FOLDER]
 
-Each file is examined on a fixed and on a floating base. The results of `dynx.diagnose` are written as tables
-of causes and effects by robot. `--mended FOLDER` keeps the corrected files, with a list that
-`tests/doctor/raw_*.py` check.
+Each file is examined on a fixed and on a floating base; see tests/doctor/survey_files.py for the options. The
+results are written as tables of causes and effects by robot.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import dynx
-from dynx.doctor import diagnose
-from dynx.workers import Workers
-
-SMALL = 1e-6
-"""Relative difference below which robots are counted separately, as differences of rounding."""
+from tests.doctor.survey_files import Entry, add_options, counts, make_tasks, remarks, survey
 
 GROUPS = {"erd": "example-robot-data", "pybullet": "pybullet_data"}
-
-
-@dataclass(frozen=True)
-class Task:
-    """One file on one base."""
-
-    group: str
-    path: str
-    base: Any
-    engines: tuple[str, ...] | None
-    mended: str | None
-
-
-def examine(task: Task) -> dict[str, Any]:
-    """The entry of the report, and the path of the corrected file."""
-    report = diagnose(task.path, base=task.base, engines=task.engines, counterexamples=False)
-    entry = report.to_dict()
-    entry["group"], entry["path"] = task.group, task.path
-    if task.mended and report.error is None:
-        name = f"{task.group}-{task.base}-{abs(hash(task.path)):x}.urdf"
-        where = Path(task.mended) / name
-        text = report.mended if report.mended is not None else report.text
-        where.write_text(text or "", encoding="utf-8")
-        entry["mended"] = str(where)
-    return entry
 
 
 def files() -> Iterator[tuple[str, str]]:
@@ -64,92 +31,45 @@ def files() -> Iterator[tuple[str, str]]:
 
 def main() -> None:
     """Examine, print what remains unexplained, write the page."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--only", choices=["erd", "pybullet"])
-    parser.add_argument("--engines")
-    parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--mended")
-    parser.add_argument("--json")
+    add_options(parser)
     options = parser.parse_args()
-    engines = tuple(options.engines.split(",")) if options.engines else None
-    if options.mended:
-        Path(options.mended).mkdir(parents=True, exist_ok=True)
-    tasks = [
-        Task(group, path, base, engines, options.mended)
-        for group, path in files()
-        if options.only in (None, group)
-        for base in ("fixed", "floating")
-    ]
-    entries: list[dict[str, Any]] = []
-    with Workers(examine, options.jobs, timeout=300.0) as workers:
-        for outcome in workers.run(tasks):
-            task = tasks[outcome.index]
-            if outcome.failure is None:
-                entries.append(outcome.value)
-            else:
-                print(f"FAILED {task.path} {task.base}: {outcome.failure.message}")
-            if entries and len(entries) % 100 == 0:
-                print(f"{len(entries)} of {len(tasks)}", flush=True)
+    groups = {path: group for group, path in files() if options.only in (None, group)}
+    tasks = make_tasks(groups, ("fixed", "floating"), options.engines, options.mended)
+    entries = survey(tasks, options.jobs, options.seconds, options.json)
+    for entry in entries:
+        entry["group"] = groups[entry["path"]]
     entries.sort(key=lambda entry: (entry["group"], entry["path"], entry["base"]))
-    if options.json:
-        Path(options.json).write_text(json.dumps(entries), encoding="utf-8")
     summary(entries)
     if not options.only:
         Path(__file__).with_name("real_robots.md").write_text(page(entries), encoding="utf-8")
 
 
-def summary(entries: Sequence[dict[str, Any]]) -> None:
+def summary(entries: Sequence[Entry]) -> None:
     """Counts, and all robots with remaining differences or errors."""
-    for group in ("erd", "pybullet"):
+    for group in GROUPS:
         for base in ("fixed", "floating"):
             of = [entry for entry in entries if (entry["group"], entry["base"]) == (group, base)]
             if of:
                 print(f"{group} {base}: {counts(of)}")
             for entry in of:
-                for line in remarks(entry):
+                for line in exceptions(entry):
                     print(f"  {label(entry)}: {line}")
 
 
-def counts(entries: Sequence[dict[str, Any]]) -> str:
-    """Summarise as in ``69 files: 1 refused, 46 differ, 0 with something unexplained``."""
-    refused = sum(entry["error"] is not None for entry in entries)
-    different = sum(differs(entry) for entry in entries)
-    large = sum(differs(entry, SMALL) for entry in entries)
-    left = sum(bool(entry["unexplained"]) for entry in entries)
-    return (
-        f"{len(entries)} files: {refused} refused, {different} differ ({large} by more than {SMALL:g}), "
-        f"{left} with something unexplained"
-    )
+def exceptions(entry: Entry) -> Iterator[str]:
+    """The remarks on a file, with its label for its path."""
+    for line in remarks(entry):
+        yield line.replace(entry["path"], label(entry))
 
 
-def remarks(entry: dict[str, Any]) -> Iterator[str]:
-    """The remaining differences and errors of one file."""
-    if entry["error"]:
-        yield f"refused: {entry['error']['message'].replace(entry['path'], label(entry))}"
-    for each in entry["unexplained"]:
-        yield f"unexplained: {each['engine']} {each['quantity']} {each['relative_error']}"
-    for rule in sorted({f["rule"] for f in entry["findings"] if f["effect"] and not f["proved"]}):
-        yield f"unproved: {rule}"
-    for each in entry["engines"]:
-        if each["refused_after"]:
-            yield f"{each['engine']} does not load it: {each['refused_after']}"
-
-
-def differs(entry: dict[str, Any], above: float | None = None) -> bool:
-    """Whether any engine differs from the file above the tolerance, or refuses it."""
-    limit = entry["tolerance"] if above is None else above
-    return any(
-        engine["refused"] or any(error is None or error > limit for error in engine["before"].values())
-        for engine in entry["engines"]
-    )
-
-
-def page(entries: Sequence[dict[str, Any]]) -> str:
+def page(entries: Sequence[Entry]) -> str:
     """The page: counts, then a table of causes and effects by robot."""
     lines = [
         "# Real robots: why engines differ on them",
         "",
-        "Written by `python docs/survey.py`. Every file is loaded by each engine as its users load it, fixed "
+        "Written by `python -m docs.survey`. Every file is loaded by each engine as its users load it, fixed "
         "and floating, and compared with reference values; see [doctor.md](doctor.md). The effect of a cause "
         "is how much an engine's result changes when that cause alone is removed, relative to the "
         "largest reference value; `no answer` means that the engine refuses the file, or cannot compute the "
@@ -168,16 +88,16 @@ def page(entries: Sequence[dict[str, Any]]) -> str:
         ]
         lines += ["", "| file | base | cause | places | effect | engines |", "|---|---|---|---|---|---|"]
         lines += merged([row for entry in of for row in rows(entry)])
-        exceptions = [f"- {label(entry)}, {entry['base']}: {line}" for entry in of for line in remarks(entry)]
-        if exceptions:
-            lines += ["", "Not examined, or not loaded by an engine after mending either:", "", *exceptions]
+        left = [f"- {label(entry)}, {entry['base']}: {line}" for entry in of for line in exceptions(entry)]
+        if left:
+            lines += ["", "Not examined, or not loaded by an engine after mending either:", "", *left]
         lines.append("")
     return "\n".join(lines)
 
 
-def rows(entry: dict[str, Any]) -> Iterator[tuple[str, ...]]:
+def rows(entry: Entry) -> Iterator[tuple[str, ...]]:
     """One row for each rule that has an effect on the file."""
-    by_rule: dict[str, list[dict[str, Any]]] = {}
+    by_rule: dict[str, list[Entry]] = {}
     for finding in entry["findings"]:
         if finding["effect"]:
             by_rule.setdefault(finding["rule"], []).append(finding)
@@ -210,7 +130,7 @@ def merged(table: Sequence[tuple[str, ...]]) -> list[str]:
     return lines
 
 
-def label(entry: dict[str, Any]) -> str:
+def label(entry: Entry) -> str:
     """The path of a file within its collection."""
     parts = Path(entry["path"]).parts
     root = "robots" if entry["group"] == "erd" else "pybullet_data"
@@ -218,7 +138,4 @@ def label(entry: dict[str, Any]) -> str:
 
 
 if __name__ == "__main__":
-    # By its own name, so that worker processes find what they are to run.
-    from survey import main as run
-
-    run()
+    main()

@@ -1,4 +1,4 @@
-"""Runs of the scripts without dynx: mended files in Pinocchio and PyBullet, each in its own process."""
+"""Mended files in the engines without dynx: each engine is a script that runs in a process of its own."""
 
 from __future__ import annotations
 
@@ -18,8 +18,10 @@ from dynx.doctor.examine.engine_input import without_meshes
 from dynx.doctor.examine.reference_values import TILTED_GRAVITY, draw_states, model_without_mimics
 from dynx.model.model import Base
 from dynx.model.xml.source import XmlSource
+from tests.doctor.survey_files import Entry
 
-SCRIPTS = {name: Path(__file__).with_name(f"raw_{name}.py") for name in ("pinocchio", "pybullet")}
+ENGINES = ("pinocchio", "pybullet", "mujoco", "drake")
+SCRIPTS = {name: Path(__file__).with_name(f"raw_{name}.py") for name in ENGINES}
 
 
 def beside(original: Path, data: bytes, folder: Path) -> Path:
@@ -54,6 +56,9 @@ def task(path: Path, base: Base, samples: int = 3, seed: int = 1) -> dict[str, A
         "floating": model.floating,
         "joints": list(model.joint_names),
         "links": [link.name for link in model.links],
+        "root": model.root,
+        "load": "",
+        "calls": [],
         "gravity": list(TILTED_GRAVITY),
         "states": [
             {
@@ -68,67 +73,84 @@ def task(path: Path, base: Base, samples: int = 3, seed: int = 1) -> dict[str, A
 
 
 def run_script(engine: str, tasks: Sequence[dict[str, Any]], folder: Path) -> list[Any]:
-    """Run one engine in a process without dynx."""
+    """Run one engine in a process without dynx; a task with which the process ends has an error."""
     inputs, found = folder / f"{engine}_tasks.json", folder / f"{engine}_results.json"
     inputs.write_text(json.dumps(list(tasks)), encoding="utf-8")
-    subprocess.run(
-        [sys.executable, str(SCRIPTS[engine]), str(inputs), str(found)], check=True, capture_output=True
-    )
-    loaded: list[Any] = json.loads(found.read_text(encoding="utf-8"))
-    return loaded
+    command = [sys.executable, str(SCRIPTS[engine]), str(inputs), str(found)]
+    if subprocess.run(command, check=False, capture_output=True, cwd=folder).returncode == 0:
+        loaded: list[Any] = json.loads(found.read_text(encoding="utf-8"))
+        return loaded
+    if len(tasks) == 1:
+        return [{"error": "the process ended"}]
+    half = len(tasks) // 2
+    return run_script(engine, tasks[:half], folder) + run_script(engine, tasks[half:], folder)
 
 
 def difference(one: Any, other: Any) -> float:
-    """Largest relative difference of poses, mass matrix and torque; infinite where one refused."""
+    """Largest relative difference of poses, mass matrix and torque; infinite where one refused.
+
+    Links that one of them lacks, because it merges them into others, are left out.
+    """
     if "error" in one or "error" in other:
         return float("inf")
     largest = 0.0
     for quantity in ("poses", "M", "tau"):
-        mine, theirs = (np.array([state[quantity] for state in each]) for each in (one, other))
+        rows = [
+            pair
+            for ours, others in zip(one, other, strict=True)
+            for pair in zip(ours[quantity], others[quantity], strict=True)
+            if None not in pair
+        ]
+        mine, theirs = (np.array([pair[k] for pair in rows]) for k in (0, 1))
         size = float(np.max(np.abs(mine), initial=0.0))
         gap = float(np.max(np.abs(mine - theirs), initial=0.0))
         largest = max(largest, gap / size if size else gap)
     return largest
 
 
-def check_files(entries: Sequence[dict[str, Any]], folder: Path, shapes: bool) -> list[tuple[float, str]]:
-    """Measure the differences of the engines on each mended file, or the message where one refuses it."""
-    tasks = []
-    for entry in entries:
-        source = XmlSource(Path(entry["mended"]).read_bytes(), entry["path"])
-        data = (source if shapes else without_meshes(source)).to_bytes()
-        place = beside(Path(entry["path"]), data, folder / f"{entry['base']}-{shapes}")
-        tasks.append(task(place, entry["base"]))
+def check_entries(entries: Sequence[Entry], folder: Path) -> list[dict[str, tuple[float, str]]]:
+    """Measure the difference of each engine from Pinocchio on each mended file, and the message of a refusal.
+
+    Engines load the file by the printed call, with the printed lines of code, and without meshes, for which
+    each looks in another place.
+    """
+    tasks: dict[str, list[dict[str, Any]]] = {engine: [] for engine in ENGINES}
+    for number, entry in enumerate(entries):
+        source = without_meshes(XmlSource(Path(entry["mended"]).read_bytes(), entry["path"]))
+        place = folder / f"{number}.urdf"
+        place.write_bytes(source.to_bytes())
+        plain = task(place, entry["base"])
+        loads = {each["engine"]: each["call"] for each in entry["engines"]}
+        for engine in ENGINES:
+            calls = [each["code"] for each in entry["calls"] if each["engine"] == engine]
+            tasks[engine].append({**plain, "load": loads.get(engine, ""), "calls": calls})
     with ThreadPoolExecutor(2) as pool:
-        one, other = pool.map(lambda engine: run_script(engine, tasks, folder), SCRIPTS)
-    messages = [[each["error"] for each in pair if "error" in each] for pair in zip(one, other, strict=True)]
+        results = list(pool.map(lambda engine: run_script(engine, tasks[engine], folder), ENGINES))
     return [
-        (difference(first, second), "; ".join(words))
-        for first, second, words in zip(one, other, messages, strict=True)
+        {
+            engine: (difference(answers[0], each), "" if isinstance(each, list) else each["error"])
+            for engine, each in zip(ENGINES, answers, strict=True)
+        }
+        for answers in zip(*results, strict=True)
     ]
 
 
 def main() -> None:
-    """Check every file that ``python docs/survey.py --json SURVEY --mended FOLDER`` mended.
-
-    A file whose meshes are not in its collection, which PyBullet refuses before and after, is checked
-    without them.
-    """
-    entries = [entry for entry in json.loads(Path(sys.argv[1]).read_text("utf-8")) if entry.get("mended")]
+    """Check every file that ``tests.doctor.survey_files --json RESULTS --mended FOLDER`` mended."""
+    with Path(sys.argv[1]).open(encoding="utf-8") as lines:
+        entries = [entry for entry in map(json.loads, lines) if entry.get("mended")]
     with TemporaryDirectory(prefix="dynx-") as folder:
-        found = check_files(entries, Path(folder), shapes=True)
-        refused = [k for k, (gap, _) in enumerate(found) if not np.isfinite(gap)]
-        again = check_files([entries[k] for k in refused], Path(folder), shapes=False)
-    for k, result in zip(refused, again, strict=True):
-        name = Path(entries[k]["path"]).name
-        print(f"{name}, {entries[k]['base']}: {found[k][1]}; without meshes: {result[0]:.1e} {result[1]}")
-        found[k] = result
-    apart = [gap for gap, _ in found]
-    for entry, (gap, words) in zip(entries, found, strict=True):
-        if not gap <= BAR:
-            print(f"DIFFERS: {Path(entry['path']).name}, {entry['base']}: {gap:.1e} {words}")
-    print(f"{sum(gap <= BAR for gap in apart)} of {len(apart)} agree within {BAR:g}")
-    print(f"largest of those: {max(gap for gap in apart if gap <= BAR):.1e}")
+        found = check_entries(entries, Path(folder))
+    alike = 0
+    for entry, of_engines in zip(entries, found, strict=True):
+        apart = {engine: result for engine, result in of_engines.items() if not result[0] <= BAR}
+        alike += not apart
+        for engine, (gap, message) in apart.items():
+            print(f"DIFFERS: {entry['path']}, {entry['base']}: {engine} {gap:.1e} {message[:200]}")
+    for engine in ENGINES:
+        gaps = [of_engines[engine][0] for of_engines in found]
+        print(f"{engine}: {sum(gap <= BAR for gap in gaps)} of {len(gaps)} within {BAR:g} of {ENGINES[0]}")
+    print(f"{alike} of {len(entries)} mended files are loaded alike by all engines")
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 """Raw engines load mended files alike: each in a process of its own without dynx.
 
 Robots that show each of the causes of PyBullet's and Pinocchio's differences on real files; all of
-them are checked by ``python docs/survey.py``.
+them are checked by ``python -m docs.survey``.
 """
 
 from __future__ import annotations
