@@ -21,6 +21,7 @@ from dynx.doctor.prove.mending import (
     Place,
     all_except,
     detections,
+    differs,
     mend,
     place_of,
     readable,
@@ -154,7 +155,7 @@ def _diagnosis_of(
     unexplained = _unexplained(last, tolerance, _engines_without_remedy(mended.case, rules))
     if unexplained and counterexamples:
         unexplained = _with_counterexamples(mended.case, unexplained, examiner, tolerance, seed, progress)
-    changed = mended.case.source.data != case.source.data
+    changed = differs(mended.case, case)
     return replace(
         with_after(report, last),
         findings=all_findings(found, proofs, mended),
@@ -162,6 +163,7 @@ def _diagnosis_of(
         choices=mended.choices,
         calls=run_time_calls(mended.case, examiner),
         mended=mended.case.source.text if changed else None,
+        form=mended.case.source.form,
     )
 
 

@@ -143,8 +143,7 @@ class DoctorReport:
     text: str | None = field(default=None, compare=False)
     """Text that was examined, for excerpts."""
     form: TextForm | None = field(default=None, compare=False)
-    """Encoding and line ends of the text as it was read, for writing the mended text alike; None for text
-    that declares its encoding itself."""
+    """Encoding and ends of the mended text, which are those of the file where they are sound."""
     seconds: float = field(default=0.0, compare=False)
 
     @property

@@ -33,6 +33,7 @@ CHANGES_ELSEWHERE: dict[str, str] = {
     "DX109": "a link has another name wherever the document names it",
     "DX212": "frames are removed, with their joints",
     "DX414": "a link has another name wherever the document names it",
+    "DX440": "the first line declares the encoding",
 }
 
 

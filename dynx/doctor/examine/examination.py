@@ -171,6 +171,9 @@ class Examiner:
                 self.engines[engine](path, reference.model, case.calls) as robot,
             ):
                 return _outputs_of(engine, robot, reference, describe)
+        except UnicodeDecodeError:
+            # Raised by bindings that return names as text, for bytes of another encoding.
+            return EngineOutput(engine, refused=f"{engine} cannot return names that are not in UTF-8")
         except DynxError as error:
             # The name of the temporary file differs every time.
             return EngineOutput(engine, refused=str(error).replace(str(path), path.name))

@@ -36,6 +36,11 @@ class Mending:
         return tuple(dict.fromkeys(sentences))
 
 
+def differs(case: Case, other: Case) -> bool:
+    """Check whether two cases have different text, or the same text in different encodings."""
+    return case.source.data != other.source.data or case.source.form != other.source.form
+
+
 def place_of(rule: Rule, detection: Detection) -> Place:
     """Return the place of a detection."""
     return rule.id, detection.link, detection.joint
@@ -106,8 +111,7 @@ def _after_remedy(mended: Mending, rule: Rule, chosen: Sequence[Detection]) -> M
     remedy = remedy_of(mended.case, rule, chosen)
     if remedy is None:
         return mended
-    same = remedy.case.source.data == mended.case.source.data and remedy.case.calls == mended.case.calls
-    if same:
+    if not differs(remedy.case, mended.case) and remedy.case.calls == mended.case.calls:
         return mended
     return Mending(remedy.case, (*mended.applied, (rule, remedy)))
 

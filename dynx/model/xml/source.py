@@ -128,6 +128,19 @@ class XmlSource:
         """
         return self.form.encode(self.text)
 
+    def in_utf8(self) -> XmlSource:
+        """Return the document in UTF-8 without a byte-order mark, and so declared where it declares an
+        encoding."""
+        declared = _DECLARED.match(self.text)
+        edits = []
+        if declared is not None:
+            start, end = (len(self.text[:at].encode("utf-8")) for at in declared.span(1))
+            edits.append(Edit(start, end, "UTF-8"))
+        new = self.apply(*edits)
+        front, end_ = (part.replace("\ufeff", "") for part in (self.form.front, self.form.end))
+        new.form = TextForm("utf-8", front, end_)
+        return new
+
     @cached_property
     def root(self) -> SourceElement:
         """The root element."""

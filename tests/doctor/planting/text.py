@@ -273,6 +273,23 @@ def _axes(site: Site) -> list[Number]:
     return found
 
 
+def not_utf8(site: Site) -> PlantedDefect:
+    """A file of an editor that saves in the code page of its country, with a name in that language."""
+    parent, _ = site.pick_link(lambda each: True, "link")
+    name = site.rng.choice(["träger", "poignée", "mão", "öglå"])
+    text, root = site.source.data, site.source.root
+    start = text.find(b"?>") + 2 if text.startswith(b"<?xml") else 0
+    if 0 < start <= root.span.start or start == 0:
+        declaration = '<?xml version="1.0" encoding="ISO-8859-1"?>' + "\n" * (start == 0)
+        inertial = (
+            '  <inertial>\n    <mass value="0.25"/>\n'
+            '    <inertia ixx="0.01" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.015"/>\n  </inertial>\n'
+        )
+        link = site.link_insertion(name, parent, inertial=inertial)
+        return site.defect("DX440", Edit(0, start, declaration), link, link=name)
+    raise CannotPlant("the declaration does not end")
+
+
 def _limits(site: Site) -> list[Number]:
     """List limits of joints that require them."""
     found = []
@@ -323,4 +340,5 @@ PLANTERS = (
     Planter("DX415", material_twice),
     Planter("DX416", unknown_version),
     Planter("DX417", unknown_shape),
+    Planter("DX440", not_utf8),
 )
