@@ -19,6 +19,9 @@ CALLS: Mapping[str, str] = {
     "mujoco.no_friction": "model.dof_frictionloss[:] = 0",
     "mujoco.no_limits": "model.jnt_limited[:] = 0",
     "mujoco.no_mimic": "model.eq_active0[:] = 0",
+    "mujoco.exact_inertial_frames": (
+        "model.body_sameframe[:] = model.body_simple[:] = model.dof_simplenum[:] = 0"
+    ),
     "mujoco.no_contacts": "model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT",
 }
 """Remedies at run time: id -> the line of code, which comes after loading and before `mujoco.MjData`."""

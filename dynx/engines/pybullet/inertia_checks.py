@@ -25,6 +25,9 @@ _STOP_RATIO = 1e-6
 _ABSOLUTE = 5 * FLOAT64_EPS
 """Tolerance by which a leading minor may be negative, whatever its unit [a power of kg m^2]."""
 
+MAX_ASYMMETRY = 5 * FLOAT64_EPS
+"""Difference of two opposite entries [kg m^2] above which inverse dynamics refuses a tensor."""
+
 _ROUNDING = 8 * FLOAT64_EPS
 """Bound on the rounding of a sum of a few products, relative to the largest."""
 
@@ -95,6 +98,45 @@ def tree_may_reject(inertial: Inertial, *, on_fixed_joint: bool) -> bool:
     )
     mean = (x + y + z) / 3.0
     return minor < _ROUNDING * x * y - _ABSOLUTE or determinant < _ROUNDING * mean * mean * mean - _ABSOLUTE
+
+
+def tree_asymmetry(inertial: Inertial) -> float:
+    """The largest difference [kg m^2] of two opposite entries of the tensor about the link's origin.
+
+    The tree of inverse dynamics computes it in the axes of the inertial frame, as moments minus
+    ``(mass * cross) * cross`` with the cross-product matrix of the centre of mass: ``(mass * x) * y`` and
+    ``(mass * y) * x`` are rounded differently. The result is exact, to the last bit of Bullet's own.
+    """
+    R = _basis(inertial.origin.rpy)
+    V = bullet_reading(inertial).axes.tolist()
+    basis = [[row[0] * V[0][k] + row[1] * V[1][k] + row[2] * V[2][k] for k in range(3)] for row in R]
+    px, py, pz = inertial.origin.xyz
+    x, y, z = (basis[0][k] * px + basis[1][k] * py + basis[2][k] * pz for k in range(3))
+    m = inertial.mass
+    return max(abs((m * a) * b - (m * b) * a) for a, b in ((x, y), (x, z), (y, z)))
+
+
+def _basis(rpy: tuple[float, float, float]) -> list[list[float]]:
+    """The rotation of ``rpy`` as Bullet computes it: by a normalised quaternion (btMatrix3x3::setRotation)."""
+    (sr, cr), (sp, cp), (sy, cy) = ((math.sin(angle / 2), math.cos(angle / 2)) for angle in rpy)
+    quat = (
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+        cr * cp * cy + sr * sp * sy,
+    )
+    shrink = 1.0 / math.sqrt(sum(each * each for each in quat))
+    x, y, z, w = (each * shrink for each in quat)
+    s = 2.0 / (x * x + y * y + z * z + w * w)
+    xs, ys, zs = x * s, y * s, z * s
+    wx, wy, wz = w * xs, w * ys, w * zs
+    xx, xy, xz = x * xs, x * ys, x * zs
+    yy, yz, zz = y * ys, y * zs, z * zs
+    return [
+        [1.0 - (yy + zz), xy - wz, xz + wy],
+        [xy + wz, 1.0 - (xx + zz), yz - wx],
+        [xz - wy, yz + wx, 1.0 - (xx + yy)],
+    ]
 
 
 def _diagonalise(tensor: Floats) -> tuple[Floats, Floats]:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from tests.doctor.planting import dynamics, elements, inertia, joints, shapes, text
+from tests.doctor.planting import bodies, dynamics, elements, inertia, joints, shapes, text
 from tests.doctor.planting.site import Planter
 
 PLANTERS: dict[str, Planter] = {
     planter.rule: planter
-    for family in (inertia, joints, dynamics, text, elements, shapes)
+    for family in (inertia, bodies, joints, dynamics, text, elements, shapes)
     for planter in family.PLANTERS
 }
 
