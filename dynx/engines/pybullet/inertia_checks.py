@@ -108,16 +108,16 @@ def tree_asymmetry(inertial: Inertial) -> float:
     ``(mass * y) * x`` are rounded differently. The result is exact, to the last bit of Bullet's own.
     """
     R = _basis(inertial.origin.rpy)
-    V = bullet_reading(inertial).axes.tolist()
+    V: list[list[float]] = bullet_reading(inertial).axes.tolist()
     basis = [[row[0] * V[0][k] + row[1] * V[1][k] + row[2] * V[2][k] for k in range(3)] for row in R]
     px, py, pz = inertial.origin.xyz
     x, y, z = (basis[0][k] * px + basis[1][k] * py + basis[2][k] * pz for k in range(3))
-    m = inertial.mass
+    m: float = inertial.mass
     return max(abs((m * a) * b - (m * b) * a) for a, b in ((x, y), (x, z), (y, z)))
 
 
 def _basis(rpy: tuple[float, float, float]) -> list[list[float]]:
-    """The rotation of ``rpy`` as Bullet computes it: by a normalised quaternion (btMatrix3x3::setRotation)."""
+    """The rotation of ``rpy`` as Bullet computes it: from a normalised quaternion."""
     (sr, cr), (sp, cp), (sy, cy) = ((math.sin(angle / 2), math.cos(angle / 2)) for angle in rpy)
     quat = (
         sr * cp * cy - cr * sp * sy,

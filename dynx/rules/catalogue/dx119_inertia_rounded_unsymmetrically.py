@@ -2,11 +2,12 @@
 heavy link's tensor.
 
 Before the first call of ``calculateInverseDynamics``, ``calculateMassMatrix`` or ``calculateJacobian``,
-PyBullet 3.2.7 moves the tensor of each link to the link's origin, and checks that it is symmetric. It computes
-two opposite entries as ``(m x) y`` and ``(m y) x``, which are rounded differently, and compares them with a
-fixed bound of 1.1e-15 kg m^2 (five units in the last place of 1), whatever the size of the link. A link can
-fail once two coordinates of its centre of mass, along the principal axes, and its mass have a product above 2
-kg m^2: 100 kg half a metre off. A quarter of such links do, and four of five of 100 t.
+PyBullet 3.2.7 moves the tensor of each link to the link's origin, and checks that it is symmetric. It
+computes two opposite entries as ``(m x) y`` and ``(m y) x``, which are rounded differently, and compares them
+with a fixed bound of 1.1e-15 kg m^2 (five units in the last place of 1), whatever the size of the link. A
+link can fail once two coordinates of its centre of mass, along the principal axes, and its mass have a
+product above 2 kg m^2. Of links with a centre of mass within half a metre, a quarter failed at 100 kg, and
+four of five at 100 t.
 
 - PyBullet 3.2.7 prints "invalid inertia tensor for body 3 I(2,0)!=I(0,2)", and all three calls raise an
   exception for the robot from then on. Links that cannot move are checked too, but never the root. Poses and
