@@ -10,6 +10,7 @@ Several threads may share one backend and its kernels.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -229,24 +230,22 @@ class CompiledBackend(Backend):
         described = kernel_quantity(quantity)
         checks = tuple(self._check(argument, tree) for argument in described.arguments)
         check_result = self._arguments.finite_acceleration if described.solves and not tree else None
-        if not compiles(self._simplified, quantity):
-            numeric = NumericCall(
-                self._simplified, quantity, details, checks, tree=tree, check_result=check_result
-            )
-            return numeric.evaluate
+        mechanism = replace(self._simplified, coupling=None) if tree else self._simplified
+        if not compiles(mechanism, quantity):
+            return NumericCall(mechanism, quantity, details, checks, check_result=check_result).evaluate
         options: dict[str, Any] = {
             "threads": self._threads,
             "validate": self._validate and not tree,
             "check_result": check_result,
         }
         if quantity not in ON_CHAINS:
-            kernel = quantity_kernel(self._simplified, quantity, details, tree=tree)
+            kernel = quantity_kernel(mechanism, quantity, details)
             return KernelCall(kernel, checks, **options).evaluate
-        chain = chain_of(self._simplified, quantity, *details)
+        chain = chain_of(mechanism, quantity, *details)
         key = (quantity, chain, tree)
         if key not in self._chain_kernels:
-            self._chain_kernels[key] = chain_kernel(self._simplified, quantity, chain, tree=tree)
-        place = place_of(self._simplified, chain, *details)
+            self._chain_kernels[key] = chain_kernel(mechanism, quantity, chain)
+        place = place_of(mechanism, chain, *details)
         return KernelCall(self._chain_kernels[key], checks, place=place, **options).evaluate
 
     def _check(self, argument: str, tree: bool) -> Callable[[Any], Floats]:
@@ -266,20 +265,11 @@ class CompiledBackend(Backend):
         """Return True, because every quantity has a kernel."""
         return True
 
-    def _frame_placement(self, q: Floats, frame: int) -> Floats:
-        return self._in_tree("frame_placement", q, details=(frame,))
-
     def _frame_placements(self, q: Floats) -> Floats:
         return self._in_tree("frame_placements", q, details=self._all_frames)
 
     def _inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
         return self._in_tree("inverse_dynamics", q, v, a)
-
-    def _forward_dynamics(self, q: Floats, v: Floats, tau: Floats) -> Floats:
-        return self._in_tree("forward_dynamics", q, v, tau)
-
-    def _mass_matrix(self, q: Floats) -> Floats:
-        return self._in_tree("mass_matrix", q)
 
     def _bias_torque(self, q: Floats, v: Floats) -> Floats:
         return self._in_tree("bias_torque", q, v)

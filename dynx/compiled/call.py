@@ -197,11 +197,10 @@ class NumericCall:
         details: tuple[Any, ...],
         checks: tuple[Check, ...],
         *,
-        tree: bool,
         check_result: Check | None = None,
     ) -> None:
         self._mechanism, self._quantity, self._details = mechanism, quantity, details
-        self._checks, self._tree, self._check_result = checks, tree, check_result
+        self._checks, self._check_result = checks, check_result
 
     def evaluate(self, q: Any, v: Any = _ABSENT, a: Any = _ABSENT, out: Floats | None = None) -> Floats:
         """Return the result (..., *shape), as `KernelCall.evaluate` does."""
@@ -211,9 +210,7 @@ class NumericCall:
         spread = [np.broadcast_to(array, (*batch, array.shape[-1])) for array in arrays]
         # A singular mass matrix divides by zero; the result is then checked.
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            found = evaluate_quantity(
-                self._mechanism, self._quantity, self._details, *spread, tree=self._tree
-            )
+            found = evaluate_quantity(self._mechanism, self._quantity, self._details, *spread)
         # A result that depends on no coordinate lacks the batch axes.
         own = len(kernel_quantity(self._quantity).shape)
         shape = (*batch, *found.shape[found.ndim - own :])

@@ -5,8 +5,8 @@ is below `MAX_DEFECT` exactly if the arguments are finite and not too large, qua
 a result that could be infinite is finite. So arguments are checked while they are in the processor's
 registers.
 
-Mimic joints are part of the traced program: inputs are coordinates of the model, or with ``tree=True`` those
-of the tree.
+Mimic joints are part of the traced program: inputs are coordinates of the model. For coordinates of the tree
+the mechanism is given without its coupling.
 
 In kernels of frame placements the frames are constants, because most programs use one frame. Kernels of other
 quantities of frames are shared by many frames (`dynx.compiled.frames`). The call alone determines the kernel,
@@ -114,15 +114,13 @@ def compiles(mechanism: Mechanism, name: str) -> bool:
 
 
 def evaluate_quantity(
-    mechanism: Mechanism, name: str, details: tuple[Any, ...], q: Array, *rates: Array, tree: bool = False
+    mechanism: Mechanism, name: str, details: tuple[Any, ...], q: Array, *rates: Array
 ) -> Array:
     """Evaluate a quantity on arrays (..., nq) and (..., nv) of numbers or of symbols.
 
-    They are in the coordinates of the model or, with `tree`, of the mechanism itself.
+    They are in the coordinates of the model; for a mechanism without coupling those are its own.
     """
     quantity = kernel_quantity(name)
-    if tree:
-        mechanism = replace(mechanism, coupling=None)
     if quantity.solves and mechanism.coupling is not None:
         # With mimic joints the reduced equations are not those of a tree.
         v, tau = rates
@@ -150,43 +148,36 @@ def _reduced(
     return np.asarray(reduce_rows(mechanism, result) if quantity.reduces_rows else result)
 
 
-def quantity_kernel(
-    mechanism: Mechanism, name: str, details: tuple[Any, ...], *, tree: bool = False
-) -> Kernel:
+def quantity_kernel(mechanism: Mechanism, name: str, details: tuple[Any, ...]) -> Kernel:
     """Return the kernel of a quantity, from the cache if it was compiled before."""
 
     def result(q: Array, *rates: Array) -> Array:
-        return evaluate_quantity(mechanism, name, details, q, *rates, tree=tree)
+        return evaluate_quantity(mechanism, name, details, q, *rates)
 
-    recipe = _recipe(mechanism, name, details, tree)
+    recipe = _recipe(mechanism, name, details)
     lanes = host().lanes
     cubic = kernel_quantity(name).growth == "cubic"
     settings = Settings(lanes, segment=SEGMENT_OF_CUBIC_CODE) if cubic else Settings(lanes)
-    return load_kernel(recipe, lambda: _program(mechanism, name, result, tree=tree), settings=settings)
+    return load_kernel(recipe, lambda: _program(mechanism, name, result), settings=settings)
 
 
-def chain_kernel(mechanism: Mechanism, name: str, chain: Chain, *, tree: bool = False) -> Kernel:
+def chain_kernel(mechanism: Mechanism, name: str, chain: Chain) -> Kernel:
     """Return the kernel of a quantity for the frames of a chain; its last input is the place of one."""
-    own = replace(mechanism, coupling=None) if tree else mechanism
 
     def result(q: Array, *rates_and_place: Array) -> Array:
         *rates, place = rates_and_place
         in_tree = partial(on_chain, mechanism, name, chain, place)
-        return _reduced(own, kernel_quantity(name), in_tree, q, *rates)
+        return _reduced(mechanism, kernel_quantity(name), in_tree, q, *rates)
 
-    recipe = _recipe(mechanism, name, chain, tree)
-    return load_kernel(
-        recipe, lambda: _program(mechanism, name, result, tree=tree, place=(chain.place_size,))
-    )
+    recipe = _recipe(mechanism, name, chain)
+    return load_kernel(recipe, lambda: _program(mechanism, name, result, place=(chain.place_size,)))
 
 
-def _recipe(mechanism: Mechanism, name: str, details: object, tree: bool) -> bytes:
-    return repr((_algorithms(), _fingerprint(mechanism), name, details, tree)).encode()
+def _recipe(mechanism: Mechanism, name: str, details: object) -> bytes:
+    return repr((_algorithms(), _fingerprint(mechanism), name, details)).encode()
 
 
-def _program(
-    mechanism: Mechanism, name: str, result: Computation, *, tree: bool, **more: tuple[int, ...]
-) -> Program:
+def _program(mechanism: Mechanism, name: str, result: Computation, **more: tuple[int, ...]) -> Program:
     """Return the program of `result`, whose inputs are the quantity's arguments and the inputs `more`,
     which are not checked."""
     quantity = kernel_quantity(name)
@@ -198,7 +189,7 @@ def _program(
             defect = defect + np.sum(abs(found)) * (MAX_DEFECT / MAX_RESULT)
         return {"result": found, "defect": defect}
 
-    return trace(result_and_defect, {**argument_shapes(mechanism, quantity.arguments, tree=tree), **more})
+    return trace(result_and_defect, {**argument_shapes(mechanism, quantity.arguments), **more})
 
 
 def _defect(mechanism: Mechanism, q: Array, *rates: Array) -> Array:

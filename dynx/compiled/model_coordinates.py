@@ -31,11 +31,9 @@ def reduce_rows(mechanism: Mechanism, A: Array) -> Array:
     return A if coupling is None else np.asarray(coupling.matrix().T @ A)
 
 
-def argument_shapes(
-    mechanism: Mechanism, arguments: Iterable[str], *, tree: bool = False
-) -> dict[str, tuple[int, ...]]:
-    """Return the shapes of arguments such as q, v and tau in the coordinates of the model or of the tree."""
-    coupling = None if tree else mechanism.coupling
+def argument_shapes(mechanism: Mechanism, arguments: Iterable[str]) -> dict[str, tuple[int, ...]]:
+    """Return the shapes of arguments such as q, v and tau in the coordinates of the model."""
+    coupling = mechanism.coupling
     n = len(mechanism.bodies) if coupling is None else coupling.n_joints
     nq, nv = (n + 7, n + 6) if mechanism.floating else (n, n)
     return {argument: (nq if argument == "q" else nv,) for argument in arguments}

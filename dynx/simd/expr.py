@@ -137,6 +137,31 @@ class Graph:
         return found
 
 
+def _unary(op: Op) -> Callable[[Any], Symbol]:
+    """Make the method of `Symbol` for an operation on one number."""
+
+    def apply(self: Symbol) -> Symbol:
+        return Symbol(self.graph, self.graph.apply(op, self.index))
+
+    return apply
+
+
+def _binary(op: Op, *, reflected: bool = False) -> Callable[[Any, Any], Symbol]:
+    """Make the method of `Symbol` for an operation on two numbers, the first being the symbol.
+
+    If `reflected` the symbol is the second. `min` and `max` return the second number if either is NaN.
+    """
+
+    def apply(self: Symbol, other: Any) -> Symbol:
+        index = _index(self.graph, other)
+        if index is None:
+            return NotImplemented
+        pair = (index, self.index) if reflected else (self.index, index)
+        return Symbol(self.graph, self.graph.apply(op, *pair))
+
+    return apply
+
+
 class Symbol:
     """A number whose value is not known yet: node `index` of `graph`. Arithmetic on it creates nodes.
 
@@ -150,93 +175,27 @@ class Symbol:
         self.graph = graph
         self.index = index
 
-    def __add__(self, other: Any) -> Symbol:
-        return self._binary("add", other)
-
-    def __radd__(self, other: Any) -> Symbol:
-        return self._binary("add", other)
-
-    def __sub__(self, other: Any) -> Symbol:
-        return self._binary("sub", other)
-
-    def __rsub__(self, other: Any) -> Symbol:
-        return self._binary_reflected("sub", other)
-
-    def __mul__(self, other: Any) -> Symbol:
-        return self._binary("mul", other)
-
-    def __rmul__(self, other: Any) -> Symbol:
-        return self._binary("mul", other)
-
-    def __truediv__(self, other: Any) -> Symbol:
-        return self._binary("div", other)
-
-    def __rtruediv__(self, other: Any) -> Symbol:
-        return self._binary_reflected("div", other)
-
-    def __neg__(self) -> Symbol:
-        return self._unary("neg")
+    __add__, __radd__ = _binary("add"), _binary("add")
+    __sub__, __rsub__ = _binary("sub"), _binary("sub", reflected=True)
+    __mul__, __rmul__ = _binary("mul"), _binary("mul")
+    __truediv__, __rtruediv__ = _binary("div"), _binary("div", reflected=True)
+    __neg__, __abs__ = _unary("neg"), _unary("abs")
+    # By these names NumPy and `dynx.spatial.scalar` evaluate functions of objects; angles are in radians.
+    sqrt, exp, tanh = _unary("sqrt"), _unary("exp"), _unary("tanh")
+    sin, cos, arctan = _unary("sin"), _unary("cos"), _unary("arctan")
+    minimum, maximum = _binary("min"), _binary("max")
 
     def __pos__(self) -> Symbol:
         return self
-
-    def __abs__(self) -> Symbol:
-        return self._unary("abs")
-
-    def sqrt(self) -> Symbol:
-        """Return the square root."""
-        return self._unary("sqrt")
-
-    def sin(self) -> Symbol:
-        """Return the sine [rad]."""
-        return self._unary("sin")
-
-    def cos(self) -> Symbol:
-        """Return the cosine [rad]."""
-        return self._unary("cos")
-
-    def exp(self) -> Symbol:
-        """Exponential."""
-        return self._unary("exp")
-
-    def tanh(self) -> Symbol:
-        """Return the hyperbolic tangent."""
-        return self._unary("tanh")
-
-    def arctan(self) -> Symbol:
-        """Return the arctangent [rad], between -pi/2 and pi/2."""
-        return self._unary("arctan")
 
     def sign(self) -> Symbol:
         """Sign: -1, 0 or 1."""
         return Symbol(self.graph, self.graph.sign(self.index))
 
-    def minimum(self, other: Any) -> Symbol:
-        """Return the smaller one of the two, or `other` if either is NaN."""
-        return self._binary("min", other)
-
-    def maximum(self, other: Any) -> Symbol:
-        """Return the larger one of the two, or `other` if either is NaN."""
-        return self._binary("max", other)
-
     def clamp(self, bound: Any) -> Symbol:
         """Clamp to [-bound, bound]; NaN stays NaN."""
-        return self._binary_reflected("max", -bound)._binary_reflected("min", bound)
-
-    def _unary(self, op: Op) -> Symbol:
-        return Symbol(self.graph, self.graph.apply(op, self.index))
-
-    def _binary(self, op: Op, other: Any) -> Symbol:
-        index = _index(self.graph, other)
-        return (
-            NotImplemented if index is None else Symbol(self.graph, self.graph.apply(op, self.index, index))
-        )
-
-    def _binary_reflected(self, op: Op, other: Any) -> Symbol:
-        index = _index(self.graph, other)
-        return (
-            NotImplemented if index is None else Symbol(self.graph, self.graph.apply(op, index, self.index))
-        )
+        above: Symbol = _binary("max", reflected=True)(self, -bound)
+        return _binary("min", reflected=True)(above, bound)
 
     # Operations that need the value.
 

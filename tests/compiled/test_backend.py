@@ -49,9 +49,9 @@ def test_concurrent_calls_compile_a_kernel_once(monkeypatch: pytest.MonkeyPatch)
     traced: list[str] = []
     make = kernels.quantity_kernel
 
-    def counted(mechanism: Mechanism, name: str, details: tuple[Any, ...], *, tree: bool) -> Kernel:
+    def counted(mechanism: Mechanism, name: str, details: tuple[Any, ...]) -> Kernel:
         traced.append(name)
-        return make(mechanism, name, details, tree=tree)
+        return make(mechanism, name, details)
 
     monkeypatch.setattr("dynx.compiled.backend.quantity_kernel", counted)
     q, v, a = state(model)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from typing import Any, TypeVar
 
 import click
@@ -169,23 +169,36 @@ frame_option = click.option(
 
 
 class GroupedCommand(click.Command):
-    """A command whose help lists its options under the headings of `groups`."""
-
-    def __init__(self, *args: Any, groups: Mapping[str, Sequence[str]], **extra: Any) -> None:
-        super().__init__(*args, **extra)
-        self.groups = groups
+    """A command whose help lists the options of each `group` under its heading."""
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the options, group by group."""
+        groups: dict[str, list[tuple[str, str]]] = {}
         options = [param for param in self.get_params(ctx) if isinstance(param, click.Option)]
-        records = {param.name: param.get_help_record(ctx) for param in options}
-        grouped = {name for names in self.groups.values() for name in names}
-        rest = [name for name in records if name is not None and name not in grouped]
-        for title, names in [*self.groups.items(), ("Other options", rest)]:
-            rows = [record for record in map(records.get, names) if record is not None]
-            if rows:
-                with formatter.section(title):
-                    formatter.write_dl(rows)
+        for option in sorted(options, key=lambda option: not hasattr(option, _HEADING)):
+            record = option.get_help_record(ctx)
+            if record is not None:
+                groups.setdefault(getattr(option, _HEADING, "Other options"), []).append(record)
+        for heading, records in groups.items():
+            with formatter.section(heading):
+                formatter.write_dl(records)
+
+
+_HEADING = "_dynx_heading"
+"""Attribute of a parameter with the heading under which its help stands."""
+
+
+def group(heading: str, *options: Callable[[F], F]) -> Callable[[F], F]:
+    """Combine several options into one decorator; `GroupedCommand` lists them under a heading."""
+
+    def decorate(command: F) -> F:
+        before = len(getattr(command, "__click_params__", ()))
+        command = stacked(*options)(command)
+        for param in getattr(command, "__click_params__", ())[before:]:
+            setattr(param, _HEADING, heading)
+        return command
+
+    return decorate
 
 
 def stacked(*options: Callable[[F], F]) -> Callable[[F], F]:

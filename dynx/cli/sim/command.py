@@ -5,13 +5,12 @@ from __future__ import annotations
 import click
 
 from dynx.cli.shell.lazy import runs
-from dynx.cli.shell.options import GroupedCommand, json_flag, model_options
+from dynx.cli.shell.options import GroupedCommand
 from dynx.cli.sim import options as sim_options
 
 
-@click.command(cls=GroupedCommand, groups=sim_options.GROUPS)
+@click.command(cls=GroupedCommand)
 @click.argument("robot", required=False)
-@model_options
 @sim_options.robot
 @sim_options.motion
 @sim_options.controller
@@ -19,7 +18,7 @@ from dynx.cli.sim import options as sim_options
 @sim_options.disturbances
 @sim_options.model_errors
 @sim_options.results
-@json_flag
+@sim_options.tutorial
 @runs("dynx.cli.sim.run:sim")
 def sim() -> None:
     """Simulate a robot under a controller, which can compute on one engine while the robot moves on another.

@@ -1,4 +1,4 @@
-"""Options of ``dynx sim``, and the headings of its ``--help``."""
+"""Options of ``dynx sim`` under the headings of its ``--help``."""
 
 from __future__ import annotations
 
@@ -6,55 +6,10 @@ from functools import partial
 
 import click
 
-from dynx.cli.shell.options import finite_number, number_list, one_of, stacked
+from dynx.cli.shell.options import finite_number, group, json_flag, model_options, number_list, one_of
 from dynx.cli.sim.values import coefficients, gain, payload, push, scale, vector
 
 PROFILES = ("cycloidal", "cubic", "quintic", "trapezoidal", "s-curve", "hold")
-
-GROUPS = {
-    "Robot": ("base", "lock", "gravity"),
-    "Reference motion": (
-        "to",
-        "to_pose",
-        "frame",
-        "start",
-        "profile",
-        "duration",
-        "settle",
-        "velocity",
-        "acceleration",
-        "jerk",
-        "ignore_limits",
-    ),
-    "Controller": (
-        "controller",
-        "backend",
-        "kp",
-        "kd",
-        "ki",
-        "natural_frequency",
-        "damping_ratio",
-        "posture_kp",
-        "posture_kd",
-        "friction_compensation",
-        "control_dt",
-        "delay",
-    ),
-    "Plant and time steps": ("plant", "dt", "substeps", "integrator", "method", "rtol", "atol", "q0", "v0"),
-    "Joint dynamics, limits and disturbances": (
-        "joint_dynamics",
-        "damping",
-        "friction",
-        "friction_slip",
-        "armature",
-        "effort_limits",
-        "position_limits",
-        "pushes",
-    ),
-    "Model error and sensor noise": ("payload", "mass_scale", "noise_q", "noise_v", "seed"),
-    "Results": ("save", "plot", "as_json", "resume", "resume_step"),
-    "All controllers of the tutorial": ("tutorial",),
-}
 
 TUTORIAL_OPTIONS = {
     *("tutorial", "robot", "lock", "gravity", "to", "start", "duration", "dt", "backend"),
@@ -68,7 +23,9 @@ _gain_option = partial(click.option, type=gain, metavar="NUMBERS")
 _coefficients_option = partial(click.option, type=coefficients, metavar="urdf|NUMBERS")
 _configuration_option = partial(click.option, type=number_list, metavar="Q")
 
-robot = stacked(
+robot = group(
+    "Robot",
+    model_options,
     click.option(
         "--gravity",
         type=vector,
@@ -77,7 +34,8 @@ robot = stacked(
     ),
 )
 
-motion = stacked(
+motion = group(
+    "Reference motion",
     _configuration_option(
         "--to",
         help="Target configuration [rad or m]: 0,1.5,... or joint=value,... (default: the initial one).",
@@ -126,7 +84,8 @@ motion = stacked(
     ),
 )
 
-controller = stacked(
+controller = group(
+    "Controller",
     click.option(
         "--controller",
         type=one_of("none", source="dynx.sim.named_controllers:CONTROLLERS"),
@@ -178,7 +137,8 @@ controller = stacked(
     ),
 )
 
-plant = stacked(
+plant = group(
+    "Plant and time steps",
     click.option(
         "--plant",
         default="pinocchio",
@@ -219,7 +179,8 @@ plant = stacked(
     ),
 )
 
-disturbances = stacked(
+disturbances = group(
+    "Joint dynamics, limits and disturbances",
     click.option(
         "--joint-dynamics",
         is_flag=True,
@@ -263,7 +224,8 @@ disturbances = stacked(
     ),
 )
 
-model_errors = stacked(
+model_errors = group(
+    "Model error and sensor noise",
     click.option(
         "--payload",
         type=payload,
@@ -290,7 +252,8 @@ model_errors = stacked(
     click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Seed of the noise (default: 0)."),
 )
 
-results = stacked(
+results = group(
+    "Results",
     click.option(
         "--save",
         multiple=True,
@@ -300,6 +263,7 @@ results = stacked(
     click.option(
         "--plot", metavar="FILE", help="File for a plot of joints, errors and torques: .png, .pdf, .svg, ..."
     ),
+    json_flag,
     click.option(
         "--resume",
         metavar="FILE.npz",
@@ -311,6 +275,10 @@ results = stacked(
         metavar="N",
         help="Number of steps to take over from the record of --resume (default: all).",
     ),
+)
+
+tutorial = group(
+    "All controllers of the tutorial",
     click.option(
         "--tutorial",
         is_flag=True,

@@ -37,8 +37,6 @@ _V = JacobianWrtVariable.kV
 _ORIGIN: Floats = np.zeros(3)
 _AT_WORLD = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
-_convert_errors = engine_errors("drake", error_message, DRAKE_FAILURES)
-
 
 class _Workspace(local):
     """The context and the forces of one thread."""
@@ -49,6 +47,7 @@ class _Workspace(local):
         self.no_forces = MultibodyForces(plant)
 
 
+@engine_errors(error_message, DRAKE_FAILURES)
 class DrakeBackend(Backend):
     """Drake behind the interface of `Backend`.
 
@@ -88,20 +87,17 @@ class DrakeBackend(Backend):
 
     # -- kinematics ---------------------------------------------------------------------------
 
-    @_convert_errors
     def _frame_placements(self, q: Floats) -> Floats:
         context, _ = self._set_positions(q)
         where = self._plant.EvalBodyPoseInWorld
         bodies = np.array([where(context, body).GetAsMatrix4() for body in self._built.bodies])
         return np.asarray(bodies[self._built.body_of_frame] @ self._built.T_body_frame)
 
-    @_convert_errors
     def _frame_placement(self, q: Floats, frame: int) -> Floats:
         context, _ = self._set_positions(q)
         T: Floats = self._built.frames[frame].CalcPoseInWorld(context).GetAsMatrix4()
         return T
 
-    @_convert_errors
     def _jacobian(self, q: Floats, frame: int, reference: Reference) -> Floats:
         context, R = self._set_positions(q)
         on_robot = self._built.frames[frame]
@@ -112,14 +108,12 @@ class DrakeBackend(Backend):
         J = self._plant.CalcJacobianSpatialVelocity(context, _V, on_robot, point, self._world, axes)
         return self._coordinates.forces_back(R, _linear_first(J))
 
-    @_convert_errors
     def _frame_velocity(self, q: Floats, v: Floats, frame: int, reference: Reference) -> Floats:
         context, _ = self._set_state(q, v)
         on_robot = self._built.frames[frame]
         velocity = _linear_first(on_robot.CalcSpatialVelocityInWorld(context).get_coeffs())
         return self._convert_to_reference(velocity, on_robot, context, reference)
 
-    @_convert_errors
     def _frame_acceleration(
         self, q: Floats, v: Floats, a: Floats, frame: int, reference: Reference
     ) -> Floats:
@@ -149,7 +143,6 @@ class DrakeBackend(Backend):
 
     # -- dynamics -----------------------------------------------------------------------------
 
-    @_convert_errors
     def _inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
         if self.model.floating:
             # Gravity is replaced by an opposite acceleration of the base; see `_upright`.
@@ -165,7 +158,6 @@ class DrakeBackend(Backend):
         wanted = coordinates.accelerations(R, v, a)
         return coordinates.forces_back(R, plant.CalcInverseDynamics(context, wanted, forces))
 
-    @_convert_errors
     def _forward_dynamics(self, q: Floats, v: Floats, tau: Floats) -> Floats:
         context, R = self._set_state(q, v)
         self._torque.FixValue(context, self._coordinates.forces(R, tau))
@@ -176,7 +168,6 @@ class DrakeBackend(Backend):
             return super()._forward_dynamics(q, v, tau)
         return self._coordinates.accelerations_back(R, v, vdot)
 
-    @_convert_errors
     def _mass_matrix(self, q: Floats) -> Floats:
         context, R = self._set_positions(_upright(q) if self.model.floating else q)
         plant = self._plant
@@ -187,7 +178,6 @@ class DrakeBackend(Backend):
         M = self._coordinates.matrix_back(R, compute(context))
         return np.asarray(0.5 * (M + M.T))
 
-    @_convert_errors
     def _bias_torque(self, q: Floats, v: Floats) -> Floats:
         if self.model.floating:
             # A zero acceleration in base axes need not be zero in the world axes that Drake uses.
@@ -196,14 +186,12 @@ class DrakeBackend(Backend):
         bias = self._plant.CalcBiasTerm(context) - self._plant.CalcGravityGeneralizedForces(context)
         return self._coordinates.forces_back(R, bias)
 
-    @_convert_errors
     def _gravity_torque(self, q: Floats) -> Floats:
         context, R = self._set_positions(q)
         return self._coordinates.forces_back(R, -self._plant.CalcGravityGeneralizedForces(context))
 
     # -- the whole body -----------------------------------------------------------------------
 
-    @_convert_errors
     def _center_of_mass(self, q: Floats) -> Floats:
         if not self._has_mass:
             return self._derive("center_of_mass", q)
@@ -211,7 +199,6 @@ class DrakeBackend(Backend):
         center: Floats = self._plant.CalcCenterOfMassPositionInWorld(context)
         return center
 
-    @_convert_errors
     def _center_of_mass_jacobian(self, q: Floats) -> Floats:
         if not self._has_mass:
             return self._derive("center_of_mass_jacobian", q)
@@ -219,7 +206,6 @@ class DrakeBackend(Backend):
         J = self._plant.CalcJacobianCenterOfMassTranslationalVelocity(context, _V, self._world, self._world)
         return self._coordinates.forces_back(R, J)
 
-    @_convert_errors
     def _centroidal_momentum(self, q: Floats, v: Floats) -> Floats:
         if not self._has_mass:
             return self._derive("centroidal_momentum", q, v)
@@ -228,12 +214,10 @@ class DrakeBackend(Backend):
         momentum = self._plant.CalcSpatialMomentumInWorldAboutPoint(context, center)
         return _linear_first(momentum.get_coeffs())
 
-    @_convert_errors
     def _kinetic_energy(self, q: Floats, v: Floats) -> Floats:
         context, _ = self._set_state(q, v)
         return np.asarray(self._plant.CalcKineticEnergy(context))
 
-    @_convert_errors
     def _potential_energy(self, q: Floats) -> Floats:
         context, _ = self._set_positions(q)
         return np.asarray(self._plant.CalcPotentialEnergy(context))

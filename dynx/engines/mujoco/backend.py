@@ -37,9 +37,6 @@ def _message(error: BaseException) -> str:
     return f"{type(error).__name__}: {(nonblank_lines(error) or ['no message'])[0]}"
 
 
-_convert_errors = engine_errors("mujoco", _message)
-
-
 class _Workspace(local):
     """The engine's `MjData` and views into it, for one thread."""
 
@@ -50,6 +47,7 @@ class _Workspace(local):
         self.p, self.R = data.xpos, data.xmat.reshape(-1, 3, 3)
 
 
+@engine_errors(_message)
 class MujocoBackend(Backend):
     """MuJoCo behind the interface of `Backend`.
 
@@ -89,7 +87,6 @@ class MujocoBackend(Backend):
 
     # -- kinematics ---------------------------------------------------------------------------
 
-    @_convert_errors
     def _frame_placements(self, q: Floats) -> Floats:
         work = self._set_positions(q)
         T = np.zeros((len(self._bodies), 4, 4))
@@ -97,14 +94,12 @@ class MujocoBackend(Backend):
         T[:, :3, :3], T[:, :3, 3], T[:, 3, 3] = work.R[bodies], work.p[bodies], 1.0
         return T
 
-    @_convert_errors
     def _frame_placement(self, q: Floats, frame: int) -> Floats:
         work, body = self._set_positions(q), self._bodies[frame]
         T = np.zeros((4, 4))
         T[:3, :3], T[:3, 3], T[3, 3] = work.R[body], work.p[body], 1.0
         return T
 
-    @_convert_errors
     def _jacobian(self, q: Floats, frame: int, reference: Reference) -> Floats:
         work, body = self._set_positions(q), self._bodies[frame]
         mujoco.mj_comPos(self._engine, work.data)
@@ -113,7 +108,6 @@ class MujocoBackend(Backend):
             return np.concatenate([work.R[body].T @ J[:3], work.R[body].T @ J[3:]])
         return J
 
-    @_convert_errors
     def _jacobian_derivative(self, q: Floats, v: Floats, frame: int, reference: Reference) -> Floats:
         work, body = self._set_state(q, v), self._bodies[frame]
         p, R = work.p[body], work.R[body]
@@ -130,7 +124,6 @@ class MujocoBackend(Backend):
             return np.concatenate([R.T @ (dJ[:3] - spin @ J[:3]), R.T @ (dJ[3:] - spin @ J[3:])])
         return np.concatenate([dJ[:3] + skew(velocity) @ J[3:] + skew(np.array(p)) @ dJ[3:], dJ[3:]])
 
-    @_convert_errors
     def _frame_velocity(self, q: Floats, v: Floats, frame: int, reference: Reference) -> Floats:
         work, body = self._set_state(q, v), self._bodies[frame]
         twist = np.zeros(6)
@@ -143,7 +136,6 @@ class MujocoBackend(Backend):
 
     # -- dynamics -----------------------------------------------------------------------------
 
-    @_convert_errors
     def _inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
         work = self._set_state(q, v)
         work.a[:] = a
@@ -152,7 +144,6 @@ class MujocoBackend(Backend):
         mujoco.mj_rnePostConstraint(self._engine, work.data)
         return self._dynamics.torque(work.data, work.R[ROOT], work.p[ROOT])
 
-    @_convert_errors
     def _forward_dynamics(self, q: Floats, v: Floats, tau: Floats) -> Floats:
         work = self._set_state(q, v)
         work.tau[:] = tau
@@ -170,14 +161,12 @@ class MujocoBackend(Backend):
             a[:3] = work.R[ROOT].T @ a[:3] - np.cross(v[3:6], v[:3])
         return a
 
-    @_convert_errors
     def _mass_matrix(self, q: Floats) -> Floats:
         work = self._set_positions(q)
         return self._dynamics.mass_matrix(work.data, work.R[ROOT], work.p[ROOT])
 
     # -- the whole body -----------------------------------------------------------------------
 
-    @_convert_errors
     def _center_of_mass(self, q: Floats) -> Floats:
         if not self._masses_add:
             return self._derive("center_of_mass", q)
@@ -185,7 +174,6 @@ class MujocoBackend(Backend):
         mujoco.mj_comPos(self._engine, work.data)
         return np.array(work.data.subtree_com[ROOT])
 
-    @_convert_errors
     def _center_of_mass_jacobian(self, q: Floats) -> Floats:
         if not self._masses_add:
             return self._derive("center_of_mass_jacobian", q)
@@ -197,7 +185,6 @@ class MujocoBackend(Backend):
             J[:, :3] = J[:, :3] @ work.R[ROOT]
         return J
 
-    @_convert_errors
     def _centroidal_momentum(self, q: Floats, v: Floats) -> Floats:
         if not self._masses_add:
             return self._derive("centroidal_momentum", q, v)
@@ -206,7 +193,6 @@ class MujocoBackend(Backend):
         linear = self._total_mass * data.subtree_linvel[ROOT]
         return np.concatenate([linear, data.subtree_angmom[ROOT]])
 
-    @_convert_errors
     def _potential_energy(self, q: Floats) -> Floats:
         data = self._set_positions(q).data
         mujoco.mj_energyPos(self._engine, data)

@@ -33,9 +33,6 @@ from dynx.model import Model
 from dynx.rbd.jacobians import Reference
 from dynx.spatial.scalar import Floats
 
-_convert_errors = engine_errors("pinocchio", error_message)
-
-
 _FUNCTIONS: dict[str, Callable[..., Floats]] = {
     "inverse_dynamics": pin.rnea,
     "forward_dynamics": pin.aba,
@@ -52,6 +49,7 @@ class _Workspace(local):
         self.data = engine.createData()
 
 
+@engine_errors(error_message)
 class PinocchioBackend(Backend):
     """Pinocchio behind the interface of `Backend`.
 
@@ -100,28 +98,24 @@ class PinocchioBackend(Backend):
 
     # -- kinematics ---------------------------------------------------------------------------
 
-    @_convert_errors
     def _frame_placements(self, q: Floats) -> Floats:
         data = self._workspace.data
         pin.framesForwardKinematics(self._engine, data, q)
         placements = data.oMf
         return np.array([placements[frame].homogeneous for frame in self._frame_ids])
 
-    @_convert_errors
     def _frame_placement(self, q: Floats, frame: int) -> Floats:
         data = self._workspace.data
         pin.forwardKinematics(self._engine, data, q)
         T: Floats = pin.updateFramePlacement(self._engine, data, self._frame_ids[frame]).homogeneous
         return T
 
-    @_convert_errors
     def _jacobian(self, q: Floats, frame: int, reference: Reference) -> Floats:
         J: Floats = pin.computeFrameJacobian(
             self._engine, self._workspace.data, q, self._frame_ids[frame], self._axes[reference]
         )
         return J if self._nv > 1 else J.reshape(6, self._nv)
 
-    @_convert_errors
     def _jacobian_derivative(self, q: Floats, v: Floats, frame: int, reference: Reference) -> Floats:
         if not self._nv:
             return np.zeros((6, 0))
@@ -130,7 +124,6 @@ class PinocchioBackend(Backend):
         )
         return dJ.reshape(6, self._nv)
 
-    @_convert_errors
     def _frame_velocity(self, q: Floats, v: Floats, frame: int, reference: Reference) -> Floats:
         engine, data, frame = self._engine, self._workspace.data, self._frame_ids[frame]
         pin.forwardKinematics(engine, data, q, v)
@@ -138,7 +131,6 @@ class PinocchioBackend(Backend):
         velocity: Floats = pin.getFrameVelocity(engine, data, frame, self._axes[reference]).vector
         return velocity
 
-    @_convert_errors
     def _frame_acceleration(
         self, q: Floats, v: Floats, a: Floats, frame: int, reference: Reference
     ) -> Floats:
@@ -165,37 +157,30 @@ class PinocchioBackend(Backend):
             return None
         return partial(function, self._engine, self._workspace.data)
 
-    @_convert_errors
     def _inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
         tau: Floats = pin.rnea(self._engine, self._workspace.data, q, v, a)
         return tau
 
-    @_convert_errors
     def _forward_dynamics(self, q: Floats, v: Floats, tau: Floats) -> Floats:
         a: Floats = pin.aba(self._engine, self._workspace.data, q, v, tau)
         return a
 
-    @_convert_errors
     def _mass_matrix(self, q: Floats) -> Floats:
         M: Floats = pin.crba(self._engine, self._workspace.data, q)
         return M
 
-    @_convert_errors
     def _bias_torque(self, q: Floats, v: Floats) -> Floats:
         tau: Floats = pin.nonLinearEffects(self._engine, self._workspace.data, q, v)
         return tau
 
-    @_convert_errors
     def _gravity_torque(self, q: Floats) -> Floats:
         tau: Floats = pin.computeGeneralizedGravity(self._engine, self._workspace.data, q)
         return tau
 
-    @_convert_errors
     def _coriolis_matrix(self, q: Floats, v: Floats) -> Floats:
         C: Floats = pin.computeCoriolisMatrix(self._engine, self._workspace.data, q, v)
         return C
 
-    @_convert_errors
     def _inertial_regressor(self, q: Floats, v: Floats, a: Floats) -> Floats:
         joints, matrices = self._link_parameters
         if not self._nv:
@@ -207,21 +192,18 @@ class PinocchioBackend(Backend):
 
     # -- the whole body -----------------------------------------------------------------------
 
-    @_convert_errors
     def _center_of_mass(self, q: Floats) -> Floats:
         if not (self._moving_mass and self._total_mass):
             return self._derive("center_of_mass", q)
         moving: Floats = pin.centerOfMass(self._engine, self._workspace.data, q, False)
         return (self._moving_mass * moving + self._rest_moment) / self._total_mass
 
-    @_convert_errors
     def _center_of_mass_jacobian(self, q: Floats) -> Floats:
         if not (self._moving_mass and self._total_mass):
             return self._derive("center_of_mass_jacobian", q)
         moving: Floats = pin.jacobianCenterOfMass(self._engine, self._workspace.data, q, False)
         return (self._moving_mass / self._total_mass) * moving.reshape(3, self._nv)
 
-    @_convert_errors
     def _centroidal_momentum(self, q: Floats, v: Floats) -> Floats:
         if not (self._moving_mass and self._total_mass):
             return self._derive("centroidal_momentum", q, v)
@@ -233,11 +215,9 @@ class PinocchioBackend(Backend):
             momentum[3:] += np.cross(moving - center, momentum[:3])
         return momentum
 
-    @_convert_errors
     def _kinetic_energy(self, q: Floats, v: Floats) -> Floats:
         return np.asarray(pin.computeKineticEnergy(self._engine, self._workspace.data, q, v))
 
-    @_convert_errors
     def _potential_energy(self, q: Floats) -> Floats:
         moving = pin.computePotentialEnergy(self._engine, self._workspace.data, q)
         return np.asarray(moving + self._rest_energy)
