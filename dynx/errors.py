@@ -34,6 +34,7 @@ from __future__ import annotations
 import difflib
 import os
 from collections.abc import Iterable
+from functools import partial
 from typing import Any, Literal, NamedTuple
 
 
@@ -58,7 +59,7 @@ class DescriptionError(ModelError):
         super().__init__(located(message, source, line))
 
     def __reduce__(self) -> tuple[object, ...]:
-        return _rebuild_located, (type(self), self.message, self.source, self.line)
+        return partial(type(self), self.message, source=self.source, line=self.line), ()
 
 
 class UnsupportedFeatureError(DescriptionError):
@@ -126,7 +127,7 @@ class TrajectoryError(DynxError, ValueError):
         super().__init__(message)
 
     def __reduce__(self) -> tuple[object, ...]:
-        return _rebuild_trajectory_error, (type(self), self.message, self.at)
+        return partial(type(self), self.message, at=self.at), ()
 
 
 class LimitViolation(NamedTuple):
@@ -173,7 +174,8 @@ class SimulationError(DynxError, RuntimeError):
         super().__init__(message)
 
     def __reduce__(self) -> tuple[object, ...]:
-        return _rebuild_simulation_error, (type(self), self.message, self.time, self.step, self.state)
+        again = partial(type(self), self.message, time=self.time, step=self.step, state=self.state)
+        return again, ()
 
 
 class DivergedError(SimulationError, ArithmeticError):
@@ -233,22 +235,6 @@ def nearest(name: str, known: Iterable[str]) -> str:
     if len(names) <= 8:
         return "; known: " + ", ".join(names)
     return f"; {len(names)} are known, such as " + ", ".join(names[:5])
-
-
-def _rebuild_trajectory_error(kind: type[TrajectoryError], message: str, at: float | None) -> TrajectoryError:
-    return kind(message, at=at)
-
-
-def _rebuild_located(
-    kind: type[DescriptionError], message: str, source: str | None, line: int | None
-) -> DescriptionError:
-    return kind(message, source=source, line=line)
-
-
-def _rebuild_simulation_error(
-    kind: type[SimulationError], message: str, time: float, step: int, state: tuple[Any, Any]
-) -> SimulationError:
-    return kind(message, time=time, step=step, state=state)
 
 
 TRACEBACK_VARIABLE = "DYNX_TRACEBACK"

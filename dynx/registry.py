@@ -74,7 +74,8 @@ class ClassRegistry(Generic[Kind]):
     def register(self, name: str, loader: Callable[[], type[Kind]]) -> None:
         """Add a class of the running program; `loader()` returns it when it is first looked up.
 
-        Raises ArgumentError for a name that is taken: a class is never replaced.
+        Raises ArgumentError for a name that is taken: a class is never replaced. Packages offer their classes
+        by entry points instead.
         """
         if not isinstance(name, str) or not name:
             raise ArgumentError(f"a {self._word}'s name is {shown(name)}; wanted a str that is not empty")

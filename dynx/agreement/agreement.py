@@ -31,6 +31,7 @@ from dynx.backends import (
 from dynx.backends.solvability import singular_coordinates
 from dynx.errors import ArgumentError, DynxError
 from dynx.model import Model
+from dynx.model.configuration import whole_number
 from dynx.model.loading import load
 
 DEFAULT_SAMPLES = 16
@@ -198,8 +199,7 @@ def _check_arguments(
 ) -> list[str | Backend]:
     numbers = (("samples", samples, 1), ("seed", seed, 0), ("referee_samples", referee_samples, 0))
     for name, value, least in numbers:
-        if isinstance(value, bool) or not isinstance(value, int) or value < least:
-            raise ArgumentError(f"{name} is {value!r}; wanted a whole number, at least {least}")
+        whole_number(name, value, least)
     if isinstance(backends, (str, Backend)):
         backends = [backends]
     chosen = list(installed_backends() if backends is None else backends)

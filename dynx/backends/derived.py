@@ -7,6 +7,7 @@ with results derived from the same engine.
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any, ClassVar
 
 from dynx.backends.base import Backend
@@ -48,7 +49,7 @@ class DerivedBackend(Backend):
         return self.inner
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _rebuild_view, (self.inner, self._options)
+        return partial(DerivedBackend, self.inner, **self._options), ()
 
 
 def native_quantities(backend: Backend | type[Backend]) -> frozenset[str]:
@@ -56,7 +57,3 @@ def native_quantities(backend: Backend | type[Backend]) -> frozenset[str]:
     derivation."""
     kind = backend if isinstance(backend, type) else type(backend)
     return frozenset(name for name, quantity in QUANTITIES.items() if kind._is_native(quantity))
-
-
-def _rebuild_view(inner: Backend, options: dict[str, Any]) -> DerivedBackend:
-    return DerivedBackend(inner, **options)

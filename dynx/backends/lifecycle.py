@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from types import TracebackType
+from functools import partial
 from typing import Any, ClassVar, TypeVar
 
 from dynx.backends.arguments import Arguments
@@ -57,20 +57,11 @@ class Lifecycle:
     def __enter__(self: Self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _rebuild, (type(self), self.model, self._options)
+        return partial(type(self), self.model, **self._options), ()
 
     def __repr__(self) -> str:
         return f"<{self.name} backend of {self.model.name}>"
-
-
-def _rebuild(kind: Any, model: Model, options: dict[str, Any]) -> Any:
-    return kind(model, **options)

@@ -7,7 +7,6 @@ backend is first used; listing names imports none.
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from dynx.errors import ArgumentError, BackendError, UnknownBackendError, shown
@@ -37,6 +36,10 @@ def _base() -> type[Backend]:
 
 
 _backends = ClassRegistry("backend", GROUP, BUILT_IN, _base, error=BackendError, unknown=UnknownBackendError)
+backend_class = _backends.find
+backend_names = _backends.names
+register = _backends.register
+unregister = _backends.unregister
 
 
 def refuse_other_than_model(model: object) -> None:
@@ -65,33 +68,9 @@ def backend(name: str, model: Model, **options: Any) -> Backend:
     return kind(model, **options)
 
 
-def backend_class(name: str) -> type[Backend]:
-    """Return the backend class of a name; this imports its engine."""
-    return _backends.find(name)
-
-
-def backend_names() -> tuple[str, ...]:
-    """Return all names of backends, dynx's own first, whether or not their engines are installed."""
-    return _backends.names()
-
-
 def installed_backends() -> tuple[str, ...]:
     """Return the names among `backend_names` whose engines can be imported; this imports them."""
     return tuple(name for name in backend_names() if _is_installed(name))
-
-
-def register(name: str, loader: Callable[[], type[Backend]]) -> None:
-    """Add a backend class of the running program; `loader()` returns it when it is first used.
-
-    Raises ArgumentError for a name that is taken: backends cannot be replaced. Packages offer their
-    backends by entry points in the group ``dynx.backends`` instead.
-    """
-    _backends.register(name, loader)
-
-
-def unregister(name: str) -> None:
-    """Remove what `register` added; UnknownBackendError for a name that no program registered."""
-    _backends.unregister(name)
 
 
 def _is_installed(name: str) -> bool:

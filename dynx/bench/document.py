@@ -4,21 +4,8 @@ from __future__ import annotations
 
 from typing import Literal, TypedDict
 
-
-class BenchCase(TypedDict):
-    """A quantity, the number of samples in one call, and the number of threads."""
-
-    quantity: str
-    batch: int
-    threads: int
-
-
-class BenchPeak(TypedDict):
-    """Measured limits of the machine on a number of threads: copying [B/s] and multiply-adds [1/s]."""
-
-    threads: int
-    copy_bandwidth: float
-    multiply_adds: float
+from dynx.bench.cases import BenchmarkCase
+from dynx.bench.roofline import Peak
 
 
 class BenchRoofline(TypedDict):
@@ -50,9 +37,12 @@ class BenchWay(TypedDict):
     roofline: BenchRoofline | None
 
 
-class BenchResult(BenchCase):
+class BenchResult(TypedDict):
     """One case with all its implementations."""
 
+    quantity: str
+    batch: int
+    threads: int
     ways: list[BenchWay]
 
 
@@ -72,6 +62,6 @@ class BenchDocument(TypedDict):
     seed: int
     processor: str
     load: float | None
-    peaks: list[BenchPeak]
+    peaks: list[Peak]
     results: list[BenchResult]
-    not_done: list[BenchCase]
+    not_done: list[BenchmarkCase]

@@ -3,26 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from typing import Any
 
 from dynx._version import __version__
-from dynx.bench.cases import BenchmarkCase
 from dynx.bench.cost import Cost
-from dynx.bench.document import (
-    BenchCase,
-    BenchDocument,
-    BenchPeak,
-    BenchResult,
-    BenchRoofline,
-    BenchWay,
-)
 from dynx.bench.measurement import Measurement
 from dynx.bench.roofline import Peak, roofline
 from dynx.bench.session import Session
 
 SCHEMA = 1
 
+_OF_MEASUREMENT = ("role", "version", "threads", "samples", "error", "tolerance", "problem")
+"""Attributes of a measurement that the document has under the same name."""
 
-def document(session: Session, found: Sequence[Sequence[Measurement]], processor: str) -> BenchDocument:
+
+def document(session: Session, found: Sequence[Sequence[Measurement]], processor: str) -> dict[str, Any]:
     """Assemble the document of a session: one entry of `found` for each measured case, in order."""
     plan = session.plan
     measured = {group[0].case for group in found if group}
@@ -39,23 +35,23 @@ def document(session: Session, found: Sequence[Sequence[Measurement]], processor
         "seed": plan.seed,
         "processor": processor,
         "load": session.load,
-        "peaks": [_peak(peak) for peak in session.peaks.values()],
+        "peaks": [asdict(peak) for peak in session.peaks.values()],
         "results": [
             result(group, [session.cost(each) for each in group], session.peaks) for group in found if group
         ],
-        "not_done": [_case(case) for case in plan.cases if case not in measured],
+        "not_done": [asdict(case) for case in plan.cases if case not in measured],
     }
 
 
 def result(
     group: Sequence[Measurement], costs: Sequence[Cost | None], peaks: Mapping[int, Peak]
-) -> BenchResult:
+) -> dict[str, Any]:
     """Return the entry of one case with all its implementations; a ratio is the time of a peer divided by
     that of the implementation."""
     timed = [each for each in group if each.role == "peer"]
     peers = {each.implementation: each.times.median for each in timed if each.times is not None}
     return {
-        **_case(group[0].case),
+        **asdict(group[0].case),
         "ways": [_entry(each, cost, peers, peaks) for each, cost in zip(group, costs, strict=True)],
     }
 
@@ -73,18 +69,12 @@ def is_wrong(measurement: Measurement) -> bool:
 
 def _entry(
     measurement: Measurement, cost: Cost | None, peers: Mapping[str, float], peaks: Mapping[int, Peak]
-) -> BenchWay:
+) -> dict[str, Any]:
     times = measurement.times
     peak = peaks.get(measurement.threads)
-    entry: BenchWay = {
+    entry: dict[str, Any] = {
         "way": measurement.implementation,
-        "role": measurement.role,
-        "version": measurement.version,
-        "threads": measurement.threads,
-        "samples": measurement.samples,
-        "error": measurement.error,
-        "tolerance": measurement.tolerance,
-        "problem": measurement.problem,
+        **{name: getattr(measurement, name) for name in _OF_MEASUREMENT},
         "ns": None,
         "ns_quartiles": None,
         "ratios": {},
@@ -97,29 +87,6 @@ def _entry(
     if times.median > 0.0:
         entry["ratios"] = {peer: seconds / times.median for peer, seconds in peers.items()}
         if cost is not None and peak is not None:
-            entry["roofline"] = _roofline(cost, times.median, peak)
+            found = roofline(cost, times.median, peak)
+            entry["roofline"] = {**asdict(cost), **asdict(found), "binds": found.binds}
     return entry
-
-
-def _roofline(cost: Cost, seconds: float, peak: Peak) -> BenchRoofline:
-    found = roofline(cost, seconds, peak)
-    return {
-        "bytes": cost.bytes,
-        "operations": cost.operations,
-        "multiply_adds": cost.multiply_adds,
-        "memory_share": found.memory_share,
-        "arithmetic_share": found.arithmetic_share,
-        "binds": found.binds,
-    }
-
-
-def _peak(peak: Peak) -> BenchPeak:
-    return {
-        "threads": peak.threads,
-        "copy_bandwidth": peak.copy_bandwidth,
-        "multiply_adds": peak.multiply_adds,
-    }
-
-
-def _case(case: BenchmarkCase) -> BenchCase:
-    return {"quantity": case.quantity, "batch": case.batch, "threads": case.threads}

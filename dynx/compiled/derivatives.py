@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -160,12 +161,8 @@ class Derivatives:
                     self._kernels[purpose] = kernel
         return kernel
 
-    def __reduce__(self) -> tuple[Callable[..., Derivatives], tuple[Model, int | None]]:
-        return _rebuild, (self.model, self._option)
+    def __reduce__(self) -> tuple[object, ...]:
+        return partial(Derivatives, self.model, threads=self._option), ()
 
     def __repr__(self) -> str:
         return f"<Derivatives of {self.model.name}>"
-
-
-def _rebuild(model: Model, threads: int | None) -> Derivatives:
-    return Derivatives(model, threads=threads)

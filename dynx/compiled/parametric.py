@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -147,8 +148,8 @@ class ParametricDynamics:
                     )
         return kernel
 
-    def __reduce__(self) -> tuple[Callable[..., ParametricDynamics], tuple[Selection, int | None]]:
-        return _rebuild, (self._selection, self._option)
+    def __reduce__(self) -> tuple[object, ...]:
+        return partial(ParametricDynamics, self._selection, threads=self._option), ()
 
     def __repr__(self) -> str:
         return f"<ParametricDynamics of {self.model.name}: {len(self.parameters.names)} parameters>"
@@ -211,7 +212,3 @@ def _joint_torque(mechanism: Mechanism, joints: Array | None, v: Array, a: Array
 def _sign(x: Any) -> Any:
     # The speed of a mimic joint with multiplier 0 is a constant.
     return np.sign(x) if isinstance(x, (int, float)) else x.sign()
-
-
-def _rebuild(selection: Selection, threads: int | None) -> ParametricDynamics:
-    return ParametricDynamics(selection, threads=threads)

@@ -45,7 +45,6 @@ class ComputedTorque(ModelBased[None], pure=True):
         self._set(kp=kp, kd=kd)
 
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
-        """Return the torque (nv,)."""
         _, q, v = measurement
         a = commanded_acceleration(q, v, *setpoint, self.kp, self.kd)
         return self.dynamics.inverse_dynamics(q, v, a), None

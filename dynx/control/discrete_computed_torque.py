@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 from dynx.backends import Backend
 from dynx.control.base import Measurement, ModelBased, parameter
-from dynx.control.gains import positive_seconds
 from dynx.model import Model
+from dynx.model.configuration import positive_seconds
 from dynx.spatial.scalar import Array, Floats
 from dynx.trajectory.base import Setpoint
 

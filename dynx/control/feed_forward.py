@@ -38,6 +38,5 @@ class FeedForward(ModelBased[None], pure=True):
         self._set(kp=checked_gain("kp", kp, model.nv), kd=checked_gain("kd", kd, model.nv))
 
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
-        """Return the torque (nv,)."""
         tau = self.dynamics.inverse_dynamics(*setpoint)
         return tau + pd_torque(measurement.q, measurement.v, setpoint.q, setpoint.v, self.kp, self.kd), None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dynx.errors import ArgumentError, GainError, shown
+from dynx.errors import ArgumentError, GainError
 from dynx.model.configuration import real_array
 from dynx.spatial.scalar import Floats
 
@@ -28,13 +28,6 @@ def checked_gain(name: str, gain: ArrayLike, length: int, *, per: str = "one for
     full = np.array(np.broadcast_to(array, (length,)))
     full.setflags(write=False)
     return full
-
-
-def positive_seconds(name: str, seconds: float) -> float:
-    """Return `seconds` as a float, or an ArgumentError if it is not a positive number."""
-    if not isinstance(seconds, int | float) or not 0.0 < seconds < np.inf:
-        raise ArgumentError(f"{name} is {shown(seconds)}; wanted a positive number of seconds")
-    return float(seconds)
 
 
 def feedback_gains(

@@ -34,7 +34,6 @@ class GravityCompensatedPD(ModelBased[None], pure=True):
         self._set(kp=checked_gain("kp", kp, model.nv), kd=checked_gain("kd", kd, model.nv))
 
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
-        """Return the torque (nv,)."""
         weight = self.dynamics.gravity_torque(measurement.q)
         return weight + pd_torque(
             measurement.q, measurement.v, setpoint.q, setpoint.v, self.kp, self.kd

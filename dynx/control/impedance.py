@@ -51,7 +51,6 @@ class Impedance(TaskSpace[None], pure=True):
         )
 
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
-        """Return the torque (nv,)."""
         error = self._error(measurement, setpoint)
         wrench = self.stiffness * error.pose + self.damping * error.twist
         weight = self.dynamics.gravity_torque(measurement.q)

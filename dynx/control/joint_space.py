@@ -8,8 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from dynx.control.base import Controller, ControllerState
+from dynx.control.base import Controller, ControllerState, Measurement
 from dynx.model import Model
+from dynx.spatial.scalar import Array
+from dynx.trajectory.base import Setpoint
 
 
 @dataclass(frozen=True)
@@ -32,6 +34,11 @@ class JointSpace(Controller[ControllerState]):
     def v_joints(self) -> slice:
         """Entries of the joints in a velocity."""
         return slice(6 if self.model.floating else 0, None)
+
+    def joint_states(self, measurement: Measurement, setpoint: Setpoint) -> tuple[Array, Array, Array, Array]:
+        """Return q and v of the joints as measured, and as the setpoint has them (n,)."""
+        q, v = self.q_joints, self.v_joints
+        return measurement.q[q], measurement.v[v], setpoint.q[q], setpoint.v[v]
 
     def all_torques(self, joint_torque: Any) -> Any:
         """Return the torque (nv,) whose joint part is `joint_torque` (n,)."""

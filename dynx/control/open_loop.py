@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.control.base import Controller, Measurement, parameter
-from dynx.control.gains import positive_seconds
 from dynx.errors import ShapeError
 from dynx.model import Model
-from dynx.model.configuration import checked_array
+from dynx.model.configuration import checked_array, positive_seconds
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint
 

@@ -64,7 +64,6 @@ class OperationalSpace(TaskSpace[None], pure=True):
         )
 
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
-        """Return the torque (nv,)."""
         _, q, v = measurement
         dynamics, frame = self.dynamics, self.frame
         error = self._error(measurement, setpoint)

@@ -31,17 +31,8 @@ class PD(JointSpace[None], pure=True):
         self._set(kp=checked_gain("kp", kp, n, per=per), kd=checked_gain("kd", kd, n, per=per))
 
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
-        """Return the torque (nv,)."""
-        joints, rates = self.q_joints, self.v_joints
-        tau = pd_torque(
-            measurement.q[joints],
-            measurement.v[rates],
-            setpoint.q[joints],
-            setpoint.v[rates],
-            self.kp,
-            self.kd,
-        )
-        return self.all_torques(tau), None
+        states = self.joint_states(measurement, setpoint)
+        return self.all_torques(pd_torque(*states, self.kp, self.kd)), None
 
 
 def pd_torque(q: Array, v: Array, q_wanted: Array, v_wanted: Array, kp: Array, kd: Array) -> Array:

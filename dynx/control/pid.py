@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.control.base import Measurement, gain, parameter
-from dynx.control.gains import checked_gain, positive_seconds
+from dynx.control.gains import checked_gain
 from dynx.control.joint_space import JointSpace
 from dynx.control.pd import pd_torque
 from dynx.control.saturation import checked_limit
 from dynx.model import Model
+from dynx.model.configuration import positive_seconds
 from dynx.spatial.scalar import Floats, clamp
 from dynx.trajectory.base import Setpoint
 
@@ -64,16 +65,9 @@ class PID(JointSpace[Floats], pure=True):
 
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: Floats) -> tuple[Floats, Floats]:
         """Return the torque (nv,) within the limits, and the next integral part."""
-        joints, rates = self.q_joints, self.v_joints
-        error = setpoint.q[joints] - measurement.q[joints]
-        wanted = state + pd_torque(
-            measurement.q[joints],
-            measurement.v[rates],
-            setpoint.q[joints],
-            setpoint.v[rates],
-            self.kp,
-            self.kd,
-        )
+        q, v, q_wanted, v_wanted = self.joint_states(measurement, setpoint)
+        error = q_wanted - q
+        wanted = state + pd_torque(q, v, q_wanted, v_wanted, self.kp, self.kd)
         tau = clamp(wanted, self.limit)
         # A factor above 1 would overcompensate the torque beyond the limits.
         share = min(1.0, self.control_dt / self.tracking_time)

@@ -26,6 +26,5 @@ class Velocity(JointSpace[None], pure=True):
         self._set(kd=checked_gain("kd", kd, self.n_joints, per="one for each joint"))
 
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
-        """Return the torque (nv,)."""
         rates = self.v_joints
         return self.all_torques(self.kd * (setpoint.v[rates] - measurement.v[rates])), None

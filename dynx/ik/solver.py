@@ -14,7 +14,7 @@ from dynx.ik.result import IKResult
 from dynx.ik.search import Candidate, Kinematics, Search, SearchLimits
 from dynx.ik.targets import checked_targets
 from dynx.model import Model
-from dynx.model.configuration import checked_q, checked_vector
+from dynx.model.configuration import checked_q, checked_vector, whole_number
 from dynx.spatial.scalar import Floats
 
 EngineSolver = Callable[[Floats, str, Floats], Floats]
@@ -150,12 +150,8 @@ def _checked_limits(
     ):
         if not (isinstance(tolerance, int | float | np.number) and 0.0 < tolerance < math.inf):
             raise ArgumentError(f"{name} is {shown(tolerance)}; wanted a positive number")
-    for name, count in (("max_iterations", max_iterations), ("max_restarts", max_restarts)):
-        if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 0:
-            raise ArgumentError(f"{name} is {shown(count)}; wanted a whole number, at least 0")
-    return SearchLimits(
-        float(position_tolerance), float(rotation_tolerance), int(max_iterations), int(max_restarts)
-    )
+    counts = whole_number("max_iterations", max_iterations, 0), whole_number("max_restarts", max_restarts, 0)
+    return SearchLimits(float(position_tolerance), float(rotation_tolerance), *counts)
 
 
 def _checked_rng(rng: np.random.Generator | int | None) -> np.random.Generator | int | None:

@@ -1,4 +1,4 @@
-"""Arithmetic of configurations (integrate, difference, sample, clip) and checks of arrays."""
+"""Arithmetic of configurations (integrate, difference, sample, clip), and checks of arrays and numbers."""
 
 from __future__ import annotations
 
@@ -46,6 +46,22 @@ def checked_vector(name: str, value: ArrayLike) -> Floats:
 
 UNIT_NORM_TOLERANCE = 4 * float(np.finfo(np.float64).eps)
 """Largest deviation from 1 of the norm of a quaternion that counts as rounding."""
+
+
+def whole_number(name: str, value: object, least: int) -> int:
+    """Return a whole number that is at least `least`; raise ArgumentError for anything else."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
+        raise ArgumentError(f"{name} is {shown(value)}; wanted a whole number, at least {least}")
+    return int(value)
+
+
+def positive_seconds(name: str, seconds: object) -> float:
+    """Return a positive, finite number of seconds as a float, or raise ArgumentError."""
+    if isinstance(seconds, int | float | np.number) and not isinstance(seconds, bool):
+        number = float(seconds)
+        if 0.0 < number < np.inf:
+            return number
+    raise ArgumentError(f"{name} is {shown(seconds)}; wanted a positive number of seconds")
 
 
 def real_array(name: str, value: ArrayLike) -> Floats:
@@ -143,7 +159,7 @@ def position_limits(model: Model) -> tuple[Floats, Floats]:
 
 
 def neutral(model: Model) -> Floats:
-    """Return zeros, with the identity quaternion for a floating base."""
+    """Return the configuration (nq,) with every joint at 0 and the base frame at the world frame."""
     q = np.zeros(model.nq)
     if model.floating:
         q[6] = 1.0
@@ -153,10 +169,10 @@ def neutral(model: Model) -> Floats:
 def random(
     model: Model, rng: np.random.Generator | int | None = None, size: tuple[int, ...] | int = ()
 ) -> Floats:
-    """Sample uniformly within the limits; in (-pi, pi) for an angle without limits, (-1, 1) for a length.
+    """Sample configurations (*size, nq) uniformly within the limits.
 
-    A floating base gets a position in the cube [-1, 1]^3 and a uniformly distributed orientation (Shoemake
-    1992). `rng` is a NumPy generator or a seed.
+    An angle without limits is in (-pi, pi), a length in (-1, 1). A floating base gets a position in the cube
+    [-1, 1]^3 and a uniformly distributed orientation (Shoemake 1992). `rng` is a NumPy generator or a seed.
     """
     rng = np.random.default_rng(rng)
     shape = (size,) if isinstance(size, int) else tuple(size)
@@ -174,7 +190,10 @@ def random(
 
 
 def integrate(model: Model, q: ArrayLike, v: ArrayLike) -> Floats:
-    """Return q plus v for unit time: the base moves along the exponential of its body twist."""
+    """Return the configuration reached from `q` (..., nq) with velocity `v` (..., nv) in unit time.
+
+    A floating base moves along the exponential of its body twist.
+    """
     q, v = checked_q(model, q), checked_array("v", v, model.nv)
     if not model.floating:
         return np.asarray(q + v)
@@ -187,7 +206,7 @@ def integrate(model: Model, q: ArrayLike, v: ArrayLike) -> Floats:
 
 
 def difference(model: Model, q0: ArrayLike, q1: ArrayLike) -> Floats:
-    """Return the v with integrate(q0, v) = q1, whose rotation angle is at most pi."""
+    """Return the velocity v (..., nv) with integrate(q0, v) = q1, whose rotation angle is at most pi."""
     q0, q1 = checked_q(model, q0, "q0"), checked_q(model, q1, "q1")
     if not model.floating:
         return np.asarray(q1 - q0)
@@ -199,7 +218,7 @@ def difference(model: Model, q0: ArrayLike, q1: ArrayLike) -> Floats:
 
 
 def clip(model: Model, q: ArrayLike) -> Floats:
-    """Return q clipped to the position limits, with a normalised quaternion."""
+    """Return `q` (..., nq) clipped to the position limits, with a normalised quaternion."""
     array = np.clip(checked_array("q", q, model.nq), model.lower, model.upper)
     if model.floating:
         norm = np.linalg.norm(array[..., 3:7], axis=-1, keepdims=True)

@@ -180,27 +180,11 @@ class Model:
 
     # -- configuration arithmetic ------------------------------------------------------------
 
-    def neutral(self) -> Floats:
-        """Return the configuration (nq,) with every joint at 0 and the base frame at the world frame."""
-        return configuration.neutral(self)
-
-    def random(
-        self, rng: np.random.Generator | int | None = None, size: tuple[int, ...] | int = ()
-    ) -> Floats:
-        """Sample configurations (*size, nq) uniformly within limits; see `configuration.random`."""
-        return configuration.random(self, rng, size)
-
-    def integrate(self, q: ArrayLike, v: ArrayLike) -> Floats:
-        """Return the configuration reached from `q` (..., nq) with velocity `v` (..., nv) in unit time."""
-        return configuration.integrate(self, q, v)
-
-    def difference(self, q0: ArrayLike, q1: ArrayLike) -> Floats:
-        """Return the velocity (..., nv) with which `integrate` moves from `q0` to `q1` in unit time."""
-        return configuration.difference(self, q0, q1)
-
-    def clip(self, q: ArrayLike) -> Floats:
-        """Return `q` (..., nq) clipped to the position limits, with a normalised quaternion."""
-        return configuration.clip(self, q)
+    neutral = configuration.neutral
+    random = configuration.random
+    integrate = configuration.integrate
+    difference = configuration.difference
+    clip = configuration.clip
 
     # -- other forms -------------------------------------------------------------------------
 
@@ -209,9 +193,7 @@ class Model:
         """The moving bodies in float64, on which the algorithms of `dynx.rbd` work."""
         return build_mechanism(self)
 
-    def to_urdf(self) -> str:
-        """Return the model as URDF text in canonical form; `dynx.load` of it returns an equal model."""
-        return write_urdf(self)
+    to_urdf = write_urdf
 
     def with_base(self, base: Base) -> Model:
         """Return the same robot with the other kind of base."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dynx.errors import ArgumentError, shown
+from dynx.model.configuration import positive_seconds
 from dynx.spatial.scalar import Floats
 
 TIME_ROUNDING = 1e-9
@@ -27,9 +28,9 @@ class Clock:
     def of(cls, dt: float, duration: float, control_dt: float | None, delay: float) -> Clock:
         """Make a clock. Raises ArgumentError for invalid times and for times that are not multiples of
         `dt`."""
-        dt = positive("dt", dt)
-        duration = positive("duration", duration)
-        control = dt if control_dt is None else positive("control_dt", control_dt)
+        dt = positive_seconds("dt", dt)
+        duration = positive_seconds("duration", duration)
+        control = dt if control_dt is None else positive_seconds("control_dt", control_dt)
         if not isinstance(delay, int | float) or not 0.0 <= delay < np.inf:
             raise ArgumentError(f"delay is {shown(delay)}; wanted seconds, 0 or more")
         return cls(
@@ -57,15 +58,6 @@ class Clock:
         """Return the times (n_controls,) [s] of the setpoints, which are `lead` control steps ahead."""
         steps = (np.arange(self.n_controls) + lead) * self.steps_per_control
         return steps.astype(np.float64) * self.dt
-
-
-def positive(name: str, seconds: object) -> float:
-    """Return a positive number of seconds as a float. Raises ArgumentError for anything else."""
-    if isinstance(seconds, int | float | np.integer | np.floating) and not isinstance(seconds, bool):
-        number = float(seconds)
-        if 0.0 < number < np.inf:
-            return number
-    raise ArgumentError(f"{name} is {shown(seconds)}; wanted a positive number of seconds")
 
 
 def multiple(name: str, seconds: float, dt: float) -> int:

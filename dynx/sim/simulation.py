@@ -6,8 +6,6 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
-from types import TracebackType
 from typing import NamedTuple
 
 import numpy as np
@@ -179,14 +177,14 @@ class Simulation:
     def _run(self, end: int) -> None:
         if end > len(self._record):
             self._extend(end)
-        if self._progress is not None:
-            self._loop = replace(self._loop, progress=partial(_call, self._progress, end))
-        left = end - self._record.steps
-        if left <= 0:
+        progress = self._progress
+        if progress is not None:
+            self._loop = replace(self._loop, progress=lambda taken: progress(taken, end))
+        if end <= self._record.steps:
             return
         self._advance(end, None, compiled=True)
-        if self._progress is not None:
-            self._progress(self._record.steps, end)
+        if progress is not None:
+            progress(self._record.steps, end)
 
     def _run_in_real_time(self, end: int) -> None:
         started, first, dt = time.perf_counter(), self._record.steps, self._loop.clock.dt
@@ -384,15 +382,9 @@ class Simulation:
     def __enter__(self) -> Simulation:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def __repr__(self) -> str:
         model, plant = self.scenario.model.name, self.scenario.plant
         return f"<Simulation of {model} on {plant}, at {self.time:.6g} s>"
-
-
-def _call(progress: Progress, wanted: int, taken: int) -> None:
-    progress(taken, wanted)

@@ -24,7 +24,7 @@ from typing import Literal
 
 from dynx.errors import CompileError, nearest, shown
 from dynx.simd.expr import Graph, Node, Simplify
-from dynx.simd.program import Port, Program, extract_program
+from dynx.simd.program import Port, Program, extract_program, scalar_ranges
 from dynx.simd.simplify import FAST
 
 Order = Literal["forward", "reverse", "markowitz"]
@@ -240,11 +240,7 @@ def _copy_nodes(graph: Graph, program: Program) -> list[int]:
 
 def _scalar_ranges(ports: Sequence[Port]) -> dict[str, range]:
     """Return the range of scalar indices of each port, by the name of the port."""
-    found, first = {}, 0
-    for port in ports:
-        found[port.name] = range(first, first + port.size)
-        first += port.size
-    return found
+    return {port.name: scalars for port, scalars in scalar_ranges(ports)}
 
 
 def _lookup(entries: dict[str, range], name: str, kind: str) -> range:

@@ -146,13 +146,13 @@ def _unary(op: Op) -> Callable[[Any], Symbol]:
     return apply
 
 
-def _binary(op: Op, *, reflected: bool = False) -> Callable[[Any, Any], Symbol]:
+def _binary(op: Op, *, reflected: bool = False) -> Callable[[Any, Any], Any]:
     """Make the method of `Symbol` for an operation on two numbers, the first being the symbol.
 
     If `reflected` the symbol is the second. `min` and `max` return the second number if either is NaN.
     """
 
-    def apply(self: Symbol, other: Any) -> Symbol:
+    def apply(self: Symbol, other: Any) -> Any:
         index = _index(self.graph, other)
         if index is None:
             return NotImplemented
@@ -160,6 +160,9 @@ def _binary(op: Op, *, reflected: bool = False) -> Callable[[Any, Any], Symbol]:
         return Symbol(self.graph, self.graph.apply(op, *pair))
 
     return apply
+
+
+_at_least, _at_most = _binary("max", reflected=True), _binary("min", reflected=True)
 
 
 class Symbol:
@@ -194,8 +197,8 @@ class Symbol:
 
     def clamp(self, bound: Any) -> Symbol:
         """Clamp to [-bound, bound]; NaN stays NaN."""
-        above: Symbol = _binary("max", reflected=True)(self, -bound)
-        return _binary("min", reflected=True)(above, bound)
+        clamped: Symbol = _at_most(_at_least(self, -bound), bound)
+        return clamped
 
     # Operations that need the value.
 

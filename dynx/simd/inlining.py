@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from dynx.simd.expr import Symbol
-from dynx.simd.program import Program
+from dynx.simd.program import Program, scalar_ranges
 from dynx.spatial.scalar import Array, arctan, cos, exp, sin, sqrt, tanh
 
 
@@ -28,13 +28,11 @@ def inline(program: Program, inputs: Mapping[str, Array]) -> dict[str, Array]:
             values.append(node.value)
         else:
             values.append(_OPERATIONS[node.op](*(values[arg] for arg in node.args)))
-    outputs, first = {}, 0
-    for port in program.outputs:
+    outputs = {}
+    for port, scalars in scalar_ranges(program.outputs):
         entries = np.empty(port.size, dtype=object)
-        for k in range(port.size):
-            entries[k] = values[program.results[first + k]]
+        entries[:] = [values[program.results[k]] for k in scalars]
         outputs[port.name] = entries.reshape(port.shape)
-        first += port.size
     return outputs
 
 

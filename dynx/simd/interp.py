@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dynx.simd.expr import Op
-from dynx.simd.program import Program
+from dynx.simd.program import Program, scalar_ranges
 from dynx.spatial.scalar import Floats
 
 Function = Callable[[Floats], Floats]
@@ -76,11 +76,10 @@ def interpret(
                 values.append(np.full(n, node.value))
             else:
                 values.append(operations[node.op](*(values[arg] for arg in node.args)))
-    outputs, first = [], 0
-    for port in program.outputs:
+    outputs = []
+    for port, scalars in scalar_ranges(program.outputs):
         out = np.empty((n, port.size))
-        for column in range(port.size):
-            out[:, column] = values[program.results[first + column]]
+        for column, k in enumerate(scalars):
+            out[:, column] = values[program.results[k]]
         outputs.append(out)
-        first += port.size
     return outputs

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import prod
 
@@ -39,6 +39,14 @@ class Program:
     def n_inputs(self) -> int:
         """Number of input scalars."""
         return sum(port.size for port in self.inputs)
+
+
+def scalar_ranges(ports: Sequence[Port]) -> Iterator[tuple[Port, range]]:
+    """Yield each port with the numbers of its scalars, which count over all ports in order."""
+    first = 0
+    for port in ports:
+        yield port, range(first, first + port.size)
+        first += port.size
 
 
 def extract_program(

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from dynx.simd.program import Program
+from dynx.simd.program import Program, scalar_ranges
 from dynx.simd.rows import tiles
 
 TRIG = frozenset({"sin", "cos"})
@@ -135,11 +135,9 @@ def _ancestors(program: Program, indices: Iterable[int], done: set[int]) -> list
 
 
 def _stores(program: Program, lanes: int) -> Iterator[Store]:
-    first = 0
-    for output, port in enumerate(program.outputs):
+    for output, (port, scalars) in enumerate(scalar_ranges(program.outputs)):
         for columns in tiles(port.size, lanes):
-            yield Store(output, columns, tuple(program.results[first + c] for c in columns))
-        first += port.size
+            yield Store(output, columns, tuple(program.results[scalars[c]] for c in columns))
 
 
 def _computed_nodes(step: Step) -> list[int]:

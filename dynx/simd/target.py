@@ -49,11 +49,6 @@ class Target:
         )
 
 
-def sse2() -> Target:
-    """Return the baseline of x86-64: vectors of two doubles, no fused multiply-add."""
-    return Target(binding.get_process_triple(), "x86-64", "")
-
-
 @cache
 def host() -> Target:
     """Return the processor of this machine."""

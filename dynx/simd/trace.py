@@ -14,7 +14,7 @@ import numpy as np
 
 from dynx.errors import TraceError
 from dynx.simd.expr import Graph, Simplify, Symbol
-from dynx.simd.program import Port, Program, extract_program
+from dynx.simd.program import Port, Program, extract_program, scalar_ranges
 from dynx.simd.simplify import FAST
 from dynx.simd.verify import check_program
 from dynx.spatial.scalar import Array
@@ -35,12 +35,9 @@ def trace(
     graph = Graph(simplify)
     ports = [Port(name, tuple(shape)) for name, shape in inputs.items()]
     arguments: dict[str, Array] = {}
-    slot = 0
-    for port in ports:
+    for port, slots in scalar_ranges(ports):
         symbols = np.empty(port.size, dtype=object)
-        for k in range(port.size):
-            symbols[k] = Symbol(graph, graph.input(slot + k))
-        slot += port.size
+        symbols[:] = [Symbol(graph, graph.input(slot)) for slot in slots]
         arguments[port.name] = symbols.reshape(port.shape)
     returned = function(**arguments)
     arrays = returned if isinstance(returned, Mapping) else {"result": returned}

@@ -11,7 +11,7 @@ from typing import NoReturn
 
 from dynx.errors import CompileError
 from dynx.simd.expr import ARITY, COMMUTATIVE, Node, constant_key
-from dynx.simd.program import Program
+from dynx.simd.program import Program, scalar_ranges
 from dynx.simd.rows import tiles
 from dynx.simd.schedule import LEAVES, Segment, Store, TrigGroup
 
@@ -134,17 +134,15 @@ def _computed_nodes(program: Program, step: int | TrigGroup) -> Iterator[tuple[i
 
 
 def _check_stores(program: Program, stores: Sequence[Store], lanes: int) -> None:
-    first = 0
-    for number, port in enumerate(program.outputs):
+    for number, (port, scalars) in enumerate(scalar_ranges(program.outputs)):
         own = sorted((store for store in stores if store.output == number), key=lambda s: s.columns.start)
         if [store.columns for store in own] != tiles(port.size, lanes):
             raise CompileError(f"output {port.name} is stored in wrong columns {[s.columns for s in own]}")
         for store in own:
-            if store.nodes != tuple(program.results[first + column] for column in store.columns):
+            if store.nodes != tuple(program.results[scalars[column]] for column in store.columns):
                 raise CompileError(
                     f"columns {store.columns} of output {port.name} are stored from wrong nodes"
                 )
-        first += port.size
     if any(not 0 <= store.output < len(program.outputs) for store in stores):
         raise CompileError("a store refers to an output that the program does not have")
 

@@ -7,6 +7,7 @@ name, which 50-digit numbers lack. The functions here work on all of them.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -19,39 +20,43 @@ Floats = NDArray[np.float64]
 """An array of float64."""
 
 
-def sin(x: Array) -> Array:
-    """Return the sine of each element [rad]."""
-    return _elementwise("sin", x)
+def _elementwise(function: str) -> Callable[[Array], Array]:
+    """Make NumPy's function of this name for floats, the element's method or mpmath's function for others."""
+
+    def evaluate_one(element: Any) -> Any:
+        method = getattr(element, function, None)
+        # `exp` of an mpmath number is an attribute, its exponent.
+        if callable(method):
+            return method()
+        import mpmath  # only the referee needs it; importing dynx must not load it
+
+        return getattr(mpmath, {"arctan": "atan"}.get(function, function))(element)
+
+    of_floats, of_objects = getattr(np, function), np.frompyfunc(evaluate_one, 1, 1)
+
+    def evaluate(x: Array) -> Array:
+        x = np.asarray(x)
+        if x.dtype != object:
+            return np.asarray(of_floats(x))
+        return np.asarray(of_objects(x), dtype=object)
+
+    return evaluate
 
 
-def cos(x: Array) -> Array:
-    """Return the cosine of each element [rad]."""
-    return _elementwise("cos", x)
-
-
-def sqrt(x: Array) -> Array:
-    """Return the square root of each element."""
-    return _elementwise("sqrt", x)
-
-
-def exp(x: Array) -> Array:
-    """Return the exponential of each element."""
-    return _elementwise("exp", x)
-
-
-def tanh(x: Array) -> Array:
-    """Return the hyperbolic tangent of each element."""
-    return _elementwise("tanh", x)
-
-
-def arctan(x: Array) -> Array:
-    """Return the arctangent of each element [rad], between -pi/2 and pi/2."""
-    return _elementwise("arctan", x)
-
-
-def sign(x: Array) -> Array:
-    """Return the sign of each element: -1, 0 or 1."""
-    return _elementwise("sign", x)
+sin = _elementwise("sin")
+"""Sine of each element [rad]."""
+cos = _elementwise("cos")
+"""Cosine of each element [rad]."""
+sqrt = _elementwise("sqrt")
+"""Square root of each element."""
+exp = _elementwise("exp")
+"""Exponential of each element."""
+tanh = _elementwise("tanh")
+"""Hyperbolic tangent of each element."""
+arctan = _elementwise("arctan")
+"""Arctangent of each element [rad], between -pi/2 and pi/2."""
+sign = _elementwise("sign")
+"""Sign of each element: -1, 0 or 1."""
 
 
 def clamp(x: Array, limit: Array) -> Array:
@@ -76,21 +81,3 @@ def append_axis(x: Any) -> Array:
     Arithmetic on 0-d object arrays returns bare scalars, which cannot be indexed; hence `np.asarray`.
     """
     return np.asarray(np.asarray(x)[..., None])
-
-
-def _elementwise(function: str, x: Array) -> Array:
-    """Apply NumPy's function of this name to floats, the element's method or mpmath's function to others."""
-    x = np.asarray(x)
-    if x.dtype != object:
-        return np.asarray(getattr(np, function)(x))
-
-    def evaluate_one(element: Any) -> Any:
-        method = getattr(element, function, None)
-        # `exp` of an mpmath number is an attribute, its exponent.
-        if callable(method):
-            return method()
-        import mpmath  # only the referee needs it; importing dynx must not load it
-
-        return getattr(mpmath, {"arctan": "atan"}.get(function, function))(element)
-
-    return np.asarray(np.frompyfunc(evaluate_one, 1, 1)(x), dtype=object)

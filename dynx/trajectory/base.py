@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dynx.errors import ArgumentError, shown
-from dynx.model.configuration import checked_entries, real_array
+from dynx.errors import ArgumentError
+from dynx.model.configuration import checked_entries, positive_seconds, real_array
 from dynx.spatial.scalar import Floats
 
 
@@ -96,14 +96,12 @@ MIN_DURATION, MAX_DURATION = 1e-30, 1e30
 
 def checked_duration(duration: float) -> float:
     """Return a duration [s] as a float; raise ArgumentError unless it is within the bounds."""
-    number = isinstance(duration, int | float | np.number) and not isinstance(duration, bool)
-    if not number or not 0.0 < duration < np.inf:
-        raise ArgumentError(f"duration is {shown(duration)}; wanted a positive number of seconds")
-    if not MIN_DURATION <= duration <= MAX_DURATION:
+    seconds = positive_seconds("duration", duration)
+    if not MIN_DURATION <= seconds <= MAX_DURATION:
         raise ArgumentError(
-            f"duration is {duration:g}; wanted between {MIN_DURATION:g} and {MAX_DURATION:g} s"
+            f"duration is {seconds:g}; wanted between {MIN_DURATION:g} and {MAX_DURATION:g} s"
         )
-    return float(duration)
+    return seconds
 
 
 def read_only(array: Floats) -> Floats:

@@ -20,8 +20,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dynx.errors import ArgumentError, TrajectoryError, shown
+from dynx.errors import ArgumentError, TrajectoryError
 from dynx.model import Model
+from dynx.model.configuration import whole_number
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Trajectory, checked_duration, read_only
 from dynx.trajectory.curve import Curve
@@ -91,13 +92,11 @@ def excitation(
     """
     ends = _ends_around(model, q0)
     T = checked_duration(duration)
-    for name, count, least in (("harmonics", harmonics, 3), ("candidates", candidates, 1)):
-        if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < least:
-            raise ArgumentError(f"{name} is {shown(count)}; wanted a whole number, at least {least}")
+    harmonics, candidates = whole_number("harmonics", harmonics, 3), whole_number("candidates", candidates, 1)
     generator = np.random.default_rng(rng)
     bounds = _MotionLimits(ends, velocity, acceleration)
     drawn = [
-        ends.rest_to_rest(T, bounds.scale(_random_series(generator, T, int(harmonics), ends.nv)))
+        ends.rest_to_rest(T, bounds.scale(_random_series(generator, T, harmonics, ends.nv)))
         for _ in range(candidates)
     ]
     if len(drawn) == 1:

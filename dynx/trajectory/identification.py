@@ -8,13 +8,12 @@ motions.
 
 from __future__ import annotations
 
-from types import TracebackType
-
 import numpy as np
 
 from dynx.backends import backend as make_backend
-from dynx.errors import ArgumentError, ShapeError, shown
+from dynx.errors import ShapeError
 from dynx.model import Model
+from dynx.model.configuration import whole_number
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Trajectory
 
@@ -29,10 +28,8 @@ class Identifiability:
     """
 
     def __init__(self, model: Model, *, backend: str = "pinocchio", samples: int = SAMPLES) -> None:
-        if isinstance(samples, bool) or not isinstance(samples, int | np.integer) or samples < 1:
-            raise ArgumentError(f"samples is {shown(samples)}; wanted a whole number, at least 1")
+        self._samples = whole_number("samples", samples, 1)
         self._engine = make_backend(backend, model)
-        self._samples = int(samples)
         rng = np.random.default_rng(0)
         v, a = rng.standard_normal((2, SAMPLES, model.nv))
         Y = self._engine.inertial_regressor(model.random(rng, SAMPLES), v, a)
@@ -67,12 +64,7 @@ class Identifiability:
     def __enter__(self) -> Identifiability:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
 

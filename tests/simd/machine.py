@@ -11,11 +11,14 @@ from llvmlite import binding
 
 from dynx.simd.emit import ENTRY, Settings, emit
 from dynx.simd.program import Program
-from dynx.simd.target import Target, host, sse2
+from dynx.simd.target import Target, host
 from dynx.spatial.scalar import Floats
 
 X86 = platform.machine().lower() in ("x86_64", "amd64")
-TARGETS: tuple[Target, ...] = (host(), sse2()) if X86 else (host(),)
+SSE2 = Target(host().triple, "x86-64", "")
+"""The baseline of x86-64: vectors of two doubles, no fused multiply-add."""
+
+TARGETS: tuple[Target, ...] = (host(), SSE2) if X86 else (host(),)
 """This processor and, if it is an x86-64 one, the baseline of that family."""
 
 LANES = (2, 4, 8)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import asdict
 from typing import Any
 
 from rich.text import Text
@@ -49,28 +50,20 @@ def document(model: Model) -> dict[str, Any]:
             }
             for link in model.links
         ],
-        "notes": [{"message": note.message, "line": note.line} for note in model.notes],
+        "notes": [asdict(note) for note in model.notes],
     }
 
 
 def _joint_entry(joint: Joint) -> dict[str, Any]:
-    limits, dynamics, mimic = joint.limits, joint.dynamics, joint.mimic
     return {
         "name": joint.name,
         "type": joint.type,
         "parent": joint.parent,
         "child": joint.child,
         "axis": list(joint.axis) if joint.moves else None,
-        "lower": limits.lower,
-        "upper": limits.upper,
-        "velocity": limits.velocity,
-        "effort": limits.effort,
-        "damping": dynamics.damping,
-        "friction": dynamics.friction,
-        "armature": dynamics.armature,
-        "mimic": None
-        if mimic is None
-        else {"joint": mimic.joint, "multiplier": mimic.multiplier, "offset": mimic.offset},
+        **asdict(joint.limits),
+        **asdict(joint.dynamics),
+        "mimic": None if joint.mimic is None else asdict(joint.mimic),
         "locked_at": joint.locked_at,
         "line": joint.line,
     }

@@ -11,7 +11,7 @@ from dynx.cli.shell.inputs import Numbers, chosen_frame, configuration, target_p
 from dynx.cli.shell.terminal import counted
 from dynx.errors import ArgumentError, LimitError, LimitViolation, shown
 from dynx.model import Model
-from dynx.sim.clock import positive
+from dynx.model.configuration import positive_seconds
 from dynx.sim.named_controllers import CONTROLLERS
 from dynx.spatial.scalar import Floats
 from dynx.trajectory import Trajectory
@@ -107,7 +107,7 @@ def plan_motion(model: Model, options: MotionInput) -> Motion:
     span = motion.duration
     if profile in LIMITED_PROFILES and options.duration is None:
         # The fastest motion ends between two steps; the simulation continues to the next.
-        dt = positive("--dt", options.dt)
+        dt = positive_seconds("--dt", options.dt)
         span = dt * math.ceil(motion.duration / dt - 1e-9)
     return Motion(motion, start, span + options.settle, frame, description)
 

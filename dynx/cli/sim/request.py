@@ -10,7 +10,7 @@ import numpy as np
 from dynx.backends.registry import backend_class
 from dynx.cli.shell.inputs import configuration, velocity
 from dynx.cli.sim.motion import Motion, MotionInput, plan_motion
-from dynx.cli.sim.values import Coefficients, PayloadInput, PushInput
+from dynx.cli.sim.values import Coefficients
 from dynx.control import EngineMotor, FrictionCompensation, ModelBased
 from dynx.control.base import Controller
 from dynx.control.friction import SLIP
@@ -82,9 +82,12 @@ def prepare(given: dict[str, Any]) -> SimulationRequest:
         # Motors of the engine have their own limits (`_controller`).
         "effort_limits": False if limits is None or isinstance(controller, EngineMotor) else limits,
         "noise": _noise(given),
-        "payload": [_payload(each) for each in given["payload"]],
+        "payload": [Payload(each.frame, each.mass, tuple(each.center)) for each in given["payload"]],
         "mass_scale": _mass_scale(model, given["mass_scale"]),
-        "pushes": [_push(each) for each in given["pushes"]],
+        "pushes": [
+            Push(each.frame, each.wrench, each.start, np.inf if each.duration is None else each.duration)
+            for each in given["pushes"]
+        ],
         "check_reference": not given["ignore_limits"],
     }
     options = {
@@ -93,7 +96,7 @@ def prepare(given: dict[str, Any]) -> SimulationRequest:
     }
     header = {
         "law": given["controller"],
-        "backend": given["backend"] if _uses_backend(controller) else None,
+        "backend": given["backend"] if isinstance(_innermost(controller), ModelBased) else None,
         "frame": motion.frame,
         "frame_given": given["frame"] is not None,
         "motion": motion.description,
@@ -200,20 +203,6 @@ def _gains_of(controller: Controller[Any] | None) -> dict[str, list[float]]:
 
 def _innermost(controller: Controller[Any] | None) -> Controller[Any] | None:
     return controller.inner if isinstance(controller, FrictionCompensation) else controller
-
-
-def _uses_backend(controller: Controller[Any] | None) -> bool:
-    """Check whether the controller evaluates its model with a backend."""
-    return isinstance(_innermost(controller), ModelBased)
-
-
-def _payload(given: PayloadInput) -> Payload:
-    return Payload(given.frame, given.mass, tuple(given.center))
-
-
-def _push(given: PushInput) -> Push:
-    duration = np.inf if given.duration is None else given.duration
-    return Push(given.frame, given.wrench, given.start, duration)
 
 
 def _mass_scale(model: Model, given: tuple[tuple[str | None, float], ...]) -> float | dict[str, float]:

@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 
 
 def write_urdf(model: Model) -> str:
-    """Return `model` as URDF; reading it with the same base and gravity returns an equal model.
+    """Return `model` as URDF text in canonical form; `dynx.load` of it returns an equal model.
 
-    URDF cannot express the base and gravity, so they must be given to ``load`` again. A locked joint is
+    URDF cannot express the base and gravity, so the same must be given to ``load`` again. A locked joint is
     written as fixed, with its position in the extension ``<dynx_locked>``; an added frame as a massless link
     on a fixed joint, marked by ``<dynx_frame>``; other readers ignore both marks. An infinite limit is
     written as the largest double, which every engine can read. Raises DescriptionError for a name that URDF

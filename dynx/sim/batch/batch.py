@@ -17,7 +17,7 @@ from dynx.control.base import Controller, gains_of
 from dynx.control.friction import SLIP, Coefficients
 from dynx.errors import ArgumentError, shown
 from dynx.model import Model
-from dynx.model.configuration import checked_q
+from dynx.model.configuration import checked_q, whole_number
 from dynx.sim.batch.disturbances import PLACEHOLDER, BatchDisturbances
 from dynx.sim.batch.kernel import FusedStep
 from dynx.sim.batch.part import Part, PartNoise, PartOutcome, StepKernels, pushing
@@ -133,13 +133,8 @@ def simulate_batch(
     if "q0" in own:
         stand_ins["q0"] = scenario.model.neutral()
     setup = Setup.of(replace(scenario, **stand_ins))
-    controller, moved, clock, limit, noise = (
-        setup.controller,
-        setup.model,
-        setup.clock,
-        setup.limit,
-        scenario.noise,
-    )
+    controller, moved, clock = setup.controller, setup.model, setup.clock
+    limit, noise = setup.limit, scenario.noise
     assert controller is not None
     assert setup.setpoint_of is not None
     if parametric is not None and not isinstance(parametric, ParametricDynamics):
@@ -154,8 +149,7 @@ def simulate_batch(
         )
     if parameters is not None and parametric is None:
         raise ArgumentError("parameters were given without the model that they are of: dynx.parametric(...)")
-    if isinstance(record_every, bool) or not isinstance(record_every, int) or record_every < 0:
-        raise ArgumentError(f"record_every is {shown(record_every)}; wanted a whole number, 0 for no record")
+    whole_number("record_every", record_every, 0)
     acting = BatchDisturbances.of(moved, setup.disturbances, varied)
     if parametric is None and not acting.armature.any():
         Solvability(moved).refuse_singular(False)
@@ -310,11 +304,8 @@ def _batch_rollouts(
     nq, nv = scenario.model.nq, scenario.model.nv
 
     def nothing(count: int) -> PartOutcome:
-        q, row, undone = (
-            np.full((count, nq), np.nan),
-            np.full((count, nv), np.nan),
-            np.full(count, -1.0),
-        )
+        q, row = np.full((count, nq), np.nan), np.full((count, nv), np.nan)
+        undone = np.full(count, -1.0)
         q_record, record = np.full((count, kept, nq), np.nan), np.full((count, kept, nv), np.nan)
         return PartOutcome(q, row, row, row, undone, q_record, record, record, row)
 
@@ -323,17 +314,5 @@ def _batch_rollouts(
     finished = np.concatenate([np.full(part.count, k in done) for k, part in enumerate(parts)])
     diverged = np.where(whole.diverged < 0, np.nan, whole.diverged * clock.dt)
     times = clock.times()[record_every::record_every] if record_every else np.zeros(0)
-    return BatchRollouts(
-        scenario,
-        whole.q,
-        whole.v,
-        whole.max_error,
-        whole.rms_error,
-        diverged,
-        finished,
-        times,
-        whole.q_record,
-        whole.v_record,
-        whole.tau_record,
-        whole.saturated,
-    )
+    found = {**whole._asdict(), "diverged": diverged}
+    return BatchRollouts(scenario, done=finished, t=times, **found)

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dynx.errors import ArgumentError, GainError, shown
+from dynx.errors import ArgumentError, GainError
 from dynx.model import Model
-from dynx.model.configuration import checked_array, real_array
+from dynx.model.configuration import checked_array, real_array, whole_number
 from dynx.sim.scenario.keywords import scenario_of
 from dynx.sim.scenario.scenario import Scenario
 from dynx.spatial.scalar import Floats
@@ -84,9 +84,7 @@ class RolloutRows:
     """Checks of arrays with one row for each rollout, which determine the number of rollouts."""
 
     def __init__(self, asked: int | None) -> None:
-        if asked is not None and (isinstance(asked, bool) or not isinstance(asked, int) or asked < 1):
-            raise ArgumentError(f"rollouts is {shown(asked)}; wanted a whole number above 0")
-        self._asked = asked
+        self._asked = None if asked is None else whole_number("rollouts", asked, 1)
         self._by = "rollouts"
 
     @property

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from dynx.control.gains import checked_gain
 from dynx.errors import ArgumentError, shown
 from dynx.model import Model
+from dynx.model.configuration import whole_number
 from dynx.spatial.scalar import Floats
 
 BLOCK_STEPS = 64
@@ -45,10 +46,8 @@ class Noise:
 
         Raises GainError for an invalid standard deviation, ArgumentError for an invalid seed or rollout.
         """
-        for name, number in (("seed", self.seed), ("rollout", self.rollout)):
-            if not isinstance(number, int) or isinstance(number, bool) or number < 0:
-                raise ArgumentError(f"{name} is {shown(number)}; wanted a whole number, 0 or more")
-        if self.rollout > MAX_ROLLOUT:
+        whole_number("seed", self.seed, 0)
+        if whole_number("rollout", self.rollout, 0) > MAX_ROLLOUT:
             raise ArgumentError(f"rollout is {shown(self.rollout)}; wanted at most {MAX_ROLLOUT}")
         return checked_gain("noise.q", self.q, nv), checked_gain("noise.v", self.v, nv)
 

@@ -22,7 +22,7 @@ from dynx.simd.cache import load_kernel, program_recipe
 from dynx.simd.emit import Settings
 from dynx.simd.expr import Graph, Symbol
 from dynx.simd.kernel import Kernel
-from dynx.simd.program import Port, Program, extract_program
+from dynx.simd.program import Port, Program, extract_program, scalar_ranges
 from dynx.simd.simplify import STRICT
 from dynx.simd.target import host
 from dynx.spatial.scalar import Array, Floats
@@ -216,10 +216,7 @@ def _without_idle_inputs(program: Program) -> Program:
     read = {node.slot for node in program.nodes if node.op == "input"}
     kept: list[Port] = []
     moved: dict[int, int] = {}
-    slot = 0
-    for port in program.inputs:
-        slots = range(slot, slot + port.size)
-        slot += port.size
+    for port, slots in scalar_ranges(program.inputs):
         if not read.isdisjoint(slots):
             moved.update(zip(slots, range(len(moved), len(moved) + port.size), strict=True))
             kept.append(port)

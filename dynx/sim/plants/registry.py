@@ -14,6 +14,7 @@ from dynx.backends import backend, backend_class, backend_names
 from dynx.backends.registry import BUILT_IN as BACKENDS
 from dynx.errors import ArgumentError, BackendError, UnknownBackendError, nearest, shown
 from dynx.model import Model
+from dynx.model.configuration import whole_number
 from dynx.registry import ClassRegistry
 from dynx.sim.plants.disturbances import Disturbances
 from dynx.sim.plants.integrated import SCHEMES, IntegratedPlant
@@ -34,16 +35,9 @@ INTEGRATORS = (*SCHEMES, ENGINE)
 _steppers = ClassRegistry(
     "plant", GROUP, BUILT_IN, lambda: Plant, error=BackendError, unknown=UnknownBackendError
 )
-
-
-def plant_names() -> tuple[str, ...]:
-    """Return the names of all plants with a stepper of their own, dynx's own first."""
-    return _steppers.names()
-
-
-def plant_class(name: str) -> type[Plant]:
-    """Return the class of the plant of that name that has a stepper of its own; this imports its engine."""
-    return _steppers.find(name)
+plant_names = _steppers.names
+plant_class = _steppers.find
+unregister = _steppers.unregister
 
 
 def require_plant(name: str) -> None:
@@ -72,14 +66,9 @@ def register(name: str, loader: Callable[[], type[Plant]]) -> None:
     _steppers.register(name, loader)
 
 
-def unregister(name: str) -> None:
-    """Remove what `register` added; UnknownBackendError for a name that no program registered."""
-    _steppers.unregister(name)
-
-
 def default_integrator(name: str) -> str:
     """Return ``engine`` for a plant with a stepper of its own, otherwise ``semi_implicit``."""
-    has_stepper = name in BUILT_IN if name in BACKENDS else name in _steppers.names()
+    has_stepper = name in BUILT_IN if name in BACKENDS else name in plant_names()
     return ENGINE if has_stepper else "semi_implicit"
 
 
@@ -98,8 +87,7 @@ def make_plant(
     Raises ArgumentError for an integrator that the plant does not have, UnknownBackendError for an unknown
     name, NotInstalledError where its engine is missing, EngineError where its constructor fails.
     """
-    if not isinstance(substeps, int) or isinstance(substeps, bool) or substeps < 1:
-        raise ArgumentError(f"substeps is {shown(substeps)}; wanted 1 or more")
+    whole_number("substeps", substeps, 1)
     if integrator not in INTEGRATORS:
         raise ArgumentError(f"integrator is {shown(integrator)}; wanted one of {', '.join(INTEGRATORS)}")
     if integrator == ENGINE:

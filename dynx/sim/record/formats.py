@@ -37,10 +37,15 @@ DAMAGED = (
 
 
 def save(rollout: RolloutData, path: str | os.PathLike[str]) -> None:
-    """Write `rollout` atomically, in the format of the suffix of `path`.
+    """Write the record to a file atomically, in the format of its suffix.
 
-    Raises ArgumentError for another format or a file that cannot be written, NotInstalledError where
-    the format needs a package that is missing.
+    - ``.npz``: complete; `Rollout.load` reads it, and so does `numpy.load`
+    - ``.csv``: a table for spreadsheets; `dynx.sim.record.csv_file` describes its columns
+    - ``.mcap``: ROS 2 messages for PlotJuggler, Foxglove and ``ros2 bag``; `dynx.sim.record.ros_topics`
+      describes the topics
+
+    All three keep every bit of the numbers. Raises ArgumentError for another format or a file that
+    cannot be written, NotInstalledError for ``.mcap`` without mcap (``pip install 'dynx[mcap]'``).
     """
     write = WRITERS.get(Path(path).suffix.lower())
     if write is None:

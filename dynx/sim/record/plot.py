@@ -43,8 +43,15 @@ class Column(NamedTuple):
     axes."""
 
 
-def plot(rollout: RolloutData, path: str | os.PathLike[str] | None) -> Any:
-    """See `Rollout.plot`. The figure belongs to no window and no global state of matplotlib."""
+def plot(rollout: RolloutData, path: str | os.PathLike[str] | None = None) -> Any:
+    """Plot positions, errors and torques with their limits; return the `matplotlib.figure.Figure`, and save
+    it at `path` if that is given.
+
+    Without a reference it shows velocities instead of errors. A limit is drawn where a torque comes near it.
+    A floating base has its own column: its position in the world, and its error, velocity and force in the
+    axes of the base. The figure belongs to no window. Raises NotInstalledError without matplotlib
+    (``pip install 'dynx[plot]'``), ArgumentError for a file that cannot be written.
+    """
     columns = _columns(rollout.model)
     figure = new_figure(7.0 if len(columns) == 1 else 3.8 * len(columns), 8.0)
     panels = figure.subplots(3, len(columns), sharex=True, squeeze=False)

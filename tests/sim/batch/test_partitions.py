@@ -160,5 +160,5 @@ def test_an_invalid_seed_or_rollout_is_refused() -> None:
     for name in ("seed", "rollout"):
         wrongs: list[Any] = [-1, 1.5, True]
         for wrong in wrongs:
-            with pytest.raises(ArgumentError, match=rf"{name} is .*; wanted a whole number, 0 or more"):
+            with pytest.raises(ArgumentError, match=rf"{name} is .*; wanted a whole number, at least 0"):
                 noise_rows(Noise(**{"q": 1e-4, name: wrong}), 1)
