@@ -12,6 +12,7 @@ from typing import ClassVar, Literal
 
 from packaging.specifiers import SpecifierSet
 
+from dynx.loaded.calls import call_on_joint
 from dynx.model.model import Base
 from dynx.rules.case import Case
 
@@ -156,10 +157,24 @@ class CallingRule(Rule):
     changed: ClassVar[str]
     """The change, as in `Remedy.changed`."""
 
+    per_joint: ClassVar[bool] = True
+    """Whether each call can also be made on single joints (`dynx.loaded.calls`), those of the detections."""
+
     def detect(self, case: Case) -> Sequence[Detection]:
-        """Return the occurrences; none once the calls are made."""
-        return [] if case.calls.issuperset(self.calls) else super().detect(case)
+        """Return the occurrences in which the calls are not yet made."""
+        return [each for each in super().detect(case) if not self._is_called(case, each)]
 
     def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy | None:
-        """Return the case with the calls, which act on the whole robot."""
-        return Remedy(case.with_calls(*self.calls), self.changed)
+        """Return the case with the calls: on the whole robot, or on the joints of some of the places."""
+        joints = {each.joint for each in detections}
+        others = {each.joint for each in super().detect(case)} - joints
+        if not (self.per_joint and others):
+            return Remedy(case.with_calls(*self.calls), self.changed)
+        single = [call_on_joint(call, joint) for call in self.calls for joint in joints if joint is not None]
+        return Remedy(case.with_calls(*single), self.changed)
+
+    def _is_called(self, case: Case, each: Detection) -> bool:
+        return all(
+            call in case.calls or (each.joint is not None and call_on_joint(call, each.joint) in case.calls)
+            for call in self.calls
+        )

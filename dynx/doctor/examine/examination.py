@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,8 @@ from dynx.doctor.examine.reference_values import (
 from dynx.engines.silence import silence
 from dynx.errors import DynxError
 from dynx.loaded import LoadedModel, LoadedRobot, loader_class
+from dynx.model.model import Base
+from dynx.model.xml.source import XmlSource
 from dynx.rules.case import Case
 from dynx.spatial.scalar import Floats
 
@@ -139,10 +142,15 @@ class Examiner:
         self.engines = {name: loader_class(name) for name in engines}
         self._samples = samples
         self._seed = seed
+        # One remedy after another leaves the robot as it is.
+        self._values = lru_cache(maxsize=8)(self._compute_reference)
 
     def reference(self, case: Case) -> ReferenceValues:
         """Compute the reference values of a case at random states."""
-        model = model_without_mimics(case.source, case.base)
+        return self._values(without_meshes(case.source).text, case.source.source, case.base)
+
+    def _compute_reference(self, text: str, name: str, base: Base) -> ReferenceValues:
+        model = model_without_mimics(XmlSource(text, name), base)
         return reference_values(model, draw_states(model, self._samples, self._seed))
 
     def examine(

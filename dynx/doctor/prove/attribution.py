@@ -2,8 +2,8 @@
 
 For every place where a rule applies, its cause is removed there and nowhere else, and each engine that the
 rule names loads the file again. The change in the engine's deviation from the reference values is the
-*effect*. Two causes can hide each other (an engine that refuses a file for two reasons); then all other
-causes are removed, and the effect is the deviation that this one cause leaves.
+*effect*. Causes can hide each other (an engine that refuses a file for two reasons, or at two places); then
+all others are removed, and the effect is the deviation that this one place leaves.
 
 A cause is *proved* for an engine where it has an effect above the tolerance, and the engine agrees with the
 reference once all causes are removed.
@@ -13,18 +13,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
+from math import isfinite
 
 from dynx.doctor.examine.examination import LOADING, QUANTITIES, Examination, Examiner, max_change
 from dynx.doctor.examine.reference_values import ReferenceValues
-from dynx.doctor.prove.mending import Mending, mend, readable, remedy_of
+from dynx.doctor.prove.mending import Mending, all_except, mend, place_of, readable, remedy_of
 from dynx.doctor.prove.reinsertion import reinserted_text
 from dynx.doctor.report import Effect
-from dynx.rules import Case, Detection, Remedy, Rule
+from dynx.rules import CallingRule, Case, Detection, Remedy, Rule
+from dynx.spatial.extended import FLOAT64_EPS
 
 NO_EFFECT = Effect("", 0.0)
 
-STATES_PER_PLACE = 2
-"""Number of states for the effect at each place, once the effect at all places together is known."""
+NOISE_SHARE = 0.01
+"""Largest rounding of the errors of an engine, as a share of the tolerance, at which differences of these errors
+are effects."""
 
 
 @dataclass(frozen=True)
@@ -58,65 +62,75 @@ class Attributor:
         """Measure the effect of the rule at each of the places where it was found."""
         self.progress(f"{rule.id} {rule.name}")
         named = [engine for engine in self.examiner.engines if engine in rule.engines]
-        affected = self._effects_of_removal(rule, found, named)
-        loading = [name for name, effect in affected.items() if effect.quantity == LOADING]
-        unaffected = [name for name in named if name not in affected and self._has_error(name)]
-        if unaffected:
-            affected |= self._effects_of_reinsertion(rule, found, unaffected)
-        if len(found) == 1 or not affected:
+        wrong = [name for name in named if self.before.max_error(name) > self.tolerance]
+        rest = cache(lambda: mend(self.case, [other for other in self.rules if other is not rule]))
+        affected = self._effects_at(rule, found, named, wrong, rest)
+        if len({place_of(rule, each) for each in found}) == 1 or not affected:
             return [self._attribution(rule, each, affected) for each in found]
-        proofs = []
-        for each in found:
-            effects = self._effects_of_removal(rule, [each], affected, STATES_PER_PLACE)
-            others = [other for other in found if other is not each]
-            # Where each of several places makes an engine refuse the file, removing one alone shows nothing.
-            refusing = [engine for engine in loading if engine not in effects]
-            effects |= self._refused_with(rule, others, refusing)
-            for engine, effect in affected.items():
-                refused = self.before.outputs[engine].refused is not None
-                if refused and engine not in effects and engine not in loading:
-                    effects[engine] = effect
-            proofs.append(self._attribution(rule, each, effects))
-        return proofs
+        hidden = [name for name in affected if self._hides(name)]
+        return [
+            self._attribution(rule, each, self._effects_at(rule, [each], affected, hidden, rest))
+            for each in found
+        ]
 
-    def _refused_with(
-        self, rule: Rule, others: Sequence[Detection], engines: Sequence[str]
+    def _effects_at(
+        self,
+        rule: Rule,
+        found: Sequence[Detection],
+        engines: Collection[str],
+        hidden: Collection[str],
+        rest: Callable[[], Mending],
     ) -> dict[str, Effect]:
-        """Find the engines that refuse the file when the cause is left at one place only."""
-        remedy = remedy_of(self.case, rule, others) if engines else None
-        if remedy is None:
-            return {}
-        reference = self._reference_of(remedy).first(1)
-        found = self.examiner.examine(remedy.case, engines, reference=reference).outputs
-        return {
-            engine: Effect(LOADING, float("inf")) for engine in engines if found[engine].refused is not None
-        }
+        """Effects of the rule at these places: by removal, or, in `hidden` engines where that shows nothing,
+        by reinsertion."""
+        noisy = {name for name in engines if self._is_noisy(name)}
+        effects = self._effects_of_removal(rule, found, [name for name in engines if name not in noisy])
+        missing = [name for name in engines if name not in effects and name in {*hidden, *noisy}]
+        if missing:
+            effects |= self._effects_of_reinsertion(rule, found, missing, rest())
+        return {name: effects[name] for name in engines if name in effects}
+
+    def _hides(self, engine: str) -> bool:
+        """Check whether an engine computes nothing as long as one of several causes is left."""
+        before = self.before.outputs[engine]
+        return before.refused is not None or bool(before.failed)
+
+    def _is_noisy(self, engine: str) -> bool:
+        """Check whether rounding of the errors of an engine would pass for an effect.
+
+        Where shapes overlap by design, for example, MuJoCo's torques are 1e18 times too large.
+        """
+        errors = [error for error in self.before.errors(engine).values() if isfinite(error)]
+        return max(errors, default=0.0) * FLOAT64_EPS > NOISE_SHARE * self.tolerance
 
     def _effects_of_removal(
-        self, rule: Rule, found: Sequence[Detection], engines: Collection[str], states: int | None = None
+        self, rule: Rule, found: Sequence[Detection], engines: Collection[str]
     ) -> dict[str, Effect]:
-        """Return the effects on each engine of removing the cause at these places and nothing else."""
-        if not engines:
-            return {}
-        remedy = remedy_of(self.case, rule, found)
+        """Effects on each engine of removing the cause at these places and nothing else."""
+        remedy = remedy_of(self.case, rule, found) if engines else None
         if remedy is None:
             return {}
-        before = self.before if states is None else self.before.first(states)
-        reference = self._reference_of(remedy)
-        after = self.examiner.examine(
-            remedy.case, engines, reference=reference if states is None else reference.first(states)
-        )
-        return self._effects(engines, before, after)
+        after = self.examiner.examine(remedy.case, engines, reference=self._reference_of(remedy))
+        return self._effects(engines, self.before, after)
 
     def _effects_of_reinsertion(
-        self, rule: Rule, found: Sequence[Detection], engines: Sequence[str]
+        self, rule: Rule, found: Sequence[Detection], engines: Sequence[str], rest: Mending
     ) -> dict[str, Effect]:
-        """Return the effects on each engine of reinserting the cause into the mended file."""
-        rest: Mending = mend(self.case, [other for other in self.rules if other is not rule])
+        """Effects on each engine of leaving the cause at these places of the mended file.
+
+        `rest` is the case without the causes of all other rules.
+        """
         if not rest.case.readable:
             return {}
-        if all(applied is not rule for applied, _ in rest.applied):
-            return self._effects(engines, self.examiner.examine(rest.case, engines), self.after)
+        places = {place_of(rule, each) for each in found}
+        if isinstance(rule, CallingRule):
+            others = [each for each in rule.detect(rest.case) if place_of(rule, each) not in places]
+            remedy = remedy_of(rest.case, rule, others)
+            left = rest if remedy is None else Mending(remedy.case)
+        else:
+            left = mend(rest.case, self.rules, all_except(places))
+        if places.intersection(place_of(rule, each) for each in rule.detect(left.case)):
+            return self._effects(engines, self.examiner.examine(left.case, engines), self.after)
         # Without this rule dynx itself could not read the file.
         remedy = remedy_of(self.case, rule, found)
         mended = mend(self.case, self.rules).case
@@ -130,13 +144,10 @@ class Attributor:
         )
         return self._effects(engines, with_cause, self.after)
 
-    def _has_error(self, engine: str) -> bool:
-        return self.before.max_error(engine) > self.tolerance
-
     def _effects(
         self, engines: Iterable[str], with_cause: Examination, without: Examination
     ) -> dict[str, Effect]:
-        """Return the effects above the tolerance."""
+        """Effects above the tolerance."""
         found = {name: self._effect(name, with_cause, without) for name in engines}
         return {name: effect for name, effect in found.items() if effect is not NO_EFFECT}
 
@@ -164,8 +175,7 @@ class Attributor:
         return Attribution(rule, each, dict(effects), bool(effects) and right)
 
     def _reference_of(self, remedy: Remedy) -> ReferenceValues:
-        """Return the reference values of the file after a remedy: the known ones where the robot is the
-        same."""
+        """Reference values of the file after a remedy: the known ones where the robot is the same."""
         if not remedy.changes_physics and _coordinates(remedy.case) == _coordinates(self.case):
             return self.before.reference
         # Other places may still hold text that dynx refuses, whose meaning is known too.

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from dynx.engines.drake.library import SpatialInertia, UnitInertia
+from dynx.loaded.calls import called_joints
 from dynx.model import Model
 from dynx.model.mechanism import float64, pose_arrays
+from dynx.model.xml.source import XmlSource
 from dynx.spatial.inertia import inertia_about_origin
 
 CALLS: Mapping[str, str] = {
@@ -39,18 +42,31 @@ NEGLIGIBLE_MASS = 2.0**-200
 by it is exact, and so small that its weight is below rounding."""
 
 
-def set_before_finalize(plant: Any, calls: Collection[str]) -> None:
-    """Apply those of `calls` that must precede `Finalize`."""
-    if "drake.no_damping" in calls:
-        for index in plant.GetJointIndices():
-            joint = plant.get_mutable_joint(index)
-            joint.set_default_damping_vector(0.0 * joint.default_damping_vector())
+def set_before_finalize(plant: Any, joints: Mapping[str, Any], path: Path, calls: Collection[str]) -> None:
+    """Apply those of `calls` that must precede `Finalize`; `joints` are those of the file, by name."""
+    for name in called_joints(calls, "drake.no_damping", joints):
+        joint = plant.get_mutable_joint(joints[name].index())
+        joint.set_default_damping_vector(0.0 * joint.default_damping_vector())
+    constraints = plant.GetConstraintIds()
     if "drake.free_mimics" in calls:
-        for constraint in plant.GetConstraintIds():
-            plant.RemoveConstraint(constraint)
-    if "drake.no_rotors" in calls:
-        for index in plant.GetJointActuatorIndices():
-            plant.get_mutable_joint_actuator(index).set_default_rotor_inertia(0.0)
+        freed = constraints
+    else:
+        # Drake numbers them in document order and does not name their joints.
+        followers = _followers(path) if constraints else []
+        known = dict(zip(followers, constraints, strict=False)) if len(followers) == len(constraints) else {}
+        freed = [known[name] for name in called_joints(calls, "drake.free_mimics", known)]
+    for constraint in freed:
+        plant.RemoveConstraint(constraint)
+    for index in plant.GetJointActuatorIndices():
+        actuator = plant.get_mutable_joint_actuator(index)
+        if any(called_joints(calls, "drake.no_rotors", [actuator.joint().name()])):
+            actuator.set_default_rotor_inertia(0.0)
+
+
+def _followers(path: Path) -> list[str]:
+    """Name the joints with a ``<mimic>``, in document order."""
+    joints = XmlSource(path.read_bytes(), str(path)).root.all("joint")
+    return [joint.attributes.get("name", "") for joint in joints if joint.first("mimic") is not None]
 
 
 def set_in_context(context: Any, bodies: Mapping[str, Any], model: Model, calls: Collection[str]) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -11,6 +11,7 @@ from typing import Any
 from dynx.engines.mujoco.library import MAX_DEPTH, mujoco
 from dynx.engines.silence import silence
 from dynx.errors import EngineError, nonblank_lines, shown
+from dynx.loaded.calls import called_joints
 from dynx.loaded.robot import require_file
 from dynx.model import Model
 
@@ -47,6 +48,7 @@ def load_file(path: Path, model: Model, calls: Collection[str]) -> Any:
             for call, code in CALLS.items():
                 if call in calls:
                     exec(code, names)
+            _set_joints(names["model"], calls)
     except Exception as error:
         raise EngineError(f"mujoco refuses {path.name}: {_message(error)}") from error
     loaded = names["model"]
@@ -58,6 +60,42 @@ def load_file(path: Path, model: Model, calls: Collection[str]) -> Any:
                 + (": MuJoCo mistakes a root named 'world' for the world" if model.root == "world" else "")
             )
     return loaded
+
+
+def _set_joints(loaded: Any, calls: Collection[str]) -> None:
+    """Apply those of `calls` that are made on single joints."""
+    joints = {loaded.joint(k).name: k for k in range(loaded.njnt)}
+    for call, change in _ON_JOINT.items():
+        if call not in calls:
+            for name in called_joints(calls, call, joints):
+                change(loaded, joints[name])
+
+
+def _free_follower(loaded: Any, joint: int) -> None:
+    """Switch off the constraints by which a joint follows another."""
+    follows = (loaded.eq_type == mujoco.mjtEq.mjEQ_JOINT) & (loaded.eq_obj1id == joint)
+    loaded.eq_active0[follows] = 0
+
+
+def _disable_damping(loaded: Any, joint: int) -> None:
+    loaded.dof_damping[loaded.jnt_dofadr[joint]] = 0
+
+
+def _disable_friction(loaded: Any, joint: int) -> None:
+    loaded.dof_frictionloss[loaded.jnt_dofadr[joint]] = 0
+
+
+def _disable_limits(loaded: Any, joint: int) -> None:
+    loaded.jnt_limited[joint] = 0
+
+
+_ON_JOINT: Mapping[str, Callable[[Any, int], None]] = {
+    "mujoco.no_damping": _disable_damping,
+    "mujoco.no_friction": _disable_friction,
+    "mujoco.no_limits": _disable_limits,
+    "mujoco.no_mimic": _free_follower,
+}
+"""The calls of `CALLS` that can be made on one joint, by its number."""
 
 
 @contextmanager

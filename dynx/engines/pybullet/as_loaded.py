@@ -29,10 +29,9 @@ from dynx.engines.pybullet.loaded_description import describe_model
 from dynx.engines.pybullet.robot import base_conversion, inverse_base_conversion
 from dynx.engines.pybullet.settings import (
     CALLS,
-    disable_joint_damping,
-    disable_limits,
     disable_simulation_settings,
     set_inertias,
+    set_joints,
     with_ballast,
 )
 from dynx.errors import EngineError, shown
@@ -95,10 +94,7 @@ class LoadedPyBullet(LoadedRobot):
         client.apply(disable_simulation_settings)
         if "pybullet.set_inertias" in calls:
             client.apply(set_inertias(self._model, self._links))
-        if "pybullet.no_damping" in calls:
-            client.apply(disable_joint_damping)
-        if "pybullet.no_limits" in calls:
-            client.apply(disable_limits)
+        client.apply(set_joints({_text(client.joints[k][1]): k for k in client.moving}, calls))
 
     @property
     def _client(self) -> LoadedClient:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 import numpy as np
 
 from dynx.engines.pybullet.loaded_client import LoadedClient, Setting
+from dynx.loaded.calls import called_joints
 from dynx.model import Model
 from dynx.model.mechanism import ROOT
 from dynx.spatial.so3 import rotation_from_quat
@@ -31,6 +32,13 @@ CALLS: Mapping[str, str] = {
 }
 """The lines of code, by the id of the remedy."""
 
+_JOINT_VALUES = {
+    "pybullet.no_damping": {"jointDamping": 0.0},
+    # Limits that no joint reaches.
+    "pybullet.no_limits": {"jointLowerLimit": -1e300, "jointUpperLimit": 1e300},
+}
+"""The values of joints that a call sets."""
+
 
 def disable_simulation_settings(client: LoadedClient) -> None:
     """Switch off motors, damping of the base and the limit of speeds, which do not come from the file."""
@@ -38,17 +46,15 @@ def disable_simulation_settings(client: LoadedClient) -> None:
     client.release_motors()
 
 
-def disable_joint_damping(client: LoadedClient) -> None:
-    """Set the damping of all joints to zero."""
-    for k in client.links:
-        client.call(client.engine.changeDynamics, client.body, k, jointDamping=0.0)
+def set_joints(joints: Mapping[str, int], calls: Collection[str]) -> Setting:
+    """Setting that applies those of `calls` that act on joints, which `joints` numbers by name."""
 
+    def change(client: LoadedClient) -> None:
+        for call, values in _JOINT_VALUES.items():
+            for name in called_joints(calls, call, joints):
+                client.call(client.engine.changeDynamics, client.body, joints[name], **values)
 
-def disable_limits(client: LoadedClient) -> None:
-    """Set limits that no joint reaches."""
-    limits = {"jointLowerLimit": -1e300, "jointUpperLimit": 1e300}
-    for k in client.moving:
-        client.call(client.engine.changeDynamics, client.body, k, **limits)
+    return change
 
 
 def set_inertias(model: Model, links: Mapping[str, int]) -> Setting:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Sequence
+from functools import lru_cache
 from typing import ClassVar
 
 from dynx.errors import shown
-from dynx.model.xml.source import Edit
+from dynx.model.xml.source import Edit, XmlSource
 from dynx.rules.case import Case
 from dynx.rules.editing import Correction, EditingRule, correction
 from dynx.rules.rule import Stage
@@ -41,12 +42,22 @@ class MisspelledNumberRule(EditingRule):
 
     def corrections(self, case: Case) -> Iterable[Correction]:
         """Yield every attribute with the fault."""
-        for attribute in numeric_attributes(case.source):
-            find = misspelled_number if attribute.count == 1 else misspelled_vector
-            text = attribute.text_in(case.source)
-            misspelling = find(text)
-            if misspelling is None or misspelling.fault != self.fault or not self.applies(attribute):
+        for attribute, text, misspelling in _misspelled(case.source):
+            if misspelling.fault != self.fault or not self.applies(attribute):
                 continue
             end = self.description.format(meant=self.text_for(case, misspelling), count=len(text.split()))
             message = f"{attribute.name} of <{attribute.element.tag}> is {shown(text)}, {end}"
             yield correction(attribute.element, message, self.edit(case, attribute, misspelling))
+
+
+# Each of the rules examines the same document before the first remedy makes another.
+@lru_cache(maxsize=4)
+def _misspelled(source: XmlSource) -> Sequence[tuple[NumericAttribute, str, Misspelling]]:
+    """Find the attributes with a fault, each with its text, in document order."""
+    found = []
+    for attribute in numeric_attributes(source):
+        text = attribute.text_in(source)
+        misspelling = misspelled_number(text) if attribute.count == 1 else misspelled_vector(text)
+        if misspelling is not None:
+            found.append((attribute, text, misspelling))
+    return found
