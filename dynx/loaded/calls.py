@@ -1,7 +1,7 @@
 """Addresses of engine calls: on the whole robot, or on one of its joints.
 
-The id of a call (a key of `LoadedRobot.CALLS`) is the call on the whole robot. ``id@joint`` is the same call on
-one joint, with which the effect of that joint alone is measured.
+The id of a call (a key of `LoadedRobot.CALLS`) is the call on the whole robot. ``id@joint`` is the same call
+on one joint, with which the effect of that joint alone is measured.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ from math import isfinite
 
 from dynx.doctor.examine.examination import LOADING, QUANTITIES, Examination, Examiner, max_change
 from dynx.doctor.examine.reference_values import ReferenceValues
-from dynx.doctor.prove.mending import Mending, all_except, mend, place_of, readable, remedy_of
+from dynx.doctor.prove.mending import Mending, Place, all_except, mend, place_of, readable, remedy_of
 from dynx.doctor.prove.reinsertion import reinserted_text
 from dynx.doctor.report import Effect
 from dynx.rules import CallingRule, Case, Detection, Remedy, Rule
@@ -27,8 +27,8 @@ from dynx.spatial.extended import FLOAT64_EPS
 NO_EFFECT = Effect("", 0.0)
 
 NOISE_SHARE = 0.01
-"""Largest rounding of the errors of an engine, as a share of the tolerance, at which differences of these errors
-are effects."""
+"""Largest rounding of the errors of an engine, as a share of the tolerance, at which their differences are
+effects."""
 
 
 @dataclass(frozen=True)
@@ -65,13 +65,25 @@ class Attributor:
         wrong = [name for name in named if self.before.max_error(name) > self.tolerance]
         rest = cache(lambda: mend(self.case, [other for other in self.rules if other is not rule]))
         affected = self._effects_at(rule, found, named, wrong, rest)
-        if len({place_of(rule, each) for each in found}) == 1 or not affected:
+        if len(found) == 1 or not affected:
             return [self._attribution(rule, each, affected) for each in found]
+        places: dict[Place, list[Detection]] = {}
+        for each in found:
+            places.setdefault(place_of(rule, each), []).append(each)
         hidden = [name for name in affected if self._hides(name)]
-        return [
-            self._attribution(rule, each, self._effects_at(rule, [each], affected, hidden, rest))
-            for each in found
-        ]
+        measured: dict[Detection, dict[str, Effect]] = {}
+        for faults in places.values():
+            if len(faults) > 1:
+                measured |= {each: self._effects_at(rule, [each], affected, (), rest) for each in faults}
+            # Each of several faults of one place can be enough for an engine to refuse the file.
+            unclear = {
+                name for name in affected if all(name not in measured.get(each, {}) for each in faults)
+            }
+            whole = self._effects_at(rule, faults, unclear, hidden, rest) if len(places) > 1 else affected
+            for each in faults:
+                shared = {name: effect for name, effect in whole.items() if name in unclear}
+                measured[each] = measured.get(each, {}) | shared
+        return [self._attribution(rule, each, measured[each]) for each in found]
 
     def _effects_at(
         self,
@@ -92,8 +104,7 @@ class Attributor:
 
     def _hides(self, engine: str) -> bool:
         """Check whether an engine computes nothing as long as one of several causes is left."""
-        before = self.before.outputs[engine]
-        return before.refused is not None or bool(before.failed)
+        return not isfinite(self.before.max_error(engine))
 
     def _is_noisy(self, engine: str) -> bool:
         """Check whether rounding of the errors of an engine would pass for an effect.
@@ -160,7 +171,7 @@ class Attributor:
             return Effect(LOADING, float("inf"))
         largest = NO_EFFECT
         for quantity in QUANTITIES:
-            if quantity in other.failed:
+            if quantity in other.failed or not isfinite(without.error(engine, quantity)):
                 continue
             if quantity in one.failed:
                 return Effect(quantity, float("inf"))

@@ -55,12 +55,14 @@ class InertiaBrokenByRounding(Rule):
 
     def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy:
         """Raise the moments of each link, or merge a point mass on a fixed joint with its parent."""
+        wrong = links_of(detections)
+        kept = set(links_of(self.detect(case))).difference(wrong)
         # Merged inertias may need a correction in their turn.
         for _ in range(_ROUNDS):
-            for name in links_of(detections):
+            for name in wrong:
                 case = _corrected(case, name)
-            detections = self.detect(case)
-            if not detections:
+            wrong = [name for name in links_of(self.detect(case)) if name not in kept]
+            if not wrong:
                 break
         return Remedy(case, "raised moments on the bound of what a body can have by a few 1e-15 of them")
 
