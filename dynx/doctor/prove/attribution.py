@@ -93,8 +93,8 @@ class Attributor:
         hidden: Collection[str],
         rest: Callable[[], Mending],
     ) -> dict[str, Effect]:
-        """Effects of the rule at these places: by removal, or, in `hidden` engines where that shows nothing,
-        by reinsertion."""
+        """Return the effects of the rule at these places: by removal, or, in `hidden` engines where that
+        shows nothing, by reinsertion."""
         noisy = {name for name in engines if self._is_noisy(name)}
         effects = self._effects_of_removal(rule, found, [name for name in engines if name not in noisy])
         missing = [name for name in engines if name not in effects and name in {*hidden, *noisy}]
@@ -117,7 +117,7 @@ class Attributor:
     def _effects_of_removal(
         self, rule: Rule, found: Sequence[Detection], engines: Collection[str]
     ) -> dict[str, Effect]:
-        """Effects on each engine of removing the cause at these places and nothing else."""
+        """Return the effects on each engine of removing the cause at these places and nothing else."""
         remedy = remedy_of(self.case, rule, found) if engines else None
         if remedy is None:
             return {}
@@ -127,7 +127,7 @@ class Attributor:
     def _effects_of_reinsertion(
         self, rule: Rule, found: Sequence[Detection], engines: Sequence[str], rest: Mending
     ) -> dict[str, Effect]:
-        """Effects on each engine of leaving the cause at these places of the mended file.
+        """Return the effects on each engine of leaving the cause at these places of the mended file.
 
         `rest` is the case without the causes of all other rules.
         """
@@ -158,7 +158,7 @@ class Attributor:
     def _effects(
         self, engines: Iterable[str], with_cause: Examination, without: Examination
     ) -> dict[str, Effect]:
-        """Effects above the tolerance."""
+        """Return the effects above the tolerance."""
         found = {name: self._effect(name, with_cause, without) for name in engines}
         return {name: effect for name, effect in found.items() if effect is not NO_EFFECT}
 
@@ -186,7 +186,8 @@ class Attributor:
         return Attribution(rule, each, dict(effects), bool(effects) and right)
 
     def _reference_of(self, remedy: Remedy) -> ReferenceValues:
-        """Reference values of the file after a remedy: the known ones where the robot is the same."""
+        """Return the reference values of the file after a remedy: the known ones where the robot is the
+        same."""
         if not remedy.changes_physics and _coordinates(remedy.case) == _coordinates(self.case):
             return self.before.reference
         # Other places may still hold text that dynx refuses, whose meaning is known too.

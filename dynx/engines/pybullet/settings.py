@@ -47,7 +47,7 @@ def disable_simulation_settings(client: LoadedClient) -> None:
 
 
 def set_joints(joints: Mapping[str, int], calls: Collection[str]) -> Setting:
-    """Setting that applies those of `calls` that act on joints, which `joints` numbers by name."""
+    """Return the setting that applies those of `calls` that act on joints, which `joints` numbers by name."""
 
     def change(client: LoadedClient) -> None:
         for call, values in _JOINT_VALUES.items():
