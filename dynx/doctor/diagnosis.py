@@ -146,7 +146,7 @@ def _diagnosis_of(
     found = with_original_lines(detections(case, rules), case.source, sound.source)
     report = first_report(case, before, tolerance)
     if report.alike and not _chosen_practice(case, found):
-        return replace(report, findings=all_findings(found, [], Mending(case)))
+        return replace(report, findings=all_findings(found, [], Mending(case), examiner.engines))
     progress("mending")
     full = mend(case, rules)
     after = examiner.examine(full.case)
@@ -158,7 +158,7 @@ def _diagnosis_of(
     changed = differs(mended.case, case)
     return replace(
         with_after(report, last),
-        findings=all_findings(found, proofs, mended),
+        findings=all_findings(found, proofs, mended, examiner.engines),
         unexplained=unexplained,
         choices=mended.choices,
         calls=run_time_calls(mended.case, examiner),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from itertools import combinations
 
@@ -80,9 +80,12 @@ def _pairs(examination: Examination) -> tuple[PairError, ...]:
 
 
 def all_findings(
-    found: Sequence[tuple[Rule, Detection]], proofs: Sequence[Attribution], mended: Mending
+    found: Sequence[tuple[Rule, Detection]],
+    proofs: Sequence[Attribution],
+    mended: Mending,
+    engines: Collection[str],
 ) -> tuple[Finding, ...]:
-    """Report everything detected, with the effect where one was measured."""
+    """Report everything detected, with the effect where one was measured; texts name these engines only."""
     proved: dict[Place, list[Attribution]] = {}
     for each in proofs:
         proved.setdefault(place_of(each.rule, each.detection), []).append(each)
@@ -93,7 +96,13 @@ def all_findings(
         of_place = proved.get(place_of(rule, detection), [])
         attribution = of_place.pop(0) if of_place else None
         finding = Finding(
-            rule.id, rule.name, rule.kind, detection.link, detection.joint, detection.line, detection.message
+            rule.id,
+            rule.name,
+            rule.kind,
+            detection.link,
+            detection.joint,
+            detection.line,
+            detection.sentence(engines),
         )
         if attribution is not None and attribution.effects:
             finding = replace(

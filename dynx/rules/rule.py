@@ -6,7 +6,7 @@ import inspect
 import re
 import sys
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
@@ -30,12 +30,22 @@ _HEADING = re.compile(r"([A-Z]+[0-9]{3}) ([a-z0-9]+(?:-[a-z0-9]+)+): (.+)", re.D
 
 @dataclass(frozen=True)
 class Detection:
-    """One place where a rule applies, with one sentence on what is wrong there."""
+    """One place where a rule applies, with one sentence on what is wrong there.
+
+    The message of a rule that concerns several engines names none of them: `engine_clauses` are pairs of an
+    engine and a clause on what it makes of the place. A report has the clauses of the engines that take part.
+    """
 
     link: str | None
     joint: str | None
     line: int | None
     message: str
+    engine_clauses: tuple[tuple[str, str], ...] = ()
+
+    def sentence(self, engines: Collection[str]) -> str:
+        """Return the message with the clauses of these engines."""
+        clauses = [clause for engine, clause in self.engine_clauses if engine in engines]
+        return f"{self.message}: {', '.join(clauses)}" if clauses else self.message
 
 
 def links_of(detections: Sequence[Detection]) -> list[str]:
@@ -73,7 +83,8 @@ class Rule(ABC):
     """Words joined by hyphens, such as ``link-without-inertial``."""
 
     title: ClassVar[str]
-    """The cause in one sentence."""
+    """The cause in one sentence. Like `advice` and `choices`, it names an engine only where the rule concerns
+    this one alone: a user may have asked for others."""
 
     kind: ClassVar[Kind] = "difference"
     stage: ClassVar[Stage] = "model"

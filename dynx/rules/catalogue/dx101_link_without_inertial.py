@@ -1,5 +1,4 @@
-"""DX101 link-without-inertial: A link without <inertial> weighs 1 kg in PyBullet, its shapes' weight in
-MuJoCo, else nothing.
+"""DX101 link-without-inertial: A link has no <inertial>: some engines give it a mass, others none.
 
 A link that only marks a place, such as a tool flange or a camera frame, is often written without an
 ``<inertial>`` element. URDF does not define the mass of such a link.
@@ -34,6 +33,14 @@ _WORLD = "world"
 """Name of a link without ``<inertial>`` that PyBullet gives no mass."""
 
 
+_READINGS = (
+    ("pinocchio", "no mass in Pinocchio"),
+    ("pybullet", "1 kg and 1 kg m^2 in PyBullet"),
+    ("mujoco", "the weight of its shapes in MuJoCo"),
+    ("drake", "no mass in Drake"),
+)
+
+
 class LinkWithoutInertial(Rule):
     engines = measured_on("pybullet", "mujoco")
     advice = "Write an <inertial>: the true one, or one of zero where the link is a mere frame."
@@ -41,10 +48,9 @@ class LinkWithoutInertial(Rule):
     def occurrences(self, case: Case) -> Iterable[Detection]:
         """Yield the links that can move and have no ``<inertial>``."""
         static = static_links(case)
-        message = "no <inertial>: 1 kg and 1 kg m^2 in PyBullet, nothing in Pinocchio and Drake"
         for name, element in case.links.items():
             if element.first("inertial") is None and name not in static and name != _WORLD:
-                yield Detection(name, None, element.line, message)
+                yield Detection(name, None, element.line, "no <inertial>", _READINGS)
 
     def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy:
         """Write an inertial of zero into each link.

@@ -1,5 +1,4 @@
-"""DX108 massless-link-with-inertia: A link of mass zero has moments of inertia: Drake makes it 1 kg, MuJoCo
-drops or refuses it.
+"""DX108 massless-link-with-inertia: A link of mass zero has moments of inertia, which no body has.
 
 A body with moments of inertia has mass. A file can contradict this: the mass of a foot or a sensor was set to
 zero and its tensor was kept.
@@ -31,6 +30,8 @@ from dynx.rules.inertia.merging import merged_inertials
 from dynx.rules.inertia.physical import MIN_MASS
 from dynx.rules.inertia.rigid_groups import inertials_in_groups, rigid_groups
 
+_READINGS = (("mujoco", "dropped or refused by MuJoCo"), ("drake", "1 kg in Drake"))
+
 
 class MasslessLinkWithInertia(Rule):
     engines = measured_on("drake", "mujoco")
@@ -42,7 +43,7 @@ class MasslessLinkWithInertia(Rule):
             largest = float(np.max(np.abs(inertial.tensor)))
             if inertial.mass == 0.0 and largest > 0.0 and not group.static:
                 message = f"the mass is zero, and the largest entry of the tensor {largest:.6g}"
-                yield Detection(name, None, inertial.line, message)
+                yield Detection(name, None, inertial.line, message, _READINGS)
 
     def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy:
         """Return the case with each tensor moved to a link with mass, or with the least mass added."""

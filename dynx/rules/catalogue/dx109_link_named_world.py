@@ -32,7 +32,7 @@ class LinkNamedWorld(Rule):
     advice = "Give the link another name, or load the robot with a fixed base."
     choices = {
         "rename": "give the link another name, wherever the document names it",
-        "keep": "keep the name; Drake and MuJoCo then read another robot",
+        "keep": "keep the name; engines that give it a meaning then read another robot",
     }
     trap_base = "floating"
 

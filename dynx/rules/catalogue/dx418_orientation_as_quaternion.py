@@ -1,4 +1,4 @@
-"""DX418 orientation-as-quaternion: The orientation of an origin is a quaternion, which only Pinocchio reads.
+"""DX418 orientation-as-quaternion: The orientation of an origin is a quaternion, which few engines read.
 
 URDF 1.1 introduced ``<origin xyz="..." quat_xyzw="0 0 0.7071 0.7071"/>`` in place of ``rpy``. A file must ask
 for it with ``<robot version="1.1">`` or ``1.2``.

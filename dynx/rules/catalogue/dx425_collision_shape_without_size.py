@@ -47,7 +47,7 @@ class CollisionShapeWithoutSize(EditingRule):
     choices = {
         "remove": "remove collisions without size",
         "thicken": "write 1e-6 m for sizes of zero; remove a collision only where a size is missing",
-        "keep": "keep them; MuJoCo then refuses the file",
+        "keep": "keep them; engines that need a size then refuse the file",
     }
     changed = "removed collision shapes without size, or gave them one"
 

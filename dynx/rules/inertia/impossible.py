@@ -39,7 +39,7 @@ class ImpossibleInertia(Rule):
         "fuse": "merge the link with links rigidly connected to it where that makes a body, which changes no "
         "equation of motion; else as nearest",
         "nearest": "put the nearest tensor that a body can have in its place",
-        "keep": "leave the numbers and give them to PyBullet and Drake after loading; MuJoCo cannot follow",
+        "keep": "leave the numbers, and give them after loading to the engines that take them",
     }
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
@@ -65,7 +65,7 @@ class ImpossibleInertia(Rule):
             moving = [name for name in names if not rigid_groups(case)[name].static]
             rotated = {name: _with_largest_on_y(found) for name in moving if (found := case.inertials[name])}
             mended = with_inertials(case, rotated).with_calls(*NUMBERS_OF_THE_FILE)
-            return Remedy(mended, "gave PyBullet and Drake the numbers of the file after loading", decision)
+            return Remedy(mended, "gave engines the numbers of the file after loading", decision)
         merged: list[str] = []
         if chosen == "fuse":
             for name in names:
