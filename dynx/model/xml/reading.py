@@ -6,12 +6,13 @@ Expat parses the text, without namespaces (so an undeclared prefix is no error) 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from xml.parsers import expat
 
 from dynx.errors import DescriptionError, escaped
 from dynx.model.elements import Note
+from dynx.model.xml.repair import Repair, repaired
 from dynx.model.xml.text import decode, strip_ends
 
 MAX_DEPTH = 256
@@ -52,11 +53,41 @@ def read_xml(
     often a tag may occur directly below the root. Character data are stored for the tags in `with_text`,
     which name elements without children. Notes are appended to `notes`. Raises DescriptionError for text that
     is not XML, is truncated, has a document type, is nested deeper than MAX_DEPTH, or has more elements than
-    MAX_ELEMENTS or `max_counts` allows.
+    MAX_ELEMENTS or `max_counts` allows. Faults of the XML that engines forgive are repaired, with notes.
     """
     text = decode(data, source, notes) if isinstance(data, bytes) else data
     text, lines_before = strip_ends(text, notes)
-    return _TreeBuilder(source, lines_before, opaque, max_counts or {}, with_text).build(text)
+
+    def builder() -> _TreeBuilder:
+        return _TreeBuilder(source, lines_before, opaque, max_counts or {}, with_text)
+
+    root, repair = _parse(text, lines_before, builder)
+    notes += () if repair is None else repair.notes
+    return root
+
+
+def repair_of(text: str, source: str, lines_before: int = 0) -> Repair | None:
+    """Check a document as `read_xml` does, and return its repair; None where it is well-formed."""
+    return _parse(text, lines_before, lambda: _TreeBuilder(source, lines_before, (), {}, ()))[1]
+
+
+def _parse(
+    text: str, lines_before: int, builder: Callable[[], _TreeBuilder]
+) -> tuple[Element, Repair | None]:
+    try:
+        return builder().build(text), None
+    except MalformedXmlError as error:
+        repair = repaired(text, lines_before)
+        if repair is None:
+            raise
+        try:
+            return builder().build(repair.text), repair
+        except MalformedXmlError:
+            raise error from None
+
+
+class MalformedXmlError(DescriptionError):
+    """Text that is not well-formed XML."""
 
 
 class _TreeBuilder:
@@ -90,8 +121,9 @@ class _TreeBuilder:
         try:
             self._parser.Parse(text.encode("utf-8"), True)
         except expat.ExpatError as error:
-            raise self._error(
-                _explain(error.code, self._root is not None), self._lines_before + error.lineno
+            reason = _explain(error.code, self._root is not None)
+            raise MalformedXmlError(
+                reason, source=self._source, line=self._lines_before + error.lineno
             ) from None
         except UnicodeEncodeError as error:
             line = self._lines_before + text.count("\n", 0, error.start) + 1

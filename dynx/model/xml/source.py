@@ -15,7 +15,7 @@ from xml.parsers import expat
 from xml.sax.saxutils import quoteattr
 
 from dynx.model.elements import Note
-from dynx.model.xml.reading import read_xml
+from dynx.model.xml.reading import repair_of
 from dynx.model.xml.text import TextForm, decode_with_encoding, strip_ends
 
 _DECLARED = re.compile(r"""<\?xml[^>]*?\bencoding\s*=\s*["']([A-Za-z0-9._-]+)["']""")
@@ -83,13 +83,12 @@ class XmlSource:
     """Text of a document with its tree of elements.
 
     `data` may be text, or bytes in any encoding that `dynx.load` reads; positions refer to the text in UTF-8.
-    Raises DescriptionError for text that is not XML, as `read_xml` does.
+    Faults that engines forgive are repaired in the text and listed in `repairs`. Raises DescriptionError for
+    text that is not XML, as `read_xml` does.
     """
 
     def __init__(self, data: str | bytes, source: str = "<string>") -> None:
         notes: list[Note] = []
-        # Checks limits and raises errors; `_SourceParser` relies on well-formed text.
-        read_xml(data, source, notes)
         whole, encoding = (
             decode_with_encoding(data, source, notes) if isinstance(data, bytes) else (data, None)
         )
@@ -100,14 +99,17 @@ class XmlSource:
             front, _, end = whole.partition(text)
             self.form = TextForm(encoding, front, end)
         self.source = source
-        self.data = text.encode("utf-8")
+        # Checks limits and raises errors; `_SourceParser` relies on well-formed text.
+        repair = repair_of(text, source, self._lines_before)
+        self.repairs = () if repair is None else repair.notes
+        self.data = (text if repair is None else repair.text).encode("utf-8")
 
     def _with_data(self, data: bytes) -> XmlSource:
         """Return the document with new text, which is not checked because edits of well-formed text are
         well-formed."""
         new = object.__new__(XmlSource)
         new.data, new.source, new.form = data, self.source, self.form
-        new._lines_before = self._lines_before
+        new._lines_before, new.repairs = self._lines_before, self.repairs
         return new
 
     @property

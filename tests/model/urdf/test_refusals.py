@@ -12,7 +12,7 @@ from tests.model.descriptions import INERTIAL, chain, joint, link, robot
 
 BAD: dict[str, tuple[str, int | None, str]] = {
     "no robot": ("\n<sdf/>", 2, "the root element is <sdf>; wanted <robot> (SDF is not read)"),
-    "two robots": ("<robot name='x'/>\n<robot name='y'/>", 2, "wanted one root element"),
+    "two robots": (robot('<link name="a"/>') + "<robot", 4, "wanted one root element"),
     "no link": (robot(""), None, "the robot has no link"),
     "link in capitals": (robot("<Link name='a'/>"), 2, "did you mean 'link'?"),
     "two root links": (robot('<link name="a"/>\n<link name="b"/>'), 3, "2 links have no parent"),
