@@ -45,8 +45,8 @@ from dynx.rules.choices import checked_choices
 DEFAULT_SAMPLES = 5
 
 NEGLIGIBLE_SHARE = 0.1
-"""Largest error of a mended file from places left as they are because none has an effect alone, as a share of
-the tolerance: their sum may be larger at other states."""
+"""Largest error of a mended file in which places without an effect of their own are left unchanged, as a
+fraction of the tolerance. At other states their joint effect may be larger."""
 
 COUNTEREXAMPLE_SECONDS = 20.0
 """Time limit [s] of the search for one smallest counterexample."""
@@ -168,11 +168,11 @@ def _diagnosis_of(
 
 
 def _reference_of(case: Case, examiner: Examiner) -> ReferenceValues:
-    """Compute the reference values; raises the error of the text as it is where dynx refuses that."""
+    """Compute the reference values; raises the error of the original text where dynx refuses it."""
     try:
         return examiner.reference(case)
     except DynxError as error:
-        # Reference values are those of an edited text, whose lines are others.
+        # Reference values are computed from an edited text, whose line numbers differ.
         raise (case.reading if isinstance(case.reading, DynxError) else error) from None
 
 
@@ -182,7 +182,7 @@ def _chosen_practice(case: Case, found: Sequence[tuple[Rule, Detection]]) -> boo
 
 
 def _rules_for(examiner: Examiner) -> list[Rule]:
-    """Select the rules that hold for an engine that takes part, and those about practice."""
+    """Select the rules that concern one of the examined engines, and those about practice."""
     versions = {name: kind.engine_version() for name, kind in examiner.engines.items()}
     return [rule for rule in all_rules() if rule.kind == "practice" or rule.holds_for(versions)]
 
@@ -226,10 +226,10 @@ def _smallest_mending(
 ) -> tuple[Mending, Examination]:
     """Apply only the remedies that matter, if they reduce the errors as far as all remedies do.
 
-    The first attempt takes the places that have an effect of their own, the second all places of the rules
-    that have one somewhere: effects too small to be measured alone may add up. Causes that show only at some
-    states are always removed, and so are those that concern an engine that refuses even the mended file,
-    because their effect on it cannot be measured.
+    The first attempt mends the places that have an effect of their own, the second all places of rules with
+    an effect somewhere, because effects that are too small to be measured alone may add up. Causes that show
+    only at some states are always removed, and so are those that concern an engine that refuses even the
+    mended file, because their effect on it cannot be measured.
     """
     unmeasured = {engine for engine in examiner.engines if after.outputs[engine].refused is not None}
     idle: set[Place] = {
@@ -254,7 +254,7 @@ def _smallest_mending(
 
 
 def _engines_without_remedy(mended: Case, rules: Sequence[Rule]) -> set[str]:
-    """Find the engines with a cause left that has no remedy or that the user chose to keep."""
+    """Find the engines for which a cause remains that has no remedy or that the user chose to keep."""
     causes = [rule for rule in rules if rule.kind == "difference"]
     left = detections(mended, causes)
     return {
@@ -263,8 +263,8 @@ def _engines_without_remedy(mended: Case, rules: Sequence[Rule]) -> set[str]:
 
 
 def _unexplained(after: Examination, tolerance: float, known: Collection[str]) -> tuple[Unexplained, ...]:
-    """Collect what remains above the tolerance: the quantity of the largest error of each engine, or
-    ``loading`` where an engine refuses even the mended file for no `known` cause."""
+    """Collect the differences that remain above the tolerance: the quantity of the largest error of each
+    engine, or ``loading`` where an engine refuses even the mended file for no `known` cause."""
     remaining = []
     for engine, output in after.outputs.items():
         if output.refused is not None and engine not in known:

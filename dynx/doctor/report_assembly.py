@@ -92,7 +92,8 @@ def all_findings(
     done = {rule.id: remedy.changed for rule, remedy in mended.applied}
     findings = []
     for rule, detection in found:
-        # A place found twice (two fields of one link, for example) has its proofs in the same order.
+        # A place that was found twice (for example in two attributes of one link) has its proofs in the same
+        # order.
         of_place = proved.get(place_of(rule, detection), [])
         attribution = of_place.pop(0) if of_place else None
         finding = Finding(

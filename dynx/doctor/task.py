@@ -15,7 +15,7 @@ from dynx.model.model import Base
 
 @dataclass(frozen=True)
 class DoctorTask:
-    """A robot, and the options of its examination; those that are None are left to `dynx.diagnose`.
+    """A robot and the options of its examination; None stands for the default of `dynx.diagnose`.
 
     `causes` selects `dynx.diagnose`; without it `dynx.compare_as_loaded` only measures the differences.
     """

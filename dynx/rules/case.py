@@ -1,4 +1,5 @@
-"""A file under examination: its text, the model that dynx reads in it, and the base it is meant for."""
+"""A file under examination: its text, the model that dynx reads from it, and the base for which it is
+examined."""
 
 from __future__ import annotations
 
@@ -16,7 +17,7 @@ from dynx.model.xml.source import SourceElement, XmlSource
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """The document `source`, meant for `base`, with the engine settings (`calls`) applied so far.
+    """The document `source`, examined on `base`, with the engine settings (`calls`) applied so far.
 
     `choices` are the user's choices where a remedy has several, by rule id (see `Rule.choices`).
     """

@@ -1,4 +1,4 @@
-"""Rules that correct the text: each place where the rule applies comes with the edits that correct it."""
+"""Rules that correct the text: for each place where the rule applies they give the edits that correct it."""
 
 from __future__ import annotations
 
@@ -37,10 +37,10 @@ def correction(element: SourceElement, message: str, *edits: Edit) -> Correction
 
 
 class EditingRule(Rule):
-    """A rule whose corrections serve both to find the places and to correct them."""
+    """A rule whose corrections both find the places and correct them."""
 
     changed: ClassVar[str]
-    """The change by the remedy, stated once for all places; see `Remedy.changed`."""
+    """Description of the change, stated once for all places; see `Remedy.changed`."""
 
     changes_physics: ClassVar[bool] = False
 

@@ -1,4 +1,5 @@
-"""Rules: a rule is a cause of disagreement between engines that is detected in a file and mostly removed."""
+"""Rules. A rule is a cause of disagreement between engines, with its detection in a file and, for most,
+its removal."""
 
 from __future__ import annotations
 

@@ -30,7 +30,8 @@ ENTRY = "kernel"
 PREFETCHED_COLUMNS = range(16, 129)
 """Row lengths of outputs whose memory is prefetched before it is written.
 
-Writes to memory outside the caches stall. Short rows stall little, and the processor prefetches long ones.
+Writing to memory outside the caches stalls. Short rows stall little, and the processor itself prefetches long
+ones.
 """
 
 PREFETCH_GROUPS = 8

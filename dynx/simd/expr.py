@@ -53,7 +53,7 @@ ARITY: Final[dict[Op, int]] = {
 """Number of arguments of every operation. `Graph` documents their semantics."""
 
 SIGN_SCALE = 2.0**537
-"""Factor whose square lifts the smallest subnormal, 2^-1074, to 1."""
+"""Factor whose square scales the smallest subnormal number, 2^-1074, to 1."""
 
 COMMUTATIVE: Final[frozenset[Op]] = frozenset({"add", "mul"})
 
@@ -192,7 +192,7 @@ class Symbol:
         return self
 
     def sign(self) -> Symbol:
-        """Sign: -1, 0 or 1."""
+        """Return the sign: -1, 0 or 1."""
         return Symbol(self.graph, self.graph.sign(self.index))
 
     def clamp(self, bound: Any) -> Symbol:

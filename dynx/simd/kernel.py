@@ -19,8 +19,8 @@ from dynx.simd.threads import run_parts
 from dynx.spatial.scalar import Floats
 
 MIN_PART_WORK = 1.2e7
-"""Least work of a part given to another thread, in bytes of code times groups of samples: about 150
-microseconds. Dispatching a part costs 20 microseconds, and waking a thread about as much."""
+"""Least work of a part that another thread gets, in bytes of code times groups of samples: about 150
+microseconds. Dispatching a part takes 20 microseconds, and waking a thread about as long."""
 
 MAX_PART_WORK = 1e10
 """Most work of a part, in bytes of code times groups of samples: some tenths of a second."""
@@ -127,9 +127,9 @@ class Kernel:
     def bind(self, inputs: Sequence[Floats], outputs: Sequence[Floats]) -> Callable[[], None]:
         """Return a function that fills these `outputs` from the current contents of these `inputs`.
 
-        For loops with many calls: everything is checked here and nothing afterwards. There must be at least
-        as many samples as lanes, rows must be contiguous, and outputs must not share memory with any other
-        array; otherwise raises ArgumentError. Raises also the errors of a plain call.
+        It is meant for loops with many calls: arrays are checked here, and not in the calls. There must be at
+        least as many samples as lanes, rows must be contiguous, and outputs must not share memory with any
+        other array; otherwise raises ArgumentError. Raises also the errors of a plain call.
         """
         code, arrays = self._open_code(), (*inputs, *outputs)
         n = _check_arrays(self.inputs, self.outputs, inputs, outputs)
@@ -268,7 +268,7 @@ def _usable_in_place(array: Floats) -> bool:
 def _address(array: Floats) -> int:
     """Return the address of the first number of an array."""
     try:
-        # Takes a third of the time of `array.ctypes`, but needs a contiguous, writeable array.
+        # This takes a third of the time of `array.ctypes`, but needs a contiguous, writeable array.
         return addressof(_first_byte(array))
     except (TypeError, ValueError, BufferError):
         return array.ctypes.data

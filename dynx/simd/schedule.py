@@ -15,7 +15,7 @@ from dynx.simd.rows import tiles
 
 TRIG = frozenset({"sin", "cos"})
 ELEMENTARY = frozenset({"exp", "tanh", "arctan"})
-"""Functions that take some thirty operations each."""
+"""Functions that take about thirty operations each."""
 
 LEAVES = frozenset({"input", "constant"})
 """Nodes that are not computed but read where they are used."""
@@ -51,7 +51,8 @@ class Segment:
 
 
 def schedule(program: Program, lanes: int, longest: int) -> list[Segment]:
-    """Return one segment if that has at most `longest` operations, else segments of about half as many.
+    """Divide the program into segments of about half of `longest` operations; into one if it has at most
+    `longest`.
 
     A group of angles is never divided.
     """

@@ -58,7 +58,7 @@ def run_parts(task: Callable[[int], object], parts: int, threads: int) -> None:
     try:
         run_remaining()
     finally:
-        # A helper that has not started by now would find no part left.
+        # A thread that has not started by now would find no part left.
         started = [future for future in futures if not future.cancel()]
         wait(started)
     for future in started:

@@ -27,7 +27,7 @@ def check_nodes(nodes: Sequence[Node], n_inputs: int) -> None:
     known: dict[object, int] = {}
     for index, (op, args, slot, value) in enumerate(nodes):
         if op not in ARITY:
-            _fail(index, f"is no known operation: {op!r}")
+            _fail(index, f"is not a known operation: {op!r}")
         if len(args) != ARITY[op]:
             _fail(index, f"({op}) has {len(args)} arguments, wanted {ARITY[op]}")
         for arg in args:

@@ -70,7 +70,7 @@ def test_programs_and_schedules_of_the_compiler_are_well_formed(
 MALFORMED_PROGRAMS: dict[str, tuple[Program, str]] = {
     "operation": (
         changed(NUMBER["add"], op=cast(Any, "pow")),
-        f"node {NUMBER['add']} is no known operation: 'pow'",
+        f"node {NUMBER['add']} is not a known operation: 'pow'",
     ),
     "arity": (changed(NUMBER["mul"], args=(0,)), f"node {NUMBER['mul']} (mul) has 1 arguments, wanted 2"),
     "later argument": (changed(NUMBER["sin"], args=(len(NODES) - 1,)), "which is not before it"),

@@ -1,8 +1,8 @@
-"""Delta debugging: as many changes as possible while a condition still holds.
+"""Delta debugging: search for as many changes as possible while a condition holds.
 
-The minimising algorithm of Zeller and Hildebrandt, "Simplifying and isolating failure-inducing input"
-(IEEE Transactions on Software Engineering 28, 2002, section 3), without the complements: these save trials
-where few changes can be made, but of a robot that shows a difference most can be removed.
+The minimising algorithm of Zeller and Hildebrandt, "Simplifying and isolating failure-inducing input" (IEEE
+Transactions on Software Engineering 28, 2002, section 3), without the complements. Those save trials if few
+changes can be made, but most of a robot that shows a difference can be removed.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ def maximal_changes(changes: Sequence[Change], holds: Callable[[Sequence[Change]
     """Find changes that can be made together with `holds` staying true, to which no other single one of
     `changes` can be added; they keep their order.
 
-    `holds` is called with sets of changes, large ones first; neighbours in the list are tried together.
+    `holds` is called with sets of changes, large sets first; neighbours in the list are tried together.
     """
     made: set[int] = set()
     size = len(changes)

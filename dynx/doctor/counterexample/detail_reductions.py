@@ -20,11 +20,13 @@ _DYNAMIC = {
 _NAMING = frozenset(["name", "type", "link", "joint", "filename"])
 
 Simpler = Callable[[SourceElement, str, str], str]
-"""(element, name of an attribute, a number in it as text) -> a simpler number."""
+"""Function of an element, the name of an attribute and a number in it as text; it returns a simpler
+number."""
 
 
 def fewer_extras(source: XmlSource) -> Reductions:
-    """Remove what does not concern dynamics: shapes, materials, transmissions, simulators' elements."""
+    """Remove elements that do not affect dynamics: shapes, materials, transmissions, elements of
+    simulators."""
     extras = [element for element in source.root.children if element.tag not in _DYNAMIC]
     for tag, dynamic in _DYNAMIC.items():
         for part in source.root.all(tag):
@@ -33,7 +35,7 @@ def fewer_extras(source: XmlSource) -> Reductions:
 
 
 def fewer_elements(source: XmlSource) -> Reductions:
-    """Remove elements inside links and joints, except a joint's ends."""
+    """Remove elements inside links and joints, except ``<parent>`` and ``<child>``."""
     parts = [part for tag in _DYNAMIC for part in source.root.all(tag)]
     inside = [element for part in parts for element in part.walk() if element is not part]
     droppable = [element for element in inside if element.tag not in ("parent", "child")]
@@ -142,7 +144,7 @@ def _removals(source: XmlSource, chosen: Sequence[SourceElement]) -> Iterator[Ed
 
 
 def _roundings(source: XmlSource, simpler: Simpler) -> Reductions:
-    """Change single numbers of attributes to simpler ones; an axis is changed as a whole."""
+    """Change single numbers of attributes to simpler ones; the numbers of an axis are changed together."""
     changes = []
     for element, attribute, words in _numbers(source):
         found = {k: simpler(element, attribute, word) for k, word in enumerate(words)}

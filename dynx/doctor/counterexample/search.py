@@ -1,4 +1,4 @@
-"""The smallest counterexample for a difference that no rule explains: for a bug report.
+"""Search for the smallest counterexample for a difference that no rule explains, for use in a bug report.
 
 The robot is reduced while the difference stays: shapes and simulators' elements are removed, then links,
 then moving joints become fixed; then elements, attributes and digits. Between these the state is simplified.
@@ -40,10 +40,11 @@ from dynx.model.xml.source import XmlSource
 from dynx.rules import Case
 
 INITIAL_STATES = 8
-"""Number of random states at which the difference is measured; the one where it is largest is kept."""
+"""Number of random states at which the difference is measured. The search starts from the one with the
+largest difference."""
 
 MAX_ROUNDS = 4
-"""Repetitions of all reductions; later ones remove little."""
+"""Largest number of repetitions of all reductions; later ones remove little."""
 
 TREE_REDUCTIONS: tuple[Callable[[XmlSource], Reductions], ...] = (
     fewer_extras,
@@ -66,14 +67,14 @@ def smallest_counterexample(
 ) -> Counterexample | None:
     """Find the smallest robot and the simplest state at which the difference is still there.
 
-    `difference(case, model, q, v, a)` is the relative error of an engine on the text of a case, at a
-    state in the coordinates of `model` (that text without mimic joints); 0 where it cannot be evaluated. The
-    result has no more links and moving joints than `case` and adds no cause of the catalogue. Its error is
-    above `tolerance` and not far below the error found first: at least the geometric mean of that (1 at most)
-    and the tolerance, so that a real difference is not reduced to noise.
+    `difference(case, model, q, v, a)` is the relative error of an engine on the text of a case, at a state in
+    the coordinates of `model` (that text without mimic joints); 0 where it cannot be evaluated. The result
+    has no more links and moving joints than `case` and adds no cause of the catalogue. Its error is above
+    `tolerance`, and at least the geometric mean of the tolerance and the error found first (or 1, if that is
+    smaller), so that a real difference is not reduced to noise.
 
-    `budget` bounds the time [s] after which no new robot is tried; None leaves `trials.MAX_TRIALS`.
-    Equal arguments give equal results unless the time runs out.
+    `budget` is the time [s] after which no new robot is tried; with None only `trials.MAX_TRIALS` limits the
+    search. Equal arguments give equal results unless the time runs out.
 
     Returns None where dynx cannot read the case, or `INITIAL_STATES` random states, which follow from
     `seed`, show no error above `tolerance`.
@@ -126,7 +127,7 @@ def _reduce(
             try:
                 smaller = case.with_source(reductions.apply(changes))
             except DescriptionError:
-                return False  # removing a namespace, for example, leaves no XML
+                return False  # For example, the text is not XML after removal of a namespace.
             return trials.holds(smaller, state)
 
         made = maximal_changes(reductions.changes, still_holds)

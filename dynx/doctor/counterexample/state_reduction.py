@@ -1,11 +1,12 @@
-"""The simplest state at which a difference still shows: most parts at rest, the others round numbers.
+"""Search for the simplest state with a difference: most parts at rest, the others round numbers.
 
-The state goes by the names of the joints, so that it fits a robot from which joints were removed. Its
-reduction has two steps. The greedy one starts from a state that shows the difference, puts as many parts as
-it can at rest, then rounds the others one by one; it always ends with a state that shows the difference.
-Hypothesis (the extra ``testing``) then searches all combinations of simple values of the parts that are left:
-it finds what needs two parts to change at once. It cannot start from a given state, and the
-combinations of all coordinates are too many, so it comes second; without it the greedy result stands.
+The parts of a state are identified by the names of joints, so that it can be used for a robot from which
+joints were removed. The reduction has two steps. The greedy one starts from a state that shows the
+difference, sets as many parts as possible to rest, then rounds the others one by one; it always ends with a
+state that shows the difference. Hypothesis (the extra ``testing``) then searches all combinations of simple
+values of the parts that are left: it also finds simplifications in which two parts change together. It comes
+second, because it cannot start from a given state and all coordinates have too many combinations. Without
+Hypothesis the greedy result is used.
 """
 
 from __future__ import annotations
@@ -29,13 +30,13 @@ Slot = tuple[str, int]
 """A part of a state: the joint, or "" for the base, and the number of the part."""
 
 Value = tuple[float, ...]
-"""One number, or the four of an attitude."""
+"""One number, or the four numbers of an attitude."""
 
 ATTITUDE: Slot = ("", 3)
 UPRIGHT: Value = (0.0, 0.0, 0.0, 1.0)
 
 MAX_EXAMPLES = 60
-"""Combinations that Hypothesis may try before it gives up."""
+"""Largest number of combinations that Hypothesis tries."""
 
 ROUND_VALUES = (1.0, -1.0, 0.5, -0.5, 2.0, -2.0)
 _HALF = 0.5**0.5
@@ -47,7 +48,7 @@ QUARTER_TURNS: tuple[Value, ...] = tuple(
 
 @dataclass(frozen=True)
 class ReducibleState:
-    """The parts of a state that are not at rest at zero.
+    """The parts of a state that are not zero.
 
     A joint has the parts 0 (position), 1 (velocity) and 2 (acceleration). A floating base has its
     position in 0-2, its attitude (quaternion xyzw) in 3, its velocity in 4-9, its acceleration in 10-15.
@@ -70,7 +71,8 @@ class ReducibleState:
         return cls({}).with_parts(parts)
 
     def on(self, model: Model) -> tuple[Floats, Floats, Floats]:
-        """Return (q, v, a) of `model`; parts that only one of the two has are left out or at rest."""
+        """Return (q, v, a) of `model`. Parts that the model does not have are left out, and parts that are
+        missing here are at rest."""
         nb = 6 if model.floating else 0
         q, v, a = model.neutral(), np.zeros(model.nv), np.zeros(model.nv)
         if model.floating:
@@ -88,7 +90,7 @@ class ReducibleState:
         return ReducibleState({slot: value for slot, value in self.parts.items() if slot[0] in known})
 
     def with_parts(self, changed: Mapping[Slot, Value]) -> ReducibleState:
-        """Change some parts; those at rest are not kept."""
+        """Change some parts; parts at rest are removed."""
         parts = {**self.parts, **changed}
         return ReducibleState({slot: value for slot, value in parts.items() if value != rest(slot)})
 
@@ -99,7 +101,7 @@ class ReducibleState:
 
     @property
     def complexity(self) -> tuple[int, int, int]:
-        """Number of parts, digits of their numbers, and negative numbers: the smaller, the simpler."""
+        """Measure of complexity: number of parts, digits of their numbers, and number of negative numbers."""
         numbers = [number for value in self.parts.values() for number in value]
         digits = sum(complexity(repr(number)) for number in numbers)
         return len(self.parts), digits, sum(number < 0.0 for number in numbers)
@@ -114,7 +116,8 @@ def rest(slot: Slot) -> Value:
 
 
 def simplest_state(state: ReducibleState, holds: Holds, seed: int) -> ReducibleState:
-    """Find the simplest state that `holds`, starting from `state`, which does; no part is added."""
+    """Find the simplest state for which `holds` is true, starting from `state`, for which it is; no part
+    is added."""
     return _search(_reduce_greedily(state, holds), holds, seed)
 
 
@@ -169,7 +172,7 @@ def _search(state: ReducibleState, holds: Holds, seed: int) -> ReducibleState:
 
 
 def _simpler_values(slot: Slot, value: Value) -> list[Value]:
-    """List values simpler than `value`, the simplest first; rest excepted."""
+    """List values simpler than `value`, the simplest first, without the value at rest."""
     if slot == ATTITUDE:
         return [] if value in QUARTER_TURNS else list(QUARTER_TURNS)
     number = value[0]

@@ -23,13 +23,14 @@ class Reductions:
 
 
 def fewer_links(source: XmlSource) -> Reductions:
-    """Remove links with their parent joints; their children move to the nearest link towards the root that
-    stays. The links of a limb follow each other in the list, so that whole limbs can be removed at once."""
+    """Remove links with their parent joints; their children are connected to the nearest remaining link
+    towards the root. The links of a limb follow each other in the list, so that whole limbs can be removed
+    at once."""
     return Reductions(_Tree(source).below_root(), lambda chosen: _Tree(source).without_children(chosen))
 
 
 def higher_links(source: XmlSource) -> Reductions:
-    """Remove links with one of their child joints, whose child replaces them; the root too."""
+    """Remove links, including the root, with one of their child joints, whose child replaces them."""
     return Reductions(_Tree(source).below_root(), lambda chosen: _Tree(source).without_parents(chosen))
 
 

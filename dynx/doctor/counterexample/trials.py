@@ -19,19 +19,20 @@ from dynx.rules import Case, all_rules
 from dynx.spatial.scalar import Floats
 
 Difference = Callable[[Case, Model, Floats, Floats, Floats], float]
-"""(case, model, q, v, a) -> relative error of the engine in question; 0 where it cannot be evaluated."""
+"""Function of (case, model, q, v, a) that returns the relative error of the engine in question; 0 where it
+cannot be evaluated."""
 
 MAX_TRIALS = 1500
 """Largest number of trials; each loads an engine, which takes 5 to 50 ms."""
 
 
 class Trials:
-    """Evaluates `difference`, stores its values, and stops when the budget [s] is spent.
+    """Evaluator of `difference` that stores its values and stops when the budget [s] is spent.
 
     A robot is tried only if it has no cause of the catalogue that the `original` does not have: a link
     without ``<inertial>``, for example, would show that difference instead. A state is tried only within the
-    limits of the joints, outside which some engines apply a force; joints of the original whose limits leave
-    no range are excepted.
+    limits of the joints, outside which some engines apply a force; an exception are joints of the original
+    whose limits leave no range.
     """
 
     def __init__(self, difference: Difference, original: Case, budget: float | None) -> None:

@@ -1,11 +1,11 @@
-"""The file that engines load: the user's text, without the shapes that dynamics does not need.
+"""The file that engines load: the user's text without the shapes that do not affect dynamics.
 
-Engines search for the mesh files that a description names, each in its own way, and a description is
-often examined where they are absent. No mesh changes the dynamics of a link that states its inertia. So
+Engines search for the mesh files that a description names, each in its own way, and a description is often
+examined where they are absent. No mesh changes the dynamics of a link that states its inertia. So
 ``<visual>`` and mesh ``<collision>`` elements are removed; shapes that need no file stay, because some
 engines compute the mass of a link without ``<inertial>`` from them. Drake also searches for the textures of
-the robot's materials: those that it finds beside the description become colours, since they are not beside
-the engine input.
+the robot's materials: those that it finds beside the description are replaced by colours, because they are
+not beside the engine input.
 """
 
 from __future__ import annotations

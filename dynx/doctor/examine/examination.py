@@ -27,10 +27,10 @@ from dynx.spatial.scalar import Floats
 KINEMATICS, JACOBIAN = "forward_kinematics", "jacobian"
 MASS, TORQUE, ACCELERATION = "mass_matrix", "inverse_dynamics", "forward_dynamics"
 LOADING = "loading"
-"""Quantity of the effect on an engine that refuses the file."""
+"""Quantity in an effect on an engine that refuses the file."""
 
 QUANTITIES = (KINEMATICS, JACOBIAN, MASS, TORQUE, ACCELERATION)
-"""Quantities that are compared; forward dynamics by the torque that the computed acceleration requires."""
+"""Compared quantities. Forward dynamics is compared by the torque that the computed acceleration requires."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,10 +72,10 @@ class Examination:
         )
 
     def scale(self, quantity: str, engine: str) -> float:
-        """Return the divisor of a deviation: the largest reference value, or the engine's largest where that
-        is 0.
+        """Return the divisor of a deviation: the largest reference value, or the engine's largest value if
+        that is 0.
 
-        A backward error is relative already.
+        For a backward error, which is already relative, it is 1.
         """
         if quantity == ACCELERATION:
             return 1.0
@@ -113,8 +113,9 @@ class Examination:
         return max(self.errors(engine).values(), default=0.0)
 
     def joint_errors(self, engine: str, other: str | None = None) -> dict[str, float]:
-        """Return the errors of inverse dynamics joint by joint, against the reference or another engine, over
-        the joint's largest reference torque (at least 1e-9 of the largest of all)."""
+        """Return the errors of inverse dynamics joint by joint, against the reference or another engine,
+        relative to the joint's largest reference torque (at least 1e-9 of the largest torque of all
+        joints)."""
         mine = self.outputs[engine].deviation.get(TORQUE, {}).get("")
         theirs = None if other is None else self.outputs[other].deviation.get(TORQUE, {}).get("")
         if mine is None or (other is not None and theirs is None):
@@ -126,8 +127,8 @@ class Examination:
         return dict(zip(coordinate_names(self.reference), ratio.tolist(), strict=True))
 
     def pair_error(self, engine: str, other: str, quantity: str) -> float:
-        """Return the deviation of two engines from each other, over its scale; infinite where one computed
-        nothing."""
+        """Return the deviation of two engines from each other, relative to its scale; infinite where one
+        computed nothing."""
         one, two = self.outputs[engine], self.outputs[other]
         if quantity in {*one.failed, *two.failed} or one.refused or two.refused:
             return float("inf")
@@ -136,7 +137,7 @@ class Examination:
 
 
 class Examiner:
-    """Examines cases of one robot with the same engines, number of states and seed."""
+    """Examiner of cases of one robot, with the same engines, number of states and seed."""
 
     def __init__(self, engines: Collection[str], samples: int, seed: int) -> None:
         self.engines = {name: loader_class(name) for name in engines}
@@ -161,7 +162,8 @@ class Examiner:
         reference: ReferenceValues | None = None,
         describe: bool = False,
     ) -> Examination:
-        """Let the engines load the text of the case; `reference` saves computing its values again."""
+        """Load the text of the case in the engines and compute their errors; a given `reference` is not
+        computed again."""
         reference = reference or self.reference(case)
         chosen = [name for name in self.engines if engines is None or name in engines]
         with temporary_urdf(without_meshes(case.source)) as path:
@@ -172,7 +174,7 @@ class Examiner:
         self, engine: str, path: Path, case: Case, reference: ReferenceValues, describe: bool
     ) -> EngineOutput:
         try:
-            # Engines print messages that the report contains in a better order.
+            # Output of engines is suppressed; the report contains their messages in order.
             with (
                 silence(),
                 np.errstate(all="ignore"),
@@ -183,7 +185,7 @@ class Examiner:
             # Raised by bindings that return names as text, for bytes of another encoding.
             return EngineOutput(engine, refused=f"{engine} cannot return names that are not in UTF-8")
         except DynxError as error:
-            # The name of the temporary file differs every time.
+            # The name of the temporary file differs each time, so it is removed from messages.
             return EngineOutput(engine, refused=str(error).replace(str(path), path.name))
 
 
@@ -235,7 +237,8 @@ def _jacobian_deviation(robot: LoadedRobot, reference: ReferenceValues) -> dict[
 
 
 def _acceleration_deviation(robot: LoadedRobot, reference: ReferenceValues) -> Floats:
-    """Return the backward errors for the torques of the states, and for those that accelerate the other way.
+    """Return the backward errors for the torques of the states, and for torques that accelerate in the
+    opposite direction.
 
     A force that acts on one side only, such as that of a joint limit, shows in one of the two.
     """
@@ -256,7 +259,7 @@ def _backward_error(robot: LoadedRobot, reference: ReferenceValues, tau: Floats)
 def max_change(before: Mapping[str, Floats], after: Mapping[str, Floats]) -> float:
     """Return the largest difference between two sets of deviations, where both have the same parts.
 
-    Infinite where their shapes differ: the robots do not have the same coordinates.
+    Infinite where their shapes differ, because the robots then have different coordinates.
     """
     gaps = [0.0]
     for part in before.keys() & after.keys():
@@ -273,7 +276,7 @@ def coordinate_names(reference: ReferenceValues) -> tuple[str, ...]:
 
 
 def _number(ratio: float) -> float:
-    """Return the ratio, infinite for NaN: values too large to be compared do not agree."""
+    """Return the ratio, or infinity for NaN, because values too large to be compared do not agree."""
     return float("inf") if np.isnan(ratio) else ratio
 
 

@@ -1,8 +1,8 @@
 """Reference values for a file: the robot as dynx reads it, evaluated by the algorithms of `dynx.rbd`.
 
 Coordinates are those of all moving joints, mimic joints included, as engines load them: the ``<mimic>`` tags
-are removed. Gravity is tilted, so that a value in the wrong frame shows. ``dynx agree``
-compares the backend `reference`, which evaluates here, with a 50-digit referee.
+are removed. Gravity is tilted, so that a value in the wrong frame differs. ``dynx agree`` compares the
+backend `reference`, which evaluates here, with a 50-digit referee.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ from dynx.reference.backend import ReferenceBackend
 from dynx.spatial.scalar import Floats
 
 TILTED_GRAVITY: Vector = (0.3, -0.7, -9.81)
-"""Gravity [m/s^2] at which files are compared: along no axis of any frame."""
+"""Gravity [m/s^2] at which files are compared, not parallel to any axis of a frame."""
 
 MAX_TIPS = 4
 """Largest number of branches at whose ends Jacobians are compared."""
 
 MAX_LIMIT_DISTANCE = 100.0
-"""Distance from zero [rad or m] beyond which limits are ignored and states are drawn near zero: so far away
-rounding of the coordinate would dominate the errors."""
+"""Distance from zero [rad or m] beyond which limits are ignored and states are drawn near zero, because
+rounding of the coordinate would dominate the errors there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,8 +97,8 @@ def draw_states(model: Model, count: int, seed: int) -> States:
     its limits, or to pi [rad] or 1 [m] from zero (or from the limit nearest to zero) if these are closer;
     velocities and accelerations up to 2.
 
-    Engines that step resist a limit with a force, so no limit may be reached within a step. A range without
-    width has no middle: there a joint may be anywhere.
+    Engines that compute a step apply a force at a limit, so no limit may be reached within a step. For a
+    range of zero width, positions are drawn as without limits.
     """
     rng = np.random.default_rng(seed)
     base = 7 if model.floating else 0
@@ -106,7 +106,7 @@ def draw_states(model: Model, count: int, seed: int) -> States:
     turning = np.array([joint.type != "prismatic" for joint in model.coordinate_joints], dtype=bool)
     reach = np.where(turning, np.pi, 1.0)
     lower, upper = model.lower[base:], model.upper[base:]
-    # Zero may be outside the limits: then positions near the closest limit are drawn.
+    # If zero is outside the limits, positions near the closest limit are drawn.
     near = np.clip(0.0, lower, np.maximum(upper, lower))
     near = np.where((np.abs(near) < reach) | (np.abs(near) > MAX_LIMIT_DISTANCE), 0.0, near)
     low, high = np.maximum(lower, near - reach), np.minimum(upper, near + reach)
@@ -119,16 +119,17 @@ def draw_states(model: Model, count: int, seed: int) -> States:
 
 def reference_values(model: Model, states: States) -> ReferenceValues:
     """Compute the reference values; forward dynamics gets the `torque` of the previous state."""
-    # A file without any mass gives NaN here, which is compared and needs no warning of NumPy.
+    # A file without any mass gives NaN here, which is compared, so NumPy's warning is silenced.
     with np.errstate(all="ignore"), ReferenceBackend(model) as reference:
-        # Frames of links come first; engines do not know those that dynx adds.
+        # Frames of links come first; engines do not have the frames that dynx adds.
         poses = reference.forward_kinematics(states.q)[:, : len(model.links)]
         bias = reference.bias_torque(states.q, states.v)
         torque = reference.inverse_dynamics(states.q, states.v, states.a)
         mass_matrix = reference.mass_matrix(states.q)
         return ReferenceValues(
             model=model,
-            # The torques of other states have the robot's own magnitude but are not balanced.
+            # The torques of other states have the right magnitude for the robot but do not compensate its
+            # weight.
             states=States(states.q, states.v, states.a, np.roll(torque, 1, axis=0)),
             poses=poses,
             jacobians={tip: reference.jacobian(states.q, tip) for tip in _tips(model)},
@@ -151,7 +152,7 @@ def referee_error(reference: ReferenceValues) -> float:
 
 
 def _is_regular(mass_matrix: Floats) -> bool:
-    """Check that the mass matrices (n, nv, nv) stay regular under the errors that engines are allowed.
+    """Check that the mass matrices (n, nv, nv) stay regular under errors within the tolerance of engines.
 
     Scaled to a unit diagonal, each must have its eigenvalues further from zero than `BAR`: nearer ones leave
     no digit of the acceleration, as on a floating base of 1e-15 kg that carries an arm.

@@ -1,4 +1,4 @@
-"""Formats of a `DoctorReport` for readers other than Python: a page for people, and those of CI services.
+"""Formats of a `DoctorReport`: an HTML page for people, and formats of CI services.
 
 The formats are functions of reports and baselines; they run no engine. Names in a robot description may hold
 anything, so each format escapes them.

@@ -1,8 +1,9 @@
 """Baselines: JSON files of accepted differences, with which a check fails only on new ones.
 
 A difference is identified by robot, base, rule, link or joint, and engines; not by its line, nor by its
-magnitude. One without a rule has the rule ``unexplained``, and its quantity instead of a link or joint. It is
-known if the file names all its engines, so that nothing is new where fewer engines are installed.
+magnitude. A difference that no rule explains has the rule ``unexplained``, and a quantity instead of a link
+or joint. A difference is known if the file names all its engines, so that nothing is new where fewer engines
+are installed.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from dynx.files.reading import read_file
 SCHEMA = 1
 
 UNEXPLAINED = "unexplained"
-"""Stands for the rule of a difference that no rule explains."""
+"""Name in place of a rule for a difference that no rule explains."""
 
 
 @dataclass(frozen=True)
@@ -108,7 +109,7 @@ class Baseline:
 
 
 def differences(report: DoctorReport, folder: str) -> tuple[Difference, ...]:
-    """Collect what makes engines differ in a report: each cause with an effect, and what has no cause."""
+    """Collect the differences of a report: each cause with an effect, and each unexplained difference."""
     robot, base = robot_key(report, folder), report.base or ""
     merged: dict[Place, Difference] = {}
 
@@ -154,7 +155,7 @@ def robot_key(report: DoctorReport, folder: str) -> str:
 
 
 def baseline_document(reports: Iterable[DoctorReport], folder: str) -> dict[str, Any]:
-    """Make the document in which all differences of these reports are known."""
+    """Make the document that accepts all differences of these reports."""
     found = [each for report in reports for each in differences(report, folder)]
     found.sort(key=lambda each: tuple(str(value or "") for value in vars(each.place).values()))
     known = []
@@ -171,7 +172,7 @@ def read_baseline(text: str, path: str) -> Baseline:
     try:
         document = read_document(text, BaselineDocument)
     except ArgumentError as error:
-        raise ArgumentError(f"{where} is no baseline: {error}") from None
+        raise ArgumentError(f"{where} is not a baseline: {error}") from None
     if document.schema != SCHEMA:
         raise ArgumentError(
             f"{where} has schema {document.schema}; this version of dynx reads schema {SCHEMA}"

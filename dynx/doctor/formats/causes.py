@@ -18,8 +18,8 @@ Status = Literal["alike", "explained", "unexplained", "refused"]
 """``explained``: engines differ and every difference has a proved cause. ``refused``: not examined."""
 
 ROUNDING = 1e-9
-"""Relative error up to which a difference is rounding of float64, or of a step in float32, and not another
-robot: PyBullet's diagonalisation of inertias leaves as much on healthy files."""
+"""Relative error up to which a difference counts as accumulated rounding: PyBullet's diagonalisation of
+inertias causes as much on files without a fault."""
 
 _ORDER: tuple[Severity, ...] = ("error", "warning", "note")
 
@@ -78,8 +78,8 @@ class Cause:
 
 
 def causes(report: DoctorReport) -> list[Cause]:
-    """Group the findings by rule: the severe first, of equals the largest effect, then by number; the places
-    of a rule by the magnitude of their effect, then as in the file."""
+    """Group the findings by rule. Rules are ordered by severity, largest effect and number; the places of
+    a rule by the magnitude of their effect, then as in the file."""
     groups: dict[str, list[Finding]] = {}
     for finding in report.findings:
         groups.setdefault(finding.rule, []).append(finding)
@@ -101,7 +101,7 @@ def severity(finding: Finding) -> Severity:
     """Return the severity of a finding."""
     if finding.effect is None:
         return "note"
-    # NaN counts as large.
+    # A NaN counts as a large error.
     return "warning" if finding.effect.relative_error <= ROUNDING else "error"
 
 

@@ -14,7 +14,7 @@ from dynx.doctor.formats import wording
 from dynx.doctor.report import DoctorReport
 
 SHOWN_JOINTS = 60
-"""Joints in a heat map, those of the largest errors; the rest is counted."""
+"""Largest number of joints in a heat map: those with the largest errors are shown, the others counted."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Step:
     css: str
 
     def is_shown(self, tolerance: float) -> bool:
-        """Check whether the legend shows it: a step below the tolerance cannot occur."""
+        """Check whether the legend shows the step; one below the tolerance cannot occur."""
         return self in (SAME, NONE) or self.limit > tolerance
 
 

@@ -1,4 +1,4 @@
-"""HTML page for people: one file that needs no other, without scripts, for screen and paper.
+"""HTML page for people: one self-contained file without scripts, for screen and paper.
 
 The templates beside this module hold the markup. Everything they print is escaped, and control characters are
 made visible: names in a robot description may hold anything.
@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from jinja2 import Environment
 
 LIMITS = {"SHOWN_RULES": 6, "OPEN_PLACES": 2, "SHOWN_PLACES": 40, "OPEN_VALUES": 25, "OPEN_LINES": 80}
-"""Largest numbers: of rules in a robot's row of the overview, of places of a cause that are expanded and
-that are listed, of engine values and of changed lines in an expanded table."""
+"""Largest numbers of rules in a robot's row of the overview, of expanded and of listed places of a cause,
+and of engine values and changed lines in an expanded table."""
 
 LOWEST_BAR = -16
 """Power of ten at which the bar of an error starts: the last digit of a double; it is full at 100 %."""
@@ -36,7 +36,7 @@ LOWEST_BAR = -16
 def html_page(
     reports: Sequence[DoctorReport], *, command: str | None = None, baseline: Baseline | None = None
 ) -> str:
-    """Make the page, in ASCII, with the `command` line that gives the same result."""
+    """Make the page, in ASCII, with the `command` line that reproduces it."""
     entries = {cause.rule: cause.entry for report in reports for cause in causes(report) if cause.entry}
     page = template_environment().get_template("page.html.j2")
     text = page.render(

@@ -1,4 +1,4 @@
-"""Text of a robot's file: excerpts about a line, and the changes by mending."""
+"""Excerpts of a robot's file around a line, and the lines that mending changed."""
 
 from __future__ import annotations
 

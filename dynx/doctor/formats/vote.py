@@ -22,7 +22,7 @@ class Vote:
 
     @property
     def alone(self) -> tuple[str, ...]:
-        """Engines that agree with no other, where there are others."""
+        """Engines that agree with no other engine, if there are others."""
         single = tuple(group[0] for group in self.groups if len(group) == 1)
         return single if len(self.groups) > 1 else ()
 

@@ -14,10 +14,10 @@ NAME_LENGTH = 120
 """Number of characters of a name that are shown; a description may hold names of any length."""
 
 _PERCENT = 1e-3
-"""Relative error from which on it is written in per cent."""
+"""Smallest relative error that is written in per cent."""
 
 _DIGITS = (4, 6, 9, 12, 15, 17)
-"""Significant digits that are tried, the fewest first, until different values differ."""
+"""Numbers of significant digits that are tried, the fewest first, until different values look different."""
 
 
 def name(text: object, limit: int = NAME_LENGTH) -> str:

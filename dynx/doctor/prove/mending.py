@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from dynx.rules import Case, Detection, Remedy, Rule, all_rules
 
 MAX_ROUNDS = 4
-"""Repetitions of all remedies. One remedy may require another (an explicit zero inertial makes a massless
-root); where this does not end, two rules undo each other."""
+"""Largest number of repetitions of all remedies. One remedy may require another one (an explicit zero
+inertial makes a massless root); more repetitions would mean that two rules undo each other."""
 
 Place = tuple[str, "str | None", "str | None"]
 """Rule, link and joint of a detection, wherever in the text it is."""
@@ -47,7 +47,7 @@ def place_of(rule: Rule, detection: Detection) -> Place:
 
 
 def readable(case: Case) -> Mending:
-    """Mend text that dynx refuses; the case stays as it is where dynx can read it, or no remedy helps."""
+    """Mend text that dynx refuses; return the case unchanged if dynx can read it, or if no remedy helps."""
     mended = Mending(case)
     for rule in _rules("reading"):
         if mended.case.readable:

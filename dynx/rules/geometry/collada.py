@@ -5,8 +5,8 @@ document order; <instance_geometry> places a mesh. Some loaders rotate a file wh
 some do not, so the points of both readings are returned. A file with other elements that move points (skins,
 <lookat>, <skew>, nodes of other files) is not read, so that no box is too small.
 
-A node that places another twice, which places a third twice, and so on, is a scene of any size in a few
-lines: MAX_NODES and MAX_POINTS bound the work.
+A few lines can describe a scene of any size (a node that places another twice, which places a third twice,
+and so on), so MAX_NODES and MAX_POINTS bound the work.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ def collada_points(data: bytes) -> Floats | None:
 
 
 class _NotSupported(Exception):
-    """An element that is not supported, or more of them than are read."""
+    """An unsupported element, or a scene larger than the bounds."""
 
 
 class _Scene:

@@ -49,7 +49,7 @@ def find_mesh(filename: str, source: str) -> Path | None:
         else:
             path = folder / filename
         return _existing(path, _enclosing(folder), shown(filename, 200))
-    except (OSError, ValueError, RuntimeError):  # a name that no file can have, or links in a circle
+    except (OSError, ValueError, RuntimeError):  # The name is invalid, or symbolic links form a cycle.
         return None
 
 
@@ -63,7 +63,7 @@ def _existing(path: Path, root: Path, described: str) -> Path | None:
     raise MeshNotFoundError(f"no file {described}{_similar(real)}")
 
 
-# A robot has dozens of meshes.
+# Cached, because a robot has dozens of meshes.
 @lru_cache(maxsize=256)
 def _enclosing(folder: Path) -> Path:
     """Return the folder of all files that come with a description: the repository, else the package.
@@ -95,7 +95,7 @@ def _in_package(uri: str, folder: Path) -> Path | None:
     return _existing(package / inside, package, f"{shown(inside, 200)} in package {shown(name)}")
 
 
-# A description names its few packages hundreds of times.
+# Cached, because a description names its few packages hundreds of times.
 @lru_cache(maxsize=256)
 def _package(name: str, folder: Path, elsewhere: tuple[tuple[str, str], ...]) -> Path | None:
     """Find a package: a folder above the description, beside one of these if it is marked as a package or

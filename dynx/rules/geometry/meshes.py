@@ -35,7 +35,7 @@ def mesh_box(path: Path) -> Box | None:
     return _box(path, status.st_mtime_ns, status.st_size)
 
 
-# Detection runs again after every remedy, and remedies change no mesh.
+# Cached, because detection runs again after every remedy, and remedies change no mesh.
 @lru_cache(maxsize=4096)
 def _box(path: Path, changed: int, size: int) -> Box | None:
     reader = {".stl": _stl_points, ".obj": _obj_points, ".dae": collada_points}.get(path.suffix.lower())

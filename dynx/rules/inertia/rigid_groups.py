@@ -49,7 +49,7 @@ class RigidGroup:
         return tuple(each for each in self.links if each in found and each != link)
 
 
-# All rules use the groups of one case before the first remedy makes another.
+# Cached, because all rules use the groups of one case before the first remedy makes another case.
 @lru_cache(maxsize=8)
 def rigid_groups(case: Case) -> Mapping[str, RigidGroup]:
     """Return the group of every link that dynx reads, by the link's name.

@@ -22,8 +22,8 @@ class MisspelledNumberRule(EditingRule):
     fault: ClassVar[Fault]
 
     description: ClassVar[str]
-    """The fault as the end of a sentence, in which ``{meant}`` stands for the corrected text and ``{count}``
-    for how many words were written."""
+    """The fault as the end of a sentence, in which ``{meant}`` stands for the corrected text and
+    ``{count}`` for the number of words in it."""
 
     elements: ClassVar[Collection[str] | None] = None
     """Tags of the elements in whose attributes the fault matters; None for all."""

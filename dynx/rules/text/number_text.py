@@ -1,7 +1,7 @@
-"""Numbers as people write them into a URDF although not every engine reads them so.
+"""Spellings of numbers in URDF files that not every engine reads.
 
-A text is *plain* where it has the form of the format: one decimal number, or three with blanks between them.
-Any other text that can be understood has one fault, and a plain text that was probably meant.
+A text is *plain* if it has the form that URDF defines: one decimal number, or three separated by blanks. Any
+other understandable text has one fault, and a plain text that was probably meant.
 """
 
 from __future__ import annotations
