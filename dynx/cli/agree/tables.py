@@ -22,7 +22,7 @@ Check = dict[str, Any]
 _TITLES: dict[str | None, str] = {
     None: "largest difference between two engines",
     "referee": "error against the referee (50 digits)",
-    "derived": "result of the engine itself against the one derived from its poses and inverse dynamics",
+    "derived": "engine's own result against the one derived from its poses and torques",
 }
 """Titles of the tables by the reference of a pair; None for pairs of two backends."""
 

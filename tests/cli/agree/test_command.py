@@ -202,7 +202,7 @@ def test_numbers_and_words_stay_whole_on_a_narrow_terminal(
     expected = {word for word in full.split() if not word.startswith("─")}
     assert expected - {*full.splitlines()[-1].split()} <= {*narrow.split()}
     table = narrow.splitlines()[2:-2]
-    assert max(len(line) for line in table if "native result" not in line) <= width
+    assert max(len(line) for line in table if "own result" not in line) <= width
 
 
 def test_one_robot_is_singular() -> None:
