@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
 
@@ -112,6 +113,19 @@ def test_tensors_that_mujoco_refuses_are_found_in_static_links_too(rule: str, pl
     case = robot("six_axis_arm", "fixed")
     root = case.model.root
     assert [entry[:2] for entry in findings(with_inertials(case, {root: plant}))] == [(rule, root)]
+
+
+def test_a_static_tensor_without_mass_that_no_body_has_is_found_and_cleared() -> None:
+    case = robot("six_axis_arm", "fixed")
+    root = case.model.root
+    impossible = replace(PLANTS["DX103"], mass=0.0)
+    for plant, found in ((PLANTS["DX108"], []), (impossible, [("DX108", root)])):
+        planted = with_inertials(case, {root: plant})
+        assert [entry[:2] for entry in findings(planted)] == found
+    rule = find_rule("DX108")
+    remedy = rule.remedy(planted, rule.detect(planted))
+    assert remedy is not None
+    assert findings(remedy.case) == []
 
 
 def test_the_rotation_of_the_root_counts_on_the_fixed_base_alone() -> None:

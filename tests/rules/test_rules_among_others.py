@@ -71,6 +71,19 @@ def test_a_tensor_of_dust_is_raised_unless_the_whole_robot_is_dust() -> None:
             assert not rule.detect(remedy.case)
 
 
+def test_point_masses_at_their_joints_are_raised_where_the_joints_are_apart() -> None:
+    rule = find_rule("DX111")
+    for apart, mends in (("0.1 0 0", True), ("0 0 0", False)):
+        points = (link(name, moments=(0.0, 0.0, 0.0)) for name in "ab")
+        case = case_of(*points, joint("ab", "a", "b", f'<origin xyz="{apart}"/>'))
+        found = rule.detect(case)
+        assert [each.link for each in found] == ["b"]
+        remedy = rule.remedy(case, found)
+        assert (remedy is not None) == mends
+        if remedy is not None:
+            assert not rule.detect(remedy.case)
+
+
 def test_a_point_mass_on_a_link_without_inertial_is_merged_with_it_beside_another_point_mass() -> None:
     point = (0.0, 0.0, 0.0)
     case = case_of(

@@ -27,6 +27,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 
 from dynx.model.elements import Inertial
+from dynx.model.mechanism import pose_arrays
 from dynx.rules import Case, Detection, Remedy, Rule, links_of, measured_on
 from dynx.rules.inertia.central import CentralInertia
 from dynx.rules.inertia.edits import line_of, with_inertials
@@ -43,6 +44,7 @@ from dynx.rules.inertia.physical import (
     with_raised_moments,
 )
 from dynx.rules.inertia.rigid_groups import RigidGroup, rigid_groups
+from dynx.spatial.extended import longdouble
 
 _MAX_ADDED_SHARE = 1e-3
 """Largest addition to the moments of a body, as a share of the robot's largest moment of inertia."""
@@ -141,5 +143,12 @@ def _group_defect(group: RigidGroup, inertials: Mapping[str, Inertial | None]) -
 
 
 def _largest_inertia(case: Case) -> float:
-    bodies = [CentralInertia.of(link.inertial) for link in case.model.links if link.inertial is not None]
-    return max((float(np.max(np.diagonal(body.about_origin()))) for body in bodies), default=0.0)
+    """Return the largest moment of inertia of a link about the origin of its own or its parent's frame."""
+    arms = {joint.child: pose_arrays(joint.origin, longdouble) for joint in case.model.joints}
+    largest = 0.0
+    for link in case.model.links:
+        if link.inertial is not None:
+            body = CentralInertia.of(link.inertial)
+            frames = [body, body.transform(*arms[link.name])] if link.name in arms else [body]
+            largest = max(largest, *(float(np.max(np.diagonal(each.about_origin()))) for each in frames))
+    return largest

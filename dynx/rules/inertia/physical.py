@@ -51,9 +51,14 @@ def principal_moments(inertial: Inertial) -> Array:
 
 @lru_cache(maxsize=CACHE_SIZE)
 def fault_beyond_rounding(inertial: Inertial) -> Fault | None:
-    """Find the fault of an inertial, if it exceeds rounding; None also for a tensor too small to matter."""
-    size = float(np.max(np.abs(inertial.tensor)))
-    if inertial.mass == 0.0 or size < MIN_MOMENT:
+    """Find the fault of an inertial, if it exceeds rounding; None also for a tensor too small to matter, and
+    for one without mass."""
+    return None if inertial.mass == 0.0 else tensor_fault(inertial)
+
+
+def tensor_fault(inertial: Inertial) -> Fault | None:
+    """Find the fault of a tensor whatever the mass, as `fault_beyond_rounding` does for a body."""
+    if float(np.max(np.abs(inertial.tensor))) < MIN_MOMENT:
         return None
     small, middle, large = principal_moments(inertial)
     rounding = ROUNDING * max(abs(small), abs(large))
