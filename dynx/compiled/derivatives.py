@@ -15,8 +15,6 @@ That is as exact as differentiating the articulated-body algorithm, but takes se
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Callable
 from functools import partial
 from typing import NamedTuple
 
@@ -27,12 +25,8 @@ from dynx.backends.arguments import Arguments
 from dynx.backends.registry import refuse_other_than_model
 from dynx.backends.solvability import Solvability
 from dynx.compiled import derivative_programs as programs
-from dynx.compiled.robot_kernel import evaluate_kernel, robot_kernel
-from dynx.compiled.simplification import simplify_mechanism
-from dynx.model import Mechanism, Model
-from dynx.simd.kernel import Kernel
-from dynx.simd.program import Program
-from dynx.simd.threads import checked_threads
+from dynx.compiled.robot_kernel import Making, RobotKernels
+from dynx.model import Model
 from dynx.spatial.scalar import Floats
 
 MAX_NV_OF_ONE_KERNEL = 12
@@ -81,20 +75,17 @@ class Derivatives:
         refuse_other_than_model(model)
         self.model = model
         self._option = threads
-        self._threads = checked_threads(threads)
+        self._kernels = RobotKernels(model, threads)
         self._arguments = Arguments(model)
         self._solvability = Solvability(model)
-        self._kernels: dict[object, Kernel] = {}
-        self._making = threading.Lock()
 
     def inverse_dynamics_derivatives(
         self, q: ArrayLike, v: ArrayLike, a: ArrayLike
     ) -> InverseDynamicsDerivatives:
         """Return the derivatives of tau = M a + bias by q, v and a; the last is the mass matrix."""
-        kernel = self._kernel("inverse_dynamics", programs.inverse_dynamics_derivatives)
-        return InverseDynamicsDerivatives(
-            *evaluate_kernel(kernel, self._checked(q, v, a, "a"), self._threads)
-        )
+        arrays = self._checked(q, v, a, "a")
+        found = self._evaluate("inverse_dynamics", programs.inverse_dynamics_derivatives, arrays)
+        return InverseDynamicsDerivatives(*found)
 
     def forward_dynamics_derivatives(
         self, q: ArrayLike, v: ArrayLike, tau: ArrayLike
@@ -107,18 +98,14 @@ class Derivatives:
         arrays = self._checked(q, v, tau, "tau")
         self._solvability.refuse_singular(joint_dynamics=False)
         if self.model.nv <= MAX_NV_OF_ONE_KERNEL:
-            kernel = self._kernel("forward_dynamics", programs.forward_dynamics_derivatives)
-            found = evaluate_kernel(kernel, arrays, self._threads)
+            found = self._evaluate("forward_dynamics", programs.forward_dynamics_derivatives, arrays)
             return ForwardDynamicsDerivatives(*map(self._arguments.finite_acceleration, found))
-        (a,) = evaluate_kernel(self._kernel("acceleration", programs.acceleration), arrays, self._threads)
+        (a,) = self._evaluate("acceleration", programs.acceleration, arrays)
         self._arguments.finite_acceleration(a)
         dtau_dq, dtau_dv, M = self.inverse_dynamics_derivatives(arrays[0], arrays[1], a)
         nv = self.model.nv
-        (factors,) = evaluate_kernel(
-            self._kernel("factors", programs.factors_of_mass),
-            [M.reshape(*a.shape[:-1], nv * nv)],
-            self._threads,
-        )
+        entries = M.reshape(*a.shape[:-1], nv * nv)
+        (factors,) = self._evaluate("factors", programs.factors_of_mass, [entries])
         return ForwardDynamicsDerivatives(
             self._solve(factors, -dtau_dq),
             self._solve(factors, -dtau_dv),
@@ -129,13 +116,14 @@ class Derivatives:
         """Return the derivative of T_world_frame by q (..., 4, 4, nv); the last axis counts the coordinates
         of v."""
         index = self.model.frame_index(frame)
-        kernel = self._kernel(("pose", index), lambda mechanism: programs.pose_derivative(mechanism, index))
-        (derivative,) = evaluate_kernel(kernel, [self._arguments.q(q)], self._threads)
+        program = partial(programs.pose_derivative, frame=index)
+        (derivative,) = self._evaluate(("pose", index), program, [self._arguments.q(q)])
         return derivative
 
     def _solve(self, factors: Floats, b: Floats) -> Floats:
         """Solve M x = b for matrices b (..., nv, nv), from the factors of M."""
-        kernel, (nv, columns) = self._kernel("solution", programs.solution_by_factors), b.shape[-2:]
+        nv, columns = b.shape[-2:]
+        kernel = self._kernels.kernel(("derivatives", "solution"), programs.solution_by_factors)
         sides = np.ascontiguousarray(np.swapaxes(b, -1, -2)).reshape(-1, columns, nv)
         factors = factors.reshape(len(sides), factors.shape[-1])
         found = np.empty_like(sides)
@@ -144,22 +132,14 @@ class Derivatives:
                 kernel([np.broadcast_to(factors[k], (columns, factors.shape[-1])), sides[k]], [found[k]])
         else:
             for c in range(columns):
-                kernel([factors, sides[:, c]], [found[:, c]], threads=self._threads)
+                kernel([factors, sides[:, c]], [found[:, c]], threads=self._kernels.threads)
         return np.swapaxes(found, -1, -2).reshape(b.shape)
 
     def _checked(self, q: ArrayLike, v: ArrayLike, x: ArrayLike, name: str) -> list[Floats]:
         return [self._arguments.q(q), self._arguments.v(v), self._arguments.v(x, name)]
 
-    def _kernel(self, purpose: object, program: Callable[[Mechanism], Program]) -> Kernel:
-        kernel = self._kernels.get(purpose)
-        if kernel is None:
-            with self._making:
-                kernel = self._kernels.get(purpose)
-                if kernel is None:
-                    mechanism = simplify_mechanism(self.model.mechanism)
-                    kernel = robot_kernel(self.model, ("derivatives", purpose), lambda: program(mechanism))
-                    self._kernels[purpose] = kernel
-        return kernel
+    def _evaluate(self, purpose: object, program: Making, arrays: list[Floats]) -> list[Floats]:
+        return self._kernels.evaluate(("derivatives", purpose), program, arrays)
 
     def __reduce__(self) -> tuple[object, ...]:
         return partial(Derivatives, self.model, threads=self._option), ()

@@ -6,7 +6,6 @@ sample of a batch may have its own inertias, payload or joint friction.
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
@@ -20,15 +19,13 @@ from dynx.backends.registry import refuse_other_than_model
 from dynx.compiled.mass_factors import factorize_mass_matrix, solve_with_factors
 from dynx.compiled.model_coordinates import argument_shapes, reduce_columns, reduce_rows, tree_coordinates
 from dynx.compiled.parameters import Parameters, Selection
-from dynx.compiled.robot_kernel import evaluate_kernel, robot_kernel
+from dynx.compiled.robot_kernel import RobotKernels
 from dynx.compiled.simplification import simplify_mechanism
 from dynx.errors import ArgumentError, shown
 from dynx.model import Mechanism, Model
 from dynx.model.configuration import checked_array
 from dynx.rbd import crba, rnea
-from dynx.simd.kernel import Kernel
 from dynx.simd.program import Program
-from dynx.simd.threads import checked_threads
 from dynx.simd.trace import trace
 from dynx.spatial.inertia import RigidInertia
 from dynx.spatial.scalar import Array, Floats
@@ -80,10 +77,8 @@ class ParametricDynamics:
         self.parameters: Parameters = selection.parameters()
         self._selection = selection
         self._option = threads
-        self._threads = checked_threads(threads)
         self._arguments = Arguments(selection.model)
-        self._kernels: dict[str, Kernel] = {}
-        self._making = threading.Lock()
+        self._kernels = RobotKernels(selection.model, threads)
 
     def inverse_dynamics(
         self, q: ArrayLike, v: ArrayLike, a: ArrayLike, parameters: ArrayLike | None = None
@@ -123,30 +118,17 @@ class ParametricDynamics:
         return self._selection.read(parameters).added_to(self._selection.remainder()).root
 
     def _evaluate(
-        self,
-        name: str,
-        function: Callable[..., Array],
-        arrays: list[Floats],
-        parameters: ArrayLike | None,
+        self, name: str, function: Callable[..., Array], arrays: list[Floats], parameters: ArrayLike | None
     ) -> Floats:
         if parameters is None:
             values = self.parameters.defaults
         else:
             values = checked_array("parameters", parameters, len(self.parameters.names))
-        (result,) = evaluate_kernel(self._kernel(name, function), [*arrays, values], self._threads)
+        purpose = ("parametric", name, self._selection.choices)
+        (result,) = self._kernels.evaluate(
+            purpose, lambda _: _program(self._selection, name, function), [*arrays, values]
+        )
         return result
-
-    def _kernel(self, name: str, function: Callable[..., Array]) -> Kernel:
-        kernel = self._kernels.get(name)
-        if kernel is None:
-            with self._making:
-                kernel = self._kernels.get(name)
-                if kernel is None:
-                    purpose = ("parametric", name, self._selection.choices)
-                    kernel = self._kernels[name] = robot_kernel(
-                        self.model, purpose, lambda: _program(self._selection, name, function)
-                    )
-        return kernel
 
     def __reduce__(self) -> tuple[object, ...]:
         return partial(ParametricDynamics, self._selection, threads=self._option), ()

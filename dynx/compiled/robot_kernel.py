@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Sequence
 from functools import cache
 from math import prod
@@ -16,12 +17,14 @@ import dynx.rbd
 import dynx.spatial
 from dynx._version import __version__
 from dynx.backends.evaluation import batch_rows, common_batch
-from dynx.model import Model
+from dynx.compiled.simplification import simplify_mechanism
+from dynx.model import Mechanism, Model
 from dynx.simd.cache import load_kernel, source_hash
 from dynx.simd.emit import Settings
 from dynx.simd.kernel import Kernel
 from dynx.simd.program import Program
 from dynx.simd.target import host
+from dynx.simd.threads import checked_threads
 from dynx.spatial.scalar import Floats
 
 MAX_NV_OF_LONG_SEGMENTS = 16
@@ -29,30 +32,50 @@ MAX_NV_OF_LONG_SEGMENTS = 16
 to compile and run about a tenth slower."""
 
 
-def robot_kernel(model: Model, purpose: object, program: Callable[[], Program]) -> Kernel:
-    """Return the kernel of `program`, which `model` and `purpose` determine; from the cache if it is
-    there."""
-    content = (model.links, model.joints, model.base, model.gravity, model.extra_frames)
-    recipe = repr((_algorithms(), content, purpose)).encode()
-    lanes = host().lanes
-    large = model.mechanism.nv > MAX_NV_OF_LONG_SEGMENTS
-    settings = Settings(lanes, segment=1200) if large else Settings(lanes)
-    return load_kernel(recipe, program, settings=settings)
+Making = Callable[[Mechanism], Program]
+"""Function that makes a program from the simplified mechanism of a robot."""
 
 
-def evaluate_kernel(kernel: Kernel, arrays: Sequence[Floats], threads: int) -> list[Floats]:
-    """Evaluate a kernel on inputs (..., size) whose leading axes broadcast; return its outputs (...,
-    *shape)."""
-    batch = common_batch(*arrays)
-    n = prod(batch)
-    rows = [batch_rows(array, batch) for array in arrays]
-    found = [np.empty((*batch, *port.shape)) for port in kernel.outputs]
-    kernel(
-        rows,
-        [out.reshape(n, port.size) for out, port in zip(found, kernel.outputs, strict=True)],
-        threads=threads,
-    )
-    return found
+class RobotKernels:
+    """Kernels of one robot, compiled when they are first needed; several threads may share them."""
+
+    def __init__(self, model: Model, threads: int | None) -> None:
+        """A batch is split over at most `threads` threads. Raises ArgumentError for an invalid number."""
+        self._model = model
+        self.threads = checked_threads(threads)
+        self._kernels: dict[object, Kernel] = {}
+        self._making = threading.Lock()
+
+    def evaluate(self, purpose: object, program: Making, arrays: Sequence[Floats]) -> list[Floats]:
+        """Evaluate `program` on inputs (..., size) whose leading axes broadcast; return its outputs (...,
+        *shape)."""
+        kernel = self.kernel(purpose, program)
+        batch = common_batch(*arrays)
+        n = prod(batch)
+        rows = [batch_rows(array, batch) for array in arrays]
+        found = [np.empty((*batch, *port.shape)) for port in kernel.outputs]
+        columns = [out.reshape(n, port.size) for out, port in zip(found, kernel.outputs, strict=True)]
+        kernel(rows, columns, threads=self.threads)
+        return found
+
+    def kernel(self, purpose: object, program: Making) -> Kernel:
+        """Return the kernel of `program`, which `purpose` determines; from the cache if it is there."""
+        kernel = self._kernels.get(purpose)
+        if kernel is None:
+            with self._making:
+                kernel = self._kernels.get(purpose)
+                if kernel is None:
+                    kernel = self._kernels[purpose] = self._load(purpose, program)
+        return kernel
+
+    def _load(self, purpose: object, program: Making) -> Kernel:
+        model, lanes = self._model, host().lanes
+        content = (model.links, model.joints, model.base, model.gravity, model.extra_frames)
+        recipe = repr((_algorithms(), content, purpose)).encode()
+        large = model.mechanism.nv > MAX_NV_OF_LONG_SEGMENTS
+        settings = Settings(lanes, segment=1200) if large else Settings(lanes)
+        mechanism = model.mechanism
+        return load_kernel(recipe, lambda: program(simplify_mechanism(mechanism)), settings=settings)
 
 
 @cache

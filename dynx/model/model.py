@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,6 +18,7 @@ from dynx.model.urdf.writer import write_urdf
 from dynx.spatial.scalar import Floats
 
 Base = Literal["fixed", "floating"]
+Part = TypeVar("Part")
 STANDARD_GRAVITY: Vector = (0.0, 0.0, -9.81)
 
 
@@ -124,24 +125,15 @@ class Model:
 
     def joint(self, name: str) -> Joint:
         """Return the joint of that name (of any type); UnknownNameError if there is none."""
-        try:
-            return self._joint_by_name[name]
-        except (KeyError, TypeError):
-            raise UnknownNameError(self._unknown_name_message("joint", name, self._joint_by_name)) from None
+        return self._named("joint", name, self._joint_by_name)
 
     def link(self, name: str) -> Link:
         """Return the link of that name; UnknownNameError if there is none."""
-        try:
-            return self._link_by_name[name]
-        except (KeyError, TypeError):
-            raise UnknownNameError(self._unknown_name_message("link", name, self._link_by_name)) from None
+        return self._named("link", name, self._link_by_name)
 
     def frame_index(self, name: str) -> int:
         """Return the index of the frame in `frame_names`; UnknownNameError if there is none."""
-        try:
-            return self._frame_index[name]
-        except (KeyError, TypeError):
-            raise UnknownNameError(self._unknown_name_message("frame", name, self._frame_index)) from None
+        return self._named("frame", name, self._frame_index)
 
     def coordinate_index(self, joint: str) -> int:
         """Return the index of the joint's coordinate in `v` (one higher in `q` with a floating base)."""
@@ -253,6 +245,12 @@ class Model:
     @cached_property
     def _frame_index(self) -> dict[str, int]:
         return {name: index for index, name in enumerate(self.frame_names)}
+
+    def _named(self, kind: str, name: str, known: Mapping[str, Part]) -> Part:
+        try:
+            return known[name]
+        except (KeyError, TypeError):
+            raise UnknownNameError(self._unknown_name_message(kind, name, known)) from None
 
     def _unknown_name_message(self, kind: str, name: object, known: Mapping[str, object]) -> str:
         message = f"no {kind} {shown(name)} in {self.name}"

@@ -192,8 +192,8 @@ SIMULATION_FAULTS = (
     Fault(
         "cdr_numbers_not_aligned_to_8_bytes",
         "dynx.sim.record.cdr",
-        right="self._put_bytes(bytes(-self._size % np.dtype(kind).itemsize))",
-        wrong="self._put_bytes(bytes(-self._size % min(np.dtype(kind).itemsize, 4)))",
+        right="bytes(-size % kind.itemsize)",
+        wrong="bytes(-size % min(kind.itemsize, 4))",
         test_file="tests/sim/record/test_mcap.py",
         test="test_a_message_is_cdr_byte_for_byte",
     ),

@@ -36,7 +36,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dynx.sim.record.cdr import CdrMessages
+from dynx.sim.record.cdr import Field, encode_messages
 from dynx.sim.record.rollout_data import RolloutData
 from dynx.spatial.scalar import Floats
 
@@ -46,8 +46,8 @@ NO_VALUES = np.zeros((0, 0))
 Stamps = np.ndarray[Any, np.dtype[np.int64]]
 """Times in nanoseconds."""
 
-Encode = Callable[[CdrMessages, Stamps, slice], None]
-"""Function that appends all fields of the messages for a slice of the states, whose stamps are given."""
+Fields = Callable[[Stamps, slice], list[Field]]
+"""Function that returns all fields of the messages for a slice of the states, whose stamps are given."""
 
 
 class Topic(NamedTuple):
@@ -57,7 +57,7 @@ class Topic(NamedTuple):
     message: str
     first: int
     last: int
-    encode: Encode
+    fields: Fields
 
     def encoded(self, stamps: Stamps, begin: int, end: int) -> list[tuple[int, bytes]]:
         """Return the messages of the states `begin` to `end` (exclusive), each with the number of its
@@ -65,9 +65,8 @@ class Topic(NamedTuple):
         begin, end = max(begin, self.first), min(end, self.last)
         if begin >= end:
             return []
-        messages = CdrMessages(end - begin)
-        self.encode(messages, stamps[begin:end], slice(begin, end))
-        return list(zip(range(begin, end), messages.encoded(), strict=True))
+        fields = self.fields(stamps[begin:end], slice(begin, end))
+        return list(zip(range(begin, end), encode_messages(end - begin, fields), strict=True))
 
 
 def topics_of(rollout: RolloutData) -> list[Topic]:
@@ -81,11 +80,11 @@ def _joint_topics(rollout: RolloutData) -> list[Topic]:
     names = model.joint_names
     flags = rollout.saturated[:, base_v:].astype(np.float64)
 
-    def joints(q: Floats, v: Floats = NO_VALUES, effort: Floats = NO_VALUES) -> Encode:
+    def joints(q: Floats, v: Floats = NO_VALUES, effort: Floats = NO_VALUES) -> Fields:
         return _joint_states(names, q[:, base_q:], v[:, base_v:], effort[:, base_v:])
 
-    def topic(name: str, kind: str, encode: Encode, first: int = 0, last: int = n + 1) -> Topic:
-        return Topic(name, kind, first, last, encode)
+    def topic(name: str, kind: str, fields: Fields, first: int = 0, last: int = n + 1) -> Topic:
+        return Topic(name, kind, first, last, fields)
 
     state, points = "sensor_msgs/JointState", "trajectory_msgs/JointTrajectory"
     topics = [
@@ -111,10 +110,10 @@ def _base_topics(rollout: RolloutData) -> list[Topic]:
 
     world = "world" if base != "world" else "map"
 
-    def topic(name: str, kind: str, encode: Encode, last: int = n + 1) -> Topic:
-        return Topic(name, kind, 0, last, encode)
+    def topic(name: str, kind: str, fields: Fields, last: int = n + 1) -> Topic:
+        return Topic(name, kind, 0, last, fields)
 
-    def odometry(q: Floats, v: Floats) -> Encode:
+    def odometry(q: Floats, v: Floats) -> Fields:
         return _odometry(world, base, q[:, :7], v[:, :6])
 
     topics = [
@@ -138,73 +137,59 @@ def _joint_states(
     position: Floats = NO_VALUES,
     velocity: Floats = NO_VALUES,
     effort: Floats = NO_VALUES,
-) -> Encode:
-    def encode(messages: CdrMessages, stamps: Stamps, states: slice) -> None:
-        _put_header(messages, stamps, "")
-        messages.put_string_sequence(names)
-        for values in (position, velocity, effort):
-            messages.put_float64_sequence(values[states])
-
-    return encode
+) -> Fields:
+    columns = (position, velocity, effort)
+    return lambda stamps, states: [*_header(stamps, ""), *_listed(names, *(x[states] for x in columns))]
 
 
-def _accelerations(names: Sequence[str], values: Floats) -> Encode:
-    def encode(messages: CdrMessages, stamps: Stamps, states: slice) -> None:
-        _put_header(messages, stamps, "")
-        messages.put_string_sequence(names)
-        messages.put_uint32(1)  # points
-        for field in (NO_VALUES, NO_VALUES, values[states], NO_VALUES):
-            messages.put_float64_sequence(field)
-        _put_time(messages, np.zeros_like(stamps))
+def _accelerations(names: Sequence[str], values: Floats) -> Fields:
+    def fields(stamps: Stamps, states: slice) -> list[Field]:
+        point = _listed(NO_VALUES, NO_VALUES, values[states], NO_VALUES)
+        return [*_header(stamps, ""), *_listed(names), 1, *point, *_time(0 * stamps)]
 
-    return encode
+    return fields
 
 
-def _numbers(values: Floats) -> Encode:
-    return lambda messages, _, states: messages.put_float64s(values[states])
+def _numbers(values: Floats) -> Fields:
+    return lambda _, states: [values[states]]
 
 
-def _text(text: str) -> Encode:
-    return lambda messages, _, states: messages.put_string(text)
+def _text(text: str) -> Fields:
+    return lambda *_: [text]
 
 
-def _transform(world: str, base: str, pose: Floats) -> Encode:
-    def encode(messages: CdrMessages, stamps: Stamps, states: slice) -> None:
-        messages.put_uint32(1)  # transforms
-        _put_header(messages, stamps, world)
-        messages.put_string(base)
-        messages.put_float64s(pose[states])
-
-    return encode
+def _transform(world: str, base: str, pose: Floats) -> Fields:
+    return lambda stamps, states: [1, *_header(stamps, world), base, pose[states]]
 
 
-def _odometry(world: str, base: str, pose: Floats, velocity: Floats) -> Encode:
+def _odometry(world: str, base: str, pose: Floats, velocity: Floats) -> Fields:
     certain = np.zeros((1, 36))
-
-    def encode(messages: CdrMessages, stamps: Stamps, states: slice) -> None:
-        _put_header(messages, stamps, world)
-        messages.put_string(base)
-        for values in (pose[states], certain, velocity[states], certain):
-            messages.put_float64s(values)
-
-    return encode
+    return lambda stamps, states: [
+        *(*_header(stamps, world), base),
+        *(pose[states], certain, velocity[states], certain),
+    ]
 
 
-def _stamped(frame: str, values: Floats) -> Encode:
-    """Encode messages of two vectors with a header: a twist, an acceleration or a wrench."""
-
-    def encode(messages: CdrMessages, stamps: Stamps, states: slice) -> None:
-        _put_header(messages, stamps, frame)
-        messages.put_float64s(values[states])
-
-    return encode
+def _stamped(frame: str, values: Floats) -> Fields:
+    """Return the fields of two vectors with a header: a twist, an acceleration or a wrench."""
+    return lambda stamps, states: [*_header(stamps, frame), values[states]]
 
 
-def _put_header(messages: CdrMessages, stamps: Stamps, frame: str) -> None:
-    _put_time(messages, stamps)
-    messages.put_string(frame)
+def _header(stamps: Stamps, frame: str) -> list[Field]:
+    return [*_time(stamps), frame]
 
 
-def _put_time(messages: CdrMessages, nanoseconds: Stamps) -> None:
-    messages.put_int32(nanoseconds // 10**9)
-    messages.put_uint32(nanoseconds % 10**9)
+def _time(nanoseconds: Stamps) -> list[Field]:
+    return [nanoseconds // 10**9, nanoseconds % 10**9]
+
+
+def _listed(*sequences: Sequence[str] | Floats) -> list[Field]:
+    """Return sequences of text for all messages, or of the k numbers of each row (n, k)."""
+    found: list[Field] = []
+    for each in sequences:
+        if not isinstance(each, np.ndarray):
+            found += [len(each), *each]
+        else:
+            # Numbers that are absent are not aligned either.
+            found += [each.shape[1], each] if each.shape[1] else [0]
+    return found

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
-from dynx.sim.record.cdr import CdrMessages
+from dynx.sim.record.cdr import Field, encode_messages
 from dynx.sim.record.ros_definitions import schema_name, schema_text
 from dynx.spatial.scalar import Floats
 
@@ -35,14 +35,11 @@ def test_messages_are_read_back(
     values: Floats, names: list[str], frame: str, second: int, nanosecond: int
 ) -> None:
     n = len(values)
-    messages = CdrMessages(n)
-    messages.put_int32(np.full(n, second))
-    messages.put_uint32(nanosecond)
-    messages.put_string(frame)
-    messages.put_string_sequence(names)
+    fields: list[Field] = [np.full(n, second), nanosecond, frame, len(names), *names]
     for field in (values, -values, values[:, ::-1]):
-        messages.put_float64_sequence(field)
-    encoded = messages.encoded()
+        # Numbers that are absent are not aligned either.
+        fields += [field.shape[1], field] if field.shape[1] else [0]
+    encoded = encode_messages(n, fields)
     assert len(encoded) == n
     for row, data in zip(values, encoded, strict=True):
         read = decoded("sensor_msgs/JointState", data)
@@ -55,14 +52,8 @@ def test_messages_are_read_back(
 
 @given(values=arrays(np.float64, (3, 7)), text=TEXTS)
 def test_numbers_in_a_row_have_no_length(values: Floats, text: str) -> None:
-    messages = CdrMessages(3)
-    messages.put_uint32(1)
-    for field in (0, np.arange(3)):
-        messages.put_uint32(field)
-    messages.put_string("w")
-    messages.put_string(text)
-    messages.put_float64s(values)
-    for k, data in enumerate(messages.encoded()):
+    encoded = encode_messages(3, [1, 0, np.arange(3), "w", text, values])
+    for k, data in enumerate(encoded):
         (read,) = decoded("tf2_msgs/TFMessage", data).transforms
         assert (read.header.stamp.nanosec, read.child_frame_id) == (k, text)
         moved, turned = read.transform.translation, read.transform.rotation
