@@ -123,6 +123,10 @@ class DoctorReport:
     robot: str
     source: str | None = None
     base: str | None = None
+    total_mass: float | None = None
+    """Sum of the masses of all links [kg], as the file states them; None where it was not examined."""
+    kinematics_only: bool = False
+    """Whether the file has no inertial data (DX118), so that only the kinematics is compared."""
     engines: tuple[EngineResult, ...] = ()
     findings: tuple[Finding, ...] = ()
     unexplained: tuple[Unexplained, ...] = ()
@@ -153,10 +157,11 @@ class DoctorReport:
 
     @property
     def alike(self) -> bool:
-        """Whether every engine loads the file, with no error above the tolerance."""
+        """Whether every engine loads the file, with no error above the tolerance, in dynamics too."""
         largest = max((e for each in self.engines for e in each.before.values()), default=0.0)
         refused = any(each.refused is not None for each in self.engines)
-        return self.error is None and not refused and largest <= self.tolerance
+        compared = self.error is None and not self.kinematics_only
+        return compared and not refused and largest <= self.tolerance
 
     @property
     def explained(self) -> bool:
@@ -180,6 +185,11 @@ class DoctorReport:
             count = len(self.unexplained)
             return f"{count} difference{'s' * (count != 1)} without an explanation"
         causes = {finding.rule for finding in self.differences}
+        if self.kinematics_only:
+            others = len(causes) - 1
+            many = f"{others} further cause{'s' * (others != 1)}"
+            also = f", and engines differ for {many}" if others > 0 else ""
+            return f"no inertial data: the dynamics cannot be compared{also}"
         if not causes:
             return "engines differ, for a cause that is known and cannot be mended"
         proved = causes - {finding.rule for finding in self.differences if not finding.proved}
@@ -198,6 +208,8 @@ class DoctorEntry:
     robot: str
     source: str | None
     base: str | None
+    total_mass: float | None
+    kinematics_only: bool
     engines: tuple[EngineResult, ...]
     findings: tuple[Finding, ...]
     explained: bool
@@ -222,6 +234,8 @@ class DoctorSummary:
     robots: int
     alike: int
     explained: int
+    massless: int
+    """Robots without inertial data whose kinematics is alike, or differs with every cause proved."""
     unexplained: int
     refused: int
     not_done: int
@@ -245,7 +259,10 @@ def results_document(reports: Iterable[DoctorReport], not_done: Sequence[str] = 
     summary = DoctorSummary(
         robots=len(reports),
         alike=sum(report.alike for report in reports),
-        explained=sum(report.explained and not report.alike for report in reports),
+        explained=sum(
+            report.explained and not report.alike and not report.kinematics_only for report in reports
+        ),
+        massless=sum(report.explained and report.kinematics_only for report in reports),
         unexplained=sum(bool(report.unexplained) for report in reports),
         refused=sum(report.error is not None for report in reports),
         not_done=len(not_done),

@@ -10,7 +10,7 @@ from dynx.doctor.examine.examination import QUANTITIES, TORQUE, Examination, Exa
 from dynx.doctor.examine.reference_values import referee_error
 from dynx.doctor.prove.attribution import Attribution
 from dynx.doctor.prove.mending import Mending, Place, place_of
-from dynx.doctor.report import DoctorReport, EngineResult, Finding, PairError, RunTimeCall
+from dynx.doctor.report import DoctorReport, Effect, EngineResult, Finding, PairError, RunTimeCall
 from dynx.loaded import loader_class
 from dynx.loaded.difference import model_difference
 from dynx.rules import Case, Detection, Rule
@@ -24,6 +24,8 @@ def first_report(case: Case, before: Examination, tolerance: float) -> DoctorRep
         robot=model.name,
         source=case.source.source,
         base=case.base,
+        total_mass=sum(link.inertial.mass for link in model.links if link.inertial is not None),
+        kinematics_only=before.reference.kinematics_only,
         engines=tuple(_engine_result(case, name, before) for name in before.outputs),
         residual=_residual(before),
         tolerance=tolerance,
@@ -85,7 +87,8 @@ def all_findings(
     mended: Mending,
     engines: Collection[str],
 ) -> tuple[Finding, ...]:
-    """Report everything detected, with the effect where one was measured; texts name these engines only."""
+    """Report everything detected, with the effect where one was measured, or is known in all `engines`; texts
+    name these engines only."""
     proved: dict[Place, list[Attribution]] = {}
     for each in proofs:
         proved.setdefault(place_of(each.rule, each.detection), []).append(each)
@@ -105,7 +108,11 @@ def all_findings(
             detection.line,
             detection.sentence(engines),
         )
-        if attribution is not None and attribution.effects:
+        if rule.undefined:
+            effect = Effect(rule.undefined, float("inf"))
+            effects = dict.fromkeys(engines, effect)
+            finding = replace(finding, engines=tuple(effects), effect=effect, effects=effects, proved=True)
+        elif attribution is not None and attribution.effects:
             finding = replace(
                 finding,
                 engines=tuple(attribution.effects),

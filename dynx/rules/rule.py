@@ -95,6 +95,10 @@ class Rule(ABC):
     ``>=3.2.5,<=3.2.7``) in which that was measured; a test loads the trap in the installed version and
     fails if the engine behaves otherwise."""
 
+    undefined: ClassVar[str] = ""
+    """Name of what the file leaves undefined where the cause is present, such as ``dynamics``; mostly empty.
+    It is the effect of the cause in every engine, and needs no measurement."""
+
     advice: ClassVar[str] = ""
     """Advice to the user, in one sentence."""
 

@@ -99,6 +99,7 @@ def test_a_report_is_the_same_again_and_is_plain_json() -> None:
         "robots": 1,
         "alike": 0,
         "explained": 1,
+        "massless": 0,
         "unexplained": 0,
         "refused": 0,
         "not_done": 0,

@@ -60,6 +60,7 @@ def test_the_summary_counts_each_robot_once() -> None:
         "robots": 4,
         "alike": 1,
         "explained": 1,
+        "massless": 0,
         "unexplained": 1,
         "refused": 1,
         "not_done": 2,

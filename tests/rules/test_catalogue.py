@@ -31,6 +31,7 @@ ALSO_IN_TRAP: dict[str, dict[str, str]] = {
 # Rules whose remedy changes more than the links, joints and lines of the detections: rule -> the reason.
 CHANGES_ELSEWHERE: dict[str, str] = {
     "DX109": "a link has another name wherever the document names it",
+    "DX118": "every moving link gets mass, if the user chose that",
     "DX212": "frames are removed, with their joints",
     "DX414": "a link has another name wherever the document names it",
     "DX440": "the first line declares the encoding",

@@ -56,8 +56,9 @@ def show_verdict(out: Console, report: DoctorReport) -> None:
         return
     style = "bold green" if report.alike else "bold" if report.explained else "bold red"
     out.print(f"{short_line(report.robot)}, {report.base} base: {one_line(report.verdict)}", style=style)
-    if report.source is not None:
-        out.print(f"({short_line(report.source)})", style="dim")
+    mass = "" if report.total_mass is None else f"total mass {report.total_mass:.4g} kg"
+    where = "" if report.source is None else short_line(report.source)
+    out.print(f"({'; '.join(filter(None, (where, mass)))})", style="dim")
 
 
 def show_engines(out: Console, report: DoctorReport) -> None:
@@ -122,9 +123,11 @@ def show_many(out: Console, reports: Sequence[DoctorReport]) -> None:
 
 
 def show_summary(out: Console, reports: Sequence[DoctorReport], seconds: float, not_done: int) -> None:
-    """Print the last line: the number of robots alike, explained, unexplained, refused and not done."""
+    """Print the last line: the number of robots with each verdict, and of those not done."""
     verdicts = [status(report) for report in reports]
     counts = {word: verdicts.count(word) for word in get_args(Status)}
+    if not counts["massless"]:
+        del counts["massless"]
     bases = len({report.base for report in reports}) > 1
     what = counted(len(reports), "examination" if bases else "robot")
     out.print(summary_line(what, counts, not_done, seconds))
@@ -272,5 +275,7 @@ def _verdict_text(report: DoctorReport) -> Text:
         return Text("alike", "green")
     if word == "unexplained":
         return Text("UNEXPLAINED", "bold red")
+    if word == "massless":
+        return Text("no inertial data", "yellow")
     alarming = any(severity(finding) == "error" for finding in report.differences)
     return Text("explained", "" if alarming else "dim")

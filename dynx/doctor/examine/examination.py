@@ -22,6 +22,7 @@ from dynx.loaded import LoadedModel, LoadedRobot, loader_class
 from dynx.model.model import Base
 from dynx.model.xml.source import XmlSource
 from dynx.rules.case import Case
+from dynx.rules.inertia.massless_links import has_inertial_data
 from dynx.spatial.scalar import Floats
 
 KINEMATICS, JACOBIAN = "forward_kinematics", "jacobian"
@@ -151,8 +152,10 @@ class Examiner:
         return self._values(without_meshes(case.source).text, case.source.source, case.base)
 
     def _compute_reference(self, text: str, name: str, base: Base) -> ReferenceValues:
-        model = model_without_mimics(XmlSource(text, name), base)
-        return reference_values(model, draw_states(model, self._samples, self._seed))
+        source = XmlSource(text, name)
+        model = model_without_mimics(source, base)
+        values = reference_values(model, draw_states(model, self._samples, self._seed))
+        return replace(values, kinematics_only=not has_inertial_data(Case(source, base)))
 
     def examine(
         self,
@@ -203,6 +206,7 @@ def _outputs_of(engine: str, robot: LoadedRobot, reference: ReferenceValues, des
     record(KINEMATICS, lambda: _pose_deviation(robot, reference))
     if reference.model.nv:
         record(JACOBIAN, lambda: _jacobian_deviation(robot, reference))
+    if reference.model.nv and not reference.kinematics_only:
         record(MASS, lambda: {"": _evaluate_samples(robot.mass_matrix, states.q) - reference.mass_matrix})
         record(
             TORQUE,

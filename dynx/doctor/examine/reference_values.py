@@ -54,7 +54,8 @@ class ReferenceValues:
     `poses` (n, n_links, 4, 4) of the links in the world; by link `jacobians` (n, 6, nv) of its frame, linear
     rows first, in axes of the world; `mass_matrix` (n, nv, nv); `torque` (n, nv) for the accelerations of
     `states`, and `bias` (n, nv) the part of it without acceleration. `solvable` says whether forward dynamics
-    has a solution.
+    has a solution. `kinematics_only` says that the file has no inertial data (DX118), so that nothing else
+    can be compared.
     """
 
     model: Model
@@ -65,6 +66,7 @@ class ReferenceValues:
     torque: Floats
     bias: Floats
     solvable: bool
+    kinematics_only: bool = False
 
     def first(self, count: int) -> ReferenceValues:
         """Keep the first `count` states."""

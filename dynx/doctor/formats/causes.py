@@ -14,8 +14,9 @@ Severity = Literal["error", "warning", "note"]
 """``error``: engines differ by more than rounding. ``warning``: by accumulated rounding.
 ``note``: nothing differs; bad practice, or a cause without effect on this base."""
 
-Status = Literal["alike", "explained", "unexplained", "refused"]
-"""``explained``: engines differ and every difference has a proved cause. ``refused``: not examined."""
+Status = Literal["alike", "explained", "massless", "unexplained", "refused"]
+"""``explained``: engines differ and every difference has a proved cause. ``massless``: the file has no
+inertial data, and only the kinematics was compared. ``refused``: not examined."""
 
 ROUNDING = 1e-9
 """Relative error up to which a difference counts as accumulated rounding: PyBullet's diagonalisation of
@@ -111,7 +112,9 @@ def status(report: DoctorReport) -> Status:
         return "refused"
     if report.alike:
         return "alike"
-    return "explained" if report.explained else "unexplained"
+    if not report.explained:
+        return "unexplained"
+    return "massless" if report.kinematics_only else "explained"
 
 
 def _size(effect: Effect | None) -> float:

@@ -25,7 +25,7 @@ from collections.abc import Iterable, Sequence
 
 from dynx.rules import Case, Detection, Remedy, Rule, links_of, measured_on
 from dynx.rules.inertia.edits import with_inertials, zero_inertial
-from dynx.rules.inertia.massless_links import heaviest_in_root_group
+from dynx.rules.inertia.massless_links import has_inertial_data, heaviest_in_root_group
 from dynx.rules.inertia.merging import merged_inertials
 from dynx.rules.inertia.rigid_groups import rigid_groups, static_links
 
@@ -47,6 +47,8 @@ class LinkWithoutInertial(Rule):
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
         """Yield the links that can move and have no ``<inertial>``."""
+        if not has_inertial_data(case):
+            return  # DX118
         static = static_links(case)
         for name, element in case.links.items():
             if element.first("inertial") is None and name not in static and name != _WORLD:

@@ -16,15 +16,19 @@ What to do: give the root the mass of the body that it represents.
 ``dynx doctor --fix`` merges the heaviest link that is rigidly connected to the root (directly or by a chain
 of fixed joints) into it; that link gets a zero inertial and keeps its name and its place. It is the same
 rigid body. Where no link rigidly connected to the root has mass, the root gets 2e-15 kg and 1.5e-14 kg m^2,
-which all engines accept and which is too little to show in any result; ``--choose DX107=keep`` leaves it. In
-a robot without any mass that counts as a change of the physics.
+which all engines accept and which is too little to show in any result; ``--choose DX107=keep`` leaves it. A
+robot without any mass has no inertial data (DX118).
 """
 
 from collections.abc import Iterable, Sequence
 
 from dynx.rules import Case, Detection, Remedy, Rule, measured_on
 from dynx.rules.inertia.edits import with_inertials
-from dynx.rules.inertia.massless_links import heaviest_in_root_group, with_least_inertia
+from dynx.rules.inertia.massless_links import (
+    has_inertial_data,
+    heaviest_in_root_group,
+    with_least_inertia,
+)
 from dynx.rules.inertia.merging import merged_inertials
 from dynx.rules.inertia.rigid_groups import rigid_groups
 
@@ -44,7 +48,7 @@ class MasslessRoot(Rule):
         inertial = case.inertials[model.root]
         # Without an <inertial> PyBullet gives the root 1 kg (DX101), unless it is named world.
         weightless = model.root == "world" if inertial is None else inertial.mass == 0.0
-        if case.base != "floating" or not weightless:
+        if case.base != "floating" or not weightless or not has_inertial_data(case):
             return []
         element = case.links[model.root]
         line = element.line if inertial is None else inertial.line
@@ -58,8 +62,6 @@ class MasslessRoot(Rule):
         if self.chosen(case) == "keep":
             return None
         if body is None:
-            weightless = not any(link.inertial and link.inertial.mass > 0.0 for link in case.model.links)
-            least = with_least_inertia(case, [root])
-            return Remedy(*least, self.decision(case), changes_physics=weightless)
+            return Remedy(*with_least_inertia(case, [root]), self.decision(case))
         bodies = merged_inertials(case, rigid_groups(case)[root], (root, body), root)
         return Remedy(with_inertials(case, bodies), f"merged the mass of {body} into the root {root}")

@@ -15,17 +15,25 @@ from dynx.rules.text.number_text import decimal
 _MASS = 2.0 * MIN_MASS
 
 
+def has_inertial_data(case: Case) -> bool:
+    """Check that anything that can move has mass or moments; True where nothing can move."""
+    moving = [case.inertials[name] for name, group in rigid_groups(case).items() if not group.static]
+    return not moving or not all(map(_is_empty, moving))
+
+
 def massless_links(case: Case) -> dict[str, bool]:
     """Return the first link of each moving rigid group without mass and moments.
 
-    The value is True where no link beyond it has mass or moments either.
+    The value is True where no link beyond it has mass or moments either. A robot without any inertial data
+    has no such links: DX118 is about the whole.
     """
+    if not has_inertial_data(case):
+        return {}
     model, groups = case.model, rigid_groups(case)
     empty: dict[str, bool] = {}
     for link in model.links:
-        head, inertial = groups[link.name].head, link.inertial
-        nothing = inertial is None or (inertial.mass < MIN_MASS and not inertial.tensor.any())
-        empty[head] = empty.get(head, True) and nothing
+        head = groups[link.name].head
+        empty[head] = empty.get(head, True) and _is_empty(link.inertial)
     carrier = {
         joint.child: groups[joint.parent].head
         for joint in model.joints
@@ -36,6 +44,10 @@ def massless_links(case: Case) -> dict[str, bool]:
     for head in reversed(carrier):
         bare[carrier[head]] = bare[carrier[head]] and bare[head]
     return {head: bare[head] for head in carrier if empty[head]}
+
+
+def _is_empty(inertial: Inertial | None) -> bool:
+    return inertial is None or (inertial.mass < MIN_MASS and not inertial.tensor.any())
 
 
 def with_least_inertia(case: Case, names: Sequence[str]) -> tuple[Case, str]:

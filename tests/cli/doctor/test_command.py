@@ -127,7 +127,7 @@ def test_several_robots_and_bases(arm: Path, tmp_path: Path) -> None:
         "robots/arm.urdf", "robots/bad.urdf", "robots/deep/sound.urdf", "nosuch",
     ]  # fmt: skip
     assert made["summary"] == {
-        "robots": 4, "alike": 1, "explained": 1, "unexplained": 0, "refused": 2, "not_done": 0,
+        "robots": 4, "alike": 1, "explained": 1, "massless": 0, "unexplained": 0, "refused": 2, "not_done": 0,
     }  # fmt: skip
     assert "4 robots: 1 alike, 1 explained, 0 unexplained, 2 refused" in result.stderr
     done = {line.partition("] ")[2] for line in result.stderr.splitlines() if line.startswith("[")}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dynx.model.xml.source import Edit, SourceElement
-from tests.doctor.planting.inertia import MOMENTS, PRODUCTS, mass, tensor
+from tests.doctor.planting.inertia import MOMENTS, PRODUCTS, mass, tensor, weightless
 from tests.doctor.planting.site import CannotPlant, PlantedDefect, Planter, Site
 
 _LEAST_GAP = 2e-15
@@ -30,6 +30,19 @@ def heavy_link(site: Site) -> PlantedDefect:
     words = {each: f"{0.5 * (size + m * square):.6g}" for each, square in zip(MOMENTS, squares, strict=True)}
     edits = [*mass(site, link, repr(m)), *tensor(site, link, **words, **dict.fromkeys(PRODUCTS, "0"))]
     return site.defect("DX119", *edits, *_origin(site, link, f"{x!r} {y!r} {z!r}"), link=name)
+
+
+def no_inertial_data(site: Site) -> PlantedDefect:
+    """A description for display: no inertial in any link, or zeros in all."""
+    if site.taken:
+        raise CannotPlant("other defects need mass")
+    removed = site.rng.random() < 0.5
+    edits: list[Edit] = []
+    for link in site.source.root.all("link"):
+        for inertial in link.all("inertial"):
+            edits += [site.source.removal(inertial)] if removed else weightless(site, link)
+    names = [part.attributes.get("name", "") for part in site.source.root.children]
+    return site.defect("DX118", *edits, touched=names, sign="<robot")
 
 
 def _unsymmetric(site: Site) -> tuple[float, float, float, float]:
@@ -69,5 +82,6 @@ def _origin(site: Site, link: SourceElement, xyz: str) -> list[Edit]:
 
 PLANTERS = (
     Planter("DX117", tiny_offset),
+    Planter("DX118", no_inertial_data),
     Planter("DX119", heavy_link),
 )
