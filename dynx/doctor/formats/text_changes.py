@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import difflib
-import re
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from dynx.doctor.lines import Opcode, line_opcodes, lines_of
 from dynx.doctor.report import DoctorReport
 
 SHOWN_LINES = 400
@@ -38,7 +38,7 @@ def changes(report: DoctorReport) -> TextChanges | None:
     if report.text is None or report.mended is None:
         return None
     before, after = lines_of(report.text), lines_of(report.mended)
-    lines = list(difflib.unified_diff(before, after, "file", "mended", n=2, lineterm=""))[2:]
+    lines = list(_difference(before, after))
     shown = tuple((KINDS.get(line[:1]), line) for line in lines[:SHOWN_LINES])
     added, removed = (sum(line.startswith(sign) for line in lines) for sign in "+-")
     return TextChanges(shown, added, removed, len(lines))
@@ -55,6 +55,37 @@ def excerpt(report: DoctorReport, line: int | None, around: int = 2) -> list[tup
     ]
 
 
-def lines_of(text: str) -> list[str]:
-    """Split a text into lines as an XML parser counts them."""
-    return re.split(r"\r\n|\r|\n", text)
+def _difference(before: Sequence[str], after: Sequence[str], context: int = 2) -> Iterator[str]:
+    """Yield the lines of a unified difference."""
+    group: list[Opcode] = []
+    for code in [*line_opcodes(before, after), None]:
+        if code is not None and code[0] != "equal":
+            group.append(code)
+            continue
+        if group and (code is None or code[2] - code[1] > 2 * context):
+            yield from _hunk(before, after, group, context)
+            group = []
+
+
+def _hunk(
+    before: Sequence[str], after: Sequence[str], group: Sequence[Opcode], context: int
+) -> Iterator[str]:
+    """Yield changes that are near each other, with the lines around and between them."""
+    _, first, _, start, _ = group[0]
+    _, _, last, _, end = group[-1]
+    lead, trail = min(context, first), min(context, len(before) - last)
+    spans = (first - lead, last + trail, start - lead, end + trail)
+    yield f"@@ -{_range(*spans[:2])} +{_range(*spans[2:])} @@"
+    at = first - lead
+    for _, i, i_end, j, j_end in group:
+        yield from (f" {line}" for line in before[at:i])
+        yield from (f"-{line}" for line in before[i:i_end])
+        yield from (f"+{line}" for line in after[j:j_end])
+        at = i_end
+    yield from (f" {line}" for line in before[at : last + trail])
+
+
+def _range(first: int, end: int) -> str:
+    """Write a range of lines as `diff -u` does."""
+    count = end - first
+    return f"{first + 1}" if count == 1 else f"{first + (count > 0)},{count}"

@@ -7,8 +7,8 @@ from the file, and then the lines of that cause are restored.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from difflib import SequenceMatcher
 
+from dynx.doctor.lines import line_opcodes
 from dynx.errors import DescriptionError
 from dynx.model.xml.source import XmlSource
 
@@ -24,10 +24,10 @@ def reinserted_text(given: XmlSource, without: XmlSource, mended: XmlSource) -> 
     """
     texts = (given.text, without.text, mended.text)
     old, base, new = ([*text.splitlines(keepends=True)] for text in texts)
-    kept = [each[1:] for each in _opcodes(base, new) if each[0] == "equal"]
+    kept = [each[1:] for each in line_opcodes(base, new) if each[0] == "equal"]
     parts: list[str] = []
     done = 0
-    for tag, first, last, start, end in _opcodes(base, old):
+    for tag, first, last, start, end in line_opcodes(base, old):
         if tag == "equal":
             continue
         at = _counterpart(kept, first, last)
@@ -42,10 +42,6 @@ def reinserted_text(given: XmlSource, without: XmlSource, mended: XmlSource) -> 
     except DescriptionError:
         # Where lines repeat, the matches of the two changes can overlap.
         return None
-
-
-def _opcodes(one: Sequence[str], other: Sequence[str]) -> Sequence[tuple[str, int, int, int, int]]:
-    return SequenceMatcher(None, one, other, autojunk=False).get_opcodes()
 
 
 def _counterpart(kept: Sequence[Lines], first: int, last: int) -> int | None:

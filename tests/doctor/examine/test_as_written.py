@@ -54,7 +54,8 @@ def test_text_that_no_engine_reads_is_given_to_them_as_it_is(encoding: str) -> N
     data = f"\ufeff{BODY}".encode(encoding)
     assert XmlSource(data).to_bytes() == data
     report = diagnose(data, engines=BOTH, samples=2)
-    assert not report.explained
+    assert all(each.refused is not None for each in report.engines)
+    assert "DX440" in {finding.rule for finding in report.differences}
     assert [(each.engine, each.quantity) for each in report.unexplained] == [
         (engine, LOADING) for engine in BOTH
     ]
