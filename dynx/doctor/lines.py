@@ -81,7 +81,8 @@ def _matches(one: Sequence[str], other: Sequence[str], a: int, b: int, c: int, d
         if a == b or c == d:
             continue
         if b - a <= MAX_COMPARED and d - c <= MAX_COMPARED:
-            for i, j, size in SequenceMatcher(None, one[a:b], other[c:d], autojunk=False).get_matching_blocks():
+            short = SequenceMatcher(None, one[a:b], other[c:d], autojunk=False)
+            for i, j, size in short.get_matching_blocks():
                 yield from ((a + i + k, c + j + k, 1) for k in range(size))
             continue
         anchors = _anchors(one, other, a, b, c, d) if rounds < MAX_ROUNDS else []
