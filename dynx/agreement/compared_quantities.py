@@ -26,8 +26,7 @@ from dynx.backends.quantities import QUANTITIES, Quantity
 from dynx.spatial.scalar import Array, Floats
 
 POINT = (0.3, -0.2, 0.1)
-"""Point [m], in the axes of the frame, at which a Jacobian is compared, in addition to the origins of the
-frames."""
+"""Point [m], in the axes of the frame, at which a Jacobian is compared, besides the origins of frames."""
 
 Evaluate = Callable[[Any, Samples], Array]
 

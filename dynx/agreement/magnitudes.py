@@ -232,8 +232,7 @@ class Magnitudes:
         return np.asarray(np.abs(self.samples.v @ self._S.T))
 
     def _fastest(self, speeds: Floats) -> Floats:
-        """Return the largest sum (n,) of `speeds` (n, nv of the tree) over the joints between a body and the
-        root."""
+        """Return the largest sum (n,) of `speeds` (n, nv of the tree) over the joints that carry a body."""
         bodies, first = len(self._mechanism.bodies), 6 if self._model.floating else 0
         between = np.zeros((bodies + 1, len(self._rotates)))
         between[:, :first] = 1.0

@@ -55,8 +55,7 @@ class Referee:
         return self._evaluate(kinematics.frame_placements, 3, q)
 
     def __getattr__(self, name: str) -> Callable[..., Array]:
-        """Return the method of `Backend` of that name, for every quantity of the table that solves no
-        equation."""
+        """Return the method of `Backend` of that name, unless its quantity solves an equation."""
         if name not in QUANTITIES or QUANTITIES[name].solves:
             raise AttributeError(f"the referee does not compute {name}")
         return partial(self._quantity, QUANTITIES[name])
@@ -85,8 +84,7 @@ class Referee:
         *velocities: ArrayLike,
         details: tuple[Any, ...] = (),
     ) -> Array:
-        """Evaluate `algorithm` in tree coordinates for every sample; the last `rank` axes of a result are not
-        batch axes."""
+        """Evaluate `algorithm` in tree coordinates for every sample; the last `rank` axes are no batch."""
         with mpmath.mp.workdps(DIGITS):
             q, rates = exactly(q), [exactly(v) for v in velocities]
             coupling = self._mechanism.coupling
@@ -106,8 +104,7 @@ class Referee:
             return np.asarray(A @ B)
 
     def _from_poses(self, algorithm: Callable[..., Array]) -> Callable[..., Array]:
-        """Return `algorithm` as a function of q. The poses of the bodies are stored, because they serve all
-        frames."""
+        """Return `algorithm` as a function of q. Poses of the bodies are stored: they serve all frames."""
 
         def evaluate(mechanism: Mechanism, q: Array, *rest: Any) -> Array:
             key = tuple(np.ravel(q).tolist()), q.shape

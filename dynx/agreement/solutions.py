@@ -163,8 +163,7 @@ def deepest_frame(model: Model) -> str:
 
 
 def _targets(samples: Samples) -> tuple[Floats, Floats]:
-    """Return target configurations within limits, and starting points some tenths of a radian away from
-    them."""
+    """Return target configurations within limits, and starting points some tenths of a radian away."""
     model = samples.model
     q = samples.q[:TARGETS]
     q_target = model.clip(q)

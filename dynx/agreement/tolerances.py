@@ -39,8 +39,7 @@ TRUNCATION = 1.0 / 630.0
 """Truncation error of the central difference of order 8, in units of h^8 f^(9) (Fornberg 1988, table 1)."""
 
 CANCELLATION = 2.1
-"""Sum of the absolute weights of that difference: rounding errors of the function are multiplied by it and
-divided by h."""
+"""Sum of the absolute weights of that difference: it multiplies rounding errors, and h divides them."""
 
 TARGET_TOLERANCE = 1e-6
 """Distance [m, rad] within which a target is reached, the default of `dynx.ik`."""
@@ -80,12 +79,10 @@ def derivative(depth: int) -> float:
 
 
 def singular(nv: int) -> float:
-    """Return the eigenvalue of the mass matrix at unit diagonal below which it is singular to double
-    precision."""
+    """Return the eigenvalue of the mass matrix at unit diagonal below which it is numerically singular."""
     return ROUNDINGS * EPS * nv
 
 
 def target_distance(depth: int, length: float) -> float:
-    """Return the bound on the distance [m, rad] of a solution from its target by the poses of another
-    engine."""
+    """Return the bound on the distance [m, rad] of a solution from its target by another engine's poses."""
     return TARGET_TOLERANCE + rounding(depth) * max(1.0, length)

@@ -347,8 +347,7 @@ class Backend(QuantityCalls):
     # -- terms that every engine shares -------------------------------------------------------
 
     def _force_torque(self, q: Any, tau: Any, forces: Forces, reference: str) -> Floats:
-        """Return the sum of J' w over the wrenches w and the frames on which they act; wrenches broadcast
-        with `tau`."""
+        """Return the sum of J' w over the frames and their wrenches w, which broadcast with `tau`."""
         wrenches = self._arguments.wrenches(forces)
         common_batch(tau, q, *wrenches.values())
         total: Any = 0.0

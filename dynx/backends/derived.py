@@ -53,7 +53,6 @@ class DerivedBackend(Backend):
 
 
 def native_quantities(backend: Backend | type[Backend]) -> frozenset[str]:
-    """Return the names of the quantities that a backend's engine computes itself, rather than by a
-    derivation."""
+    """Return the names of the quantities that a backend's engine computes itself, without derivation."""
     kind = backend if isinstance(backend, type) else type(backend)
     return frozenset(name for name, quantity in QUANTITIES.items() if kind._is_native(quantity))

@@ -98,8 +98,7 @@ def common_batch(q: Floats, *others: Floats) -> tuple[int, ...]:
 
 
 def batch_rows(array: Floats, batch: tuple[int, ...]) -> Floats:
-    """Return the rows (n, size) of an array (..., size) broadcast to a batch of n, as a view where
-    possible."""
+    """Return the rows (n, size) of an array (..., size) broadcast to a batch of n, if possible as a view."""
     if array.shape[:-1] == batch:
         return array.reshape(prod(batch), array.shape[-1])
     if array.ndim == 1:

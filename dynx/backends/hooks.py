@@ -126,8 +126,7 @@ class EngineHooks(ABC):
         return np.asarray(0.5 * np.sum(v * apply_matrix(self._mass_matrix(q), v), axis=-1))
 
     def _body_poses(self, q: Floats) -> kinematics.Poses:
-        """Return the poses of the root and of each moving body, from the engine's own frame
-        placements."""
+        """Return the poses of the root and of each moving body, from the engine's frame placements."""
         return kinematics.poses_from_frames(self._mechanism, self._frame_placements(q))
 
 

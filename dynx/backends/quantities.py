@@ -118,8 +118,7 @@ class Quantity:
         return tuple(n if isinstance(n, int) else extents[n] for n in self.shape)
 
     def evaluate(self, mechanism: Mechanism, q: Array, *rest: Any) -> Array:
-        """Evaluate the algorithm at the configuration q (..., nq) of the tree, with the other arguments and
-        details."""
+        """Evaluate the algorithm at the tree's configuration q (..., nq), other arguments and details."""
         first = kinematics.body_poses(mechanism, q) if self.takes_poses else q
         return np.asarray(self.algorithm(mechanism, first, *rest))
 

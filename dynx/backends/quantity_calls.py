@@ -32,8 +32,7 @@ class _Plan(NamedTuple):
 
 
 class QuantityCalls(Lifecycle, EngineHooks):
-    """Base of backends: checks of arguments, evaluation of quantities, and the terms shared by all
-    engines."""
+    """Base of backends: checks of arguments, evaluation of quantities, and terms shared by all engines."""
 
     def __init__(self, model: Model, *, validate: bool = True) -> None:
         super().__init__(model, Arguments(model), validate=validate)

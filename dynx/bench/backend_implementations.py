@@ -45,8 +45,7 @@ class BackendImplementation(Implementation):
 
 
 def backend_implementation(model: Model, name: str, threads: int) -> BackendImplementation:
-    """Return the backend of that name; one that takes `threads` evaluates a batch in one call of compiled
-    code."""
+    """Return the backend of that name; one that takes `threads` evaluates a batch in one compiled call."""
     if "threads" not in inspect.signature(backend_class(name)).parameters:
         return BackendImplementation(backend(name, model))
     return BackendImplementation(backend(name, model, threads=threads), threads=threads, whole=True)

@@ -23,8 +23,7 @@ from dynx.reference.backend import ReferenceBackend
 from dynx.spatial.scalar import Floats
 
 CHECKED_AT_ENDS, CHECKED_BETWEEN = 16, 224
-"""Number of samples that are checked at each end of a batch, where vectors may be incomplete, and in
-between."""
+"""Number of samples checked at each end of a batch, where vectors may be incomplete, and in between."""
 
 
 @dataclass(frozen=True)

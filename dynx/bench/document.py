@@ -47,8 +47,7 @@ class BenchResult(TypedDict):
 
 
 class BenchDocument(TypedDict):
-    """The document; `load` is the load average before the run, `not_done` the cases that an interrupted
-    run left out."""
+    """The document; `load` is the load average before the run, `not_done` the cases left out by Ctrl-C."""
 
     schema: int
     dynx: str

@@ -92,8 +92,7 @@ def chains_program(chains: int = CHAINS, links: int = CHAIN_LENGTH) -> Program:
 
 
 def _copy_bandwidth(pool: ThreadPoolExecutor, threads: int, repetitions: int, size: int) -> float:
-    """Return the number of bytes read and written per second, by a copying kernel or by NumPy, whichever
-    is faster."""
+    """Return the bytes read and written per second by a copying kernel or by NumPy, the faster of them."""
     rows = max(size // (8 * ROW_SIZE), threads * host().lanes)
     source, target = np.ones((rows, ROW_SIZE)), np.zeros((rows, ROW_SIZE))
     kernel = Kernel(trace(lambda x: x, {"x": (ROW_SIZE,)}))

@@ -1,5 +1,4 @@
-"""Measurement of one case: every implementation is checked, and those within tolerance are timed
-alternately."""
+"""Measurement of one case: every implementation is checked, those within tolerance timed alternately."""
 
 from __future__ import annotations
 

@@ -32,8 +32,7 @@ COMPILED = "compiled"
 
 @dataclass(frozen=True)
 class Plan:
-    """Cases to time on one robot. Quantities of frames are timed at `frame`; None for `backends` means
-    all."""
+    """Cases to time on one robot. Quantities of frames are timed at `frame`; `backends` None means all."""
 
     model: Model
     frame: str

@@ -40,8 +40,7 @@ class Times:
         return (high - low) / self.median if self.median > 0.0 else float("inf")
 
     def less(self, other: Times) -> Times:
-        """Return the difference of the times in each repetition; negative where noise exceeds the
-        difference."""
+        """Return the difference of the times in each repetition; negative where noise exceeds it."""
         return Times(tuple(own - taken for own, taken in zip(self.seconds, other.seconds, strict=True)))
 
     def per(self, count: int) -> Times:
@@ -66,8 +65,7 @@ def once(call: Call, clock: Clock = time.perf_counter) -> float:
 
 
 def _rounds(call: Call, clock: Clock) -> int:
-    """Return the number of repetitions of the call within one timing. Determining it also warms up the
-    call."""
+    """Return the repetitions of the call within one timing. Determining it also warms up the call."""
     rounds = 1
     while True:
         taken = rounds * _timed(call, rounds, clock)

@@ -20,12 +20,10 @@ from dynx.simd.kernel import Kernel, Workspace
 from dynx.spatial.scalar import Floats
 
 Check = Callable[..., Floats]
-"""Function that converts an argument to a float64 array (..., size), or raises an error that describes
-what is wrong."""
+"""Function that converts an argument to a float64 array (..., size), or raises an error that names it."""
 
 MAX_COPIED_SAMPLES = 256
-"""Largest batch that is copied to the workspace; for larger ones, looking up the addresses of arrays is
-faster."""
+"""Largest batch that is copied to the workspace; for larger ones, looking up addresses is faster."""
 
 MAX_COPIED_SIZE = 16384
 """Largest size of one array of such a batch."""

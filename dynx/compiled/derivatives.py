@@ -113,8 +113,7 @@ class Derivatives:
         )
 
     def forward_kinematics_derivative(self, q: ArrayLike, frame: str) -> Floats:
-        """Return the derivative of T_world_frame by q (..., 4, 4, nv); the last axis counts the coordinates
-        of v."""
+        """Return the derivative of T_world_frame by q (..., 4, 4, nv); the last axis counts entries of v."""
         index = self.model.frame_index(frame)
         program = partial(programs.pose_derivative, frame=index)
         (derivative,) = self._evaluate(("pose", index), program, [self._arguments.q(q)])

@@ -94,8 +94,7 @@ _WITH_BASE_PARAMETERS = frozenset({"inverse_dynamics", "bias_torque", "gravity_t
 
 
 def kernel_quantity(name: str) -> Quantity:
-    """Return the table's entry for a quantity, by the name of the hook that computes it without its
-    underscore."""
+    """Return the table's entry for a quantity, by the name of its hook without the underscore."""
     return _PLACEMENTS.get(name) or QUANTITIES[name]
 
 
@@ -193,8 +192,7 @@ def _program(mechanism: Mechanism, name: str, result: Computation, **more: tuple
 
 
 def _defect(mechanism: Mechanism, q: Array, *rates: Array) -> Array:
-    """Return the sum of the squares of all arguments; far above `MAX_DEFECT` if a quaternion is not of unit
-    length."""
+    """Return the sum of squares of all arguments; far above `MAX_DEFECT` for a quaternion not of length 1."""
     numbers = np.concatenate([q, *rates])
     total = _sum_by_pairs([x * x for x in numbers])
     if mechanism.floating:
@@ -204,8 +202,7 @@ def _defect(mechanism: Mechanism, q: Array, *rates: Array) -> Array:
 
 
 def _sum_by_pairs(terms: list[Any]) -> Any:
-    """Add terms in pairs, so that few additions depend on one another and the processor can do several at
-    once."""
+    """Add terms in pairs: few additions then depend on one another, and the processor overlaps them."""
     while len(terms) > 1:
         odd = terms[len(terms) // 2 * 2 :]
         terms = [a + b for a, b in zip(terms[::2], terms[1::2], strict=False)] + odd

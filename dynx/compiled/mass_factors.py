@@ -1,5 +1,4 @@
-"""Solution of equations with the mass matrix in a kernel, exploiting the sparsity due to branches of the
-tree."""
+"""Solution of equations with the mass matrix in a kernel, by the sparsity due to branches of the tree."""
 
 from __future__ import annotations
 
@@ -30,8 +29,7 @@ def solve_with_factors(L: list[list[Array]], D: list[Array], b: Array) -> Array:
 
 
 def filled_entries(mechanism: Mechanism) -> tuple[int, list[tuple[int, int]]]:
-    """Return nv, and the positions of the entries of L that may differ from zero, in the order of
-    elimination."""
+    """Return nv, and the positions where L may differ from zero, in the order of elimination."""
     base = 6 if mechanism.floating else 0
     on_branch = np.zeros((mechanism.nv, mechanism.nv), dtype=bool)
     on_branch[:base] = True

@@ -47,8 +47,7 @@ class RobotKernels:
         self._making = threading.Lock()
 
     def evaluate(self, purpose: object, program: Making, arrays: Sequence[Floats]) -> list[Floats]:
-        """Evaluate `program` on inputs (..., size) whose leading axes broadcast; return its outputs (...,
-        *shape)."""
+        """Evaluate `program` on inputs (..., size) that broadcast; return its outputs (..., *shape)."""
         kernel = self.kernel(purpose, program)
         batch = common_batch(*arrays)
         n = prod(batch)

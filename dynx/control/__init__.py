@@ -1,5 +1,4 @@
-"""Controllers, one per file: frozen dataclasses that compute a torque from measurement, setpoint and
-state."""
+"""Controllers, one per file: frozen dataclasses that compute torques from measurement, setpoint, state."""
 
 from dynx.control.base import Controller, Measurement, ModelBased
 from dynx.control.computed_torque import ComputedTorque

@@ -75,8 +75,7 @@ class Controller(ABC, Generic[ControllerState]):
     """Whether `torque` and `initial_state` are array code that depends on fields and arguments alone."""
 
     def __init_subclass__(cls, *, pure: bool = False, **options: Any) -> None:
-        """Set `is_pure` for this class to `pure`. Subclasses do not inherit it, because they may do
-        anything."""
+        """Set `is_pure` for this class to `pure`. Subclasses do not inherit it: they may do anything."""
         super().__init_subclass__(**options)
         cls.is_pure = pure
         # `dataclass` generates its own versions of these methods unless a class defines them.
@@ -200,8 +199,7 @@ def chain_of(controller: Controller[Any]) -> Iterator[Controller[Any]]:
 
 
 def gains_of(controller: Controller[Any]) -> dict[str, Floats]:
-    """Return the gains that a controller declares; for a controller without declared fields, its public
-    arrays."""
+    """Return the gains that a controller declares; its public arrays if it declares no fields."""
     known = fields_of(controller)
     arrays = {name: x for name, x in attributes_of(controller).items() if isinstance(x, np.ndarray)}
     return {
@@ -238,8 +236,7 @@ def rebind(
 
 
 def engine_of(model: Model, engine: str | Backend) -> Backend:
-    """Return the backend of that name for `model`, or `engine` itself if it is a backend of an equal
-    model."""
+    """Return the backend of that name for `model`, or `engine` itself if its model is equal."""
     if not isinstance(engine, Backend):
         return backend(engine, model, validate=False)
     if engine.model != model:

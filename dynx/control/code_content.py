@@ -137,8 +137,7 @@ def _code(code: CodeType, docstring: str | None) -> Any:
 
 
 def _value(value: Any, seen: Seen) -> Any:
-    """Return the content of a value that code refers to; for an object that cannot be compared, its
-    identity."""
+    """Return the content of a value that code refers to, or the identity of one that cannot be compared."""
     kind = _name(type(value))
     if value is None or isinstance(value, bool | int | float | complex | str | bytes):
         return kind, repr(value)

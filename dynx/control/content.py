@@ -60,8 +60,7 @@ def content_of(thing: Any) -> Hashable:
 
 
 def fields_of(thing: Any) -> dict[str, Field[Any]]:
-    """Return the dataclass fields by name; for an object whose class is not a dataclass, those of its base
-    classes."""
+    """Return the dataclass fields by name; those of the base classes if the class is no dataclass."""
     return {each.name: each for each in fields(thing)} if is_dataclass(thing) else {}
 
 

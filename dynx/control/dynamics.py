@@ -62,8 +62,7 @@ class EngineDynamics(Dynamics):
         super().__init__(backend.model)
 
     def evaluation(self, quantity: str) -> Evaluation:
-        """Return the engine's hook itself if its coordinates are those of the model, otherwise the
-        backend's method."""
+        """Return the engine's hook if its coordinates are the model's, otherwise the backend's method."""
         backend = self.backend
         method: Evaluation = getattr(backend, quantity)
         if quantity in FRAME_QUANTITIES or not self._calls_hook(quantity):

@@ -27,8 +27,7 @@ UNLIMITED_FORCE = 1e30
 
 
 class MotorCommand(NamedTuple):
-    """Arguments of `setJointMotorControlArray`, each with one number per joint; None for the engine's
-    default."""
+    """Arguments of `setJointMotorControlArray`, one number per joint each; None for the engine's default."""
 
     mode: str
     positions: list[float] | None = None
@@ -51,8 +50,7 @@ class EngineMotor(JointSpace[None]):
         super().__init__(model)
 
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
-        """Raise UnsupportedFeatureError, because the engine's solver determines the torque during the
-        step."""
+        """Raise UnsupportedFeatureError: the engine's solver determines the torque during the step."""
         raise UnsupportedFeatureError(
             f"{self.name} is a motor inside PyBullet, so it runs with plant='pybullet' only"
         )

@@ -20,8 +20,7 @@ MIN_SLIP = 1e-9
 """Smallest slip speed above 0 [rad/s or m/s]; the division overflows for smaller ones."""
 
 Coefficients = bool | ArrayLike
-"""Coefficients: True for those of the description, False for zero, one number, or one for each joint with
-a coordinate."""
+"""Coefficients: True for the description's, False for zero, one number, or one per joint coordinate."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,8 +81,7 @@ class JointFriction:
         return self.torque_for(v, self.damping, self.friction)
 
     def torque_for(self, v: Array, damping: Array, friction: Array) -> Array:
-        """Return the torque (..., nv) of friction with other coefficients, of the same shapes as those
-        here."""
+        """Return the torque (..., nv) of friction with other coefficients, of the same shapes."""
         speed = v if self.to_tree is None else v @ self.to_tree.T
         torque = damping * speed
         if self._dry:

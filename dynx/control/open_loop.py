@@ -17,8 +17,7 @@ from dynx.trajectory.base import Setpoint
 
 @dataclass(frozen=True)
 class OpenLoop(Controller[None], pure=True):
-    """Controller that applies row k of a table of torques from time k control_dt on, and zero torque after
-    the last row."""
+    """Controller that applies row k of a table of torques from time k control_dt on, and then zero torque."""
 
     model: Model
     torques: Floats = parameter("N m or N")

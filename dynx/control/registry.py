@@ -70,8 +70,7 @@ def to_document(controller: Controller[Any]) -> dict[str, Any]:
 
 
 def from_document(model: Model, document: Mapping[str, Any]) -> Controller[Any]:
-    """Return the controller of `model` that `to_document` wrote. Raises ArgumentError for any other
-    document."""
+    """Return the controller of `model` that `to_document` wrote. Raises ArgumentError for other documents."""
     arguments = {name: _read(model, value) for name, value in document.items() if name != "controller"}
     kind = controller_class(document.get("controller", ""))
     known = getattr(kind, "__dataclass_fields__", {})

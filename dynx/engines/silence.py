@@ -28,8 +28,7 @@ def silence() -> Iterator[None]:
 
 @contextmanager
 def capture_output(lines: list[str]) -> Iterator[None]:
-    """Capture all output of the process as `silence` does, and append its lines that are not blank to
-    `lines`."""
+    """Capture all output of the process as `silence` does, and append its non-blank lines to `lines`."""
     with TemporaryFile() as file:
         try:
             with _streams_to(file.fileno()):

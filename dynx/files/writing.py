@@ -59,8 +59,7 @@ def write_text(path: str | os.PathLike[str], text: str) -> None:
 
 
 def _require_reader(path: str, flags: int) -> int:
-    """Open a file; raise OSError ENXIO for a named pipe without a reader, on which `open` would block
-    forever."""
+    """Open a file; OSError ENXIO for a named pipe without a reader, on which `open` would block forever."""
     try:
         descriptor = os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
     except OSError as error:

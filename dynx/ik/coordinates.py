@@ -12,8 +12,7 @@ from dynx.spatial.scalar import Floats
 FULL_TURN = 2.0 * math.pi
 
 _FULL_TURN_TOLERANCE = 1e-8
-"""Tolerance [rad] by which a range may be smaller than 2 pi and still count as a full turn, because files
-round limits."""
+"""Amount [rad] by which a range may be below 2 pi and still count as a full turn: files round limits."""
 
 _DEFAULT_RANGE = {"prismatic": 1.0}
 """Half the range [m] searched for a prismatic joint without limits; for angles it is pi [rad]."""

@@ -16,8 +16,7 @@ TIME_ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class Clock:
-    """Time steps of `dt` [s]. The time of step k is computed as k dt, so that rounding errors do not add
-    up."""
+    """Time steps of `dt` [s]. Step k is at time k dt, so that rounding errors do not add up."""
 
     dt: float
     n_steps: int
@@ -26,8 +25,7 @@ class Clock:
 
     @classmethod
     def of(cls, dt: float, duration: float, control_dt: float | None, delay: float) -> Clock:
-        """Make a clock. Raises ArgumentError for invalid times and for times that are not multiples of
-        `dt`."""
+        """Make a clock. Raises ArgumentError for invalid times and times that are no multiples of `dt`."""
         dt = positive_seconds("dt", dt)
         duration = positive_seconds("duration", duration)
         control = dt if control_dt is None else positive_seconds("control_dt", control_dt)

@@ -169,8 +169,7 @@ CONTROLLERS = NamedControllers()
 
 
 def _of_class(kind: type[Controller[Any]]) -> NamedController:
-    """Make the entry of a registered class, whose constructor gets the gains and the other arguments that
-    it declares."""
+    """Make the entry of a registered class, whose constructor gets the arguments that it declares."""
     parameters = signature(kind).parameters
 
     def make(request: ControllerRequest) -> Controller[Any]:

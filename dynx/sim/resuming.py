@@ -22,8 +22,7 @@ def require_rollout(rollout: object) -> None:
 
 
 def refuse_other_scenario(rollout: Rollout, scenario: Scenario) -> None:
-    """Raise ArgumentError if the scenario of `rollout` differs from `scenario` in anything but the
-    duration."""
+    """Raise ArgumentError if the scenario of `rollout` differs from `scenario` in more than the duration."""
     then = rollout.scenario
     if then is None:
         raise ArgumentError("the rollout to resume has no scenario, so it cannot be compared")

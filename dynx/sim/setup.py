@@ -1,5 +1,4 @@
-"""The checked parts of a scenario that every executor needs: clock, model of the plant, reference, limits,
-initial state."""
+"""Checked parts of a scenario that every executor needs: clock, plant's model, reference, limits, start."""
 
 from __future__ import annotations
 
@@ -113,8 +112,7 @@ def disturbances_of(scenario: Scenario, moved: Model) -> Disturbances:
 
 
 def effort_limits_of(scenario: Scenario) -> Floats | None:
-    """Return the effort limits (nv,) of a scenario. Raises ArgumentError for limits that its motors cannot
-    have."""
+    """Return the effort limits (nv,) of a scenario; ArgumentError for limits its motors cannot have."""
     if scenario.effort_limits is False:
         return None
     if isinstance(scenario.controller, EngineMotor):

@@ -87,8 +87,7 @@ class Tutorial:
     backend: str = DYNX
 
     def rows(self) -> Iterator[Row]:
-        """Simulate and yield the rows one by one; the outcome of a mode that is not available has the
-        reason."""
+        """Simulate and yield the rows one by one; the outcome of an unavailable mode has the reason."""
         missing = {plant: _missing(plant) for plant in self.plants}
         for mode in MODES:
             yield Row(

@@ -18,8 +18,7 @@ from dynx.spatial.scalar import Array, arctan, cos, sign, sin, sqrt
 from dynx.spatial.so3 import quat_product, rotate, rotate_back, rotation_from_quat, skew
 
 TINY = 1e-300
-"""Term added to squared angles [rad^2] before division; rounding absorbs it unless the angle is extremely
-small."""
+"""Term added to squared angles [rad^2] before division; rounding absorbs it for all but tiny angles."""
 
 
 def quat_exp(rotation_vector: Array) -> Array:

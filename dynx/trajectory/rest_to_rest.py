@@ -119,8 +119,7 @@ def _trajectory_of_phases(
 
 
 def _at_rest(ends: Ends, T: float, curve: PiecewisePolynomial) -> Trajectory:
-    """Return the motion. Its velocity at both ends is exactly 0, its acceleration that of the first and of
-    the last phase."""
+    """Return the motion. At both ends its velocity is exactly 0, its acceleration that of the end phase."""
     rest = np.zeros(ends.nv)
     acceleration = 2.0 * curve.coefficients[0, 2]
     if curve.coefficients.shape[1] == 4:

@@ -11,8 +11,7 @@ from rich.text import Text
 Cell = str | Text
 
 _GAP, _NARROW_GAP = 3, 2
-"""Number of blanks between two columns in a table that fits and in one that does not; one blank precedes
-the first column."""
+"""Number of blanks between columns in a table that fits and in one that does not; one precedes them."""
 
 _MAX_KEY_FRACTION = 0.4
 """Largest width of a key, as a fraction of the width of a table that does not fit; wider keys are wrapped."""

@@ -158,8 +158,7 @@ def _status(ended: EarlyEnd) -> str:
 
 
 def _overshoot(request: SimulationRequest, ended: EarlyEnd) -> Entry | None:
-    """Return the joint whose damping is unstable for the time step, where that can be the reason for
-    divergence."""
+    """Return the joint whose damping is unstable for the time step, if that may have caused divergence."""
     if not isinstance(ended, DivergedError):
         return None
     found = largest_overshoot(request.controller, np.asarray(request.scenario.q0), request.clock.control_dt)

@@ -40,8 +40,7 @@ REQUIRED_OPTION = {
 """Options that have an effect only together with another option."""
 
 STEP_BYTES = 2000
-"""Approximate memory [bytes] that a step needs besides its record: setpoints, and temporary arrays of the
-summary."""
+"""Approximate memory [bytes] of a step besides its record: setpoints, temporary arrays of the summary."""
 
 
 @dataclass(frozen=True)
@@ -153,8 +152,7 @@ def _motor_limit(model: Model, limits: Coefficients | None) -> Any:
 def _limits_of_motors(
     model: Model, limits: Coefficients | None, controller: Controller[Any] | None
 ) -> list[float] | None:
-    """Return the effort limits of PyBullet's motors; None for any other controller, and for the default of
-    the engine."""
+    """Return the effort limits of PyBullet's motors; None for other controllers and engine defaults."""
     if limits is None or not isinstance(controller, EngineMotor):
         return None
     base = 6 if model.floating else 0
@@ -163,8 +161,7 @@ def _limits_of_motors(
 
 
 def _joint_dynamics(given: dict[str, Any]) -> dict[str, Any]:
-    """Return the damping, friction and armature of the joints; single options override
-    ``--joint-dynamics``."""
+    """Return damping, friction and armature of the joints; single options override ``--joint-dynamics``."""
     all_of_urdf: bool = given["joint_dynamics"]
     names = ("damping", "friction", "armature")
     dynamics = {name: all_of_urdf if given[name] is None else given[name] for name in names}

@@ -95,8 +95,7 @@ class DrakeCoordinates:
         return tau if self._same else self._to_plant(R, tau)
 
     def forces_back(self, R: Floats, force: Floats) -> Floats:
-        """Return the torque of dynx for the plant's generalized force; also for the rows of a matrix (...,
-        n_v)."""
+        """Return the torque of dynx for the plant's generalized force, or for rows of a matrix (..., n_v)."""
         if self._same:
             return force
         out: Floats = force[..., self._columns]

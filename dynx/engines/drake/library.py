@@ -68,8 +68,7 @@ __all__ = [
 
 
 def drake_version() -> str:
-    """Return the version of the distribution, such as ``1.51.1``; ``unknown`` for one that pip did not
-    install."""
+    """Return the version of the distribution, such as ``1.51.1``; ``unknown`` if pip did not install it."""
     try:
         return version("drake")
     except PackageNotFoundError:

@@ -26,8 +26,7 @@ def describe_link(body: Any, context: Any) -> LoadedInertial:
 
 
 def describe_joint(joint: Any, actuator: Any | None) -> LoadedJoint:
-    """Return the description of a joint that moves; effort and armature are those of its actuator, if it has
-    one."""
+    """Return the description of a joint that moves; effort and armature are those of its actuator, if any."""
     placement = np.array(joint.frame_on_parent().GetFixedPoseInBodyFrame().GetAsMatrix4())
     kind = str(joint.type_name())
     if joint.num_velocities() != 1:

@@ -42,15 +42,13 @@ class ProjectedDynamics:
                 body = engine.body_parentid[body]
 
     def mass_matrix(self, data: Any, R_root: Floats, p_root: Floats) -> Floats:
-        """Return the mass matrix (nv, nv), after `mj_kinematics` on `data`; (R, p) is the pose of the
-        root."""
+        """Return the mass matrix (nv, nv), after `mj_kinematics` on `data`; (R, p) is the root's pose."""
         Jp, Jr = self._jacobians(data, R_root, p_root)
         M: Floats = _gramian(Jp, np.repeat(self._mass, 3)) + _gramian(Jr, self._moments.ravel())
         return np.asarray(0.5 * (M + M.T))
 
     def torque(self, data: Any, R_root: Floats, p_root: Floats) -> Floats:
-        """Return the torque (nv,), after `mj_rnePostConstraint` on `data`, whose accelerations do not
-        include gravity."""
+        """Return the torque (nv,), after `mj_rnePostConstraint` (accelerations without gravity) on `data`."""
         bodies = self._bodies
         # MuJoCo's velocities and spatial accelerations are about the robot's centre of mass, in world axes,
         # angular part first; here they are converted to classical ones of the body's centre of mass.

@@ -25,8 +25,7 @@ from dynx.spatial.scalar import Array, Floats
 from dynx.spatial.so3 import quat_from_rotation, rotation_from_rpy
 
 MAX_NV = 1000
-"""Largest number of tree velocities: compiling such a chain takes 3 s, and the time grows with the cube
-(measured, 4.0)."""
+"""Largest number of tree velocities: compiling such a chain takes 3 s, growing cubically (measured, 4.0)."""
 
 WORLD = 0
 """MuJoCo's body 0."""
@@ -49,8 +48,7 @@ class MujocoTree:
 
 
 def build_tree(model: Model) -> MujocoTree:
-    """Return the MuJoCo's tree of a robot. Raises EngineLimitError for a robot that is too large for
-    MuJoCo."""
+    """Return MuJoCo's tree of a robot. Raises EngineLimitError for a robot that is too large for MuJoCo."""
     mechanism = model.mechanism
     if mechanism.nv > MAX_NV:
         raise EngineLimitError(
@@ -125,8 +123,7 @@ def _write_inertias(model: Model, compiled: Any, tree: tuple[int, ...]) -> Float
 
 
 def _principal(inertial: Inertial) -> tuple[Floats, Array]:
-    """Return the principal moments (3,), and their axes as the columns of a rotation (3, 3), in the link
-    frame."""
+    """Return the principal moments (3,), and their axes as columns of a rotation (3, 3), in link axes."""
     tensor = inertial.tensor
     moments, axes = jacobi_eigen(longdouble(tensor))
     return np.asarray(moments, dtype=np.float64), _rotation(inertial.origin) @ axes

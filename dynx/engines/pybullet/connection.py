@@ -81,8 +81,7 @@ class BulletConnection(ABC):
         self._disconnect()
 
     def call(self, function: Callable[..., Any], *args: Any, **options: Any) -> Any:
-        """Call the engine and return the result. Raises EngineError with the engine's message if the call
-        fails."""
+        """Call the engine and return the result. Raises EngineError, with its message, if it fails."""
         try:
             return function(*args, physicsClientId=self._client, **options)
         except (SystemError, TypeError, ValueError, self.engine.error) as error:
@@ -99,8 +98,7 @@ class BulletConnection(ABC):
     # -- quantities ---------------------------------------------------------------------------
 
     def com_poses(self, joints: Reals) -> tuple[Floats, Floats]:
-        """Return the positions (n, 3) and attitudes, quat_xyzw (n, 4), of the inertial frames of all
-        links."""
+        """Return positions (n, 3) and attitudes, quat_xyzw (n, 4), of the inertial frames of all links."""
         self.reset_joints(joints)
         if not self.links:
             return np.zeros((0, 3)), np.zeros((0, 4))
@@ -221,8 +219,7 @@ class BulletConnection(ABC):
             self.control_motors(self.engine.VELOCITY_CONTROL, forces=[0.0] * len(self.moving))
 
     def disable_damping(self) -> None:
-        """Switch off the damping of the base and the limit of joint speeds, which do not come from the
-        file."""
+        """Switch off the damping of the base and the limit of joint speeds, which are not the file's."""
         # This needs a separate call: together with a setting of a link, Bullet would apply that setting to
         # the root.
         options = {"linearDamping": 0.0, "angularDamping": 0.0, "maxJointVelocity": 1e300}

@@ -21,8 +21,7 @@ MAX_JOINTS = 127
 """Largest number of joints, fixed ones included: from the 128th on Bullet returns no joint state."""
 
 MAX_NAME_LENGTH = 1000
-"""Largest length of a name [bytes]: a joint's of 1,264 overflows Bullet's stack, a link's of 2,000 crashes
-it."""
+"""Largest length of a name [bytes]: 1,264 of a joint overflow Bullet's stack, 2,000 of a link crash it."""
 
 _OPAQUE = frozenset(["visual", "collision", "transmission", "gazebo", "sensor", "ros2_control"])
 

@@ -41,8 +41,7 @@ class PrincipalInertia:
 
 @dataclass(frozen=True)
 class Ballast:
-    """Additional mass [kg] at the body's origin and rotational inertia [kg m^2], the same about every
-    axis."""
+    """Additional mass [kg] at the body's origin and rotational inertia [kg m^2], equal about all axes."""
 
     mass: float = 0.0
     rotational: float = 0.0

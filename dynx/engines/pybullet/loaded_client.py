@@ -74,8 +74,7 @@ class LoadedClient(BulletConnection):
         return homogeneous(rotation_from_quat(np.array(info[4])), np.array(info[3]))
 
     def make_tree(self) -> None:
-        """Make the tree of Bullet's inverse dynamics. If Bullet refuses, calls that need the tree will
-        raise an error."""
+        """Make the tree of Bullet's inverse dynamics. If Bullet refuses, calls that need it raise errors."""
         rest = [0.0] * (len(self.moving) + (6 if self.floating else 0))
         if not rest:
             return

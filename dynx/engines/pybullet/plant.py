@@ -103,8 +103,7 @@ class BulletPlant(Plant):
         return StepResult(self._q, self._v, first, tau)
 
     def refuse(self, controller: object) -> None:
-        """Raise UnsupportedFeatureError for an engine motor together with armature, which Bullet's motors
-        do not support."""
+        """Raise UnsupportedFeatureError for an engine motor with armature, which Bullet's motors lack."""
         if isinstance(controller, EngineMotor) and self.disturbances.has_armature:
             raise UnsupportedFeatureError(
                 f"{controller.name} is a motor inside PyBullet, without armature; use a torque controller"
@@ -137,8 +136,7 @@ class BulletPlant(Plant):
         return self._advance(disturbance), disturbance
 
     def _tree_torque(self, q: Floats, v: Floats, a: Floats) -> Floats:
-        """Return the torque of every joint of the tree, including mimic joints, that gives the
-        acceleration `a`."""
+        """Return the torque of every joint of the tree, mimic joints too, that gives acceleration `a`."""
         coupling = self._coupling
         if coupling is None:
             return self._engine.inverse_dynamics(q, v, a)

@@ -30,8 +30,7 @@ _IDENTITY = np.eye(4)
 
 
 class BulletRobot:
-    """A mechanism, with `times` copies of the ballast, in its own Bullet client. Each call takes one
-    sample."""
+    """A mechanism, with `times` copies of the ballast, in a Bullet client. Each call takes one sample."""
 
     def __init__(
         self, engine: ModuleType, mechanism: Mechanism, ballast: tuple[Ballast, ...], times: int
@@ -150,8 +149,7 @@ class BulletRobot:
         iterations: int,
         residual: float,
     ) -> Floats:
-        """Return the joints (n,) at which Bullet's solver stopped, starting from `q`; the base does not
-        move."""
+        """Return the joints (n,) at which Bullet's solver stopped, from `q` on; the base does not move."""
         body = self._frame_body[frame]
         if body == ROOT:
             return np.array(self._joints(q))
@@ -216,8 +214,7 @@ class BulletRobot:
         return float64(T)
 
     def _point(self, frame: BodyFrame, root: PrincipalInertia) -> list[float]:
-        """Return the frame's origin relative to the origin of its body (for the root: of C), along the
-        principal axes."""
+        """Return the frame's origin relative to its body's (for the root: to C), along the principal axes."""
         if frame.body == ROOT:
             point = root.axes.T @ (frame.p - root.center)
         else:
@@ -241,8 +238,7 @@ def pose_matrices(position: ArrayLike, quat_xyzw: ArrayLike) -> Floats:
 
 
 def _products_to_rotation() -> Floats:
-    """Return the matrix (16, 16) from the products of x, y, z, w, row by row, to the entries of [[R - 1,
-    0], [0, 0]]."""
+    """Return the matrix (16, 16) from the products of x, y, z, w to the entries of [[R - 1, 0], [0, 0]]."""
     K = np.zeros((4, 4, 4, 4))
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
@@ -256,8 +252,7 @@ _FROM_PRODUCTS = _products_to_rotation()
 
 
 def base_conversion(axes: Array, center: Array) -> Array:
-    """Return X (6, 6), for the axes (3, 3) and the origin (3,) of C in the base frame; see the module
-    docstring."""
+    """Return X (6, 6), for axes (3, 3) and origin (3,) of C in the base frame; see the module docstring."""
     X = np.zeros((6, 6), dtype=axes.dtype)
     X[:3, 3:] = X[3:, :3] = axes.T
     X[3:, 3:] = -axes.T @ skew(center)

@@ -105,8 +105,7 @@ class XmlSource:
         self.data = (text if repair is None else repair.text).encode("utf-8")
 
     def _with_data(self, data: bytes) -> XmlSource:
-        """Return the document with new text, which is not checked because edits of well-formed text are
-        well-formed."""
+        """Return the document with new text, unchecked: edits of well-formed text are well-formed."""
         new = object.__new__(XmlSource)
         new.data, new.source, new.form = data, self.source, self.form
         new._lines_before, new.repairs = self._lines_before, self.repairs

@@ -238,8 +238,7 @@ def refuse_uncompiled(scenario: Scenario) -> None:
 
 
 def _step_kernels(step: FusedStep, clock: Clock, wrenches: Floats) -> StepKernels:
-    """Return the kernels of a step with and without controller and pushes, for the combinations that
-    occur."""
+    """Return the kernels of a step with and without controller and pushes, for combinations that occur."""
     controlled = np.arange(clock.n_steps) % clock.steps_per_control == 0
     kinds = set(zip(controlled.tolist(), pushing(wrenches), strict=True))
     return {

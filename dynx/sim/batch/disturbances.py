@@ -39,8 +39,7 @@ class BatchDisturbances:
 
     @classmethod
     def of(cls, model: Model, disturbances: Disturbances, varied: Mapping[str, Floats]) -> BatchDisturbances:
-        """Make the disturbances of a batch; `varied` has the coefficients (n, joints) that replace
-        placeholders."""
+        """Make the disturbances of a batch; `varied` has the coefficients (n, joints) for placeholders."""
         sizes = {name: rows.shape[1] for name, rows in varied.items()}
         # Each joint depends on at most one coordinate, so the armature matrix is diagonal.
         armature = disturbances.armature.diagonal().copy()
@@ -51,8 +50,7 @@ class BatchDisturbances:
         return {**self.varied, **({"wrenches": WRENCH * len(self.pushes)} if pushed else {})}
 
     def wrenches(self, clock: Clock) -> Floats:
-        """Return the wrenches of the pushes in each step (n_steps, 6 per push), zero while a push does not
-        act."""
+        """Return the wrenches of the pushes in each step (n_steps, 6 per push), zero for idle pushes."""
         times = clock.times()[:-1]
         acting = np.stack([push.acts(times, clock.dt) for push in self.pushes], axis=1)
         strength = np.array([push.wrench for push in self.pushes], dtype=np.float64)

@@ -165,8 +165,7 @@ class FusedStep:
         return {name: (size,) for name, size in sizes.items()}
 
     def _commanded(self, controller: Controller[Any], given: Mapping[str, Array]) -> dict[str, Array]:
-        """Return the torque within the limits, the controller state, and the number of steps at the effort
-        limits."""
+        """Return the torque within limits, the controller state, and the number of steps at effort limits."""
         q, v = (given["q_measured"], given["v_measured"]) if self.delayed else (given["q"], given["v"])
         if self.noisy:
             off = given["noise_q"]

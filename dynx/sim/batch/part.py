@@ -72,8 +72,7 @@ class Part:
     fixed: dict[str, Floats]
     """Constant inputs: parameters and gains (count, size)."""
     setpoints: Setpoint
-    """Setpoints of the control steps: position (n_controls, nq), velocity and acceleration (n_controls,
-    nv)."""
+    """Setpoints of control steps: position (n_controls, nq), velocity and acceleration (n_controls, nv)."""
     references: Floats
     """Reference configuration after each step (n_steps, nq)."""
     wrenches: Floats

@@ -61,8 +61,7 @@ class BatchRollouts:
         return np.where(np.isnan(self.diverged), worst, np.where(self.done, np.inf, np.nan))
 
     def quantiles(self, levels: Sequence[float] = (0.05, 0.5, 0.95)) -> Floats:
-        """Return the quantiles (len(levels),) of `worst` over the computed rollouts; NaN if there are
-        none."""
+        """Return the quantiles (len(levels),) of `worst` over the computed rollouts; NaN without any."""
         worst = self.worst[self.done]
         if not len(worst):
             return np.full(len(levels), np.nan)

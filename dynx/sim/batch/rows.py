@@ -93,8 +93,7 @@ class RolloutRows:
         return 1 if self._asked is None else self._asked
 
     def of(self, name: str, values: ArrayLike, size: int, *, spread: bool = False) -> Floats:
-        """Return `values` as a finite array (size,) or (n, size); with `spread`, a last axis of length 1
-        holds for all."""
+        """Return `values` as a finite array (size,) or (n, size); with `spread`, one column holds for all."""
         array = np.asarray(values, dtype=np.float64) if spread else checked_array(name, values, size)
         if spread and array.ndim and array.shape[-1] == 1:
             array = np.broadcast_to(array, (*array.shape[:-1], size))

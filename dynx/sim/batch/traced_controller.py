@@ -47,8 +47,7 @@ class ArrayDynamics(Dynamics):
 
 
 def traced_controller(controller: Controller[Any], gains: Mapping[str, Array]) -> Controller[Any]:
-    """Return the controller with array code in place of its engine, and with other gains in its innermost
-    controller."""
+    """Return the controller with array code as its engine, and other gains in its innermost controller."""
     last = innermost(controller)
     return rebind(
         controller,

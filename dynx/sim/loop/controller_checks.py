@@ -42,8 +42,7 @@ def check_controller(model: Model, controller: Controller[Any], clock: Clock) ->
 
 
 def controller_numbers(controller: Controller[Any]) -> dict[str, Any]:
-    """Return the public numbers of a controller and of its inner one, such as gains, in types that JSON
-    has."""
+    """Return public numbers of a controller and its inner one, such as gains, in types that JSON has."""
     found: dict[str, Any] = {}
     for name, value in sorted(attributes_of(controller).items()):
         if name.startswith("_"):

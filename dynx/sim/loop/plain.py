@@ -238,19 +238,17 @@ class Loop:
         kind, why = type(self.plant), f"{type(error).__name__}: {error}"
         if is_own(kind):
             return self._diverged(k, record, why)
-        t, state = k * self.clock.dt, (record.q[k].copy(), record.v[k].copy())
-        message = f"plant {kind.__name__} failed in step {k}, at {t:.6g} s: {why}"
-        return SimulationError(message, time=t, step=k, state=state)
+        return self._ended(SimulationError, k, record, f"plant {kind.__name__} failed", why)
 
-    def _diverged(self, k: int, record: Record, why: str) -> DivergedError:
-        t, state = k * self.clock.dt, (record.q[k].copy(), record.v[k].copy())
-        return DivergedError(
-            f"the simulation diverged in step {k}, at {t:.6g} s: {why}", time=t, step=k, state=state
-        )
+    def _diverged(self, k: int, record: Record, why: str) -> SimulationError:
+        return self._ended(DivergedError, k, record, "the simulation diverged", why)
 
-    def _control_failed(self, k: int, record: Record, why: str) -> ControlError:
-        t, state = k * self.clock.dt, (record.q[k].copy(), record.v[k].copy())
+    def _control_failed(self, k: int, record: Record, why: str) -> SimulationError:
         name = "" if self.controller is None else self.controller.name
-        return ControlError(
-            f"controller {name} failed in step {k}, at {t:.6g} s: {why}", time=t, step=k, state=state
-        )
+        return self._ended(ControlError, k, record, f"controller {name} failed", why)
+
+    def _ended(
+        self, kind: type[SimulationError], k: int, record: Record, event: str, why: str
+    ) -> SimulationError:
+        t, state = k * self.clock.dt, (record.q[k].copy(), record.v[k].copy())
+        return kind(f"{event} in step {k}, at {t:.6g} s: {why}", time=t, step=k, state=state)

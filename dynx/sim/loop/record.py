@@ -11,8 +11,7 @@ from dynx.spatial.scalar import Floats
 
 @dataclass
 class Record:
-    """States at n + 1 times, torques and accelerations of the n steps between, and the number of steps
-    taken."""
+    """States at n + 1 times, torques and accelerations of the n steps between, and the count of steps."""
 
     q: Floats
     v: Floats

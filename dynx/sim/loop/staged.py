@@ -52,8 +52,7 @@ NOISE = ("noise_q", "noise_v")
 
 
 def staged_loop(loop: Loop, left: int) -> StagedLoop | str:
-    """Compile the loop into stages for `left` more steps; if that is impossible or too slow, return the
-    reason."""
+    """Compile the loop into stages for `left` more steps; return the reason if it is impossible or slow."""
     plant = loop.plant
     if left < MIN_STEPS_TO_COMPILE:
         return f"fewer than {MIN_STEPS_TO_COMPILE} steps"
@@ -80,8 +79,7 @@ def staged_loop(loop: Loop, left: int) -> StagedLoop | str:
 
 
 class StagedLoop:
-    """A loop in compiled stages: one step that evaluates the controller, and one that holds its last
-    torque."""
+    """A loop in compiled stages: one step evaluates the controller, another holds its last torque."""
 
     def __init__(self, loop: Loop, plant: IntegratedPlant) -> None:
         """Raises CompileError for a controller that cannot be traced."""
@@ -106,8 +104,7 @@ class StagedLoop:
         """Reason for stopping before the end."""
 
     def run(self, record: Record, loop_state: LoopState, end: int) -> None:
-        """Step from the last state of `record` to step `end`, or until a step has to be repeated by the
-        plain executor."""
+        """Step from the last state of `record` to `end`, or until the plain executor has to repeat a step."""
         begin = record.steps
         self._plant.reset(record.q[begin], record.v[begin])
         arrays = self._arrays(record, loop_state)
@@ -225,8 +222,7 @@ class StagedLoop:
     def _prepared_steps(
         self, step: StagedStep, by_step: Mapping[str, StridedRows], record: Record
     ) -> TakeSteps:
-        """Prepare the kernel and engine calls of the next steps; `by_step` has the rows of each array that
-        the steps use."""
+        """Prepare kernel and engine calls of the next steps; `by_step` has the rows of arrays they use."""
         first = record.steps
         first_rows = np.zeros(len(by_step["q"].rows), dtype=np.int64)
         places = {name: np.zeros((1, size)) for name, size in (*step.sizes.items(), ("defect", 1))}
@@ -277,8 +273,7 @@ class StagedLoop:
 
 
 def _trace_failure(name: str, error: Exception) -> str:
-    """Return the message for an error of a controller on symbols, with the line of its `torque` where it was
-    raised."""
+    """Return the message for an error of a controller on symbols, with its line in `torque`."""
     torques = [frame for frame in extract_tb(error.__traceback__) if frame.name == "torque"]
     place = f" ({Path(torques[-1].filename).name}, line {torques[-1].lineno})" if torques else ""
     return f"{name}.torque() cannot be traced: {error or type(error).__name__}{place}"

@@ -37,8 +37,7 @@ EngineCall = Callable[..., Floats]
 EXACTLY_ROUNDED = frozenset(
     {"input", "constant", "add", "sub", "mul", "div", "neg", "abs", "sqrt", "min", "max"}
 )
-"""Operations whose results have the same bits in NumPy and in a kernel, because IEEE 754 requires correct
-rounding."""
+"""Operations with the same bits in NumPy and in a kernel: IEEE 754 requires correct rounding of them."""
 
 MAX_CACHED_STAGES = 128
 """Number of kernels of stages that this process keeps for later simulations."""
@@ -51,8 +50,7 @@ class Stage:
     """A stage of a step, which ends with an engine call."""
 
     kernel: Kernel
-    """Kernel that writes the arguments and, if they are guarded, the defect: 0 if they are finite,
-    otherwise NaN."""
+    """Kernel that writes the arguments and, if guarded, the defect: 0 if they are finite, otherwise NaN."""
     call: EngineCall
     arguments: tuple[tuple[str, Shape], ...]
     """Arrays that this stage or an earlier one wrote, and their shapes."""
@@ -112,15 +110,13 @@ class EngineCallTracer:
         return self._symbols(result, int(np.prod(shape))).reshape(shape)
 
     def number(self, value: Floats) -> Array:
-        """Return symbols for numbers (n,) of a controller, so that controllers with other gains share the
-        stages."""
+        """Return symbols for numbers (n,) of a controller: controllers with other gains share the stages."""
         name = f"number {len(self._numbers)}"
         self._numbers[name] = value
         return self._symbols(name, value.size)
 
     def refuse_inexact_rounding(self) -> None:
-        """Raise TraceError if an operation that was traced so far rounds differently in a kernel and in
-        NumPy."""
+        """Raise TraceError if an operation traced so far rounds differently in a kernel and in NumPy."""
         for node in self._graph.nodes:
             if node.op not in EXACTLY_ROUNDED:
                 raise TraceError(f"{node.op} is not rounded as NumPy rounds it")

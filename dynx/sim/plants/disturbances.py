@@ -58,15 +58,13 @@ class Push:
         return Push(self.frame, wrench, float(self.start), float(self.duration), self.reference)
 
     def acts(self, t: Any, dt: float) -> Any:
-        """Check whether it acts in the steps of length `dt` that begin at `t`, a time or an array of times
-        [s]."""
+        """Check whether it acts in the steps of length `dt` that begin at the time or times `t` [s]."""
         since = t - self.start + TIME_ROUNDING * dt
         return (since >= 0.0) & (since < self.duration)
 
 
 class Disturbances:
-    """Friction, armature and pushes that act on a plant besides its motors, from the arguments of
-    `dynx.simulate`."""
+    """Friction, armature and pushes that act on a plant, from the arguments of `dynx.simulate`."""
 
     def __init__(
         self,

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
+from typing import Any
 
 from dynx.backends import Backend
 from dynx.backends.solvability import singular_coordinates
-from dynx.errors import ArgumentError, shown
 from dynx.model import Model
 from dynx.sim.plants.disturbances import Disturbances, DisturbedAcceleration
 from dynx.sim.plants.integrators import Accelerate, Adaptive, RungeKutta4, SemiImplicitEuler, State
 from dynx.sim.plants.plant import Plant, StepResult
 from dynx.spatial.scalar import Array, Floats
 
-SCHEMES = ("semi_implicit", "rk4", "adaptive")
-"""Names of the integration schemes."""
+SCHEMES: dict[str, Callable[..., SemiImplicitEuler | RungeKutta4 | Adaptive]] = {
+    "semi_implicit": SemiImplicitEuler,
+    "rk4": RungeKutta4,
+    "adaptive": Adaptive,
+}
+"""Integration schemes by name, each made of a model, a step [s] and its own options."""
 
 
 @lru_cache(maxsize=64)
@@ -35,26 +40,13 @@ class IntegratedPlant(Plant):
         *,
         integrator: str = "semi_implicit",
         substeps: int = 1,
-        method: str = "DOP853",
-        rtol: float = 1e-10,
-        atol: float = 1e-12,
+        **options: Any,
     ) -> None:
-        """Raises ArgumentError for an integrator that does not exist."""
+        """`options` are those of the integrator `adaptive`. Raises ArgumentError for invalid ones."""
         super().__init__(engine.model, disturbances, dt, substeps=substeps)
         self._engine = engine
         self._accelerate = DisturbedAcceleration(engine, disturbances)
-        if integrator == "semi_implicit":
-            self._scheme: SemiImplicitEuler | RungeKutta4 | Adaptive = SemiImplicitEuler(
-                engine.model, self._h
-            )
-        elif integrator == "rk4":
-            self._scheme = RungeKutta4(engine.model, self._h)
-        elif integrator == "adaptive":
-            self._scheme = Adaptive(engine.model, self._h, method=method, rtol=rtol, atol=atol)
-        else:
-            raise ArgumentError(
-                f"integrator is {shown(integrator)}; a plant of dynx has {', '.join(SCHEMES)}"
-            )
+        self._scheme = SCHEMES[integrator](engine.model, self._h, **options)
         self.dynamics = self._accelerate.dynamics
         """The engine's dynamics without disturbances."""
         self._forward = self.dynamics.forward_dynamics

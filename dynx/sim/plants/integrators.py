@@ -83,8 +83,7 @@ class SemiImplicitEuler:
 
 @cache
 def _base_step() -> Kernel:
-    """Compile `floating_step` of a base alone, with the same rounding as in every other kernel that
-    contains it."""
+    """Compile `floating_step` of a base alone, rounded as in every other kernel that contains it."""
 
     def step(q: Array, v: Array, a: Array, h: Array, center: Array) -> dict[str, Array]:
         return dict(zip(("q", "v"), floating_step(q, v, a, h[0], center), strict=True))
@@ -139,8 +138,7 @@ class RungeKutta4:
 
 
 class Adaptive:
-    """Integrator with error-controlled steps within each step of the plant, by
-    `scipy.integrate.solve_ivp`."""
+    """Integrator with error-controlled steps in each step of the plant, by `scipy.integrate.solve_ivp`."""
 
     def __init__(self, model: Model, h: float, *, method: str, rtol: float, atol: float) -> None:
         self._flow = _Flow(model)

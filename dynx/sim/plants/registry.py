@@ -106,5 +106,5 @@ def make_plant(
             f"integrator={ENGINE!r}"
         )
     require_plant(name)
-    engine = backend(name, model, validate=False)
-    return IntegratedPlant(engine, disturbances, dt, integrator=integrator, substeps=substeps, **options)
+    engine, own = backend(name, model, validate=False), options if integrator == "adaptive" else {}
+    return IntegratedPlant(engine, disturbances, dt, integrator=integrator, substeps=substeps, **own)

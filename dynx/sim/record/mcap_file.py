@@ -29,8 +29,7 @@ ABOUT_CHANNEL = {"offered_qos_profiles": ""}
 
 
 def write_mcap(rollout: RolloutData, file: BinaryIO) -> None:
-    """Write `rollout` as a recording. Raises NotInstalledError without mcap (``pip install
-    'dynx[mcap]'``)."""
+    """Write `rollout` as a recording. Raises NotInstalledError without mcap (``dynx[mcap]``)."""
     try:
         from mcap.writer import Writer
     except ImportError as error:

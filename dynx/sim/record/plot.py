@@ -19,8 +19,7 @@ from dynx.sim.record.rollout_data import RolloutData
 from dynx.spatial.scalar import Floats
 
 STYLES = ("-", "--", "-.", ":")
-"""Line styles. Together with matplotlib's ten colours they give distinguishable curves, also in print
-without colour."""
+"""Line styles. With matplotlib's ten colours they distinguish curves, also in print without colour."""
 
 PER_COLUMN = 12
 """Largest number of curves in one panel."""
@@ -39,8 +38,7 @@ class Column(NamedTuple):
     units: tuple[str, str]
     """Units of positions and of efforts."""
     of_base: bool = False
-    """Whether this is the column of a floating base: its position is in the world, all else in its own
-    axes."""
+    """Whether this is the column of a floating base: position in the world, all else in its own axes."""
 
 
 def plot(rollout: RolloutData, path: str | os.PathLike[str] | None = None) -> Any:
@@ -145,6 +143,5 @@ def _effort_limits(rollout: RolloutData) -> Floats:
 
 
 def _plain(text: str) -> str:
-    """Escape `text` so that matplotlib shows it literally: neither as a formula nor hidden from the
-    legend."""
+    """Escape `text` so that matplotlib shows it literally: neither a formula nor hidden from the legend."""
     return (" " if text.startswith("_") else "") + text.replace("$", r"\$")

@@ -17,6 +17,5 @@ class Rollout(RolloutData):
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Rollout:
-        """Read a ``.npz`` file that `save` wrote, to the last bit. Raises ArgumentError for any other
-        file."""
+        """Read a ``.npz`` file of `save`, to the last bit. Raises ArgumentError for any other file."""
         return cls(**load(path))

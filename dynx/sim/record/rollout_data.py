@@ -70,8 +70,7 @@ class RolloutData:
     scenario: Scenario | None = None
     """The simulation whose record this is; None for a record made in another way."""
     executor: str = ""
-    """Executor of the steps: ``staged``, or ``plain`` with the reason; several are separated by
-    semicolons."""
+    """Executor of the steps: ``staged``, or ``plain`` with the reason; semicolons separate several."""
     departures: tuple[str, ...] = ()
     """Interventions that make the record differ from its scenario, such as torques given by the caller."""
 

@@ -42,8 +42,7 @@ DEFINITIONS = {
         "builtin_interfaces/Duration time_from_start\n"
     ),
 }
-"""Definition of each message by ``package/Name``. A field type of the same package is written without the
-package."""
+"""Definition of each message by ``package/Name``; a field type of its own package is written without it."""
 
 SEPARATOR = "=" * 80
 
@@ -55,8 +54,7 @@ def schema_name(message: str) -> str:
 
 
 def schema_text(message: str) -> str:
-    """Return the definition of `message` and, after separators, of all message types inside it (format
-    ``ros2msg``)."""
+    """Return the definition of `message` and, after separators, of all types inside it (``ros2msg``)."""
     needed = _needed(message)
     parts = [DEFINITIONS[message], *(f"{SEPARATOR}\nMSG: {name}\n{DEFINITIONS[name]}" for name in needed)]
     return "".join(parts)

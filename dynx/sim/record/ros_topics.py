@@ -60,8 +60,7 @@ class Topic(NamedTuple):
     fields: Fields
 
     def encoded(self, stamps: Stamps, begin: int, end: int) -> list[tuple[int, bytes]]:
-        """Return the messages of the states `begin` to `end` (exclusive), each with the number of its
-        state."""
+        """Return the messages of the states `begin` to `end` (exclusive), each with its state's number."""
         begin, end = max(begin, self.first), min(end, self.last)
         if begin >= end:
             return []

@@ -13,8 +13,7 @@ from dynx.sim.setup import clock_of, disturbances_of, effort_limits_of
 
 
 def settings_of(scenario: Scenario) -> dict[str, Any]:
-    """Return plant, controller, times, limits, friction, noise and pushes of a scenario, in types that
-    JSON has."""
+    """Return plant, controller, times, limits, friction, noise and pushes of a scenario, fit for JSON."""
     controller, clock, limit = scenario.controller, clock_of(scenario), effort_limits_of(scenario)
     moved = plant_model(scenario.model, scenario.payloads, scenario.mass_scale)
     disturbances = disturbances_of(scenario, moved)

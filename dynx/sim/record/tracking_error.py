@@ -19,8 +19,7 @@ Entry = dict[str, Any]
 
 
 def joint_error(rollout: Rollout) -> Entry:
-    """Summarise the error over all joints and times; each number is None without a reference or without
-    joints."""
+    """Summarise the error over all joints and times; numbers are None without a reference or joints."""
     base = 6 if rollout.model.floating else 0
     error = np.abs(rollout.error[:, base:])
     if rollout.reference is None or error.size == 0:
@@ -54,8 +53,7 @@ def frame_error(rollout: Rollout, frame: str | None) -> Entry | None:
 
 
 def _body_error(t: Floats, position: Floats, rotation: Floats) -> Entry:
-    """Summarise the norms of the position errors (n + 1, 3) [m] and of the rotation vectors (n + 1, 3)
-    [rad]."""
+    """Summarise the norms of position errors (n + 1, 3) [m] and of rotation vectors (n + 1, 3) [rad]."""
     return {
         name: {
             "max": float(norm.max()),

@@ -212,8 +212,7 @@ def _object(value: Any, given: Mapping[str, Any], model: Model | None) -> Docume
 
 
 def _code_of(value: Any) -> dict[str, Document]:
-    """Return the checksum of the code of an object's class, and the duration of a trajectory; empty for a
-    class of dynx."""
+    """Return the code's checksum for an object's class, and a trajectory's duration; empty for dynx's own."""
     if not is_foreign(type(value)):
         return {}
     duration = {DURATION: float(value.duration)} if isinstance(value, Trajectory) else {}
@@ -260,8 +259,7 @@ def _with_infinities(entry: Any) -> Any:
 
 
 def _is_declared(value: Any) -> bool:
-    """Check whether the class of `value` is a dataclass itself, and `value` has no attributes besides its
-    fields."""
+    """Check whether the class of `value` is itself a dataclass, and `value` has only its fields."""
     if "__dataclass_fields__" not in vars(type(value)):
         return False
     return set(getattr(value, "__dict__", ())) <= {each.name for each in fields(value)}
@@ -282,8 +280,7 @@ def _name_of(kind: type) -> str:
 
 
 def _class_of(name: str) -> Any:
-    """Return the class of that name in dynx or in a module that is already imported; None if there is
-    none."""
+    """Return the class of that name in dynx or a module that is already imported; None without one."""
     module, _, path = name.partition(":")
     if module.partition(".")[0] == "dynx":
         importlib.import_module(module)

@@ -122,8 +122,7 @@ class Scenario:
         return tuple(self.payload) if isinstance(self.payload, tuple) else ()
 
     def with_defaults(self) -> Scenario:
-        """Return an equal scenario in which the defaults replace None for integrator, control step and
-        duration."""
+        """Return an equal scenario without None for integrator, control step and, if known, duration."""
         duration = self.duration
         if duration is None and isinstance(self.reference, Trajectory | Unknown):
             duration = self.reference.duration

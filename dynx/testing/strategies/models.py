@@ -246,8 +246,7 @@ def _limbs(
 
 
 def _with_mimics(joints: list[Joint], mimics: list[tuple[int, float, float] | None]) -> list[Joint]:
-    """Make some joints mimic others. A driver comes earlier in `joints` or is independent, so no cycle can
-    form."""
+    """Make some joints mimic others. A driver is earlier in `joints` or independent: no cycle can form."""
     moving = [k for k, joint in enumerate(joints) if joint.moves]
     followers = [k for k in moving if mimics[k] is not None]
     if len(followers) == len(moving):
