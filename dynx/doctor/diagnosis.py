@@ -11,7 +11,6 @@ from dynx.agreement.report import Failure
 from dynx.agreement.tolerances import BAR
 from dynx.doctor.counterexample.search import smallest_counterexample
 from dynx.doctor.counterexample.trials import difference_of
-from dynx.doctor.examine.engine_input import without_meshes
 from dynx.doctor.examine.examination import LOADING, TORQUE, Examination, Examiner
 from dynx.doctor.examine.line_map import with_original_lines
 from dynx.doctor.examine.reference_values import ReferenceValues
@@ -32,8 +31,9 @@ from dynx.doctor.report import (
     Unexplained,
 )
 from dynx.doctor.report_assembly import all_findings, first_report, run_time_calls, with_after
+from dynx.doctor.variants import diagnosed_variants, variants_as_loaded
 from dynx.errors import ArgumentError, DescriptionError, DynxError
-from dynx.loaded import ENGINES, installed_engines
+from dynx.loaded import COMMON_VARIANTS, ENGINES, VARIANTS, engine_of, installed_engines
 from dynx.model import Model
 from dynx.model.configuration import checked_base
 from dynx.model.loading import read_description
@@ -69,24 +69,26 @@ def diagnose(
 ) -> DoctorReport:
     """Find and prove the causes for which engines that load this robot's file differ, and mend the file.
 
-    `robot` is any argument of `dynx.load`. `engines` are names of `dynx.loaded.ENGINES` (default: all that
-    are installed). Each loads the file by its documented call and is compared with reference values at
-    `samples` random states that follow from `seed`, in tilted gravity; a relative error above `tolerance`
-    is a difference. `choose` maps rule ids to one of the rule's `choices`. `counterexamples` selects
-    the search for the smallest robot that shows a difference which no rule explains. `progress` is called
-    with the name of each step.
+    `robot` is any argument of `dynx.load`. `engines` are names of `dynx.loaded.ENGINES` and of
+    `dynx.loaded.VARIANTS` (default: all engines that are installed). Each loads the file by its documented
+    call and is compared with reference values at `samples` random states that follow from `seed`, in tilted
+    gravity; a relative error above `tolerance` is a difference. By default common variants are examined too
+    (`DoctorReport.variants`); they differ by the user's call, which no file can mend, so they count as
+    differences only if `engines` names them. `choose` maps rule ids to one of the rule's `choices`.
+    `counterexamples` selects the search for the smallest robot that shows a difference which no rule
+    explains. `progress` is called with the name of each step.
 
     A robot that cannot be read gives a report with `error` set. Raises ArgumentError,
     UnknownBackendError, NotInstalledError and UnknownNameError for arguments that are invalid for any robot.
     """
     started = time.perf_counter()
-    examiner = _examiner(engines, samples, seed, tolerance)
+    examiner, variants = _examiners(engines, samples, seed, tolerance)
     choices = checked_choices((choose or {}).items())
     checked_base(base)
     progress = progress or _ignore_progress
     try:
         case = open_case(robot, base, choices)
-        report = _diagnosis_of(case, examiner, tolerance, counterexamples, seed, progress)
+        report = _diagnosis_of(case, examiner, variants, tolerance, counterexamples, seed, progress)
     except DynxError as error:
         report = refused_report(str(_label(robot)), error, base=base)
     return replace(report, samples=samples, seed=seed, seconds=time.perf_counter() - started)
@@ -103,12 +105,14 @@ def compare_as_loaded(
 ) -> DoctorReport:
     """Compare engines that load the file themselves, without a search for causes."""
     started = time.perf_counter()
-    examiner = _examiner(engines, samples, seed, tolerance)
+    examiner, variants = _examiners(engines, samples, seed, tolerance)
     checked_base(base)
     try:
         case = open_case(robot, base, {})
-        before = examiner.examine(case, reference=_reference_of(readable(case).case, examiner), describe=True)
+        reference = _reference_of(readable(case).case, examiner)
+        before = examiner.examine(case, reference=reference, describe=True)
         report = first_report(case, before, tolerance)
+        report = replace(report, variants=variants_as_loaded(case, reference, variants))
     except DynxError as error:
         report = refused_report(str(_label(robot)), error, base=base)
     return replace(report, samples=samples, seed=seed, seconds=time.perf_counter() - started)
@@ -133,6 +137,7 @@ def refused_report(robot: str, error: DynxError, *, base: str | None = None) -> 
 def _diagnosis_of(
     case: Case,
     examiner: Examiner,
+    variants: Examiner,
     tolerance: float,
     counterexamples: bool,
     seed: int,
@@ -146,13 +151,17 @@ def _diagnosis_of(
     found = with_original_lines(detections(case, rules), case.source, sound.source)
     report = first_report(case, before, tolerance)
     if report.alike and not _chosen_practice(case, found):
-        return replace(report, findings=all_findings(found, [], Mending(case), examiner.engines))
+        return replace(
+            report,
+            findings=all_findings(found, [], Mending(case), examiner.engines),
+            variants=diagnosed_variants(case, reference, case, reference, rules, variants, tolerance),
+        )
     progress("mending")
     full = mend(case, rules)
     after = examiner.examine(full.case)
     proofs = _prove_causes(case, rules, examiner, before, after, tolerance, progress)
     mended, last = _smallest_mending(case, rules, full, after, proofs, examiner, tolerance)
-    unexplained = _unexplained(last, tolerance, _engines_without_remedy(mended.case, rules))
+    unexplained = _unexplained(last, tolerance, _engines_without_remedy(mended.case, rules, examiner.engines))
     if unexplained and counterexamples:
         unexplained = _with_counterexamples(mended.case, unexplained, examiner, tolerance, seed, progress)
     changed = differs(mended.case, case)
@@ -162,6 +171,7 @@ def _diagnosis_of(
         unexplained=unexplained,
         choices=mended.choices,
         calls=run_time_calls(mended.case, examiner),
+        variants=diagnosed_variants(case, reference, mended.case, last.reference, rules, variants, tolerance),
         mended=mended.case.source.text if changed else None,
         form=mended.case.source.form,
     )
@@ -201,7 +211,7 @@ def _prove_causes(
     The causes of rules about the text are removed from the text as it is, those of rules about the robot from
     the text made readable. Meshes are removed from both texts first.
     """
-    slim = case.with_source(without_meshes(case.source))
+    slim = case.with_source(examiner.without_unused(case.source))
     sound = readable(slim).case
     readably = before if sound is slim else examiner.examine(sound, reference=before.reference)
     causes = [rule for rule in rules if rule.kind == "difference"]
@@ -235,7 +245,7 @@ def _smallest_mending(
     idle: set[Place] = {
         place_of(each.rule, each.detection)
         for each in proofs
-        if not (each.effects or each.rule.depends_on_state or unmeasured.intersection(each.rule.engines))
+        if not (each.effects or each.rule.depends_on_state or each.rule.named_of(unmeasured))
     }
     effective = {each.rule.id for each in proofs if each.effects}
     for omitted in (idle, {each for each in idle if each[0] not in effective}):
@@ -253,12 +263,15 @@ def _smallest_mending(
     return full, after
 
 
-def _engines_without_remedy(mended: Case, rules: Sequence[Rule]) -> set[str]:
+def _engines_without_remedy(mended: Case, rules: Sequence[Rule], engines: Collection[str]) -> set[str]:
     """Find the engines for which a cause remains that has no remedy or that the user chose to keep."""
     causes = [rule for rule in rules if rule.kind == "difference"]
     left = detections(mended, causes)
     return {
-        engine for rule, each in left if remedy_of(mended, rule, [each]) is None for engine in rule.engines
+        engine
+        for rule, each in left
+        if remedy_of(mended, rule, [each]) is None
+        for engine in rule.named_of(engines)
     }
 
 
@@ -298,7 +311,10 @@ def _with_counterexamples(
     return tuple(found)
 
 
-def _examiner(engines: Sequence[str] | None, samples: int, seed: int, tolerance: float) -> Examiner:
+def _examiners(
+    engines: Sequence[str] | None, samples: int, seed: int, tolerance: float
+) -> tuple[Examiner, Examiner]:
+    """Return the examiner of the engines, and that of the variants to examine beside them."""
     for name, value, least in (("samples", samples, 1), ("seed", seed, 0)):
         if isinstance(value, bool) or not isinstance(value, int) or value < least:
             raise ArgumentError(f"{name} is {value!r}; wanted a whole number, at least {least}")
@@ -306,8 +322,9 @@ def _examiner(engines: Sequence[str] | None, samples: int, seed: int, tolerance:
         raise ArgumentError(f"tolerance is {tolerance!r}; wanted a relative error between 0 and 1")
     chosen = installed_engines() if engines is None else tuple(dict.fromkeys(engines))
     if isinstance(engines, str) or not chosen:
-        raise ArgumentError(f"engines is {engines!r}; wanted names out of {', '.join(ENGINES)}")
-    return Examiner(chosen, samples, seed)
+        raise ArgumentError(f"engines is {engines!r}; wanted names out of {', '.join([*ENGINES, *VARIANTS])}")
+    beside = [name for name in COMMON_VARIANTS if engines is None and engine_of(name) in chosen]
+    return Examiner(chosen, samples, seed), Examiner(beside, samples, seed)
 
 
 def _label(robot: object) -> str:

@@ -70,6 +70,23 @@ class EngineResult:
 
 
 @dataclass(frozen=True)
+class VariantResult(EngineResult):
+    """Another common call of an engine, examined beside it: ``pybullet:plain`` is PyBullet's call without the
+    flag that makes it read inertias.
+
+    What differs by the call alone is in `findings`, with proof and remedy, and not in those of the report,
+    because no file can mend a call. `after` is measured on the mended file, with the remedy of the call.
+    """
+
+    findings: tuple[Finding, ...] = ()
+
+    @property
+    def largest_error(self) -> float:
+        """Largest error as loaded, infinite where the file is refused."""
+        return float("inf") if self.refused is not None else max(self.before.values(), default=0.0)
+
+
+@dataclass(frozen=True)
 class PairError:
     """Relative error of two engines on one quantity as loaded, and of inverse dynamics joint by joint."""
 
@@ -117,7 +134,8 @@ class DoctorReport:
     `residual` is the largest relative error that remains after mending, `referee` that of the reference
     values themselves (mass matrix and inverse dynamics at one state) against 50 digits. `choices` are
     sentences on the decisions where the file is ambiguous and on the changes to the physics of the robot.
-    `model_difference` lists the values of engines that the file does not state.
+    `model_difference` lists the values of engines that the file does not state. `variants` are other common
+    calls of the engines; they count neither for `alike` nor for `explained`, `findings` and `residual`.
     """
 
     robot: str
@@ -139,6 +157,7 @@ class DoctorReport:
     calls: tuple[RunTimeCall, ...] = ()
     pairs: tuple[PairError, ...] = ()
     model_difference: tuple[Deviation, ...] = ()
+    variants: tuple[VariantResult, ...] = ()
     error: Failure | None = None
     error_line: int | None = field(default=None, compare=False)
     """Line of the text at which the `error` is, where it is known."""
@@ -157,11 +176,19 @@ class DoctorReport:
 
     @property
     def alike(self) -> bool:
-        """Whether every engine loads the file, with no error above the tolerance, in dynamics too."""
+        """Whether every engine loads the file, with no error above the tolerance, in dynamics too.
+
+        `variants` do not count.
+        """
         largest = max((e for each in self.engines for e in each.before.values()), default=0.0)
         refused = any(each.refused is not None for each in self.engines)
         compared = self.error is None and not self.kinematics_only
         return compared and not refused and largest <= self.tolerance
+
+    @property
+    def variants_off(self) -> tuple[VariantResult, ...]:
+        """Variants with an error above the tolerance, and those that refuse the file."""
+        return tuple(each for each in self.variants if not each.largest_error <= self.tolerance)
 
     @property
     def explained(self) -> bool:
@@ -180,7 +207,8 @@ class DoctorReport:
         if self.error is not None:
             return f"not examined ({self.error.type}: {self.error.message})"
         if self.alike:
-            return "all engines load it alike"
+            off = [f"{each.engine} is {_off(each)}" for each in self.variants_off]
+            return "; ".join(["all engines load it alike", *off])
         if self.unexplained:
             count = len(self.unexplained)
             return f"{count} difference{'s' * (count != 1)} without an explanation"
@@ -199,6 +227,11 @@ class DoctorReport:
     def to_dict(self) -> dict[str, Any]:
         """Make the entry of ``results``, of plain numbers, strings and lists."""
         return document_of(DoctorEntry, replace(self, seconds=round(self.seconds, 4)))
+
+
+def _off(variant: VariantResult) -> str:
+    error = variant.largest_error
+    return f"off by {100.0 * error:.2g} %" if error < 1e4 else "off without bound"
 
 
 @dataclass(frozen=True)
@@ -223,6 +256,7 @@ class DoctorEntry:
     calls: tuple[RunTimeCall, ...]
     pairs: tuple[PairError, ...]
     model_difference: tuple[Deviation, ...]
+    variants: tuple[VariantResult, ...]
     error: Failure | None
     seconds: float
 

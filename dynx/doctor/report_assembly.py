@@ -10,7 +10,15 @@ from dynx.doctor.examine.examination import QUANTITIES, TORQUE, Examination, Exa
 from dynx.doctor.examine.reference_values import referee_error
 from dynx.doctor.prove.attribution import Attribution
 from dynx.doctor.prove.mending import Mending, Place, place_of
-from dynx.doctor.report import DoctorReport, Effect, EngineResult, Finding, PairError, RunTimeCall
+from dynx.doctor.report import (
+    DoctorReport,
+    Effect,
+    EngineResult,
+    Finding,
+    PairError,
+    RunTimeCall,
+    VariantResult,
+)
 from dynx.loaded import loader_class
 from dynx.loaded.difference import model_difference
 from dynx.rules import Case, Detection, Rule
@@ -44,6 +52,18 @@ def with_after(report: DoctorReport, after: Examination) -> DoctorReport:
         for each in report.engines
     )
     return replace(report, engines=engines, residual=_residual(after))
+
+
+def variant_result(
+    case: Case, name: str, before: Examination, after: Examination, findings: Sequence[Finding]
+) -> VariantResult:
+    """Report a loading variant that is examined beside its engine."""
+    result = replace(
+        _engine_result(case, name, before),
+        refused_after=after.outputs[name].refused,
+        after=after.errors(name),
+    )
+    return VariantResult(**vars(result), findings=tuple(findings))
 
 
 def _residual(examination: Examination) -> float:

@@ -6,15 +6,26 @@ robots are compared, not conventions.
 """
 
 from dynx.loaded.description import LoadedInertial, LoadedJoint, LoadedModel
-from dynx.loaded.registry import ENGINES, installed_engines, load_as, loader_class
+from dynx.loaded.registry import (
+    COMMON_VARIANTS,
+    ENGINES,
+    VARIANTS,
+    engine_of,
+    installed_engines,
+    load_as,
+    loader_class,
+)
 from dynx.loaded.robot import LoadedRobot
 
 __all__ = [
+    "COMMON_VARIANTS",
     "ENGINES",
+    "VARIANTS",
     "LoadedInertial",
     "LoadedJoint",
     "LoadedModel",
     "LoadedRobot",
+    "engine_of",
     "installed_engines",
     "load_as",
     "loader_class",

@@ -1,6 +1,9 @@
 """The engines that load a file themselves, by name; each is imported when it is first looked up.
 
-Other packages add engines by entry points in the group ``dynx.loaded``.
+A *loading variant* is another documented call by which the users of an engine load a file. Its name begins
+with that of its engine, ``ENGINE:VARIANT``.
+
+Other packages add engines and variants by entry points in the group ``dynx.loaded``.
 """
 
 from __future__ import annotations
@@ -21,26 +24,38 @@ REGISTRY: ClassRegistry[LoadedRobot] = ClassRegistry(
         "pybullet": "dynx.engines.pybullet.as_loaded:LoadedPyBullet",
         "mujoco": "dynx.engines.mujoco.as_loaded:LoadedMujoco",
         "drake": "dynx.engines.drake.as_loaded:LoadedDrake",
+        "pybullet:plain": "dynx.engines.pybullet.plain_loading:PlainPyBullet",
     },
     lambda: LoadedRobot,
     error=BackendError,
     unknown=UnknownBackendError,
 )
 
-ENGINES = tuple(REGISTRY.built_in)
+VARIANTS = tuple(name for name in REGISTRY.built_in if ":" in name)
+"""Names of dynx's own loading variants."""
+
+ENGINES = tuple(name for name in REGISTRY.built_in if name not in VARIANTS)
 """Names of dynx's own engines."""
+
+COMMON_VARIANTS = ("pybullet:plain",)
+"""Variants so common that they are examined beside their engine by default."""
+
+
+def engine_of(name: str) -> str:
+    """The engine of a loading variant; an engine's own name."""
+    return name.partition(":")[0]
 
 
 def loader_class(engine: str) -> type[LoadedRobot]:
-    """The class of that name; raises NotInstalledError where its engine is missing."""
+    """The class of that engine or variant; raises NotInstalledError where the engine is missing."""
     found = REGISTRY.find(engine)
     found.engine_version()
     return found
 
 
 def installed_engines() -> tuple[str, ...]:
-    """Names of the engines that can be used here; this imports them."""
-    return tuple(engine for engine in REGISTRY.names() if _is_installed(engine))
+    """Names of the engines that can be used here, without variants; this imports them."""
+    return tuple(name for name in REGISTRY.names() if engine_of(name) == name and _is_installed(name))
 
 
 def load_as(engine: str, path: Path, model: Model, calls: Collection[str] = ()) -> LoadedRobot:

@@ -32,10 +32,14 @@ class LoadedRobot(ABC):
     """
 
     name: ClassVar[str]
-    """Name of the engine: ``pinocchio``, ``pybullet``, ``mujoco``, ``drake``."""
+    """Name of the engine: ``pinocchio``, ``pybullet``, ``mujoco``, ``drake``; of a loading variant, another
+    documented call of an engine, ``ENGINE:VARIANT``, such as ``pybullet:plain``."""
 
     CALLS: ClassVar[Mapping[str, str]] = {}
     """Engine settings that are remedies at run time: id -> the line of code a user would write."""
+
+    loads_meshes: ClassVar[bool] = False
+    """Whether mesh collision shapes change the dynamics of a link that states its inertia."""
 
     @abstractmethod
     def __init__(self, path: Path, model: Model, calls: Collection[str] = ()) -> None:

@@ -13,6 +13,7 @@ from typing import ClassVar, Literal
 
 from packaging.specifiers import SpecifierSet
 
+from dynx.loaded import engine_of
 from dynx.loaded.calls import call_on_joint
 from dynx.model.model import Base
 from dynx.rules.case import Case
@@ -45,7 +46,8 @@ class Detection:
 
     def sentence(self, engines: Collection[str]) -> str:
         """Return the message with the clauses of these engines."""
-        clauses = [clause for engine, clause in self.engine_clauses if engine in engines]
+        named = {engine_of(engine) for engine in engines}
+        clauses = [clause for engine, clause in self.engine_clauses if engine in named]
         return f"{self.message}: {', '.join(clauses)}" if clauses else self.message
 
 
@@ -93,7 +95,8 @@ class Rule(ABC):
     engines: ClassVar[Mapping[str, str]] = {}
     """Engines that read the file otherwise than dynx, each with the versions (PEP 440 specifier, such as
     ``>=3.2.5,<=3.2.7``) in which that was measured; a test loads the trap in the installed version and
-    fails if the engine behaves otherwise."""
+    fails if the engine behaves otherwise. An engine stands for its loading variants too; a variant
+    (``pybullet:plain``) is named where it alone is meant."""
 
     undefined: ClassVar[str] = ""
     """Name of what the file leaves undefined where the cause is present, such as ``dynamics``; mostly empty.
@@ -144,12 +147,21 @@ class Rule(ABC):
         return f"{self.id}={chosen}: {self.choices[chosen]}; otherwise {others}"
 
     @classmethod
+    def versions_of(cls, engine: str) -> str | None:
+        """Return the versions of an engine or loading variant that the rule names; None for none."""
+        return cls.engines.get(engine, cls.engines.get(engine_of(engine)))
+
+    @classmethod
+    def named_of(cls, engines: Iterable[str]) -> list[str]:
+        """Select the engines and loading variants that the rule names."""
+        return [engine for engine in engines if cls.versions_of(engine) is not None]
+
+    @classmethod
     def holds_for(cls, versions: Mapping[str, str]) -> bool:
         """Check whether the rule holds for any of these engines in these versions."""
         return any(
-            SpecifierSet(stated).contains(versions[engine], prereleases=True)
-            for engine, stated in cls.engines.items()
-            if engine in versions
+            SpecifierSet(cls.versions_of(engine) or "").contains(versions[engine], prereleases=True)
+            for engine in cls.named_of(versions)
         )
 
     @classmethod

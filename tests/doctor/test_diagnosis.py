@@ -27,7 +27,7 @@ TRAP = find_trap("DX101")
 
 
 def difference_rules() -> list[Rule]:
-    """List the rules about differences that hold for an installed engine."""
+    """List the rules about differences that hold for an installed engine, without those about variants."""
     versions = {engine: loader_class(engine).engine_version() for engine in installed_engines()}
     return [rule for rule in all_rules() if rule.kind == "difference" and rule.holds_for(versions)]
 

@@ -18,13 +18,16 @@ from dynx.doctor.examine.examination import Examination, Examiner
 from dynx.doctor.examine.reference_values import ReferenceValues
 from dynx.doctor.prove.mending import mend
 from dynx.errors import ModelError
-from dynx.loaded import installed_engines, loader_class
+from dynx.loaded import VARIANTS, engine_of, installed_engines, loader_class
 from dynx.rules import Case, Rule, all_rules
 from dynx.rules.traps import trap_case
 
 STATES, SEED = 3, 0
 
 VERSIONS = {engine: loader_class(engine).engine_version() for engine in installed_engines()}
+
+VARIANT_VERSIONS = {name: VERSIONS[engine_of(name)] for name in VARIANTS if engine_of(name) in VERSIONS}
+"""Versions of the loading variants, which only the rules that name them are tested on."""
 
 # Engines that are wrong on a trap for a second cause that the trap must contain: the reason.
 WRONG_FOR_SECOND_CAUSE: dict[tuple[str, str], str] = {
@@ -41,7 +44,7 @@ def rules_and_engines(named: bool) -> list[Any]:
     return [
         pytest.param(rule, engine, id=f"{rule.id}-{engine}-{version}")
         for rule in all_rules()
-        for engine, version in VERSIONS.items()
+        for engine, version in (VERSIONS | VARIANT_VERSIONS if named else VERSIONS).items()
         if (engine in rule.engines) == named
     ]
 
@@ -82,7 +85,7 @@ def description(examination: Examination, engine: str) -> str:
 @pytest.mark.parametrize(("rule", "engine"), rules_and_engines(named=True))
 def test_fact(rule: Rule, engine: str) -> None:
     before = examiner(engine).examine(trap_case(rule), reference=reference_of(rule, engine))
-    if VERSIONS[engine] not in SpecifierSet(rule.engines[engine], prereleases=True):
+    if VERSIONS[engine_of(engine)] not in SpecifierSet(rule.engines[engine], prereleases=True):
         assert before.max_error(engine) <= BAR, description(before, engine)
         return
     assert before.max_error(engine) > BAR, description(before, engine)
@@ -100,7 +103,7 @@ def test_fact(rule: Rule, engine: str) -> None:
 def test_a_remedy_at_run_time_is_known_to_its_engine(rule: Rule) -> None:
     case = mended_trap(rule)
     calls = frozenset() if case is None else case.calls
-    known = {call for engine in VERSIONS for call in loader_class(engine).CALLS}
+    known = {call for engine in VERSIONS | VARIANT_VERSIONS for call in loader_class(engine).CALLS}
     assert {call for call in calls if call.split(".")[0] in VERSIONS} <= known
 
 

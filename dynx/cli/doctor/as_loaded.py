@@ -164,6 +164,8 @@ def vote_lines(report: DoctorReport, found: Vote) -> list[str]:
             lines.append(f"{engine.engine} {off if math.isfinite(error) else missing}")
     if largest_error(report) <= report.tolerance:
         lines.append(f"nothing differs by more than {report.tolerance:g}")
+    for variant in report.variants_off:
+        lines += [f"another common call, {variant.engine}: {line}" for line in wording.variant(variant)]
     return lines
 
 

@@ -14,7 +14,15 @@ from dynx.cli.shell.exits import one_line, short_line
 from dynx.cli.shell.tables import Table
 from dynx.cli.shell.terminal import counted, summary_line
 from dynx.doctor.formats import wording
-from dynx.doctor.formats.causes import ROUNDING, Cause, Status, causes, severity, status
+from dynx.doctor.formats.causes import (
+    ROUNDING,
+    Cause,
+    Status,
+    catalogue_entry,
+    causes,
+    severity,
+    status,
+)
 from dynx.doctor.formats.vote import largest_error
 from dynx.doctor.report import DoctorReport, EngineResult, Finding
 
@@ -36,6 +44,7 @@ def show_one(out: Console, report: DoctorReport, saved: Mapping[int, str], mende
         return
     show_engines(out, report)
     show_errors(out, report)
+    show_variants(out, report)
     found = causes(report)
     _show_causes(out, "causes", [each for each in found if each.largest_effect is not None])
     rest = [each for each in found if each.largest_effect is None]
@@ -65,9 +74,8 @@ def show_engines(out: Console, report: DoctorReport) -> None:
     """Print each engine with its version and the call that loads the file."""
     heading(out, "each engine loads the file with the call of its documentation")
     for each in report.engines:
-        out.print(f"  {each.engine} {one_line(each.version)}", style="bold")
-        for line in each.call.splitlines():
-            out.print(f"      {wording.name(line, 500)}", style="dim")
+        call = "; ".join(wording.name(line, 500) for line in each.call.splitlines())
+        out.print(Text.assemble((f"  {each.engine} {one_line(each.version)}: ", "bold"), (call, "dim")))
         if each.refused is not None:
             sentence(out, f"refuses the file: {one_line(each.refused)}", 6, "red")
             after = "loads the mended file" if each.refused_after is None else "refuses the mended file too"
@@ -101,6 +109,19 @@ def show_errors(out: Console, report: DoctorReport, *, mended: bool = True) -> N
     )
 
 
+def show_variants(out: Console, report: DoctorReport) -> None:
+    """Print the variants that differ: the call, the effect of its causes and what to write instead."""
+    for each in report.variants_off:
+        out.print()
+        title = f"another common call, {each.engine}, loads another robot: "
+        out.print(Text.assemble((title, "bold"), (wording.name(each.call, 500), "dim")))
+        for line in wording.variant(each):
+            sentence(out, line, 2)
+        for rule in map(catalogue_entry, dict.fromkeys(finding.rule for finding in each.findings)):
+            if rule is not None and rule.advice:
+                sentence(out, f"-> {one_line(rule.advice)}", 2)
+
+
 def show_many(out: Console, reports: Sequence[DoctorReport]) -> None:
     """Print one line for each robot and base."""
     bases = len({report.base for report in reports}) > 1
@@ -119,7 +140,18 @@ def show_many(out: Console, reports: Sequence[DoctorReport]) -> None:
     out.print("largest relative error of any engine, as loaded (refused: an engine refuses it)", style="bold")
     out.print("and the residual error after mending", style="bold")
     out.print(table)
+    _count_variants(out, reports)
     out.print()
+
+
+def _count_variants(out: Console, reports: Sequence[DoctorReport]) -> None:
+    """Print for each variant the number of robots that it loads otherwise."""
+    off = [each for report in reports for each in report.variants_off]
+    for name in dict.fromkeys(each.engine for each in off):
+        mine = [each for each in off if each.engine == name]
+        rules = ", ".join(sorted({finding.rule for each in mine for finding in each.findings}))
+        share = f"{len(mine)} of {counted(len(reports), 'robot')}"
+        out.print(f"{name}: {share} loaded otherwise by this call{f' ({rules})' if rules else ''}")
 
 
 def show_summary(out: Console, reports: Sequence[DoctorReport], seconds: float, not_done: int) -> None:
@@ -139,8 +171,7 @@ def _show_causes(out: Console, title: str, found: Sequence[Cause]) -> None:
     heading(out, title)
     for cause in found:
         out.print(_cause_line(cause))
-        sentence(out, one_line(cause.title), 6)
-        out.print(f"      {_extent(cause)}")
+        sentence(out, f"{one_line(cause.title)} ({_extent(cause)})", 6)
         _show_places(out, cause)
         if cause.advice and (cause.largest_effect is not None or cause.kind == "practice"):
             sentence(out, f"-> {one_line(cause.advice)}", 6)

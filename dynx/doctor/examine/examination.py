@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
@@ -138,7 +139,7 @@ class Examination:
 
 
 class Examiner:
-    """Examiner of cases of one robot, with the same engines, number of states and seed."""
+    """Examiner of cases of one robot, with the same engines or variants, number of states and seed."""
 
     def __init__(self, engines: Collection[str], samples: int, seed: int) -> None:
         self.engines = {name: loader_class(name) for name in engines}
@@ -169,9 +170,25 @@ class Examiner:
         computed again."""
         reference = reference or self.reference(case)
         chosen = [name for name in self.engines if engines is None or name in engines]
-        with temporary_urdf(without_meshes(case.source)) as path:
-            outputs = {name: self._evaluate(name, path, case, reference, describe) for name in chosen}
+        with ExitStack() as files:
+            paths = {
+                meshes: files.enter_context(temporary_urdf(text, mesh_boxes=meshes))
+                for meshes, text in self._engine_inputs(case, chosen)
+            }
+            outputs = {
+                name: self._evaluate(name, paths[self.engines[name].loads_meshes], case, reference, describe)
+                for name in chosen
+            }
         return Examination(reference, outputs)
+
+    def without_unused(self, source: XmlSource) -> XmlSource:
+        """Remove the shapes that none of the engines loads."""
+        return without_meshes(source, collisions=not any(kind.loads_meshes for kind in self.engines.values()))
+
+    def _engine_inputs(self, case: Case, chosen: Sequence[str]) -> Iterator[tuple[bool, XmlSource]]:
+        """Yield the text for engines that load meshes (True) and for those that load none (False)."""
+        for meshes in {self.engines[name].loads_meshes for name in chosen}:
+            yield meshes, without_meshes(case.source, collisions=not meshes)
 
     def _evaluate(
         self, engine: str, path: Path, case: Case, reference: ReferenceValues, describe: bool

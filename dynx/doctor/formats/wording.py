@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import PurePath
 from typing import Any
 
-from dynx.doctor.report import Effect, Finding, Unexplained
+from dynx.doctor.report import Effect, Finding, Unexplained, VariantResult
 from dynx.errors import escaped
 
 NAME_LENGTH = 120
@@ -92,6 +92,21 @@ def unexplained(each: Unexplained) -> str:
         return f"{name(each.engine)} returns no valid {quantity(each.quantity)}"
     where = "" if each.joint is None else f", most at joint {name(each.joint)}"
     return f"{quantity(each.quantity)} of {name(each.engine)} is off by {size(each.relative_error)}{where}"
+
+
+def variant(each: VariantResult) -> list[str]:
+    """Write what a loading variant changes, by its causes where they are known."""
+    if each.refused is not None:
+        return [f"refuses the file: {name(each.refused, 1000)}"]
+    if not each.findings:
+        key = max(each.before, key=lambda key: each.before[key])
+        return [difference(key, each.before[key])]
+    lines = []
+    for cause in each.findings:
+        proof = "proved" if cause.proved else "not proved"
+        rule = f"{name(cause.rule)} {name(cause.name)}, {proof}"
+        lines.append(f"{effect(cause.effect)}: {rule}; {name(cause.message, 300)}")
+    return lines
 
 
 def titles(robots: Sequence[str]) -> list[str]:

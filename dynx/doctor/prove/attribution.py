@@ -61,7 +61,7 @@ class Attributor:
     def attribute(self, rule: Rule, found: Sequence[Detection]) -> list[Attribution]:
         """Measure the effect of the rule at each of the places where it was found."""
         self.progress(f"{rule.id} {rule.name}")
-        named = [engine for engine in self.examiner.engines if engine in rule.engines]
+        named = rule.named_of(self.examiner.engines)
         wrong = [name for name in named if self.before.max_error(name) > self.tolerance]
         rest = cache(lambda: mend(self.case, [other for other in self.rules if other is not rule]))
         affected = self._effects_at(rule, found, named, wrong, rest)

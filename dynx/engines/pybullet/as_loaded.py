@@ -15,6 +15,7 @@ instead of those of the world, because no call changes that.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
+from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import ClassVar
@@ -54,12 +55,13 @@ class LoadedPyBullet(LoadedRobot):
         engine = bullet()
         require_harmless(path, model)
         self._model = model
-        self._clients = [LoadedClient(engine, path, model.name, fixed=not model.floating)]
+        options = {"fixed": not model.floating, "file_inertia": self._uses_file_inertia(calls)}
+        self._clients = [LoadedClient(engine, path, model.name, **options)]
         try:
             self._prepare(calls)
             if self._client.refused and "pybullet.extrapolate_inertias" in calls:
                 for times in (1, 2):
-                    other = LoadedClient(engine, path, model.name, fixed=not model.floating)
+                    other = LoadedClient(engine, path, model.name, **options)
                     self._clients.append(other)
                     self._set(other, calls)
                     other.apply(with_ballast(times))
@@ -96,6 +98,11 @@ class LoadedPyBullet(LoadedRobot):
             client.apply(set_inertias(self._model, self._links))
         client.apply(set_joints({_text(client.joints[k][1]): k for k in client.moving}, calls))
 
+    @classmethod
+    def _uses_file_inertia(cls, calls: Collection[str]) -> bool:
+        """Whether the call that loads the file has the flag for the inertias of the file."""
+        return True
+
     @property
     def _client(self) -> LoadedClient:
         """The robot as it was loaded."""
@@ -118,7 +125,8 @@ class LoadedPyBullet(LoadedRobot):
     def describe(self) -> LoadedModel:
         """Describe the model from `getDynamicsInfo` and `getJointInfo`."""
         base = self.link_poses(self._model.neutral())[0]
-        return describe_model(self._client, self._model, self._links, base)
+        described = describe_model(self._client, self._model, self._links, base)
+        return replace(described, engine=self.name)
 
     def close(self) -> None:
         """Disconnect the client, or clients."""

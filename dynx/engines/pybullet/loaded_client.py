@@ -28,11 +28,14 @@ Setting = Callable[["LoadedClient"], None]
 class LoadedClient(BulletConnection):
     """One robot as `loadURDF` loads it."""
 
-    def __init__(self, engine: ModuleType, path: Path, robot: str, *, fixed: bool) -> None:
+    def __init__(
+        self, engine: ModuleType, path: Path, robot: str, *, fixed: bool, file_inertia: bool = True
+    ) -> None:
         super().__init__(engine, robot)
         self._fixed = fixed
+        self._flags = engine.URDF_USE_INERTIA_FROM_FILE if file_inertia else 0
         self._file = path.read_bytes()
-        self._path: Path | None = path
+        self._path = path
         self._settings: list[Setting] = []
         self._refusal: EngineError | None = None
         self._needs_tree = (
@@ -43,7 +46,6 @@ class LoadedClient(BulletConnection):
         self.messages: list[str] = []
         """The lines that Bullet printed while it loaded."""
         self._connect()
-        self._path = None
         self.links = list(range(int(self.call(engine.getNumJoints, self.body))))
         self.joints = [self.call(engine.getJointInfo, self.body, k) for k in self.links]
         """`getJointInfo` of every joint, as loaded."""
@@ -97,18 +99,18 @@ class LoadedClient(BulletConnection):
         self.make_tree()
 
     def _load(self) -> None:
-        if self._path is not None:
+        if self._path.is_file() and self._path.read_bytes() == self._file:
             self._load_from(self._path)
             return
-        # The file may have been deleted since.
+        # The file is gone or another when a robot is loaded again.
         with TemporaryDirectory(prefix="dynx-", ignore_cleanup_errors=True) as folder:
             path = Path(folder) / "robot.urdf"
             path.write_bytes(self._file)
             self._load_from(path)
 
     def _load_from(self, path: Path) -> None:
-        flags = self.engine.URDF_USE_INERTIA_FROM_FILE
+        options = {"useFixedBase": self._fixed, "flags": self._flags}
         self.messages.clear()
         with capture_output(self.messages):
-            body = self.call(self.engine.loadURDF, str(path), useFixedBase=self._fixed, flags=flags)
+            body = self.call(self.engine.loadURDF, str(path), **options)
         self.body = int(body)

@@ -42,8 +42,11 @@ _LAYOUT = (("stride", "1"), ("offset", "0"))
 _NUMBER = re.compile(r"\S+")
 
 
-def collada_points(data: bytes) -> Floats | None:
-    """Return all points of the scene (n, 3) [m]; None where the file has elements that are not supported."""
+def collada_points(data: bytes, *, turned: bool = True) -> Floats | None:
+    """Return all points of the scene (n, 3) [m]; None where the file has elements that are not supported.
+
+    With `turned` they include those of the scene rotated so that its up axis is z.
+    """
     prefix = re.search(rb"<(\w+:)COLLADA\b", data[:1000])
     names = "" if prefix is None else prefix.group(1).decode("ascii", "replace")
     try:
@@ -55,8 +58,8 @@ def collada_points(data: bytes) -> Floats | None:
     if not found:
         return None
     points = scene.unit * np.concatenate(found)
-    turned = _TO_Z_UP.get(scene.up_axis)
-    return points if turned is None else np.concatenate([points, points @ np.array(turned).T])
+    R = _TO_Z_UP.get(scene.up_axis) if turned else None
+    return points if R is None else np.concatenate([points, points @ np.array(R).T])
 
 
 class _NotSupported(Exception):

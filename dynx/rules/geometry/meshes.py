@@ -15,7 +15,10 @@ from dynx.spatial.scalar import Floats
 
 Box = tuple[tuple[float, float, float], tuple[float, float, float]]
 
-_STL_HEAD, _STL_FACET = 84, 50
+STL_FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+"""A facet of a binary STL file."""
+
+_STL_HEAD = 84
 
 # Each line is matched in time proportional to its length: a pattern must not run across lines, nor start
 # again within a run of blanks.
@@ -23,27 +26,29 @@ _STL_VERTEX = re.compile(rb"^[ \t]*vertex[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)", re.
 _OBJ_VERTEX = re.compile(rb"^[ \t]*v[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)", re.MULTILINE)
 
 
-def mesh_box(path: Path) -> Box | None:
+def mesh_box(path: Path, *, by_bullet: bool = False) -> Box | None:
     """Return the lowest and highest corner of a mesh in its own frame, unscaled; None if it is unreadable.
 
-    Time and memory are proportional to the size of the file, of which MAX_BYTES of `dynx.files` are read.
+    The box holds the mesh in every reading; with `by_bullet` it is that of PyBullet, which reads no text STL
+    and ignores the up axis of COLLADA. Time and memory are proportional to the size of the file, of which
+    MAX_BYTES of `dynx.files` are read.
     """
     try:
         status = path.stat()
     except (OSError, ValueError):
         return None
-    return _box(path, status.st_mtime_ns, status.st_size)
+    return _box(path, by_bullet, status.st_mtime_ns, status.st_size)
 
 
 # Cached, because detection runs again after every remedy, and remedies change no mesh.
 @lru_cache(maxsize=4096)
-def _box(path: Path, changed: int, size: int) -> Box | None:
-    reader = {".stl": _stl_points, ".obj": _obj_points, ".dae": collada_points}.get(path.suffix.lower())
+def _box(path: Path, by_bullet: bool, changed: int, size: int) -> Box | None:
+    reader = _READERS.get(path.suffix.lower())
     if reader is None:
         return None
     try:
         with np.errstate(all="ignore"):
-            points = reader(read_file(str(path)))
+            points = reader(read_file(str(path)), by_bullet)
     except (DynxError, ValueError):
         return None
     if points is None or len(points) == 0 or not np.isfinite(points).all():
@@ -52,20 +57,27 @@ def _box(path: Path, changed: int, size: int) -> Box | None:
     return (low[0], low[1], low[2]), (high[0], high[1], high[2])
 
 
-def _stl_points(data: bytes) -> Floats | None:
+def _stl_points(data: bytes, by_bullet: bool) -> Floats | None:
     """Return the corners of the facets. A binary file is known by its length, since some begin with "solid"
     too."""
     if len(data) >= _STL_HEAD:
         count = int.from_bytes(data[80:84], "little")
-        if len(data) == _STL_HEAD + _STL_FACET * count:
-            facet = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
-            corners = np.frombuffer(data, facet, count, _STL_HEAD)["corners"]
+        if len(data) == _STL_HEAD + STL_FACET.itemsize * count:
+            corners = np.frombuffer(data, STL_FACET, count, _STL_HEAD)["corners"]
             return corners.reshape(-1, 3).astype(np.float64)
-    return _vertices(_STL_VERTEX, data) if data.lstrip()[:5].lower() == b"solid" else None
+    is_text = data.lstrip()[:5].lower() == b"solid" and not by_bullet
+    return _vertices(_STL_VERTEX, data) if is_text else None
 
 
-def _obj_points(data: bytes) -> Floats | None:
+def _obj_points(data: bytes, by_bullet: bool) -> Floats | None:
     return _vertices(_OBJ_VERTEX, data)
+
+
+def _collada_points(data: bytes, by_bullet: bool) -> Floats | None:
+    return collada_points(data, turned=not by_bullet)
+
+
+_READERS = {".stl": _stl_points, ".obj": _obj_points, ".dae": _collada_points}
 
 
 def _vertices(pattern: re.Pattern[bytes], data: bytes) -> Floats:

@@ -16,6 +16,8 @@ from dynx.cli.doctor.mending import write_mended
 from dynx.cli.shell.main import cli
 from dynx.doctor.diagnosis import DEFAULT_SAMPLES, diagnose
 from dynx.errors import ArgumentError
+from dynx.loaded import installed_engines
+from dynx.rules.traps import find_trap
 from tests.doctor.formats.test_sarif import require_valid
 
 QUICK = ["--engines", "pinocchio,pybullet", "--samples", "2", "--jobs", "1"]
@@ -251,3 +253,31 @@ def test_as_loaded_takes_no_lock(arm: Path) -> None:
     result = CliRunner().invoke(cli, ["agree", "arm.urdf", "--as-loaded", "--lock", "elbow=1"])
     assert result.exit_code == 2
     assert "--lock" in result.stderr
+
+
+@pytest.mark.parametrize(("robot", "most"), [("ur5", 40), (str(find_trap("DX115")), 25)])
+def test_a_report_fits_one_screen_and_shows_the_plain_call(robot: str, most: int) -> None:
+    result = CliRunner().invoke(cli, ["doctor", robot, "--jobs", "1"])
+    assert result.exit_code == 0
+    assert len(result.stdout.splitlines()) <= most
+    if "pybullet" in installed_engines():
+        call = "robot = p.loadURDF(path, useFixedBase=True)"
+        assert f"another common call, pybullet:plain, loads another robot: {call}\n" in result.stdout
+        assert "DX115 inertia-from-shapes, proved" in result.stdout
+        assert "-> Write flags=p.URDF_USE_INERTIA_FROM_FILE" in result.stdout
+
+
+def test_the_plain_call_fails_a_check_only_where_it_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    if "pybullet" not in installed_engines():
+        pytest.skip("needs PyBullet")
+    command = ["doctor", str(find_trap("DX115")), "--quiet", "--jobs", "1"]
+    files = ["--sarif", "a.sarif", "--junit", "a.xml"]
+    assert CliRunner().invoke(cli, [*command, *files]).exit_code == 0
+    assert json.loads(Path("a.sarif").read_text())["runs"][0]["results"] == []
+    assert 'failures="0"' in Path("a.xml").read_text()
+    assert CliRunner().invoke(cli, [*command, "--engines", "pybullet:plain"]).exit_code == 1
+    unknown = CliRunner().invoke(cli, [*command, "--engines", "pybullet:plan"])
+    assert "did you mean 'pybullet:plain'" in unknown.stderr

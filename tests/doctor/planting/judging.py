@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from dynx.doctor import DoctorReport, Finding, diagnose
+from dynx.doctor.report import VariantResult
 from dynx.model.model import Base
 from tests.doctor.planting.plan import Trial, plant_defects
 from tests.doctor.planting.robots import clean_text
@@ -72,10 +73,15 @@ def _report_complaints(report: DoctorReport, defects: Sequence[PlantedDefect]) -
     if report.error is not None:
         return [report.verdict]
     wrong = [] if report.explained else [report.verdict]
+    wrong += [f"{each.engine} off without a proof" for each in report.variants_off if not _is_proved(each)]
     expected = {defect.place for defect in defects}.union(*(defect.also for defect in defects))
     return wrong + [
         f"{_finding_text(each)} blamed" for each in report.differences if _place(each) not in expected
     ]
+
+
+def _is_proved(variant: VariantResult) -> bool:
+    return bool(variant.findings) and all(each.proved for each in variant.findings)
 
 
 def _place(finding: Finding) -> Place:
