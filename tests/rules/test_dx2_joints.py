@@ -10,8 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dynx.doctor.prove.mending import mend
 from dynx.model import Model
 from dynx.model.loading import load
+from dynx.model.model import Base
 from dynx.model.xml.source import XmlSource
 from dynx.reference.backend import ReferenceBackend
 from dynx.rules import Case, find_rule
@@ -192,6 +194,17 @@ def test_a_floating_joint_at_the_root_is_made_what_dynx_reads() -> None:
     assert only(found).joint == "free"
     assert_same_robot(case.model, remedy.case.model)
     assert not find_rule("DX210").detect(case)
+
+
+@pytest.mark.parametrize("base", ["fixed", "floating"])
+def test_a_floating_joint_at_the_root_is_made_fixed_before_the_root_gets_a_body(base: Base) -> None:
+    case = trap("DX211")
+    text = case.source.text
+    frame = text[text.index('<link name="ground">') : text.index('<joint name="free"')]
+    case = Case(XmlSource(text.replace(frame, '<link name="ground"/>')), base)
+    after = mend(case).case
+    assert after.model.joint_names == case.model.joint_names
+    assert after.joints["free"].attributes["type"] == "fixed"
 
 
 def test_frames_are_dropped_until_pybullet_can_hold_the_robot() -> None:

@@ -22,12 +22,10 @@ the middle angle is 90 degrees, and limits of the joint are dropped. MuJoCo refu
 
 from collections.abc import Iterable
 
-from dynx.model.xml.source import Edit, SourceElement
+from dynx.model.xml.source import Edit
 from dynx.rules import Case, Correction, EditingRule, correction, measured_on
-from dynx.rules.case import end_of
-from dynx.rules.joints.elements import joints_of_type
+from dynx.rules.joints.elements import joints_of_type, specifies_base
 from dynx.rules.joints.splitting import TYPES, joint_split
-from dynx.rules.text.attributes import number_or_none
 
 
 class JointOfSeveralFreedoms(EditingRule):
@@ -44,26 +42,10 @@ class JointOfSeveralFreedoms(EditingRule):
         """Yield such joints, except a floating one below an empty root (DX211)."""
         for joint in joints_of_type(case, TYPES):
             kind = joint.attributes["type"]
-            if not joint.attributes.get("name") or (kind == "floating" and _is_the_base(case, joint)):
+            if not joint.attributes.get("name") or (kind == "floating" and specifies_base(case, joint)):
                 continue
             if self.chosen(case) == "fixed":
                 edits: tuple[Edit, ...] = (case.source.attribute_edit(joint, "type", "fixed"),)
             else:
                 edits = tuple(joint_split(case.source, joint))
             yield correction(joint, f"the joint is {kind}", *edits)
-
-
-def _is_the_base(case: Case, joint: SourceElement) -> bool:
-    """Check whether a floating joint carries the robot on an empty root, which may be so in a file that dynx
-    refuses for another reason."""
-    parent = end_of(joint, "parent")
-    ends = [(end_of(each, "parent"), end_of(each, "child")) for each in case.source.root.all("joint")]
-    carried = [child for above, child in ends if above == parent]
-    is_root = parent in case.links and all(child != parent for _, child in ends)
-    return case.readable or (is_root and len(carried) == 1 and _is_empty(case.links[parent]))
-
-
-def _is_empty(link: SourceElement) -> bool:
-    inertial = link.first("inertial")
-    mass = None if inertial is None else inertial.first("mass")
-    return inertial is None or (mass is not None and number_or_none(mass, "value") == 0.0)

@@ -18,16 +18,19 @@ What to do: specify the base in one place. ``dynx doctor --fix`` makes the joint
 from collections.abc import Iterable
 
 from dynx.rules import Case, Correction, EditingRule, correction, measured_on
-from dynx.rules.joints.elements import joints_of_type
+from dynx.rules.joints.elements import joints_of_type, specifies_base
 
 
 class FloatingJointAtRoot(EditingRule):
+    # Before the rules about inertia, which may give the empty root a body.
+    stage = "reading"
     advice = "Make the joint fixed, and specify in the loading call whether the base floats."
     engines = measured_on("mujoco", "drake")
     changed = "made the floating joint below the root fixed: the loading call says whether the base floats"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
-        """Yield the joint, of which there is at most one that dynx can read."""
+        """Yield the joint, of which there is at most one."""
         for joint in joints_of_type(case, ("floating",)):
-            edit = case.source.attribute_edit(joint, "type", "fixed")
-            yield correction(joint, "the joint below the root is floating", edit)
+            if specifies_base(case, joint):
+                edit = case.source.attribute_edit(joint, "type", "fixed")
+                yield correction(joint, "the joint below the root is floating", edit)

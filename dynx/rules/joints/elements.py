@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator
 
 from dynx.model.xml.source import Edit, SourceElement, XmlSource
-from dynx.rules.case import Case
+from dynx.rules.case import Case, end_of
+from dynx.rules.text.attributes import number_or_none
 from dynx.rules.text.number_text import LARGEST
 
 SINGLE = ("revolute", "continuous", "prismatic")
@@ -32,9 +33,25 @@ def elements_in_joints(
             yield joint, element
 
 
+def specifies_base(case: Case, joint: SourceElement) -> bool:
+    """Check whether a floating joint carries the robot on an empty root, which may be so in a file that dynx
+    refuses for another reason."""
+    parent = end_of(joint, "parent")
+    ends = [(end_of(each, "parent"), end_of(each, "child")) for each in case.source.root.all("joint")]
+    carried = [child for above, child in ends if above == parent]
+    is_root = parent in case.links and all(child != parent for _, child in ends)
+    return case.readable or (is_root and len(carried) == 1 and _is_empty(case.links[parent]))
+
+
 def axis_edit(source: XmlSource, joint: SourceElement, xyz: str) -> Edit:
     """Return the edit that sets the axis of a joint, whether it has one or not."""
     axis = joint.first("axis")
     if axis is None:
         return source.insertion(joint, f'<axis xyz="{xyz}"/>')
     return source.attribute_edit(axis, "xyz", xyz)
+
+
+def _is_empty(link: SourceElement) -> bool:
+    inertial = link.first("inertial")
+    mass = None if inertial is None else inertial.first("mass")
+    return inertial is None or (mass is not None and number_or_none(mass, "value") == 0.0)
