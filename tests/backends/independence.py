@@ -22,7 +22,7 @@ AnyBackend = TypeVar("AnyBackend", bound=Backend)
 
 
 def check_results_belong_to_the_caller(engine: Backend) -> None:
-    """Check that later calls change no earlier result, writing to a result no later call, and no argument."""
+    """Check that neither a later call nor writing to a result changes another result or an argument."""
     first, second = motion(engine.model, seed=1), motion(engine.model, seed=2)
     before = tuple(x.copy() for x in first)
     results = all_quantities(engine, *first)
@@ -37,7 +37,7 @@ def check_results_belong_to_the_caller(engine: Backend) -> None:
 
 
 def check_threads_get_equal_results(engine: Backend, samples: int) -> None:
-    """Check the results of `THREADS` threads that evaluate all samples at once, each from another one on."""
+    """Check the results of `THREADS` threads at once, each of which starts at another sample."""
     states = [motion(engine.model, seed) for seed in range(samples)]
     expected = [all_quantities(engine, *state) for state in states]
     together = threading.Barrier(THREADS)

@@ -28,8 +28,9 @@ _MAX_DIFFERENCES = 6
 class Conclusion:
     """The reports of a run, and the paths of their files.
 
-    `targets` has the file for the mended description of each input (which is one per task where any is
-    not None), `folder` is for counterexamples, `engines` are those that the user chose.
+    `targets` has the file for the mended description of each input, or None where none is wanted. Where any
+    is wanted, each input has one task. `folder` is for counterexamples, `engines` are those that the user
+    chose.
     """
 
     def __init__(

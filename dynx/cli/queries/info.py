@@ -124,12 +124,12 @@ def _joint_table(model: Model) -> Table:
             joint.type,
             _vector(joint.axis),
             *(f"{bound:.4g}" if math.isfinite(bound) else "-" for bound in bounds),
-            _rule(joint),
+            _mimic_rule(joint),
         )
     return table
 
 
-def _rule(joint: Joint) -> str:
+def _mimic_rule(joint: Joint) -> str:
     if joint.mimic is None:
         return ""
     offset = "" if joint.mimic.offset == 0.0 else f" {joint.mimic.offset:+.6g}"

@@ -10,7 +10,11 @@ from types import FrameType
 
 
 class Interruption:
-    """Request to end the run: `code` is None without one, else the exit code, 128 + signal."""
+    """Request to end the run.
+
+    `code` is None until a signal arrives; then it is the exit code, 128 + signal. Set `finishing` to have
+    later signals ignored while the results are written.
+    """
 
     def __init__(self) -> None:
         self.code: int | None = None
@@ -26,7 +30,7 @@ class Interruption:
 
 @contextmanager
 def interruptible() -> Iterator[Interruption]:
-    """Raise KeyboardInterrupt in the block at the first SIGINT or SIGTERM, unless `finishing`."""
+    """Raise KeyboardInterrupt in the block at the first SIGINT or SIGTERM, unless `finishing` is set."""
     interruption = Interruption()
     if threading.current_thread() is not threading.main_thread():
         yield interruption  # only the main thread can set handlers and receives signals

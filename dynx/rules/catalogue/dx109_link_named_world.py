@@ -46,7 +46,7 @@ class LinkNamedWorld(Rule):
         return [Detection(_WORLD, None, element.line, f"{what} is named world")]
 
     def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy | None:
-        """Another name that no link has."""
+        """Return the remedy that renames the link to a name that no link has."""
         if self.chosen(case) == "keep":
             return None
         name = fresh_name(f"{_WORLD}_link", case.links)

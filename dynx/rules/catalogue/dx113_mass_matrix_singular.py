@@ -44,7 +44,7 @@ class MassMatrixSingular(Rule):
                 yield Detection(name, None, case.links[name].line, message)
 
     def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy | None:
-        """Return the least that all engines take, unless the user keeps the file."""
+        """Give the links the least inertia that all engines accept, unless the user keeps the file."""
         if self.chosen(case) == "keep":
             return None
         return Remedy(

@@ -34,7 +34,7 @@ class AxisWithoutDirection(EditingRule):
     changed = "gave joints without a direction to move in one, or fixed them"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
-        """Axes of revolute, continuous and prismatic joints."""
+        """Yield axes of revolute, continuous and prismatic joints."""
         for joint, axis in elements_in_joints(case, "axis", SINGLE):
             if misspelled_direction(axis) is not None:
                 continue

@@ -26,7 +26,7 @@ class LowerLimitAboveUpper(EditingRule):
     advice = "Exchange the limits, or correct the one that is wrong."
     engines = measured_on("drake")
     choices = {
-        "exchange": "exchange a lower limit above the upper with it",
+        "exchange": "exchange the two limits where the lower is above the upper",
         "unlimited": "write the largest double for both limits where the lower is above the upper",
     }
     changed = "exchanged lower and upper limits that were in the wrong order"

@@ -28,7 +28,7 @@ class TooManyJoints(Rule):
     engines = measured_on("pybullet")
     choices = {
         "drop": "remove frames without mass at the ends of the robot until 127 joints are left",
-        "keep": "keep all links; PyBullet then cannot hold the robot",
+        "keep": "keep all links; PyBullet then cannot load the robot",
     }
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
@@ -36,7 +36,7 @@ class TooManyJoints(Rule):
         joints = case.source.root.all("joint")
         if len(joints) <= MAX_JOINTS:
             return []
-        message = f"the robot has {len(joints)} joints, fixed ones included; PyBullet holds {MAX_JOINTS}"
+        message = f"the robot has {len(joints)} joints, fixed ones included; PyBullet accepts {MAX_JOINTS}"
         return [Detection(None, None, joints[MAX_JOINTS].line, message)]
 
     def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy | None:
@@ -53,7 +53,7 @@ class TooManyJoints(Rule):
             edits += [source.removal(case.links[name]), source.removal(case.joints[carriers[name]])]
         return Remedy(
             case.with_source(source.apply(*edits)),
-            f"took {len(dropped)} links that are mere frames",
+            f"removed {len(dropped)} links that are mere frames",
             self.decision(case),
         )
 

@@ -38,7 +38,7 @@ class UpperLimitMissing(EditingRule):
     depends_on_state = True
 
     def corrections(self, case: Case) -> Iterable[Correction]:
-        """Limits of joints that have a range: a continuous one has none in any engine's motion."""
+        """Yield limits of joints that have a range: a continuous one has none in any engine's motion."""
         for _, limit in elements_in_joints(case, "limit", ("revolute", "prismatic")):
             lower = number_or_none(limit, "lower")
             if "upper" in limit.attributes or lower is None or lower > _UPPER_OF_PYBULLET:

@@ -9,12 +9,13 @@ dynamics includes it:
 - Drake 1.51 (``CalcInverseDynamics`` with the plant's force elements): likewise.
 - Forward dynamics: PyBullet's ``stepSimulation``, MuJoCo and Drake damp, Pinocchio's ``aba`` does not.
 
-The effect is damping times velocity, often a few per cent of the torque, and most of it at low inertia.
+The effect is damping times velocity, often a few per cent of the torque. Where the inertia is low, it is most
+of the torque.
 
 What to do: decide which convention you want, and add ``damping * v`` to Pinocchio's torque or switch damping
 off in the others. The file is correct, so ``dynx doctor --fix`` does not change it. dynx returns the
-rigid-body torque unless called with ``joint_dynamics=True``; doctor compares the former and prints the calls
-that switch damping off in each engine.
+rigid-body torque unless called with ``joint_dynamics=True``; doctor compares the rigid-body torque and prints
+the calls that switch damping off in each engine.
 """
 
 from collections.abc import Iterable

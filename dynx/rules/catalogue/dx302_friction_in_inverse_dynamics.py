@@ -11,8 +11,8 @@ not.
 The effect is the friction itself, a few per cent of the torque for a geared arm.
 
 What to do: decide which convention you want. The file is correct, so ``dynx doctor --fix`` does not change
-it. dynx returns the rigid-body torque unless called with ``joint_dynamics=True``; doctor compares the former
-and prints the call that switches friction off in MuJoCo.
+it. dynx returns the rigid-body torque unless called with ``joint_dynamics=True``; doctor compares the
+rigid-body torque and prints the call that switches friction off in MuJoCo.
 """
 
 from collections.abc import Iterable
@@ -29,7 +29,7 @@ class FrictionInInverseDynamics(CallingRule):
     changed = "compared without dry friction"
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
-        """Joints that move with a friction that is not zero."""
+        """Yield joints that move with a friction that is not zero."""
         for _, dynamics in elements_in_joints(case, "dynamics", SINGLE):
             if friction := number_or_none(dynamics, "friction"):
                 yield found_at(dynamics, f"the joint has dry friction {friction:g}")

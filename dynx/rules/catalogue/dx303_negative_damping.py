@@ -28,7 +28,7 @@ class NegativeDamping(EditingRule):
     changed = "made the damping of joints positive or zero"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
-        """Joints that move."""
+        """Yield joints that move."""
         for _, dynamics in elements_in_joints(case, "dynamics", SINGLE):
             if (number_or_none(dynamics, "damping") or 0.0) >= 0.0:
                 continue

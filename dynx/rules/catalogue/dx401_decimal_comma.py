@@ -6,8 +6,8 @@ current locale (a CAD exporter on a German or French computer) write a comma.
 Each engine reads it differently:
 
 - Pinocchio 4.1: with such a ``<mass>`` or ``<origin>`` of an ``<inertial>`` the whole inertial is dropped, so
-  the link weighs nothing; with such an ``<inertia>`` the tensor alone is, so the link is a point mass. A line
-  on stderr says so. In a ``<joint>`` the file is refused.
+  the link weighs nothing; with such an ``<inertia>`` only the tensor is dropped, so the link is a point
+  mass. A line on stderr says so. In a ``<joint>`` the file is refused.
 - PyBullet 3.2.7 reads up to the comma: ``2,5`` is 2, ``0,03`` is 0. It prints no warning. In a vector it does
   so with each of the three numbers.
 - MuJoCo 4.0 refuses the file and names the line.
@@ -40,7 +40,7 @@ class DecimalComma(MisspelledNumberRule):
     description = "with a comma where {meant} needs a point"
 
     def text_for(self, case: Case, misspelling: Misspelling) -> str:
-        """By the user's choice."""
+        """Return the number as the user chose to read it."""
         if self.chosen(case) == "thousands" and misspelling.otherwise is not None:
             return misspelling.otherwise
         return misspelling.meant

@@ -23,6 +23,6 @@ from dynx.rules.text.misspelled_numbers import MisspelledNumberRule
 class CommaBetweenNumbers(MisspelledNumberRule):
     advice = "Separate the numbers of a vector by blanks alone."
     engines = EVERY_ENGINE
-    changed = "parted the numbers of vectors by blanks instead of commas"
+    changed = "separated the numbers of vectors by blanks instead of commas"
     fault = "separator"
     description = "with commas or semicolons between the numbers {meant}"

@@ -3,8 +3,8 @@
 A second point, a unit, a Fortran exponent (``1.5d-3``), a hexadecimal number.
 
 - Pinocchio 4.1: with such a ``<mass>`` or ``<origin>`` of an ``<inertial>`` the whole inertial is dropped, so
-  the link weighs nothing; with such an ``<inertia>`` the tensor alone is, so the link is a point mass. A line
-  on stderr says so. In a ``<joint>`` the file is refused.
+  the link weighs nothing; with such an ``<inertia>`` only the tensor is dropped, so the link is a point
+  mass. A line on stderr says so. In a ``<joint>`` the file is refused.
 - PyBullet 3.2.7 reads the number at the beginning and ignores the rest, without a warning. ``1.5d-3`` is then
   1.5, a thousand times too large.
 - MuJoCo 4.0 refuses the file and names the line, but reads hexadecimal numbers.
@@ -31,5 +31,5 @@ class TextAfterNumber(MisspelledNumberRule):
     description = "which is no decimal number; {meant} is the readable part"
 
     def decision(self, case: Case) -> str | None:
-        """There is one reading; it is still a guess."""
+        """Write the decision: there is one reading, and it is a guess."""
         return f"{self.id}: the number at the beginning was kept, and no unit was converted"

@@ -23,6 +23,6 @@ from dynx.rules.text.misspelled_numbers import MisspelledNumberRule
 class TabInVector(MisspelledNumberRule):
     advice = "Separate the numbers of a vector by blanks alone."
     engines = measured_on("pinocchio", "pybullet")
-    changed = "parted the numbers of vectors by blanks instead of tabs and line breaks"
+    changed = "separated the numbers of vectors by blanks instead of tabs and line breaks"
     fault = "tab"
     description = "with a tab, a line break or another blank among its numbers"

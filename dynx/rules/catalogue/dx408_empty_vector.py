@@ -29,5 +29,5 @@ class EmptyVector(MisspelledNumberRule):
     elements = ("origin",)
 
     def edit(self, case: Case, attribute: NumericAttribute, misspelling: Misspelling) -> Edit:
-        """Without the attribute."""
+        """Return the edit that removes the attribute."""
         return case.source.attribute_removal(attribute.element, attribute.name)

@@ -29,7 +29,7 @@ class MissingProductOfInertia(EditingRule):
     changed = "wrote the products of inertia that were missing as 0"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
-        """Tensors with all three moments and not all products."""
+        """Yield tensors with all three moments and not all products."""
         for link in case.source.root.all("link"):
             for inertial in link.all("inertial"):
                 for tensor in inertial.all("inertia"):

@@ -26,7 +26,7 @@ class PercentInName(EditingRule):
     changed = "wrote _ for % in names"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
-        """Robot, links and joints of such a name."""
+        """Yield robot, links and joints of such a name."""
         source = case.source
         root = source.root
         if "%" in root.attributes.get("name", ""):

@@ -24,7 +24,7 @@ class MaterialDefinedTwice(EditingRule):
     changed = "removed further definitions of materials"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
-        """Materials directly in the robot whose name was there before."""
+        """Yield materials directly in the robot whose name an earlier material has."""
         seen = set()
         for material in case.source.root.all("material"):
             name = material.attributes.get("name", "")

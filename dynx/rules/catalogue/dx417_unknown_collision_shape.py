@@ -31,7 +31,7 @@ class UnknownCollisionShape(EditingRule):
     changed = "removed collisions of unknown shape"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
-        """Collisions whose first geometry holds no known shape."""
+        """Yield collisions whose first geometry contains no known shape."""
         for link in case.source.root.all("link"):
             for collision in link.all("collision"):
                 geometry = collision.first("geometry")

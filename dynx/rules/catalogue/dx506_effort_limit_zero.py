@@ -21,7 +21,7 @@ class EffortLimitZero(Rule):
     advice = "Write the largest torque [N m] or force [N] that the motor gives at the joint."
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
-        """Moving joints with a coordinate of their own and an effort limit of exactly zero."""
+        """Yield moving joints with a coordinate of their own and an effort limit of exactly zero."""
         for joint in case.model.coordinate_joints:
             if joint.limits.effort == 0.0:
                 yield Detection(

@@ -20,7 +20,7 @@ class VelocityLimitZero(Rule):
     advice = 'Write the largest speed [rad/s or m/s] of the joint, or type="fixed" if it never moves.'
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
-        """Moving joints with a coordinate of their own and a velocity limit of exactly zero."""
+        """Yield moving joints with a coordinate of their own and a velocity limit of exactly zero."""
         message = "the velocity limit is 0, so the joint must not move"
         for joint in case.model.coordinate_joints:
             if joint.limits.velocity == 0.0:

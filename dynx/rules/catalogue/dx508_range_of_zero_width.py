@@ -23,7 +23,7 @@ class RangeOfZeroWidth(Rule):
     advice = 'Write the range of the joint, or type="continuous" if it has none, or type="fixed".'
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
-        """Revolute and prismatic joints with a coordinate of their own and no range."""
+        """Yield revolute and prismatic joints with a coordinate of their own and no range."""
         for joint in case.model.coordinate_joints:
             if joint.type == "continuous" or joint.limits.lower != joint.limits.upper:
                 continue

@@ -28,7 +28,7 @@ class LimitsOnContinuousJoint(OptionalEditingRule):
     changed = "removed the lower and upper limits of continuous joints"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
-        """Continuous joints with `lower` or `upper`."""
+        """Yield continuous joints with `lower` or `upper`."""
         for _, limit in elements_in_joints(case, "limit", ("continuous",)):
             written = [end for end in _RANGE if end in limit.attributes]
             if written:

@@ -19,9 +19,9 @@ class ZeroOutsideLimits(Rule):
     advice = "Give your programs a start configuration inside the limits."
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
-        """Joints with a coordinate of their own whose range does not hold zero."""
+        """Yield joints with a coordinate of their own whose range does not contain zero."""
         for joint in case.model.coordinate_joints:
             lower, upper = sorted((joint.limits.lower, joint.limits.upper))
             if not lower <= 0.0 <= upper:
-                message = f"the range {lower:.6g} to {upper:.6g} does not hold 0"
+                message = f"the range {lower:.6g} to {upper:.6g} does not contain 0"
                 yield Detection(None, joint.name, joint.line, message)

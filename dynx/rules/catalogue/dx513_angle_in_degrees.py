@@ -29,7 +29,7 @@ class AngleInDegrees(Rule):
     advice = "Write the angle in radians."
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
-        """``<origin>``s with such an angle and revolute joints with such limits."""
+        """Yield ``<origin>``s with such an angle and revolute joints with such limits."""
         return sorted([*_origins(case), *_limits(case)], key=lambda detection: detection.line or 0)
 
 

@@ -30,7 +30,7 @@ class AngleCutShort(OptionalEditingRule):
     changes_physics = True
 
     def corrections(self, case: Case) -> Iterable[Correction]:
-        """Joints with such an angle in their origin."""
+        """Yield joints with such an angle in their origin."""
         for _, origin in elements_in_joints(case, "origin"):
             words = origin.attributes.get("rpy", "").split()
             short = [(word, angle) for word in words if (angle := _meant(word)) is not None]
