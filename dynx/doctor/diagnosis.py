@@ -24,6 +24,7 @@ from dynx.doctor.prove.mending import (
     mend,
     place_of,
     readable,
+    refusal,
     remedy_of,
 )
 from dynx.doctor.report import (
@@ -178,12 +179,12 @@ def _diagnosis_of(
 
 
 def _reference_of(case: Case, examiner: Examiner) -> ReferenceValues:
-    """Compute the reference values; raises the error of the original text where dynx refuses it."""
+    """Compute the reference values; where dynx refuses the text, raise the first error without a remedy."""
     try:
         return examiner.reference(case)
     except DynxError as error:
         # Reference values are computed from an edited text, whose line numbers differ.
-        raise (case.reading if isinstance(case.reading, DynxError) else error) from None
+        raise (refusal(case) or error) from None
 
 
 def _chosen_practice(case: Case, found: Sequence[tuple[Rule, Detection]]) -> bool:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
+from dynx.doctor.examine.line_map import line_map
+from dynx.errors import DescriptionError, DynxError
 from dynx.rules import Case, Detection, Remedy, Rule, all_rules
 
 MAX_ROUNDS = 4
@@ -48,12 +50,29 @@ def place_of(rule: Rule, detection: Detection) -> Place:
 
 def readable(case: Case) -> Mending:
     """Mend text that dynx refuses; return the case unchanged if dynx can read it, or if no remedy helps."""
+    mended = _after_reading_rules(case)
+    return mended if mended.case.readable else Mending(case)
+
+
+def refusal(case: Case) -> DynxError | None:
+    """Return the error that remains after all remedies of rules about text, with its line in the text as it
+    is; None where dynx can then read the case."""
+    mended = _after_reading_rules(case).case
+    error = mended.reading
+    if isinstance(error, DescriptionError) and error.line is not None:
+        texts = (each.source.text_with_lines_before.splitlines() for each in (case, mended))
+        line = line_map(*texts).get(error.line, error.line)
+        return type(error)(error.message, source=error.source, line=line)
+    return error if isinstance(error, DynxError) else None
+
+
+def _after_reading_rules(case: Case) -> Mending:
     mended = Mending(case)
     for rule in _rules("reading"):
         if mended.case.readable:
             break
         mended = _after_remedy(mended, rule, rule.detect(mended.case))
-    return mended if mended.case.readable else Mending(case)
+    return mended
 
 
 def detections(case: Case, rules: Sequence[Rule]) -> list[tuple[Rule, Detection]]:

@@ -8,11 +8,12 @@ import pytest
 
 from dynx.agreement.tolerances import BAR
 from dynx.doctor.examine.examination import Examiner
-from dynx.doctor.prove.mending import all_except, mend, place_of
+from dynx.doctor.prove.mending import all_except, mend, place_of, refusal
 from dynx.loaded import installed_engines
-from dynx.rules import find_rule
+from dynx.model.xml.source import XmlSource
+from dynx.rules import Case, find_rule
 from tests.doctor.prove.test_attribution import Replacement
-from tests.rules.documents import case_of, link
+from tests.rules.documents import case_of, joint, link
 from tests.rules.trap_cases import trap
 
 
@@ -57,3 +58,16 @@ def test_a_place_that_is_left_out_stays_as_it_is() -> None:
     (found,) = rule.detect(case)
     assert mend(case, wanted=all_except({place_of(rule, found)})).case.source.data == case.source.data
     assert not rule.detect(mend(case).case)
+
+
+def test_a_refusal_names_the_first_fault_that_has_no_remedy_at_its_line() -> None:
+    unlimited = joint("elbow", "base", "arm", limit="")
+    lost = joint("wrist", "hand", "tool")
+    case = case_of(link("base"), link("arm"), unlimited, link("tool"), lost)
+    assert "no <limit>" in str(case.reading)
+    assert str(refusal(case)) == (
+        "<string>:6: parent of joint 'wrist' is 'hand', which is not a link; known: base, arm, tool"
+    )
+    shifted = Case(XmlSource("\n\n" + case.source.text))
+    assert str(refusal(shifted)).startswith("<string>:8: parent of joint 'wrist'")
+    assert refusal(case_of(link("base"), link("arm"), unlimited)) is None
