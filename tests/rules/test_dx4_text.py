@@ -40,6 +40,8 @@ MENDED = {
     "DX417": ("base", None),
     "DX418": (None, "elbow"),
     "DX419": (None, "elbow"),
+    "DX420": (None, "elbow"),
+    "DX421": (None, "elbow"),
     "DX426": (None, None),
 }
 SPEC = importlib.util.find_spec("pybullet_data")
@@ -104,9 +106,11 @@ def _faults(place: NumericAttribute, text: str) -> list[tuple[str, str]]:
     """Ways to write the same numbers badly, with the rule about each."""
     if place.count == 1:
         ways = [("DX405", f"\u00a0{text}"), ("DX405", f" {text} "), ("DX403", f"{text} kg")]
+        ways += [("DX421", text.replace("-", "\u2212"))] if "-" in text else []
         return [*ways, ("DX401", text.replace(".", ","))] if "." in text else ways
     words = text.split()
     ways = [("DX402", ", ".join(words)), ("DX404", f"{text} 7"), ("DX402", "; ".join(words))]
+    ways += [("DX421", text.replace("-", "\u2212"))] if "-" in text else []
     return [*ways, ("DX401", text.replace(".", ","))] if "." in text else ways
 
 

@@ -1,5 +1,5 @@
-"""Elements and attributes that some engines read and others skip or refuse: DX218 to DX221, DX418, DX419,
-DX530, DX531."""
+"""Elements, attributes and names that some engines read and others skip or refuse: DX218 to DX221, DX418 to
+DX420, DX530, DX531, DX533."""
 
 from __future__ import annotations
 
@@ -186,6 +186,53 @@ def test_pinocchio_drops_an_inertial_with_two_orientations() -> None:
     assert pin.buildModelFromXML(zero).inertias[1].mass == 1.0
 
 
+# -- names and numbers ----------------------------------------------------------------------------
+
+
+def test_names_lose_their_blanks_wherever_they_are_mentioned() -> None:
+    text = case_of(
+        *(link(" "), link("arm "), link("arm"), link(" arm")),
+        *(joint("j", " ", "arm "), joint(" k", "arm ", "arm"), joint("l", "arm", " arm")),
+    ).source.text.replace('name="robot"', 'name=" "')
+    case = Case(XmlSource(text))
+    assert found("DX533", case) == [
+        "the name of the <robot>, ' ', is blank",
+        "the name of the <link>, ' ', is blank",
+        "the name of the <link>, 'arm ', begins or ends with a blank",
+        "the name of the <link>, ' arm', begins or ends with a blank",
+        "the name of the <joint>, ' k', begins or ends with a blank",
+    ]
+    model = mended("DX533", Case(XmlSource(text), choices={"DX533": "trim"}))[1].case.model
+    assert model.name == "robot"
+    assert [each.name for each in model.links] == ["link", "arm_2", "arm", "arm_3"]
+    assert [(each.name, each.parent, each.child) for each in model.joints] == [
+        ("j", "link", "arm_2"),
+        ("k", "arm_2", "arm"),
+        ("l", "arm", "arm_3"),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("written", "left"),
+    [
+        ('<dynamics damping="" friction="0.1"/>', '<dynamics friction="0.1"/>'),
+        ('<calibration rising="" falling="0"/>', '<calibration falling="0"/>'),
+        (
+            '<limit lower="-1" upper=" " effort="1" velocity="1"/>',
+            '<limit lower="-1" effort="1" velocity="1"/>',
+        ),
+    ],
+)
+def test_an_empty_number_of_a_joint_is_removed(written: str, left: str) -> None:
+    for type in ("continuous", "fixed"):
+        assert left in mended("DX420", arm(written, type=type))[1].case.source.text
+
+
+def test_an_empty_mass_is_zero() -> None:
+    case = case_of(link("base", mass="", moments=(0.0, 0.0, 0.0)))
+    assert mended("DX420", case)[1].case.model.inertial("base").mass == 0.0
+
+
 # -- xacro ----------------------------------------------------------------------------------------
 
 
@@ -212,7 +259,7 @@ def test_xacro_elements_within_others_are_not_counted() -> None:
 
 
 @pytest.mark.parametrize("engine", installed_engines())
-@pytest.mark.parametrize("rule", ["DX530", "DX531"])
-def test_every_engine_skips_what_dynx_skips(rule: str, engine: str) -> None:
+@pytest.mark.parametrize("rule", ["DX530", "DX531", "DX532", "DX533"])
+def test_every_engine_reads_what_dynx_reads(rule: str, engine: str) -> None:
     case = trap(rule)
     assert Examiner([engine], 3, 0).examine(case).max_error(engine) <= BAR

@@ -7,6 +7,7 @@ Expat parses the text, without namespaces (so an undeclared prefix is no error) 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from xml.parsers import expat
 
@@ -74,20 +75,16 @@ def repair_of(text: str, source: str, lines_before: int = 0) -> Repair | None:
 def _parse(
     text: str, lines_before: int, builder: Callable[[], _TreeBuilder]
 ) -> tuple[Element, Repair | None]:
+    tree = builder()
     try:
-        return builder().build(text), None
-    except MalformedXmlError as error:
-        repair = repaired(text, lines_before)
-        if repair is None:
-            raise
-        try:
+        return tree.build(text), None
+    except expat.ExpatError as error:
+        fault = tree.explained(error)
+    repair = repaired(text, lines_before)
+    if repair is not None:
+        with suppress(expat.ExpatError):
             return builder().build(repair.text), repair
-        except MalformedXmlError:
-            raise error from None
-
-
-class MalformedXmlError(DescriptionError):
-    """Text that is not well-formed XML."""
+    raise fault
 
 
 class _TreeBuilder:
@@ -120,11 +117,6 @@ class _TreeBuilder:
     def build(self, text: str) -> Element:
         try:
             self._parser.Parse(text.encode("utf-8"), True)
-        except expat.ExpatError as error:
-            reason = _explain(error.code, self._root is not None)
-            raise MalformedXmlError(
-                reason, source=self._source, line=self._lines_before + error.lineno
-            ) from None
         except UnicodeEncodeError as error:
             line = self._lines_before + text.count("\n", 0, error.start) + 1
             raise self._error("contains half of a surrogate pair, which is not a character", line) from None
@@ -183,6 +175,11 @@ class _TreeBuilder:
             "it can define entities that expand without bound or fetch other files; remove it",
             line,
         )
+
+    def explained(self, error: expat.ExpatError) -> DescriptionError:
+        """Return the error of dynx for one that expat raised."""
+        line = self._lines_before + error.lineno
+        return self._error(_explain(error.code, self._root is not None), line)
 
     def _error(self, message: str, line: int) -> DescriptionError:
         return DescriptionError(message, source=self._source, line=line)

@@ -14,17 +14,18 @@ from typing import Literal
 LARGEST = "1.7976931348623157e+308"
 """The largest double, which every engine can read and which stands for "no limit"."""
 
-Fault = Literal["comma", "separator", "rest", "count", "blank", "tab", "infinite", "empty"]
+Fault = Literal["comma", "separator", "rest", "count", "blank", "tab", "infinite", "empty", "minus"]
 """Fault of a text: a decimal ``comma``, a ``separator`` other than blanks in a vector, a ``rest`` behind a
 number, a wrong ``count``, a ``blank`` behind a single number, a ``tab`` or line break in a vector, an
-``infinite`` number, an ``empty`` vector."""
+``infinite`` number, an ``empty`` number or vector, a ``minus`` that is not the hyphen of ASCII."""
 
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _COMMA = re.compile(r"[+-]?(?:[0-9]+,[0-9]*|,[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _GROUPED = re.compile(r"([+-]?[0-9]{1,3}(?:,[0-9]{3})+)\.[0-9]*")
 _INFINITE = re.compile(r"([+-]?)inf(?:inity)?", re.IGNORECASE)
 _FORTRAN = re.compile(r"([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))[dD]([+-]?[0-9]+)")
-_HEXADECIMAL = re.compile(r"[+-]?0[xX][0-9a-fA-F]+")
+_HEXADECIMAL = re.compile(r"[+-]?0[xX](?:[0-9a-fA-F]+\.?[0-9a-fA-F]*|\.[0-9a-fA-F]+)(?:[pP][+-]?[0-9]{1,4})?")
+_MINUS = re.compile("[\u2010-\u2015\u2212\ufe63\uff0d](?=[0-9.])")
 _BLANKS = " \t\r\n"
 """The white space of XML, which every engine skips in front of a number and not every one behind it."""
 
@@ -54,8 +55,12 @@ def decimal(value: float) -> str:
 def misspelled_number(text: str) -> Misspelling | None:
     """Return the fault of a text that should be one number; None where it is plain or incomprehensible."""
     word = text.strip()
+    if not word:
+        return Misspelling("empty", "")
     if is_number(word):
         return None if text.lstrip(_BLANKS) == word else Misspelling("blank", word)
+    if (hyphens := _MINUS.sub("-", word)) != word and is_number(hyphens):
+        return Misspelling("minus", hyphens)
     if sign := _infinite_sign(word):
         return Misspelling("infinite", sign.removeprefix("+") + LARGEST)
     return _misspelled_word(word)
@@ -66,6 +71,9 @@ def misspelled_vector(text: str) -> Misspelling | None:
     words = text.split()
     if not words:
         return Misspelling("empty", "")
+    hyphens = [_MINUS.sub("-", word) for word in words]
+    if hyphens != words and len(words) == 3 and all(map(is_number, hyphens)):
+        return Misspelling("minus", " ".join(hyphens))
     if any(mark in text for mark in _UNEXPANDED):
         return None
     if all(map(is_number, words)):
@@ -89,7 +97,7 @@ def _misspelled_word(word: str) -> Misspelling | None:
     if _GROUPED.fullmatch(word):
         return Misspelling("comma", word.replace(",", ""), word.replace(",", ""))
     if _HEXADECIMAL.fullmatch(word):
-        return Misspelling("rest", repr(float(int(word, 16))))
+        return _hexadecimal(word)
     if exponent := _FORTRAN.fullmatch(word):
         return Misspelling("rest", f"{exponent.group(1)}e{exponent.group(2)}")
     front = _NUMBER.match(word)
@@ -97,6 +105,13 @@ def _misspelled_word(word: str) -> Misspelling | None:
     if front is None or re.match(r"[-+,;]\s*[0-9.]", word[front.end() :]):
         return None
     return Misspelling("rest", front.group())
+
+
+def _hexadecimal(word: str) -> Misspelling | None:
+    try:
+        return Misspelling("rest", repr(float.fromhex(word)))
+    except OverflowError:
+        return None
 
 
 def _word_fault(word: str) -> Misspelling | None:

@@ -93,6 +93,18 @@ def empty_vector(site: Site) -> PlantedDefect:
     return _rewrite(site, "DX408", _pick(site, _origins(site)), site.rng.choice(["", " "]))
 
 
+def empty_number(site: Site) -> PlantedDefect:
+    """A lower limit that was not filled in."""
+    lower = [each for each in _limits(site) if each.name == "lower" and float(each.text) < 0.0]
+    return _rewrite(site, "DX420", _pick(site, lower), site.rng.choice(["", " "]))
+
+
+def typographic_minus(site: Site) -> PlantedDefect:
+    """Numbers copied from a document."""
+    number = _pick(site, [*_origins(site), *_limits(site)], lambda text: "-" in text)
+    return _rewrite(site, "DX421", number, number.text.replace("-", site.rng.choice("\u2212\u2013")))
+
+
 def missing_product(site: Site) -> PlantedDefect:
     """Products of inertia that are zero, left out."""
     name, link = site.pick_link(site.skeleton.solid, "body")
@@ -331,6 +343,8 @@ PLANTERS = (
     Planter("DX406", tab_in_vector),
     Planter("DX407", infinite),
     Planter("DX408", empty_vector),
+    Planter("DX420", empty_number),
+    Planter("DX421", typographic_minus),
     Planter("DX409", missing_product),
     Planter("DX410", incomplete),
     Planter("DX411", repeated),

@@ -87,6 +87,10 @@ def test_odd_white_space_of_a_vector(words: list[str], blank: str) -> None:
         ("-1.57.", "rest", "-1.57"),
         ("1.5d-3", "rest", "1.5e-3"),
         ("0x10", "rest", "16.0"),
+        ("-0x1.8p-2", "rest", "-0.375"),
+        ("\u22121.5", "minus", "-1.5"),
+        ("1e\u20133", "minus", "1e-3"),
+        (" ", "empty", ""),
         ("1,250.5", "comma", "1250.5"),
     ],
 )
@@ -96,7 +100,10 @@ def test_single_numbers(written: str, fault: str, meant: str) -> None:
     assert (found.fault, found.meant) == (fault, meant)
 
 
-@pytest.mark.parametrize("written", ["heavy", "nan", "", "${mass}", "2.5${unit}", "1,2,3", "1-2", "--1"])
+INCOMPREHENSIBLE = ["heavy", "nan", "\u2212", "\u22121,5,2", "0x1p9999"]
+
+
+@pytest.mark.parametrize("written", [*INCOMPREHENSIBLE, "${mass}", "2.5${unit}", "1,2,3", "1-2", "--1"])
 def test_what_is_no_number_is_not_understood(written: str) -> None:
     assert misspelled_number(written) is None
 
@@ -104,6 +111,13 @@ def test_what_is_no_number_is_not_understood(written: str) -> None:
 @pytest.mark.parametrize("written", ["a b c", "$(optenv XYZ 1 2 3)", "${a} 0 0", "1,2,3,4", "1 2 nan"])
 def test_what_is_no_vector_is_not_understood(written: str) -> None:
     assert misspelled_vector(written) is None
+
+
+@pytest.mark.parametrize("minus", ["\u2212", "\u2013", "\uff0d"])
+def test_a_vector_with_another_minus(minus: str) -> None:
+    found = misspelled_vector(f"{minus}1 2\t{minus}.5")
+    assert found is not None
+    assert (found.fault, found.meant) == ("minus", "-1 2 -.5")
 
 
 def test_a_comma_can_part_thousands() -> None:
