@@ -7,13 +7,12 @@ urdfdom, it excludes ``rpy`` and is scaled to length 1.
 from __future__ import annotations
 
 import math
-import re
 
 import numpy as np
 
 from dynx.errors import shown
 from dynx.model.elements import ZERO, Pose, Vector
-from dynx.model.urdf.values import Reading
+from dynx.model.urdf.values import Reading, urdf_version
 from dynx.model.xml.reading import Element
 from dynx.spatial.so3 import rotation_from_quat, rpy_from_rotation
 
@@ -21,13 +20,11 @@ QUATERNION = "quat_xyzw"
 """Attribute of ``<origin>`` that holds a quaternion (x, y, z, w)."""
 
 _FIRST_VERSION = (1, 1)
-_VERSION = re.compile(r"\s*([0-9]+)(?:\.([0-9]+))?")
 
 
 def reads_quaternions(version: str | None) -> bool:
     """Check whether `quat_xyzw` has a meaning in a robot whose attribute ``version`` is this one."""
-    found = _VERSION.match(version or "")
-    return found is not None and (int(found.group(1)), int(found.group(2) or 0)) >= _FIRST_VERSION
+    return urdf_version(version) >= _FIRST_VERSION
 
 
 def rpy_of_quaternion(quat_xyzw: tuple[float, ...]) -> Vector:

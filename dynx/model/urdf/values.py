@@ -16,6 +16,7 @@ MAX_NAME = 1000
 """Largest length of a name [characters]; 1,264 characters overflow PyBullet's stack."""
 
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+_VERSION = re.compile(r"\s*([0-9]{1,9})(?:\.([0-9]{1,9}))?")
 _NOT_IN_XML = "\ufffe\uffff"
 _XACRO = "; xacro did not expand it"
 _WHY_IGNORED = {"loop_joint": "; the loop that it closes stays open"}
@@ -138,6 +139,12 @@ class Reading:
             hint = "; decimals take a point, and numbers are separated by white space"
         message = f"{attribute} in <{element.tag}> of {what} is {shown(text)}; wanted {wanted}{hint}"
         return self.error(element, message)
+
+
+def urdf_version(text: str | None) -> tuple[int, int]:
+    """Return the version of URDF in the attribute ``version`` of a robot; 1.0 where it states none."""
+    found = _VERSION.match(text or "")
+    return (1, 0) if found is None else (int(found.group(1)), int(found.group(2) or 0))
 
 
 def name_fault(name: str) -> str | None:

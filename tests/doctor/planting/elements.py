@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from tests.doctor.planting.inertia import has_link
-from tests.doctor.planting.joints import moving
+from tests.doctor.planting.joints import limited, moving
 from tests.doctor.planting.site import CannotPlant, PlantedDefect, Planter, Site
 
 
@@ -52,6 +52,20 @@ def world_not_declared(site: Site) -> PlantedDefect:
     return site.defect("DX221", edit, joint="mount", touched=[site.model.root])
 
 
+def incomplete_limit(site: Site) -> PlantedDefect:
+    """A range of URDF 1.0, without the end that is zero, in a robot that states URDF 1.2."""
+    if "version" in site.source.root.attributes:
+        raise CannotPlant("has a version")
+    joint, element = site.pick_joint(
+        lambda each: limited(each) and each.limits.lower <= 0.0 < each.limits.upper, "joint with a range"
+    )
+    limit = element.first("limit")
+    if limit is None or "lower" not in limit.attributes:
+        raise CannotPlant("has no lower limit")
+    version = site.source.attribute_edit(site.source.root, "version", "1.2")
+    return site.defect("DX222", version, site.source.attribute_removal(limit, "lower"), joint=joint.name)
+
+
 def quaternion(site: Site) -> PlantedDefect:
     """An orientation as URDF 1.2 writes it, of length 1 or not."""
     size = site.rng.choice([1.0, 2.0])
@@ -85,6 +99,7 @@ PLANTERS = (
     Planter("DX219", axis_of_fixed_joint),
     Planter("DX220", loop_joint),
     Planter("DX221", world_not_declared, ("fixed",)),
+    Planter("DX222", incomplete_limit),
     Planter("DX418", quaternion),
     Planter("DX419", unreadable_quaternion),
 )

@@ -1,0 +1,38 @@
+"""DX222 limit-incomplete-in-urdf-1-2: A robot states URDF 1.2, and a limit lacks its lower or upper end.
+
+Up to URDF 1.1 a missing ``lower`` or ``upper`` is 0. From version 1.2 on the ``<limit>`` of every joint that
+is not continuous needs both, and ``effort`` and ``velocity`` may be missing.
+
+- Pinocchio 4.1 (its reader is urdfdom) refuses the file: "revolute and prismatic joints must have both lower
+  and upper position limits specified in URDF version 1.2 or later". A fixed joint with a ``<limit>`` counts.
+- PyBullet 3.2.7, MuJoCo 4.0 and Drake 1.51 ignore the version. dynx reads a missing end as 0.
+
+What to do: write both ends. ``dynx doctor --fix`` writes 0 for the missing one, as earlier versions of URDF
+define it.
+"""
+
+from collections.abc import Iterable
+
+from dynx.model.urdf.values import urdf_version
+from dynx.rules import Case, Correction, EditingRule, correction, measured_on
+from dynx.rules.joints.elements import elements_in_joints
+
+_FIRST_VERSION = (1, 2)
+_TYPES = ("revolute", "prismatic", "fixed", "floating", "planar")
+
+
+class LimitIncompleteInUrdf12(EditingRule):
+    stage = "reading"
+    advice = "Write the lower and the upper limit."
+    engines = measured_on("pinocchio")
+    changed = "wrote 0 for ends of limits that URDF 1.2 requires"
+
+    def corrections(self, case: Case) -> Iterable[Correction]:
+        """Yield limits without one of the ends, in a robot of URDF 1.2."""
+        if urdf_version(case.source.root.attributes.get("version")) < _FIRST_VERSION:
+            return
+        for _, limit in elements_in_joints(case, "limit", _TYPES):
+            missing = [end for end in ("lower", "upper") if end not in limit.attributes]
+            if missing:
+                edits = (case.source.attribute_edit(limit, end, "0") for end in missing)
+                yield correction(limit, f"the <limit> has no {' and no '.join(missing)}", *edits)
