@@ -123,6 +123,15 @@ class Quantity:
         return np.asarray(self.algorithm(mechanism, first, *rest))
 
 
+LIBRARIES = ("Pinocchio", "Drake", "MuJoCo", "PyBullet")
+"""Libraries whose names of quantities are in the table, in this order."""
+
+
+def _elsewhere(*names: str | None) -> dict[str, str]:
+    """Return the names of a quantity by library; None where a library has no such quantity."""
+    return {library: name for library, name in zip(LIBRARIES, names, strict=False) if name is not None}
+
+
 _AT_POINT = ("reference", "point")
 _FORCES = ("external_forces", "force_reference", "joint_dynamics")
 
@@ -135,12 +144,7 @@ _TABLE = (
         kinematics.frame_placement,
         "pose",
         "Featherstone 2008, section 4.4",
-        {
-            "Pinocchio": "framesForwardKinematics",
-            "Drake": "CalcPoseInWorld",
-            "MuJoCo": "mj_kinematics",
-            "PyBullet": "getLinkState",
-        },
+        _elsewhere("framesForwardKinematics", "CalcPoseInWorld", "mj_kinematics", "getLinkState"),
         of_frame=True,
     ),
     Quantity(
@@ -151,12 +155,7 @@ _TABLE = (
         jacobians.frame_jacobian,
         "jacobian",
         "Siciliano et al., eq. 3.30",
-        {
-            "Pinocchio": "computeFrameJacobian",
-            "Drake": "CalcJacobianSpatialVelocity",
-            "MuJoCo": "mj_jac",
-            "PyBullet": "calculateJacobian",
-        },
+        _elsewhere("computeFrameJacobian", "CalcJacobianSpatialVelocity", "mj_jac", "calculateJacobian"),
         options=_AT_POINT,
         of_frame=True,
     ),
@@ -168,7 +167,7 @@ _TABLE = (
         jacobians.frame_jacobian_derivative,
         "jacobian rate",
         "Siciliano et al., eq. 3.30, differentiated in time",
-        {"Pinocchio": "getFrameJacobianTimeVariation", "MuJoCo": "mj_jacDot"},
+        _elsewhere("getFrameJacobianTimeVariation", None, "mj_jacDot"),
         refereed=False,
         options=_AT_POINT,
         of_frame=True,
@@ -181,11 +180,7 @@ _TABLE = (
         jacobians.frame_velocity,
         "velocity",
         "Featherstone 2008, section 2.8",
-        {
-            "Pinocchio": "getFrameVelocity",
-            "Drake": "CalcSpatialVelocityInWorld",
-            "MuJoCo": "mj_objectVelocity",
-        },
+        _elsewhere("getFrameVelocity", "CalcSpatialVelocityInWorld", "mj_objectVelocity"),
         refereed=False,
         options=_AT_POINT,
         of_frame=True,
@@ -198,11 +193,9 @@ _TABLE = (
         jacobians.frame_acceleration,
         "acceleration",
         "Featherstone 2008, section 2.11",
-        {
-            "Pinocchio": "getFrameClassicalAcceleration",
-            "Drake": "CalcSpatialAccelerationInWorld",
-            "MuJoCo": "mj_objectAcceleration",
-        },
+        _elsewhere(
+            "getFrameClassicalAcceleration", "CalcSpatialAccelerationInWorld", "mj_objectAcceleration"
+        ),
         refereed=False,
         options=_AT_POINT,
         of_frame=True,
@@ -215,12 +208,7 @@ _TABLE = (
         rnea.inverse_dynamics,
         "torque",
         "Luh, Walker and Paul 1980",
-        {
-            "Pinocchio": "rnea",
-            "Drake": "CalcInverseDynamics",
-            "MuJoCo": "mj_inverse",
-            "PyBullet": "calculateInverseDynamics",
-        },
+        _elsewhere("rnea", "CalcInverseDynamics", "mj_inverse", "calculateInverseDynamics"),
         options=_FORCES,
         takes_poses=False,
     ),
@@ -232,11 +220,7 @@ _TABLE = (
         aba.forward_dynamics,
         "solution",
         "Featherstone 2008, section 7.3",
-        {
-            "Pinocchio": "aba",
-            "Drake": "get_generalized_acceleration_output_port",
-            "MuJoCo": "mj_forward",
-        },
+        _elsewhere("aba", "get_generalized_acceleration_output_port", "mj_forward"),
         options=_FORCES,
         takes_poses=False,
         solves=True,
@@ -249,12 +233,7 @@ _TABLE = (
         crba.mass_matrix,
         "inertia",
         "Featherstone 2008, section 6.2",
-        {
-            "Pinocchio": "crba",
-            "Drake": "CalcMassMatrix",
-            "MuJoCo": "mj_fullM",
-            "PyBullet": "calculateMassMatrix",
-        },
+        _elsewhere("crba", "CalcMassMatrix", "mj_fullM", "calculateMassMatrix"),
         options=("joint_dynamics",),
         takes_poses=False,
         growth="pairs",
@@ -267,7 +246,7 @@ _TABLE = (
         rnea.bias_torque,
         "bias torque",
         "Siciliano et al., section 7.1.3",
-        {"Pinocchio": "nonLinearEffects", "Drake": "CalcBiasTerm", "MuJoCo": "qfrc_bias"},
+        _elsewhere("nonLinearEffects", "CalcBiasTerm", "qfrc_bias"),
         options=_FORCES,
         takes_poses=False,
     ),
@@ -279,7 +258,7 @@ _TABLE = (
         rnea.gravity_torque,
         "gravity torque",
         "Siciliano et al., section 7.1.3",
-        {"Pinocchio": "computeGeneralizedGravity", "Drake": "CalcGravityGeneralizedForces"},
+        _elsewhere("computeGeneralizedGravity", "CalcGravityGeneralizedForces"),
         takes_poses=False,
     ),
     Quantity(
@@ -290,7 +269,7 @@ _TABLE = (
         coriolis.coriolis_matrix,
         "coriolis",
         "Echeandia and Wensing 2021, eq. 24",
-        {"Pinocchio": "computeCoriolisMatrix"},
+        _elsewhere("computeCoriolisMatrix"),
         growth="pairs",
         refereed=False,
     ),
@@ -302,7 +281,7 @@ _TABLE = (
         regressor.inertial_regressor,
         "regressor",
         "Atkeson, An and Hollerbach 1986",
-        {"Pinocchio": "computeJointTorqueRegressor"},
+        _elsewhere("computeJointTorqueRegressor"),
         growth="cubic",
         refereed=False,
         # The frames of the links come first.
@@ -316,11 +295,7 @@ _TABLE = (
         centroidal.center_of_mass,
         "length",
         "Orin, Goswami and Lee 2013",
-        {
-            "Pinocchio": "centerOfMass",
-            "Drake": "CalcCenterOfMassPositionInWorld",
-            "MuJoCo": "subtree_com",
-        },
+        _elsewhere("centerOfMass", "CalcCenterOfMassPositionInWorld", "subtree_com"),
     ),
     Quantity(
         "center_of_mass_jacobian",
@@ -330,11 +305,9 @@ _TABLE = (
         centroidal.center_of_mass_jacobian,
         "linear jacobian",
         "Orin, Goswami and Lee 2013",
-        {
-            "Pinocchio": "jacobianCenterOfMass",
-            "Drake": "CalcJacobianCenterOfMassTranslationalVelocity",
-            "MuJoCo": "mj_jacSubtreeCom",
-        },
+        _elsewhere(
+            "jacobianCenterOfMass", "CalcJacobianCenterOfMassTranslationalVelocity", "mj_jacSubtreeCom"
+        ),
         refereed=False,
     ),
     Quantity(
@@ -345,11 +318,7 @@ _TABLE = (
         centroidal.centroidal_momentum,
         "momentum",
         "Orin, Goswami and Lee 2013",
-        {
-            "Pinocchio": "computeCentroidalMomentum",
-            "Drake": "CalcSpatialMomentumInWorldAboutPoint",
-            "MuJoCo": "subtree_angmom",
-        },
+        _elsewhere("computeCentroidalMomentum", "CalcSpatialMomentumInWorldAboutPoint", "subtree_angmom"),
         refereed=False,
     ),
     Quantity(
@@ -360,7 +329,7 @@ _TABLE = (
         centroidal.kinetic_energy,
         "kinetic energy",
         "Siciliano et al., section 7.1.1",
-        {"Pinocchio": "computeKineticEnergy", "Drake": "CalcKineticEnergy", "MuJoCo": "mj_energyVel"},
+        _elsewhere("computeKineticEnergy", "CalcKineticEnergy", "mj_energyVel"),
         options=("joint_dynamics",),
     ),
     Quantity(
@@ -371,7 +340,7 @@ _TABLE = (
         centroidal.potential_energy,
         "potential energy",
         "Siciliano et al., section 7.1.2",
-        {"Pinocchio": "computePotentialEnergy", "Drake": "CalcPotentialEnergy", "MuJoCo": "mj_energyPos"},
+        _elsewhere("computePotentialEnergy", "CalcPotentialEnergy", "mj_energyPos"),
     ),
 )
 
