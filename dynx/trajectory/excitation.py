@@ -20,6 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dynx.backends.registry import refuse_other_than_model
 from dynx.errors import ArgumentError, TrajectoryError
 from dynx.model import Model
 from dynx.model.configuration import whole_number
@@ -168,8 +169,7 @@ def _random_series(rng: np.random.Generator, T: float, harmonics: int, nv: int) 
 
 
 def _ends_around(model: Model, q0: ArrayLike | None) -> Ends:
-    if not isinstance(model, Model):
-        raise ArgumentError(f"model is of type {type(model).__name__}; wanted a Model")
+    refuse_other_than_model(model)
     if model.floating or not model.nv:
         why = "a floating base" if model.floating else "no joint that moves"
         raise ArgumentError(f"{model.name} has {why}; excitation needs joints on a fixed base")

@@ -10,6 +10,7 @@ import numpy as np
 
 from dynx.backends import Backend
 from dynx.backends import backend as make_backend
+from dynx.backends.registry import refuse_other_than_model
 from dynx.errors import ArgumentError, LimitError, LimitViolation, ShapeError, shown
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
@@ -69,8 +70,7 @@ def violations(
 
     Raises ShapeError if the trajectory does not fit the model.
     """
-    if not isinstance(model, Model):
-        raise ArgumentError(f"model is of type {type(model).__name__}; wanted a Model")
+    refuse_other_than_model(model)
     if not isinstance(trajectory, Trajectory):
         raise ArgumentError(f"trajectory is of type {type(trajectory).__name__}; wanted a Trajectory")
     if (trajectory.nq, trajectory.nv) != (model.nq, model.nv):

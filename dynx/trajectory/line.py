@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.backends import Backend
+from dynx.backends.registry import refuse_other_than_model
 from dynx.errors import ArgumentError, ShapeError, TrajectoryError, shown
 from dynx.ik import checked_targets
 from dynx.model import Model
@@ -136,8 +137,7 @@ class _Line:
     def __init__(
         self, model: Model, frame: str, q0: ArrayLike, target: ArrayLike, engine: str | Backend
     ) -> None:
-        if not isinstance(model, Model):
-            raise ArgumentError(f"model is of type {type(model).__name__}; wanted a Model")
+        refuse_other_than_model(model)
         if model.floating:
             raise ArgumentError(f"{model.name} has a floating base; a line needs a fixed one")
         if isinstance(engine, Backend) and engine.model != model:

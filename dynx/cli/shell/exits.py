@@ -1,10 +1,12 @@
 """Exit codes of the command line, and the conversion of an error into one line and a code.
 
-0    success: engines agree, the target was reached, the simulation reached its end 1    negative result:
-engines differ, the target was not reached, the simulation diverged 2    some input cannot be used (commands
-for several robots still process the others) 70   a defect of dynx 74   standard output cannot be written, for
-example because the disk is full (EX_IOERR of sysexits.h) 130  interrupted by Ctrl-C; 143 terminated 141  the
-reader of standard output closed it, as `head` does (128 + SIGPIPE)
+0    success: engines agree, the target was reached, the simulation reached its end
+1    negative result: engines differ, the target was not reached, the simulation diverged
+2    some input cannot be used (commands for several robots still process the others)
+70   a defect of dynx
+74   standard output cannot be written, for example because the disk is full (EX_IOERR of sysexits.h)
+130  interrupted by Ctrl-C; 143 terminated
+141  the reader of standard output closed it, as `head` does (128 + SIGPIPE)
 """
 
 from __future__ import annotations
