@@ -73,8 +73,10 @@ def test_a_sphere_of_a_shell_has_the_bound_itself() -> None:
     assert BEYOND.detect(case_of(link("base", sphere, mass=2.0, moments=moments))) == []
 
 
-def test_a_tensor_on_a_shape_without_extent_is_beyond_it() -> None:
-    assert len(BEYOND.detect(case_of(link("base", visual('<sphere radius="0"/>'))))) == 1
+def test_a_shape_without_extent_is_a_placeholder_and_no_bound() -> None:
+    assert BEYOND.detect(case_of(link("base", visual('<sphere radius="0"/>')))) == []
+    both = visual('<sphere radius="0"/>'), visual('<sphere radius="0.01"/>')
+    assert len(BEYOND.detect(case_of(link("base", *both)))) == 1
 
 
 @given(st.floats(1e-9, 1e9))

@@ -2,6 +2,6 @@
 
 from dynx.rules.geometry.extent import Extent
 from dynx.rules.geometry.mesh_files import MeshNotFoundError, find_mesh
-from dynx.rules.geometry.rigid_shapes import group_extents
+from dynx.rules.geometry.rigid_shapes import body_extents, group_extents
 
-__all__ = ["Extent", "MeshNotFoundError", "find_mesh", "group_extents"]
+__all__ = ["Extent", "MeshNotFoundError", "body_extents", "find_mesh", "group_extents"]

@@ -15,23 +15,34 @@ from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous, inverse
 
 
+def body_extents(case: Case) -> Iterator[tuple[RigidGroup, Extent]]:
+    """Yield each rigid group with mass, and the extent of all its shapes in the frame of its head.
+
+    A group is left out where it has no shape, only shapes of size zero, or a shape of unknown size (a missing
+    mesh).
+    """
+    for group in dict.fromkeys(rigid_groups(case).values()):
+        if not any(case.model.inertial(name).mass > 0.0 for name in group.links):
+            continue
+        extent = _group_extent(case, group)
+        if extent is not None and not extent.empty and extent.diagonal() > 0.0:
+            yield group, extent
+
+
 def group_extents(case: Case) -> Iterator[tuple[Link, Extent]]:
     """Yield each link with mass, and the extent of all shapes of its rigid group, in its link frame.
 
     Descriptions often put the shape of a part in one link and its mass in another on a fixed joint, so every
-    shape of the group counts. A link is left out where its group has no shape, only shapes of size zero, or a
-    shape of unknown size (a missing mesh).
+    shape of the group counts.
     """
     groups = rigid_groups(case)
-    known: dict[str, Extent | None] = {}
+    known = {group.head: extent for group, extent in body_extents(case)}
     for link in case.model.links:
         if link.inertial is None or link.inertial.mass == 0.0:
             continue
         group = groups[link.name]
-        if group.head not in known:
-            known[group.head] = _group_extent(case, group)
-        extent = known[group.head]
-        if extent is not None and not extent.empty and extent.diagonal() > 0.0:
+        extent = known.get(group.head)
+        if extent is not None:
             yield link, extent.transform(inverse(_pose(group, link.name)))
 
 

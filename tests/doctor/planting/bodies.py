@@ -34,8 +34,6 @@ def heavy_link(site: Site) -> PlantedDefect:
 
 def no_inertial_data(site: Site) -> PlantedDefect:
     """A description for display: no inertial in any link, or zeros in all."""
-    if site.taken:
-        raise CannotPlant("other defects need mass")
     removed = site.rng.random() < 0.5
     edits: list[Edit] = []
     for link in site.source.root.all("link"):
@@ -82,6 +80,6 @@ def _origin(site: Site, link: SourceElement, xyz: str) -> list[Edit]:
 
 PLANTERS = (
     Planter("DX117", tiny_offset),
-    Planter("DX118", no_inertial_data),
+    Planter("DX118", no_inertial_data, alone=True),
     Planter("DX119", heavy_link),
 )

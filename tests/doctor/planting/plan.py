@@ -66,8 +66,12 @@ def single_trials(
 def pair_trials(
     rules: Sequence[str], pairs: int, seed: int = 0, among: Sequence[str] = ROBOTS
 ) -> Iterator[Trial]:
-    """Plan pairs of different rules: each rule in at least `pairs`, and no pair twice."""
+    """Plan pairs of different rules: each rule in at least `pairs`, and no pair twice.
+
+    Rules whose defect hides others are in none.
+    """
     rng = Random(f"pairs {seed}")
+    rules = [rule for rule in rules if not PLANTERS[rule].alone]
     counts = Counter(dict.fromkeys(rules, 0))
     seen: set[frozenset[str]] = set()
     while (rule := min(counts, key=lambda each: counts[each])) and counts[rule] < pairs:

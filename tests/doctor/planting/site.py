@@ -148,8 +148,10 @@ class Site:
 
 @dataclass(frozen=True)
 class Planter:
-    """Plants the defect of one rule; `bases` are those on which it is a defect."""
+    """Plants the defect of one rule; `bases` are those on which it is a defect, `alone` says that it hides
+    most others."""
 
     rule: str
     plant: Callable[[Site], PlantedDefect]
     bases: tuple[Base, ...] = ("fixed", "floating")
+    alone: bool = False
