@@ -25,6 +25,7 @@ REGISTRY: ClassRegistry[LoadedRobot] = ClassRegistry(
         "mujoco": "dynx.engines.mujoco.as_loaded:LoadedMujoco",
         "drake": "dynx.engines.drake.as_loaded:LoadedDrake",
         "pybullet:plain": "dynx.engines.pybullet.plain_loading:PlainPyBullet",
+        "mujoco:balanceinertia": "dynx.engines.mujoco.as_loaded:BalancedMujoco",
     },
     lambda: LoadedRobot,
     error=BackendError,

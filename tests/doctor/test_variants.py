@@ -77,6 +77,19 @@ def test_the_plain_call_is_measured_without_a_search_for_causes() -> None:
     assert variant.findings == ()
 
 
+@pytest.mark.skipif("mujoco" not in installed_engines(), reason="needs MuJoCo")
+def test_balanced_inertias_load_in_mujoco_as_another_robot() -> None:
+    trap = find_trap("DX103")
+    report = diagnose(trap, engines=["mujoco", "mujoco:balanceinertia"], counterexamples=False)
+    refusing, balanced = report.engines
+    assert refusing.refused is not None
+    assert balanced.refused is None
+    assert balanced.before["mass_matrix"] > 1e-3 > BAR >= balanced.after["mass_matrix"]
+    (finding,) = report.differences
+    assert (finding.rule, finding.proved) == ("DX103", True)
+    assert finding.engines == ("mujoco", "mujoco:balanceinertia")
+
+
 def test_engines_that_are_named_have_no_variant_beside_them() -> None:
     assert diagnose(find_trap("DX115"), engines=["pinocchio", "pybullet"]).variants == ()
     assert engine_of(PLAIN) == "pybullet"

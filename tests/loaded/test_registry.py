@@ -13,7 +13,17 @@ import numpy as np
 import pytest
 
 from dynx.errors import BackendError, NotInstalledError, UnknownBackendError
-from dynx.loaded import ENGINES, LoadedRobot, installed_engines, load_as, loader_class, registry
+from dynx.loaded import (
+    COMMON_VARIANTS,
+    ENGINES,
+    VARIANTS,
+    LoadedRobot,
+    engine_of,
+    installed_engines,
+    load_as,
+    loader_class,
+    registry,
+)
 from dynx.model import Inertial
 from dynx.model.loading import load
 from tests.backends.robots import chain
@@ -34,12 +44,29 @@ def test_every_installed_engine_has_a_class_of_its_name() -> None:
     assert set(installed_engines()) <= set(ENGINES)
 
 
-@pytest.mark.parametrize("name", installed_engines())
+def test_every_variant_is_another_call_of_its_engine() -> None:
+    for name in VARIANTS:
+        if engine_of(name) not in installed_engines():
+            continue
+        kind, engine = loader_class(name), loader_class(engine_of(name))
+        assert issubclass(kind, engine)
+        assert kind.name == name != engine_of(name)
+        assert kind.engine_version() == engine.engine_version()
+        assert len({each.load_call(floating) for each in (kind, engine) for floating in (True, False)}) == 4
+        assert all(call.startswith(f"{engine_of(name)}.") for call in kind.CALLS)
+    assert set(COMMON_VARIANTS) <= set(VARIANTS)
+    assert engine_of("pinocchio") == "pinocchio"
+
+
+LOADERS = [name for name in (*ENGINES, *VARIANTS) if engine_of(name) in installed_engines()]
+
+
+@pytest.mark.parametrize("name", LOADERS)
 def test_a_robot_is_loaded_by_the_engine_of_that_name(name: str, tmp_path: Path) -> None:
     path = tmp_path / "robot.urdf"
     path.write_text(chain(2).to_urdf())
     with load_as(name, path, chain(2)) as robot:
-        assert robot.name == name
+        assert robot.name == robot.describe().engine == name
         assert robot.mass_matrix(chain(2).neutral()).shape == (2, 2)
 
 

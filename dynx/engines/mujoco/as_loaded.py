@@ -11,12 +11,13 @@ With a fixed base MuJoCo merges the root link, and all links on fixed joints, in
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
 
-from dynx.engines.mujoco.file_loading import CALLS, FIXED, FLOATING, load_file
+from dynx.engines.mujoco.file_loading import CALLS, load_file, loading_lines
 from dynx.engines.mujoco.library import mujoco, silence_warnings
 from dynx.engines.mujoco.loaded_description import WORLD, describe_model
 from dynx.loaded.description import LoadedModel
@@ -33,7 +34,7 @@ class LoadedMujoco(LoadedRobot):
 
     def __init__(self, path: Path, model: Model, calls: Collection[str] = ()) -> None:
         self._model = model
-        self._loaded = loaded = load_file(Path(path), model, calls)
+        self._loaded = loaded = load_file(Path(path), model, self.load_call(model.floating), calls)
         self._gravity: Floats = np.array(loaded.opt.gravity)
         loaded.opt.gravity[:] = model.gravity
         self._bodies = [self._body(link.name) for link in model.links]
@@ -52,11 +53,11 @@ class LoadedMujoco(LoadedRobot):
     @classmethod
     def load_call(cls, floating: bool) -> str:
         """One line for a fixed base, three for a floating one."""
-        return FLOATING if floating else FIXED
+        return loading_lines(floating=floating)
 
     def describe(self) -> LoadedModel:
         """Describe MuJoCo's model."""
-        return describe_model(self._loaded, self._model, self._gravity)
+        return replace(describe_model(self._loaded, self._model, self._gravity), engine=self.name)
 
     def link_poses(self, q: Floats) -> Floats:
         """T_world_link (n_links, 4, 4); NaN for links that MuJoCo merged into others."""
@@ -168,3 +169,17 @@ class LoadedMujoco(LoadedRobot):
             instead = "not there" if number < 0 else "of several degrees of freedom"
             raise lacking_joints(self.name, self._model, {name: instead})
         return number
+
+
+class BalancedMujoco(LoadedMujoco):
+    """A robot as MuJoCo loads it with `balanceinertia`, by which it accepts impossible inertias.
+
+    Moments of which one exceeds the sum of the others are replaced by their mean.
+    """
+
+    name: ClassVar[str] = "mujoco:balanceinertia"
+
+    @classmethod
+    def load_call(cls, floating: bool) -> str:
+        """Three lines for a fixed base, four for a floating one."""
+        return loading_lines(floating=floating, options="spec.compiler.balanceinertia = True")

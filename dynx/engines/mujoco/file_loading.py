@@ -28,19 +28,13 @@ CALLS: Mapping[str, str] = {
 """Remedies at run time: id -> the line of code, which comes after loading and before `mujoco.MjData`."""
 
 FIXED = "model = mujoco.MjModel.from_xml_path(path)"
-FLOATING = (
-    "spec = mujoco.MjSpec.from_file(path)\n"
-    "spec.worldbody.first_body().add_freejoint()\n"
-    "model = spec.compile()"
-)
-"""The documented lines that give a URDF a floating base, for which MuJoCo's reader has no option."""
 
 
-def load_file(path: Path, model: Model, calls: Collection[str]) -> Any:
-    """Load the file in MuJoCo and apply `calls`; raises EngineError with MuJoCo's message if that fails."""
+def load_file(path: Path, model: Model, loading: str, calls: Collection[str]) -> Any:
+    """Load the file in MuJoCo by the lines `loading` and apply `calls`; raises EngineError with MuJoCo's
+    message if that fails."""
     _refuse_crashes(path, model)
     names: dict[str, Any] = {"mujoco": mujoco, "path": str(path)}
-    loading = FLOATING if model.floating else FIXED
     try:
         with _without_warnings():
             # The lines shown to users are those that are executed.
@@ -60,6 +54,14 @@ def load_file(path: Path, model: Model, calls: Collection[str]) -> Any:
                 + (": MuJoCo mistakes a root named 'world' for the world" if model.root == "world" else "")
             )
     return loaded
+
+
+def loading_lines(*, floating: bool, options: str = "") -> str:
+    """Return the documented lines that load a URDF with compiler options, and with a floating base, for which
+    MuJoCo's reader has no option."""
+    free = "spec.worldbody.first_body().add_freejoint()" if floating else ""
+    lines = ("spec = mujoco.MjSpec.from_file(path)", options, free, "model = spec.compile()")
+    return "\n".join(filter(None, lines)) if floating or options else FIXED
 
 
 def _set_joints(loaded: Any, calls: Collection[str]) -> None:
