@@ -16,9 +16,10 @@ given torque. Its forward error has no such bound: with an ill-conditioned mass 
 the input changes the acceleration by any amount."""
 
 MAX_COMPONENT_ERROR = 1e-10
-"""Promised bound on the error of each torque over its own magnitude. The torque of a finger at the end of a
-long arm has the rounding errors of the arm's acceleration, so its relative error exceeds that of the largest
-torque by the ratio of its distance from the arm's axis to its radius of gyration."""
+"""Promised bound on the error of each torque over its own magnitude. It is much larger than the other bound,
+because the small torque of a finger at the end of a long arm contains rounding errors of the arm's large
+accelerations: its relative error grows by the ratio of the finger's distance from the arm's axis to its
+radius of gyration."""
 
 ROUNDINGS = 32
 """Rounding errors that one joint adds, in units of the roundoff. They come from a rotation (three products

@@ -31,7 +31,7 @@ class Evaluation:
     def __call__(
         self,
         hook: Callable[..., Any],
-        tail: tuple[int, ...],
+        result_shape: tuple[int, ...],
         q: Floats,
         *velocities: Floats,
         args: tuple[Any, ...] = (),
@@ -40,7 +40,7 @@ class Evaluation:
         """Evaluate `hook(q, *velocities, *args)` for every sample of the broadcast batch.
 
         q (..., nq) and velocities (..., nv) are in model coordinates, the hook's in tree
-        coordinates. `tail` is the shape of one result in tree coordinates; `reduce` converts it.
+        coordinates. `result_shape` is the shape of one result in tree coordinates; `reduce` converts it.
         """
         batch = common_batch(q, *velocities)
         if self._coupling is not None:
@@ -50,7 +50,7 @@ class Evaluation:
             x if x.shape[:-1] == batch else np.broadcast_to(x, (*batch, x.shape[-1]))
             for x in (q, *velocities)
         ]
-        shape = (*batch, *tail)
+        shape = (*batch, *result_shape)
         if self._vectorized or not batch:
             result = np.asarray(hook(*samples, *args))
             if result.shape != shape:

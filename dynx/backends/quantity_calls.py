@@ -1,4 +1,4 @@
-"""Evaluation of a call in model coordinates by the engine's hook, as the table of quantities describes it."""
+"""Evaluation of quantities by an engine's hooks, with arguments and results in model coordinates."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class _Plan(NamedTuple):
     """The entry of a quantity in the table, prepared for one backend."""
 
     hook: str
-    tail: tuple[int, ...]
+    result_shape: tuple[int, ...]
     reduction: Reduction | None
     implied_details: tuple[Any, ...]
 
@@ -56,7 +56,7 @@ class QuantityCalls(Lifecycle, EngineHooks):
         if hook is None:
             hook = partial(self._derive, name)
             details = details or plan.implied_details
-        return self._evaluation(hook, plan.tail, q, *rates, args=details, reduce=plan.reduction)
+        return self._evaluation(hook, plan.result_shape, q, *rates, args=details, reduce=plan.reduction)
 
     def _plan(self, quantity: Quantity) -> _Plan:
         evaluation, reduction = self._evaluation, None
@@ -64,8 +64,8 @@ class QuantityCalls(Lifecycle, EngineHooks):
             reduction = evaluation.reduce_both if quantity.reduces_rows else evaluation.reduce_columns
         elif quantity.reduces_rows:
             reduction = evaluation.reduce_rows
-        tail = quantity.shape_of(self.model, self._mechanism.nv)
-        return _Plan(quantity.hook, tail, reduction, quantity.implied_details(self.model))
+        result_shape = quantity.shape_of(self.model, self._mechanism.nv)
+        return _Plan(quantity.hook, result_shape, reduction, quantity.implied_details(self.model))
 
     def _index(self, frame: str) -> int:
         try:

@@ -80,7 +80,7 @@ def _timed(candidate: Candidate, times: Iterator[Times]) -> Measurement:
         return found
     of_call = next(times)
     if ready.baseline is not None:
-        of_call = of_call.less(next(times))
+        of_call = of_call.minus(next(times))
         if of_call.quartiles[0] <= 0.0:
             return replace(found, problem=LOST_IN_NOISE)
     return replace(found, times=of_call.per(found.samples))

@@ -39,7 +39,7 @@ class Times:
         low, high = self.quartiles
         return (high - low) / self.median if self.median > 0.0 else float("inf")
 
-    def less(self, other: Times) -> Times:
+    def minus(self, other: Times) -> Times:
         """Return the difference of the times in each repetition; negative where noise exceeds it."""
         return Times(tuple(own - taken for own, taken in zip(self.seconds, other.seconds, strict=True)))
 

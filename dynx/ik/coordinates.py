@@ -23,8 +23,9 @@ Columns = slice | list[int]
 class FrameCoordinates:
     """The coordinates of the model that move a frame, as variables of the solver.
 
-    They are a list of floats: with a floating base its six, relative to the current base pose (a body twist
-    for unit time), then the joints between root and frame, in the order of q. Angles whose range is a full
+    Their values are a list of floats: first the six of a floating base, if there is one, as the body twist
+    that reaches its pose from the current one in unit time; then those of the joints between root and frame,
+    in the order of q. Angles whose range is a full
     turn have infinite bounds here; after the search they are shifted by full turns into their limits, as near
     as possible to the initial configuration. Coordinates of other branches of the tree never change.
     """

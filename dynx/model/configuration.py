@@ -229,7 +229,8 @@ def clip(model: Model, q: ArrayLike) -> Floats:
 
 
 def _sampling_range(low: float, high: float, default_range: float) -> tuple[float, float]:
-    """Return the limits. A missing one is `default_range` from 0, or twice that from the other limit."""
+    """Return the range to sample: the limits; with one limit, twice `default_range` from it; with none, from
+    minus to plus `default_range`."""
     bounded_below, bounded_above = low > -MAX_MAGNITUDE, high < MAX_MAGNITUDE
     if bounded_below and bounded_above:
         return low, high

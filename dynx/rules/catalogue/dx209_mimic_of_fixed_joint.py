@@ -3,7 +3,7 @@
 The joint it follows was made fixed (a gripper that is not used, say) and the followers were forgotten. By the
 definition of ``<mimic>`` they cannot move either: their value is the offset.
 
-- Drake 1.51 refuses the file: a joint of one coordinate cannot mimic one of none.
+- Drake 1.51 refuses the file: a joint with one coordinate cannot mimic a joint without coordinates.
 - MuJoCo 4.0 warns and lets the joint move freely.
 - Pinocchio 4.1 and PyBullet 3.2.7 let every mimic joint move freely by default, and Pinocchio with
   ``mimic=True`` refuses the file.
@@ -36,7 +36,7 @@ class MimicOfFixedJoint(EditingRule):
     changed = "made joints that mimic a fixed one fixed or free"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
-        """Yield joints that move by their type and have a ``<mimic>``, and are fixed to dynx."""
+        """Yield joints whose type is one that moves and whose ``<mimic>`` lets dynx read them as fixed."""
         known = {joint.name: joint for joint in case.model.joints}
         for element, mimic in elements_in_joints(case, "mimic", SINGLE):
             joint = known[element.attributes["name"]]

@@ -3,8 +3,8 @@ different mass.
 
 Two patterns are reported. A tensor that is exactly the unit matrix: 1 kg m^2 about every axis is the inertia
 of a steel ball of 0.15 m radius and 111 kg, and not of a usual link. And one tensor with three equal moments
-(0.001 in many tutorials) that at least three links share although their masses differ: their inertias would
-differ.
+(0.001 in many tutorials) that at least three links share although their masses differ: the inertias of real
+links would differ too.
 
 All engines use the numbers unchanged. With an identity tensor on a link of a few hundred grams the inertia of
 the whole arm is that of the placeholder: torques and gains tuned on them are useless.

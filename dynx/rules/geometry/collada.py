@@ -42,10 +42,10 @@ _LAYOUT = (("stride", "1"), ("offset", "0"))
 _NUMBER = re.compile(r"\S+")
 
 
-def collada_points(data: bytes, *, turned: bool = True) -> Floats | None:
+def collada_points(data: bytes, *, add_z_up: bool = True) -> Floats | None:
     """Return all points of the scene (n, 3) [m]; None where the file has elements that are not supported.
 
-    With `turned` they include those of the scene rotated so that its up axis is z.
+    With `add_z_up`, the points of the scene rotated so that its up axis is z are added.
     """
     prefix = re.search(rb"<(\w+:)COLLADA\b", data[:1000])
     names = "" if prefix is None else prefix.group(1).decode("ascii", "replace")
@@ -58,7 +58,7 @@ def collada_points(data: bytes, *, turned: bool = True) -> Floats | None:
     if not found:
         return None
     points = scene.unit * np.concatenate(found)
-    R = _TO_Z_UP.get(scene.up_axis) if turned else None
+    R = _TO_Z_UP.get(scene.up_axis) if add_z_up else None
     return points if R is None else np.concatenate([points, points @ np.array(R).T])
 
 

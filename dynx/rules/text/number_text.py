@@ -48,7 +48,7 @@ def is_number(text: str) -> bool:
 
 
 def decimal(value: float) -> str:
-    """Return the shortest decimal that reads back as the same double; engines read no ``-0``."""
+    """Return the shortest decimal that reads back as the same double, with 0 for minus zero."""
     return repr(float(value) + 0.0)
 
 
@@ -115,7 +115,7 @@ def _hexadecimal(word: str) -> Misspelling | None:
 
 
 def _word_fault(word: str) -> Misspelling | None:
-    """Return the misspelling of a word of a vector; a plain number stands for itself."""
+    """Return the misspelling of a word of a vector; for a plain number one that means the number itself."""
     return Misspelling("rest", word) if is_number(word) else _misspelled_word(word)
 
 
