@@ -18,6 +18,17 @@ def axis_not_unit(site: Site) -> PlantedDefect:
     return site.defect("DX201", *site.part_edits(element, "axis", xyz=words), joint=joint.name)
 
 
+def axis_nearly_aligned(site: Site) -> PlantedDefect:
+    """A coordinate axis with the noise of a CAD program."""
+    joint, element = site.pick_joint(
+        lambda each: moving(each) and max(each.axis) == 1.0, "joint that moves along a coordinate axis"
+    )
+    noise = [site.rng.choice([1e-8, -4.2e-9, 1.2e-10, 6e-11, -1e-11]) for _ in range(3)]
+    pairs = zip(joint.axis, noise, strict=True)
+    words = " ".join(f"{1.0 if value == 1.0 else error:g}" for value, error in pairs)
+    return site.defect("DX226", *site.part_edits(element, "axis", xyz=words), joint=joint.name)
+
+
 def axis_without_direction(site: Site) -> PlantedDefect:
     """The zero axis that exporters write for fixed joints."""
     joint, element = site.pick_joint(moving, "joint that moves")
@@ -246,4 +257,5 @@ PLANTERS = (
     Planter("DX215", actuator_twice),
     Planter("DX216", upper_missing),
     Planter("DX217", named_root_joint, ("floating",)),
+    Planter("DX226", axis_nearly_aligned),
 )
