@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Mapping, Sequence
+from io import StringIO
 from typing import get_args
 
 from rich.console import Console
@@ -26,8 +27,11 @@ from dynx.doctor.formats.causes import (
 from dynx.doctor.formats.vote import largest_error
 from dynx.doctor.report import DoctorReport, EngineResult, Finding
 
-_MAX_PLACES = 4
-"""Number of places listed for one rule; ``--json`` and ``--html`` have all."""
+_PLACES = (4, 3, 2, 1)
+"""Numbers of places listed for one rule; ``--json`` and ``--html`` have all."""
+
+SCREEN = 40, 100
+"""Rows and columns of a terminal: the largest of `_PLACES` is taken with which a report fits it."""
 
 _MAX_RULES = 3
 """Number of rules listed for one of several robots."""
@@ -39,6 +43,21 @@ def show_one(out: Console, report: DoctorReport, saved: Mapping[int, str], mende
     `saved` has the file with the counterexample of each unexplained difference, by its number, and
     `mended` is the file with the mended description.
     """
+    fitting = (count for count in _PLACES if _rows(report, saved, mended, count) <= SCREEN[0])
+    _show(out, report, saved, mended, next(fitting, 2))
+
+
+def _rows(report: DoctorReport, saved: Mapping[int, str], mended: str | None, places: int) -> int:
+    """Return the number of rows of a report on a terminal."""
+    text = StringIO()
+    out = Console(file=text, width=SCREEN[1], soft_wrap=True, markup=False, emoji=False, highlight=False)
+    _show(out, report, saved, mended, places)
+    return sum(max(1, -(-len(line) // SCREEN[1])) for line in text.getvalue().splitlines())
+
+
+def _show(
+    out: Console, report: DoctorReport, saved: Mapping[int, str], mended: str | None, places: int
+) -> None:
     show_verdict(out, report)
     if report.error is not None:
         return
@@ -46,12 +65,12 @@ def show_one(out: Console, report: DoctorReport, saved: Mapping[int, str], mende
     show_errors(out, report)
     show_variants(out, report)
     found = causes(report)
-    _show_causes(out, "causes", [each for each in found if each.largest_effect is not None])
+    _show_causes(out, "causes", [each for each in found if each.largest_effect is not None], places)
     rest = [each for each in found if each.largest_effect is None]
     present = [each for each in rest if each.kind == "difference"]
-    _show_causes(out, "present, without effect on this base", present)
+    _show_causes(out, "present, without effect on this base", present, places)
     practice = [each for each in rest if each.kind == "practice"]
-    _show_causes(out, "bad practice", practice)
+    _show_causes(out, "bad practice", practice, places)
     _show_list(out, "decided where the file is ambiguous", report.choices)
     _show_calls(out, report)
     _show_unexplained(out, report, saved)
@@ -113,7 +132,7 @@ def show_variants(out: Console, report: DoctorReport) -> None:
     """Print the variants that differ: the call, the effect of its causes and what to write instead."""
     for each in report.variants_off:
         out.print()
-        title = f"another common call, {each.engine}, loads another robot: "
+        title = f"another common call, {each.engine}, differs: "
         out.print(Text.assemble((title, "bold"), (wording.name(each.call, 500), "dim")))
         for line in wording.variant(each):
             sentence(out, line, 2)
@@ -165,24 +184,25 @@ def show_summary(out: Console, reports: Sequence[DoctorReport], seconds: float, 
     out.print(summary_line(what, counts, not_done, seconds))
 
 
-def _show_causes(out: Console, title: str, found: Sequence[Cause]) -> None:
+def _show_causes(out: Console, title: str, found: Sequence[Cause], places: int) -> None:
     if not found:
         return
     heading(out, title)
     for cause in found:
         out.print(_cause_line(cause))
         sentence(out, f"{one_line(cause.title)} ({_extent(cause)})", 6)
-        _show_places(out, cause)
+        _show_places(out, cause, places)
         if cause.advice and (cause.largest_effect is not None or cause.kind == "practice"):
             sentence(out, f"-> {one_line(cause.advice)}", 6)
 
 
-def _show_places(out: Console, cause: Cause) -> None:
-    for finding in cause.findings[:_MAX_PLACES]:
+def _show_places(out: Console, cause: Cause, places: int) -> None:
+    shown = cause.findings[:places]
+    more = f"; and {len(cause.findings) - len(shown)} more" if len(cause.findings) > len(shown) else ""
+    for finding in shown:
         parts = [each for each in (wording.effects(finding), wording.name(finding.message, 300)) if each]
-        sentence(out, f"{_place(finding)}: {'; '.join(parts)}", 6, "dim")
-    if len(cause.findings) > _MAX_PLACES:
-        out.print(f"      and {len(cause.findings) - _MAX_PLACES} more", style="dim")
+        end = more if finding is shown[-1] else ""
+        sentence(out, f"{_place(finding)}: {'; '.join(parts)}{end}", 6, "dim")
 
 
 def _place(finding: Finding) -> str:
@@ -241,6 +261,8 @@ def _show_unexplained(out: Console, report: DoctorReport, saved: Mapping[int, st
 
 
 def _show_next(out: Console, report: DoctorReport, mended: str | None) -> None:
+    if mended is None and report.alike and not report.findings:
+        return
     out.print()
     if mended is not None:
         action = "nothing to change in the text; copied to" if report.mended is None else "mended:"

@@ -23,6 +23,10 @@ MAX_ELEMENTS = 2_000_000
 """Largest number of elements in one document; it bounds memory."""
 
 
+MAX_ATTRIBUTES = 1000
+"""Largest number of attributes of one element; URDF needs 8. Parsers of engines take quadratic time."""
+
+
 @dataclass(slots=True)
 class Element:
     """An XML element: tag with its prefix, attributes, line, and child elements."""
@@ -54,7 +58,8 @@ def read_xml(
     often a tag may occur directly below the root. Character data are stored for the tags in `with_text`,
     which name elements without children. Notes are appended to `notes`. Raises DescriptionError for text that
     is not XML, is truncated, has a document type, is nested deeper than MAX_DEPTH, or has more elements than
-    MAX_ELEMENTS or `max_counts` allows. Faults of the XML that engines forgive are repaired, with notes.
+    MAX_ELEMENTS or `max_counts`, or more attributes of one than MAX_ATTRIBUTES, allow. Faults of the XML that
+    engines forgive are repaired, with notes.
     """
     text = decode(data, source, notes) if isinstance(data, bytes) else data
     text, lines_before = strip_ends(text, notes)
@@ -137,6 +142,10 @@ class _TreeBuilder:
         self._count += 1
         if self._depth > MAX_DEPTH:
             raise self._error(f"elements are nested more than {MAX_DEPTH} deep", line)
+        if len(attributes) > MAX_ATTRIBUTES:
+            raise self._error(
+                f"an element has {len(attributes)} attributes; at most {MAX_ATTRIBUTES} are read", line
+            )
         if self._count > MAX_ELEMENTS:
             raise self._error(f"contains more than {MAX_ELEMENTS} elements", line)
         if self._opaque_depth is not None:

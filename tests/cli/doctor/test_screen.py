@@ -1,0 +1,72 @@
+"""The report of one robot fits a screen: 40 rows, and 25 for a robot without a fault."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from io import StringIO
+
+import pytest
+from rich.console import Console
+
+from dynx.cli.doctor.tables import SCREEN, show_one
+from dynx.doctor import diagnose
+from dynx.doctor.report import DoctorReport
+from dynx.loaded import ENGINES, installed_engines
+from dynx.rules.traps import find_trap
+from tests.doctor.formats.reports import differing
+
+pytestmark = pytest.mark.skipif(
+    not set(installed_engines()).issuperset({"pinocchio", "pybullet", "mujoco", "drake"}),
+    reason="the rows of four engines are counted",
+)
+
+COLUMNS = 100
+
+
+def rows(report: DoctorReport) -> int:
+    """The rows that a report takes on a terminal of 100 columns."""
+    text = shown(report)
+    return sum(max(1, -(-len(line) // COLUMNS)) for line in text.splitlines())
+
+
+def shown(report: DoctorReport, width: int = COLUMNS) -> str:
+    """The report of one robot."""
+    out = StringIO()
+    show_one(Console(file=out, width=width, soft_wrap=True, markup=False, emoji=False), report, {}, None)
+    return out.getvalue()
+
+
+def test_the_report_of_ur5_fits_a_screen() -> None:
+    report = diagnose("ur5")
+    assert len(report.engines) >= len(set(ENGINES) & set(installed_engines()))
+    assert rows(report) <= 40, shown(report)
+
+
+def test_the_report_of_a_robot_without_a_fault_has_25_rows() -> None:
+    mended = diagnose(find_trap("DX201")).mended
+    assert mended is not None
+    report = diagnose(mended)
+    assert report.alike
+    assert not report.findings
+    assert rows(report) <= 25, shown(report)
+
+
+def test_the_report_of_a_robot_that_only_another_call_misreads_has_25_rows() -> None:
+    report = diagnose(find_trap("DX115"))
+    assert report.alike
+    assert rows(report) <= 25, shown(report)
+
+
+def test_places_are_left_out_where_the_report_would_not_fit() -> None:
+    report = differing()
+    many = tuple(replace(report.findings[0], link=f"link_{k}", line=k) for k in range(30))
+    few = replace(report, findings=many[:3], unexplained=(), choices=(), calls=())
+    assert "and 1 more" not in shown(few)
+    crowded = replace(few, choices=tuple(f"choice {k}" for k in range(SCREEN[0] - rows(few))))
+    assert "; and " in shown(crowded)
+    assert rows(crowded) <= SCREEN[0]
+
+
+def test_a_report_is_the_same_on_a_terminal_and_in_a_file() -> None:
+    report = differing()
+    assert shown(report, 10_000).count("line ") == shown(report, COLUMNS).count("line ")
