@@ -30,7 +30,7 @@ def lost_texture(site: Site) -> PlantedDefect:
     )
     color = site.rng.choice(["", '<color rgba="1 1 1 1"/>\n  '])
     return _material(
-        site, "DX426", f'<material name="planted">\n  {color}<texture filename="{image}"/>\n', image
+        site, "DX426", f'<material name="planted_texture">\n  {color}<texture filename="{image}"/>\n', image
     )
 
 
@@ -38,12 +38,12 @@ def without_colour(site: Site) -> PlantedDefect:
     """A material whose colour was never written, or has three numbers."""
     inside, sign = site.rng.choice(
         [
-            ("<texture/>", "planted"),
+            ("<texture/>", "planted_colour"),
             ('<color rgba="0.3 0.2 0.1"/>', 'rgba="0.3 0.2 0.1"'),
             ('<color rgb="0.3 0.2 0.1"/>', 'rgb="0.3 0.2 0.1"'),
         ]
     )
-    return _material(site, "DX427", f'<material name="planted">\n  {inside}\n', sign)
+    return _material(site, "DX427", f'<material name="planted_colour">\n  {inside}\n', sign)
 
 
 def _material(site: Site, rule: str, text: str, sign: str) -> PlantedDefect:
