@@ -172,3 +172,19 @@ def test_a_material_without_colour(text: str, engines: set[str], tmp_path: Path)
     found, remedy = mended("DX427", case)
     assert len(found) == 1
     assert not any(refused(remedy.case.source.text, engine, tmp_path) for engine in INSTALLED)
+
+
+def test_a_missing_texture_of_a_visual_is_bad_practice(tmp_path: Path) -> None:
+    path = tmp_path / "robot.urdf"
+    (tmp_path / "here.png").write_bytes(b"an image")
+    looks = "".join(
+        f'<visual><geometry><box size="1 1 1"/></geometry><material name="{name}">'
+        f'<texture filename="{name}.png"/></material></visual>'
+        for name in ("here", "gone", "gone")
+    )
+    case = case_of(link("base"), link("arm", looks), joint("elbow", "base", "arm"), source=path)
+    path.write_text(case.source.text)
+    (each,) = find_rule("DX516").detect(case)
+    assert each.link == "arm"
+    assert "'gone.png'" in each.message
+    assert not any(refused(case.source.text, engine, tmp_path) for engine in INSTALLED)

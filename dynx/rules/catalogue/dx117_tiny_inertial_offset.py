@@ -7,7 +7,8 @@ mass and the attitude of these axes in the body frame. When it compiles a model 
 
 - MuJoCo 4.0.0 drops the attitude where each component of the vector part of its quaternion is below 1e-6,
   that is, a rotation by less than 2e-6 rad. If it does, it drops the centre of mass as well where each
-  coordinate is below 1e-6 m. Rigidly connected links are merged before, so the pose is that of their sum.
+  coordinate is below 1e-6 m. Rigidly connected links are merged before, so the pose is that of their sum,
+  unless the file has ``<mujoco><compiler fusestatic="false"/></mujoco>``.
 - Pinocchio 4.1.0, PyBullet 3.2.7 and Drake 1.51.1 use all numbers.
 
 The effect: gravity torques of a balanced link vanish. A centre of mass at 7e-7 m was 2.3e-2 of the torques of

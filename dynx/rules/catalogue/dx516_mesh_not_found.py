@@ -1,13 +1,14 @@
-"""DX516 mesh-not-found: The file of a mesh is not where the description says it is.
+"""DX516 mesh-not-found: The file of a mesh, or of the texture of a visual, is not where the description says.
 
-Reported are meshes whose location is certain: a path relative to the description, a ``file://`` path, or a
+Reported are files whose location is certain: a path relative to the description, a ``file://`` path, or a
 file in a package that was found (in the folders above the description, in ROS_PACKAGE_PATH or
 AMENT_PREFIX_PATH) but does not contain it. On a case-sensitive file system ``Base.STL`` is not ``base.stl``.
 Paths that leave the package or repository of the description are not looked at.
 
 PyBullet 3.2.7 refuses the whole file ("Cannot load URDF file") for a mesh in ``<visual>`` or in
 ``<collision>``, and so does Drake 1.51 with a scene graph; MuJoCo 4.0 does for ``<collision>`` alone, since
-it discards what is only visual. Pinocchio's ``buildModelFromUrdf`` reads no mesh, its ``buildGeomFromUrdf``
+it discards what is only visual. A texture in ``<visual>`` is missed by Drake with a scene graph alone; one in
+a material of the robot is DX426. Pinocchio's ``buildModelFromUrdf`` reads no mesh, its ``buildGeomFromUrdf``
 raises. PyBullet also searches folders of its own (``setAdditionalSearchPath``), so it may find meshes that
 others do not. Dynamics does not depend on shapes, and dynx reads the file without them.
 
@@ -20,19 +21,21 @@ from collections.abc import Iterable
 from dynx.rules import Case, Detection, Rule
 from dynx.rules.geometry import MeshNotFoundError, find_mesh
 from dynx.rules.geometry.shapes import geometry_elements
+from dynx.rules.geometry.textures import visual_textures
 
 
 class MeshNotFound(Rule):
     kind = "practice"
-    advice = "Put the mesh there, or correct the path, capitals included."
+    advice = "Put the file there, or correct the path, capitals included."
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
-        """Yield the first reference to each missing mesh."""
-        seen = set()
+        """Yield the first reference to each missing file."""
+        seen = {""}
         for name, link in case.links.items():
-            for element in geometry_elements(link):
+            shapes = [each for each in geometry_elements(link) if each.tag == "mesh"]
+            for element in (*shapes, *visual_textures(link)):
                 filename = element.attributes.get("filename", "")
-                if element.tag != "mesh" or filename in seen:
+                if filename in seen:
                     continue
                 seen.add(filename)
                 try:

@@ -8,7 +8,6 @@ from urllib.parse import unquote, urlsplit
 
 from dynx.errors import shown
 from dynx.model.xml.source import Edit, SourceElement, XmlSource
-from dynx.rules.geometry.mesh_files import MeshNotFoundError, find_mesh
 
 GREY = '<color rgba="0.5 0.5 0.5 1"/>'
 """Colour in place of a texture."""
@@ -20,6 +19,13 @@ def robot_textures(source: XmlSource) -> Iterator[tuple[SourceElement, SourceEle
         texture = material.first("texture")
         if texture is not None and texture.attributes.get("filename"):
             yield material, texture
+
+
+def visual_textures(link: SourceElement) -> Iterator[SourceElement]:
+    """Yield the ``<texture>`` elements in the materials of the visuals of a link."""
+    for visual in link.all("visual"):
+        for material in visual.all("material"):
+            yield from material.all("texture")
 
 
 def missing_texture(texture: SourceElement, source: str) -> str | None:
@@ -36,11 +42,8 @@ def missing_texture(texture: SourceElement, source: str) -> str | None:
         return None if os.path.isfile(path) else f"no texture {shown(filename, 200)}"
     if "://" in filename:
         return f"Drake cannot read the texture {shown(filename, 200)} from there"
-    try:
-        find_mesh(filename, source)
-    except MeshNotFoundError:
-        return f"no texture {shown(filename, 200)}"
-    return None
+    here = os.path.isfile(os.path.join(os.path.dirname(source), filename))
+    return None if here or not os.path.isfile(source) else f"no texture {shown(filename, 200)}"
 
 
 def texture_replacements(source: XmlSource) -> Iterator[Edit]:
