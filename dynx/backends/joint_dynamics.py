@@ -15,13 +15,14 @@ from dynx.spatial.scalar import Floats
 
 
 class JointDynamicsTerms:
-    """The `<dynamics>` of all moving joints, in the coordinates of the model."""
+    """The `<dynamics>` of all moving joints: `damping` and `friction` in coordinates of the tree, the rest in
+    those of the model."""
 
     def __init__(self, model: Model) -> None:
         moving = [joint.dynamics for joint in model.joints if joint.moves]
         base = [0.0] * (6 if model.floating else 0)
-        self._damping = np.array(base + [d.damping for d in moving])
-        self._friction = np.array(base + [d.friction for d in moving])
+        self.damping = np.array(base + [d.damping for d in moving])
+        self.friction = np.array(base + [d.friction for d in moving])
         armature = np.array(base + [d.armature for d in moving])
         coupling = model.mechanism.coupling
         self._S = np.eye(len(armature)) if coupling is None else coupling.matrix()
@@ -31,7 +32,7 @@ class JointDynamicsTerms:
     def friction_torque(self, v: Any) -> Floats:
         """Return the torque (..., nv) of damping and Coulomb friction at velocity v (..., nv)."""
         tree = np.asarray(v) @ self._S.T
-        return np.asarray((self._damping * tree + self._friction * np.sign(tree)) @ self._S)
+        return np.asarray((self.damping * tree + self.friction * np.sign(tree)) @ self._S)
 
     def armature_torque(self, a: Any) -> Floats:
         """Return the torque (..., nv) of the armature at acceleration a (..., nv)."""

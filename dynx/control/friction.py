@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dynx.backends.joint_dynamics import JointDynamicsTerms
 from dynx.control.gains import checked_gain
 from dynx.errors import ArgumentError, shown
 from dynx.model import Model
@@ -49,18 +50,14 @@ class JointFriction:
         """
         if not isinstance(slip, int | float) or not (slip == 0.0 or MIN_SLIP <= slip < np.inf):
             raise ArgumentError(f"slip is {shown(slip)}; wanted a speed: 0, or {MIN_SLIP:g} or more")
-        moving = [joint.dynamics for joint in model.joints if joint.moves]
-        of_model = damping is True, friction is True
+        own, of_model = JointDynamicsTerms(model), (damping is True, friction is True)
         coupling = model.mechanism.coupling
         # The coefficients of the description belong to the joints of the tree, given ones to the coordinates.
         through = coupling is not None and any(of_model)
-        base = [0.0] * (6 if model.floating else 0)
-        own_damping = np.array(base + [joint.damping for joint in moving])
-        own_friction = np.array(base + [joint.friction for joint in moving])
         values = {
             "model": model,
-            "damping": self._coefficients("damping", damping, own_damping, model, through),
-            "friction": self._coefficients("friction", friction, own_friction, model, through),
+            "damping": self._coefficients("damping", damping, own.damping, model, through),
+            "friction": self._coefficients("friction", friction, own.friction, model, through),
             "slip": float(slip),
             "to_tree": coupling.matrix() if coupling is not None and through else None,
         }

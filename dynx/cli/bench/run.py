@@ -24,7 +24,7 @@ from dynx.cli.shell.inputs import chosen_frame
 from dynx.cli.shell.interruption import interruptible
 from dynx.cli.shell.progress import progress_bar
 from dynx.cli.shell.run import processors
-from dynx.cli.shell.terminal import console, counted, echo_json
+from dynx.cli.shell.terminal import counted, present
 from dynx.model.loading import load
 from dynx.model.model import Base
 
@@ -82,10 +82,7 @@ def run_bench(session: Session, *, as_json: bool) -> int:
             complain(f"interrupted: {len(cases) - len(found)} of {counted(len(cases), 'case')} not done")
         interruption.finishing = True
         made = document(session, found, processor_description())
-        if as_json:
-            echo_json(made)
-        else:
-            show(console(), made)
+        present(made, show, as_json=as_json)
         wrong_ones = wrong(found)
         for each in wrong_ones:
             complain(f"{each.implementation}, {each.case.quantity.replace('_', ' ')}: {each.problem}")

@@ -16,7 +16,7 @@ import io
 import os
 import sys
 import traceback
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 
 import click
@@ -46,6 +46,15 @@ def complain(message: str) -> None:
     # If standard error cannot be written, the exit code still reports the error.
     with suppress(OSError):
         click.echo(f"dynx: error: {one_line(message)}", err=True)
+
+
+def failure_of(call: Callable[..., object], *args: object) -> DynxError | None:
+    """Call a function and return its error, or None, so that results are still shown if it fails."""
+    try:
+        call(*args)
+    except DynxError as error:
+        return error
+    return None
 
 
 class ClosedPipe(Exception):

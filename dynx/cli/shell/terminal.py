@@ -5,13 +5,15 @@ from __future__ import annotations
 import errno
 import os
 import sys
-from collections.abc import Mapping
-from typing import TextIO
+from collections.abc import Callable, Mapping
+from typing import TextIO, TypeVar
 
 import click
 from rich.console import Console
 
 from dynx.files.documents import json_text
+
+Document = TypeVar("Document")
 
 PIPE_WIDTH = 10_000
 """Width of a file or pipe [columns], so large that no table is divided."""
@@ -31,6 +33,14 @@ def console(*, err: bool = False) -> Console:
 def echo_json(document: object) -> None:
     """Write `document` to standard output."""
     click.echo(json_text(document), file=_standard_output())
+
+
+def present(document: Document, show: Callable[[Console, Document], None], *, as_json: bool) -> None:
+    """Write a document to standard output as JSON, or show it as tables."""
+    if as_json:
+        echo_json(document)
+    else:
+        show(console(), document)
 
 
 def number(value: float) -> str:

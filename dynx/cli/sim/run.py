@@ -7,10 +7,10 @@ from typing import Any
 
 import click
 
-from dynx.cli.shell.exits import BAD_INPUT, DONE, INTERRUPTED, NEGATIVE_RESULT, complain
+from dynx.cli.shell.exits import BAD_INPUT, DONE, INTERRUPTED, NEGATIVE_RESULT, complain, failure_of
 from dynx.cli.shell.interruption import interruptible
 from dynx.cli.shell.progress import progress_bar
-from dynx.cli.shell.terminal import console, echo_json
+from dynx.cli.shell.terminal import present
 from dynx.cli.sim.document import EarlyEnd, document
 from dynx.cli.sim.motion import limit_message
 from dynx.cli.sim.options import TUTORIAL_OPTIONS
@@ -61,12 +61,9 @@ def run_sim(request: SimulationRequest, outputs: Outputs, *, as_json: bool) -> i
             raise ArgumentError(limit_message(error, request.scenario.model.name, ignorable=True)) from error
         seconds = time.perf_counter() - started
         interruption.finishing = True
-        write_error = _write(outputs, rollout)
+        write_error = failure_of(outputs.write, rollout)
         made = {**document(request, rollout, seconds, ended), "files": [] if write_error else outputs.files}
-        if as_json:
-            echo_json(made)
-        else:
-            show(console(), made)
+        present(made, show, as_json=as_json)
         if ended is not None:
             resumable = isinstance(ended, RolloutInterrupted)
             complain(f"{ended}{_saved_files(outputs, write_error, resumable=resumable)}")
@@ -88,15 +85,6 @@ def _simulate(request: SimulationRequest) -> Rollout:
             **request.options,
             progress=lambda taken, wanted: advance(taken, "simulating"),
         )
-
-
-def _write(outputs: Outputs, rollout: Rollout) -> DynxError | None:
-    """Write the files; return the error where that fails, so that the tables are still shown."""
-    try:
-        outputs.write(rollout)
-    except DynxError as error:
-        return error
-    return None
 
 
 def _saved_files(outputs: Outputs, write_error: DynxError | None, *, resumable: bool) -> str:

@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 
 from dynx._version import __version__
-from dynx.cli.shell.exits import BAD_INPUT, DONE, NEGATIVE_RESULT, complain, one_line
+from dynx.cli.shell.exits import BAD_INPUT, DONE, NEGATIVE_RESULT, complain, failure_of, one_line
 from dynx.cli.shell.inputs import configuration
 from dynx.cli.shell.interruption import interruptible
 from dynx.cli.shell.progress import progress_bar
-from dynx.cli.shell.terminal import console, counted, echo_json
+from dynx.cli.shell.terminal import counted, present
 from dynx.cli.sim.motion import limit_message
 from dynx.cli.sim.tutorial_tables import show
-from dynx.errors import ArgumentError, DynxError, LimitError
+from dynx.errors import ArgumentError, LimitError
 from dynx.model.loading import load
 from dynx.sim.clock import Clock
 from dynx.sim.named_controllers import NATURAL_FREQUENCY
@@ -42,11 +42,8 @@ def run_tutorial(robot: str | None, given: dict[str, Any], picture: str | None, 
             complain(f"interrupted: {counted(len(MODES) - len(rows), 'controller')} not done")
         interruption.finishing = True
         made = document(experiments, rows)
-        plot_error = None if picture is None else _draw(experiments, rows, picture)
-        if as_json:
-            echo_json(made)
-        else:
-            show(console(), made)
+        plot_error = None if picture is None else failure_of(plot_rows, rows, experiments, picture)
+        present(made, show, as_json=as_json)
         failed = [
             f"{row.mode} on {plant}: {outcome.problem}"
             for row in rows
@@ -60,15 +57,6 @@ def run_tutorial(robot: str | None, given: dict[str, Any], picture: str | None, 
     if plot_error is not None:
         return BAD_INPUT
     return NEGATIVE_RESULT if failed else DONE
-
-
-def _draw(experiments: Tutorial, rows: Sequence[Row], picture: str) -> DynxError | None:
-    """Draw the plot; return the error where that fails, so that the table is still shown."""
-    try:
-        plot_rows(rows, experiments, picture)
-    except DynxError as error:
-        return error
-    return None
 
 
 def document(experiments: Tutorial, rows: Sequence[Row]) -> dict[str, Any]:
