@@ -35,8 +35,7 @@ TARGETS = 2
 
 
 def regular_samples(magnitudes: Magnitudes) -> list[int]:
-    """Return the indices of the samples whose mass matrix is positive definite to double precision, or [0] if
-    there is none.
+    """Return the indices of samples whose mass matrix is numerically positive definite, or [0] without any.
 
     Where it is singular (a stretched wrist whose links are point masses) no unique acceleration exists, and
     rounding decides whether an engine detects that.

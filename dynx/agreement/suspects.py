@@ -26,8 +26,7 @@ def find_suspects(
 
     The strongest evidence is an error against the 50-digit referee. Next comes a backend that differs from
     all others while they agree, then one that differs from what is derived from its own poses and inverse
-    dynamics, or that breaks an identity of mechanics. Without any evidence all backends that differ are
-    named.
+    dynamics, or breaks an identity of mechanics. Without any evidence all backends that differ are named.
     """
     suspects = []
     for quantity in dict.fromkeys(comparison.quantity for comparison in quantities):

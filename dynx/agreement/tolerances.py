@@ -74,8 +74,7 @@ def eigenvalue(depth: int, nv: int) -> float:
 
 def derivative(depth: int) -> float:
     """Return the bound on the error of a numerical derivative over magnitude times frequency: Bernstein's
-    bound on the ninth derivative of a band-limited function gives the truncation, `CANCELLATION` the
-    rounding."""
+    bound on the ninth derivative of a band-limited function gives truncation, `CANCELLATION` rounding."""
     return STEP**ORDER * TRUNCATION + CANCELLATION * ROUNDINGS * EPS * (depth + FIXED_JOINTS) / STEP
 
 

@@ -59,8 +59,7 @@ def cost_of(program: Program) -> Cost:
 
 
 def program_of(model: Model, quantity: str, frame: str) -> Program | None:
-    """Return the program that the backend `compiled` compiles for a quantity, without the check of its
-    arguments.
+    """Return the program that the backend `compiled` compiles for a quantity, without checks of arguments.
 
     Return None if that backend evaluates the quantity with NumPy because its code would be too long.
     """

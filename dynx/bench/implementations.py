@@ -34,8 +34,7 @@ class Implementation(ABC):
     """An implementation of quantities that can be timed.
 
     `threads` is the number of threads that it uses. `whole` is true if it evaluates a batch in one call of
-    compiled code; others are called once for each sample, or need much memory, and may be timed at fewer
-    samples.
+    compiled code; others are called once per sample, or need much memory, and may be timed at fewer samples.
     """
 
     name: str

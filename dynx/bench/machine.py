@@ -70,8 +70,7 @@ def load() -> float | None:
 
 
 def chains_program(chains: int = CHAINS, links: int = CHAIN_LENGTH) -> Program:
-    """Return the program of interleaved chains x -> x a + b and the sum of their ends, which no optimiser can
-    shorten.
+    """Return interleaved chains x -> x a + b and the sum of their ends, which no optimiser can shorten.
 
     It is built node by node, because the order matters: one link of every chain, then the next link.
     """

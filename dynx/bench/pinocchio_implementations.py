@@ -48,8 +48,7 @@ class PinocchioImplementation(Implementation):
     def samples(self, batch: Batch) -> Batch:
         """Return the same states with mimic joints as coordinates of their own.
 
-        Each torque is distributed over the joints that depend on one coordinate so that the virtual work is
-        the same.
+        Each torque is distributed over the joints of one coordinate so that the virtual work is the same.
         """
         coupling = batch.model.mechanism.coupling
         if coupling is None:

@@ -2,8 +2,7 @@
 
 A kernel has the arguments of its quantity as inputs and two outputs: the result, and a ``defect``. The defect
 is below `MAX_DEFECT` exactly if the arguments are finite and not too large, quaternions have unit length, and
-a result that could be infinite is finite. So arguments are checked while they are in the processor's
-registers.
+a result that could be infinite is finite. So arguments are checked while in the processor's registers.
 
 Mimic joints are part of the traced program: inputs are coordinates of the model. For coordinates of the tree
 the mechanism is given without its coupling.

@@ -25,8 +25,7 @@ class OperationalSpace(TaskSpace[None], pure=True):
 
     The frame's error e obeys e'' + kd e' + kp e = 0. Joint accelerations that do not accelerate the frame
     move the posture to the setpoint, by the projector of the dynamically consistent inverse J# = M^-1 J' (J
-    M^-1 J' + damping^2)^-1. `damping` keeps the torque finite near singular postures, where it causes an
-    error.
+    M^-1 J' + damping^2)^-1. `damping` keeps the torque finite near singular postures, and causes an error.
     """
 
     kp: Floats = gain("1/s^2")

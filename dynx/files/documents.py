@@ -1,8 +1,7 @@
 """JSON documents: built from typed classes, read into them strictly, and described by JSON Schema.
 
 Each document has one class that declares its keys and types. A number that is not finite is written as null,
-because JSON cannot express it; so every number in a schema may be null. This is the only module that uses
-msgspec.
+because JSON cannot express it; so every number in a schema may be null. No other module uses msgspec.
 """
 
 from __future__ import annotations

@@ -93,8 +93,7 @@ def simulate(
 
     **Resuming.** With `resume` the first `step` steps (by default all) are taken from that record and the
     rest is computed, with the same result as one run, to the last bit. The record's scenario must be equal to
-    this one in every field but `duration`. The controller must have no other state than the one that it
-    returns.
+    this one in every field but `duration`. The controller must have no state but the one that it returns.
 
     **Long runs.** `progress` is called regularly with the number of steps taken and the total number. Ctrl-C
     raises RolloutInterrupted, which has the record until then in ``.rollout`` and can be resumed.

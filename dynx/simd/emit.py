@@ -30,8 +30,7 @@ ENTRY = "kernel"
 PREFETCHED_COLUMNS = range(16, 129)
 """Row lengths of outputs whose memory is prefetched before it is written.
 
-Writing to memory outside the caches stalls. Short rows stall little, and the processor itself prefetches long
-ones.
+Writing to memory outside the caches stalls. Short rows stall little, and processors prefetch long ones.
 """
 
 PREFETCH_GROUPS = 8

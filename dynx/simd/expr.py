@@ -32,23 +32,13 @@ Op = Literal[
     "max",
 ]
 
+_UNARY: Final[tuple[Op, ...]] = ("neg", "abs", "sqrt", "sin", "cos", "exp", "tanh", "arctan")
+_BINARY: Final[tuple[Op, ...]] = ("add", "sub", "mul", "div", "min", "max")
 ARITY: Final[dict[Op, int]] = {
     "input": 0,
     "constant": 0,
-    "add": 2,
-    "sub": 2,
-    "mul": 2,
-    "div": 2,
-    "neg": 1,
-    "abs": 1,
-    "sqrt": 1,
-    "sin": 1,
-    "cos": 1,
-    "exp": 1,
-    "tanh": 1,
-    "arctan": 1,
-    "min": 2,
-    "max": 2,
+    **dict.fromkeys(_BINARY, 2),
+    **dict.fromkeys(_UNARY, 1),
 }
 """Number of arguments of every operation. `Graph` documents their semantics."""
 

@@ -16,8 +16,7 @@ def inline(program: Program, inputs: Mapping[str, Array]) -> dict[str, Array]:
     """Return the outputs of `program` by name, given one array for every input.
 
     The arrays hold symbols of one trace, plain numbers, or both; operations on numbers alone are computed
-    at once. Arrays of mpmath's numbers are evaluated in mpmath's precision. Outputs have the shapes of
-    their ports.
+    at once. Arrays of mpmath's numbers are evaluated in its precision. Outputs have their ports' shapes.
     """
     slots = [entry for port in program.inputs for entry in np.asarray(inputs[port.name]).ravel().tolist()]
     values: list[Any] = []

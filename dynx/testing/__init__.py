@@ -4,8 +4,7 @@
 - `dynx.testing.plugin`: the same for ``pytest --dynx-robot my.urdf``, without a test file
 - `dynx.testing.strategies`: Hypothesis strategies for robots and states (the extra ``testing``)
 
-Importing this package imports neither Hypothesis nor an engine, because pytest imports it in every run for
-the plugin.
+Importing this package imports neither Hypothesis nor an engine: pytest imports it for the plugin.
 """
 
 from __future__ import annotations

@@ -105,8 +105,7 @@ class Ends:
 def checked_ends(q0: ArrayLike, q1: ArrayLike, model: Model | None) -> Ends:
     """Check two configurations (nq,); without a model every coordinate is a joint's.
 
-    Raises ShapeError, DTypeError, NotFiniteError, and ArgumentError for a quaternion that is not of unit
-    norm.
+    Raises ShapeError, DTypeError, NotFiniteError, and ArgumentError for a quaternion not of unit norm.
     """
     first, last = (configuration(name, q, model) for name, q in (("q0", q0), ("q1", q1)))
     if first.shape != last.shape:

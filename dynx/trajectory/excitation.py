@@ -82,8 +82,7 @@ def excitation(
     `harmonics` (at least 3) is the number of multiples of 1 / duration [Hz] in the series. The motion of
     every joint is scaled until it reaches a limit: the model's limits of position and velocity (`velocity`
     replaces the latter), and `acceleration`, if given; one number or (nv,). `q0` is by default the middle of
-    the position limits, or 0 for a joint without limits; such a joint moves at most pi [rad] or 1 m from
-    there.
+    the position limits, or 0 for a joint without limits, which moves at most pi [rad] or 1 m from there.
 
     Of `candidates` series drawn with `rng`, a seed or a generator, the one with the smallest condition number
     of the inertial regressor is returned, since its samples determine the inertial parameters best

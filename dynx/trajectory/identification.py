@@ -2,8 +2,7 @@
 
 Torque is linear in the parameters, tau = Y pi; the stacked samples of a motion form a least-squares problem
 whose condition number bounds how much the noise of the torque is amplified in the parameters (Swevers et al.
-1997). Only some linear combinations of parameters affect the torque; their number is the rank of Y over all
-motions.
+1997). Only some linear combinations of parameters affect the torque: as many as the rank of Y.
 """
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
 """Folder of finished parts, from which a run that was killed continues.
 
-The file of a part is named by the hash of its scenario and its inputs. Files are written atomically, so each
-is complete.
+The file of a part is named by the hash of its scenario and its inputs. Files are written atomically.
 """
 
 from __future__ import annotations

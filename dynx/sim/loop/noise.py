@@ -64,8 +64,7 @@ class Noise:
 class NoiseStream:
     """Standard normal numbers by Philox4x64 (Salmon et al., Parallel Random Numbers, 2011).
 
-    The key of the generator is the seed and the number of the rollout; its counter is the block of control
-    steps.
+    The generator's key is the seed and the number of the rollout; its counter is the block of control steps.
     """
 
     def __init__(self, seed: int) -> None:

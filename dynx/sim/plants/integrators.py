@@ -34,8 +34,7 @@ State = tuple[Floats, Floats, Floats]
 
 
 class SemiImplicitEuler:
-    """Integrator v' = v + h a(q, v), q' = q (+) h v' of first order. The energy of a conservative system
-    stays bounded.
+    """First-order integrator v' = v + h a(q, v), q' = q (+) h v'; energy that is conserved stays bounded.
 
     A floating base moves by `floating_step`, which is compiled for floats, because NumPy would take twenty
     times as long as the dynamics.

@@ -45,8 +45,7 @@ class RolloutData:
     """n steps of a robot in motion: states at n + 1 times, and torques and accelerations between them.
 
     Row k of `a`, `tau` and `saturated` belongs to the step from ``t[k]`` to ``t[k + 1]``: the torque that
-    acted on the plant, the acceleration at the beginning of the step, and whether each motor was at its
-    limit.
+    acted on the plant, the acceleration as the step begins, and whether each motor was at its limit.
     """
 
     model: Model

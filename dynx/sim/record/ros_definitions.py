@@ -1,7 +1,6 @@
 """Definitions of the ROS 2 messages of a recording, which every recording contains.
 
-They are copied from ROS 2 common_interfaces and rcl_interfaces without comments, and are the same from Humble
-to Rolling.
+They are those of ROS 2 common_interfaces and rcl_interfaces without comments, from Humble to Rolling.
 """
 
 from __future__ import annotations

@@ -169,8 +169,7 @@ class Scenario:
         """Convert to a document of numbers and text, from which `from_dict` makes an equal scenario.
 
         A trajectory of your own can be rebuilt if its class is a frozen dataclass, and a controller of your
-        own if its class is registered too. Otherwise it is written as a fingerprint, which can only be
-        compared.
+        own if its class is registered too. Any other is written as a fingerprint, which can only be compared.
         """
         document: dict[str, Document] = {"schema": SCHEMA, "model": encode(self.model)}
         for name in field_names():
