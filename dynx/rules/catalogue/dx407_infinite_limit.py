@@ -11,7 +11,7 @@ dynx refuses it too, because half of the engines do.
 What to do: omit the limit where that is allowed (``type="continuous"`` needs no lower and no upper), or write
 a number that no joint reaches. ``dynx doctor --fix`` writes the largest double, 1.7976931348623157e+308,
 which all four engines read and which dynx reads as "no limit". Infinite masses, inertias and positions have
-no such substitute and remain errors.
+no such substitute, see DX420.
 """
 
 from dynx.rules import measured_on

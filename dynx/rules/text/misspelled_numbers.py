@@ -32,6 +32,10 @@ class MisspelledNumberRule(EditingRule):
         """Check whether the fault matters in this attribute."""
         return self.elements is None or attribute.element.tag in self.elements
 
+    def matches(self, attribute: NumericAttribute, misspelling: Misspelling) -> bool:
+        """Check whether the attribute has the fault of this rule where it matters."""
+        return misspelling.fault == self.fault and self.applies(attribute)
+
     def text_for(self, case: Case, misspelling: Misspelling) -> str:
         """Return the corrected text."""
         return misspelling.meant
@@ -43,7 +47,7 @@ class MisspelledNumberRule(EditingRule):
     def corrections(self, case: Case) -> Iterable[Correction]:
         """Yield every attribute with the fault."""
         for attribute, text, misspelling in _misspelled(case.source):
-            if misspelling.fault != self.fault or not self.applies(attribute):
+            if not self.matches(attribute, misspelling):
                 continue
             end = self.description.format(meant=self.text_for(case, misspelling), count=len(text.split()))
             message = f"{attribute.name} of <{attribute.element.tag}> is {shown(text)}, {end}"

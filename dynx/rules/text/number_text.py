@@ -14,10 +14,11 @@ from typing import Literal
 LARGEST = "1.7976931348623157e+308"
 """The largest double, which every engine can read and which stands for "no limit"."""
 
-Fault = Literal["comma", "separator", "rest", "count", "blank", "tab", "infinite", "empty", "minus"]
+Fault = Literal["comma", "separator", "rest", "count", "blank", "tab", "infinite", "empty", "minus", "word"]
 """Fault of a text: a decimal ``comma``, a ``separator`` other than blanks in a vector, a ``rest`` behind a
 number, a wrong ``count``, a ``blank`` behind a single number, a ``tab`` or line break in a vector, an
-``infinite`` number, an ``empty`` number or vector, a ``minus`` that is not the hyphen of ASCII."""
+``infinite`` number, an ``empty`` number or vector, a ``minus`` that is not the hyphen of ASCII, a ``word``
+without a number."""
 
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _COMMA = re.compile(r"[+-]?(?:[0-9]+,[0-9]*|,[0-9]+)(?:[eE][+-]?[0-9]+)?")
@@ -53,7 +54,8 @@ def decimal(value: float) -> str:
 
 
 def misspelled_number(text: str) -> Misspelling | None:
-    """Return the fault of a text that should be one number; None where it is plain or incomprehensible."""
+    """Return the fault of a text that should be one number; None where it is plain or an expression of
+    xacro."""
     word = text.strip()
     if not word:
         return Misspelling("empty", "")
@@ -63,18 +65,19 @@ def misspelled_number(text: str) -> Misspelling | None:
         return Misspelling("minus", hyphens)
     if sign := _infinite_sign(word):
         return Misspelling("infinite", sign.removeprefix("+") + LARGEST)
-    return _misspelled_word(word)
+    return _misspelled_word(word) or (None if _unexpanded(word) else Misspelling("word", ""))
 
 
 def misspelled_vector(text: str) -> Misspelling | None:
-    """Return the fault of a text that should be three numbers; None where it is plain or incomprehensible."""
+    """Return the fault of a text that should be three numbers; None where it is plain or an expression of
+    xacro."""
     words = text.split()
     if not words:
         return Misspelling("empty", "")
     hyphens = [_MINUS.sub("-", word) for word in words]
     if hyphens != words and len(words) == 3 and all(map(is_number, hyphens)):
         return Misspelling("minus", " ".join(hyphens))
-    if any(mark in text for mark in _UNEXPANDED):
+    if _unexpanded(text):
         return None
     if all(map(is_number, words)):
         if len(words) != 3:
@@ -82,15 +85,16 @@ def misspelled_vector(text: str) -> Misspelling | None:
         odd = any(character.isspace() and character != " " for character in text)
         return Misspelling("tab", " ".join(words)) if odd else None
     if "," in text or ";" in text:
-        return _with_commas(words, text)
+        return _with_commas(words, text) or Misspelling("word", "")
+    if len(words) != 3:
+        return Misspelling("word", "")
     parts = [_word_fault(word) for word in words]
-    if len(words) != 3 or None in parts:
-        return None
-    return Misspelling("rest", " ".join(part.meant for part in parts if part is not None))
+    fault: Fault = "word" if None in parts else "rest"
+    return Misspelling(fault, " ".join("0" if part is None else part.meant for part in parts))
 
 
 def _misspelled_word(word: str) -> Misspelling | None:
-    if any(mark in word for mark in _UNEXPANDED):
+    if _unexpanded(word):
         return None
     if _COMMA.fullmatch(word):
         return Misspelling("comma", word.replace(",", "."), word.replace(",", ""))
@@ -112,6 +116,10 @@ def _hexadecimal(word: str) -> Misspelling | None:
         return Misspelling("rest", repr(float.fromhex(word)))
     except OverflowError:
         return None
+
+
+def _unexpanded(text: str) -> bool:
+    return any(mark in text for mark in _UNEXPANDED)
 
 
 def _word_fault(word: str) -> Misspelling | None:

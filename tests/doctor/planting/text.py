@@ -93,12 +93,12 @@ def empty_vector(site: Site) -> PlantedDefect:
     return _rewrite(site, "DX408", _pick(site, _origins(site)), site.rng.choice(["", " "]))
 
 
-def empty_number(site: Site) -> PlantedDefect:
-    """A lower limit that was not filled in."""
+def without_number(site: Site) -> PlantedDefect:
+    """A lower limit that was not filled in, or is a word."""
     ranges = {each.name: each.limits for each in site.model.joints}
     lower = [each for each in _limits(site) if each.name == "lower" and float(each.text) < 0.0]
     wide = [each for each in lower if each.joint is not None and ranges[each.joint].upper > 0.0]
-    return _rewrite(site, "DX420", _pick(site, wide), site.rng.choice(["", " "]))
+    return _rewrite(site, "DX420", _pick(site, wide), site.rng.choice(["", " ", "none", "nan"]))
 
 
 def typographic_minus(site: Site) -> PlantedDefect:
@@ -345,7 +345,7 @@ PLANTERS = (
     Planter("DX406", tab_in_vector),
     Planter("DX407", infinite),
     Planter("DX408", empty_vector),
-    Planter("DX420", empty_number),
+    Planter("DX420", without_number),
     Planter("DX421", typographic_minus),
     Planter("DX409", missing_product),
     Planter("DX410", incomplete),

@@ -100,16 +100,35 @@ def test_single_numbers(written: str, fault: str, meant: str) -> None:
     assert (found.fault, found.meant) == (fault, meant)
 
 
-INCOMPREHENSIBLE = ["heavy", "nan", "\u2212", "\u22121,5,2", "0x1p9999"]
+@pytest.mark.parametrize(
+    "written", ["heavy", "nan", "\u2212", "\u22121,5,2", "0x1p9999", "1,2,3", "1-2", "--1", "a b"]
+)
+def test_what_is_no_number_is_a_word(written: str) -> None:
+    found = misspelled_number(written)
+    assert found is not None
+    assert (found.fault, found.meant) == ("word", "")
 
 
-@pytest.mark.parametrize("written", [*INCOMPREHENSIBLE, "${mass}", "2.5${unit}", "1,2,3", "1-2", "--1"])
-def test_what_is_no_number_is_not_understood(written: str) -> None:
+@pytest.mark.parametrize(
+    ("written", "meant"),
+    [
+        ("a b c", "0 0 0"),
+        ("1 2 nan", "1 2 0"),
+        ("inf 2kg -3", "0 2 -3"),
+        ("1,2,3,4", ""),
+        ("a", ""),
+        ("1 2 x 4", ""),
+    ],
+)
+def test_words_of_a_vector_are_zero(written: str, meant: str) -> None:
+    found = misspelled_vector(written)
+    assert found is not None
+    assert (found.fault, found.meant) == ("word", meant)
+
+
+@pytest.mark.parametrize("written", ["${mass}", "2.5${unit}", "$(optenv XYZ 1 2 3)", "${a} 0 0"])
+def test_what_xacro_did_not_expand_is_not_understood(written: str) -> None:
     assert misspelled_number(written) is None
-
-
-@pytest.mark.parametrize("written", ["a b c", "$(optenv XYZ 1 2 3)", "${a} 0 0", "1,2,3,4", "1 2 nan"])
-def test_what_is_no_vector_is_not_understood(written: str) -> None:
     assert misspelled_vector(written) is None
 
 
