@@ -76,6 +76,8 @@ def page(entries: Sequence[Entry]) -> str:
         "quantity, until "
         "it is removed. Every cause listed is proved. Rules are explained in [rules.md](rules.md).",
         "",
+        "Figures on public files that the doctor was not developed with: [public_files.md](public_files.md).",
+        "",
     ]
     for group, title in GROUPS.items():
         of = [entry for entry in entries if entry["group"] == group]

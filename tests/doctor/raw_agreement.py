@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 import subprocess
 import sys
@@ -18,7 +19,7 @@ from dynx.doctor.examine.engine_input import without_meshes
 from dynx.doctor.examine.reference_values import TILTED_GRAVITY, draw_states, model_without_mimics
 from dynx.model.model import Base
 from dynx.model.xml.source import XmlSource
-from tests.doctor.survey_files import Entry
+from tests.doctor.survey_files import Entry, read_entries
 
 ENGINES = ("pinocchio", "pybullet", "mujoco", "drake")
 SCRIPTS = {name: Path(__file__).with_name(f"raw_{name}.py") for name in ENGINES}
@@ -137,20 +138,27 @@ def check_entries(entries: Sequence[Entry], folder: Path) -> list[dict[str, tupl
 
 def main() -> None:
     """Check every file that ``tests.doctor.survey_files --json RESULTS --mended FOLDER`` mended."""
-    with Path(sys.argv[1]).open(encoding="utf-8") as lines:
-        entries = [entry for entry in map(json.loads, lines) if entry.get("mended")]
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("results", type=Path, help="results of the survey")
+    parser.add_argument("--json", type=Path, help="file for the differences")
+    options = parser.parse_args()
+    entries = [entry for entry in read_entries(options.results) if entry.get("mended")]
     with TemporaryDirectory(prefix="dynx-") as folder:
         found = check_entries(entries, Path(folder))
-    alike = 0
+    verdicts = []
     for entry, of_engines in zip(entries, found, strict=True):
         apart = {engine: result for engine, result in of_engines.items() if not result[0] <= BAR}
-        alike += not apart
-        for engine, (gap, message) in apart.items():
-            print(f"DIFFERS: {entry['path']}, {entry['base']}: {engine} {gap:.1e} {message[:200]}")
+        messages = {engine: message or f"{gap:.1e}" for engine, (gap, message) in apart.items()}
+        verdicts.append({"path": entry["path"], "base": entry["base"], "alike": not apart, "apart": messages})
+        for engine, message in messages.items():
+            print(f"DIFFERS: {entry['path']}, {entry['base']}: {engine} {message[:200]}")
     for engine in ENGINES:
         gaps = [of_engines[engine][0] for of_engines in found]
         print(f"{engine}: {sum(gap <= BAR for gap in gaps)} of {len(gaps)} within {BAR:g} of {ENGINES[0]}")
+    alike = sum(not each["apart"] for each in verdicts)
     print(f"{alike} of {len(entries)} mended files are loaded alike by all engines")
+    if options.json:
+        options.json.write_text(json.dumps(verdicts), encoding="utf-8")
 
 
 if __name__ == "__main__":
