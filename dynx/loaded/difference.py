@@ -48,7 +48,7 @@ Row = tuple[str, str, str, Any, Any]
 
 
 def model_difference(model: Model, loaded: Iterable[LoadedModel]) -> tuple[Deviation, ...]:
-    """Every deviation of the engines from `model`, engine by engine, links before joints.
+    """Return every deviation of the engines from `model`, engine by engine, links before joints.
 
     The inertia of the root link of a fixed base is not compared: no result depends on it, and some engines
     drop it. `model` has the base with which the engines loaded the file.
@@ -118,7 +118,7 @@ def _inertial(
 
 
 def _offset_inertia(inertial: LoadedInertial) -> float:
-    """The part of the moment of inertia about the link's origin that comes from the centre of mass."""
+    """Return the part of the moment of inertia about the link's origin that comes from the centre of mass."""
     return float(inertial.mass * np.sum(inertial.center**2))
 
 
@@ -172,7 +172,7 @@ def _pose(wanted: Floats, held: Floats, reach: float) -> Iterator[tuple[str, Any
 
 
 def _differ(wanted: Any, held: Any, size: float = 0.0) -> bool:
-    """Whether two numbers or arrays differ by more than rounding of the largest entry, or of `size`."""
+    """Check whether two numbers or arrays differ by more than rounding of the largest entry, or of `size`."""
     wanted, held = np.asarray(wanted, dtype=np.float64), np.asarray(held, dtype=np.float64)
     if np.array_equal(wanted, held):
         return False
@@ -183,14 +183,14 @@ def _differ(wanted: Any, held: Any, size: float = 0.0) -> bool:
 
 
 def _reach(model: Model) -> float:
-    """The largest offset in the file [m], in proportion to which positions are rounded."""
+    """Return the largest offset in the file [m], in proportion to which positions are rounded."""
     offsets = [joint.origin.xyz for joint in model.joints]
     offsets += [link.inertial.origin.xyz for link in model.links if link.inertial is not None]
     return max((abs(x) for offset in offsets for x in offset), default=0.0)
 
 
 def _number(value: float) -> float | None:
-    """The limit, or None where there is none, because JSON has no infinity."""
+    """Return the limit, or None where there is none, because JSON has no infinity."""
     return float(value) if abs(value) < NO_LIMIT else None
 
 

@@ -16,7 +16,7 @@ Placements = Mapping[str, tuple[str, Floats]]
 
 
 def rigid_placements(model: Model) -> Placements:
-    """The placement of each link in its rigid group."""
+    """Return the placement of each link in its rigid group."""
     placements = {model.root: (model.root, np.eye(4))}
     for joint in model.joints:
         if joint.moves:
@@ -34,7 +34,7 @@ def merged_inertial(
     others: Sequence[str],
     instead: Mapping[str, LoadedInertial],
 ) -> LoadedInertial:
-    """The inertia that the file gives for `link` and those of `others` that are rigidly connected to it.
+    """Return the inertia, by the file, of `link` and those of `others` that are rigidly connected to it.
 
     `placements` is `rigid_placements` of the model. An inertial in `instead` replaces that of the file.
     """
@@ -60,7 +60,7 @@ def merged_inertial(
 
 
 def _in_frame(model: Model, link: str, T: Floats, instead: Mapping[str, LoadedInertial]) -> LoadedInertial:
-    """The inertia of one link, where T (4, 4) is its pose in the frame of the result."""
+    """Return the inertia of one link, where T (4, 4) is its pose in the frame of the result."""
     R, p = T[:3, :3], T[:3, 3]
     if link in instead:
         held = instead[link]

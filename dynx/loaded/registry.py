@@ -43,24 +43,24 @@ COMMON_VARIANTS = ("pybullet:plain",)
 
 
 def engine_of(name: str) -> str:
-    """The engine of a loading variant; an engine's own name."""
+    """Return the engine of a loading variant, or the name itself if it is that of an engine."""
     return name.partition(":")[0]
 
 
 def loader_class(engine: str) -> type[LoadedRobot]:
-    """The class of that engine or variant; raises NotInstalledError where the engine is missing."""
+    """Return the class of that engine or variant; raises NotInstalledError where the engine is missing."""
     found = REGISTRY.find(engine)
     found.engine_version()
     return found
 
 
 def installed_engines() -> tuple[str, ...]:
-    """Names of the engines that can be used here, without variants; this imports them."""
+    """Return the names of the engines that can be used here, without variants; this imports them."""
     return tuple(name for name in REGISTRY.names() if engine_of(name) == name and _is_installed(name))
 
 
 def load_as(engine: str, path: Path, model: Model, calls: Collection[str] = ()) -> LoadedRobot:
-    """The robot as `engine` loads it from the file; see `LoadedRobot`."""
+    """Return the robot as `engine` loads it from the file; see `LoadedRobot`."""
     return loader_class(engine)(path, model, calls)
 
 

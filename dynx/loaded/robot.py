@@ -48,44 +48,45 @@ class LoadedRobot(ABC):
     @classmethod
     @abstractmethod
     def engine_version(cls) -> str:
-        """The version of the engine that is installed, such as ``3.2.7``."""
+        """Return the version of the engine that is installed, such as ``3.2.7``."""
 
     @classmethod
     @abstractmethod
     def load_call(cls, floating: bool) -> str:
-        """The documented call that loads a file, as the line or lines of code that users write."""
+        """Return the documented call that loads a file, as the line or lines of code that users write."""
 
     @abstractmethod
     def describe(self) -> LoadedModel:
-        """The model that the engine holds."""
+        """Return the model that the engine holds."""
 
     @abstractmethod
     def link_poses(self, q: Floats) -> Floats:
-        """T_world_link (n_links, 4, 4) in the order of `model.links`; NaN for links that it lacks."""
+        """Return T_world_link (n_links, 4, 4) in the order of `model.links`; NaN for links that it lacks."""
 
     @abstractmethod
     def jacobian(self, q: Floats, link: str) -> Floats:
-        """Geometric Jacobian (6, nv) of a link frame, linear rows first, axes of the world; NaN for a
-        link that it lacks."""
+        """Return the geometric Jacobian (6, nv) of a link frame, linear rows first, axes of the world; NaN
+        for a link that it lacks."""
 
     @abstractmethod
     def mass_matrix(self, q: Floats) -> Floats:
-        """M (nv, nv)."""
+        """Return M (nv, nv)."""
 
     @abstractmethod
     def inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
-        """tau (nv,) as the engine computes it, including joint damping, say, if it adds that."""
+        """Return tau (nv,) as the engine computes it, with joint damping if the engine adds it, for example."""
 
     @abstractmethod
     def forward_dynamics(self, q: Floats, v: Floats, tau: Floats) -> Floats:
-        """a (nv,)."""
+        """Return a (nv,)."""
 
     @abstractmethod
     def close(self) -> None:
         """Release the resources of the engine."""
 
     def _solved_acceleration(self, q: Floats, v: Floats, tau: Floats) -> Floats:
-        """a (nv,) from the engine's mass matrix and inverse dynamics; NaN where the matrix is singular.
+        """Return a (nv,) from the engine's mass matrix and inverse dynamics; NaN where the matrix
+        is singular.
 
         This replaces an engine's own forward dynamics where that would move a joint which the model lacks.
         """
@@ -109,7 +110,7 @@ def require_file(path: Path) -> None:
 
 
 def lacking_joints(engine: str, model: Model, instead: Mapping[str, str]) -> EngineError:
-    """The error of an engine in which joints of `model` do not have one degree of freedom.
+    """Return the error of an engine in which joints of `model` do not have one degree of freedom.
 
     `instead` maps the name of each to its type in the engine.
     """

@@ -1,4 +1,4 @@
-"""Proof of a cause by ablation: it is removed alone, or all others are, and the engines are measured again.
+"""Proof of a cause by ablation: remove it alone, or all others, and measure the engines again.
 
 For every place where a rule applies, its cause is removed there and nowhere else, and each engine that the
 rule names loads the file again. The change in the engine's deviation from the reference values is the
@@ -27,8 +27,8 @@ from dynx.spatial.extended import FLOAT64_EPS
 NO_EFFECT = Effect("", 0.0)
 
 NOISE_SHARE = 0.01
-"""Largest rounding of the errors of an engine, as a share of the tolerance, at which their differences are
-effects."""
+"""Largest rounding error of an engine's errors, over the tolerance, with which their differences are still
+taken for effects."""
 
 
 @dataclass(frozen=True)
@@ -163,7 +163,7 @@ class Attributor:
         return {name: effect for name, effect in found.items() if effect is not NO_EFFECT}
 
     def _effect(self, engine: str, with_cause: Examination, without: Examination) -> Effect:
-        """Change of the engine's output, in the quantity in which it is largest."""
+        """Return the change of the engine's output, in the quantity in which it is largest."""
         one, other = with_cause.outputs[engine], without.outputs[engine]
         if other.refused is not None:
             return NO_EFFECT
@@ -186,11 +186,11 @@ class Attributor:
         return Attribution(rule, each, dict(effects), bool(effects) and right)
 
     def _reference_of(self, remedy: Remedy) -> ReferenceValues:
-        """Return the reference values of the file after a remedy: the known ones where the robot is the
-        same."""
+        """Return the reference values of the file after a remedy: those of the file before it where the robot
+        is the same."""
         if not remedy.changes_physics and _coordinates(remedy.case) == _coordinates(self.case):
             return self.before.reference
-        # Other places may still hold text that dynx refuses, whose meaning is known too.
+        # Text that dynx refuses may be left at other places; `readable` corrects it.
         return self.examiner.reference(readable(remedy.case).case)
 
 

@@ -72,12 +72,13 @@ class LoadedDrake(LoadedRobot):
 
     @classmethod
     def engine_version(cls) -> str:
-        """The version of Drake's distribution, such as ``1.51.1``."""
+        """Return the version of Drake's distribution, such as ``1.51.1``."""
         return drake_version()
 
     @classmethod
     def load_call(cls, floating: bool) -> str:
-        """Four lines for a fixed base; without ``WeldFrames`` the base floats."""
+        """Return the call: four lines for a fixed base; for a floating one the line with ``WeldFrames`` is
+        omitted."""
         weld = "plant.WeldFrames(plant.world_frame(), plant.GetFrameByName(root_link))\n"
         return (
             "plant = MultibodyPlant(time_step=0.0)\n"
@@ -87,7 +88,7 @@ class LoadedDrake(LoadedRobot):
     # -- quantities ------------------------------------------------------------------------------
 
     def link_poses(self, q: Floats) -> Floats:
-        """``EvalBodyPoseInWorld``."""
+        """Return the poses that ``EvalBodyPoseInWorld`` gives."""
         T = np.full((len(self._model.links), 4, 4), np.nan)
         with self._convert_errors("EvalBodyPoseInWorld"):
             self._place(q)
@@ -98,7 +99,7 @@ class LoadedDrake(LoadedRobot):
         return T
 
     def jacobian(self, q: Floats, link: str) -> Floats:
-        """``CalcJacobianSpatialVelocity`` with respect to v, with the linear rows first."""
+        """Return the result of ``CalcJacobianSpatialVelocity`` with respect to v, linear rows first."""
         if link not in self._bodies:
             return np.full((6, self._model.nv), np.nan)
         frame, world = self._bodies[link].body_frame(), self._plant.world_frame()
@@ -108,13 +109,13 @@ class LoadedDrake(LoadedRobot):
         return self._coordinates.forces_back(R, np.concatenate([J[3:], J[:3]]))
 
     def mass_matrix(self, q: Floats) -> Floats:
-        """``CalcMassMatrix``, which includes the reflected inertia of rotors."""
+        """Return the result of ``CalcMassMatrix``, which includes the reflected inertia of rotors."""
         with self._convert_errors("CalcMassMatrix"):
             R = self._place(q)
             return self._coordinates.matrix_back(R, np.array(self._plant.CalcMassMatrix(self._context)))
 
     def inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
-        """``CalcInverseDynamics`` with the forces of ``CalcForceElementsContribution``."""
+        """Return the result of ``CalcInverseDynamics`` with the forces of ``CalcForceElementsContribution``."""
         plant, coordinates = self._plant, self._coordinates
         with self._convert_errors("CalcInverseDynamics"):
             R = self._place(q)
@@ -125,8 +126,11 @@ class LoadedDrake(LoadedRobot):
         return coordinates.forces_back(R, tau)
 
     def forward_dynamics(self, q: Floats, v: Floats, tau: Floats) -> Floats:
-        """The port ``generalized_acceleration``; solved from ``CalcMassMatrix`` and
-        ``CalcInverseDynamics`` where a joint that the model lacks is held."""
+        """Return the output port ``generalized_acceleration``.
+
+        Where a joint that the model lacks is held, the acceleration is solved from ``CalcMassMatrix`` and
+        ``CalcInverseDynamics``.
+        """
         if self._model.nv < self._plant.num_velocities():
             return self._solved_acceleration(q, v, tau)
         with self._convert_errors("compute forward dynamics of"):
@@ -183,7 +187,7 @@ class LoadedDrake(LoadedRobot):
         return found
 
     def _find_joints(self, instances: list[Any]) -> dict[str, Any]:
-        """The file's joints by name, without the one to the world that is a weld or floats."""
+        """Return the file's joints by name, without the one to the world that is a weld or floats."""
         plant = self._plant
         known = {joint.name for joint in self._model.joints}
         joints = [
@@ -192,7 +196,7 @@ class LoadedDrake(LoadedRobot):
         return {joint.name(): joint for joint in joints if joint.name() in known}
 
     def _find_coordinates(self) -> DrakeCoordinates:
-        """The map between the coordinates of dynx and those of the plant."""
+        """Return the map between the coordinates of dynx and those of the plant."""
         plant, model = self._plant, self._model
         wanted = [self._joints.get(name) for name in model.joint_names]
         wrong = {

@@ -47,12 +47,12 @@ class LoadedMujoco(LoadedRobot):
 
     @classmethod
     def engine_version(cls) -> str:
-        """The version of MuJoCo."""
+        """Return the version of MuJoCo."""
         return str(mujoco.__version__)
 
     @classmethod
     def load_call(cls, floating: bool) -> str:
-        """One line for a fixed base, three for a floating one."""
+        """Return the call: one line for a fixed base, three for a floating one."""
         return loading_lines(floating=floating)
 
     def describe(self) -> LoadedModel:
@@ -60,7 +60,7 @@ class LoadedMujoco(LoadedRobot):
         return replace(describe_model(self._loaded, self._model, self._gravity), engine=self.name)
 
     def link_poses(self, q: Floats) -> Floats:
-        """T_world_link (n_links, 4, 4); NaN for links that MuJoCo merged into others."""
+        """Return T_world_link (n_links, 4, 4); NaN for links that MuJoCo merged into others."""
         self._place(q)
         mujoco.mj_kinematics(self._loaded, self._data)
         T = np.full((len(self._bodies), 4, 4), np.nan)
@@ -72,7 +72,7 @@ class LoadedMujoco(LoadedRobot):
         return T
 
     def jacobian(self, q: Floats, link: str) -> Floats:
-        """`mj_jacBody` of a link frame, (6, nv)."""
+        """Return the Jacobian (6, nv) of a link frame by `mj_jacBody`."""
         body = self._bodies[self._model.frame_index(link)]
         if body is None:
             return np.full((6, len(self._v)), np.nan)
@@ -87,7 +87,7 @@ class LoadedMujoco(LoadedRobot):
         return J
 
     def mass_matrix(self, q: Floats) -> Floats:
-        """`mj_fullM`, (nv, nv)."""
+        """Return the mass matrix (nv, nv) by `mj_fullM`."""
         self._place(q)
         mujoco.mj_forward(self._loaded, self._data)
         M = np.zeros((self._loaded.nv, self._loaded.nv))
@@ -104,7 +104,7 @@ class LoadedMujoco(LoadedRobot):
         return M
 
     def inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
-        """`mj_inverse`, (nv,), which subtracts damping and constraint forces."""
+        """Return the torque (nv,) of `mj_inverse`, which subtracts damping and constraint forces."""
         self._place(q, v)
         self._data.qacc[self._v] = a
         if self._model.floating:
@@ -116,7 +116,7 @@ class LoadedMujoco(LoadedRobot):
         return tau
 
     def forward_dynamics(self, q: Floats, v: Floats, tau: Floats) -> Floats:
-        """`mj_forward` with `tau` in `qfrc_applied`, (nv,)."""
+        """Return the acceleration (nv,) of `mj_forward` with `tau` in `qfrc_applied`."""
         self._place(q, v)
         self._data.qfrc_applied[self._v] = tau
         if self._model.floating:
@@ -150,12 +150,12 @@ class LoadedMujoco(LoadedRobot):
                 data.qvel[:3] = self._base_rotation() @ v[:3]
 
     def _base_rotation(self) -> Floats:
-        """R of the base; MuJoCo has the base's linear velocity in world axes."""
+        """Return R of the base; MuJoCo has the base's linear velocity in world axes."""
         R: Floats = self._data.xmat[self._loaded.jnt_bodyid[0]].reshape(3, 3)
         return R
 
     def _body(self, link: str) -> int | None:
-        """MuJoCo's body for a link; the world for a fixed root named ``world``."""
+        """Return MuJoCo's body for a link; the world for a fixed root named ``world``."""
         if not link:
             return None
         number = int(mujoco.mj_name2id(self._loaded, mujoco.mjtObj.mjOBJ_BODY, link))
@@ -181,5 +181,5 @@ class BalancedMujoco(LoadedMujoco):
 
     @classmethod
     def load_call(cls, floating: bool) -> str:
-        """Three lines for a fixed base, four for a floating one."""
+        """Return the call: three lines for a fixed base, four for a floating one."""
         return loading_lines(floating=floating, options="spec.compiler.balanceinertia = True")

@@ -61,19 +61,19 @@ class LoadedPinocchio(LoadedRobot):
 
     @classmethod
     def engine_version(cls) -> str:
-        """The version of the library pinocchio, such as ``4.1.0``."""
+        """Return the version of the library pinocchio, such as ``4.1.0``."""
         return str(pin.__version__)
 
     @classmethod
     def load_call(cls, floating: bool) -> str:
-        """One line; the joint of a floating base is the second argument."""
+        """Return the call: one line; the joint of a floating base is its second argument."""
         root = ", pinocchio.JointModelFreeFlyer()" if floating else ""
         return f"model = pinocchio.buildModelFromUrdf(path{root})"
 
     # -- quantities ------------------------------------------------------------------------------
 
     def link_poses(self, q: Floats) -> Floats:
-        """Poses of the engine's BODY frames."""
+        """Return the poses of the engine's BODY frames."""
         T = np.full((len(self._model.links), 4, 4), np.nan)
         with self._convert_errors("framesForwardKinematics"):
             pin.framesForwardKinematics(self._engine, self._data, self._configuration(q))
@@ -83,7 +83,7 @@ class LoadedPinocchio(LoadedRobot):
         return T
 
     def jacobian(self, q: Floats, link: str) -> Floats:
-        """``computeFrameJacobian`` in LOCAL_WORLD_ALIGNED."""
+        """Return the result of ``computeFrameJacobian`` in LOCAL_WORLD_ALIGNED."""
         if link not in self._links:
             return np.full((6, self._model.nv), np.nan)
         with self._convert_errors("computeFrameJacobian"):
@@ -98,7 +98,7 @@ class LoadedPinocchio(LoadedRobot):
         return np.asarray(J.reshape(6, self._engine.nv)[:, self._v])
 
     def mass_matrix(self, q: Floats) -> Floats:
-        """``crba``."""
+        """Return the mass matrix by ``crba``."""
         with self._convert_errors("crba"):
             M = np.array(pin.crba(self._engine, self._data, self._configuration(q)))
         # Some versions fill the upper triangle only.
@@ -106,7 +106,7 @@ class LoadedPinocchio(LoadedRobot):
         return np.asarray(M[np.ix_(self._v, self._v)])
 
     def inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
-        """``rnea``."""
+        """Return the torque by ``rnea``."""
         with self._convert_errors("rnea"):
             tau = pin.rnea(
                 self._engine, self._data, self._configuration(q), self._velocity(v), self._velocity(a)
@@ -114,7 +114,8 @@ class LoadedPinocchio(LoadedRobot):
         return np.asarray(tau[self._v])
 
     def forward_dynamics(self, q: Floats, v: Floats, tau: Floats) -> Floats:
-        """``aba``; solved from ``crba`` and ``rnea`` where a joint that the model lacks is held."""
+        """Return the acceleration by ``aba``, or from ``crba`` and ``rnea`` where a joint that the model lacks
+        is held."""
         if len(self._v) < self._engine.nv:
             return self._solved_acceleration(q, v, tau)
         with self._convert_errors("aba"):
@@ -201,7 +202,7 @@ class LoadedPinocchio(LoadedRobot):
     # -- coordinates --------------------------------------------------------------------------
 
     def _find_joints(self) -> list[Any]:
-        """The engine's joint for each coordinate of dynx."""
+        """Return the engine's joint for each coordinate of dynx."""
         known = {name: self._engine.joints[number] for number, name in enumerate(self._engine.names)}
         names = self._model.joint_names
         wrong = {

@@ -100,7 +100,7 @@ class LoadedPyBullet(LoadedRobot):
 
     @classmethod
     def _uses_file_inertia(cls, calls: Collection[str]) -> bool:
-        """Whether the call that loads the file has the flag for the inertias of the file."""
+        """Check whether the call that loads the file has the flag for the inertias of the file."""
         return True
 
     @property
@@ -110,7 +110,7 @@ class LoadedPyBullet(LoadedRobot):
 
     @classmethod
     def engine_version(cls) -> str:
-        """The version of the distribution, such as ``3.2.7``."""
+        """Return the version of the distribution, such as ``3.2.7``."""
         bullet()
         try:
             return version("pybullet")
@@ -119,7 +119,7 @@ class LoadedPyBullet(LoadedRobot):
 
     @classmethod
     def load_call(cls, floating: bool) -> str:
-        """One line, after ``import pybullet as p`` and ``p.connect(p.DIRECT)``."""
+        """Return the call: one line, after ``import pybullet as p`` and ``p.connect(p.DIRECT)``."""
         return f"robot = p.loadURDF(path, useFixedBase={not floating}, flags=p.URDF_USE_INERTIA_FROM_FILE)"
 
     def describe(self) -> LoadedModel:
@@ -136,7 +136,7 @@ class LoadedPyBullet(LoadedRobot):
     # -- quantities ------------------------------------------------------------------------------
 
     def link_poses(self, q: Floats) -> Floats:
-        """Poses composed from those of the inertial frames."""
+        """Return the poses composed from those of the inertial frames."""
         client = self._client
         if self._model.floating:
             T_world_C = homogeneous(rotation_from_quat(q[3:7]), q[:3]) @ self._T_base_C
@@ -154,7 +154,7 @@ class LoadedPyBullet(LoadedRobot):
         return T
 
     def jacobian(self, q: Floats, link: str) -> Floats:
-        """`calculateJacobian` at the origin of the link frame.
+        """Return the result of `calculateJacobian` at the origin of the link frame.
 
         That call needs a moving joint; for the root, and for a robot without such a joint, the Jacobian is
         computed from the poses.
@@ -175,7 +175,7 @@ class LoadedPyBullet(LoadedRobot):
         return J
 
     def _base_jacobian(self, q: Floats, link: str) -> Floats:
-        """The Jacobian of a link that moves with the base only."""
+        """Return the Jacobian of a link that moves with the base only."""
         J = np.zeros((6, self._model.nv))
         if self._model.floating:
             R = rotation_from_quat(q[3:7])
@@ -186,7 +186,7 @@ class LoadedPyBullet(LoadedRobot):
         return J
 
     def mass_matrix(self, q: Floats) -> Floats:
-        """`calculateMassMatrix`."""
+        """Return the result of `calculateMassMatrix`."""
         if not self._has_coordinates:
             return np.zeros((0, 0))
         M = self._extrapolate(lambda client: client.mass_matrix(self._joints(q)))
@@ -199,7 +199,7 @@ class LoadedPyBullet(LoadedRobot):
         return M
 
     def inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
-        """`calculateInverseDynamics`."""
+        """Return the result of `calculateInverseDynamics`."""
         if not self._has_coordinates:
             return np.zeros(0)
         if not self._model.floating:
@@ -221,7 +221,7 @@ class LoadedPyBullet(LoadedRobot):
         return np.concatenate([wrench, tau[6:][self._order]])
 
     def forward_dynamics(self, q: Floats, v: Floats, tau: Floats) -> Floats:
-        """The change of the velocity in one step of unit length.
+        """Return the change of the velocity in one step of unit length.
 
         It is solved from mass matrix and inverse dynamics where a joint that the model lacks is held.
         """
@@ -248,7 +248,7 @@ class LoadedPyBullet(LoadedRobot):
     # -- coordinates --------------------------------------------------------------------------
 
     def _find_joints(self) -> list[int]:
-        """The index of each coordinate of dynx among those of Bullet."""
+        """Return the index of each coordinate of dynx among those of Bullet."""
         engine, client = self._client.engine, self._client
         single = {engine.JOINT_REVOLUTE, engine.JOINT_PRISMATIC}
         kinds = {_text(info[1]): info[2] for info in client.joints}
@@ -277,7 +277,7 @@ class LoadedPyBullet(LoadedRobot):
         return self._in_bullet_order(q[7 if self._model.floating else 0 :])
 
     def _in_bullet_order(self, values: Floats) -> list[float]:
-        """The last entries of `values`, one for each joint of dynx, in Bullet's order; zero for other
+        """Return the last entries of `values`, one for each joint of dynx, in Bullet's order; zero for other
         joints."""
         n = len(self._order)
         x = [0.0] * len(self._client.moving)

@@ -101,7 +101,7 @@ def tree_may_reject(inertial: Inertial, *, on_fixed_joint: bool) -> bool:
 
 
 def tree_asymmetry(inertial: Inertial) -> float:
-    """The largest difference [kg m^2] of two opposite entries of the tensor about the link's origin.
+    """Return the largest difference [kg m^2] of two opposite entries of the tensor about the link's origin.
 
     The tree of inverse dynamics computes it in the axes of the inertial frame, as moments minus
     ``(mass * cross) * cross`` with the cross-product matrix of the centre of mass: ``(mass * x) * y`` and
@@ -117,7 +117,7 @@ def tree_asymmetry(inertial: Inertial) -> float:
 
 
 def _basis(rpy: tuple[float, float, float]) -> list[list[float]]:
-    """The rotation of ``rpy`` as Bullet computes it: from a normalised quaternion."""
+    """Return the rotation of ``rpy`` as Bullet computes it: from a normalised quaternion."""
     (sr, cr), (sp, cp), (sy, cy) = ((math.sin(angle / 2), math.cos(angle / 2)) for angle in rpy)
     quat = (
         sr * cp * cy - cr * sp * sy,

@@ -32,5 +32,5 @@ class PlainPyBullet(LoadedPyBullet):
 
     @classmethod
     def load_call(cls, floating: bool) -> str:
-        """One line, after ``import pybullet as p`` and ``p.connect(p.DIRECT)``."""
+        """Return the call: one line, after ``import pybullet as p`` and ``p.connect(p.DIRECT)``."""
         return "robot = p.loadURDF(path)" if floating else "robot = p.loadURDF(path, useFixedBase=True)"

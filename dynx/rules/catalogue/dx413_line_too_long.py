@@ -64,7 +64,7 @@ def _long_lines(data: bytes) -> Iterator[Span]:
 
 
 def _cut_position(data: bytes, element: SourceElement, line: Span) -> int | None:
-    """Return the byte of a line before which a cut falls into the element's start or end tag."""
+    """Return the position in `data` at which PyBullet cuts the start or end tag of the element, if any."""
     tags = [element.start_tag]
     if not element.empty:
         tags.append(Span(data.rindex(b"</", 0, element.span.end), element.span.end))

@@ -29,6 +29,6 @@ class MaterialDefinedTwice(EditingRule):
         for material in case.source.root.all("material"):
             name = material.attributes.get("name", "")
             if name in seen:
-                message = f"material {shown(name)} is defined a further time"
+                message = f"material {shown(name)} is defined again"
                 yield correction(material, message, case.source.removal(material))
             seen.add(name)

@@ -1,9 +1,9 @@
 """DX515 misspelled-word: An element or attribute is misspelled, so every reader ignores it.
 
 URDF readers ignore unknown names, mostly without a warning: with ``<intertial>`` the link has no mass, with
-``<limit uper="1">`` the range ends at 0, with ``<dynamics dampng="1">`` there is no damping. Reported are
-elements of ``<robot>``, ``<link>``, ``<joint>`` and ``<inertial>``, and attributes of elements that matter
-for dynamics, that are unknown and close to a missing known name.
+``<limit uper="1">`` the range ends at 0, with ``<dynamics dampng="1">`` there is no damping. The rule
+reports an unknown name that is close to a known name which is missing: of elements of ``<robot>``,
+``<link>``, ``<joint>`` and ``<inertial>``, and of attributes of elements that matter for dynamics.
 
 Extensions (``<gazebo>``, ``<sensor>``, names with a prefix) are not close to any of them.
 

@@ -81,7 +81,7 @@ def _enclosing(folder: Path) -> Path:
 
 
 def _is_private(folder: Path) -> bool:
-    """Whether a folder can belong to one description: not the root, a home folder, or one above it."""
+    """Check whether a folder can belong to one description: not the root, a home folder, or one above it."""
     home = Path(os.path.realpath(os.path.expanduser("~")))
     return folder != folder.parent and not home.is_relative_to(folder)
 

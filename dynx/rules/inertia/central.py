@@ -93,7 +93,7 @@ def _nearest_axes(axes: Array, wanted: Array) -> tuple[list[int], Array]:
         if np.linalg.det(np.asarray(axes[:, order] * signs, dtype=float)) < 0:
             signs[int(np.argmin(np.abs(along)))] *= -1
         trace = float(np.sum(along * signs))
-        # The order of the document wins unless another is clearly nearer.
+        # Of orders that are equally near, to rounding, the first is kept.
         if best is None or trace > best[0] + 1e-9:
             best = trace, order, axes[:, order] * signs
     assert best is not None

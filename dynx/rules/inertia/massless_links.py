@@ -25,7 +25,7 @@ def massless_links(case: Case) -> dict[str, bool]:
     """Return the first link of each moving rigid group without mass and moments.
 
     The value is True where no link beyond it has mass or moments either. A robot without any inertial data
-    has no such links: DX118 is about the whole.
+    has no such links here, because DX118 reports it.
     """
     if not has_inertial_data(case):
         return {}
