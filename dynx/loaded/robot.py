@@ -74,7 +74,7 @@ class LoadedRobot(ABC):
 
     @abstractmethod
     def inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
-        """Return tau (nv,) as the engine computes it, with joint damping if the engine adds it, for example."""
+        """Return tau (nv,) as the engine computes it, with joint damping, say, if the engine adds it."""
 
     @abstractmethod
     def forward_dynamics(self, q: Floats, v: Floats, tau: Floats) -> Floats:

@@ -115,7 +115,7 @@ class LoadedDrake(LoadedRobot):
             return self._coordinates.matrix_back(R, np.array(self._plant.CalcMassMatrix(self._context)))
 
     def inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
-        """Return the result of ``CalcInverseDynamics`` with the forces of ``CalcForceElementsContribution``."""
+        """Return the torque of ``CalcInverseDynamics`` with forces by ``CalcForceElementsContribution``."""
         plant, coordinates = self._plant, self._coordinates
         with self._convert_errors("CalcInverseDynamics"):
             R = self._place(q)

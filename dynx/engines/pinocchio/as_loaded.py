@@ -114,7 +114,7 @@ class LoadedPinocchio(LoadedRobot):
         return np.asarray(tau[self._v])
 
     def forward_dynamics(self, q: Floats, v: Floats, tau: Floats) -> Floats:
-        """Return the acceleration by ``aba``, or from ``crba`` and ``rnea`` where a joint that the model lacks
+        """Return the acceleration by ``aba``, or by ``crba`` and ``rnea`` where a joint that the model lacks
         is held."""
         if len(self._v) < self._engine.nv:
             return self._solved_acceleration(q, v, tau)
