@@ -40,12 +40,12 @@ def layers(text: str) -> list[list[str]]:
 
 
 def test_every_room_has_a_line() -> None:
-    table = PAGE[PAGE.index("## The rooms") : PAGE.index("## How one text")]
+    table = PAGE.partition("## The rooms")[2].partition("\n## ")[0]
     assert set(re.findall(r"^\| `(\w+)` \|", table, flags=re.MULTILINE)) == rooms()
 
 
 def test_the_picture_has_the_rooms_in_the_order_of_the_import_contract() -> None:
-    picture = PAGE[PAGE.index("```text") : PAGE.index("Engines stand high")].splitlines()
+    picture = PAGE.partition("```text")[2].partition("```")[0].splitlines()
     drawn = {room: number for number, line in enumerate(picture) for room in re.findall(r"\w+", line[:28])}
     heights = [[drawn[room] for room in layer] for layer in layers(PROJECT)]
     for above, below in pairwise(heights):
