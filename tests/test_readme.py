@@ -24,7 +24,7 @@ README = PAGES["README.md"]
 
 
 def blocks(language: str, text: str = README) -> list[str]:
-    """The fenced blocks of one language, in order."""
+    """Return the fenced blocks of one language, in order."""
     return re.findall(rf"^```{language}\n(.*?)^```$", text, flags=re.MULTILINE | re.DOTALL)
 
 
@@ -45,7 +45,7 @@ def commands() -> list[tuple[str, str]]:
 
 
 def shape(line: str) -> str:
-    """A line with its numbers, and the blanks that align them, taken out."""
+    """Return a line with its numbers, and the blanks that align them, taken out."""
     return re.sub(r"\s+", " ", re.sub(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?", "#", line)).strip()
 
 

@@ -38,7 +38,7 @@ def errors(name: str, document: object) -> list[str]:
 
 
 def every_key(document: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
-    """The path of each key of the objects in a document."""
+    """Return the path of each key of the objects in a document."""
     items = document.items() if isinstance(document, dict) else []
     here = [(*path, key) for key, _ in items]
     entries = list(items) if here else list(enumerate(document)) if isinstance(document, list) else []

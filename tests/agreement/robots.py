@@ -20,7 +20,7 @@ ASKEW = Pose((0.1, 0.2, 0.3), (0.4, 0.1, -0.3))
 
 
 def arm(base: Base = "fixed") -> Model:
-    """Two revolute joints, a sliding one, a follower, a fixed tip; axes and origins are askew."""
+    """Return two revolute joints, a sliding one, a follower, a fixed tip; axes and origins are askew."""
     links = [Link(name, BODY) for name in ("foot", "upper", "lower", "slide", "finger")] + [Link("tip")]
     joints = [
         Joint(
@@ -46,14 +46,14 @@ def arm(base: Base = "fixed") -> Model:
 
 
 def pendulum(mass: float, length: float) -> Model:
-    """A point mass on a massless rod about the y axis, hanging down at 0."""
+    """Return a point mass on a massless rod about the y axis, hanging down at 0."""
     bob = Inertial(mass, Pose((0.0, 0.0, -length)))
     joint = Joint("hinge", "continuous", "world", "rod", axis=(0.0, 1.0, 0.0))
     return Model.build("pendulum", [Link("world"), Link("rod", bob)], [joint])
 
 
 def massless_finger() -> Model:
-    """A joint that moves no inertia: M is singular everywhere."""
+    """Return a joint that moves no inertia: M is singular everywhere."""
     links = [Link("foot", BODY), Link("arm", BODY), Link("finger")]
     joints = [Joint("swing", "continuous", "foot", "arm"), Joint("point", "continuous", "arm", "finger")]
     return Model.build("massless_finger", links, joints)
@@ -68,7 +68,7 @@ def massless_chain(n_joints: int) -> Model:
 
 
 def rock(base: Base = "fixed") -> Model:
-    """One link, no joint."""
+    """Return a robot of one link and no joint."""
     return Model.build("rock", [Link("rock", BODY)], [], base=base)
 
 

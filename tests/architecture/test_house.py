@@ -19,13 +19,13 @@ FOLDERS_OF_INDEPENDENT_MODULES = {Path("dynx/rules/catalogue")}
 
 
 def rooms() -> set[str]:
-    """Names of the folders and modules directly in dynx, without those that every package has."""
+    """Return the names of the folders and modules directly in dynx, without those that every package has."""
     entries = (path for path in (ROOT / "dynx").iterdir() if not path.name.startswith("_"))
     return {path.stem for path in entries if path.is_dir() or path.suffix == ".py"}
 
 
 def sources() -> dict[Path, int]:
-    """Number of lines of each module of the project that is not empty."""
+    """Return the number of lines of each module of the project that is not empty."""
     folders = ("dynx", "tests", "benchmarks", "docs")
     paths = (path for folder in folders for path in ROOT.glob(f"{folder}/**/*.py"))
     counted = {path.relative_to(ROOT): len(path.read_text(encoding="utf-8").splitlines()) for path in paths}
@@ -33,7 +33,7 @@ def sources() -> dict[Path, int]:
 
 
 def layers(text: str) -> list[list[str]]:
-    """The rooms of each layer of the import contract, from the top."""
+    """Return the rooms of each layer of the import contract, from the top."""
     block = re.search(r'type = "layers"\nlayers = \[\n(.*?)^\]', text, flags=re.MULTILINE | re.DOTALL)
     assert block
     return [re.findall(r"dynx\.(\w+)", line) for line in block.group(1).splitlines()]

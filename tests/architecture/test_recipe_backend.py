@@ -47,7 +47,7 @@ defective = third_party_engine:DefectiveBackend
 
 @pytest.fixture
 def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """A folder on the path with the module and what an installer writes beside it."""
+    """Yield a folder on the path with the module and what an installer writes beside it."""
     info = tmp_path / "third_party_engine-1.0.dist-info"
     info.mkdir()
     (tmp_path / "third_party_engine.py").write_text(dedent(MODULE), encoding="utf-8")

@@ -30,7 +30,7 @@ def weigh(robot, base, lock):
 
 @pytest.fixture
 def package(tmp_path: Path) -> Path:
-    """The folder in which the package is installed: a module, and metadata with the entry point."""
+    """Return the folder in which the package is installed: a module, and metadata with the entry point."""
     (tmp_path / "acme_weigh.py").write_text(MODULE)
     metadata = tmp_path / "acme_weigh-1.0.dist-info"
     metadata.mkdir()

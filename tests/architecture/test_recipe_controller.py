@@ -45,7 +45,7 @@ damper = third_party_controller:Damper
 
 @pytest.fixture(autouse=True)
 def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """A folder on the path with the module and the metadata that an installer writes."""
+    """Yield a folder on the path with the module and the metadata that an installer writes."""
     info = tmp_path / "third_party_controller-1.0.dist-info"
     info.mkdir()
     (tmp_path / "third_party_controller.py").write_text(MODULE, encoding="utf-8")

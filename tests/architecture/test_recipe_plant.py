@@ -44,7 +44,7 @@ NAME = "explicit_euler"
 
 @pytest.fixture
 def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """The folder in which the package is installed: a module, and metadata with the entry point."""
+    """Yield the folder in which the package is installed: a module, and metadata with the entry point."""
     (tmp_path / "acme_plant.py").write_text(MODULE)
     metadata = tmp_path / "acme_plant-1.0.dist-info"
     metadata.mkdir()

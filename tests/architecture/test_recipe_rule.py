@@ -49,7 +49,7 @@ Install = Callable[..., None]
 
 @pytest.fixture
 def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """The folder of a package that follows the recipe; its trap is the one of DX101."""
+    """Yield the folder of a package that follows the recipe; its trap is the one of DX101."""
     (tmp_path / "acme101_unweighed_link.py").write_text(MODULE)
     (tmp_path / "acme101_unweighed_link.urdf").write_bytes(find_trap("DX101").read_bytes())
     monkeypatch.syspath_prepend(str(tmp_path))
@@ -59,7 +59,7 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 @pytest.fixture
 def install(monkeypatch: pytest.MonkeyPatch) -> Iterator[Install]:
-    """A function that installs entry points in a dynx without DX101, for the time of a test."""
+    """Yield a function that installs entry points in a dynx without DX101, for the time of a test."""
     own = tuple(rule for rule in all_rules() if rule.id != "DX101")
     monkeypatch.setattr(registry, "_own_rules", lambda: own)
 

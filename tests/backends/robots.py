@@ -35,7 +35,7 @@ _TREE: tuple[tuple[JointType, int, Vector], ...] = (
 
 
 def mixed_robot(base: str = "fixed", *, mimic: bool = False) -> Model:
-    """A branched robot with every kind of joint, oblique gravity, damping, friction and armature."""
+    """Return a branched robot with every kind of joint, oblique gravity, damping, friction and armature."""
     rng = np.random.default_rng(7)
     links = [Link(f"link{k}", _inertial(rng)) for k in range(len(_TREE) + 1)]
     # A massless link in the middle, and one at the end of a fixed joint.
@@ -74,7 +74,7 @@ def chain(n: int, kind: JointType = "revolute") -> Model:
 
 
 def pair(root: Inertial | None, tip: Inertial | None, base: Base, prismatic: bool = False) -> Model:
-    """A root and a first link with these inertials, and a second link with an ordinary one."""
+    """Return a root and a first link with these inertials, and a second link with an ordinary one."""
     kind: JointType = "prismatic" if prismatic else "revolute"
     joints = [
         Joint("a", kind, "root", "tip", Pose((0.1, 0.2, 0.3), (0.4, 0.5, 0.6)), (0.6, 0.0, 0.8)),
@@ -85,7 +85,7 @@ def pair(root: Inertial | None, tip: Inertial | None, base: Base, prismatic: boo
 
 
 def motion(model: Model, seed: int = 0, size: tuple[int, ...] = ()) -> tuple[Floats, Floats, Floats]:
-    """q, v and a third array like v, with the given leading axes."""
+    """Return q, v and a third array like v, with the given leading axes."""
     rng = np.random.default_rng(seed)
     shape = (*size, model.nv)
     return model.random(rng, size), rng.standard_normal(shape), rng.standard_normal(shape)
@@ -94,7 +94,7 @@ def motion(model: Model, seed: int = 0, size: tuple[int, ...] = ()) -> tuple[Flo
 def all_quantities(
     backend: Backend, q: Floats, v: Floats, x: Floats, *, forward_dynamics: bool = True
 ) -> dict[str, Floats]:
-    """Every quantity of the backend, for the last frame of the model; `x` serves as a and as tau."""
+    """Return every quantity of the backend, for the last frame of the model; `x` serves as a and as tau."""
     frame = backend.model.frame_names[-1]
     results = {
         "forward_kinematics": backend.forward_kinematics(q),

@@ -255,7 +255,7 @@ def test_any_arguments_raise_only_errors_of_dynx(q: Any, v: Any, frame: Any, opt
 
 
 def _returns_or_refuses(call: Callable[[], Floats]) -> bool:
-    """Whether an array of floats comes out, or an error of dynx with something to say."""
+    """Check whether the call returns an array of floats or raises an error of dynx with a message."""
     try:
         return call().dtype == np.float64
     except DynxError as error:

@@ -18,7 +18,7 @@ each_quantity = pytest.mark.parametrize("quantity", QUANTITIES.values(), ids=QUA
 
 
 def parameters(quantity: Quantity) -> list[str]:
-    """Names of the parameters of the method, by the table."""
+    """Return the names of the parameters of the method, by the table."""
     frame = ["frame"] if quantity.of_frame else []
     return ["self", *quantity.arguments, *frame, *quantity.options]
 

@@ -68,6 +68,6 @@ def session_of(
     cases: tuple[BenchmarkCase, ...],
     repetitions: int = 2,
 ) -> Session:
-    """A session of these implementations on a machine whose peaks are known."""
+    """Return a session of these implementations on a machine whose peaks are known."""
     plan = Plan(model, model.frame_names[-1], cases, repetitions=repetitions)
     return Session(plan, peak=lambda threads: PEAK, implementations=lambda plan, threads: implementations)

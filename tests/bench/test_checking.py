@@ -19,7 +19,7 @@ ROBOTS = ("double_pendulum", "panda")
 
 
 def judge_and_reference(quantity: str, robot: str, base: Base) -> tuple[Judge, Floats]:
-    """The judge of some samples, and the reference values."""
+    """Return the judge of some samples, and the reference values."""
     model = dynx.load(robot, base=base)
     batch = draw_batch(model, model.frame_names[-1], 20)
     frame = [batch.frame] if QUANTITIES[quantity].of_frame else []

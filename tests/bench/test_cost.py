@@ -58,7 +58,7 @@ def test_the_cost_matches_the_emitted_instructions() -> None:
     labels = [k for k, line in enumerate(write.lines) if not line.startswith(" ")]
     straight = write.lines[: labels[0]]  # before the branch for large angles
     assert sum("@llvm.fma" in line for line in straight) == SINE_COSINE_PAIRS
-    # Of the sign of the result nothing is counted: it is turned by operations on bits.
+    # The sign of the result costs nothing: bit operations set it.
     single = [line for line in straight if any(f" {op} " in line for op in ("fadd", "fsub", "fmul"))]
     assert len(single) == SINE_COSINE_SINGLES
 

@@ -102,7 +102,7 @@ def test_the_baseline_runs_on_a_model_of_one_joint(quantity: str) -> None:
 
 
 def answer_of(quantity: str) -> tuple[int, ...]:
-    """Shape of the quantity for the pendulum."""
+    """Return the shape of the quantity for the pendulum."""
     return {"forward_kinematics": (4, 4), "jacobian": (6, 1), "mass_matrix": (1, 1)}.get(quantity, (1,))
 
 

@@ -20,7 +20,7 @@ COST = Cost(bytes=192, operations=750, multiply_adds=400)
 
 
 def found(implementation: str, nanoseconds: tuple[float, ...] | None, role: str = "backend") -> Measurement:
-    """A measurement of the given nanoseconds."""
+    """Return a measurement of the given nanoseconds."""
     times = None if nanoseconds is None else Times(tuple(1e-9 * each for each in nanoseconds))
     return Measurement(CASE, implementation, role, "1.0", 1, 65536, 1e-15, 1e-13, times)
 

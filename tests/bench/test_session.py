@@ -95,7 +95,7 @@ def test_the_cost_is_that_of_the_compiled_program() -> None:
 
 
 def measured(implementation: str) -> Measurement:
-    """A measurement of the mass matrix."""
+    """Return a measurement of the mass matrix."""
     return Measurement(BenchmarkCase("mass_matrix", 8), implementation, "backend", "", 1, 8)
 
 

@@ -20,7 +20,7 @@ class Clock:
         return self.now
 
     def taking(self, seconds: float, name: str = "") -> Callable[[], None]:
-        """A call of the given duration."""
+        """Return a call of the given duration."""
 
         def call() -> None:
             self.now += seconds

@@ -23,14 +23,14 @@ TIP = "tip"
 
 
 def made(model: Model, **options: Any) -> CompiledBackend:
-    """The backend, as its own class."""
+    """Return the backend, as its own class."""
     engine = backend("compiled", model, **options)
     assert isinstance(engine, CompiledBackend)
     return engine
 
 
 def state(model: Model, size: tuple[int, ...] = ()) -> tuple[Floats, Floats, Floats]:
-    """q, v and a with the given leading axes, always the same."""
+    """Return q, v and a with the given leading axes, always the same."""
     rng = np.random.default_rng(3)
     q = model.random(rng, size)
     v, a = rng.standard_normal((2, *size, model.nv))

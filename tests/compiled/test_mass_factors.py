@@ -13,7 +13,7 @@ from tests.rules.documents import joint, link
 
 
 def two_arms(base: Base, *, mimic: bool) -> Model:
-    """Two arms of two joints; with `mimic` the tip of the second drives that of the first."""
+    """Return two arms of two joints; with `mimic` the tip of the second drives that of the first."""
     place = "<origin xyz='0.1 0.2 0.3' rpy='1 2 3'/>"
     follows = "<mimic joint='tip' multiplier='0.5'/>" if mimic else ""
     parts = [link(name, center=(0.1, 0.0, 0.2)) for name in ("root", "a", "b", "c", "d")]

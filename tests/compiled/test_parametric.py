@@ -215,6 +215,6 @@ def test_it_pickles() -> None:
 
 
 def changed_model(model: Model, link: str, inertial: Inertial | None) -> Model:
-    """The model with another inertial for one link."""
+    """Return the model with another inertial for one link."""
     links = [replace(own, inertial=inertial) if own.name == link else own for own in model.links]
     return replace(model, links=tuple(links))

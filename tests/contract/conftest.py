@@ -18,7 +18,7 @@ ALIVE = 8
 
 @pytest.fixture(scope="session", params=installed_backends())
 def backend_name(request: pytest.FixtureRequest) -> str:
-    """Name of an installed backend."""
+    """Return the name of an installed backend."""
     return str(request.param)
 
 

@@ -52,11 +52,11 @@ class EngineCall:
         return self.quantity.arguments
 
     def tail(self, model: Model) -> tuple[int, ...]:
-        """The last axes of the result."""
+        """Return the last axes of the result."""
         return self.quantity.shape_of(model)
 
     def evaluate(self, engine: Backend, state: State) -> Floats:
-        """The result at a state; for a quantity of a frame, that of the model's last one."""
+        """Return the result at a state; for a quantity of a frame, that of the model's last one."""
         values = [getattr(state, argument) for argument in self.arguments]
         options = dict(self.options)
         if self.quantity.of_frame:
@@ -101,7 +101,7 @@ ENGINE_CALLS = engine_calls()
 
 
 def random_state(model: Model, seed: int, size: tuple[int, ...] = ()) -> State:
-    """A state from a seed; the same for every backend."""
+    """Return a state from a seed; the same for every backend."""
     rng = np.random.default_rng(seed)
     v, a, tau = (rng.uniform(-2.0, 2.0, (*size, model.nv)) for _ in range(3))
     return State(model.random(rng, size), v, a, tau)

@@ -8,7 +8,7 @@ from dynx.model import Inertial, Joint, JointDynamics, Limits, Link, Mimic, Mode
 
 
 def body(mass: float, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Inertial:
-    """A body without symmetry whose centre of mass is at (x, y, z), its axes turned."""
+    """Return a body without symmetry whose centre of mass is at (x, y, z), its axes turned."""
     return Inertial(
         mass,
         Pose((x, y, z), (0.3, -0.2, 0.5)),
@@ -79,7 +79,7 @@ LINK_ORDER = ("trunk", "zeta", "plate", "mid", "tool", "alpha", "beta")
 
 
 def branched() -> Model:
-    """Two branches with every kind of joint and a tilted gravity."""
+    """Return two branches with every kind of joint and a tilted gravity."""
     return Model.build("branched", LINKS, JOINTS, gravity=(0.3, -0.7, -9.81))
 
 
@@ -95,6 +95,6 @@ def followed_elbow(multiplier: float, offset: float) -> list[Joint]:
 
 
 def hinge(inertial: Inertial | None, axis: tuple[float, float, float] = (0.0, 1.0, 0.0)) -> Model:
-    """One link on one hinge."""
+    """Return one link on one hinge."""
     joint = Joint("hinge", "continuous", "ground", "arm", axis=axis)
     return Model.build("hinge", [Link("ground"), Link("arm", inertial)], [joint])

@@ -18,26 +18,26 @@ each_call = pytest.mark.parametrize("engine_call", ENGINE_CALLS, ids=str)
 
 
 def every_other(x: Floats) -> Floats:
-    """The same numbers, each two apart in memory."""
+    """Return the same numbers, each two apart in memory."""
     wide = np.full((*x.shape[:-1], 2 * x.shape[-1]), np.nan)
     wide[..., ::2] = x
     return wide[..., ::2]
 
 
 def backward(x: Floats) -> Floats:
-    """The same numbers, backward in memory."""
+    """Return the same numbers, backward in memory."""
     return np.ascontiguousarray(x[..., ::-1])[..., ::-1]
 
 
 def read_only(x: Floats) -> Floats:
-    """The same numbers, not to be written to."""
+    """Return the same numbers, not to be written to."""
     x = x.copy()
     x.flags.writeable = False
     return x
 
 
 def big_endian(x: Floats) -> Floats:
-    """The same numbers in the other order of bytes."""
+    """Return the same numbers in the other order of bytes."""
     return x.astype(">f8")
 
 

@@ -30,7 +30,7 @@ each_call = pytest.mark.parametrize("engine_call", ENGINE_CALLS, ids=str)
 
 
 def is_projected(engine_call: EngineCall) -> bool:
-    """Whether the result of a robot with a mimic joint is a projection of that without the coupling."""
+    """Check whether the result of a robot with a mimic joint is a projection of that without the coupling."""
     return not engine_call.options.get("joint_dynamics") and engine_call.method != "forward_dynamics"
 
 

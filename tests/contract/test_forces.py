@@ -185,7 +185,7 @@ class TestJointDynamics:
 
     @staticmethod
     def in_the_joints(model: Model, v: np.ndarray) -> dict[str, float]:
-        """The rate of every moving joint."""
+        """Return the rate of every moving joint."""
         rates = {name: float(v[model.coordinate_index(name)]) for name in model.joint_names}
         for joint in model.joints:
             if joint.mimic is not None:

@@ -12,7 +12,7 @@ ENGINES = ("pinocchio", "pybullet", "mujoco", "pydrake")
 
 
 def modules_after(program: str) -> set[str]:
-    """The top-level modules that a fresh interpreter holds after `program`."""
+    """Return the top-level modules that a fresh interpreter holds after `program`."""
     report = "import sys; print(' '.join({name.partition('.')[0] for name in sys.modules}))"
     done = subprocess.run(
         [sys.executable, "-c", f"{program}\n{report}"], capture_output=True, text=True, check=True

@@ -49,7 +49,7 @@ def result(engine: Backend, call: Call) -> Floats:
 
 @pytest.fixture(scope="module")
 def alone(backend_name: str) -> dict[Call, Floats]:
-    """Results by call, each of a new backend; tests fill it."""
+    """Return the results by call, each of a new backend; tests fill it."""
     return {}
 
 

@@ -35,7 +35,7 @@ def cross_matrix(x: Floats) -> Floats:
 
 
 def columns_from_poses(model: Model, engine: Backend, q: Floats, frame: str) -> Floats:
-    """The geometric Jacobian by definition: z x (p - o) and z, or z and 0, from poses alone.
+    """Return the geometric Jacobian by definition: z x (p - o) and z, or z and 0, from poses alone.
 
     The axis z of a joint goes through the origin o of its child link.
     """

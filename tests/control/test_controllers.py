@@ -44,7 +44,7 @@ SEEDS = st.integers(0, 2**32 - 1)
 
 
 def situation(seed: int) -> tuple[Measurement, Setpoint]:
-    """Any state and any setpoint."""
+    """Return a random state and a random setpoint."""
     rng = np.random.default_rng(seed)
     q, wanted = ARM.random(rng, 2)
     v, v_wanted, a_wanted = rng.uniform(-2.0, 2.0, (3, ARM.nv))

@@ -158,7 +158,7 @@ def read_entries(path: Path) -> list[Entry]:
 
 
 def differs(entry: Entry, above: float | None = None) -> bool:
-    """Whether any engine differs from the file above the tolerance, or refuses it."""
+    """Check whether any engine differs from the file above the tolerance, or refuses it."""
     limit = entry["tolerance"] if above is None else above
     return any(
         engine["refused"] or any(error is None or error > limit for error in engine["before"].values())
@@ -182,7 +182,7 @@ def counts(entries: Sequence[Entry]) -> str:
 
 
 def remarks(entry: Entry) -> Iterator[str]:
-    """The remaining differences and errors of one file."""
+    """Yield the remaining differences and errors of one file."""
     if "failed" in entry:
         yield f"not done: {entry['failed']}: {entry['message']}"
         return
@@ -200,7 +200,7 @@ def remarks(entry: Entry) -> Iterator[str]:
 
 
 def summary(entries: Sequence[Entry], root: Path) -> Iterator[str]:
-    """The counts by base, remarks on each file, the causes and the slowest files."""
+    """Yield the counts by base, remarks on each file, the causes and the slowest files."""
     for base in sorted({entry["base"] for entry in entries}):
         of = [entry for entry in entries if entry["base"] == base]
         sources = {_label(entry, root).partition("/")[0] for entry in of}

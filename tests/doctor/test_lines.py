@@ -17,7 +17,7 @@ texts = st.lists(st.sampled_from(["a", "b", "c", "", "link 1", "link 2", "link 3
 
 
 def rebuilt(one: list[str], other: list[str]) -> list[str]:
-    """The other text from the lines of one that are equal and the rest of its own."""
+    """Return the other text from the lines of one that are equal and the rest of its own."""
     found, i, j = [], 0, 0
     for tag, first, last, start, end in line_opcodes(one, other):
         assert (first, start) == (i, j)

@@ -19,7 +19,7 @@ LOSSES = JointDynamics(0.5, 0.25)
 def forked(
     base: Base = "fixed", dynamics: JointDynamics = NO_LOSSES, *, root: str = "trunk", wide: bool = False
 ) -> Model:
-    """A rotating arm with a tool on a fixed joint, and a sliding arm.
+    """Return a rotating arm with a tool on a fixed joint, and a sliding arm.
 
     The names of both are against the order of the alphabet, and the arm that is deeper comes first in
     the document. `dynamics` are those of the turning arm, which is continuous; a `wide` one has limits, and

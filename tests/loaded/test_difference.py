@@ -24,7 +24,7 @@ BODY = Inertial(2.0, Pose((0.1, 0.2, 0.3), (0.3, 0.2, 0.1)), 0.2, 0.01, 0.02, 0.
 
 
 def exact(model: Model) -> LoadedModel:
-    """The description by an engine that loads the file as dynx does and merges no links."""
+    """Return the description by an engine that loads the file as dynx does and merges no links."""
     links = {}
     for link in model.links:
         inertial = link.inertial or Inertial()
@@ -50,7 +50,7 @@ def exact(model: Model) -> LoadedModel:
 
 
 def with_merged_links(model: Model) -> LoadedModel:
-    """The description by an engine that merges links connected by fixed joints."""
+    """Return the description by an engine that merges links connected by fixed joints."""
     mechanism = build_mechanism(model)
     inertials = {}
     places = {frame.name: frame.body for frame in mechanism.frames[: len(model.links)]}

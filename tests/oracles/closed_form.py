@@ -85,7 +85,7 @@ class FixedBaseForm(ClosedForm):
 
 
 def matrix(rows: list[list[Any]]) -> Floats:
-    """A matrix (..., m, n) of entries that are numbers or batches of numbers."""
+    """Return a matrix (..., m, n) of entries that are numbers or batches of numbers."""
     shape = np.broadcast_shapes(*(np.shape(entry) for row in rows for entry in row))
     return np.stack(
         [np.stack([np.broadcast_to(entry, shape) for entry in row], axis=-1) for row in rows], axis=-2
@@ -93,5 +93,5 @@ def matrix(rows: list[list[Any]]) -> Floats:
 
 
 def vector(entries: list[Any]) -> Floats:
-    """A vector (..., n) of entries that are numbers or batches of numbers."""
+    """Return a vector (..., n) of entries that are numbers or batches of numbers."""
     return np.asarray(matrix([entries])[..., 0, :])

@@ -10,7 +10,7 @@ from tests.oracles.closed_form import FixedBaseForm, Floats, G, matrix, vector
 
 
 def pose_about_y(angle: Floats, x: Floats, z: Floats) -> Floats:
-    """A frame at (x, 0, z), rotated by `angle` about y."""
+    """Return a frame at (x, 0, z), rotated by `angle` about y."""
     c, s = np.cos(angle), np.sin(angle)
     return matrix([[c, 0, s, x], [0, 1, 0, 0], [-s, 0, c, z], [0, 0, 0, 1]])
 

@@ -10,7 +10,7 @@ from tests.oracles.closed_form import FixedBaseForm, Floats, G, Vector, matrix, 
 
 
 def pose_about_z(angle: Floats, x: Floats, y: Floats) -> Floats:
-    """A frame at (x, y, 0), rotated by `angle` about z."""
+    """Return a frame at (x, y, 0), rotated by `angle` about z."""
     c, s = np.cos(angle), np.sin(angle)
     return matrix([[c, -s, 0, x], [s, c, 0, y], [0, 0, 1, 0], [0, 0, 0, 1]])
 

@@ -37,7 +37,7 @@ def to_base_parameters(mechanism: Mechanism) -> Mechanism:
 
 @st.composite
 def cases(draw: st.DrawFn, solvable: bool = False) -> Case:
-    """A random mechanism and sample in 50 digits."""
+    """Return a random mechanism and sample in 50 digits."""
     model = draw(models(max_links=5, solvable=solvable, base="either"))
     q, _, _ = draw(samples(model))
     mechanism = exact_mechanism(model)

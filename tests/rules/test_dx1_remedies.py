@@ -227,7 +227,7 @@ def test_a_link_named_world_is_renamed_wherever_it_is_named() -> None:
 
 
 def with_inertial(case: Case, name: str, inertial: Inertial) -> Case:
-    """The case with another inertial in one link."""
+    """Return the case with another inertial in one link."""
     element = case.links[name]
     old = {each.name: each.inertial for each in case.model.links}[name]
     assert old is not None

@@ -24,7 +24,7 @@ angles = st.floats(-3.0, 3.0)
 
 
 def body(points: np.ndarray, half: np.ndarray, rpy: tuple[float, float, float]) -> Case:
-    """A link that is the points of mass (n, 4), each a mass and a place in units of the half box."""
+    """Return a link that is the points of mass (n, 4), each a mass and a place in units of the half box."""
     mass, places = points[:, 0], points[:, 1:] * half
     center = mass @ places / mass.sum()
     arms = places - center

@@ -16,12 +16,12 @@ finite = st.floats(-10.0, 10.0)
 
 
 def arm(*inside: str, limit: str = LIMIT, type: str = "revolute") -> Case:
-    """Two links and a joint, which is as given."""
+    """Return two links and a joint, which is as given."""
     return case_of(link("base"), link("arm"), joint("elbow", "base", "arm", *inside, limit=limit, type=type))
 
 
 def found(rule: str, case: Case) -> list[str | None]:
-    """The joints that a rule names."""
+    """Return the joints that a rule names."""
     return [each.joint for each in find_rule(rule).detect(case)]
 
 

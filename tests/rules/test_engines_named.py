@@ -17,12 +17,12 @@ ENGINES = re.compile(r"pinocchio|(?:py)?bullet|mujoco|drake", re.IGNORECASE)
 
 
 def named(text: str) -> set[str]:
-    """The engines that a text names."""
+    """Return the engines that a text names."""
     return {f"py{name}" if name == "bullet" else name for name in map(str.lower, ENGINES.findall(text))}
 
 
 def allowed(rule: Rule) -> set[str]:
-    """The engine that a rule is about, if it is about one."""
+    """Return the engine that a rule is about, if it is about one."""
     engines = {name.partition(":")[0] for name in rule.engines}
     return engines if len(engines) == 1 else set()
 

@@ -42,7 +42,7 @@ HELD: dict[str, dict[str, Range]] = {
 
 
 def arm(written_ends: str, type: str = "revolute") -> Case:
-    """One joint with such a limit."""
+    """Return one joint with such a limit."""
     limit = f'<limit {written_ends} effort="1" velocity="1"/>'
     return case_of(link("base"), link("arm"), joint("elbow", "base", "arm", type=type, limit=limit))
 

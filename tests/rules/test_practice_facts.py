@@ -98,7 +98,7 @@ def test_pinocchio_refuses_a_chain_of_mimics() -> None:
 
 
 def missing(tag: str, folder: Path) -> str:
-    """The path of a robot whose mesh, in <visual> or <collision>, is not there."""
+    """Return the path of a robot whose mesh, in <visual> or <collision>, is not there."""
     mesh = f'<{tag}><geometry><mesh filename="gone.stl"/></geometry></{tag}>'
     path = folder / "robot.urdf"
     path.write_text(case_of(link("base"), link("arm", mesh), joint("elbow", "base", "arm")).source.text)

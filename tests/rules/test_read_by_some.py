@@ -25,7 +25,7 @@ quaternions = st.tuples(numbers, numbers, numbers, numbers).filter(lambda q: mat
 
 
 def arm(*inside: str, type: str = "revolute", head: str = "") -> Case:
-    """Two links and a joint with these elements; `head` are attributes of the robot."""
+    """Return two links and a joint with these elements; `head` are attributes of the robot."""
     case = case_of(link("base"), link("arm"), joint("elbow", "base", "arm", *inside, type=type, limit=LIMIT))
     text = case.source.text.replace("<robot ", f"<robot {head} ")
     # An axis among the elements takes the place of the usual one.

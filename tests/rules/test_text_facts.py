@@ -25,7 +25,7 @@ needs_pinocchio = pytest.mark.skipif("pinocchio" not in installed_engines(), rea
 
 
 def held(engine: str, old: str, new: str) -> tuple[LoadedInertial, LoadedJoint]:
-    """The arm and its joint in an engine that loads the sound robot with `new` in place of `old`."""
+    """Return the arm and its joint in an engine that loads the sound robot with `new` in place of `old`."""
     text = SOUND.source.text.replace(old, new)
     assert text != SOUND.source.text
     with temporary_urdf(XmlSource(text)) as path, silence(), load_as(engine, path, SOUND.model) as robot:

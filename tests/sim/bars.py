@@ -24,15 +24,15 @@ MOMENTUM = 1e-12
 
 
 def tutorial_robot() -> Model:
-    """The arm of the tutorial, in its gravity."""
+    """Return the arm of the tutorial, in its gravity."""
     return load("ur5").with_gravity((0.0, 0.0, -9.8))
 
 
 def tutorial_motion(duration: float = 2.0) -> Trajectory:
-    """The tutorial's cycloidal motion."""
+    """Return the tutorial's cycloidal motion."""
     return cycloidal(np.zeros(6), [-1.5, -1.0, 1.0, -1.57, -1.57, -1.57], duration=duration)
 
 
 def apart(a: Floats, b: Floats) -> float:
-    """The largest difference of two records, over the largest entry."""
+    """Return the largest difference of two records, over the largest entry."""
     return float(np.max(np.abs(a - b)) / max(1.0, float(np.max(np.abs(b)))))

@@ -29,12 +29,12 @@ MOTORS = ("position-motor", "velocity-motor", "pd-motor")
 
 @pytest.fixture(scope="module")
 def rows() -> dict[str, Row]:
-    """All modes on all plants, once."""
+    """Return the rows of all modes on all plants, simulated once."""
     return {row.mode: row for row in tutorial().rows()}
 
 
 def error(row: Row, plant: str = DYNX) -> float:
-    """The largest error of a mode that there must be."""
+    """Return the largest error of a mode, which must have one."""
     largest = row.outcomes[plant].max_error
     assert largest is not None
     return largest

@@ -28,7 +28,7 @@ THRICE = trace(lambda x: 3.0 * x + 1.0, {"x": (2,)})
 
 @pytest.fixture(autouse=True)
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An empty cache."""
+    """Return an empty cache."""
     monkeypatch.delenv("DYNX_CACHE", raising=False)
     monkeypatch.setenv("DYNX_CACHE_DIR", str(tmp_path / "cache"))
     return tmp_path / "cache" / "kernels"

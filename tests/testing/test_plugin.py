@@ -75,7 +75,7 @@ class Run(Protocol):
 
 @pytest.fixture
 def home(tmp_path: Path) -> Path:
-    """The directory in which `run` and `start` run pytest, empty at first."""
+    """Return the directory in which `run` and `start` run pytest, empty at first."""
     folder = tmp_path / "home"
     folder.mkdir()
     return folder

@@ -57,7 +57,7 @@ def doctor(*arguments: str) -> Result:
 
 @pytest.fixture
 def arm(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A file on which PyBullet and Pinocchio differ, in the working directory."""
+    """Return a file on which PyBullet and Pinocchio differ, in the working directory."""
     monkeypatch.chdir(tmp_path)
     path = tmp_path / "arm.urdf"
     path.write_bytes(ARM.encode("latin-1"))

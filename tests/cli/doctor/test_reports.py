@@ -113,7 +113,7 @@ def test_a_counterexample_stays_in_its_folder(name: str) -> None:
 
 
 def shown(report: DoctorReport, width: int = 80) -> str:
-    """The report of one robot on a terminal of that width."""
+    """Return the report of one robot on a terminal of that width."""
     out = StringIO()
     show_one(Console(file=out, width=width, soft_wrap=True, markup=False, emoji=False), report, {}, None)
     return out.getvalue()

@@ -24,13 +24,13 @@ COLUMNS = 100
 
 
 def rows(report: DoctorReport) -> int:
-    """The rows that a report takes on a terminal of 100 columns."""
+    """Return the rows that a report takes on a terminal of 100 columns."""
     text = shown(report)
     return sum(max(1, -(-len(line) // COLUMNS)) for line in text.splitlines())
 
 
 def shown(report: DoctorReport, width: int = COLUMNS) -> str:
-    """The report of one robot."""
+    """Return the report of one robot."""
     out = StringIO()
     show_one(Console(file=out, width=width, soft_wrap=True, markup=False, emoji=False), report, {}, None)
     return out.getvalue()

@@ -113,7 +113,7 @@ def differing(robot: str = "arm", base: str = "fixed", line_shift: int = 0, **na
 
 
 def alike(robot: str = "arm") -> DoctorReport:
-    """All engines load the file alike."""
+    """Return the report of a file that all engines load alike."""
     small = {"mass_matrix": 1e-16}
     return DoctorReport(
         robot=robot,
@@ -130,7 +130,7 @@ def alike(robot: str = "arm") -> DoctorReport:
 
 
 def refused(robot: str = "broken") -> DoctorReport:
-    """A robot that could not be read."""
+    """Return a robot that could not be read."""
     return DoctorReport(robot, base="fixed", error=Failure("DescriptionError", f"{robot}: no XML"))
 
 

@@ -19,7 +19,7 @@ from tests.doctor.formats.reports import HOSTILE, alike, differing, refused
 
 
 def written(*reports: DoctorReport, path: str = "known.json") -> Baseline:
-    """The baseline of reports, through its text."""
+    """Return the baseline of reports, through its text."""
     return read_baseline(json_text(baseline_document(reports, str(Path(path).parent))), path)
 
 

@@ -13,7 +13,7 @@ from tests.doctor.formats.reports import alike, differing, hostile, refused
 
 
 def cases(text: str) -> dict[str, list[str]]:
-    """The outcomes of every test case of the document, by name."""
+    """Return the outcomes of every test case of the document, by name."""
     root = ElementTree.fromstring(text)
     return {str(case.get("name")): [child.tag for child in case] for case in root.iter("testcase")}
 

@@ -69,7 +69,7 @@ def require_valid(document: dict[str, Any]) -> None:
 
 
 def results(*reports: DoctorReport, baseline: Baseline | None = None) -> list[dict[str, Any]]:
-    """The results of the one run."""
+    """Return the results of the one run."""
     document = sarif_document(reports, baseline)
     require_valid(document)
     found: list[dict[str, Any]] = document["runs"][0]["results"]
@@ -77,7 +77,7 @@ def results(*reports: DoctorReport, baseline: Baseline | None = None) -> list[di
 
 
 def prints(found: list[dict[str, Any]]) -> list[str]:
-    """The fingerprints of results."""
+    """Return the fingerprints of results."""
     return [value for result in found for value in result["partialFingerprints"].values()]
 
 

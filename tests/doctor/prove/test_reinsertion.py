@@ -11,7 +11,7 @@ LINES = ("<robot>", *(f'  <link name="l{k}" mass="{k}"/>' for k in range(6)), "<
 
 
 def text_with(changes: dict[int, str | None]) -> XmlSource:
-    """The document with other text in some lines; None takes a line away."""
+    """Return the document with other text in some lines; None takes a line away."""
     kept = [changes.get(k, line) for k, line in enumerate(LINES)]
     return XmlSource("\n".join(line for line in kept if line is not None))
 

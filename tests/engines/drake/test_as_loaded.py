@@ -80,7 +80,7 @@ def test_a_joint_that_the_model_lacks_is_held_at_zero() -> None:
 
 
 def changed(model: Model, link: str, inertial: Inertial | None) -> Model:
-    """The robot with another inertial for one link."""
+    """Return the robot with another inertial for one link."""
     links = tuple(replace(each, inertial=inertial) if each.name == link else each for each in model.links)
     return replace(model, links=links)
 

@@ -38,7 +38,7 @@ STRANGE = {
 
 
 def pair(first: Inertial, second: Inertial, base: str, kind: JointType = "revolute") -> Model:
-    """Two links, each on a joint, on a base of 2 kg."""
+    """Return two links, each on a joint, on a base of 2 kg."""
     root = Inertial(2.0, Pose((0.3, 0.2, 0.1)), 1.0, 0.0, 0.0, 1.0, 0.0, 1.0)
     links = [Link("root", root), Link("first", first), Link("second", second)]
     joints = [
@@ -75,7 +75,7 @@ def test_inertias_that_no_body_can_have_are_used_as_they_stand(
 
 
 def indefinite() -> Model:
-    """A robot whose mass matrix is regular and neither positive nor negative."""
+    """Return a robot whose mass matrix is regular and neither positive nor negative."""
     return pair(replace(BODY, ixx=-0.9), BODY, "floating")
 
 

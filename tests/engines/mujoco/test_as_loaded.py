@@ -46,7 +46,7 @@ def robots() -> Strategy[Model]:
 
 
 def solid(model: Model) -> Model:
-    """The robot with a body on each link that moves and weighs too little for MuJoCo."""
+    """Return the robot with a body on each link that moves and weighs too little for MuJoCo."""
     moved = {joint.child for joint in model.joints if joint.moves} | ({model.root} & _floating(model))
     return replace(model, links=tuple(_solid(link) if link.name in moved else link for link in model.links))
 
@@ -93,7 +93,7 @@ def worst(
 
 
 def forked(base: Base = "fixed", dynamics: JointDynamics = NO_LOSSES) -> Model:
-    """The fork with limits that MuJoCo, which turns them into forces, never meets."""
+    """Return the fork with limits that MuJoCo, which turns them into forces, never meets."""
     return fork.forked(base, dynamics, wide=True)
 
 

@@ -236,7 +236,7 @@ def test_a_robot_with_one_joint_or_none_has_arrays_of_the_usual_shapes(base: str
 
 
 def _pair(first: Inertial, second: Inertial, base: str = "fixed") -> Model:
-    """A moving body of two welded links, on a base of 2 kg."""
+    """Return a moving body of two welded links, on a base of 2 kg."""
     root = Inertial(2.0, Pose((0.3, 0.2, 0.1)), 1.0, 0.0, 0.0, 1.0, 0.0, 1.0)
     links = [Link("root", root), Link("first", first), Link("second", second)]
     joints = [

@@ -29,7 +29,7 @@ BODY = Inertial(1.5, Pose((0.1, 0.2, 0.3), (0.3, 0.2, 0.1)), ixx=0.3, iyy=0.4, i
 
 
 def forked(base: Base) -> Model:
-    """Two arms, one of them continuous, and a welded tool; the root's inertia is off its frame."""
+    """Return two arms, one of them continuous, and a welded tool; the root's inertia is off its frame."""
     links = [Link(name, BODY) for name in ("trunk", "z", "a", "tool")]
     joints = [
         Joint(

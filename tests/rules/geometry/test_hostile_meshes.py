@@ -23,7 +23,7 @@ LENGTH = 2**20
 
 
 def nested_instances(doublings: int) -> bytes:
-    """A COLLADA file of nodes that each place the next one twice: 2^doublings meshes."""
+    """Return a COLLADA file of nodes that each place the next one twice: 2^doublings meshes."""
     nodes = "".join(
         f'<node id="n{k}"><instance_node url="#n{k + 1}"/><instance_node url="#n{k + 1}"/></node>'
         for k in range(doublings)

@@ -13,7 +13,7 @@ from dynx.rules.geometry.meshes import mesh_box
 
 @pytest.fixture
 def robot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A description in a ROS package, with one mesh."""
+    """Return a description in a ROS package, with one mesh."""
     monkeypatch.delenv("ROS_PACKAGE_PATH", raising=False)
     monkeypatch.delenv("AMENT_PREFIX_PATH", raising=False)
     mesh = tmp_path / "arm_description/meshes/Base.stl"

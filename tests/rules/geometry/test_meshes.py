@@ -22,13 +22,13 @@ triangles = st.lists(st.tuples(*[st.tuples(numbers, numbers, numbers)] * 3), min
 
 
 def binary_stl(facets: list[tuple[Corner, ...]], head: bytes = b"") -> bytes:
-    """A binary STL file."""
+    """Return a binary STL file."""
     body = b"".join(struct.pack("<12fH", 0, 0, 1, *np.ravel(facet), 0) for facet in facets)
     return head.ljust(80, b" ") + struct.pack("<I", len(facets)) + body
 
 
 def ascii_stl(facets: list[tuple[Corner, ...]]) -> bytes:
-    """A text STL file."""
+    """Return a text STL file."""
     lines = ["solid part"]
     for facet in facets:
         corners = [f"      vertex {x!r} {y!r} {z!r}" for x, y, z in facet]
@@ -37,14 +37,14 @@ def ascii_stl(facets: list[tuple[Corner, ...]]) -> bytes:
 
 
 def obj(facets: list[tuple[Corner, ...]]) -> bytes:
-    """An OBJ file; normals and texture coordinates are no corners."""
+    """Return an OBJ file; normals and texture coordinates are no corners."""
     lines = ["# a part", "vn 5000 0 0", "vt 6000 0"]
     lines += [f"v {x!r} {y!r} {z!r}" for facet in facets for x, y, z in facet]
     return "\n".join([*lines, "f 1//1 2//1 3//1", ""]).encode()
 
 
 def dae(facets: list[tuple[Corner, ...]], up: str = "Z_UP", node: str = "", unit: float = 1.0) -> bytes:
-    """A COLLADA file whose one node holds `node` and the mesh."""
+    """Return a COLLADA file whose one node holds `node` and the mesh."""
     numbers = " ".join(repr(value) for facet in facets for corner in facet for value in corner)
     count = 3 * len(facets)
     return f"""<?xml version="1.0"?>
@@ -65,7 +65,7 @@ def dae(facets: list[tuple[Corner, ...]], up: str = "Z_UP", node: str = "", unit
 
 
 def box_of(facets: list[tuple[Corner, ...]]) -> Box:
-    """The box of all corners."""
+    """Return the box of all corners."""
     corners = np.array(facets).reshape(-1, 3)
     low, high = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
     return (low[0], low[1], low[2]), (high[0], high[1], high[2])
@@ -73,7 +73,7 @@ def box_of(facets: list[tuple[Corner, ...]]) -> Box:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """One folder for all examples; boxes are kept by path, so each example takes a name of its own."""
+    """Return one folder for all examples; boxes are kept by path, so each example takes a name of its own."""
     return tmp_path_factory.mktemp("meshes")
 
 
@@ -126,7 +126,7 @@ FACET: list[tuple[Corner, ...]] = [((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 2.0,
 
 
 def points(data: bytes) -> Floats:
-    """The points of a COLLADA file that can be read."""
+    """Return the points of a COLLADA file that can be read."""
     found = collada_points(data)
     assert found is not None
     return found

@@ -37,7 +37,7 @@ def placed(points: Floats, xyz: tuple[float, ...], rpy: tuple[float, ...]) -> Fl
 
 
 def box_of(shape: str, xyz: tuple[float, ...], rpy: tuple[float, ...]) -> tuple[Floats, Floats]:
-    """The box about one visual."""
+    """Return the box about one visual."""
     case = case_of(link("base", visual(shape, words(xyz), words(rpy))))
     extent = link_extent(case.links["base"], "<string>")
     assert extent is not None

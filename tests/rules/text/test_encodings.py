@@ -18,7 +18,7 @@ COMMENTED = PLAIN.replace("<link", "<!-- größe --><link", 1)
 
 
 def declared(encoding: str, text: str) -> bytes:
-    """The text, with a declaration of its encoding."""
+    """Return the text, with a declaration of its encoding."""
     return f'<?xml version="1.0" encoding="{encoding}"?>\n{text}'.encode(encoding)
 
 

@@ -61,7 +61,7 @@ def laws(arm: Model) -> dict[str, Controller[Any]]:
 
 
 def close(found: Floats, wanted: Floats) -> bool:
-    """Two steppers of dynx differ by rounding only."""
+    """Check that the results of two steppers of dynx differ by rounding only."""
     return apart(found, wanted) < EXACT_ON_DYNX
 
 

@@ -32,7 +32,7 @@ def small_parts(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def batch(executor: Executor | None, **options: Any) -> BatchRollouts:
-    """A batch with its own payloads, gains and noise, to be computed by any executor."""
+    """Return a batch with its own payloads, gains and noise, to be computed by any executor."""
     arm = dynx.load("ur5")
     rng = np.random.default_rng(1)
     return simulate_batch(

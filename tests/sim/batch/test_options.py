@@ -60,7 +60,7 @@ def arm() -> Model:
 
 
 def held(arm: Model, **options: Any) -> BatchRollouts:
-    """An arm held a little away from where it starts, as a batch that was held against one rollout."""
+    """Return an arm held a little away from where it starts, as a batch that was held against one rollout."""
     law = GravityCompensatedPD(arm, kp=60, kd=6)
     return batch_and_one(arm, law, POSTURE, q0=POSTURE + 0.05, duration=0.05, **options)[0]
 

@@ -64,7 +64,7 @@ def batch(rows: slice = slice(None), *, noise: Noise = NOISE, **options: Any) ->
 
 @cache
 def whole() -> BatchRollouts:
-    """The whole batch in one part; computed before a test changes the size of parts."""
+    """Return the whole batch in one part; computed before a test changes the size of parts."""
     return batch(threads=1)
 
 

@@ -51,7 +51,7 @@ OPTIONS: dict[str, dict[str, Any]] = {
 
 
 def held(robot: Model, plant: str = "pinocchio", **options: Any) -> Rollout:
-    """An arm held a little away from where it starts."""
+    """Return an arm held a little away from where it starts."""
     law = GravityCompensatedPD(robot, kp=60, kd=6)
     return simulate(robot, law, POSTURE, q0=POSTURE + 0.05, plant=plant, duration=0.1, **options)
 

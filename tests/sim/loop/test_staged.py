@@ -97,7 +97,7 @@ def outcome(*asked: Any, **options: Any) -> tuple[Rollout, str]:
 
 
 def both(*asked: Any, glued: bool = True, **options: Any) -> Rollout:
-    """One simulation in stages and plainly, which must be the same."""
+    """Return the rollout of a simulation in stages, after checking that the plain one is the same."""
     seen: list[bool] = []
     with glue(on=True, seen=seen):
         quick, told = outcome(*asked, **options)

@@ -31,7 +31,7 @@ BODY = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz=
 
 
 def pendulum(robot: str, joint: str) -> str:
-    """The URDF of one body on one joint."""
+    """Return the URDF of one body on one joint."""
     ends = '<parent link="a"/><child link="b"/>'
     return (
         f'<robot name="{robot}"><link name="a"/><link name="b">{BODY}</link>'
@@ -193,7 +193,7 @@ def refused(path: Path) -> str:
 
 
 def loaded(path: Path) -> Rollout | ArgumentError:
-    """The rollout, or the one error that may come instead."""
+    """Return the rollout, or the one error that may come instead."""
     try:
         return Rollout.load(path)
     except ArgumentError as error:

@@ -75,7 +75,7 @@ def read(path: Path) -> tuple[Messages, dict[str, tuple[str, int]], dict[str, st
 
 
 def rows(messages: list[tuple[int, Any]], field: str) -> Floats:
-    """A field of all messages; dots lead to fields of fields."""
+    """Return a field of all messages; dots lead to fields of fields."""
     found = []
     for _, message in messages:
         value = message
@@ -87,7 +87,7 @@ def rows(messages: list[tuple[int, Any]], field: str) -> Floats:
 
 
 def vector(value: Any) -> list[float]:
-    """The numbers of a sequence, or of a vector, a quaternion or a pair of them."""
+    """Return the numbers of a sequence, or of a vector, a quaternion or a pair of them."""
     if isinstance(value, int | float):
         return [value]
     parts = value if isinstance(value, list) else [getattr(value, name) for name in value.__slots__]

@@ -23,7 +23,7 @@ REST = Setpoint(np.zeros(1), np.zeros(1), np.zeros(1))
 
 
 def damper(gain: Any, code: str = "-gain * measurement.v", head: str = "", scale: float = 1.0) -> Any:
-    """A class of a controller with a text for its torque and an enclosed constant."""
+    """Return a class of a controller with a text for its torque and an enclosed constant."""
     text = (
         "def made(Controller, gain):\n"
         "    class Damper(Controller):\n"
