@@ -44,6 +44,9 @@ from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous, inverse
 from dynx.spatial.so3 import cross, quat_from_rotation, rotation_from_quat, skew
 
+USE_INERTIA = "URDF_USE_INERTIA_FROM_FILE"
+"""Flag that makes PyBullet read the inertias of the file."""
+
 
 class LoadedPyBullet(LoadedRobot):
     """A robot as PyBullet loads it; see `LoadedRobot` and the module docstring."""
@@ -55,13 +58,13 @@ class LoadedPyBullet(LoadedRobot):
         engine = bullet()
         require_harmless(path, model)
         self._model = model
-        options = {"fixed": not model.floating, "file_inertia": self._uses_file_inertia(calls)}
-        self._clients = [LoadedClient(engine, path, model.name, **options)]
+        fixed, flags = not model.floating, self._flags(calls)
+        self._clients = [LoadedClient(engine, path, model.name, fixed=fixed, flags=flags)]
         try:
             self._prepare(calls)
             if self._client.refused and "pybullet.extrapolate_inertias" in calls:
                 for times in (1, 2):
-                    other = LoadedClient(engine, path, model.name, **options)
+                    other = LoadedClient(engine, path, model.name, fixed=fixed, flags=flags)
                     self._clients.append(other)
                     self._set(other, calls)
                     other.apply(with_ballast(times))
@@ -99,9 +102,9 @@ class LoadedPyBullet(LoadedRobot):
         client.apply(set_joints({_text(client.joints[k][1]): k for k in client.moving}, calls))
 
     @classmethod
-    def _uses_file_inertia(cls, calls: Collection[str]) -> bool:
-        """Check whether the call that loads the file has the flag for the inertias of the file."""
-        return True
+    def _flags(cls, calls: Collection[str]) -> tuple[str, ...]:
+        """Return the names of the flags with which the file is loaded."""
+        return (USE_INERTIA,)
 
     @property
     def _client(self) -> LoadedClient:

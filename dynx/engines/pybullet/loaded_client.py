@@ -6,7 +6,7 @@ speed limit, steps of unit length. Joint damping and joint limits of the file st
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import ModuleType
@@ -29,11 +29,12 @@ class LoadedClient(BulletConnection):
     """One robot as `loadURDF` loads it."""
 
     def __init__(
-        self, engine: ModuleType, path: Path, robot: str, *, fixed: bool, file_inertia: bool = True
+        self, engine: ModuleType, path: Path, robot: str, *, fixed: bool, flags: Iterable[str]
     ) -> None:
+        """`flags` are names of constants of `engine` for ``loadURDF``."""
         super().__init__(engine, robot)
         self._fixed = fixed
-        self._flags = engine.URDF_USE_INERTIA_FROM_FILE if file_inertia else 0
+        self._flags = sum(int(getattr(engine, flag)) for flag in flags)
         self._file = path.read_bytes()
         self._path = path
         self._settings: list[Setting] = []
