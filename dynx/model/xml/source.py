@@ -96,7 +96,7 @@ class XmlSource:
         if encoding is None:
             self.form = TextForm(_declared_encoding(text))
         else:
-            front, _, end = whole.partition(text)
+            front, _, end = whole.partition(text) if text else (whole, "", "")
             self.form = TextForm(encoding, front, end)
         self.source = source
         # Checks limits and raises errors; `_SourceParser` relies on well-formed text.
