@@ -40,7 +40,6 @@ class BackendImplementation(Implementation):
         return PreparedCall(lambda: method(*arguments, *frame))
 
     def close(self) -> None:
-        """Close the backend."""
         self._engine.close()
 
 

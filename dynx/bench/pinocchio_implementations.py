@@ -82,7 +82,6 @@ class PinocchioBatch(PinocchioImplementation):
         return case.batch > 1 and case.quantity in self._in_parallel
 
     def prepare(self, case: BenchmarkCase, batch: Batch, out: Floats) -> PreparedCall:
-        """Return the call."""
         function = getattr(pin, self._in_parallel[case.quantity])
         columns = [each.T for each in batch.arguments(case.quantity)]
         results, threads, pool = out.T, self.threads, self._pool
@@ -104,7 +103,6 @@ class PinocchioLoop(PinocchioImplementation):
         return case.quantity in BENCHMARK_QUANTITIES
 
     def prepare(self, case: BenchmarkCase, batch: Batch, out: Floats) -> PreparedCall:
-        """Return the call."""
         frame = self._frame_ids[batch.model.frame_index(batch.frame)]
         function = _binding_call(self._engine, case.quantity, frame)
         return PreparedCall(_looped(function, case, batch, out))
@@ -124,7 +122,6 @@ class PinocchioInside(PinocchioLoop):
         return case.batch >= MIN_CALLS and super().supports(case)
 
     def prepare(self, case: BenchmarkCase, batch: Batch, out: Floats) -> PreparedCall:
-        """Return the call."""
         full = super().prepare(case, batch, out)
         engine, frame = _one_joint()
         n = len(batch)

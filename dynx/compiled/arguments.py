@@ -33,7 +33,6 @@ class BatchArguments(Arguments):
             raise ClosedError(f"this backend of {self._model.name} was closed; make a new one")
 
     def q(self, q: Any) -> Floats:
-        """Return a configuration (..., nq), finite, with a unit quaternion for a floating base."""
         if not self.closed and _is_batch(q, self._q_shape) and _below(q, MAX_MAGNITUDE):
             if not self._floating:
                 return np.asarray(q)
@@ -47,13 +46,11 @@ class BatchArguments(Arguments):
         return super().q(q)
 
     def v(self, v: Any, name: str = "v") -> Floats:
-        """Return a velocity, acceleration or torque (..., nv), finite."""
         if _is_batch(v, self._v_shape) and _below(v, MAX_MAGNITUDE):
             return np.asarray(v)
         return super().v(v, name)
 
     def finite_acceleration(self, a: Floats) -> Floats:
-        """Return the result of forward dynamics; raises SingularMassMatrixError where it is not finite."""
         if _below(a, _MAX_ACCELERATION):
             return a
         return super().finite_acceleration(a)

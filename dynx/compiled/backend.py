@@ -87,7 +87,6 @@ class CompiledBackend(Backend):
     def forward_kinematics(
         self, q: ArrayLike, frame: str | Sequence[str] | None = None, *, out: Floats | None = None
     ) -> Floats:
-        """Return T_world_frame (..., 4, 4); for several frames, or None for all, (..., n, 4, 4)."""
         if frame is not None and not isinstance(frame, str):
             names = self._arguments.frames(frame)
             # The poses are selected from those of all frames, because a kernel for each list of frames would
@@ -113,7 +112,6 @@ class CompiledBackend(Backend):
         point: ArrayLike | None = None,
         out: Floats | None = None,
     ) -> Floats:
-        """Return J (..., 6, nv) with J v the velocity of `frame`, linear [m/s] then angular [rad/s]."""
         if point is not None:
             return write_into(out, super().jacobian(q, frame, reference=reference, point=point))
         try:
@@ -135,7 +133,6 @@ class CompiledBackend(Backend):
         joint_dynamics: bool = False,
         out: Floats | None = None,
     ) -> Floats:
-        """Return the torque tau (..., nv) that gives acceleration `a`: M a + bias - J' external forces."""
         if external_forces is None and not joint_dynamics:
             call = self._public_calls.get("inverse_dynamics")
             if call is None:
@@ -162,10 +159,6 @@ class CompiledBackend(Backend):
         joint_dynamics: bool = False,
         out: Floats | None = None,
     ) -> Floats:
-        """Return the acceleration a (..., nv) that `tau` and the external forces give.
-
-        Raises SingularMassMatrixError, which names the joints, if nothing that a joint moves has inertia.
-        """
         if external_forces is None and not joint_dynamics and self._eliminates:
             call = self._public_calls.get("forward_dynamics")
             if call is None:
@@ -184,7 +177,6 @@ class CompiledBackend(Backend):
         return write_into(out, a)
 
     def mass_matrix(self, q: ArrayLike, *, joint_dynamics: bool = False, out: Floats | None = None) -> Floats:
-        """Return M (..., nv, nv), symmetric."""
         call = self._public_calls.get("mass_matrix")
         if call is None:
             call = self._call_by_name("mass_matrix")

@@ -45,7 +45,6 @@ class PiecewisePolynomial(Curve):
 
     @property
     def knots(self) -> Floats:
-        """The breaks."""
         return self.breaks
 
     def __call__(self, t: Floats) -> tuple[Floats, Floats, Floats]:

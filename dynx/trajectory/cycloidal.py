@@ -44,7 +44,6 @@ class Cycloid(Curve):
 
     @property
     def knots(self) -> Floats:
-        """The two ends."""
         return np.array([0.0, self.duration])
 
     def __call__(self, t: Floats) -> tuple[Floats, Floats, Floats]:

@@ -32,7 +32,6 @@ class DisplacementTrajectory(Trajectory):
 
     @property
     def knots(self) -> Floats:
-        """The knots of the curve."""
         return self.curve.knots
 
     def inside(self, t: Floats) -> Setpoint:

@@ -48,7 +48,6 @@ class FourierSeries(Curve):
 
     @property
     def knots(self) -> Floats:
-        """The two ends."""
         return np.array([0.0, self.duration])
 
     def __call__(self, t: Floats) -> tuple[Floats, Floats, Floats]:

@@ -77,12 +77,10 @@ class BulletPlant(Plant):
         return DisturbedAcceleration(self._engine, self.disturbances)
 
     def reset(self, q: Floats, v: Floats) -> None:
-        """Set the state."""
         self._q, self._v = q, v
         self._place()
 
     def step(self, t: float, tau: Floats) -> StepResult:
-        """Take one step, in sub-steps if there are several."""
         first = self._substep(t, tau)
         for k in range(1, self.substeps):
             self._substep(t + k * self._h, tau)
@@ -110,7 +108,6 @@ class BulletPlant(Plant):
             )
 
     def close(self) -> None:
-        """Disconnect the clients."""
         self._client.close()
         for made in ("_engine", "_tree"):
             if made in self.__dict__:

@@ -60,7 +60,6 @@ class IntegratedPlant(Plant):
         self._q, self._v = q, v
 
     def step(self, t: float, tau: Floats) -> StepResult:
-        """Take one step, or as many sub-steps."""
         q, v, a = self._advance(t, tau)
         for k in range(1, self.substeps):
             q, v, _ = self._advance(t + k * self._h, tau)
@@ -99,5 +98,4 @@ class IntegratedPlant(Plant):
         return state
 
     def close(self) -> None:
-        """Close the backend."""
         self._engine.close()
