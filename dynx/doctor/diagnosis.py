@@ -14,40 +14,41 @@ from dynx.doctor.counterexample.trials import difference_of
 from dynx.doctor.examine.examination import LOADING, TORQUE, Examination, Examiner
 from dynx.doctor.examine.line_map import with_original_lines
 from dynx.doctor.examine.reference_values import ReferenceValues
-from dynx.doctor.prove.attribution import Attribution, Attributor
 from dynx.doctor.prove.mending import (
     Mending,
-    Place,
     all_except,
     detections,
     differs,
     mend,
-    place_of,
     readable,
     refusal,
     remedy_of,
 )
+from dynx.doctor.prove.proofs import Proofs
+from dynx.doctor.prove.selection import Selection, smallest_mending
 from dynx.doctor.report import (
     DoctorReport,
     Unexplained,
 )
-from dynx.doctor.report_assembly import all_findings, first_report, run_time_calls, with_after
+from dynx.doctor.report_assembly import (
+    all_findings,
+    changes_of,
+    first_report,
+    run_time_calls,
+    with_after,
+)
 from dynx.doctor.variants import diagnosed_variants, variants_as_loaded
-from dynx.errors import ArgumentError, DescriptionError, DynxError
+from dynx.errors import ArgumentError, DescriptionError, DynxError, UnknownNameError, nearest, shown
 from dynx.loaded import COMMON_VARIANTS, ENGINES, VARIANTS, engine_of, installed_engines
 from dynx.model import Model
 from dynx.model.configuration import checked_base
 from dynx.model.loading import read_description
 from dynx.model.model import Base
 from dynx.model.xml.source import XmlSource
-from dynx.rules import Case, Detection, Rule, all_rules
+from dynx.rules import LEVELS, Case, Detection, Level, Rule, all_rules
 from dynx.rules.choices import checked_choices
 
 DEFAULT_SAMPLES = 5
-
-NEGLIGIBLE_SHARE = 0.1
-"""Largest error of a mended file in which places without an effect of their own are left unchanged, as a
-fraction of the tolerance. At other states their joint effect may be larger."""
 
 COUNTEREXAMPLE_SECONDS = 20.0
 """Time limit [s] of the search for one smallest counterexample."""
@@ -65,6 +66,7 @@ def diagnose(
     seed: int = 0,
     tolerance: float = BAR,
     choose: Mapping[str, str] | None = None,
+    level: Level = "physics",
     counterexamples: bool = True,
     progress: Progress | None = None,
 ) -> DoctorReport:
@@ -75,9 +77,11 @@ def diagnose(
     call and is compared with reference values at `samples` random states that follow from `seed`, in tilted
     gravity; a relative error above `tolerance` is a difference. By default common variants are examined too
     (`DoctorReport.variants`); they differ by the user's call, which no file can mend, so they count as
-    differences only if `engines` names them. `choose` maps rule ids to one of the rule's `choices`.
-    `counterexamples` selects the search for the smallest robot that shows a difference which no rule
-    explains. `progress` is called with the name of each step.
+    differences only if `engines` names them. `choose` maps rule ids to one of the rule's `choices`. `level`
+    is the largest change of the mended file: ``safe`` changes nothing that a reader notices, ``rounding`` the
+    equations of motion by rounding only, ``physics`` whatever the causes require. `counterexamples` selects
+    the search for the smallest robot that shows a difference which no rule explains. `progress` is called
+    with the name of each step.
 
     A robot that cannot be read gives a report with `error` set. Raises ArgumentError,
     UnknownBackendError, NotInstalledError and UnknownNameError for arguments that are invalid for any robot.
@@ -86,10 +90,12 @@ def diagnose(
     examiner, variants = _examiners(engines, samples, seed, tolerance)
     choices = checked_choices((choose or {}).items())
     checked_base(base)
+    if level not in LEVELS:
+        raise UnknownNameError(f"no level {shown(level)}{nearest(level, LEVELS)}")
     progress = progress or _ignore_progress
     try:
         case = open_case(robot, base, choices)
-        report = _diagnosis_of(case, examiner, variants, tolerance, counterexamples, seed, progress)
+        report = _diagnosis_of(case, examiner, variants, tolerance, counterexamples, seed, level, progress)
     except DynxError as error:
         report = refused_report(str(_label(robot)), error, base=base)
     return replace(report, samples=samples, seed=seed, seconds=time.perf_counter() - started)
@@ -142,6 +148,7 @@ def _diagnosis_of(
     tolerance: float,
     counterexamples: bool,
     seed: int,
+    level: Level,
     progress: Progress,
 ) -> DoctorReport:
     progress("loading")
@@ -160,20 +167,35 @@ def _diagnosis_of(
     progress("mending")
     full = mend(case, rules)
     after = examiner.examine(full.case)
-    proofs = _prove_causes(case, rules, examiner, before, after, tolerance, progress)
-    mended, last = _smallest_mending(case, rules, full, after, proofs, examiner, tolerance)
-    unexplained = _unexplained(last, tolerance, _engines_without_remedy(mended.case, rules, examiner.engines))
+    proofs = Proofs(case, rules, examiner, before, full.case, after, tolerance, progress)
+    best = smallest_mending(
+        case,
+        rules,
+        Selection(full, after, proofs.attributions()),
+        examiner,
+        tolerance,
+        lambda rule: proofs.measure(rule, minor=True),
+    )
+    left = _engines_without_remedy(best.mending.case, rules, examiner.engines)
+    unexplained = _unexplained(best.examination, tolerance, left)
     if unexplained and counterexamples:
-        unexplained = _with_counterexamples(mended.case, unexplained, examiner, tolerance, seed, progress)
-    changed = differs(mended.case, case)
+        unexplained = _with_counterexamples(
+            best.mending.case, unexplained, examiner, tolerance, seed, progress
+        )
+    mended, last = best.mending, best.examination
+    if level != "physics":
+        mended = mend(case, rules, all_except(best.omitted), level)
+        last = examiner.examine(mended.case, reference=examiner.reference(readable(mended.case).case))
     return replace(
-        with_after(report, last),
-        findings=all_findings(found, proofs, mended, examiner.engines),
+        with_after(report, last, best.examination),
+        findings=all_findings(found, best.proofs, mended, examiner.engines),
         unexplained=unexplained,
         choices=mended.choices,
         calls=run_time_calls(mended.case, examiner),
+        level=level,
+        changes=changes_of(case, best.mending, mended),
         variants=diagnosed_variants(case, reference, mended.case, last.reference, rules, variants, tolerance),
-        mended=mended.case.source.text if changed else None,
+        mended=mended.case.source.text if differs(mended.case, case) else None,
         form=mended.case.source.form,
     )
 
@@ -196,72 +218,6 @@ def _rules_for(examiner: Examiner) -> list[Rule]:
     """Select the rules that concern one of the examined engines, and those about practice."""
     versions = {name: kind.engine_version() for name, kind in examiner.engines.items()}
     return [rule for rule in all_rules() if rule.kind == "practice" or rule.holds_for(versions)]
-
-
-def _prove_causes(
-    case: Case,
-    rules: Sequence[Rule],
-    examiner: Examiner,
-    before: Examination,
-    after: Examination,
-    tolerance: float,
-    progress: Progress,
-) -> list[Attribution]:
-    """Measure the effect of every rule about differences at every place.
-
-    The causes of rules about the text are removed from the text as it is, those of rules about the robot from
-    the text made readable. Meshes are removed from both texts first.
-    """
-    slim = case.with_source(examiner.without_unused(case.source))
-    sound = readable(slim).case
-    readably = before if sound is slim else examiner.examine(sound, reference=before.reference)
-    causes = [rule for rule in rules if rule.kind == "difference"]
-    by_text = Attributor(examiner, slim, causes, before, after, tolerance, progress)
-    by_robot = Attributor(examiner, sound, causes, readably, after, tolerance, progress)
-    found = detections(slim, causes)
-    proofs: list[Attribution] = []
-    for rule in dict.fromkeys(rule for rule, _ in found):
-        places = [each for other, each in found if other is rule]
-        proofs += (by_text if rule.stage == "reading" else by_robot).attribute(rule, places)
-    return proofs
-
-
-def _smallest_mending(
-    case: Case,
-    rules: Sequence[Rule],
-    full: Mending,
-    after: Examination,
-    proofs: Sequence[Attribution],
-    examiner: Examiner,
-    tolerance: float,
-) -> tuple[Mending, Examination]:
-    """Apply only the remedies that matter, if they reduce the errors as far as all remedies do.
-
-    The first attempt mends the places that have an effect of their own, the second all places of rules with
-    an effect somewhere, because effects that are too small to be measured alone may add up. Causes that show
-    only at some states are always removed, and so are those that concern an engine that refuses even the
-    mended file, because their effect on it cannot be measured.
-    """
-    unmeasured = {engine for engine in examiner.engines if after.outputs[engine].refused is not None}
-    idle: set[Place] = {
-        place_of(each.rule, each.detection)
-        for each in proofs
-        if not (each.effects or each.rule.depends_on_state or each.rule.named_of(unmeasured))
-    }
-    effective = {each.rule.id for each in proofs if each.effects}
-    for omitted in (idle, {each for each in idle if each[0] not in effective}):
-        if not omitted:
-            break
-        least = mend(case, rules, all_except(omitted))
-        if not least.case.readable:
-            continue
-        result = examiner.examine(least.case)
-        if all(
-            result.max_error(engine) <= max(NEGLIGIBLE_SHARE * tolerance, after.max_error(engine))
-            for engine in examiner.engines
-        ):
-            return least, result
-    return full, after
 
 
 def _engines_without_remedy(mended: Case, rules: Sequence[Rule], engines: Collection[str]) -> set[str]:

@@ -15,7 +15,7 @@ from dynx.agreement.report import Failure
 from dynx.files.documents import document_of, to_json_values
 from dynx.loaded.difference import Deviation
 from dynx.model.xml.text import TextForm
-from dynx.rules.rule import Kind
+from dynx.rules.rule import Kind, Level
 
 SCHEMA = 1
 
@@ -121,10 +121,32 @@ class Unexplained:
 
 @dataclass(frozen=True)
 class RunTimeCall:
-    """A remedy that no URDF can express: a line of code for the users of one engine."""
+    """A remedy that no URDF can express: a line of code for the users of one engine.
+
+    `comparison` says that it removes forces that belong to the robot, such as joint damping: for comparing
+    engines and not for simulating.
+    """
 
     engine: str
     code: str
+    comparison: bool = False
+
+
+@dataclass(frozen=True)
+class Change:
+    """Change of the file by the remedies of one rule, with everything in the file that they change.
+
+    `others` are elements that are neither links nor joints, such as ``transmission drive``. `made` is false
+    for a change that is above the level of the mended file.
+    """
+
+    rule: str
+    level: Level
+    change: str
+    links: tuple[str, ...] = ()
+    joints: tuple[str, ...] = ()
+    others: tuple[str, ...] = ()
+    made: bool = True
 
 
 @dataclass(frozen=True, repr=False)
@@ -134,8 +156,10 @@ class DoctorReport:
     `residual` is the largest relative error that remains after mending, `referee` that of the reference
     values themselves (mass matrix and inverse dynamics at one state) against 50 digits. `choices` are
     sentences on the decisions where the file is ambiguous and on the changes to the physics of the robot.
-    `model_difference` lists the values of engines that the file does not state. `variants` are other common
-    calls of the engines; they count neither for `alike` nor for `explained`, `findings` and `residual`.
+    `level` is the highest level of the remedies in the mended file; `changes` are theirs, and those that the
+    level leaves undone. `model_difference` lists the values of engines that the file does not state.
+    `variants` are other common calls of the engines; they count neither for `alike` nor for `explained`,
+    `findings` and `residual`.
     """
 
     robot: str
@@ -155,6 +179,8 @@ class DoctorReport:
     referee: float = 0.0
     choices: tuple[str, ...] = ()
     calls: tuple[RunTimeCall, ...] = ()
+    level: Level = "physics"
+    changes: tuple[Change, ...] = ()
     pairs: tuple[PairError, ...] = ()
     model_difference: tuple[Deviation, ...] = ()
     variants: tuple[VariantResult, ...] = ()
@@ -254,6 +280,8 @@ class DoctorEntry:
     referee: float
     choices: tuple[str, ...]
     calls: tuple[RunTimeCall, ...]
+    level: Level
+    changes: tuple[Change, ...]
     pairs: tuple[PairError, ...]
     model_difference: tuple[Deviation, ...]
     variants: tuple[VariantResult, ...]

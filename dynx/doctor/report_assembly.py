@@ -9,8 +9,10 @@ from itertools import combinations
 from dynx.doctor.examine.examination import QUANTITIES, TORQUE, Examination, Examiner
 from dynx.doctor.examine.reference_values import referee_error
 from dynx.doctor.prove.attribution import Attribution
-from dynx.doctor.prove.mending import Mending, Place, place_of
+from dynx.doctor.prove.levels import changed_parts, level_of
+from dynx.doctor.prove.mending import Mending, Place, differs, place_of
 from dynx.doctor.report import (
+    Change,
     DoctorReport,
     Effect,
     EngineResult,
@@ -21,7 +23,7 @@ from dynx.doctor.report import (
 )
 from dynx.loaded import loader_class
 from dynx.loaded.difference import model_difference
-from dynx.rules import Case, Detection, Rule
+from dynx.rules import LEVELS, CallingRule, Case, Detection, Rule, all_rules
 
 
 def first_report(case: Case, before: Examination, tolerance: float) -> DoctorReport:
@@ -45,13 +47,13 @@ def first_report(case: Case, before: Examination, tolerance: float) -> DoctorRep
     )
 
 
-def with_after(report: DoctorReport, after: Examination) -> DoctorReport:
-    """Add the errors of the engines on the mended file."""
+def with_after(report: DoctorReport, after: Examination, proved: Examination) -> DoctorReport:
+    """Add the errors of the engines on the mended file, and the largest one once all causes are removed."""
     engines = tuple(
         replace(each, refused_after=after.outputs[each.engine].refused, after=after.errors(each.engine))
         for each in report.engines
     )
-    return replace(report, engines=engines, residual=_residual(after))
+    return replace(report, engines=engines, residual=_residual(proved))
 
 
 def variant_result(
@@ -145,9 +147,53 @@ def all_findings(
     return tuple(sorted(findings, key=lambda finding: finding.kind))
 
 
+def changes_of(case: Case, full: Mending, mended: Mending) -> tuple[Change, ...]:
+    """List the changes that `mended` makes in the text of the case, then those that only `full` makes."""
+    made = {change.rule: change for change in _changes(case, mended)}
+    left = []
+    for change in _changes(case, full):
+        done = made.get(change.rule, Change(change.rule, "safe", ""))
+        rest = replace(
+            change,
+            links=tuple(name for name in change.links if name not in done.links),
+            joints=tuple(name for name in change.joints if name not in done.joints),
+            others=tuple(name for name in change.others if name not in done.others),
+            made=False,
+        )
+        if rest.links or rest.joints or rest.others or change.rule not in made:
+            left.append(rest)
+    return (*made.values(), *left)
+
+
+def _changes(case: Case, mended: Mending) -> list[Change]:
+    """List the changes by the remedies of a mending, one for each rule."""
+    found: dict[str, Change] = {}
+    before = case
+    for rule, remedy in mended.applied:
+        parts = changed_parts(before.source, remedy.case.source)
+        if parts or differs(before, remedy.case):
+            links, joints = (tuple(n for tag, n in parts if tag == kind) for kind in ("link", "joint"))
+            others = tuple(f"{tag} {n}".rstrip() for tag, n in parts if tag not in ("link", "joint"))
+            known = found.get(rule.id, Change(rule.id, "safe", remedy.changed))
+            found[rule.id] = Change(
+                rule.id,
+                max(known.level, level_of(rule, before, remedy), key=LEVELS.index),
+                known.change if remedy.changed in known.change else f"{known.change}; {remedy.changed}",
+                tuple(dict.fromkeys((*known.links, *links))),
+                tuple(dict.fromkeys((*known.joints, *joints))),
+                tuple(dict.fromkeys((*known.others, *others))),
+            )
+        before = remedy.case
+    return list(found.values())
+
+
 def run_time_calls(case: Case, examiner: Examiner) -> tuple[RunTimeCall, ...]:
     """Collect the code of the run-time remedies that the mended case requires."""
     known = [(name, kind.CALLS) for name, kind in examiner.engines.items()]
+    compared = {call for rule in all_rules() if isinstance(rule, CallingRule) for call in rule.calls}
     return tuple(
-        RunTimeCall(engine, calls[call]) for engine, calls in known for call in calls if call in case.calls
+        RunTimeCall(engine, calls[call], comparison=call in compared)
+        for engine, calls in known
+        for call in calls
+        if call in case.calls
     )

@@ -11,6 +11,7 @@ from dynx.doctor.report import DoctorReport
 from dynx.errors import BackendError, DynxError
 from dynx.loaded.registry import ENGINES, loader_class
 from dynx.model.model import Base
+from dynx.rules.rule import Level
 
 
 @dataclass(frozen=True)
@@ -27,6 +28,7 @@ class DoctorTask:
     seed: int = 0
     tolerance: float | None = None
     choose: tuple[tuple[str, str], ...] = ()
+    level: Level = "physics"
     causes: bool = True
 
 
@@ -39,7 +41,7 @@ def examine(task: DoctorTask) -> DoctorReport:
         chosen["tolerance"] = task.tolerance
     try:
         if task.causes:
-            report = diagnose(task.robot, choose=dict(task.choose), **chosen)
+            report = diagnose(task.robot, choose=dict(task.choose), level=task.level, **chosen)
         else:
             report = compare_as_loaded(task.robot, **chosen)
     except DynxError as error:

@@ -8,15 +8,17 @@ from dynx.rules.case import Case
 from dynx.rules.editing import Correction, EditingRule, OptionalEditingRule, correction, found_at
 from dynx.rules.engine_versions import EVERY_ENGINE, measured_on
 from dynx.rules.registry import all_rules, find_rule
-from dynx.rules.rule import CallingRule, Detection, Remedy, Rule, links_of
+from dynx.rules.rule import LEVELS, CallingRule, Detection, Level, Remedy, Rule, links_of
 
 __all__ = [
     "EVERY_ENGINE",
+    "LEVELS",
     "CallingRule",
     "Case",
     "Correction",
     "Detection",
     "EditingRule",
+    "Level",
     "OptionalEditingRule",
     "Remedy",
     "Rule",

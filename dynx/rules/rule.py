@@ -9,7 +9,7 @@ import sys
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, get_args
 
 from packaging.specifiers import SpecifierSet
 
@@ -26,6 +26,12 @@ where the user chose so."""
 Stage = Literal["reading", "model"]
 """``reading``: the cause is in the text, and dynx may refuse the file until it is removed; these rules are
 applied first and must not use `Case.model`. ``model``: the cause is in the robot that was read."""
+
+Level = Literal["safe", "rounding", "physics"]
+"""Largest change that a remedy makes: none that a reader notices, rounding of the equations of motion, or
+more (`dynx.doctor.prove.levels`)."""
+
+LEVELS: tuple[Level, ...] = get_args(Level)
 
 _HEADING = re.compile(r"([A-Z]+[0-9]{3}) ([a-z0-9]+(?:-[a-z0-9]+)+): (.+)", re.DOTALL)
 
@@ -108,6 +114,9 @@ class Rule(ABC):
     choices: ClassVar[Mapping[str, str]] = {}
     """Ways to remove the cause where there are several, the default first: name -> what it does, in the
     imperative."""
+
+    unambiguous: ClassVar[bool] = False
+    """Whether text that dynx refuses for this cause can be read in one way only: then the remedy is safe."""
 
     trap_base: ClassVar[Base] = "fixed"
     """The base on which the trap shows the difference."""

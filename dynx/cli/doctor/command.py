@@ -41,6 +41,14 @@ from dynx.cli.shell.options import choice_pair, name_list, run_options
 )
 @click.option("--fix", "fix", metavar="OUT", help="File for the mended URDF; for several robots a directory.")
 @click.option(
+    "--level",
+    type=click.Choice(["safe", "rounding", "physics"]),
+    default="physics",
+    show_default=True,
+    help="Largest change of the mended URDF: `safe` changes nothing that a reader notices, `rounding` the "
+    "equations of motion by rounding only, `physics` whatever the causes require.",
+)
+@click.option(
     "--in-place", is_flag=True, help="Overwrite the files that were read with the mended descriptions."
 )
 @click.option(

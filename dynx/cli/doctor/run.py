@@ -16,6 +16,7 @@ from dynx.errors import DynxError
 from dynx.model.expansion import expand, refusals
 from dynx.model.model import Base
 from dynx.rules.choices import checked_choices
+from dynx.rules.rule import Level
 
 
 def doctor(
@@ -27,6 +28,7 @@ def doctor(
     tolerance: float,
     choose: tuple[tuple[str, str], ...],
     fix: str | None,
+    level: Level,
     in_place: bool,
     json_path: str | None,
     html: str | None,
@@ -51,7 +53,10 @@ def doctor(
     outputs.keep_apart((each.robot for each in inputs), () if in_place else targets, baseline_path)
     examined = [(each, one) for each in inputs for one in bases]
     run = doctor_run(
-        [DoctorTask(each.robot, one, engines, samples, seed, tolerance, choices) for each, one in examined],
+        [
+            DoctorTask(each.robot, one, engines, samples, seed, tolerance, choices, level)
+            for each, one in examined
+        ],
         refusals=refusals([each for each, _ in examined]),
     )
     conclusion = Conclusion(run, outputs, baseline, targets, in_place, counterexamples, engines)

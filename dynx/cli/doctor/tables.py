@@ -72,6 +72,7 @@ def _show(
     practice = [each for each in rest if each.kind == "practice"]
     _show_causes(out, "bad practice", practice, places)
     _show_list(out, "decided where the file is ambiguous", report.choices)
+    _show_changes(out, report)
     _show_calls(out, report)
     _show_unexplained(out, report, saved)
     _show_next(out, report, mended)
@@ -237,11 +238,21 @@ def _show_list(out: Console, title: str, items: Sequence[str]) -> None:
 
 
 def _show_calls(out: Console, report: DoctorReport) -> None:
-    if report.calls:
-        heading(out, "calls after loading, for what no URDF can express")
-        for call in report.calls:
+    for title, comparison in wording.CALLS.items():
+        calls = [call for call in report.calls if call.comparison == comparison]
+        if calls:
+            heading(out, title)
+        for call in calls:
             out.print(f"  {wording.name(call.engine)}")
             block(out, call.code, 6)
+
+
+def _show_changes(out: Console, report: DoctorReport) -> None:
+    """Print what the mended file changes, and what its level leaves undone."""
+    made = [wording.change(each) for each in report.changes if each.made]
+    left = [wording.change(each) for each in report.changes if not each.made]
+    _show_list(out, "the mended file changes", made)
+    _show_list(out, f"left undone at --level {report.level}", left)
 
 
 def _show_unexplained(out: Console, report: DoctorReport, saved: Mapping[int, str]) -> None:

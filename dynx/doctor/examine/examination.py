@@ -148,6 +148,10 @@ class Examiner:
         # One remedy after another leaves the robot as it is.
         self._values = lru_cache(maxsize=8)(self._compute_reference)
 
+    def with_samples(self, samples: int) -> Examiner:
+        """Return an examiner with the same engines and seed, and another number of states."""
+        return Examiner(self.engines, samples, self._seed)
+
     def reference(self, case: Case) -> ReferenceValues:
         """Compute the reference values of a case at random states."""
         return self._values(without_meshes(case.source).text, case.source.source, case.base)

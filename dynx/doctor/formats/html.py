@@ -66,7 +66,7 @@ def template_environment() -> Environment:
         lstrip_blocks=True,
     )
     words = (wording.name, wording.relative, wording.quantity, wording.effect, wording.part)
-    more = (wording.unexplained, wording.finding_effect, wording.variant)
+    more = (wording.unexplained, wording.finding_effect, wording.variant, wording.change)
     environment.filters.update({each.__name__: each for each in (*words, *more)})
     environment.filters["capitalized"] = lambda text: text[:1].upper() + text[1:]
     views: tuple[Callable[..., Any], ...] = (causes, status, step_of, bar_position, largest_error)

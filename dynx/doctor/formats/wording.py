@@ -7,11 +7,20 @@ from collections.abc import Sequence
 from pathlib import PurePath
 from typing import Any
 
-from dynx.doctor.report import Effect, Finding, Unexplained, VariantResult
+from dynx.doctor.report import Change, Effect, Finding, Unexplained, VariantResult
 from dynx.errors import escaped
 
 NAME_LENGTH = 120
 """Number of characters of a name that are shown; a description may hold names of any length."""
+
+CALLS = {
+    "calls after loading, for what no URDF can express": False,
+    "to compare engines (not to simulate)": True,
+}
+"""Titles of the calls after loading, by `RunTimeCall.comparison`."""
+
+_MAX_PARTS = 8
+"""Number of changed elements that are listed; the JSON document has all."""
 
 _PERCENT = 1e-3
 """Smallest relative error that is written in per cent."""
@@ -107,6 +116,16 @@ def variant(each: VariantResult) -> list[str]:
         rule = f"{name(cause.rule)} {name(cause.name)}, {proof}"
         lines.append(f"{effect(cause.effect)}: {rule}; {name(cause.message, 300)}")
     return lines
+
+
+def change(each: Change) -> str:
+    """Write ``DX103 (rounding): merged ...; link foot, link leg``, listing some of many elements."""
+    parts = [f"link {link}" for link in each.links] + [f"joint {joint}" for joint in each.joints]
+    parts += each.others
+    shown = [name(part) for part in parts[:_MAX_PARTS]]
+    more = [f"{len(parts) - _MAX_PARTS} more"] if len(parts) > _MAX_PARTS else []
+    where = f"; {', '.join([*shown, *more])}" if shown else ""
+    return f"{name(each.rule)} ({each.level}): {name(each.change, 1000)}{where}"
 
 
 def titles(robots: Sequence[str]) -> list[str]:

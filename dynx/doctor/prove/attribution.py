@@ -30,15 +30,23 @@ NOISE_SHARE = 0.01
 """Largest rounding error of an engine's errors, over the tolerance, with which their differences are still
 taken for effects."""
 
+MINOR_SHARE = 1e-3
+"""Smallest effect that is more than rounding, as a share of the tolerance."""
+
 
 @dataclass(frozen=True)
 class Attribution:
-    """The effect of one rule at one place on each engine where it has one above the tolerance."""
+    """The effect of one rule at one place on each engine where it has one above the tolerance.
+
+    `minor` has the effects that are smaller, which may add up; None where they were not measured place by
+    place.
+    """
 
     rule: Rule
     detection: Detection
     effects: Mapping[str, Effect]
     proved: bool
+    minor: Mapping[str, Effect] | None = None
 
     @property
     def largest_effect(self) -> Effect | None:
@@ -58,15 +66,22 @@ class Attributor:
     tolerance: float
     progress: Callable[[str], None]
 
-    def attribute(self, rule: Rule, found: Sequence[Detection]) -> list[Attribution]:
-        """Measure the effect of the rule at each of the places where it was found."""
+    def attribute(self, rule: Rule, found: Sequence[Detection], *, minor: bool = False) -> list[Attribution]:
+        """Measure the effect of the rule at each of the places where it was found.
+
+        Places are measured one by one if together they have an effect above the tolerance, or `minor` effects
+        are wanted.
+        """
         self.progress(f"{rule.id} {rule.name}")
         named = rule.named_of(self.examiner.engines)
         wrong = [name for name in named if self.before.max_error(name) > self.tolerance]
         rest = cache(lambda: mend(self.case, [other for other in self.rules if other is not rule]))
-        affected = self._effects_at(rule, found, named, wrong, rest)
-        if len(found) == 1 or not affected:
-            return [self._attribution(rule, each, affected) for each in found]
+        whole = self._effects_at(rule, found, named, wrong, rest)
+        affected = whole if minor else self._large(whole)
+        if len(found) == 1:
+            return [self._attribution(rule, each, whole) for each in found]
+        if not affected:
+            return [Attribution(rule, each, {}, False) for each in found]
         places: dict[Place, list[Detection]] = {}
         for each in found:
             places.setdefault(place_of(rule, each), []).append(each)
@@ -77,12 +92,14 @@ class Attributor:
                 measured |= {each: self._effects_at(rule, [each], affected, (), rest) for each in faults}
             # Each of several faults of one place can be enough for an engine to refuse the file.
             unclear = {
-                name for name in affected if all(name not in measured.get(each, {}) for each in faults)
+                name
+                for name in affected
+                if all(name not in self._large(measured.get(each, {})) for each in faults)
             }
-            whole = self._effects_at(rule, faults, unclear, hidden, rest) if len(places) > 1 else affected
+            shared = self._effects_at(rule, faults, unclear, hidden, rest) if len(places) > 1 else affected
             for each in faults:
-                shared = {name: effect for name, effect in whole.items() if name in unclear}
-                measured[each] = measured.get(each, {}) | shared
+                own = {name: effect for name, effect in shared.items() if name in unclear}
+                measured[each] = measured.get(each, {}) | own
         return [self._attribution(rule, each, measured[each]) for each in found]
 
     def _effects_at(
@@ -97,7 +114,8 @@ class Attributor:
         shows nothing, by reinsertion."""
         noisy = {name for name in engines if self._is_noisy(name)}
         effects = self._effects_of_removal(rule, found, [name for name in engines if name not in noisy])
-        missing = [name for name in engines if name not in effects and name in {*hidden, *noisy}]
+        large = self._large(effects)
+        missing = [name for name in engines if name not in large and name in {*hidden, *noisy}]
         if missing:
             effects |= self._effects_of_reinsertion(rule, found, missing, rest())
         return {name: effects[name] for name in engines if name in effects}
@@ -158,9 +176,13 @@ class Attributor:
     def _effects(
         self, engines: Iterable[str], with_cause: Examination, without: Examination
     ) -> dict[str, Effect]:
-        """Return the effects above the tolerance."""
+        """Return the effects that are more than rounding."""
         found = {name: self._effect(name, with_cause, without) for name in engines}
         return {name: effect for name, effect in found.items() if effect is not NO_EFFECT}
+
+    def _large(self, effects: Mapping[str, Effect]) -> dict[str, Effect]:
+        """Return the effects above the tolerance."""
+        return {name: each for name, each in effects.items() if each.relative_error > self.tolerance}
 
     def _effect(self, engine: str, with_cause: Examination, without: Examination) -> Effect:
         """Return the change of the engine's output, in the quantity in which it is largest."""
@@ -177,13 +199,16 @@ class Attributor:
                 return Effect(quantity, float("inf"))
             gap = max_change(one.deviation.get(quantity, {}), other.deviation.get(quantity, {}))
             error = gap / without.scale(quantity, engine)
-            if error > max(largest.relative_error, self.tolerance):
+            if error > max(largest.relative_error, MINOR_SHARE * self.tolerance):
                 largest = Effect(quantity, error)
         return largest
 
-    def _attribution(self, rule: Rule, each: Detection, effects: Mapping[str, Effect]) -> Attribution:
+    def _attribution(self, rule: Rule, each: Detection, measured: Mapping[str, Effect]) -> Attribution:
+        measured = {name: measured[name] for name in self.examiner.engines if name in measured}
+        effects = self._large(measured)
         right = all(self.after.max_error(engine) <= self.tolerance for engine in effects)
-        return Attribution(rule, each, dict(effects), bool(effects) and right)
+        minor = {name: effect for name, effect in measured.items() if name not in effects}
+        return Attribution(rule, each, effects, bool(effects) and right, minor)
 
     def _reference_of(self, remedy: Remedy) -> ReferenceValues:
         """Return the reference values of the file after a remedy: those of the file before it where the robot

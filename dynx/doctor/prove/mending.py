@@ -6,8 +6,9 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
 from dynx.doctor.examine.line_map import line_map
+from dynx.doctor.prove.levels import level_of
 from dynx.errors import DescriptionError, DynxError
-from dynx.rules import Case, Detection, Remedy, Rule, all_rules
+from dynx.rules import LEVELS, Case, Detection, Level, Remedy, Rule, all_rules
 
 MAX_ROUNDS = 4
 """Largest number of repetitions of all remedies. One remedy may require another one (an explicit zero
@@ -48,16 +49,16 @@ def place_of(rule: Rule, detection: Detection) -> Place:
     return rule.id, detection.link, detection.joint
 
 
-def readable(case: Case) -> Mending:
+def readable(case: Case, level: Level = "physics") -> Mending:
     """Mend text that dynx refuses; return the case unchanged if dynx can read it, or if no remedy helps."""
-    mended = _after_reading_rules(case)
+    mended = _after_reading_rules(case, level)
     return mended if mended.case.readable else Mending(case)
 
 
 def refusal(case: Case) -> DynxError | None:
     """Return the error that remains after all remedies of rules about text, with its line in the text as it
     is; None where dynx can then read the case."""
-    mended = _after_reading_rules(case).case
+    mended = _after_reading_rules(case, "physics").case
     error = mended.reading
     if isinstance(error, DescriptionError) and error.line is not None:
         texts = (each.source.text_with_lines_before.splitlines() for each in (case, mended))
@@ -66,12 +67,12 @@ def refusal(case: Case) -> DynxError | None:
     return error if isinstance(error, DynxError) else None
 
 
-def _after_reading_rules(case: Case) -> Mending:
+def _after_reading_rules(case: Case, level: Level) -> Mending:
     mended = Mending(case)
     for rule in _rules("reading"):
         if mended.case.readable:
             break
-        mended = _after_remedy(mended, rule, rule.detect(mended.case))
+        mended = _after_remedy(mended, rule, rule.detect(mended.case), level)
     return mended
 
 
@@ -87,12 +88,18 @@ def detections(case: Case, rules: Sequence[Rule]) -> list[tuple[Rule, Detection]
     return found
 
 
-def mend(case: Case, rules: Sequence[Rule] | None = None, wanted: DetectionFilter | None = None) -> Mending:
+def mend(
+    case: Case,
+    rules: Sequence[Rule] | None = None,
+    wanted: DetectionFilter | None = None,
+    level: Level = "physics",
+) -> Mending:
     """Apply the remedies of rules about differences, and of those about practice for which the user chose
     one: those about the text first, in the order of their numbers, until none is left to apply.
 
     `rules` are those to choose from (default: the whole catalogue; text that dynx cannot read otherwise
-    is mended by any rule), `wanted` selects the detections to act on (default: all).
+    is mended by any rule), `wanted` selects the detections to act on (default: all). Remedies above `level`
+    (`dynx.doctor.prove.levels`) are left undone.
     """
     chosen_rules = all_rules() if rules is None else rules
     ordered = [rule for stage in ("reading", "model") for rule in chosen_rules if rule.stage == stage]
@@ -103,9 +110,9 @@ def mend(case: Case, rules: Sequence[Rule] | None = None, wanted: DetectionFilte
             if not _applies(rule, case) or (rule.stage == "model" and not mended.case.readable):
                 continue
             chosen = [each for each in rule.detect(mended.case) if wanted is None or wanted(rule, each)]
-            mended = _after_remedy(mended, rule, chosen)
+            mended = _after_remedy(mended, rule, chosen, level)
         if not mended.case.readable:
-            then = readable(mended.case)
+            then = readable(mended.case, level)
             mended = Mending(then.case, mended.applied + then.applied)
         if mended.case is before:
             break
@@ -126,13 +133,25 @@ def _applies(rule: Rule, case: Case) -> bool:
     return rule.kind == "difference" or rule.id in (case.choices or {})
 
 
-def _after_remedy(mended: Mending, rule: Rule, chosen: Sequence[Detection]) -> Mending:
+def _after_remedy(mended: Mending, rule: Rule, chosen: Sequence[Detection], level: Level) -> Mending:
     remedy = remedy_of(mended.case, rule, chosen)
     if remedy is None:
         return mended
     if not differs(remedy.case, mended.case) and remedy.case.calls == mended.case.calls:
         return mended
-    return Mending(remedy.case, (*mended.applied, (rule, remedy)))
+    if level == "physics" or _within(level, rule, mended.case, remedy):
+        return Mending(remedy.case, (*mended.applied, (rule, remedy)))
+    if len({place_of(rule, each) for each in chosen}) == 1:
+        return mended
+    for place in dict.fromkeys(place_of(rule, each) for each in chosen):
+        # An edit can have moved the lines of places that follow.
+        here = [each for each in rule.detect(mended.case) if place_of(rule, each) == place]
+        mended = _after_remedy(mended, rule, here, level)
+    return mended
+
+
+def _within(level: Level, rule: Rule, case: Case, remedy: Remedy) -> bool:
+    return LEVELS.index(level_of(rule, case, remedy)) <= LEVELS.index(level)
 
 
 def _rules(stage: str) -> list[Rule]:

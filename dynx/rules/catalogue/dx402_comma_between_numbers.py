@@ -23,6 +23,7 @@ from dynx.rules.text.misspelled_numbers import MisspelledNumberRule
 class CommaBetweenNumbers(MisspelledNumberRule):
     advice = "Separate the numbers of a vector by blanks alone."
     engines = EVERY_ENGINE
+    unambiguous = True
     changed = "separated the numbers of vectors by blanks instead of commas"
     fault = "separator"
     description = "with commas or semicolons between the numbers {meant}"

@@ -21,6 +21,7 @@ from dynx.rules.text.misspelled_numbers import MisspelledNumberRule
 class InfiniteLimit(MisspelledNumberRule):
     advice = "Write a large finite number, or omit the limit."
     engines = measured_on("pinocchio", "drake")
+    unambiguous = True
     changed = "wrote the largest double for infinite limits"
     fault = "infinite"
     description = "which is no finite number"

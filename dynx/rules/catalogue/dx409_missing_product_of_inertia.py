@@ -26,6 +26,7 @@ class MissingProductOfInertia(EditingRule):
     stage = "reading"
     advice = "Write all six numbers of the tensor."
     engines = measured_on("pinocchio", "mujoco")
+    unambiguous = True
     changed = "wrote the products of inertia that were missing as 0"
 
     def corrections(self, case: Case) -> Iterable[Correction]:

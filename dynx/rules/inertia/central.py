@@ -41,7 +41,7 @@ class CentralInertia:
         mass = self.mass + other.mass
         if mass == 0:
             return CentralInertia(mass, self.center, self.tensor + other.tensor)
-        center = (self.mass * self.center + other.mass * other.center) / mass
+        center = (self.mass * self.center + other.mass * other.center) / mass if other.mass else self.center
         arm = other.center - self.center
         steiner = self.mass * other.mass / mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
         return CentralInertia(mass, center, self.tensor + other.tensor + steiner)

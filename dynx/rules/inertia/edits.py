@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dynx.model.elements import Inertial
+from dynx.model.elements import Inertial, Vector
 from dynx.model.xml.source import Edit, SourceElement, XmlSource
 from dynx.rules.case import Case
 from dynx.rules.text.attributes import orientation_edits
-from dynx.rules.text.number_text import decimal
+from dynx.rules.text.number_text import decimal, is_number
 from dynx.rules.text.numeric_attributes import MOMENTS
 
 ZERO_TENSOR = "<inertia {}/>".format(" ".join(f'{name}="0"' for name in MOMENTS))
@@ -33,7 +33,9 @@ def inertial_edits(source: XmlSource, link: SourceElement, old: Inertial | None,
         if name == "rpy":
             edits += orientation_edits(source, origin, wanted)
         else:
-            edits.append(source.attribute_edit(origin, name, " ".join(map(decimal, wanted))))
+            edits.append(
+                source.attribute_edit(origin, name, _vector_text(origin.attributes.get(name), wanted))
+            )
     if origin is None and new.origin != old.origin:
         edits.append(source.insertion(element, _origin_text(new), first=True))
     mass, tensor = element.first("mass"), element.first("inertia")
@@ -59,6 +61,17 @@ def line_of(case: Case, link: str, tag: str) -> int:
     for inner in ("inertial", tag):
         element = element.first(inner) or element
     return element.line
+
+
+def _vector_text(written: str | None, wanted: Vector) -> str:
+    """Write a vector; numbers that stay as they are keep their spelling."""
+    words = (written or "").split()
+    if len(words) != len(wanted):
+        return " ".join(map(decimal, wanted))
+    return " ".join(
+        word if is_number(word) and float(word) == value else decimal(value)
+        for word, value in zip(words, wanted, strict=True)
+    )
 
 
 def _origin_text(inertial: Inertial) -> str:

@@ -50,7 +50,7 @@ def is_number(text: str) -> bool:
 
 def decimal(value: float) -> str:
     """Return the shortest decimal that reads back as the same double, with 0 for minus zero."""
-    return repr(float(value) + 0.0)
+    return repr(float(value) + 0.0).removesuffix(".0")
 
 
 def misspelled_number(text: str) -> Misspelling | None:

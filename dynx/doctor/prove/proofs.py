@@ -1,0 +1,70 @@
+"""Proofs of all causes in one case: for each rule the effect at every place."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from dynx.doctor.examine.examination import Examination, Examiner
+from dynx.doctor.prove.attribution import Attribution, Attributor
+from dynx.doctor.prove.mending import detections, readable
+from dynx.rules import Case, Rule
+
+RARE_STATES = 40
+"""Number of states for a cause that shows at some states only, where it does not at the first."""
+
+
+class Proofs:
+    """Measurement of the effects of causes in one case, which is examined `before` and `after` mending.
+
+    The causes of rules about the text are removed from the text as it is, those of rules about the robot from
+    the text made readable. Meshes are removed from both texts first.
+    """
+
+    def __init__(
+        self,
+        case: Case,
+        rules: Sequence[Rule],
+        examiner: Examiner,
+        before: Examination,
+        mended: Case,
+        after: Examination,
+        tolerance: float,
+        progress: Callable[[str], None],
+    ) -> None:
+        self._text = case.with_source(examiner.without_unused(case.source))
+        self._robot = readable(self._text).case
+        self._mended = mended
+        self._rules = [rule for rule in rules if rule.kind == "difference"]
+        self._examiner, self._tolerance, self._progress = examiner, tolerance, progress
+        self._found = detections(self._text, self._rules)
+        readably = before
+        if self._robot is not self._text:
+            readably = examiner.examine(self._robot, reference=before.reference)
+        self._by_text = self._attributor(self._text, examiner, before, after)
+        self._by_robot = self._attributor(self._robot, examiner, readably, after)
+
+    def attributions(self) -> list[Attribution]:
+        """Measure the effect of every rule about differences at every place."""
+        rules = dict.fromkeys(rule for rule, _ in self._found)
+        return [each for rule in rules for each in self.measure(rule)]
+
+    def measure(self, rule: Rule, *, minor: bool = False) -> list[Attribution]:
+        """Measure the effect of one rule at every place; see `Attributor.attribute`."""
+        places = [each for other, each in self._found if other is rule]
+        by = self._by_text if rule.stage == "reading" else self._by_robot
+        found = by.attribute(rule, places, minor=minor)
+        if rule.depends_on_state and not any(each.effects for each in found):
+            return self._at_more_states(rule).attribute(rule, places, minor=minor)
+        return found
+
+    def _at_more_states(self, rule: Rule) -> Attributor:
+        more = self._examiner.with_samples(RARE_STATES)
+        engines = rule.named_of(more.engines)
+        case = self._text if rule.stage == "reading" else self._robot
+        before = more.examine(case, engines, reference=more.reference(self._robot))
+        return self._attributor(case, more, before, more.examine(self._mended, engines))
+
+    def _attributor(
+        self, case: Case, examiner: Examiner, before: Examination, after: Examination
+    ) -> Attributor:
+        return Attributor(examiner, case, self._rules, before, after, self._tolerance, self._progress)
