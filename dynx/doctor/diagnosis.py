@@ -194,7 +194,15 @@ def _diagnosis_of(
         calls=run_time_calls(mended.case, examiner),
         level=level,
         changes=changes_of(case, best.mending, mended),
-        variants=diagnosed_variants(case, reference, mended.case, last.reference, rules, variants, tolerance),
+        variants=diagnosed_variants(
+            case,
+            reference,
+            best.mending.case,
+            best.examination.reference,
+            rules,
+            variants,
+            tolerance,
+        ),
         mended=mended.case.source.text if differs(mended.case, case) else None,
         form=mended.case.source.form,
     )

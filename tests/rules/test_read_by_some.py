@@ -136,8 +136,8 @@ def test_a_quaternion_becomes_the_angles_that_dynx_reads(quaternion: tuple[float
         ('quat_xyzw="0 0 1"', ""),
         ('quat_xyzw="0 0 0 0"', ""),
         ('quat_xyzw=""', ""),
-        ('quat_xyzw="0, 0; 0,2"', 'rpy="0.0 0.0 0.0"'),
-        ('quat_xyzw="0\t0 0 2"', 'rpy="0.0 0.0 0.0"'),
+        ('quat_xyzw="0, 0; 0,2"', 'rpy="0 0 0"'),
+        ('quat_xyzw="0\t0 0 2"', 'rpy="0 0 0"'),
     ],
 )
 def test_a_bad_quaternion_is_removed_or_written_as_angles(written: str, left: str) -> None:

@@ -24,7 +24,8 @@ def test_a_plain_number_has_no_fault(x: float) -> None:
 def test_a_number_is_written_as_it_was(x: float) -> None:
     assert float(decimal(x)) == x
     assert is_number(decimal(x))
-    assert decimal(-0.0) == "0.0"
+    assert decimal(-0.0) == "0"
+    assert len(decimal(x)) <= len(repr(x))
 
 
 @given(st.lists(numbers, min_size=3, max_size=3), st.sampled_from([" ", "  "]))
