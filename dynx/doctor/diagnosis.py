@@ -11,6 +11,7 @@ from dynx.agreement.report import Failure
 from dynx.agreement.tolerances import BAR
 from dynx.doctor.counterexample.search import smallest_counterexample
 from dynx.doctor.counterexample.trials import difference_of
+from dynx.doctor.examine.contacts import describe_contacts
 from dynx.doctor.examine.examination import LOADING, TORQUE, Examination, Examiner
 from dynx.doctor.examine.line_map import with_original_lines
 from dynx.doctor.examine.reference_values import ReferenceValues
@@ -176,6 +177,7 @@ def _diagnosis_of(
         tolerance,
         lambda rule: proofs.measure(rule, minor=True),
     )
+    found = _with_contacts(found, best, case.with_source(full.case.source), seed)
     left = _engines_without_remedy(best.mending.case, rules, examiner.engines)
     unexplained = _unexplained(best.examination, tolerance, left)
     if unexplained and counterexamples:
@@ -226,6 +228,18 @@ def _rules_for(examiner: Examiner) -> list[Rule]:
     """Select the rules that concern one of the examined engines, and those about practice."""
     versions = {name: kind.engine_version() for name, kind in examiner.engines.items()}
     return [rule for rule in all_rules() if rule.kind == "practice" or rule.holds_for(versions)]
+
+
+def _with_contacts(
+    found: Sequence[tuple[Rule, Detection]], best: Selection, mended: Case, seed: int
+) -> list[tuple[Rule, Detection]]:
+    """Name the links in contact where contacts have an effect."""
+    touching = {each.rule: engine for each in best.proofs if each.rule.present_as for engine in each.effects}
+    texts = {rule: describe_contacts(mended, engine, seed) for rule, engine in touching.items()}
+    return [
+        (rule, replace(each, message=f"{each.message}: {texts[rule]}") if texts.get(rule) else each)
+        for rule, each in found
+    ]
 
 
 def _engines_without_remedy(mended: Case, rules: Sequence[Rule], engines: Collection[str]) -> set[str]:

@@ -22,7 +22,10 @@ SCHEMA = 1
 
 @dataclass(frozen=True)
 class Effect:
-    """Relative change of a quantity by a cause, infinite where an engine computes nothing because of it."""
+    """Relative change of a quantity by a cause, infinite where an engine computes nothing because of it.
+
+    It is infinite also for ``contact_forces``, whose size means nothing where shapes overlap.
+    """
 
     quantity: str
     relative_error: float

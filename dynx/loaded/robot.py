@@ -80,6 +80,13 @@ class LoadedRobot(ABC):
     def forward_dynamics(self, q: Floats, v: Floats, tau: Floats) -> Floats:
         """Return a (nv,)."""
 
+    def contacts(self, q: Floats) -> Mapping[tuple[str, str], float]:
+        """Return the pairs of links whose contact adds forces, each with the depth [m] of the penetration.
+
+        Empty in an engine whose equations of motion have no contacts.
+        """
+        return {}
+
     @abstractmethod
     def close(self) -> None:
         """Release the resources of the engine."""

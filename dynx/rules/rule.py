@@ -121,6 +121,10 @@ class Rule(ABC):
     trap_base: ClassVar[Base] = "fixed"
     """The base on which the trap shows the difference."""
 
+    present_as: ClassVar[str] = ""
+    """Quantity that reports call present where the size of an effect means nothing, such as that of forces
+    between shapes that overlap; empty for a rule whose effects have a size."""
+
     depends_on_state: ClassVar[bool] = False
     """Whether the difference shows at some states only, so that its absence at others proves nothing."""
 

@@ -9,6 +9,7 @@ from typing import Any
 
 from dynx.doctor.report import Change, Effect, Finding, Unexplained, VariantResult
 from dynx.errors import escaped
+from dynx.rules.registry import all_rules
 
 NAME_LENGTH = 120
 """Number of characters of a name that are shown; a description may hold names of any length."""
@@ -60,6 +61,8 @@ def effect(each: Effect | None) -> str:
     """Write ``mass matrix off by 1900 %``, ``the file is refused``, or that a cause changes nothing."""
     if each is None:
         return "no effect on this base"
+    if _has_no_size(each):
+        return f"{quantity(each.quantity)} present"
     if not math.isfinite(each.relative_error):
         return "the file is refused" if each.quantity == "loading" else f"no valid {quantity(each.quantity)}"
     return f"{quantity(each.quantity)} off by {size(each.relative_error)}"
@@ -85,7 +88,14 @@ def effects(finding: Finding) -> str:
 def _at_place(each: Effect) -> str:
     if math.isfinite(each.relative_error):
         return f"{size(each.relative_error)} in"
+    if _has_no_size(each):
+        return f"{quantity(each.quantity)} in"
     return "refused by" if each.quantity == "loading" else f"no valid {quantity(each.quantity)} in"
+
+
+def _has_no_size(each: Effect) -> bool:
+    """Check whether an effect is present or not, whatever its size."""
+    return any(each.quantity == rule.present_as for rule in all_rules())
 
 
 def difference(key: str, error: float) -> str:

@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from math import isfinite
+from math import inf, isfinite
 
 from dynx.doctor.examine.examination import LOADING, QUANTITIES, Examination, Examiner, max_change
 from dynx.doctor.examine.reference_values import ReferenceValues
@@ -206,6 +206,8 @@ class Attributor:
     def _attribution(self, rule: Rule, each: Detection, measured: Mapping[str, Effect]) -> Attribution:
         measured = {name: measured[name] for name in self.examiner.engines if name in measured}
         effects = self._large(measured)
+        if rule.present_as:
+            effects = {name: Effect(rule.present_as, inf) for name in effects}
         right = all(self.after.max_error(engine) <= self.tolerance for engine in effects)
         minor = {name: effect for name, effect in measured.items() if name not in effects}
         return Attribution(rule, each, effects, bool(effects) and right, minor)

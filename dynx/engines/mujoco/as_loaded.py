@@ -127,6 +127,18 @@ class LoadedMujoco(LoadedRobot):
             a[:3] = self._base_rotation().T @ a[:3] - np.cross(v[3:6], v[:3])
         return a
 
+    def contacts(self, q: Floats) -> Mapping[tuple[str, str], float]:
+        """Pairs of `data.contact`, by the links into which MuJoCo merged others; the world is the root."""
+        self._place(q)
+        mujoco.mj_forward(self._loaded, self._data)
+        found: dict[tuple[str, str], float] = {}
+        for contact in self._data.contact[: self._data.ncon]:
+            bodies = self._loaded.geom_bodyid[[contact.geom1, contact.geom2]]
+            names = (self._loaded.body(body).name if body > WORLD else self._model.root for body in bodies)
+            one, other = sorted(names)
+            found[one, other] = max(found.get((one, other), 0.0), -float(contact.dist))
+        return found
+
     def close(self) -> None:
         """Release MuJoCo's model and data."""
         vars(self).pop("_data", None)

@@ -5,7 +5,8 @@ shapes are larger than the links, push each other apart in a simulation.
 
 - MuJoCo 4.0: ``mj_inverse`` finds the contacts of the configuration and adds their forces to the torque.
   Contacts between a link and its parent are left out, those of other pairs are not. Where shapes overlap by
-  design, the error of the torque is unbounded.
+  design, the error of the torque is unbounded; the report calls such forces present, and names the links
+  that touch at states within limits in which mimic joints follow.
 - Pinocchio 4.1 (``rnea``) and PyBullet 3.2.7 (``calculateInverseDynamics``) have no contacts; PyBullet
   simulates contacts of a robot with itself only with a flag. Drake 1.51 has them where a scene graph is
   connected, and not in inverse dynamics.
@@ -23,6 +24,7 @@ from dynx.rules import CallingRule, Case, Detection, measured_on
 class ContactsAsForces(CallingRule):
     advice = "Switch contacts off where you need rigid-body torques."
     engines = measured_on("mujoco")
+    present_as = "contact_forces"
     depends_on_state = True
     calls = ("mujoco.no_contacts",)
     changed = "compared without contacts"

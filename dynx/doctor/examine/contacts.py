@@ -1,0 +1,77 @@
+"""Contacts of a robot with itself, at states within its limits in which mimic joints follow."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from dynx.doctor.examine.engine_input import temporary_urdf, without_meshes
+from dynx.doctor.examine.reference_values import draw_states, model_without_mimics
+from dynx.engines.silence import silence
+from dynx.errors import DynxError
+from dynx.loaded import loader_class
+from dynx.rules.case import Case
+from dynx.spatial.scalar import Floats
+
+STATES = 40
+"""Number of states at which contacts are looked for."""
+
+_MAX_PAIRS = 4
+"""Number of pairs that are listed."""
+
+
+@dataclass
+class Contact:
+    """Number of states in which two links touch, and how deep they penetrate each other at most [m]."""
+
+    states: int = 0
+    depth: float = 0.0
+
+
+def describe_contacts(case: Case, engine: str, seed: int) -> str:
+    """Write which links touch in an engine; empty where the engine cannot tell."""
+    try:
+        found = links_in_contact(case, engine, seed)
+    except DynxError:
+        return ""
+    if not found:
+        return f"none touch in {STATES} states within limits in which mimic joints follow; in others some do"
+    deepest = sorted(found.items(), key=lambda item: -item[1].depth)
+    listed = [
+        f"{one} and {other} touch in {each.states} of {STATES} states, up to {1e3 * each.depth:.3g} mm deep"
+        for (one, other), each in deepest[:_MAX_PAIRS]
+    ]
+    more = len(deepest) - _MAX_PAIRS
+    return "; ".join([*listed, *([f"and {more} more pairs"] if more > 0 else [])])
+
+
+def links_in_contact(case: Case, engine: str, seed: int) -> Mapping[tuple[str, str], Contact]:
+    """Find the pairs of links that touch; raises EngineError where the engine refuses the file."""
+    model = model_without_mimics(case.source, case.base)
+    found: dict[tuple[str, str], Contact] = {}
+    with (
+        temporary_urdf(without_meshes(case.source)) as path,
+        silence(),
+        loader_class(engine)(path, model) as robot,
+    ):
+        for q in following_positions(case, STATES, seed):
+            for pair, depth in robot.contacts(q).items():
+                contact = found.setdefault(pair, Contact())
+                contact.states += 1
+                contact.depth = max(contact.depth, depth)
+    return found
+
+
+def following_positions(case: Case, count: int, seed: int) -> Floats:
+    """Draw positions (count, nq) of all moving joints within their limits, in which mimic joints follow."""
+    free, model = model_without_mimics(case.source, case.base), case.model
+    q = draw_states(model, count, seed).q
+    base = 7 if model.floating else 0
+    columns = {joint.name: q[:, base + k] for k, joint in enumerate(model.coordinate_joints)}
+    for joint in model.joints:
+        if joint.mimic is not None and joint.mimic.joint in columns:
+            columns[joint.name] = joint.mimic.multiplier * columns[joint.mimic.joint] + joint.mimic.offset
+    held = np.zeros(count)
+    return np.column_stack([q[:, :base], *(columns.get(name, held) for name in free.joint_names)])
