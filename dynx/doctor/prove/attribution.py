@@ -85,7 +85,6 @@ class Attributor:
         places: dict[Place, list[Detection]] = {}
         for each in found:
             places.setdefault(place_of(rule, each), []).append(each)
-        hidden = [name for name in affected if self._hides(name)]
         measured: dict[Detection, dict[str, Effect]] = {}
         for faults in places.values():
             if len(faults) > 1:
@@ -96,7 +95,7 @@ class Attributor:
                 for name in affected
                 if all(name not in self._large(measured.get(each, {})) for each in faults)
             }
-            shared = self._effects_at(rule, faults, unclear, hidden, rest) if len(places) > 1 else affected
+            shared = self._effects_at(rule, faults, unclear, (), rest) if len(places) > 1 else affected
             for each in faults:
                 own = {name: effect for name, effect in shared.items() if name in unclear}
                 measured[each] = measured.get(each, {}) | own
@@ -107,30 +106,28 @@ class Attributor:
         rule: Rule,
         found: Sequence[Detection],
         engines: Collection[str],
-        hidden: Collection[str],
+        wrong: Collection[str],
         rest: Callable[[], Mending],
     ) -> dict[str, Effect]:
-        """Return the effects of the rule at these places: by removal, or, in `hidden` engines where that
-        shows nothing, by reinsertion."""
-        noisy = {name for name in engines if self._is_noisy(name)}
-        effects = self._effects_of_removal(rule, found, [name for name in engines if name not in noisy])
+        """Return the effects of the rule at these places: by removal, or by reinsertion in engines where
+        other causes obscure them, and in those of `wrong` where removal shows nothing."""
+        obscured = [name for name in engines if self._is_obscured(name)]
+        effects = self._effects_of_reinsertion(rule, found, obscured, rest()) if obscured else {}
+        effects |= self._effects_of_removal(rule, found, [name for name in engines if name not in effects])
         large = self._large(effects)
-        missing = [name for name in engines if name not in large and name in {*hidden, *noisy}]
+        missing = [name for name in engines if name in wrong and name not in {*large, *obscured}]
         if missing:
             effects |= self._effects_of_reinsertion(rule, found, missing, rest())
-        return {name: effects[name] for name in engines if name in effects}
+        return effects
 
-    def _hides(self, engine: str) -> bool:
-        """Check whether an engine computes nothing as long as one of several causes is left."""
-        return not isfinite(self.before.max_error(engine))
-
-    def _is_noisy(self, engine: str) -> bool:
-        """Check whether rounding of the errors of an engine would pass for an effect.
+    def _is_obscured(self, engine: str) -> bool:
+        """Check whether other causes obscure an effect: the engine computes nothing as long as one of them is
+        left, or rounding of its errors would pass for an effect.
 
         Where shapes overlap by design, for example, MuJoCo's torques are 1e18 times too large.
         """
-        errors = [error for error in self.before.errors(engine).values() if isfinite(error)]
-        return max(errors, default=0.0) * FLOAT64_EPS > NOISE_SHARE * self.tolerance
+        error = self.before.max_error(engine)
+        return not error * FLOAT64_EPS <= NOISE_SHARE * self.tolerance
 
     def _effects_of_removal(
         self, rule: Rule, found: Sequence[Detection], engines: Collection[str]

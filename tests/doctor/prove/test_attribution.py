@@ -22,6 +22,7 @@ TWO = case_of(
     *(link("base"), FRAME.format("near"), FRAME.format("far")),
     joint("j", "base", "near"),
     joint("k", "near", "far", '<origin xyz="2 0 0.1" rpy="0.5 0 0"/>', type="prismatic"),
+    *(link("hand", center=(0.1, 0.2, 0.3)), joint("w", "far", "hand", type="fixed")),
 )
 
 

@@ -1,0 +1,62 @@
+"""Links in contact are named, at states within limits in which mimic joints follow."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from dynx.doctor.diagnosis import diagnose
+from dynx.doctor.examine.contacts import describe_contacts, following_positions, links_in_contact
+from dynx.doctor.examine.reference_values import model_without_mimics
+from dynx.doctor.formats import wording
+from dynx.loaded import installed_engines
+from dynx.rules import Case
+from dynx.rules.traps import trap_case
+from tests.rules.documents import case_of, joint, link
+
+pytestmark = pytest.mark.skipif("mujoco" not in installed_engines(), reason="MuJoCo is not installed")
+
+BALL = '<collision><geometry><sphere radius="0.1"/></geometry></collision>'
+
+
+def gripper(mimic: str) -> Case:
+    """Make two fingers that meet only where the second does not follow the first."""
+    fingers = [link(name, BALL) for name in ("left", "right")]
+    slides = [
+        joint("left_slide", "base", "left", '<origin xyz="0 0.5 0"/>', type="prismatic"),
+        joint("right_slide", "base", "right", f'<origin xyz="0 -0.5 0"/>{mimic}', type="prismatic"),
+    ]
+    return case_of(link("base"), *fingers, *(each.replace("0 0 1", "0 1 0") for each in slides))
+
+
+def test_mimic_joints_follow() -> None:
+    case = gripper('<mimic joint="left_slide" multiplier="2" offset="0.1"/>')
+    names = model_without_mimics(case.source, case.base).joint_names
+    q = following_positions(case, 5, 0)
+    left, right = (q[:, names.index(name)] for name in ("left_slide", "right_slide"))
+    np.testing.assert_array_equal(right, 2.0 * left + 0.1)
+    assert len(set(left)) == 5
+
+
+def test_fingers_that_follow_do_not_touch() -> None:
+    assert not links_in_contact(gripper('<mimic joint="left_slide"/>'), "mujoco", 0)
+    assert {*links_in_contact(gripper(""), "mujoco", 0)} == {("left", "right")}
+    assert "none touch" in describe_contacts(gripper('<mimic joint="left_slide"/>'), "mujoco", 0)
+
+
+def test_an_engine_without_contacts_and_one_that_refuses_the_file_name_none() -> None:
+    assert not links_in_contact(gripper(""), "pinocchio", 0)
+    refused = case_of(link("base"), '<link name="a"/>', joint("j", "base", "a"))
+    assert describe_contacts(refused, "mujoco", 0) == ""
+
+
+def test_contacts_are_present_and_their_links_named() -> None:
+    report = diagnose(trap_case("DX308").source.text, counterexamples=False)
+    (finding,) = (each for each in report.differences if each.rule == "DX308")
+    assert finding.proved
+    assert "slider and upper touch in" in finding.message
+    assert "mm deep" in finding.message
+    assert wording.effect(finding.effect) == "contact forces present"
+    assert json.loads(json.dumps(report.to_dict()))["findings"][0]["effect"]["relative_error"] is None
