@@ -11,6 +11,7 @@ from dynx.agreement.report import Failure
 from dynx.agreement.tolerances import BAR
 from dynx.doctor.counterexample.search import smallest_counterexample
 from dynx.doctor.counterexample.trials import difference_of
+from dynx.doctor.examine.bounds import require_bounded
 from dynx.doctor.examine.contacts import describe_contacts
 from dynx.doctor.examine.examination import LOADING, TORQUE, Examination, Examiner
 from dynx.doctor.examine.line_map import with_original_lines
@@ -127,11 +128,15 @@ def compare_as_loaded(
 
 
 def open_case(robot: Robot, base: Base, choices: Mapping[str, str]) -> Case:
-    """Read the document of a robot as a case; raises the errors of `dynx.load`."""
+    """Read the document of a robot as a case; raises the errors of `dynx.load`, and DescriptionError for a
+    document larger than is examined."""
     if isinstance(robot, Model):
-        return Case(XmlSource(robot.to_urdf(), robot.source), base, choices=choices)
-    data, source, _ = read_description(robot)
-    return Case(XmlSource(data, source), base, choices=choices)
+        document = XmlSource(robot.to_urdf(), robot.source)
+    else:
+        data, source, _ = read_description(robot)
+        document = XmlSource(data, source)
+    require_bounded(document)
+    return Case(document, base, choices=choices)
 
 
 def refused_report(robot: str, error: DynxError, *, base: str | None = None) -> DoctorReport:
