@@ -98,7 +98,8 @@ class InertiaTooSmall(Rule):
             moments, axes = central.principal(held.origin.rpy)
             near = central.about(nearest_moments(moments), axes)
             if (
-                moment_increase(near, ACCEPTED_MOMENT) > _MAX_ADDED_SHARE * _largest_inertia(before)
+                moment_increase(near, ACCEPTED_MOMENT)
+                > _MAX_ADDED_SHARE * _largest_inertia(before, in_parent=True)
                 and not group.static
             ):
                 continue
@@ -142,9 +143,9 @@ def _group_defect(group: RigidGroup, inertials: Mapping[str, Inertial | None]) -
     return None
 
 
-def _largest_inertia(case: Case) -> float:
-    """Return the largest moment of inertia of a link about the origin of its own or its parent's frame."""
-    arms = {joint.child: pose_arrays(joint.origin, longdouble) for joint in case.model.joints}
+def _largest_inertia(case: Case, *, in_parent: bool = False) -> float:
+    """Return the largest moment of inertia of a link about its origin, or also about that of its parent."""
+    arms = {joint.child: pose_arrays(joint.origin, longdouble) for joint in case.model.joints if in_parent}
     largest = 0.0
     for link in case.model.links:
         if link.inertial is not None:
