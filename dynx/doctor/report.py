@@ -13,6 +13,7 @@ from typing import Any
 from dynx._version import __version__
 from dynx.agreement.report import Failure
 from dynx.files.documents import document_of, to_json_values
+from dynx.loaded import engine_of
 from dynx.loaded.difference import Deviation
 from dynx.model.xml.text import TextForm
 from dynx.rules.rule import Kind, Level
@@ -87,6 +88,10 @@ class VariantResult(EngineResult):
     def largest_error(self) -> float:
         """Largest error as loaded, infinite where the file is refused."""
         return float("inf") if self.refused is not None else max(self.before.values(), default=0.0)
+
+    def is_like(self, engine: EngineResult) -> bool:
+        """Check whether the engine itself loads, or refuses, the file as this variant does."""
+        return (self.refused is None, self.before) == (engine.refused is None, engine.before)
 
 
 @dataclass(frozen=True)
@@ -216,8 +221,15 @@ class DoctorReport:
 
     @property
     def variants_off(self) -> tuple[VariantResult, ...]:
-        """Variants with an error above the tolerance, and those that refuse the file."""
-        return tuple(each for each in self.variants if not each.largest_error <= self.tolerance)
+        """Variants that refuse the file or have an error above the tolerance, other than their engine's."""
+        return tuple(
+            each
+            for each in self.variants
+            if not each.largest_error <= self.tolerance and not any(map(each.is_like, self._engines_of(each)))
+        )
+
+    def _engines_of(self, variant: VariantResult) -> list[EngineResult]:
+        return [each for each in self.engines if each.engine == engine_of(variant.engine)]
 
     @property
     def explained(self) -> bool:

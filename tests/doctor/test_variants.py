@@ -90,6 +90,14 @@ def test_balanced_inertias_load_in_mujoco_as_another_robot() -> None:
     assert finding.engines == ("mujoco", "mujoco:balanceinertia")
 
 
+def test_a_variant_that_is_like_its_engine_is_not_shown() -> None:
+    """PyBullet fixes a robot without mass to the world, by either call."""
+    massless = diagnose(find_trap("DX118"), base="floating", counterexamples=False)
+    (variant,) = massless.variants
+    assert variant.refused is not None
+    assert massless.variants_off == ()
+
+
 def test_engines_that_are_named_have_no_variant_beside_them() -> None:
     assert diagnose(find_trap("DX115"), engines=["pinocchio", "pybullet"]).variants == ()
     assert engine_of(PLAIN) == "pybullet"
