@@ -42,6 +42,7 @@ MENDED = {
     "DX419": (None, "elbow"),
     "DX420": (None, "elbow"),
     "DX421": (None, "elbow"),
+    "DX424": ("base", None),
     "DX426": (None, None),
 }
 SPEC = importlib.util.find_spec("pybullet_data")

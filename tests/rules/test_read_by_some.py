@@ -114,6 +114,61 @@ def test_a_declared_world_and_another_parent_that_is_missing_are_no_matter() -> 
     assert found("DX221", Case(XmlSource(declared.replace('"world"', '"map"', 1)))) == []
 
 
+@pytest.mark.parametrize(
+    ("choice", "links"), [("attach", ["base", "arm", "table", "leg"]), ("remove", ["base", "arm"])]
+)
+def test_trees_beside_the_robot_are_attached_or_removed(choice: str, links: list[str]) -> None:
+    text = case_of(
+        *(link("table"), link("leg"), link("base"), link("arm"), link("hand")),
+        *(joint("elbow", "base", "arm"), joint("wrist", "arm", "hand"), joint("fold", "table", "leg")),
+    ).source.text
+    case = Case(XmlSource(text), choices={"DX223": choice})
+    each, remedy = mended("DX223", case)
+    assert only(each).link == "table"
+    assert remedy.changes_physics
+    assert {each.name for each in remedy.case.model.links} == {*links, "hand"}
+    assert remedy.case.model.root == "base"
+
+
+def test_parts_that_form_no_trees_have_no_second_root() -> None:
+    cycle = case_of(link("a"), link("b"), joint("j", "a", "b"), joint("k", "b", "a"), link("c"))
+    two_parents = case_of(link("a"), link("b"), link("c"), joint("j", "a", "c"), joint("k", "b", "c"))
+    nowhere = case_of(link("a"), link("b"), joint("j", "c", "b"))
+    for case in (two_parents, nowhere, case_of(link("a"), link("b"), joint("j", "a", "b"))):
+        assert found("DX223", case) == []
+    assert find_rule("DX223").detect(cycle) == []
+
+
+@pytest.mark.parametrize("tag", ["visual", "collision"])
+@pytest.mark.parametrize("inside", ["", "<geometry/>", "<origin/><geometry><cone/></geometry>"])
+def test_shapes_without_geometry_are_removed_or_kept(tag: str, inside: str) -> None:
+    case = case_of(link("base", f"<{tag}>{inside}</{tag}>"))
+    assert f"<{tag}" not in mended("DX424", case)[1].case.source.text
+    kept = Case(case.source, choices={"DX424": "keep"})
+    assert find_rule("DX424").remedy(kept, find_rule("DX424").detect(kept)) is None
+    plane = case_of(link("base", f"<{tag}><geometry><plane/></geometry></{tag}>"))
+    assert found("DX424", plane) == []
+
+
+@pytest.mark.parametrize(
+    "inside",
+    [
+        '<collision><origin/><origin/><geometry><box size="1 1 1"/></geometry></collision>',
+        '<collision><geometry><box size="1 1 1"/><box size="2 1 1"/></geometry></collision>',
+    ],
+)
+def test_elements_of_a_collision_are_not_repeated(inside: str) -> None:
+    case = case_of(link("base", inside))
+    assert mended("DX411", case)[1].case.model == case.model
+
+
+def test_a_tensor_without_moments_is_none() -> None:
+    text = case_of(link("base")).source.text.replace('iyy="0.01" ', "")
+    remedy = mended("DX410", Case(XmlSource(text)))[1]
+    inertial = remedy.case.model.inertial("base")
+    assert (inertial.mass, inertial.tensor.any()) == (1.0, False)
+
+
 # -- quaternions ----------------------------------------------------------------------------------
 
 

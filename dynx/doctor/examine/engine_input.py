@@ -19,14 +19,15 @@ from tempfile import TemporaryDirectory
 from dynx.doctor.examine.mesh_boxes import with_mesh_boxes
 from dynx.model.xml.source import XmlSource
 from dynx.rules.geometry.bullet_boxes import collision_meshes
+from dynx.rules.geometry.known_shapes import has_shape
 from dynx.rules.geometry.textures import texture_replacements
 
 
 def without_meshes(source: XmlSource, *, collisions: bool = True) -> XmlSource:
     """Remove visual shapes, textures that engines find and, with `collisions`, collision shapes that are
-    meshes."""
+    meshes. Visuals without a shape, for which an engine may refuse the file, are left."""
     links = source.root.all("link")
-    shapes = [shape for link in links for shape in link.all("visual")]
+    shapes = [shape for link in links for shape in link.all("visual") if has_shape(shape)]
     if collisions:
         shapes += [shape for link in links for shape, _ in collision_meshes(link)]
     return source.apply(*map(source.removal, shapes), *texture_replacements(source))

@@ -10,8 +10,8 @@ engines accept fewer, some refuse the file.
 The effect is a link without moments of inertia in Pinocchio: of order 0.01 to 1 in the mass matrix.
 
 What to do: write the products that are zero as ``0``. ``dynx doctor --fix`` does so; two engines read a
-missing product as zero. A missing moment (``ixx``, ``iyy``, ``izz``) is not corrected: no body has a zero
-moment, and the file does not contain the number.
+missing product as zero. A missing moment (``ixx``, ``iyy``, ``izz``) is DX410: no body has a zero moment, and
+the file does not contain the number.
 """
 
 from collections.abc import Iterable

@@ -1,7 +1,8 @@
 """DX410 incomplete-inertial: An inertial has no mass or no inertia tensor.
 
 ``<inertial>`` needs both ``<mass value="..."/>`` and ``<inertia .../>``. Often ``<mass>2.5</mass>`` was
-written, which looks right but which no engine reads.
+written, which looks right but which no engine reads. A tensor without ``ixx``, ``iyy`` or ``izz`` is none:
+``<inertia/>`` is what is left of a template.
 
 - Pinocchio 4.1 reports that on stderr. Without a mass it drops the whole inertial, so the link weighs
   nothing; without a tensor the link is a point mass.
@@ -25,6 +26,8 @@ from dynx.rules.inertia.edits import ZERO_TENSOR, zero_inertial
 from dynx.rules.text.element_text import text_in
 from dynx.rules.text.number_text import is_number
 
+_MOMENTS = ("ixx", "iyy", "izz")
+
 
 class IncompleteInertial(EditingRule):
     stage = "reading"
@@ -46,10 +49,14 @@ class IncompleteInertial(EditingRule):
     def _in(self, case: Case, inertial: SourceElement) -> Iterable[Correction]:
         mass, tensor = inertial.first("mass"), inertial.first("inertia")
         if mass is not None and "value" in mass.attributes:
-            if tensor is None:
-                yield correction(
-                    inertial, "<inertial> has no <inertia>", *self._without_tensor(case, inertial)
+            missing = [name for name in _MOMENTS if tensor is not None and name not in tensor.attributes]
+            if tensor is None or missing:
+                what = (
+                    f"<inertia> has no {' and no '.join(missing)}"
+                    if missing
+                    else "<inertial> has no <inertia>"
                 )
+                yield correction(inertial, what, *self._without_tensor(case, inertial, tensor))
             return
         inside = "" if mass is None else text_in(case.source, mass)
         if mass is None or not is_number(inside):
@@ -59,7 +66,11 @@ class IncompleteInertial(EditingRule):
             edit = case.source.replacement(mass, f'<mass value="{inside}"/>')
             yield correction(mass, f"<mass> has {inside} between its tags and no value", edit)
 
-    def _without_tensor(self, case: Case, inertial: SourceElement) -> tuple[Edit, ...]:
+    def _without_tensor(
+        self, case: Case, inertial: SourceElement, tensor: SourceElement | None
+    ) -> tuple[Edit, ...]:
         if self.chosen(case) == "weightless":
             return (case.source.replacement(inertial, zero_inertial()),)
+        if tensor is not None:
+            return (case.source.replacement(tensor, ZERO_TENSOR),)
         return (case.source.insertion(inertial, ZERO_TENSOR),)

@@ -3,7 +3,7 @@
 It happens when files are merged or templates expanded. Readers that look for the origin of a joint find the
 first one.
 
-- MuJoCo 4.0 refuses the file: "repeated element", with the line.
+- MuJoCo 4.0 refuses the file: "repeated element", with the line. Collisions and materials count too.
 - Pinocchio 4.1, PyBullet 3.2.7 and Drake 1.51 use the first and ignore the others without a warning. So does
   dynx, with a note.
 
@@ -22,7 +22,11 @@ _ONCE = {
     "link": ("inertial",),
     "inertial": ("origin", "mass", "inertia"),
     "joint": ("origin", "parent", "child", "axis", "limit", "dynamics", "mimic"),
+    "collision": ("origin", "geometry"),
+    "geometry": ("box", "sphere", "cylinder", "capsule", "mesh"),
+    "material": ("color", "texture"),
 }
+"""Elements that may occur once, by the element that they are in."""
 
 
 class RepeatedElement(EditingRule):
@@ -34,7 +38,7 @@ class RepeatedElement(EditingRule):
     def corrections(self, case: Case) -> Iterable[Correction]:
         """Yield every element after the first of its kind."""
         for part in case.source.root.children:
-            if part.tag in ("link", "joint"):
+            if part.tag in ("link", "joint", "material"):
                 yield from _in(case, part)
 
 
@@ -44,6 +48,6 @@ def _in(case: Case, part: SourceElement) -> Iterable[Correction]:
         if child.tag in seen and child.tag in _ONCE[part.tag]:
             message = f"a further <{child.tag}> in the same <{part.tag}>; engines use the first"
             yield correction(child, message, case.source.removal(child))
-        elif child.tag == "inertial":
+        elif child.tag in _ONCE:
             yield from _in(case, child)
         seen.add(child.tag)

@@ -16,8 +16,7 @@ removes the ``<collision>``. ``--choose DX417=keep`` keeps it, and MuJoCo refuse
 from collections.abc import Iterable
 
 from dynx.rules import Case, Correction, EditingRule, correction, measured_on
-
-_KNOWN = frozenset(["box", "sphere", "cylinder", "capsule", "mesh"])
+from dynx.rules.geometry.known_shapes import BULLET_ONLY, KNOWN, shapes_in
 
 
 class UnknownCollisionShape(EditingRule):
@@ -31,12 +30,12 @@ class UnknownCollisionShape(EditingRule):
     changed = "removed collisions of unknown shape"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
-        """Yield collisions whose first geometry contains no known shape."""
+        """Yield collisions whose first geometry contains such a shape and no other."""
         for link in case.source.root.all("link"):
             for collision in link.all("collision"):
-                geometry = collision.first("geometry")
-                if geometry is None or any(child.tag in _KNOWN for child in geometry.children):
+                shapes = shapes_in(collision)
+                if KNOWN.intersection(shapes) or not BULLET_ONLY.intersection(shapes):
                     continue
-                shapes = ", ".join(f"<{child.tag}>" for child in geometry.children) or "nothing"
+                named = ", ".join(f"<{shape}>" for shape in shapes)
                 edits = () if self.chosen(case) == "keep" else (case.source.removal(collision),)
-                yield correction(collision, f"the geometry of <collision> is {shapes}", *edits)
+                yield correction(collision, f"the geometry of <collision> is {named}", *edits)

@@ -66,6 +66,26 @@ def incomplete_limit(site: Site) -> PlantedDefect:
     return site.defect("DX222", version, site.source.attribute_removal(limit, "lower"), joint=joint.name)
 
 
+def second_root(site: Site) -> PlantedDefect:
+    """A table beside the robot."""
+    if has_link(site, "table"):
+        raise CannotPlant("has a table")
+    text = (
+        '<link name="table">\n  <inertial>\n    <mass value="9"/>\n'
+        '    <inertia ixx="0.4" ixy="0" ixz="0" iyy="0.5" iyz="0" izz="0.6"/>\n  </inertial>\n</link>'
+    )
+    return site.defect("DX223", site.source.insertion(site.source.root, text), link="table")
+
+
+def without_geometry(site: Site) -> PlantedDefect:
+    """A shape that a template left empty."""
+    name, link = site.pick_link(lambda each: True, "link")
+    tag = site.rng.choice(["visual", "collision"])
+    inside = site.rng.choice(["", "<geometry/>", "<geometry>\n    <ellipsoid/>\n  </geometry>"])
+    text = f"<{tag}>\n  {inside}\n</{tag}>"
+    return site.defect("DX424", site.source.insertion(link, text), link=name)
+
+
 def quaternion(site: Site) -> PlantedDefect:
     """An orientation as URDF 1.2 writes it, of length 1 or not."""
     size = site.rng.choice([1.0, 2.0])
@@ -100,6 +120,8 @@ PLANTERS = (
     Planter("DX220", loop_joint),
     Planter("DX221", world_not_declared, ("fixed",)),
     Planter("DX222", incomplete_limit),
+    Planter("DX223", second_root),
+    Planter("DX424", without_geometry),
     Planter("DX418", quaternion),
     Planter("DX419", unreadable_quaternion),
 )
