@@ -166,7 +166,19 @@ def test_a_tensor_without_moments_is_none() -> None:
     text = case_of(link("base")).source.text.replace('iyy="0.01" ', "")
     remedy = mended("DX410", Case(XmlSource(text)))[1]
     inertial = remedy.case.model.inertial("base")
-    assert (inertial.mass, inertial.tensor.any()) == (1.0, False)
+    assert inertial.mass == 1.0
+    assert not inertial.tensor.any()
+
+
+def test_settings_of_mujoco_that_change_nothing_are_left() -> None:
+    for harmless in ('<compiler meshdir="m" fusestatic="false"/>', '<option gravity="0 0 -1"/>', ""):
+        case = case_of(link("base"), f"<mujoco>{harmless}</mujoco>")
+        assert found("DX224", case) == []
+    flag = '<option wind="1 0 0"><flag gravity="disable"/></option>'
+    case = case_of(link("base"), f"<mujoco>{flag}</mujoco>")
+    assert found("DX224", case) == ["<option> of <mujoco> sets wind", "<flag> of <mujoco> sets gravity"]
+    assert "<mujoco><option><flag/></option></mujoco>" in mended("DX224", case)[1].case.source.text
+    assert '<compiler meshdir="meshes"/>' in mended("DX224", trap("DX224"))[1].case.source.text
 
 
 # -- quaternions ----------------------------------------------------------------------------------

@@ -62,12 +62,13 @@ def test_text_that_no_engine_reads_is_given_to_them_as_it_is(encoding: str) -> N
 
 @needs_mujoco
 def test_what_hides_behind_a_refusal_stays_as_it_is() -> None:
-    """MuJoCo refuses the empty <collision> to the end, so that nothing shows what DX411 does to it."""
-    text = find_trap("DX411").read_text(encoding="utf-8").replace("</link>", "<collision/></link>", 1)
+    """MuJoCo refuses its own <option> to the end, so that nothing shows what DX411 does to it."""
+    option = '<mujoco><option gravity="down"/></mujoco></robot>'
+    text = find_trap("DX411").read_text(encoding="utf-8").replace("</robot>", option)
     found = diagnose(text, engines=["mujoco"], samples=2, counterexamples=False)
     assert [(each.quantity, each.engine) for each in found.unexplained] == [(LOADING, "mujoco")]
     (refusal,) = (each.refused_after for each in found.engines)
-    assert "geometry" in (refusal or "")
+    assert "gravity" in (refusal or "")
     assert found.mended is None
     assert not found.changes
     again = diagnose(text, engines=["mujoco"], samples=2, counterexamples=False)

@@ -86,6 +86,15 @@ def without_geometry(site: Site) -> PlantedDefect:
     return site.defect("DX424", site.source.insertion(link, text), link=name)
 
 
+def mujoco_settings(site: Site) -> PlantedDefect:
+    """Masses scaled to another total, or raised to a least one."""
+    total = sum(site.skeleton.mass(each.name) for each in site.model.links)
+    value = site.rng.choice([f'boundmass="{2.0 * total:.9g}"', f'settotalmass="{3.0 * total:.9g}"'])
+    text = f'<mujoco>\n  <compiler meshdir="meshes" {value}/>\n</mujoco>'
+    edit = site.source.insertion(site.source.root, text)
+    return site.defect("DX224", edit, sign="<compiler")
+
+
 def quaternion(site: Site) -> PlantedDefect:
     """An orientation as URDF 1.2 writes it, of length 1 or not."""
     size = site.rng.choice([1.0, 2.0])
@@ -121,6 +130,7 @@ PLANTERS = (
     Planter("DX221", world_not_declared, ("fixed",)),
     Planter("DX222", incomplete_limit),
     Planter("DX223", second_root),
+    Planter("DX224", mujoco_settings),
     Planter("DX424", without_geometry),
     Planter("DX418", quaternion),
     Planter("DX419", unreadable_quaternion),
