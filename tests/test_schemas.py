@@ -82,6 +82,7 @@ def test_baselines_keep_their_schema() -> None:
 COMMANDS = [
     ("bench", ["bench", "double_pendulum", "--quick", "--batch", "8", "--threads", "1"], 0),
     ("sim", ["sim", "ur5", "--duration", "0.01", "--payload", "tool0:3", "--noise-q", "1e-4"], 0),
+    ("sim", ["sim", "ur5", "--duration", "0.01", "--mass-scale", "forearm_link=2"], 0),
     ("sim", ["sim", "ur5", "--to", "elbow_joint=0.1", "--controller", "operational-space"], 0),
     (
         "sim",

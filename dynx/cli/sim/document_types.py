@@ -84,7 +84,7 @@ class SimDocument(TypedDict):
     motor_limits: list[float] | None
     settings: dict[str, Any]
     payload: list[PayloadEntry]
-    mass_scale: float
+    mass_scale: float | dict[str, float]
     total_mass: float
     passive: bool
     status: Literal["done", "diverged", "control failed", "interrupted"]
