@@ -82,9 +82,8 @@ def agree(
         # NaN and infinity from an engine appear in the report, so NumPy's warnings are silenced.
         with ExitStack() as opened, np.errstate(all="ignore"):
             engines = [_open(each, loaded, opened) for each in chosen]
-            return _compare_all(
-                loaded, engines, samples, seed, referee_samples, progress or _ignore_progress, started
-            )
+            tell = progress or (lambda step: None)
+            return _compare_all(loaded, engines, samples, seed, referee_samples, tell, started)
     except DynxError as error:
         return refused_report(
             loaded.name,
@@ -237,7 +236,3 @@ def _distinct_names(engines: list[Backend]) -> list[str]:
 def _label(model: object) -> str:
     text = str(model)
     return text if len(text) <= 200 and "\n" not in text else "<string>"
-
-
-def _ignore_progress(step: str) -> None:
-    """Ignore the name of a step."""

@@ -89,25 +89,13 @@ def compare(
     assert not isinstance(one, Refusal)
     assert not isinstance(other, Refusal)
     if one.shape != other.shape:
-        note = f"{first.name} gives shape {one.shape}, {second.name} {other.shape}"
-        return failed_comparison(quantity.name, first, second, tolerance, note)
-    derived = second.name == DERIVED and quantity.derived_scale is not None
-    scale = (
-        quantity.derived_scale(magnitudes)
-        if derived and quantity.derived_scale
-        else quantity.scale(magnitudes)
-    )
-    verdict = judge(_difference(one, other), scale)
-    return Comparison(
-        quantity.name,
-        pair_name(first, second),
-        verdict.absolute,
-        verdict.relative,
-        tolerance,
-        verdict.relative <= tolerance,
-        locate(verdict.position, quantity.layout, samples),
-        note=not_finite_note((first, one), (second, other)),
-    )
+        shapes = f"{first.name} gives shape {one.shape}, {second.name} {other.shape}"
+        return failed_comparison(quantity.name, first, second, tolerance, shapes)
+    scale = (quantity.derived_scale if second.name == DERIVED else None) or quantity.scale
+    verdict = judge(_difference(one, other), scale(magnitudes))
+    worst = locate(verdict.position, quantity.layout, samples)
+    note = not_finite_note((first, one), (second, other))
+    return concluded(quantity.name, first, second, verdict, tolerance, worst, note)
 
 
 def not_finite_note(*results: tuple[BackendResults, Array]) -> str | None:
@@ -116,9 +104,18 @@ def not_finite_note(*results: tuple[BackendResults, Array]) -> str | None:
     return f"{' and '.join(names)}: NaN or infinity in the result" if names else None
 
 
-def pair_name(first: BackendResults, second: BackendResults) -> str:
-    """Return the name of a pair, such as ``pinocchio~pybullet``."""
-    return f"{first.name}~{second.name}"
+def concluded(
+    name: str,
+    first: BackendResults,
+    second: BackendResults,
+    verdict: Verdict,
+    tolerance: float,
+    worst: WorstSample | None = None,
+    note: str | None = None,
+) -> Comparison:
+    """Return the comparison of two results of the quantity `name`, whose largest error is `verdict`."""
+    pair, error = f"{first.name}~{second.name}", verdict.relative
+    return Comparison(name, pair, verdict.absolute, error, tolerance, error <= tolerance, worst, note)
 
 
 def compare_refusals(
@@ -137,7 +134,7 @@ def compare_refusals(
         return None
     if len(refused) == len(results) and all(result.singular for result in refused):
         note = f"refused alike: {refused[0].error}"
-        return Comparison(name, pair_name(first, second), 0.0, 0.0, tolerance, True, note=note)
+        return concluded(name, first, second, Verdict(0.0, 0.0, None), tolerance, note=note)
     note = "; ".join(
         f"{each.name} refuses: {result}"
         for each, result in zip((first, second), results, strict=False)
@@ -150,21 +147,13 @@ def failed_comparison(
     name: str, first: BackendResults, second: BackendResults, tolerance: float, note: str
 ) -> Comparison:
     """Return a comparison that fails without a finite error."""
-    return Comparison(name, pair_name(first, second), np.inf, np.inf, tolerance, False, note=note)
+    return concluded(name, first, second, Verdict(np.inf, np.inf, None), tolerance, note=note)
 
 
 def state(samples: Samples, k: int, frame: str | None = None, reference: str | None = None) -> WorstSample:
     """Return sample number k of `samples` as a record."""
-    return WorstSample(
-        index=int(samples.index[k]),
-        kind=samples.kinds[k],
-        q=tuple(samples.q[k].tolist()),
-        v=tuple(samples.v[k].tolist()),
-        a=tuple(samples.a[k].tolist()),
-        tau=tuple(samples.tau[k].tolist()),
-        frame=frame,
-        reference=reference,
-    )
+    q, v, a, tau = (tuple(each[k].tolist()) for each in (samples.q, samples.v, samples.a, samples.tau))
+    return WorstSample(int(samples.index[k]), samples.kinds[k], q, v, a, tau, frame, reference)
 
 
 def locate(position: tuple[int, ...] | None, layout: Layout, samples: Samples) -> WorstSample | None:

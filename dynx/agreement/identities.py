@@ -84,15 +84,8 @@ def _inverse_of_inverse(name: str, backend: Backend, magnitudes: Magnitudes) -> 
     """Check that inverse dynamics of the result of forward dynamics is the given torque."""
     results = BackendResults(name, backend, magnitudes.samples)
     found = compare_forward_dynamics(results, results, magnitudes, both=False)
-    return IdentityCheck(
-        "inverse dynamics of forward dynamics",
-        name,
-        found.max_rel_error,
-        found.tolerance,
-        found.agree,
-        found.worst_sample,
-        found.note,
-    )
+    identity, error = "inverse dynamics of forward dynamics", found.max_rel_error
+    return IdentityCheck(identity, name, error, found.tolerance, found.agree, found.worst_sample, found.note)
 
 
 # -- algebra ------------------------------------------------------------------------------------------
@@ -218,13 +211,9 @@ def _rotated_world(backend: Backend, samples: Samples, magnitudes: Magnitudes) -
         tau = other.inverse_dynamics(q, samples.v, samples.a)
         M = other.mass_matrix(q)
     torque = tau - backend.inverse_dynamics(samples.q, samples.v, samples.a)
-    inertia = M - backend.mass_matrix(samples.q)
-    n = len(samples)
-    torque, inertia = (
-        torque / _positive(largest(magnitudes.torque)),
-        inertia / _positive(mass_scale(magnitudes)),
-    )
-    return np.concatenate([torque, inertia.reshape(n, -1)], axis=-1), np.ones(1)
+    torque = torque / _positive(largest(magnitudes.torque))
+    inertia = (M - backend.mass_matrix(samples.q)) / _positive(mass_scale(magnitudes))
+    return np.concatenate([torque, inertia.reshape(len(samples), -1)], axis=-1), np.ones(1)
 
 
 def _positive(size: Floats) -> Floats:

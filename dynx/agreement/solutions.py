@@ -16,10 +16,10 @@ from dynx.agreement.comparison import (
     Comparison,
     Verdict,
     compare_refusals,
+    concluded,
     failed_comparison,
     judge,
     not_finite_note,
-    pair_name,
     state,
 )
 from dynx.agreement.magnitudes import Magnitudes
@@ -76,16 +76,8 @@ def compare_forward_dynamics(
         verdict = _backward_error(a, tau, chosen, magnitudes)
         if verdict.relative > worst.relative or worst.position is None:
             worst = verdict
-    return Comparison(
-        name,
-        pair_name(solver, verifier),
-        worst.absolute,
-        worst.relative,
-        tolerance,
-        worst.relative <= tolerance,
-        None if worst.position is None else state(samples, chosen[worst.position[0]]),
-        "; ".join(notes) or None,
-    )
+    where = None if worst.position is None else state(samples, chosen[worst.position[0]])
+    return concluded(name, solver, verifier, worst, tolerance, where, "; ".join(notes) or None)
 
 
 def _required_torque(backend: Any, samples: Samples, *, a: Array, chosen: list[int]) -> Array:
@@ -138,16 +130,8 @@ def compare_inverse_kinematics(
     searches = 2 * len(q_target)
     missed = searches - sum(len(error) for error in errors)
     verdict = judge(np.concatenate(errors), np.ones(1))
-    return Comparison(
-        name,
-        pair_name(first, second),
-        verdict.absolute,
-        verdict.relative,
-        tolerance,
-        verdict.relative <= tolerance,
-        None,
-        f"{missed} of {searches} searches reported no solution" if missed else None,
-    )
+    note = f"{missed} of {searches} searches reported no solution" if missed else None
+    return concluded(name, first, second, verdict, tolerance, note=note)
 
 
 def _poses(backend: Any, samples: Samples, *, q: Array, frame: str) -> Array:

@@ -110,11 +110,10 @@ class Simulation:
         self._departures: tuple[str, ...] = ()
         try:
             self._plant.refuse(setup.controller)
-            bodies = backend("reference", setup.model, validate=False) if scenario.position_limits else None
-            armature = setup.disturbances.armature
             stops = None
-            if bodies is not None:
-                stops = Stops(setup.model, lambda q: bodies.mass_matrix(q) + armature)
+            if scenario.position_limits:
+                bodies = backend("reference", setup.model, validate=False)
+                stops = Stops(setup.model, lambda q: bodies.mass_matrix(q) + setup.disturbances.armature)
             self._loop = Loop(self._plant, setup.controller, setpoints, clock, sensors, setup.limit, stops)
         except BaseException:
             self._plant.close()

@@ -58,6 +58,11 @@ class MotionInput:
         return "cycloidal" if self.has_target else "hold"
 
     @property
+    def seconds(self) -> float:
+        """The duration given, or the default [s]."""
+        return DURATION if self.duration is None else self.duration
+
+    @property
     def has_target(self) -> bool:
         """Whether a target is given."""
         return self.to is not None or self.to_pose is not None
@@ -95,10 +100,9 @@ def plan_motion(model: Model, options: MotionInput) -> Motion:
     }
     if profile == "hold":
         held = start if options.to is None else configuration(model, options.to, "--to", start)
-        span = DURATION if options.duration is None else options.duration
         reference = None if options.controller == "none" and options.to is None else held
-        description |= {"to": None if reference is None else held.tolist(), "duration": span}
-        return Motion(reference, start, span + options.settle, frame, description)
+        description |= {"to": None if reference is None else held.tolist(), "duration": options.seconds}
+        return Motion(reference, start, options.seconds + options.settle, frame, description)
     if options.to is None:
         motion = _line_motion(model, options, frame, start)
     else:
@@ -115,21 +119,14 @@ def plan_motion(model: Model, options: MotionInput) -> Motion:
 def _joint_motion(model: Model, options: MotionInput, profile: str, start: Floats) -> Trajectory:
     goal = configuration(model, options.to, "--to", start)
     if profile in TIMED_PROFILES:
-        duration = DURATION if options.duration is None else options.duration
-        return TIMED_PROFILES[profile](start, goal, duration, model=model)
-    limits: dict[str, Any] = {
-        "acceleration": options.acceleration,
-        "velocity": options.velocity,
-        "duration": options.duration,
-    }
-    if profile == "s-curve":
-        return trajectory.s_curve(start, goal, jerk=_required(options.jerk), model=model, **limits)
-    return trajectory.trapezoidal(start, goal, model=model, **limits)
+        return TIMED_PROFILES[profile](start, goal, options.seconds, model=model)
+    plan = trajectory.s_curve if profile == "s-curve" else trajectory.trapezoidal
+    limits = {name: getattr(options, name) for name in ("velocity", "duration", *LIMITED_PROFILES[profile])}
+    return plan(start, goal, model=model, **limits)
 
 
 def _line_motion(model: Model, options: MotionInput, frame: str | None, start: Floats) -> Trajectory:
-    duration = DURATION if options.duration is None else options.duration
-    time_law = TIMED_PROFILES[options.chosen_profile]([0.0], [1.0], duration)
+    time_law = TIMED_PROFILES[options.chosen_profile]([0.0], [1.0], options.seconds)
     return trajectory.line(model, str(frame), start, target_pose(options.to_pose, "--to-pose"), law=time_law)
 
 
@@ -154,11 +151,6 @@ def _refuse_contradictions(options: MotionInput) -> None:
             raise ArgumentError(f"--{name} needs --profile {' or '.join(takers)}, not {profile}")
     if options.settle < 0.0:
         raise ArgumentError(f"--settle is {options.settle:g} s; wanted 0 or more")
-
-
-def _required(limit: Limit | None) -> Limit:
-    assert limit is not None
-    return limit
 
 
 def limit_message(error: LimitError, robot: str, *, ignorable: bool) -> str:

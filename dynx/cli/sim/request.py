@@ -81,12 +81,9 @@ def prepare(given: dict[str, Any]) -> SimulationRequest:
         # Motors of the engine have their own limits (`_controller`).
         "effort_limits": False if limits is None or isinstance(controller, EngineMotor) else limits,
         "noise": _noise(given),
-        "payload": [Payload(each.frame, each.mass, tuple(each.center)) for each in given["payload"]],
+        "payload": [Payload(*each) for each in given["payload"]],
         "mass_scale": _mass_scale(model, given["mass_scale"]),
-        "pushes": [
-            Push(each.frame, each.wrench, each.start, np.inf if each.duration is None else each.duration)
-            for each in given["pushes"]
-        ],
+        "pushes": [Push(*each) for each in given["pushes"]],
         "check_reference": not given["ignore_limits"],
     }
     options = {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from typing import NamedTuple
 
@@ -24,16 +25,16 @@ _PAYLOAD = re.compile(r"(?P<frame>.+?):(?P<mass>[^:,]+)(:(?P<center>[^:,]+(,[^:,
 
 
 class PushInput(NamedTuple):
-    """Value of ``--push``; `duration` None lasts until the end."""
+    """First fields of a `dynx.sim.Push`."""
 
     frame: str
     wrench: list[float]
     start: float
-    duration: float | None
+    duration: float
 
 
 class PayloadInput(NamedTuple):
-    """Value of ``--payload``."""
+    """First fields of a `dynx.sim.Payload`."""
 
     frame: str
     mass: float
@@ -73,7 +74,7 @@ def push(text: str) -> PushInput:
         found["frame"],
         [*wrench, 0.0, 0.0, 0.0][:6],
         0.0 if start is None else finite_number(start),
-        None if duration is None else finite_number(duration),
+        math.inf if duration is None else finite_number(duration),
     )
 
 
