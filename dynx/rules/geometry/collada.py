@@ -15,6 +15,7 @@ import re
 from collections.abc import Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dynx.errors import DescriptionError
 from dynx.model.xml.reading import Element, read_xml
@@ -42,24 +43,28 @@ _LAYOUT = (("stride", "1"), ("offset", "0"))
 _NUMBER = re.compile(r"\S+")
 
 
-def collada_points(data: bytes, *, add_z_up: bool = True) -> Floats | None:
+def collada_points(data: bytes, *, by_bullet: bool = False) -> Floats | None:
     """Return all points of the scene (n, 3) [m]; None where the file has elements that are not supported.
 
-    With `add_z_up`, the points of the scene rotated so that its up axis is z are added.
+    They include those of the scene rotated so that its up axis is z. With `by_bullet` they are those that
+    PyBullet loads: of triangles and lists of polygons, in the scene as it is written.
     """
     prefix = re.search(rb"<(\w+:)COLLADA\b", data[:1000])
     names = "" if prefix is None else prefix.group(1).decode("ascii", "replace")
     try:
-        root = read_xml(data, "<mesh>", [], with_text={f"{names}{tag}" for tag in _WITH_TEXT})
-        scene = _Scene(root)
+        with_text = {f"{names}{tag}" for tag in (*_WITH_TEXT, *(("p",) if by_bullet else ()))}
+        scene = _Scene(read_xml(data, "<mesh>", [], with_text=with_text), faces_only=by_bullet)
         found = [points @ T[:3, :3].T + T[:3, 3] for points, T in scene.placed()]
     except (_NotSupported, DescriptionError, ValueError):
         return None
     if not found:
         return None
     points = scene.unit * np.concatenate(found)
-    R = _TO_Z_UP.get(scene.up_axis) if add_z_up else None
+    R = None if by_bullet else _TO_Z_UP.get(scene.up_axis)
     return points if R is None else np.concatenate([points, points @ np.array(R).T])
+
+
+Rows = NDArray[np.intp]
 
 
 class _NotSupported(Exception):
@@ -67,7 +72,8 @@ class _NotSupported(Exception):
 
 
 class _Scene:
-    def __init__(self, root: Element) -> None:
+    def __init__(self, root: Element, *, faces_only: bool) -> None:
+        self._faces_only = faces_only
         self._by_id: dict[str, Element] = {}
         for element in _all_below(root):
             element.tag = element.tag.rpartition(":")[2]
@@ -114,7 +120,13 @@ class _Scene:
         # Many geometries may share one source.
         if id(source) not in self._points_of:
             self._points_of[id(source)] = _positions(source)
-        return self._points_of[id(source)]
+        points = self._points_of[id(source)]
+        if not self._faces_only:
+            return points
+        # A geometry may be placed many times.
+        if id(geometry) not in self._points_of:
+            self._points_of[id(geometry)] = points[_rows_of_faces(geometry, len(points))]
+        return self._points_of[id(geometry)]
 
     def _target(self, element: Element, attribute: str) -> Element:
         reference = element.attributes.get(attribute, "")
@@ -122,6 +134,23 @@ class _Scene:
         if not reference.startswith("#") or target is None:
             raise _NotSupported
         return target
+
+
+def _rows_of_faces(geometry: Element, count: int) -> Rows:
+    """Return the numbers of the points, `count` in all, that triangles and lists of polygons use."""
+    used = [np.zeros(0)]
+    for kind in ("triangles", "polylist"):
+        for primitive in _path(geometry, "mesh", kind):
+            columns = {each.attributes.get("semantic"): each for each in primitive.all("input")}
+            offsets = [int(each.attributes.get("offset", "0")) for each in primitive.all("input")]
+            if "VERTEX" not in columns or min(offsets) < 0:
+                raise _NotSupported
+            column = int(columns["VERTEX"].attributes.get("offset", "0"))
+            used += [_numbers(indices)[column :: 1 + max(offsets)] for indices in primitive.all("p")]
+    rows = np.unique(np.concatenate(used).astype(np.intp))
+    if rows.size and not 0 <= rows[0] <= rows[-1] < count:
+        raise _NotSupported
+    return rows
 
 
 def _positions(source: Element) -> Floats:

@@ -30,8 +30,9 @@ def mesh_box(path: Path, *, by_bullet: bool = False) -> Box | None:
     """Return the lowest and highest corner of a mesh in its own frame, unscaled; None if it is unreadable.
 
     Programs differ on the up axis of COLLADA; the box contains the mesh as each of them places it. With
-    `by_bullet` it is the box of PyBullet, which ignores that axis and cannot read STL in text form. Time and
-    memory are proportional to the size of the file; a file above MAX_BYTES of `dynx.files` is unreadable.
+    `by_bullet` it is the box of PyBullet, which ignores that axis and points without a face, and cannot read
+    STL in text form. Time and memory are proportional to the size of the file; a file above MAX_BYTES of
+    `dynx.files` is unreadable.
     """
     try:
         status = path.stat()
@@ -74,7 +75,7 @@ def _obj_points(data: bytes, by_bullet: bool) -> Floats | None:
 
 
 def _collada_points(data: bytes, by_bullet: bool) -> Floats | None:
-    return collada_points(data, add_z_up=not by_bullet)
+    return collada_points(data, by_bullet=by_bullet)
 
 
 _READERS = {".stl": _stl_points, ".obj": _obj_points, ".dae": _collada_points}

@@ -47,7 +47,8 @@ def obj(corners: Sequence[tuple[float, ...]]) -> bytes:
 
 
 def dae(corners: Sequence[tuple[float, ...]]) -> bytes:
-    """Write a COLLADA file with another unit and another up axis."""
+    """Write a COLLADA file with another unit, another up axis, and a point without a face."""
+    corners = [*corners, (9.0, 9.0, 9.0)]
     numbers = " ".join(str(x) for corner in corners for x in corner)
     faces = " ".join(str(k) for face in TRIANGLES for k in face)
     return f"""<?xml version="1.0"?>
@@ -127,8 +128,17 @@ def test_a_mesh_that_is_missing_damaged_or_of_text_is_left_out(tmp_path: Path) -
     facet = f"facet normal 0 0 1\nouter loop\n{corners}endloop\nendfacet\n"
     (tmp_path / "text.stl").write_text(f"solid a\n{facet}endsolid a\n")
     (tmp_path / "short.stl").write_bytes(stl(CORNERS)[:-1])
+    (tmp_path / "beyond.dae").write_bytes(dae(CORNERS[:6]))
     path = tmp_path / "robot.urdf"
-    for name in ("none.stl", "text.stl", "short.stl", "package://elsewhere/m.stl", "../../m.stl", "m.ply"):
+    for name in (
+        "none.stl",
+        "text.stl",
+        "short.stl",
+        "beyond.dae",
+        "package://elsewhere/m.stl",
+        "../../m.stl",
+        "m.ply",
+    ):
         path.write_text(LINK.format(name))
         with temporary_urdf(XmlSource(path.read_bytes(), str(path)), mesh_boxes=True) as written:
             assert "<collision>" not in written.read_text()
