@@ -8,10 +8,12 @@ from pathlib import Path
 
 import pytest
 
+from dynx.doctor import diagnose
 from dynx.engines.pybullet.inertia_checks import MAX_ASYMMETRY, tree_asymmetry
 from dynx.engines.silence import silence
 from dynx.model.elements import Inertial, Pose
 from dynx.rules import Case, find_rule
+from dynx.rules.inertia.central import CentralInertia
 from dynx.rules.inertia.edits import inertial_edits
 from tests.rules.documents import case_of, joint, link
 from tests.rules.trap_cases import assert_same_robot, mended
@@ -98,3 +100,20 @@ def test_links_that_cannot_move_are_checked_and_the_root_is_not(tmp_path: Path) 
     for fixed in (True, False):
         assert inverse_dynamics_works(root, tmp_path, fixed)
     assert not RULE.detect(root)
+
+
+def test_each_of_two_places_is_proved_although_another_remedy_removes_it() -> None:
+    """Principal axes (DX105) change the rounding, so that neither place fails in the mended file."""
+    fleeting = [
+        each
+        for each in draws(400)
+        if tree_asymmetry(each) > MAX_ASYMMETRY
+        and each.ixy
+        and tree_asymmetry(CentralInertia.of(each).inertial(each.origin.rpy)) <= MAX_ASYMMETRY
+    ]
+    case = heavy(fleeting[0])
+    edits = inertial_edits(case.source, case.links["wheel"], case.inertials["wheel"], fleeting[1])
+    report = diagnose(case.source.apply(*edits).text, engines=["pybullet"])
+    proved = {(each.rule, each.link) for each in report.differences if each.proved}
+    assert {("DX119", "arm"), ("DX119", "wheel")} <= proved
+    assert report.explained

@@ -47,6 +47,7 @@ def test_one_finding_and_no_invented_mass(links: Sequence[str], base: Base) -> N
     assert report.total_mass == 0.0
     assert report.verdict == "no inertial data: the dynamics cannot be compared"
     assert status(report) == "massless"
+    assert not report.variants_off
     for engine in report.engines:
         assert not DYNAMICS.intersection(engine.before)
         assert engine.refused is not None or engine.before.keys() == {"forward_kinematics", "jacobian"}

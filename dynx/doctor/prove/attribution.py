@@ -96,6 +96,8 @@ class Attributor:
                 if all(name not in self._large(measured.get(each, {})) for each in faults)
             }
             shared = self._effects_at(rule, faults, unclear, (), rest) if len(places) > 1 else affected
+            blocked = [name for name in unclear if name not in self._large(shared)]
+            shared = shared | self._effects_of_last(rule, faults, found, blocked)
             for each in faults:
                 own = {name: effect for name, effect in shared.items() if name in unclear}
                 measured[each] = measured.get(each, {}) | own
@@ -113,7 +115,10 @@ class Attributor:
         other causes obscure them, and in those of `wrong` where removal shows nothing."""
         obscured = [name for name in engines if self._is_obscured(name)]
         effects = self._effects_of_reinsertion(rule, found, obscured, rest()) if obscured else {}
-        effects |= self._effects_of_removal(rule, found, [name for name in engines if name not in effects])
+        # An engine that computed nothing and does without the cause shows more than a mended file does.
+        blocked = {name for name in obscured if not isfinite(self.before.max_error(name))}
+        settled = effects.keys() - (blocked - self._large(effects).keys())
+        effects |= self._effects_of_removal(rule, found, [name for name in engines if name not in settled])
         large = self._large(effects)
         missing = [name for name in engines if name in wrong and name not in {*large, *obscured}]
         if missing:
@@ -138,6 +143,23 @@ class Attributor:
             return {}
         after = self.examiner.examine(remedy.case, engines, reference=self._reference_of(remedy))
         return self._effects(engines, self.before, after)
+
+    def _effects_of_last(
+        self, rule: Rule, faults: Sequence[Detection], found: Sequence[Detection], engines: Sequence[str]
+    ) -> dict[str, Effect]:
+        """Return the effects on each engine of these faults once the rule's other places are mended.
+
+        This shows faults of which one alone blocks an engine and which the remedy of another rule removes.
+        """
+        rest = remedy_of(self.case, rule, [each for each in found if each not in faults]) if engines else None
+        remedy = remedy_of(self.case, rule, found) if rest is not None else None
+        if rest is None or remedy is None:
+            return {}
+        last, without = (
+            self.examiner.examine(each.case, engines, reference=self._reference_of(each))
+            for each in (rest, remedy)
+        )
+        return self._effects(engines, last, without)
 
     def _effects_of_reinsertion(
         self, rule: Rule, found: Sequence[Detection], engines: Sequence[str], rest: Mending
