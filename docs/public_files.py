@@ -54,8 +54,10 @@ def figures(manifest: Sequence[dict[str, Any]], results: dict[str, Path]) -> Ite
         "*Differ*: an engine refuses the file or differs from it by more than 1e-12 (in brackets: by more "
         f"than {SMALL:g}). *Unexplained*: a difference remains after removing all causes. *Refused*: dynx "
         "does not read the file; in brackets the number of these files that two engines or more load. *Alike "
-        "without dynx*: mended files that Pinocchio, PyBullet, MuJoCo and Drake, each in a process without "
-        "dynx, load with poses, mass matrix and torques within 1e-12 of each other, by the printed calls."
+        "without dynx*: of the mended files that all engines load, according to the report, those that "
+        "Pinocchio, PyBullet, MuJoCo and Drake, each in a process without dynx, load with poses, mass matrix "
+        "and torques within 1e-12 of each other, by the printed calls. Of a file without inertial data, in "
+        "which nothing is invented, only poses are compared, and MuJoCo refuses many."
     )
     yield ""
     header = (
@@ -103,9 +105,9 @@ def row(of: Sequence[Entry]) -> str:
 
 
 def alike(gaps: Sequence[dict[str, Any]], base: str) -> str:
-    """The number of mended files that engines without dynx load alike, of those that were compared."""
-    of = [each for each in gaps if each["base"] == base]
-    return f"{sum(each['alike'] for each in of)} of {len(of)}" if of else ""
+    """The number of mended files that engines without dynx load alike, of those that all are to load."""
+    of = [each for each in gaps if each["base"] == base and not each["refusing"]]
+    return f"{sum(not each['apart'] for each in of)} of {len(of)}" if of else ""
 
 
 def sources(manifest: Sequence[dict[str, Any]]) -> Iterator[str]:
