@@ -18,7 +18,11 @@ from dynx.cli.shell.options import choice_pair, name_list, run_options
     help="Whether the root link is fixed to the world or free; `both` examines each.",
 )
 @click.option(
-    "--engines", type=name_list, metavar="A,B,C", help="Engines to examine (default: all installed)."
+    "--engines",
+    type=name_list,
+    metavar="A,B,C",
+    help="Engines and loading variants to examine (default: all installed engines; beside them, not counted, "
+    "pybullet:plain).",
 )
 @click.option("--samples", type=click.IntRange(min=1), help="Number of random states per robot (default: 5).")
 @click.option(
