@@ -120,9 +120,9 @@ CHECKS_FAULTS = (
     ),
     Fault(
         "doctor_edits_more_than_is_needed",
-        "dynx.doctor.diagnosis",
-        right="            return least, result",
-        wrong="            return full, result",
+        "dynx.doctor.prove.selection",
+        right="        return Selection(least, result, proofs, frozenset(idle))",
+        wrong="        return full",
         test_file="tests/doctor/test_diagnosis_of_one_engine.py",
         test="test_only_the_place_that_matters_is_mended",
     ),
