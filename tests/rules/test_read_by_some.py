@@ -300,6 +300,22 @@ def test_an_empty_mass_is_zero() -> None:
     assert mended("DX420", case)[1].case.model.inertial("base").mass == 0.0
 
 
+@pytest.mark.parametrize(
+    ("text", "lines"),
+    [
+        ('\n<?xml version="1.0"?>\n<?a b?>\n<robot name="r"><link name="l"/></robot>', []),
+        ('<?a b?>\n<robot name="r"><link name="l"/></robot>', []),
+        ('\n<!-- c -->\n<?a b?><robot name="r"><link name="l"/></robot>', [3]),
+        ('<robot name="r"><link name="l"/>\n<?a?><!-- <?b?> --></robot><?c d?>', [2, 2]),
+    ],
+)
+def test_instructions_behind_anything_but_declarations_are_removed(text: str, lines: list[int]) -> None:
+    case = Case(XmlSource(text))
+    assert [each.line for each in find_rule("DX423").detect(case)] == lines
+    if lines:
+        assert mended("DX423", case)[1].case.model == case.model
+
+
 # -- xacro ----------------------------------------------------------------------------------------
 
 

@@ -23,6 +23,7 @@ _ONCE = {
     "inertial": ("origin", "mass", "inertia"),
     "joint": ("origin", "parent", "child", "axis", "limit", "dynamics", "mimic"),
     "collision": ("origin", "geometry"),
+    "visual": ("material",),
     "geometry": ("box", "sphere", "cylinder", "capsule", "mesh"),
     "material": ("color", "texture"),
 }

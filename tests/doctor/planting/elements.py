@@ -95,6 +95,13 @@ def mujoco_settings(site: Site) -> PlantedDefect:
     return site.defect("DX224", edit, sign="<compiler")
 
 
+def processing_instruction(site: Site) -> PlantedDefect:
+    """The mark of an editor."""
+    _, link = site.pick_link(lambda each: True, "link")
+    edit = site.source.insertion_after(link, '<?editor fold="on"?>')
+    return site.defect("DX423", edit, sign="<?editor")
+
+
 def quaternion(site: Site) -> PlantedDefect:
     """An orientation as URDF 1.2 writes it, of length 1 or not."""
     size = site.rng.choice([1.0, 2.0])
@@ -131,6 +138,7 @@ PLANTERS = (
     Planter("DX222", incomplete_limit),
     Planter("DX223", second_root),
     Planter("DX224", mujoco_settings),
+    Planter("DX423", processing_instruction),
     Planter("DX424", without_geometry),
     Planter("DX418", quaternion),
     Planter("DX419", unreadable_quaternion),
