@@ -8,8 +8,8 @@ ENGINES_FAULTS = (
     Fault(
         "coulomb_friction_at_rest",
         "dynx.backends.joint_dynamics",
-        right="self._friction * np.sign(tree)",
-        wrong="self._friction * np.where(tree < 0.0, -1.0, 1.0)",
+        right="self.friction * np.sign(tree)",
+        wrong="self.friction * np.where(tree < 0.0, -1.0, 1.0)",
         test_file="tests/contract/test_forces.py",
         test="TestJointDynamics::test_dry_friction_is_zero_at_rest[reference]",
     ),
