@@ -22,6 +22,7 @@ _DECLARED = re.compile(r"""<\?xml[^>]*?\bencoding\s*=\s*["']([A-Za-z0-9._-]+)["'
 _LINE_END = re.compile(rb"\r\n|\r|\n")
 _BARE_LINE_FEED = re.compile(rb"(?<!\r)\n")
 _ATTRIBUTE = re.compile(rb"""\s+([^\s=/>]+)\s*=\s*("[^"]*"|'[^']*')""")
+_ATTRIBUTES = re.compile(rb"""(?:\s+[^\s=/>]+\s*=\s*(?:"[^"]*"|'[^']*'))*""")
 
 
 @dataclass(frozen=True)
@@ -34,16 +35,29 @@ class Span:
 
 @dataclass(eq=False, repr=False)
 class SourceElement:
-    """An element with its span, and the span of each attribute including the white space before it."""
+    """An element of the document `data`, with its span and that of its start tag."""
 
     tag: str
     attributes: dict[str, str]
     line: int
     span: Span
     start_tag: Span
-    places: dict[str, Span]
+    data: bytes
     parent: SourceElement | None
     children: list[SourceElement] = field(default_factory=list)
+
+    @cached_property
+    def places(self) -> dict[str, Span]:
+        """The span of each attribute, including the white space before it.
+
+        Found when it is first used: most documents are parsed to read a few of their elements.
+        """
+        at = self.start_tag.start + 1 + len(self.tag.encode("utf-8"))
+        places = {}
+        while found := _ATTRIBUTE.match(self.data, at):
+            places[found.group(1).decode("utf-8")] = Span(found.start(), found.end())
+            at = found.end()
+        return places
 
     def __repr__(self) -> str:
         return f"<SourceElement {self.tag} in line {self.line}>"
@@ -247,7 +261,7 @@ class XmlSource:
 
 
 class _SourceParser:
-    """One pass of expat over well-formed text that records the positions of elements and attributes."""
+    """One pass of expat over well-formed text that records the positions of elements."""
 
     def __init__(self, data: bytes, lines_before: int) -> None:
         self._data = data
@@ -270,16 +284,13 @@ class _SourceParser:
         return self._root
 
     def _start(self, tag: str, attributes: dict[str, str]) -> None:
-        start = at = self._parser.CurrentByteIndex
-        at += 1 + len(tag.encode("utf-8"))
-        places = {}
-        while found := _ATTRIBUTE.match(self._data, at):
-            places[found.group(1).decode("utf-8")] = Span(found.start(), found.end())
-            at = found.end()
-        span = Span(start, self._data.index(b">", at) + 1)
+        start = self._parser.CurrentByteIndex
+        written = _ATTRIBUTES.match(self._data, start + 1 + len(tag.encode("utf-8")))
+        assert written is not None  # The pattern matches a tag without attributes too.
+        span = Span(start, self._data.index(b">", written.end()) + 1)
         parent = self._open[-1] if self._open else None
         line = self._lines_before + self._parser.CurrentLineNumber
-        element = SourceElement(tag, attributes, line, span, span, places, parent)
+        element = SourceElement(tag, attributes, line, span, span, self._data, parent)
         if parent is None:
             self._root = element
         else:
