@@ -187,10 +187,12 @@ def test_a_massless_link_in_the_middle_of_a_chain_is_not_one_at_its_end() -> Non
         joint("bc", "b", "c"),
     )
     assert findings(end) == [("DX113", "c", 4)]
+    # Another branch has mass; a robot that has none anywhere is DX118.
     both = case_of(
-        *(link("a"), link("b", mass=0, moments=EMPTY), link("c", mass=0, moments=EMPTY)),
+        *(link("a"), link("b", mass=0, moments=EMPTY), link("c", mass=0, moments=EMPTY), link("d")),
         joint("ab", "a", "b"),
         joint("bc", "b", "c"),
+        joint("ad", "a", "d"),
     )
     assert findings(both) == [("DX113", "b", 3), ("DX113", "c", 4)]
 

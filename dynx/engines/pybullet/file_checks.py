@@ -1,7 +1,8 @@
-"""Checks for files that are known to crash PyBullet (measured with pybullet 3.2.5 to 3.2.7).
+"""Checks for files that crash PyBullet or make its results undefined (measured with pybullet 3.2.5 to 3.2.7).
 
 PyBullet itself checks nothing. It uses names as printf formats, crashes on an element without ``name`` or
-``type`` and on a graph that is not a tree, and has room for the states of 127 joints.
+``type`` and on a graph that is not a tree, has room for the states of 127 joints, and does not initialise the
+axis of a joint whose ``<axis>`` has no ``xyz``.
 """
 
 from __future__ import annotations
@@ -25,9 +26,12 @@ MAX_NAME_LENGTH = 1000
 
 _OPAQUE = frozenset(["visual", "collision", "transmission", "gazebo", "sensor", "ros2_control"])
 
+_WITHOUT_AXIS = frozenset(["fixed", "floating"])
+"""Types of joints whose ``<axis>`` PyBullet does not read."""
+
 
 def require_harmless(path: Path, model: Model) -> None:
-    """Raise EngineError, with the reason, for a file on which PyBullet is known to crash.
+    """Raise EngineError, with the reason, for a file on which PyBullet crashes or its results are undefined.
 
     Its links and joints must be those of `model`, which dynx has checked to be one tree.
     """
@@ -44,6 +48,17 @@ def require_harmless(path: Path, model: Model) -> None:
         raise EngineError(f"pybullet cannot load {model.name}: {error}") from error
     for reason in _hazards(root, model):
         raise EngineError(f"pybullet would crash on {model.name}: {reason}")
+    for joint in root.all("joint"):
+        axis = next(iter(joint.all("axis")), None)
+        if (
+            axis is not None
+            and "xyz" not in axis.attributes
+            and joint.attributes["type"] not in _WITHOUT_AXIS
+        ):
+            raise EngineError(
+                f"pybullet reads the axis of joint {shown(joint.attributes['name'])} from memory that it did "
+                f"not initialise (line {axis.line}: <axis> has no xyz), so its results change from run to run"
+            )
     joints = len(root.all("joint"))
     if joints > MAX_JOINTS:
         raise EngineError(

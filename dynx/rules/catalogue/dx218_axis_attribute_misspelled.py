@@ -5,7 +5,8 @@ engine looks for them under that name.
 
 - Pinocchio 4.1 loads it with a zero axis. The joint has a coordinate that moves nothing: its row and column
   of the mass matrix are zero.
-- PyBullet 3.2.7 loads it with a zero axis. Inverse dynamics and mass matrix fail.
+- PyBullet 3.2.7 loads it, and the axis is whatever its memory held: zero at first, another at each load of a
+  longer program. dynx does not use such results and reports the file as refused.
 - MuJoCo 4.0 refuses the file ("required attribute missing: 'xyz'"), also where the joint is fixed.
 - Drake 1.51 reads (1, 0, 0), URDF's default for a joint without ``<axis>``.
 

@@ -90,10 +90,15 @@ def test_an_error_is_relative_whatever_the_robot_weighs(mass: float) -> None:
 
 
 def test_where_the_reference_value_is_zero_the_error_is_1() -> None:
-    case = case_of('<link name="base"/>', '<link name="frame"/>', joint("j", "base", "frame"))
+    # A point mass on the axis of the joint.
+    case = case_of(
+        *('<link name="base"/>', link("wheel", moments=(0.0, 0.0, 0.0)), '<link name="frame"/>'),
+        joint("j", "base", "wheel"),
+        joint("flange", "wheel", "frame", type="fixed"),
+    )
     errors = examine_case(case).errors(NAME)
     assert errors[MASS] == errors[TORQUE] == 1.0
-    # Nothing has mass, so no torque gives an acceleration.
+    # The mass matrix is zero, so no torque gives an acceleration.
     assert ACCELERATION not in errors
 
 

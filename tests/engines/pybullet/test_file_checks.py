@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+import dynx
 from dynx.engines.pybullet.as_loaded import LoadedPyBullet
 from dynx.engines.pybullet.file_checks import MAX_JOINTS, MAX_NAME_LENGTH, require_harmless
 from dynx.errors import EngineError
@@ -49,6 +51,21 @@ def test_files_that_crash_bullet_are_refused(reason: str, monkeypatch: pytest.Mo
     ):
         pass
     assert reason in str(caught.value)
+
+
+@pytest.mark.parametrize("axis", ["<axis/>", '<axis xzy="0 0 1"/>'])
+def test_an_axis_that_bullet_does_not_initialise_is_refused(axis: str) -> None:
+    text = re.sub(r"<axis[^>]*/>", axis, TEXT, count=1)
+    assert text != TEXT
+    with (
+        pytest.raises(EngineError, match=r"axis of joint 'joint0' from memory .*<axis> has no xyz"),
+        loaded(LoadedPyBullet, chain(2), text),
+    ):
+        pass
+    fixed = TEXT.replace('name="joint0" type="revolute"', 'name="joint0" type="fixed"')
+    model = dynx.load(fixed)
+    with loaded(LoadedPyBullet, model, re.sub(r"<axis[^>]*/>", axis, fixed, count=1)) as robot:
+        assert robot.mass_matrix(model.neutral()).shape == (1, 1)
 
 
 def test_what_is_no_file_is_not_handed_over(tmp_path: Path) -> None:
