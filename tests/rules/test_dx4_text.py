@@ -17,6 +17,7 @@ from dynx.rules.catalogue.dx413_line_too_long import MAX_LINE_BYTES
 from dynx.rules.text.misspelled_numbers import MisspelledNumberRule
 from dynx.rules.text.numeric_attributes import NumericAttribute, numeric_attributes
 from dynx.testing.strategies import urdf_text
+from tests.rules.documents import case_of, joint
 from tests.rules.trap_cases import assert_same_robot, changed_lines, mended, only, trap
 
 READING = tuple(rule.id for rule in all_rules() if rule.stage == "reading")
@@ -210,3 +211,26 @@ def test_files_of_pybullet_that_dynx_refuses_become_readable(file: str) -> None:
         remedy = rule.remedy(case, rule.detect(case))
         case = case if remedy is None else remedy.case
     assert case.readable, case.reading
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ('<mass value="0.4"/>', '<mass valeu="0.4"/>'),
+        ('<mass value="0.4"/>', '<mass vale="0.4" unit="kg"/>'),
+        ('ixx="0.001"', 'ixxx="0.001"'),
+        ('izz="0.003" iyy="0.002"', 'IZZ="0.003" iy="0.002"'),
+    ],
+)
+def test_a_number_under_a_misspelled_name_is_what_was_meant(right: str, wrong: str) -> None:
+    tensor = '<inertia ixx="0.001" izz="0.003" iyy="0.002" ixy="0" ixz="0" iyz="0"/>'
+    inertial = f'<inertial><mass value="0.4"/>{tensor}</inertial>'
+    text = case_of(
+        '<link name="base"/>', f'<link name="arm">{inertial}</link>', joint("j", "base", "arm")
+    ).source.text
+    broken = text.replace(right, wrong)
+    assert broken != text
+    found, remedy = mended("DX410", Case(XmlSource(broken)))
+    assert len(found) == 1
+    model, meant = remedy.case.model, Case(XmlSource(text)).model
+    assert [link.inertial for link in model.links] == [link.inertial for link in meant.links]

@@ -12,21 +12,28 @@ written, which looks right but which no engine reads. A tensor without ``ixx``, 
 
 The effect is a file that does not load, or a link without its mass: of order 0.01 to 1 in the mass matrix.
 
-What to do: complete it. ``dynx doctor --fix`` can only guess, and the report says so: a number between the
-tags, ``<mass>2.5</mass>``, is the mass; a tensor without mass is dropped, so that the link weighs nothing; a
-mass without tensor stays as a point mass at the origin of the inertial, as in Pinocchio and Drake.
-``--choose DX410=weightless`` drops that mass too.
+What to do: complete it. A number under a misspelled name, ``<mass valeu="1.5"/>`` or ``ixxx="0.02"``, is what
+was meant; ``dynx doctor --fix`` corrects the name. Otherwise it can only guess, and the report says so: a
+number between the tags, ``<mass>2.5</mass>``, is the mass; a tensor without mass is dropped, so that the link
+weighs nothing; a mass without tensor stays as a point mass at the origin of the inertial, as in Pinocchio and
+Drake. ``--choose DX410=weightless`` drops that mass too.
 """
 
-from collections.abc import Iterable
+import difflib
+from collections.abc import Iterable, Sequence
 
+from dynx.errors import escaped
 from dynx.model.xml.source import Edit, SourceElement
 from dynx.rules import EVERY_ENGINE, Case, Correction, EditingRule, correction
 from dynx.rules.inertia.edits import ZERO_TENSOR, zero_inertial
 from dynx.rules.text.element_text import text_in
 from dynx.rules.text.number_text import is_number
+from dynx.rules.text.numeric_attributes import MOMENTS
 
 _MOMENTS = ("ixx", "iyy", "izz")
+_KNOWN = frozenset(["value", *MOMENTS])
+_CLOSE = 0.6
+"""Ratio of matching letters (difflib) of names such as ``valeu`` and ``ixxx``."""
 
 
 class IncompleteInertial(EditingRule):
@@ -48,6 +55,14 @@ class IncompleteInertial(EditingRule):
 
     def _in(self, case: Case, inertial: SourceElement) -> Iterable[Correction]:
         mass, tensor = inertial.first("mass"), inertial.first("inertia")
+        misspelled = [
+            found
+            for element, names in ((mass, ("value",)), (tensor, _MOMENTS))
+            if element is not None and (found := _misspelled(case, element, names)) is not None
+        ]
+        if misspelled:
+            yield from misspelled
+            return
         if mass is not None and "value" in mass.attributes:
             missing = [name for name in _MOMENTS if tensor is not None and name not in tensor.attributes]
             if tensor is None or missing:
@@ -74,3 +89,24 @@ class IncompleteInertial(EditingRule):
         if tensor is not None:
             return (case.source.replacement(tensor, ZERO_TENSOR),)
         return (case.source.insertion(inertial, ZERO_TENSOR),)
+
+
+def _misspelled(case: Case, element: SourceElement, names: Sequence[str]) -> Correction | None:
+    """Return the correction of the names of attributes, where each that is missing has its number under a
+    name that is close to it."""
+    missing = [name for name in names if name not in element.attributes]
+    unknown = {
+        name: text for name, text in element.attributes.items() if name not in _KNOWN and is_number(text)
+    }
+    meant: dict[str, str] = {}
+    for name in unknown:
+        for close in difflib.get_close_matches(name.lower(), missing, n=1, cutoff=_CLOSE):
+            meant.setdefault(close, name)
+    if not missing or len(meant) < len(missing):
+        return None
+    edits, texts = list[Edit](), list[str]()
+    for right, wrong in meant.items():
+        edits.append(case.source.attribute_removal(element, wrong))
+        edits.append(case.source.attribute_edit(element, right, unknown[wrong]))
+        texts.append(f"{right} {unknown[wrong]} in {escaped(wrong)}")
+    return correction(element, f"<{element.tag}> has its {' and its '.join(texts)}", *edits)
