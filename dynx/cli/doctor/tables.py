@@ -276,7 +276,8 @@ def _show_next(out: Console, report: DoctorReport, mended: str | None) -> None:
         return
     out.print()
     if mended is not None:
-        action = "nothing to change in the text; copied to" if report.mended is None else "mended:"
+        level = "" if report.level == "physics" else f" at level {report.level}"
+        action = f"nothing to change in the text{level}; copied to" if report.mended is None else "mended:"
         out.print(f"{action} {one_line(mended)}", style="bold green")
     elif report.mended is not None:
         base = "" if report.base == "fixed" else f" --base {report.base}"
@@ -290,10 +291,10 @@ def _show_next(out: Console, report: DoctorReport, mended: str | None) -> None:
 
 
 def _residual(report: DoctorReport) -> str:
-    """Write the error that remains after mending, and the engines that have none."""
+    """Write the error that remains without the causes, and the engines that have none."""
     missing = [each.engine for each in report.engines if each.refused_after is not None]
     without = f" (without {', '.join(map(wording.name, missing))})" if missing else ""
-    return f"residual error after mending: {wording.relative(report.residual)}{without}"
+    return f"residual error without all causes: {wording.relative(report.residual)}{without}"
 
 
 def _change(engine: EngineResult, key: str, tolerance: float, mended: bool) -> Text:
