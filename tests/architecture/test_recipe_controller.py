@@ -58,12 +58,12 @@ def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]
 
 def test_it_simulates_alone_and_in_a_batch() -> None:
     arm = dynx.load("ur5")
-    law = controller_class("damper")(arm, kd=5.0)  # type: ignore[call-arg]
+    damper = controller_class("damper")(arm, kd=5.0)  # type: ignore[call-arg]
     start = arm.neutral() + 0.1
-    one = dynx.simulate(arm, law, arm.neutral(), q0=start, duration=0.3, plant="compiled")
-    many = dynx.simulate_batch(arm, law, arm.neutral(), q0=start, duration=0.3, gains={"kd": [5.0, 6.0]})
+    one = dynx.simulate(arm, damper, arm.neutral(), q0=start, duration=0.3, plant="compiled")
+    many = dynx.simulate_batch(arm, damper, arm.neutral(), q0=start, duration=0.3, gains={"kd": [5.0, 6.0]})
     np.testing.assert_allclose(many.q[0], one.q[-1], rtol=1e-9)
-    assert control.controller_from_document(arm, control.controller_to_document(law)) == law
+    assert control.controller_from_document(arm, control.controller_to_document(damper)) == damper
 
 
 def test_the_command_line_finds_it() -> None:

@@ -9,6 +9,7 @@ be read in more than one way.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
@@ -66,10 +67,11 @@ def _texts(source: XmlSource) -> dict[tuple[Part, int], bytes]:
     """Return the text of each element of the robot, numbered where names repeat, and of the start tag."""
     root = source.root
     texts = {((root.tag, ""), 0): source.data[root.start_tag.start : root.start_tag.end]}
+    numbers: Counter[Part] = Counter([(root.tag, "")])
     for element in root.children:
         part = (element.tag, element.attributes.get("name", ""))
-        number = sum(other == part for other, _ in texts)
-        texts[part, number] = source.data[element.span.start : element.span.end]
+        texts[part, numbers[part]] = source.data[element.span.start : element.span.end]
+        numbers[part] += 1
     return texts
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 from dynx.doctor.examine.examination import Examination, Examiner
@@ -52,6 +52,7 @@ def smallest_mending(
         result = examiner.examine(least.case)
         return least, result, {name for name in examiner.engines if result.max_error(name) > allowed(name)}
 
+    right = {name for name in examiner.engines if full.examination.max_error(name) <= tolerance}
     proofs = full.proofs
     if not (idle := _idle_places(proofs)):
         return full
@@ -62,7 +63,7 @@ def smallest_mending(
     measured = {name: list(measure(rule)) for name, rule in unknown.items()}
     proofs = [measured[each.rule.id].pop(0) if each.rule.id in measured else each for each in proofs]
     for share in _SHARES:
-        grown = [_with_minor(each, share * tolerance) for each in proofs]
+        grown = [_with_minor(each, share * tolerance, right) for each in proofs]
         least, result, wrong = attempt(_idle_places(grown))
         if not wrong:
             return Selection(least, result, grown, frozenset(_idle_places(grown)))
@@ -77,7 +78,8 @@ def _idle_places(proofs: Sequence[Attribution]) -> set[Place]:
     return {place for place in places - effective if place[0] not in called}
 
 
-def _with_minor(each: Attribution, bound: float) -> Attribution:
-    """Count the minor effects above the bound as effects."""
+def _with_minor(each: Attribution, bound: float, right: Collection[str]) -> Attribution:
+    """Count the minor effects above the bound as effects, proved if all their engines end up `right`."""
     larger = {name: minor for name, minor in (each.minor or {}).items() if minor.relative_error > bound}
-    return replace(each, effects={**each.effects, **larger}, proved=True) if larger else each
+    effects = {**each.effects, **larger}
+    return replace(each, effects=effects, proved=effects.keys() <= set(right)) if larger else each

@@ -19,7 +19,6 @@ weighs nothing; a mass without tensor stays as a point mass at the origin of the
 Drake. ``--choose DX410=weightless`` drops that mass too.
 """
 
-import difflib
 from collections.abc import Iterable, Sequence
 
 from dynx.errors import escaped
@@ -27,13 +26,12 @@ from dynx.model.xml.source import Edit, SourceElement
 from dynx.rules import EVERY_ENGINE, Case, Correction, EditingRule, correction
 from dynx.rules.inertia.edits import ZERO_TENSOR, zero_inertial
 from dynx.rules.text.element_text import text_in
+from dynx.rules.text.misspelled_names import meant_name
 from dynx.rules.text.number_text import is_number
 from dynx.rules.text.numeric_attributes import MOMENTS
 
 _MOMENTS = ("ixx", "iyy", "izz")
 _KNOWN = frozenset(["value", *MOMENTS])
-_CLOSE = 0.6
-"""Ratio of matching letters (difflib) of names such as ``valeu`` and ``ixxx``."""
 
 
 class IncompleteInertial(EditingRule):
@@ -98,14 +96,12 @@ def _misspelled(case: Case, element: SourceElement, names: Sequence[str]) -> Cor
     unknown = {
         name: text for name, text in element.attributes.items() if name not in _KNOWN and is_number(text)
     }
-    meant: dict[str, str] = {}
-    for name in unknown:
-        for close in difflib.get_close_matches(name.lower(), missing, n=1, cutoff=_CLOSE):
-            meant.setdefault(close, name)
-    if not missing or len(meant) < len(missing):
+    meant = {meant_name(name, missing, ()): name for name in unknown}
+    if not missing or not meant.keys() >= set(missing):
         return None
     edits, texts = list[Edit](), list[str]()
-    for right, wrong in meant.items():
+    for right in missing:
+        wrong = meant[right]
         edits.append(case.source.attribute_removal(element, wrong))
         edits.append(case.source.attribute_edit(element, right, unknown[wrong]))
         texts.append(f"{right} {unknown[wrong]} in {escaped(wrong)}")

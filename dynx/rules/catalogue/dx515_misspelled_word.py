@@ -11,11 +11,11 @@ All engines ignore the same names. Correcting a name changes the robot, possibly
 intention, so no edit removes the cause.
 """
 
-import difflib
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 
 from dynx.model.xml.source import SourceElement
 from dynx.rules import Case, Detection, Rule, found_at
+from dynx.rules.text.misspelled_names import meant_name
 from dynx.rules.text.numeric_attributes import MOMENTS
 
 _ELEMENTS = {
@@ -37,8 +37,6 @@ _ATTRIBUTES = {
     "dynamics": ("damping", "friction", "armature"),
     "mimic": ("joint", "multiplier", "offset"),
 }
-_CLOSE = 0.8
-"""Ratio of matching letters (difflib): one letter wrong, missing or doubled in a word of five or more."""
 
 
 class MisspelledWord(Rule):
@@ -52,7 +50,7 @@ class MisspelledWord(Rule):
 
 
 def _misspelled(part: SourceElement, root: SourceElement) -> Iterator[tuple[SourceElement, str]]:
-    meant = _meant(part.tag, _ELEMENTS["robot"], ())
+    meant = meant_name(part.tag, _ELEMENTS["robot"], ())
     if root.tag == "robot" and meant is not None:
         yield part, f"<{part.tag}> is ignored; <{meant}> was meant"
     if part.tag not in ("link", "joint"):
@@ -60,12 +58,12 @@ def _misspelled(part: SourceElement, root: SourceElement) -> Iterator[tuple[Sour
     for element in _dynamic_elements(part):
         known = _ATTRIBUTES.get(element.tag, ())
         for attribute in element.attributes:
-            meant = _meant(attribute, known, element.attributes)
+            meant = meant_name(attribute, known, element.attributes)
             if meant is not None:
                 yield element, f"{attribute} of <{element.tag}> is ignored; {meant} was meant"
         for child in element.children:
             present = {other.tag for other in element.children}
-            meant = _meant(child.tag, _ELEMENTS.get(element.tag, ()), present)
+            meant = meant_name(child.tag, _ELEMENTS.get(element.tag, ()), present)
             if meant is not None:
                 yield child, f"<{child.tag}> in <{element.tag}> is ignored; <{meant}> was meant"
 
@@ -77,12 +75,3 @@ def _dynamic_elements(part: SourceElement) -> Iterator[SourceElement]:
         if child.tag in _ATTRIBUTES or child.tag == "inertial":
             yield child
             yield from (below for below in child.children if below.tag in _ATTRIBUTES)
-
-
-def _meant(word: str, known: Sequence[str], present: Collection[str]) -> str | None:
-    """Return the known name closest to an unknown one, if it is absent."""
-    if word in known or ":" in word:
-        return None
-    absent = [other for other in known if other not in present]
-    close = difflib.get_close_matches(word.lower(), absent, n=1, cutoff=_CLOSE)
-    return close[0] if close else None

@@ -102,15 +102,15 @@ def _package(name: str, folder: Path, elsewhere: tuple[tuple[str, str], ...]) ->
     belongs to the description, or in a folder of the environment."""
     enclosing = _enclosing(folder)
     for root in (folder, *folder.parents):
-        found = _found(name, [root]) if _is_private(root) else None
+        found = _find(name, [root]) if _is_private(root) else None
         own = found is not None and (folder.is_relative_to(found) or found.is_relative_to(enclosing))
         if found is not None and (own or any((found / marker).is_file() for marker in _PACKAGE_FILES)):
             return found
     listed = [Path(entry, below) for all_, below in elsewhere for entry in all_.split(os.pathsep) if entry]
-    return _found(name, listed)
+    return _find(name, listed)
 
 
-def _found(name: str, roots: list[Path]) -> Path | None:
+def _find(name: str, roots: list[Path]) -> Path | None:
     try:
         return find_package(name, roots)
     except DescriptionError:
