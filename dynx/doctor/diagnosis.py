@@ -38,6 +38,7 @@ from dynx.doctor.report_assembly import (
     first_report,
     run_time_calls,
     with_after,
+    with_meshes,
 )
 from dynx.doctor.variants import diagnosed_variants, variants_as_loaded
 from dynx.errors import ArgumentError, DescriptionError, DynxError, UnknownNameError, nearest, shown
@@ -163,7 +164,7 @@ def _diagnosis_of(
     before = examiner.examine(case, reference=reference, describe=True)
     rules = _rules_for(examiner)
     found = with_original_lines(detections(case, rules), case.source, sound.source)
-    report = first_report(case, before, tolerance)
+    report = with_meshes(first_report(case, before, tolerance), case.source)
     if report.alike and not _chosen_practice(case, found):
         return replace(
             report,

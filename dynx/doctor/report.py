@@ -141,6 +141,16 @@ class RunTimeCall:
 
 
 @dataclass(frozen=True)
+class UnreadMesh:
+    """A mesh file that was not read, so that nothing is compared with the size of the link's shape."""
+
+    file: str
+    link: str
+    line: int
+    reason: str
+
+
+@dataclass(frozen=True)
 class Change:
     """Change of the file by the remedies of one rule, with everything in the file that they change.
 
@@ -192,6 +202,10 @@ class DoctorReport:
     pairs: tuple[PairError, ...] = ()
     model_difference: tuple[Deviation, ...] = ()
     variants: tuple[VariantResult, ...] = ()
+    meshes: int = 0
+    """Number of mesh files that the description names."""
+    unread_meshes: tuple[UnreadMesh, ...] = ()
+    """Those of them that were not read."""
     error: Failure | None = None
     error_line: int | None = field(default=None, compare=False)
     """Line of the text at which the `error` is, where it is known."""
@@ -300,6 +314,8 @@ class DoctorEntry:
     pairs: tuple[PairError, ...]
     model_difference: tuple[Deviation, ...]
     variants: tuple[VariantResult, ...]
+    meshes: int
+    unread_meshes: tuple[UnreadMesh, ...]
     error: Failure | None
     seconds: float
 

@@ -19,11 +19,14 @@ from dynx.doctor.report import (
     Finding,
     PairError,
     RunTimeCall,
+    UnreadMesh,
     VariantResult,
 )
 from dynx.loaded import loader_class
 from dynx.loaded.difference import model_difference
+from dynx.model.xml.source import XmlSource
 from dynx.rules import LEVELS, CallingRule, Case, Detection, Rule, all_rules
+from dynx.rules.geometry import named_meshes, reason_unread
 
 
 def first_report(case: Case, before: Examination, tolerance: float) -> DoctorReport:
@@ -45,6 +48,18 @@ def first_report(case: Case, before: Examination, tolerance: float) -> DoctorRep
         text=case.source.text,
         form=case.source.form,
     )
+
+
+def with_meshes(report: DoctorReport, source: XmlSource) -> DoctorReport:
+    """Add the mesh files that the description names and that were not read."""
+    named = list(named_meshes(source))
+    unread = []
+    for link, mesh in named:
+        file = mesh.attributes["filename"]
+        reason = reason_unread(file, source.source)
+        if reason is not None:
+            unread.append(UnreadMesh(file, link.attributes.get("name", ""), mesh.line, reason))
+    return replace(report, meshes=len(named), unread_meshes=tuple(unread))
 
 
 def with_after(report: DoctorReport, after: Examination, proved: Examination) -> DoctorReport:

@@ -71,6 +71,9 @@ def _show(
     _show_causes(out, "present, without effect on this base", present, places)
     practice = [each for each in rest if each.kind == "practice"]
     _show_causes(out, "bad practice", practice, places)
+    if report.unread_meshes:
+        out.print()
+        sentence(out, f"not examined: {wording.unread_meshes(report)}", 0, "yellow")
     _show_list(out, "decided where the file is ambiguous", report.choices)
     _show_changes(out, report)
     _show_calls(out, report)
@@ -161,6 +164,11 @@ def show_many(out: Console, reports: Sequence[DoctorReport]) -> None:
     out.print("and the residual error after mending", style="bold")
     out.print(table)
     _count_variants(out, reports)
+    unread = sum(bool(report.unread_meshes) for report in reports)
+    if unread:
+        share = f"{unread} of {counted(len(reports), 'robot')}"
+        checked = f"their links are not checked against the size of shapes ({wording.SHAPE_RULES})"
+        out.print(f"meshes could not be read: {share}; {checked}", style="yellow")
     out.print()
 
 

@@ -67,7 +67,8 @@ def template_environment() -> Environment:
     )
     words = (wording.name, wording.relative, wording.quantity, wording.effect, wording.part)
     more = (wording.unexplained, wording.finding_effect, wording.variant, wording.change)
-    environment.filters.update({each.__name__: each for each in (*words, *more)})
+    filters = (*words, *more, wording.unread_meshes)
+    environment.filters.update({each.__name__: each for each in filters})
     environment.filters["capitalized"] = lambda text: text[:1].upper() + text[1:]
     views: tuple[Callable[..., Any], ...] = (causes, status, step_of, bar_position, largest_error)
     views += (wording.difference, engine_map, pair_map, joint_map, model_tables, changes, excerpt)

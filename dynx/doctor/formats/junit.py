@@ -48,6 +48,8 @@ def _suite(report: DoctorReport, baseline: Baseline | None) -> Element:
     suite.set("tests", str(len(suite)))
     for key, tag in (("failures", "failure"), ("errors", "error"), ("skipped", "skipped")):
         suite.set(key, str(outcomes.count(tag)))
+    if report.unread_meshes:
+        ElementTree.SubElement(suite, "system-out").text = f"not examined: {wording.unread_meshes(report)}"
     return suite
 
 

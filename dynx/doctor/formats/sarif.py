@@ -71,7 +71,8 @@ def sarif_document(
         results = sorted(results, key=_severity, reverse=True)[:MAX_RESULTS]
     root = os.path.join(_root(), "")
     successful = not not_done and all(report.error is None for report in reports)
-    notifications = [{"level": "warning", "message": {"text": note}} for note in notes]
+    notifications: list[dict[str, Any]] = [{"level": "warning", "message": {"text": note}} for note in notes]
+    notifications += [_unread_meshes(report) for report in reports if report.unread_meshes]
     invocation = {"executionSuccessful": successful, "toolExecutionNotifications": notifications}
     return {
         "$schema": SCHEMA_URI,
@@ -162,6 +163,13 @@ def _result(
         "locations": [{"physicalLocation": {"artifactLocation": location, "region": region}}],
         "partialFingerprints": {_FINGERPRINT: digest},
     }
+
+
+def _unread_meshes(report: DoctorReport) -> dict[str, Any]:
+    """Return the notification of meshes that were not read, at the first of them."""
+    region = {"startLine": max(report.unread_meshes[0].line, 1)}
+    place = {"physicalLocation": {"artifactLocation": artifact_location(report), "region": region}}
+    return {"level": "note", "message": {"text": f"{wording.unread_meshes(report)}."}, "locations": [place]}
 
 
 def _key(each: Finding | Unexplained | Place) -> tuple[str | None, ...]:

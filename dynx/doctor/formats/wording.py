@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import PurePath
 from typing import Any
 
-from dynx.doctor.report import Change, Effect, Finding, Unexplained, VariantResult
+from dynx.doctor.report import Change, DoctorReport, Effect, Finding, Unexplained, VariantResult
 from dynx.errors import escaped
 from dynx.rules.registry import all_rules
 
@@ -19,6 +20,9 @@ CALLS = {
     "to compare engines (not to simulate)": True,
 }
 """Titles of the calls after loading, by `RunTimeCall.comparison`."""
+
+SHAPE_RULES = "DX501 to DX503, DX517"
+"""Rules that compare mass and inertia of a link with the size of its shapes."""
 
 _MAX_PARTS = 8
 """Number of changed elements that are listed; the JSON document has all."""
@@ -126,6 +130,21 @@ def variant(each: VariantResult) -> list[str]:
         rule = f"{name(cause.rule)} {name(cause.name)}, {proof}"
         lines.append(f"{effect(cause.effect)}: {rule}; {name(cause.message, 300)}")
     return lines
+
+
+def unread_meshes(report: DoctorReport) -> str:
+    """Write how many meshes were not read, the commonest reason and its consequence; empty for none."""
+    unread = report.unread_meshes
+    if not unread:
+        return ""
+    reasons = Counter(each.reason for each in unread)
+    (reason, count), *others = reasons.most_common()
+    shown = name(reason, 300) + (f" for {count} of them" if others else "")
+    which = f"{len(unread)} of {report.meshes} mesh files" if report.meshes > 1 else "the mesh file"
+    return (
+        f"{which} could not be read ({shown}); engines are compared without meshes, but masses and inertias "
+        f"of such links are not checked against the size of their shapes ({SHAPE_RULES})"
+    )
 
 
 def change(each: Change) -> str:

@@ -3,5 +3,14 @@
 from dynx.rules.geometry.extent import Extent
 from dynx.rules.geometry.mesh_files import MeshNotFoundError, find_mesh
 from dynx.rules.geometry.rigid_shapes import body_extents, group_extents
+from dynx.rules.geometry.unread_meshes import named_meshes, reason_unread
 
-__all__ = ["Extent", "MeshNotFoundError", "body_extents", "find_mesh", "group_extents"]
+__all__ = [
+    "Extent",
+    "MeshNotFoundError",
+    "body_extents",
+    "find_mesh",
+    "group_extents",
+    "named_meshes",
+    "reason_unread",
+]

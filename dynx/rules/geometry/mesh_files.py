@@ -53,6 +53,25 @@ def find_mesh(filename: str, source: str) -> Path | None:
         return None
 
 
+def reason_unknown(filename: str, source: str) -> str:
+    """Return the reason why `find_mesh` does not know the folder of a mesh."""
+    if not os.path.isfile(source):
+        return "the description was not read from a file"
+    if filename.startswith("package://"):
+        name = filename.removeprefix("package://").partition("/")[0]
+        try:
+            found = _package(name, Path(os.path.realpath(source)).parent, _listed_packages())
+        except (OSError, ValueError, RuntimeError):
+            found = None
+        outside = f"{shown(filename, 200)} is outside its package"
+        return f"package {shown(name)} was not found" if found is None else outside
+    if "$(" in filename:
+        return "only xacro and launch files expand $(...)"
+    if "://" in filename and not filename.startswith("file://"):
+        return f"dynx reads no {shown(filename.partition('://')[0] + '://')}"
+    return f"{shown(filename, 200)} is outside the folder of the description"
+
+
 def _existing(path: Path, root: Path, described: str) -> Path | None:
     """Return the file of `path`; None where that is not below `root`; MeshNotFoundError without one."""
     real = Path(os.path.realpath(path))
@@ -88,11 +107,15 @@ def _is_private(folder: Path) -> bool:
 
 def _in_package(uri: str, folder: Path) -> Path | None:
     name, _, inside = uri.removeprefix("package://").partition("/")
-    elsewhere = [(os.environ.get(variable, ""), below) for variable, below in _SEARCH_PATHS]
-    package = _package(name, folder, tuple(elsewhere))
+    package = _package(name, folder, _listed_packages())
     if package is None:
         return None
     return _existing(package / inside, package, f"{shown(inside, 200)} in package {shown(name)}")
+
+
+def _listed_packages() -> tuple[tuple[str, str], ...]:
+    """Return the value of each variable of `_SEARCH_PATHS`, and where packages lie in its folders."""
+    return tuple((os.environ.get(variable, ""), below) for variable, below in _SEARCH_PATHS)
 
 
 # Cached, because a description names its few packages hundreds of times.

@@ -41,6 +41,11 @@ def mesh_box(path: Path, *, by_bullet: bool = False) -> Box | None:
     return _box(path, by_bullet, status.st_mtime_ns, status.st_size)
 
 
+def is_mesh_format(path: Path) -> bool:
+    """Check whether the suffix of a file is that of a format that `mesh_box` reads."""
+    return path.suffix.lower() in _READERS
+
+
 # Cached, because detection runs again after every remedy, and remedies change no mesh.
 @lru_cache(maxsize=4096)
 def _box(path: Path, by_bullet: bool, changed: int, size: int) -> Box | None:

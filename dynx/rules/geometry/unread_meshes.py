@@ -1,0 +1,36 @@
+"""Meshes that dynx does not read, so that no rule compares a mass or an inertia with their size."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from dynx.model.xml.source import SourceElement, XmlSource
+from dynx.rules.geometry.mesh_files import MeshNotFoundError, find_mesh, reason_unknown
+from dynx.rules.geometry.meshes import is_mesh_format, mesh_box
+from dynx.rules.geometry.shapes import geometry_elements
+
+
+def named_meshes(source: XmlSource) -> Iterator[tuple[SourceElement, SourceElement]]:
+    """Yield the first ``<mesh>`` of each file that a description names, after its ``<link>``."""
+    seen = {""}
+    for link in source.root.all("link"):
+        for element in geometry_elements(link):
+            filename = element.attributes.get("filename", "")
+            if element.tag == "mesh" and filename not in seen:
+                seen.add(filename)
+                yield link, element
+
+
+def reason_unread(filename: str, source: str) -> str | None:
+    """Return the reason why a mesh of the description `source` (a path) is not read; None if it is."""
+    try:
+        path = find_mesh(filename, source)
+    except MeshNotFoundError as error:
+        return str(error)
+    if path is None:
+        return reason_unknown(filename, source)
+    if mesh_box(path) is not None:
+        return None
+    if not is_mesh_format(path):
+        return f"dynx reads STL, OBJ and COLLADA, and no {path.suffix or 'file without a suffix'}"
+    return f"no points can be read in the {path.suffix} file"

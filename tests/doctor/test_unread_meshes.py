@@ -1,0 +1,121 @@
+"""A report names the meshes that were not read, and the checks that are left out without them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from dynx.cli.shell.main import cli
+from dynx.doctor import diagnose
+from dynx.doctor.formats import html_page, junit_xml, sarif_document
+from dynx.doctor.report import DoctorReport
+from dynx.rules.geometry.meshes import STL_FACET
+from tests.doctor.formats.test_sarif import require_valid
+
+ARM = """<robot name="arm">
+  <link name="base"/>
+  <link name="tool">
+    <visual>
+      <geometry><mesh filename="package://arm_description/meshes/tool.stl"/></geometry>
+    </visual>
+    <inertial>
+      <mass value="1"/>
+      <inertia ixx="100" ixy="0" ixz="0" iyy="100" iyz="0" izz="100"/>
+    </inertial>
+  </link>
+  <joint name="elbow" type="continuous">
+    <parent link="base"/>
+    <child link="tool"/>
+    <axis xyz="0 0 1"/>
+  </joint>
+</robot>
+"""
+"""The inertia is a thousand times that of any body of the size of the mesh."""
+
+
+@pytest.fixture
+def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return a description in its package, beside the mesh that it names."""
+    for variable in ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH"):
+        monkeypatch.delenv(variable, raising=False)
+    folder = tmp_path / "arm_description"
+    (folder / "meshes").mkdir(parents=True)
+    facets = np.zeros(2, STL_FACET)
+    facets["corners"] = [[[0, 0, 0], [0.1, 0, 0], [0, 0.1, 0]], [[0, 0, 0], [0.1, 0, 0], [0, 0, 0.1]]]
+    mesh = bytes(80) + len(facets).to_bytes(4, "little") + facets.tobytes()
+    (folder / "meshes/tool.stl").write_bytes(mesh)
+    (folder / "arm.urdf").write_text(ARM)
+    return folder / "arm.urdf"
+
+
+def examined(path: Path) -> DoctorReport:
+    """Diagnose a file with one engine."""
+    return diagnose(str(path), engines=["pinocchio"], samples=1)
+
+
+def test_a_file_copied_out_of_its_package_is_reported_as_examined_without_meshes(
+    package: Path, tmp_path: Path
+) -> None:
+    inside = examined(package)
+    assert "DX501" in {finding.rule for finding in inside.findings}
+    assert (inside.meshes, inside.unread_meshes) == (1, ())
+    copy = tmp_path / "elsewhere" / "arm.urdf"
+    copy.parent.mkdir()
+    copy.write_text(ARM)
+    outside = examined(copy)
+    assert outside.alike
+    assert "DX501" not in {finding.rule for finding in outside.findings}
+    [mesh] = outside.unread_meshes
+    assert (mesh.link, mesh.line) == ("tool", 5)
+    assert mesh.reason == "package 'arm_description' was not found"
+
+    command = ["doctor", str(copy), "--engines", "pinocchio", "--samples", "1", "--jobs", "1"]
+    result = CliRunner().invoke(cli, [*command, "--json", str(tmp_path / "x.json")])
+    assert result.exit_code == 0
+    words = "the mesh file could not be read (package 'arm_description' was not found)"
+    assert words in result.stdout
+    assert "DX501" in result.stdout
+    [entry] = json.loads((tmp_path / "x.json").read_text())["results"]
+    assert (entry["meshes"], [each["file"] for each in entry["unread_meshes"]]) == (1, [mesh.file])
+    several = CliRunner().invoke(cli, [*command, str(package)])
+    assert "meshes could not be read: 1 of 2 robots" in several.stdout
+
+    assert "The mesh file could not be read" in html_page([outside])
+    assert words in junit_xml([outside])
+    document = sarif_document([outside])
+    require_valid(document)
+    [run] = document["runs"]
+    assert run["results"] == []
+    [note] = run["invocations"][0]["toolExecutionNotifications"]
+    assert words in note["message"]["text"]
+    assert note["locations"][0]["physicalLocation"]["region"]["startLine"] == 5
+
+
+@pytest.mark.parametrize(
+    ("filename", "reason"),
+    [
+        ("package://hand/a.stl", "package 'hand' was not found"),
+        ("package://arm_description/meshes/none.stl", "no file 'meshes/none.stl' in package"),
+        ("meshes/tool.glb", "no file 'meshes/tool.glb'"),
+        ("arm.urdf", "no .urdf"),
+        ("meshes/empty.stl", "no points can be read in the .stl file"),
+        ("../../other.stl", "outside the folder of the description"),
+        ("package://arm_description/../other.stl", "outside its package"),
+        ("https://example.org/a.stl", "dynx reads no 'https://'"),
+        ("$(find hand)/a.stl", "only xacro and launch files expand $(...)"),
+    ],
+)
+def test_the_reason_is_stated(package: Path, filename: str, reason: str) -> None:
+    (package.parent / "meshes/empty.stl").write_bytes(b"solid x\nendsolid x\n")
+    package.write_text(ARM.replace("package://arm_description/meshes/tool.stl", filename))
+    [mesh] = examined(package).unread_meshes
+    assert reason in mesh.reason
+
+
+def test_of_text_without_a_file_no_mesh_is_looked_for() -> None:
+    [mesh] = diagnose(ARM, engines=["pinocchio"], samples=1).unread_meshes
+    assert mesh.reason == "the description was not read from a file"
