@@ -152,6 +152,7 @@ def all_findings(
         elif attribution is not None and attribution.effects:
             finding = replace(
                 finding,
+                message=finding.message + _condition(attribution),
                 engines=tuple(attribution.effects),
                 effect=attribution.largest_effect,
                 effects=dict(attribution.effects),
@@ -160,6 +161,12 @@ def all_findings(
             )
         findings.append(finding)
     return tuple(sorted(findings, key=lambda finding: finding.kind))
+
+
+def _condition(attribution: Attribution) -> str:
+    """Write in which variants the effect is measured with the remedy of another cause, that of the call."""
+    behind = {name: rule for name, rule in attribution.behind.items() if name in attribution.effects}
+    return "".join(f"; measured in {name} with the remedy of {rule}" for name, rule in behind.items())
 
 
 def changes_of(case: Case, full: Mending, mended: Mending) -> tuple[Change, ...]:

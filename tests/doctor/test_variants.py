@@ -70,6 +70,36 @@ def test_what_an_engine_has_its_variant_has_too(rule: str) -> None:
     assert all(PLAIN not in each.engines for each in beside.findings)
 
 
+BOX = '<collision><geometry><box size="0.3 0.2 0.1"/></geometry></collision>'
+
+
+@pytest.mark.parametrize("variant", [PLAIN, "pybullet:merge"])
+@pytest.mark.parametrize("rule", ["DX101", "DX102", "DX103", "DX104", "DX105", "DX119"])
+def test_a_cause_behind_the_call_of_a_variant_is_measured_with_that_call_mended(
+    rule: str, variant: str
+) -> None:
+    """The plain call uses no tensor, but the inertial frame, which the remedy of DX105 turns."""
+    case = trap_case(rule)
+    boxes = [case.source.insertion(link, BOX) for link in case.source.root.all("link")]
+    text = case.source.apply(*boxes).text
+    engine, own = (
+        diagnose(text, engines=[name], counterexamples=False).differences for name in ("pybullet", variant)
+    )
+    shared = [each for each in own if each.rule not in ("DX115", "DX116")]
+    assert [(each.rule, each.link, each.proved) for each in shared] == [
+        (each.rule, each.link, each.proved) for each in engine
+    ]
+    assert {rule} <= {each.rule for each in shared}
+    call = next((each.rule for each in own if each not in shared), None)
+    for one, other in zip(shared, engine, strict=True):
+        assert one.effect is not None
+        assert other.effect is not None
+        assert one.effect.quantity == other.effect.quantity
+        assert one.effect.relative_error == pytest.approx(other.effect.relative_error, rel=1e-3)
+        told = f"; measured in {variant} with the remedy of {call}"
+        assert one.message == other.message + (told if call else "")
+
+
 def test_the_plain_call_is_measured_without_a_search_for_causes() -> None:
     (variant,) = compare_as_loaded(find_trap("DX115")).variants
     (full,) = diagnose(find_trap("DX115")).variants

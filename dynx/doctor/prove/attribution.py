@@ -5,6 +5,10 @@ rule names loads the file again. The change in the engine's deviation from the r
 *effect*. Causes can hide each other (an engine that refuses a file for two reasons, or at two places); then
 all others are removed, and the effect is the deviation that this one place leaves.
 
+A loading variant whose own call is a cause may not use what another cause is about: PyBullet's plain call
+uses no tensor, but it does use the inertial frame, which a remedy turns. So there the effects of other causes
+are measured with that call mended.
+
 A cause is *proved* for an engine where it has an effect above the tolerance, and the engine agrees with the
 reference once all causes are removed.
 """
@@ -12,8 +16,8 @@ reference once all causes are removed.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cache
+from dataclasses import dataclass, field
+from functools import cache, cached_property
 from math import inf, isfinite
 
 from dynx.doctor.examine.examination import LOADING, QUANTITIES, Examination, Examiner, max_change
@@ -21,6 +25,7 @@ from dynx.doctor.examine.reference_values import ReferenceValues
 from dynx.doctor.prove.mending import Mending, Place, all_except, mend, place_of, readable, remedy_of
 from dynx.doctor.prove.reinsertion import reinserted_text
 from dynx.doctor.report import Effect
+from dynx.loaded import engine_of
 from dynx.rules import CallingRule, Case, Detection, Remedy, Rule
 from dynx.spatial.extended import FLOAT64_EPS
 
@@ -39,7 +44,7 @@ class Attribution:
     """The effect of one rule at one place on each engine where it has one above the tolerance.
 
     `minor` has the effects that are smaller, which may add up; None where they were not measured place by
-    place.
+    place. `behind` has, by loading variant, the rule about its call with whose remedy effects were measured.
     """
 
     rule: Rule
@@ -47,6 +52,7 @@ class Attribution:
     effects: Mapping[str, Effect]
     proved: bool
     minor: Mapping[str, Effect] | None = None
+    behind: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def largest_effect(self) -> Effect | None:
@@ -96,7 +102,8 @@ class Attributor:
                 if all(name not in self._large(measured.get(each, {})) for each in faults)
             }
             shared = self._effects_at(rule, faults, unclear, (), rest) if len(places) > 1 else affected
-            blocked = [name for name in unclear if name not in self._large(shared)]
+            behind = self._behind(rule)
+            blocked = [name for name in unclear if name not in {*self._large(shared), *behind}]
             shared = shared | self._effects_of_last(rule, faults, found, blocked)
             for each in faults:
                 own = {name: effect for name, effect in shared.items() if name in unclear}
@@ -113,11 +120,12 @@ class Attributor:
     ) -> dict[str, Effect]:
         """Return the effects of the rule at these places: by removal, or by reinsertion in engines where
         other causes obscure them, and in those of `wrong` where removal shows nothing."""
-        obscured = [name for name in engines if self._is_obscured(name)]
+        behind = self._behind(rule)
+        obscured = [name for name in engines if name in behind or self._is_obscured(name)]
         effects = self._effects_of_reinsertion(rule, found, obscured, rest()) if obscured else {}
         # An engine that computed nothing and does without the cause shows more than a mended file does.
         blocked = {name for name in obscured if not isfinite(self.before.max_error(name))}
-        settled = effects.keys() - (blocked - self._large(effects).keys())
+        settled = {*effects.keys() - (blocked - self._large(effects).keys()), *behind}
         effects |= self._effects_of_removal(rule, found, [name for name in engines if name not in settled])
         large = self._large(effects)
         missing = [name for name in engines if name in wrong and name not in {*large, *obscured}]
@@ -133,6 +141,26 @@ class Attributor:
         """
         error = self.before.max_error(engine)
         return not error * FLOAT64_EPS <= NOISE_SHARE * self.tolerance
+
+    def _behind(self, rule: Rule) -> Mapping[str, str]:
+        """Return the rule about the call of each loading variant behind which other effects are measured."""
+        return {name: each for name, each in self._call_rules.items() if each != rule.id}
+
+    @cached_property
+    def _call_rules(self) -> Mapping[str, str]:
+        """The rule that names a loading variant itself and is found here, by variant."""
+        variants = [name for name in self.examiner.engines if engine_of(name) != name]
+        found = {
+            name: rule
+            for name in variants
+            for rule in self.rules
+            if isinstance(rule, CallingRule) and name in rule.engines
+        }
+        return {name: rule.id for name, rule in found.items() if rule.detect(self._sound)}
+
+    @cached_property
+    def _sound(self) -> Case:
+        return readable(self.case).case
 
     def _effects_of_removal(
         self, rule: Rule, found: Sequence[Detection], engines: Collection[str]
@@ -229,7 +257,7 @@ class Attributor:
             effects = {name: Effect(rule.present_as, inf) for name in effects}
         right = all(self.after.max_error(engine) <= self.tolerance for engine in effects)
         minor = {name: effect for name, effect in measured.items() if name not in effects}
-        return Attribution(rule, each, effects, bool(effects) and right, minor)
+        return Attribution(rule, each, effects, bool(effects) and right, minor, self._behind(rule))
 
     def _reference_of(self, remedy: Remedy) -> ReferenceValues:
         """Return the reference values of the file after a remedy: those of the file before it where the robot
