@@ -16,6 +16,7 @@
     |  |- NotInstalledError         a package is missing (names the extra that installs it)
     |  |- EngineLimitError          the model is larger than the engine can hold
     |  |- EngineError               the engine failed; its own exception is ``__cause__``
+    |  |  `- UnusableEngineError    it would crash on the robot, or its results are undefined or of another
     |  `- ClosedError               the backend was closed
     |- TrajectoryError              the motion does not exist (and where along it)
     |  `- LimitError                a motion violates limits of the model (lists each)
@@ -112,6 +113,11 @@ class EngineLimitError(BackendError):
 
 class EngineError(BackendError):
     """The engine failed; ``__cause__`` is the engine's own exception."""
+
+
+class UnusableEngineError(EngineError):
+    """The engine itself refuses nothing, but dynx does not use it: it would crash on the robot, its results
+    are undefined, or they are those of another robot."""
 
 
 class ClosedError(BackendError):

@@ -13,7 +13,7 @@ from dynx.doctor.counterexample.search import smallest_counterexample
 from dynx.doctor.counterexample.trials import difference_of
 from dynx.doctor.examine.bounds import require_bounded
 from dynx.doctor.examine.contacts import describe_contacts
-from dynx.doctor.examine.examination import LOADING, TORQUE, Examination, Examiner
+from dynx.doctor.examine.examination import TORQUE, Examination, Examiner
 from dynx.doctor.examine.line_map import with_original_lines
 from dynx.doctor.examine.reference_values import ReferenceValues
 from dynx.doctor.prove.mending import (
@@ -262,11 +262,12 @@ def _engines_without_remedy(mended: Case, rules: Sequence[Rule], engines: Collec
 
 def _unexplained(after: Examination, tolerance: float, known: Collection[str]) -> tuple[Unexplained, ...]:
     """Collect the differences that remain above the tolerance: the quantity of the largest error of each
-    engine, or ``loading`` where an engine refuses even the mended file for no `known` cause."""
+    engine, or ``loading`` where an engine refuses even the mended file for no `known` cause (``result`` where
+    it is not used on that)."""
     remaining = []
     for engine, output in after.outputs.items():
         if output.refused is not None and engine not in known:
-            remaining.append(Unexplained(engine, LOADING, float("inf")))
+            remaining.append(Unexplained(engine, output.missing, float("inf")))
         errors = after.errors(engine)
         quantity = max(errors, key=lambda name: errors[name], default=None)
         if quantity is not None and errors[quantity] > tolerance:

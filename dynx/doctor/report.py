@@ -1,7 +1,7 @@
 """Report of `dynx.diagnose` on one robot, and its JSON document (schema 1, docs/schemas/doctor.json).
 
-A number that is not finite is null in the document: an engine that refuses the file (quantity ``loading``) or
-computes NaN has no error.
+A number that is not finite is null in the document: an engine that refuses the file (quantity ``loading``),
+whose results are not used (``result``) or that computes NaN has no error.
 """
 
 from __future__ import annotations
@@ -61,7 +61,9 @@ class EngineResult:
     """Load call of one engine, and its relative errors `before` and `after` mending, by quantity.
 
     Errors are against the reference values that dynx computes from the file. `refused` is the message with
-    which the engine refuses the file, `refused_after` that for the mended file.
+    which the engine refuses the file, `refused_after` that for the mended file. With `not_used` the engine
+    itself refuses nothing; `refused` is the reason why dynx does not use it on the file: it would crash, its
+    results are undefined, or they are those of another robot.
     """
 
     engine: str
@@ -71,6 +73,8 @@ class EngineResult:
     refused_after: str | None = None
     before: Mapping[str, float] = field(default_factory=dict)
     after: Mapping[str, float] = field(default_factory=dict)
+    not_used: bool = False
+    not_used_after: bool = False
 
 
 @dataclass(frozen=True)

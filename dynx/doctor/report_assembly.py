@@ -65,7 +65,12 @@ def with_meshes(report: DoctorReport, source: XmlSource) -> DoctorReport:
 def with_after(report: DoctorReport, after: Examination, proved: Examination) -> DoctorReport:
     """Add the errors of the engines on the mended file, and the largest one once all causes are removed."""
     engines = tuple(
-        replace(each, refused_after=after.outputs[each.engine].refused, after=after.errors(each.engine))
+        replace(
+            each,
+            refused_after=after.outputs[each.engine].refused,
+            not_used_after=after.outputs[each.engine].not_used,
+            after=after.errors(each.engine),
+        )
         for each in report.engines
     )
     return replace(report, engines=engines, residual=_residual(proved))
@@ -78,6 +83,7 @@ def variant_result(
     result = replace(
         _engine_result(case, name, before),
         refused_after=after.outputs[name].refused,
+        not_used_after=after.outputs[name].not_used,
         after=after.errors(name),
     )
     return VariantResult(**vars(result), findings=tuple(findings))
@@ -91,13 +97,15 @@ def _residual(examination: Examination) -> float:
 
 def _engine_result(case: Case, name: str, before: Examination) -> EngineResult:
     kind = loader_class(name)
-    errors, refused = before.errors(name), before.outputs[name].refused
+    errors, output = before.errors(name), before.outputs[name]
     return EngineResult(
         engine=name,
         version=kind.engine_version(),
         call=kind.load_call(case.base == "floating"),
-        refused=refused,
-        refused_after=refused,
+        refused=output.refused,
+        refused_after=output.refused,
+        not_used=output.not_used,
+        not_used_after=output.not_used,
         before=errors,
         after=errors,
     )

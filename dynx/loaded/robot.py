@@ -9,7 +9,7 @@ from typing import ClassVar, TypeVar
 
 import numpy as np
 
-from dynx.errors import EngineError, shown
+from dynx.errors import EngineError, UnusableEngineError, shown
 from dynx.loaded.description import LoadedModel
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
@@ -27,8 +27,9 @@ class LoadedRobot(ABC):
     Each method takes one sample: q (nq,), v, a, tau (nv,), float64 and finite. Results are not checked:
     NaN from an engine is returned.
 
-    Raises EngineError if the engine refuses the file (with the engine's message), if it lacks a joint of
-    `model`, and if it would crash on the file (which is then not passed to the engine).
+    Raises EngineError if the engine refuses the file (with the engine's message), and UnusableEngineError if
+    it would crash on the file (which is then not passed to the engine), if its results are undefined, and if
+    it lacks a joint of `model`.
     """
 
     name: ClassVar[str]
@@ -116,10 +117,10 @@ def require_file(path: Path) -> None:
         raise EngineError(f"no regular file to load: {shown(path, 300)}")
 
 
-def lacking_joints(engine: str, model: Model, instead: Mapping[str, str]) -> EngineError:
+def lacking_joints(engine: str, model: Model, instead: Mapping[str, str]) -> UnusableEngineError:
     """Return the error of an engine in which joints of `model` do not have one degree of freedom.
 
     `instead` maps the name of each to its type in the engine.
     """
     listed = ", ".join(f"{shown(name)} ({kind})" for name, kind in list(instead.items())[:5])
-    return EngineError(f"{engine} lacks joints of {model.name} with one degree of freedom: {listed}")
+    return UnusableEngineError(f"{engine} lacks joints of {model.name} with one degree of freedom: {listed}")

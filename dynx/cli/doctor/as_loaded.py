@@ -20,7 +20,7 @@ from dynx.cli.shell.tables import Table
 from dynx.cli.shell.terminal import console, counted, summary_line
 from dynx.doctor.formats import wording
 from dynx.doctor.formats.vote import Vote, largest_error, largest_quantity_error, vote
-from dynx.doctor.report import DoctorReport
+from dynx.doctor.report import DoctorReport, EngineResult
 from dynx.doctor.task import DoctorTask, check_engines, missing_engines
 from dynx.model.expansion import expand, refusals
 from dynx.model.model import Base
@@ -122,7 +122,7 @@ def _show_many(out: Console, reports: Sequence[DoctorReport], seconds: float, no
             result = results.get(engine)
             far = None if result is None else largest_quantity_error(result)
             if result is not None and result.refused is not None:
-                cells.append("refuses")
+                cells.append("not used" if result.not_used else "refuses")
             else:
                 cells.append("" if far is None else error_text(far[1], report.tolerance))
         found = vote(report)
@@ -148,7 +148,8 @@ def vote_lines(report: DoctorReport, found: Vote) -> list[str]:
         lines.append("no two engines agree")
     else:
         lines += [f"{engine} stands alone" for engine in found.alone]
-    lines += [f"{engine} does not load the file" for engine in found.refused]
+    without = [each for each in report.engines if each.engine in found.refused]
+    lines += [f"{each.engine} {_absence(each)}" for each in without]
     wrong = [
         each.engine for each in report.engines if each.refused is None and each.engine not in found.right
     ]
@@ -167,6 +168,10 @@ def vote_lines(report: DoctorReport, found: Vote) -> list[str]:
     for variant in report.variants_off:
         lines += [f"another common call, {variant.engine}: {line}" for line in wording.variant(variant)]
     return lines
+
+
+def _absence(each: EngineResult) -> str:
+    return "is not used on the file" if each.not_used else "does not load the file"
 
 
 def _and(names: Sequence[str]) -> str:

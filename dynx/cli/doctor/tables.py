@@ -33,6 +33,12 @@ _PLACES = (4, 3, 2, 1)
 SCREEN = 40, 100
 """Rows and columns of a terminal: the largest of `_PLACES` is taken with which a report fits it."""
 
+_ABOVE_MANY = (
+    "largest relative error of any engine, as loaded (refused: an engine refuses it;",
+    "not used: an engine would crash on it, or its results mean nothing),",
+    "and the residual error after mending",
+)
+
 _MAX_RULES = 3
 """Number of rules listed for one of several robots."""
 
@@ -100,10 +106,13 @@ def show_engines(out: Console, report: DoctorReport) -> None:
         call = "; ".join(wording.name(line, 500) for line in each.call.splitlines())
         out.print(Text.assemble((f"  {each.engine} {one_line(each.version)}: ", "bold"), (call, "dim")))
         if each.refused is not None:
-            sentence(out, f"refuses the file: {one_line(each.refused)}", 6, "red")
-            after = "loads the mended file" if each.refused_after is None else "refuses the mended file too"
-            if report.mended is not None:
-                sentence(out, after, 6, "green" if each.refused_after is None else "red")
+            sentence(out, wording.refusal(each), 6, "red")
+            if report.mended is not None and each.refused_after is None:
+                sentence(out, "loads the mended file", 6, "green")
+            elif report.mended is not None:
+                same = each.refused_after == each.refused
+                after = wording.refusal(each, mended=True)
+                sentence(out, after.partition(":")[0] if same else after, 6, "red")
 
 
 def show_errors(out: Console, report: DoctorReport, *, mended: bool = True) -> None:
@@ -160,8 +169,8 @@ def show_many(out: Console, reports: Sequence[DoctorReport]) -> None:
             "" if left is None else error_text(left, report.tolerance),
             _rules(report),
         )
-    out.print("largest relative error of any engine, as loaded (refused: an engine refuses it)", style="bold")
-    out.print("and the residual error after mending", style="bold")
+    for line in _ABOVE_MANY:
+        out.print(line, style="bold")
     out.print(table)
     _count_variants(out, reports)
     unread = sum(bool(report.unread_meshes) for report in reports)
@@ -309,7 +318,8 @@ def _change(engine: EngineResult, key: str, tolerance: float, mended: bool) -> T
     """Write the error before mending, and the one after where either exceeds the tolerance."""
     before, after = engine.before.get(key), engine.after.get(key)
     if before is None:
-        first = Text("refused" if engine.refused is not None else "-", "red")
+        word = "-" if engine.refused is None else "not used" if engine.not_used else "refused"
+        first = Text(word, "red")
     else:
         first = error_text(before, tolerance)
     if after is None or not mended or (before is not None and before <= tolerance and after <= tolerance):
@@ -327,8 +337,10 @@ def error_text(error: float, tolerance: float) -> Text:
 def _largest(report: DoctorReport) -> Text:
     if report.error is not None:
         return Text("")
-    if any(each.refused is not None for each in report.engines):
-        return Text("refused", STYLES["error"])
+    without = [each for each in report.engines if each.refused is not None]
+    if without:
+        word = "not used" if all(each.not_used for each in without) else "refused"
+        return Text(word, STYLES["error"])
     return error_text(largest_error(report), report.tolerance)
 
 

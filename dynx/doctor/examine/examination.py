@@ -18,7 +18,7 @@ from dynx.doctor.examine.reference_values import (
     reference_values,
 )
 from dynx.engines.silence import silence
-from dynx.errors import DynxError
+from dynx.errors import DynxError, UnusableEngineError
 from dynx.loaded import LoadedModel, LoadedRobot, loader_class
 from dynx.model.model import Base
 from dynx.model.xml.source import XmlSource
@@ -31,6 +31,9 @@ MASS, TORQUE, ACCELERATION = "mass_matrix", "inverse_dynamics", "forward_dynamic
 LOADING = "loading"
 """Quantity in an effect on an engine that refuses the file."""
 
+RESULT = "result"
+"""Quantity in an effect on an engine that refuses nothing, but whose results on the file are not used."""
+
 QUANTITIES = (KINEMATICS, JACOBIAN, MASS, TORQUE, ACCELERATION)
 """Compared quantities. Forward dynamics is compared by the torque that the computed acceleration requires."""
 
@@ -42,14 +45,20 @@ class EngineOutput:
     `deviation` maps a quantity to engine minus reference: by link (n, 4, 4) or (n, 6, nv) for poses and
     Jacobians, under "" (n, nv, nv) or (n, nv) for the rest, (n, 2, nv) for accelerations. A quantity that
     the engine could not compute is in `failed`, with its error message; `refused` is the message with which
-    it refused the file.
+    it refused the file, or, with `not_used`, the reason why dynx does not use the engine on it.
     """
 
     engine: str
     refused: str | None = None
+    not_used: bool = False
     deviation: Mapping[str, Mapping[str, Floats]] = field(default_factory=dict)
     failed: Mapping[str, str] = field(default_factory=dict)
     description: LoadedModel | None = None
+
+    @property
+    def missing(self) -> str:
+        """The quantity in which an engine without results shows: `LOADING` or `RESULT`."""
+        return RESULT if self.not_used else LOADING
 
     def first(self, count: int) -> EngineOutput:
         """Keep the first `count` states."""
@@ -210,7 +219,11 @@ class Examiner:
             return EngineOutput(engine, refused=f"{engine} cannot return names that are not in UTF-8")
         except DynxError as error:
             # The name of the temporary file differs each time, so it is removed from messages.
-            return EngineOutput(engine, refused=str(error).replace(str(path), path.name))
+            return EngineOutput(
+                engine,
+                refused=str(error).replace(str(path), path.name),
+                not_used=isinstance(error, UnusableEngineError),
+            )
 
 
 def _outputs_of(engine: str, robot: LoadedRobot, reference: ReferenceValues, describe: bool) -> EngineOutput:
@@ -238,7 +251,7 @@ def _outputs_of(engine: str, robot: LoadedRobot, reference: ReferenceValues, des
         if reference.solvable:
             record(ACCELERATION, lambda: {"": _acceleration_deviation(robot, reference)})
     description = robot.describe() if describe else None
-    return EngineOutput(engine, None, deviation, failed, description)
+    return EngineOutput(engine, None, False, deviation, failed, description)
 
 
 def _evaluate_samples(compute: Callable[..., Floats], *columns: Floats) -> Floats:

@@ -132,7 +132,7 @@ def differences(report: DoctorReport, folder: str) -> tuple[Difference, ...]:
         if engine.engine in named:
             continue
         if engine.refused is not None:
-            add_unexplained(engine.engine, "loading", math.inf)
+            add_unexplained(engine.engine, "result" if engine.not_used else "loading", math.inf)
         for quantity, error in engine.before.items():
             if engine.refused is None and not error <= report.tolerance:
                 add_unexplained(engine.engine, quantity, error)

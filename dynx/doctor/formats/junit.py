@@ -75,7 +75,7 @@ def _quantities(report: DoctorReport, *, accepted: bool) -> Iterator[tuple[str, 
     prefix = "known: " if accepted else ""
     for each in report.engines:
         if each.refused is not None:
-            message = f"{prefix}{each.engine} refuses the file: {wording.name(each.refused, 2000)}"
+            message = f"{prefix}{each.engine}, {wording.refusal(each)}"
             yield f"{each.engine} loads the file", _failure(message, known=accepted)
     for key in dict.fromkeys(key for each in report.engines for key in each.before):
         errors = {each.engine: each.before[key] for each in report.engines if key in each.before}

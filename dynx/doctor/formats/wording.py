@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import PurePath
 from typing import Any
 
-from dynx.doctor.report import Change, DoctorReport, Effect, Finding, Unexplained, VariantResult
+from dynx.doctor.report import Change, DoctorReport, Effect, EngineResult, Finding, Unexplained, VariantResult
 from dynx.errors import escaped
 from dynx.rules.registry import all_rules
 
@@ -111,16 +111,28 @@ def unexplained(each: Unexplained) -> str:
     """Write a difference without an explanation as a clause with the engine as its subject."""
     if each.quantity == "loading":
         return f"{name(each.engine)} refuses the file, also without the causes that are known"
+    if each.quantity == "result":
+        return f"{name(each.engine)} is not used on the file, also without the causes that are known"
     if not math.isfinite(each.relative_error):
         return f"{name(each.engine)} returns no valid {quantity(each.quantity)}"
     where = "" if each.joint is None else f", most at joint {name(each.joint)}"
     return f"{quantity(each.quantity)} of {name(each.engine)} is off by {size(each.relative_error)}{where}"
 
 
+def refusal(each: EngineResult, *, mended: bool = False) -> str:
+    """Write why an engine has no results on the file, or on the mended one."""
+    not_used, reason = (each.not_used_after, each.refused_after) if mended else (each.not_used, each.refused)
+    if not_used:
+        start = "not used on the mended file either" if mended else "not used"
+    else:
+        start = "refuses the mended file too" if mended else "refuses the file"
+    return f"{start}: {name(reason, 1000)}"
+
+
 def variant(each: VariantResult) -> list[str]:
     """Write what a loading variant changes, by its causes where they are known."""
     if each.refused is not None:
-        return [f"refuses the file: {name(each.refused, 1000)}"]
+        return [refusal(each)]
     if not each.findings:
         key = max(each.before, key=lambda key: each.before[key])
         return [difference(key, each.before[key])]

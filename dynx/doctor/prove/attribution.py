@@ -20,7 +20,7 @@ from dataclasses import dataclass, field
 from functools import cache, cached_property
 from math import inf, isfinite
 
-from dynx.doctor.examine.examination import LOADING, QUANTITIES, Examination, Examiner, max_change
+from dynx.doctor.examine.examination import QUANTITIES, Examination, Examiner, max_change
 from dynx.doctor.examine.reference_values import ReferenceValues
 from dynx.doctor.prove.mending import Mending, Place, all_except, mend, place_of, readable, remedy_of
 from dynx.doctor.prove.reinsertion import reinserted_text
@@ -237,7 +237,7 @@ class Attributor:
         if other.refused is not None:
             return NO_EFFECT
         if one.refused is not None:
-            return Effect(LOADING, float("inf"))
+            return Effect(one.missing, float("inf"))
         largest = NO_EFFECT
         for quantity in QUANTITIES:
             if quantity in other.failed or not isfinite(without.error(engine, quantity)):

@@ -30,7 +30,7 @@ from dynx.engines.drake.library import (
 )
 from dynx.engines.drake.loaded_description import describe_joint, describe_link, remarks
 from dynx.engines.drake.settings import CALLS, set_before_finalize, set_in_context
-from dynx.errors import EngineError, shown
+from dynx.errors import EngineError, UnusableEngineError, shown
 from dynx.loaded.description import LoadedModel
 from dynx.loaded.robot import LoadedRobot, lacking_joints
 from dynx.model import Model
@@ -56,7 +56,7 @@ class LoadedDrake(LoadedRobot):
             plant.mutable_gravity_field().set_gravity_vector(np.array(model.gravity))
             self._bodies = self._find_bodies(instances)
             if model.root not in self._bodies:
-                raise EngineError(f"drake lacks the root link {shown(model.root)} of {model.name}")
+                raise UnusableEngineError(f"drake lacks the root link {shown(model.root)} of {model.name}")
             if not model.floating and model.root != "world":
                 plant.WeldFrames(plant.world_frame(), self._bodies[model.root].body_frame())
             self._joints = self._find_joints(instances)
@@ -215,7 +215,7 @@ class LoadedDrake(LoadedRobot):
         if wrong:
             raise lacking_joints(self.name, model, wrong)
         if model.floating and floating is None:
-            raise EngineError(f"drake does not let the base of {model.name} float")
+            raise UnusableEngineError(f"drake does not let the base of {model.name} float")
         base = None if floating is None else (floating.position_start(), floating.velocity_start())
         joints = [joint for joint in wanted if joint is not None]
         return DrakeCoordinates(

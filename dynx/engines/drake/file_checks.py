@@ -11,7 +11,7 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from dynx.errors import EngineError, ModelError, located, shown
+from dynx.errors import EngineError, ModelError, UnusableEngineError, located, shown
 from dynx.files.reading import read_file
 from dynx.loaded.robot import require_file
 from dynx.model import Model
@@ -27,14 +27,15 @@ def require_harmless(path: Path, model: Model) -> None:
     """Raise EngineError for a file on which Drake would end the process or misplace the robot."""
     require_file(path)
     if len(model.links) > MAX_LINKS:
-        raise EngineError(f"{model.name} has {len(model.links)} links; drake can load at most {MAX_LINKS}")
+        count = len(model.links)
+        raise UnusableEngineError(f"{model.name} has {count} links; drake can load at most {MAX_LINKS}")
     _require_own_world(model)
     try:
         source = XmlSource(read_file(str(path)), str(path))
     except ModelError as error:
         raise EngineError(f"drake cannot load a file that is not XML: {error}") from error
     for message, line in _fatal_faults(source):
-        raise EngineError(located(f"drake would end the process: {message}", str(path), line))
+        raise UnusableEngineError(located(f"drake would end the process: {message}", str(path), line))
 
 
 def _require_own_world(model: Model) -> None:
@@ -42,12 +43,12 @@ def _require_own_world(model: Model) -> None:
     if "world" not in {link.name for link in model.links}:
         return
     if model.root != "world":
-        raise EngineError(
+        raise UnusableEngineError(
             f"drake mistakes the link 'world' of {model.name} for the world itself, so the robot is attached "
             "there and not at its root"
         )
     if model.floating:
-        raise EngineError(
+        raise UnusableEngineError(
             f"drake mistakes the link 'world' of {model.name} for the world itself, so its base cannot float"
         )
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from dynx.engines.mujoco.library import MAX_DEPTH, mujoco
 from dynx.engines.silence import silence
-from dynx.errors import EngineError, nonblank_lines, shown
+from dynx.errors import EngineError, UnusableEngineError, nonblank_lines, shown
 from dynx.loaded.calls import called_joints
 from dynx.loaded.robot import require_file
 from dynx.model import Model
@@ -49,7 +49,7 @@ def load_file(path: Path, model: Model, loading: str, calls: Collection[str]) ->
     if model.floating:
         name = loaded.body(int(loaded.jnt_bodyid[0])).name if loaded.njnt else "nothing"
         if name != model.root:
-            raise EngineError(
+            raise UnusableEngineError(
                 f"mujoco lets {shown(name)} float instead of the root {shown(model.root)} of {path.name}"
                 + (": MuJoCo mistakes a root named 'world' for the world" if model.root == "world" else "")
             )
@@ -126,7 +126,7 @@ def _refuse_crashes(path: Path, model: Model) -> None:
     for joint in model.joints:
         depth[joint.child] = depth[joint.parent] + 1
     if max(depth.values()) > MAX_DEPTH:
-        raise EngineError(
+        raise UnusableEngineError(
             f"{path.name} has {max(depth.values())} links in a row; long chains crash mujoco, so dynx loads "
             f"at most {MAX_DEPTH}"
         )

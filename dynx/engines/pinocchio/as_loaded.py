@@ -17,7 +17,7 @@ import numpy as np
 from dynx.engines.pinocchio.engine_model import MAX_NV, WORLD
 from dynx.engines.pinocchio.library import pin
 from dynx.engines.silence import capture_output
-from dynx.errors import EngineError, nonblank_lines
+from dynx.errors import EngineError, UnusableEngineError, nonblank_lines
 from dynx.loaded.description import LoadedInertial, LoadedJoint, LoadedModel
 from dynx.loaded.robot import LoadedRobot, lacking_joints, require_file
 from dynx.model import Model
@@ -40,7 +40,7 @@ class LoadedPinocchio(LoadedRobot):
             with capture_output(messages):
                 self._engine = pin.buildModelFromUrdf(str(path), *root)
             if self._engine.nv > MAX_NV:
-                raise EngineError(
+                raise UnusableEngineError(
                     f"{model.name} has {self._engine.nv} degrees of freedom in pinocchio; at most {MAX_NV} "
                     "are supported, because its workspace grows with their cube"
                 )

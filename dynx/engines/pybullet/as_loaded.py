@@ -35,7 +35,7 @@ from dynx.engines.pybullet.settings import (
     set_joints,
     with_ballast,
 )
-from dynx.errors import EngineError, shown
+from dynx.errors import UnusableEngineError, shown
 from dynx.loaded.description import LoadedModel
 from dynx.loaded.robot import LoadedRobot, lacking_joints
 from dynx.model import Model
@@ -79,7 +79,7 @@ class LoadedPyBullet(LoadedRobot):
         children = {_text(info[12]): k for k, info in enumerate(client.joints)}
         self._links = {_text(root): ROOT, **children}
         if model.floating and not client.floating:
-            raise EngineError(
+            raise UnusableEngineError(
                 f"pybullet fixes {model.name} to the world: there its root {shown(model.root)} has no mass"
             )
         self._order = self._find_joints()

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from dynx.errors import EngineError, ModelError, shown
+from dynx.errors import EngineError, ModelError, UnusableEngineError, shown
 from dynx.files.reading import read_file
 from dynx.loaded.robot import require_file
 from dynx.model import Model
@@ -47,7 +47,7 @@ def require_harmless(path: Path, model: Model) -> None:
     except ModelError as error:
         raise EngineError(f"pybullet cannot load {model.name}: {error}") from error
     for reason in _hazards(root, model):
-        raise EngineError(f"pybullet would crash on {model.name}: {reason}")
+        raise UnusableEngineError(f"pybullet would crash on {model.name}: {reason}")
     for joint in root.all("joint"):
         axis = next(iter(joint.all("axis")), None)
         if (
@@ -55,13 +55,13 @@ def require_harmless(path: Path, model: Model) -> None:
             and "xyz" not in axis.attributes
             and joint.attributes["type"] not in _WITHOUT_AXIS
         ):
-            raise EngineError(
+            raise UnusableEngineError(
                 f"pybullet reads the axis of joint {shown(joint.attributes['name'])} from memory that it did "
                 f"not initialise (line {axis.line}: <axis> has no xyz), so its results change from run to run"
             )
     joints = len(root.all("joint"))
     if joints > MAX_JOINTS:
-        raise EngineError(
+        raise UnusableEngineError(
             f"{model.name} has {joints} joints, fixed ones included; pybullet supports at most {MAX_JOINTS}"
         )
 

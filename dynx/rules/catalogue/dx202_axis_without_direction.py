@@ -8,8 +8,8 @@ not ``xyz`` is DX218.
 - Pinocchio 4.1 loads it. The joint has a coordinate that moves nothing: its row and column of the mass matrix
   are zero, and forward dynamics gives NaN.
 - PyBullet 3.2.7 loads it. With the zero axis, positions behind the joint are NaN, inverse dynamics and mass
-  matrix fail. For ``<axis/>`` the axis is whatever its memory held, another at each load; dynx does not use
-  such results and reports the file as refused.
+  matrix fail. For ``<axis/>`` the axis is whatever its memory held, another at each load: the result is
+  undefined. Reports say "not used" there, not "refused".
 - MuJoCo 4.0 refuses the file.
 - Drake 1.51 refuses the zero axis, and reads ``<axis/>`` as (1, 0, 0).
 

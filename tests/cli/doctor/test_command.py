@@ -91,6 +91,35 @@ def test_a_difference_is_named_mended_and_gone(arm: Path, tmp_path: Path) -> Non
     assert "all engines load it alike" in again.stdout
 
 
+def test_an_engine_whose_result_is_undefined_does_not_refuse_the_file(arm: Path) -> None:
+    arm.write_text(SOUND.replace('<axis xyz="1 0 0"/>', "<axis/>"), encoding="latin-1")
+    files = ["--json", "x.json", "--html", "x.html", "--junit", "x.xml", "--sarif", "x.sarif"]
+    result = doctor("arm.urdf", *files)
+    assert result.exit_code == 1, result.stderr
+    [entry] = json.loads(Path("x.json").read_text())["results"]
+    [pybullet] = [each for each in entry["engines"] if each["engine"] == "pybullet"]
+    assert (pybullet["not_used"], pybullet["not_used_after"], pybullet["refused_after"]) == (
+        True,
+        False,
+        None,
+    )
+    assert "memory that it did not initialise" in pybullet["refused"]
+    [finding] = [each for each in entry["findings"] if each["rule"] == "DX202"]
+    assert finding["effects"]["pybullet"]["quantity"] == "result"
+    written = [result.stdout, *(Path(file).read_text() for file in files[1::2])]
+    for text in written[:1] + written[2:4]:
+        assert "not used: pybullet reads the axis" in text.replace("Not used", "not used")
+    for text in written:
+        assert "refuses" not in text.replace("MuJoCo 4.0 refuses", "").replace("Drake 1.51 refuses", "")
+        assert "refused by" not in text
+    [sarif] = json.loads(written[-1])["runs"]
+    assert "refused" not in next(each for each in sarif["results"] if each["ruleId"] == "DX202")["message"]
+    compared = CliRunner().invoke(
+        cli, ["agree", "arm.urdf", "--as-loaded", "--backends", "pinocchio,pybullet"]
+    )
+    assert "pybullet is not used on the file" in compared.stdout
+
+
 def test_a_baseline_accepts_known_differences_and_no_others(arm: Path) -> None:
     assert doctor("arm.urdf", "--write-baseline", "known.json", "--quiet").exit_code == 0
     # The same finding on another line is the same finding.

@@ -29,6 +29,7 @@ def test_an_effect_names_its_quantity() -> None:
     assert wording.effect(Effect("mass_matrix", 0.5)) == "mass matrix off by 50 %"
     assert wording.effect(Effect("forward dynamics", math.inf)) == "no valid forward dynamics"
     assert wording.effect(Effect("loading", math.inf)) == "the file is refused"
+    assert wording.effect(Effect("result", math.inf)) == "no valid result"
 
 
 @given(st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=2, max_size=5))

@@ -11,7 +11,7 @@ import pytest
 import dynx
 from dynx.engines.pybullet.as_loaded import LoadedPyBullet
 from dynx.engines.pybullet.file_checks import MAX_JOINTS, MAX_NAME_LENGTH, require_harmless
-from dynx.errors import EngineError
+from dynx.errors import EngineError, UnusableEngineError
 from dynx.model import Joint, Link, Model
 from tests.backends.robots import chain
 from tests.loaded.files import loaded
@@ -58,7 +58,7 @@ def test_an_axis_that_bullet_does_not_initialise_is_refused(axis: str) -> None:
     text = re.sub(r"<axis[^>]*/>", axis, TEXT, count=1)
     assert text != TEXT
     with (
-        pytest.raises(EngineError, match=r"axis of joint 'joint0' from memory .*<axis> has no xyz"),
+        pytest.raises(UnusableEngineError, match=r"axis of joint 'joint0' from memory .*<axis> has no xyz"),
         loaded(LoadedPyBullet, chain(2), text),
     ):
         pass
