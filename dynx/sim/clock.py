@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,7 +26,10 @@ class Clock:
 
     @classmethod
     def of(cls, dt: float, duration: float, control_dt: float | None, delay: float) -> Clock:
-        """Make a clock. Raises ArgumentError for invalid times and times that are no multiples of `dt`."""
+        """Make a clock; the duration is rounded up to a multiple of `dt`.
+
+        Raises ArgumentError for invalid times, and a `control_dt` or `delay` that is no multiple of `dt`.
+        """
         dt = positive_seconds("dt", dt)
         duration = positive_seconds("duration", duration)
         control = dt if control_dt is None else positive_seconds("control_dt", control_dt)
@@ -33,7 +37,7 @@ class Clock:
             raise ArgumentError(f"delay is {shown(delay)}; wanted seconds, 0 or more")
         return cls(
             dt,
-            multiple("duration", duration, dt),
+            steps_to(duration, dt),
             multiple("control_dt", control, dt),
             multiple("delay", delay, dt) if delay else 0,
         )
@@ -42,6 +46,11 @@ class Clock:
     def n_controls(self) -> int:
         """Number of control steps."""
         return -(-self.n_steps // self.steps_per_control)
+
+    @property
+    def duration(self) -> float:
+        """Simulated time [s]."""
+        return self.n_steps * self.dt
 
     @property
     def control_dt(self) -> float:
@@ -58,14 +67,24 @@ class Clock:
         return steps.astype(np.float64) * self.dt
 
 
+def steps_to(seconds: float, dt: float) -> int:
+    """Return the number of steps of `dt` after which a time has passed, 1 or more."""
+    steps = max(1, round(seconds / dt))
+    return steps if _is_near(seconds / dt, steps) else max(1, math.ceil(seconds / dt))
+
+
 def multiple(name: str, seconds: float, dt: float) -> int:
     """Return the number of steps of `dt` in a time. Raises ArgumentError, which names the nearest multiple,
     if the time is not a multiple of `dt`."""
     steps = round(seconds / dt)
-    if steps < 1 or abs(seconds / dt - steps) > TIME_ROUNDING * steps:
+    if steps < 1 or not _is_near(seconds / dt, steps):
         nearest = max(1, steps) * dt
         raise ArgumentError(
             f"{name} is {seconds:.12g} s, which is not a multiple of dt = {dt:.12g} s; "
             f"the nearest one is {nearest:.12g} s"
         )
     return steps
+
+
+def _is_near(ratio: float, steps: int) -> bool:
+    return abs(ratio - steps) <= TIME_ROUNDING * steps

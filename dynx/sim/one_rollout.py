@@ -80,8 +80,9 @@ def simulate(
 
     **Time** [s]. `dt` is the step of the record; the plant takes `substeps` steps in each. The controller
     runs every `control_dt` (by default `dt`), and its torque is held in between. It measures the state as it
-    was `delay` earlier, or the initial state if that is before the start. The default `duration` is that of
-    the reference. All times are multiples of `dt`.
+    was `delay` earlier, or the initial state if that is before the start; `control_dt` and `delay` are
+    multiples of `dt`. The default `duration` is that of the reference. It is rounded up to a multiple of
+    `dt`; a reference that has ended before is held at its end.
 
     **Joints**, the same in every plant: `damping`, dry `friction` (over the speed `friction_slip`, see
     `JointFriction`) and `armature`, each True for those of the description, one number or one for each joint;

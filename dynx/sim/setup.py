@@ -82,7 +82,8 @@ def known_controller(scenario: Scenario) -> Controller[Any] | None:
 
 
 def clock_of(scenario: Scenario) -> Clock:
-    """Return the clock of a scenario. Raises ArgumentError for times that are no multiples of `dt`."""
+    """Return the clock of a scenario. Raises ArgumentError for a `control_dt` or `delay` that is no multiple
+    of `dt`."""
     duration = scenario.duration
     if duration is None and isinstance(scenario.reference, Trajectory):
         duration = scenario.reference.duration

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -11,7 +10,6 @@ from dynx.cli.shell.inputs import Numbers, chosen_frame, configuration, target_p
 from dynx.cli.shell.terminal import counted
 from dynx.errors import ArgumentError, LimitError, LimitViolation, shown
 from dynx.model import Model
-from dynx.model.configuration import positive_seconds
 from dynx.sim.named_controllers import CONTROLLERS
 from dynx.spatial.scalar import Floats
 from dynx.trajectory import Trajectory
@@ -43,7 +41,6 @@ class MotionInput:
     acceleration: Limit | None
     jerk: Limit | None
     controller: str
-    dt: float
 
     @classmethod
     def of(cls, given: dict[str, Any]) -> MotionInput:
@@ -108,12 +105,7 @@ def plan_motion(model: Model, options: MotionInput) -> Motion:
     else:
         motion = _joint_motion(model, options, profile, start)
     description |= {"to": motion.end.q.tolist(), "duration": motion.duration}
-    span = motion.duration
-    if profile in LIMITED_PROFILES and options.duration is None:
-        # The fastest motion ends between two steps; the simulation continues to the next.
-        dt = positive_seconds("--dt", options.dt)
-        span = dt * math.ceil(motion.duration / dt - 1e-9)
-    return Motion(motion, start, span + options.settle, frame, description)
+    return Motion(motion, start, motion.duration + options.settle, frame, description)
 
 
 def _joint_motion(model: Model, options: MotionInput, profile: str, start: Floats) -> Trajectory:

@@ -14,6 +14,7 @@ from dynx.control.base import Controller
 from dynx.control.friction import SLIP, Coefficients
 from dynx.errors import ArgumentError, nearest, shown
 from dynx.model import Model
+from dynx.sim.clock import TIME_ROUNDING, Clock
 from dynx.sim.loop.noise import Noise
 from dynx.sim.plants.disturbances import Push
 from dynx.sim.plants.model_error import MassScale, Payload
@@ -74,7 +75,8 @@ class Scenario:
     dt: float = 1e-3
     """Step of the record [s]."""
     duration: float | None = None
-    """Time to simulate [s]; by default the duration of the reference. A `Simulation` does not need it."""
+    """Time to simulate [s], rounded up to a multiple of `dt`; by default the duration of the reference. A
+    `Simulation` does not need it."""
     control_dt: float | None = None
     """Step of the controller [s]; by default `dt`."""
     delay: float = 0.0
@@ -122,7 +124,8 @@ class Scenario:
         return tuple(self.payload) if isinstance(self.payload, tuple) else ()
 
     def with_defaults(self) -> Scenario:
-        """Return an equal scenario without None for integrator, control step and, if known, duration."""
+        """Return an equal scenario without None for integrator, control step and, if known, duration, which
+        is that of the simulation: rounded up to a multiple of `dt`."""
         duration = self.duration
         if duration is None and isinstance(self.reference, Trajectory | Unknown):
             duration = self.reference.duration
@@ -130,7 +133,7 @@ class Scenario:
             self,
             integrator=self.integrator or default_integrator(self.plant),
             control_dt=self.dt if self.control_dt is None else self.control_dt,
-            duration=duration,
+            duration=_simulated(duration, self.dt),
         )
 
     def differences(self, other: Scenario) -> list[Difference]:
@@ -209,6 +212,17 @@ class Scenario:
 def field_names() -> tuple[str, ...]:
     """Return the names of all fields of a scenario."""
     return tuple(each.name for each in fields(Scenario))
+
+
+def _simulated(duration: float | None, dt: float) -> float | None:
+    """Return `duration` rounded up to a multiple of `dt`; unchanged if it is one, or if a time is invalid."""
+    if duration is None:
+        return None
+    try:
+        simulated = Clock.of(dt, duration, None, 0.0).duration
+    except (ArgumentError, OverflowError):
+        return duration
+    return duration if abs(simulated - duration) <= TIME_ROUNDING * simulated else simulated
 
 
 def _as_array(value: Any) -> Any:
