@@ -13,7 +13,7 @@ from dynx.control.engine_motors import EngineMotor
 from dynx.control.saturation import checked_limit
 from dynx.errors import ArgumentError
 from dynx.model import Model
-from dynx.model.configuration import checked_array, checked_q
+from dynx.model.configuration import checked_array, checked_q, whole_number
 from dynx.sim.clock import Clock
 from dynx.sim.loop.controller_checks import check_controller
 from dynx.sim.loop.references import SetpointOf, checked_reference
@@ -108,7 +108,7 @@ def disturbances_of(scenario: Scenario, moved: Model) -> Disturbances:
         scenario.friction_slip,
         scenario.armature,
         scenario.pushes,
-        scenario.dt,
+        scenario.dt / whole_number("substeps", scenario.substeps, 1),
     )
 
 

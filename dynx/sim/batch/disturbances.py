@@ -51,10 +51,10 @@ class BatchDisturbances:
 
     def wrenches(self, clock: Clock) -> Floats:
         """Return the wrenches of the pushes in each step (n_steps, 6 per push), zero for idle pushes."""
-        times = clock.times()[:-1]
-        acting = np.stack([push.acts(times, clock.dt) for push in self.pushes], axis=1)
+        times = clock.times()[:-1].tolist()
+        shares = np.array([[push.share(t, clock.dt) for push in self.pushes] for t in times])
         strength = np.array([push.wrench for push in self.pushes], dtype=np.float64)
-        return np.asarray(np.where(acting[:, :, None], strength, 0.0).reshape(clock.n_steps, -1))
+        return np.asarray((shares[:, :, None] * strength).reshape(clock.n_steps, -1))
 
     def added_to(
         self,

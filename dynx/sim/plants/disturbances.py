@@ -23,16 +23,23 @@ from dynx.errors import ArgumentError, shown
 from dynx.model import Model
 from dynx.model.configuration import checked_array
 from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED, REFERENCES
-from dynx.sim.clock import TIME_ROUNDING
 from dynx.spatial.scalar import Floats
+
+
+TIME_ROUNDING = 4.0 * float(np.finfo(np.float64).eps)
+"""Relative difference of two times that counts as rounding."""
+
+SLIVER = 1e-6
+"""Largest part of a push that may be counted in the step before or after its own."""
 
 
 @dataclass(frozen=True)
 class Push:
     """A wrench (6,), force [N] then moment [N m], on `frame` from `start` [s] for `duration` [s].
 
-    `reference` names the point and the axes of the wrench, as for `external_forces` of a backend. The push
-    acts in those physics steps that begin while it lasts.
+    `reference` names the point and the axes of the wrench, as for `external_forces` of a backend. In each
+    step of the plant the wrench is constant, multiplied by the share of the step in which the push lasts. So
+    the impulse is exact for any start, duration and step, under every integrator.
     """
 
     frame: str
@@ -57,14 +64,25 @@ class Push:
             )
         return Push(self.frame, wrench, float(self.start), float(self.duration), self.reference)
 
-    def acts(self, t: Any, dt: float) -> Any:
-        """Check whether it acts in the steps of length `dt` that begin at the time or times `t` [s]."""
-        since = t - self.start + TIME_ROUNDING * dt
-        return (since >= 0.0) & (since < self.duration)
+    def share(self, t: float, h: float) -> float:
+        """Return the share, from 0 to 1, of the step of length `h` [s] from time `t` [s] in which it acts."""
+        # Times on the grid are rounded; a step that begins with the push must not miss the last bit of it.
+        rounding = min(TIME_ROUNDING * max(abs(t) + h, abs(self.start)), SLIVER * self.duration)
+        since = t - self.start
+        if since >= -rounding and since + h <= self.duration + rounding:
+            return 1.0
+        before, after = (
+            0.0 if each <= rounding else self.duration if each >= self.duration - rounding else each
+            for each in (since, since + h)
+        )
+        return (after - before) / h
 
 
 class Disturbances:
-    """Friction, armature and pushes that act on a plant, from the arguments of `dynx.simulate`."""
+    """Friction, armature and pushes that act on a plant, from the arguments of `dynx.simulate`.
+
+    `step` is the time from one evaluation of `torque` to the next [s].
+    """
 
     def __init__(
         self,
@@ -74,7 +92,7 @@ class Disturbances:
         slip: float = 0.0,
         armature: Coefficients = False,
         pushes: Sequence[Push] = (),
-        dt: float = 0.0,
+        step: float = 0.0,
     ) -> None:
         """Raises GainError and ArgumentError for coefficients and pushes that `model` cannot have."""
         self.friction = JointFriction(model, damping, friction, slip)
@@ -82,7 +100,7 @@ class Disturbances:
         self.armature = _armature_matrix(model, armature)
         """Armature (nv, nv), added to the mass matrix."""
         self.has_armature = bool(self.armature.any())
-        self._dt = dt
+        self._step = step
 
     @property
     def has_torque(self) -> bool:
@@ -103,8 +121,10 @@ class Disturbances:
         """Return the torque (nv,) of pushes minus that of friction, in a step that began at `t`."""
         tau = -self.friction(v)
         for push in self.pushes:
-            if push.acts(t, self._dt):
-                tau = tau + engine.jacobian(q, push.frame, reference=push.reference).T @ push.wrench
+            share = push.share(t, self._step)
+            if share:
+                J = engine.jacobian(q, push.frame, reference=push.reference)
+                tau = tau + J.T @ (share * np.asarray(push.wrench))
         return tau
 
 
