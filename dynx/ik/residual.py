@@ -14,18 +14,27 @@ Triple = tuple[float, float, float]
 
 
 class Residual:
-    """Error from a frame to one target: position [m], then rotation vector [rad], in world axes."""
+    """Error from a frame to one target: position [m], then rotation vector [rad], in world axes.
 
-    __slots__ = ("_point", "_position", "_rotation")
+    A part of the target that is None is free: it has no rows.
+    """
 
-    def __init__(self, position: Floats, rotation: Floats | None, point: Floats | None) -> None:
-        x, y, z = position.tolist()
-        self._position: Triple = (x, y, z)
+    __slots__ = ("_point", "_position", "_rotation", "rows")
+
+    def __init__(self, position: Floats | None, rotation: Floats | None, point: Floats | None) -> None:
+        x, y, z = (0.0, 0.0, 0.0) if position is None else position.tolist()
+        self._position: Triple | None = None if position is None else (x, y, z)
         self._rotation = rotation
         self._point = point
+        self.rows = slice(3 if position is None else 0, 3 if rotation is None else 6)
+        """Rows of the Jacobian that change the error."""
 
     def __call__(self, T_world_frame: Floats) -> tuple[tuple[float, ...], float, float]:
-        """Return (residual (6,), or (3,) without a rotation; position error [m]; rotation error [rad])."""
+        """Return (residual (6,), or (3,) if a part is free; position error [m]; rotation error [rad])."""
+        if self._position is None:
+            assert self._rotation is not None
+            rx, ry, rz, angle = rotation_vector(self._rotation.dot(T_world_frame[:3, :3].T))
+            return (rx, ry, rz), 0.0, angle
         if self._point is None:
             px, py, pz, _ = T_world_frame[:, 3].tolist()
         else:

@@ -23,9 +23,9 @@ class IKResult:
     success: NDArray[np.bool_]
     """Whether both errors are within the tolerances (...,)."""
     position_error: Floats
-    """Distance from the target (...,) [m]."""
+    """Distance from the target (...,) [m]; 0 if the position is free."""
     rotation_error: Floats
-    """Angle to the target (...,) [rad], between 0 and pi; 0 if the target is only a position."""
+    """Angle to the target (...,) [rad], between 0 and pi; 0 if the rotation is free."""
     iterations: NDArray[np.int64]
     """Number of solver steps, summed over all starts (...,)."""
     restarts: NDArray[np.int64]

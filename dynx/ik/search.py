@@ -89,7 +89,7 @@ class Search:
 
     def run(
         self,
-        position: Floats,
+        position: Floats | None,
         rotation: Floats | None,
         q0: Floats,
         rng: np.random.Generator | int | None,
@@ -155,7 +155,7 @@ class Search:
             if stagnant or steps == self._limits.max_iterations:
                 break
             recent.append(squared_error)
-            q = self._step_from(q, error_vector, _DAMPING * squared_error + _MIN_DAMPING)
+            q = self._step_from(q, error_vector, residual.rows, _DAMPING * squared_error + _MIN_DAMPING)
         return best, steps
 
     def _refine(self, q: Floats, residual: Residual) -> tuple[Floats, int]:
@@ -168,7 +168,8 @@ class Search:
         squared_error, factor, steps = _half_square(error_vector), _DAMPING, 0
         while steps < self._limits.max_iterations:
             steps += 1
-            trial = self._step_from(q, error_vector, factor * squared_error + _MIN_DAMPING)
+            damping = factor * squared_error + _MIN_DAMPING
+            trial = self._step_from(q, error_vector, residual.rows, damping)
             trial_residual, _, _ = residual(self._kinematics.forward_kinematics(trial, self._frame))
             trial_error = _half_square(trial_residual)
             gain = squared_error - trial_error
@@ -181,16 +182,14 @@ class Search:
                 break
         return q, steps
 
-    def _step_from(self, q: Floats, error_vector: tuple[float, ...], damping: float) -> Floats:
+    def _step_from(self, q: Floats, error_vector: tuple[float, ...], rows: slice, damping: float) -> Floats:
         """Return the configuration after one step from q."""
         if self._point is None:
             J = self._kinematics.jacobian(q, self._frame)
         else:
             J = self._kinematics.jacobian(q, self._frame, point=self._point)
         coordinates = self._coordinates
-        y = self._step(
-            J[: len(error_vector), coordinates.columns], error_vector, coordinates.values(q), damping
-        )
+        y = self._step(J[rows, coordinates.columns], error_vector, coordinates.values(q), damping)
         return coordinates.with_values(q, y)
 
 

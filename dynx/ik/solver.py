@@ -27,6 +27,7 @@ def inverse_kinematics(
     frame: str,
     q0: ArrayLike | None = None,
     *,
+    free: str | None = None,
     point: ArrayLike | None = None,
     position_tolerance: float = 1e-6,
     rotation_tolerance: float = 1e-6,
@@ -37,10 +38,13 @@ def inverse_kinematics(
 ) -> IKResult:
     """Find a configuration within limits that brings `frame` to `target`.
 
-    `target` is a pose T_world_target (..., 4, 4), or a position (..., 3) [m] with free rotation. The search
-    starts at `q0` (..., nq), moved into the limits, or at a random configuration if q0 is None. Targets and
-    q0 broadcast. `point` (3,) [m], in the axes of the frame, is the point that reaches the target position
-    instead of the origin of the frame.
+    `target` is a pose T_world_target (..., 4, 4), or a position (..., 3) [m] with free rotation. With
+    ``free="position"`` it is a rotation (..., 3, 3), or that of a pose; with ``free="rotation"`` a position,
+    or that of a pose. `point` (3,) [m], in the axes of the frame, is the point that reaches the target
+    position instead of the origin of the frame.
+
+    The search starts at `q0` (..., nq), moved into the limits, or at a random configuration if q0 is None.
+    Targets and q0 broadcast.
 
     A target counts as reached within `position_tolerance` [m] and `rotation_tolerance` [rad]. A start is
     abandoned after `max_iterations` steps, or sooner if it stagnates; the search then restarts at a random
@@ -59,10 +63,12 @@ def inverse_kinematics(
     """
     model = kinematics.model
     model.frame_index(frame)
-    targets = checked_targets(target)
+    targets = checked_targets(target, free)
     limits = _checked_limits(position_tolerance, rotation_tolerance, max_iterations, max_restarts)
     rng = _checked_rng(rng)
     at = None if point is None else checked_vector("point", point)
+    if at is not None and targets.positions is None:
+        raise ArgumentError("point is given in addition to free='position', with which it has no effect")
     start = _start(model, q0)
     try:
         batch = np.broadcast_shapes(targets.batch, start.shape[:-1])
@@ -74,13 +80,14 @@ def inverse_kinematics(
     search = Search(kinematics, frame, at, limits)
     if method == "dynx":
 
-        def solve(position: Floats, rotation: Floats | None, q: Floats) -> Candidate:
+        def solve(position: Floats | None, rotation: Floats | None, q: Floats) -> Candidate:
             return search.run(position, rotation, q, rng, begin_at_q0=q0 is not None)
 
     elif method == "engine":
-        engine_solve = _engine_solver(kinematics, targets.rotations is None or at is not None)
+        is_pose = targets.positions is not None and targets.rotations is not None
+        engine_solve = _engine_solver(kinematics, not is_pose or at is not None)
 
-        def solve(position: Floats, rotation: Floats | None, q: Floats) -> Candidate:
+        def solve(position: Floats | None, rotation: Floats | None, q: Floats) -> Candidate:
             T = np.eye(4)
             T[:3, :3], T[:3, 3] = rotation, position
             q_engine = engine_solve(T, frame, q)
@@ -98,13 +105,8 @@ def inverse_kinematics(
         return IKResult(
             one.q, np.asarray(one.success), errors[0, ...], errors[1, ...], steps[0, ...], steps[1, ...]
         )
-    positions = np.broadcast_to(targets.positions, (*batch, 3)).reshape(-1, 3)
-    starts = np.broadcast_to(start, (*batch, model.nq)).reshape(len(positions), model.nq)
-    if targets.rotations is None:
-        found = [solve(p, None, q) for p, q in zip(positions, starts, strict=True)]
-    else:
-        rotations = np.broadcast_to(targets.rotations, (*batch, 3, 3)).reshape(-1, 3, 3)
-        found = [solve(p, R, q) for p, R, q in zip(positions, rotations, starts, strict=True)]
+    starts = np.broadcast_to(start, (*batch, model.nq)).reshape(math.prod(batch), model.nq)
+    found = [solve(p, R, q) for (p, R), q in zip(targets.rows(batch), starts, strict=True)]
     return _result(found, batch, model.nq)
 
 

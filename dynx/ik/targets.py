@@ -1,14 +1,16 @@
-"""Targets of inverse kinematics: a pose, or the position of a point with free rotation."""
+"""Targets of inverse kinematics: a pose, the position of a point, or a rotation."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from itertools import repeat
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dynx.errors import ArgumentError, ShapeError
+from dynx.errors import ArgumentError, ShapeError, nearest, shown
 from dynx.model.configuration import MAX_MAGNITUDE, checked_entries, real_array
 from dynx.spatial.scalar import Floats
 
@@ -19,29 +21,52 @@ _ROUNDING_TOLERANCE = 1e-12
 """Deviation from orthonormality above which the nearest rotation is used, as for a pose in float32."""
 
 
+LIKENESS_TOLERANCE = 1e-2
+"""Largest entry of R'R - 1 in three positions that are refused because they may be a rotation."""
+
+FREE = ("rotation", "position")
+"""Parts of a target that may be free."""
+
+
 @dataclass(frozen=True, eq=False)
 class Targets:
-    """Poses or positions in world axes, with the leading axes `batch`.
+    """Poses, positions or rotations in world axes, with the leading axes `batch`; what is free is None."""
 
-    `rotations` is None if only positions are given.
-    """
-
-    positions: Floats  # (*batch, 3) [m]
+    positions: Floats | None  # (*batch, 3) [m]
     rotations: Floats | None  # (*batch, 3, 3)
 
     @property
     def batch(self) -> tuple[int, ...]:
         """Shape of the leading axes."""
-        return self.positions.shape[:-1]
+        if self.positions is not None:
+            return self.positions.shape[:-1]
+        assert self.rotations is not None
+        return self.rotations.shape[:-2]
+
+    def rows(self, batch: tuple[int, ...]) -> Iterator[tuple[Floats | None, Floats | None]]:
+        """Yield position and rotation of each target, broadcast to the leading axes `batch`."""
+        count = math.prod(batch)
+        found: list[Iterable[Floats | None]] = []
+        for array, shape in ((self.positions, (3,)), (self.rotations, (3, 3))):
+            if array is None:
+                found.append(repeat(None, count))
+            else:
+                found.append(np.broadcast_to(array, (*batch, *shape)).reshape(count, *shape))
+        return zip(*found, strict=True)
 
 
-def checked_targets(target: ArrayLike) -> Targets:
-    """Read poses T_world_target (..., 4, 4) or positions (..., 3) [m].
+def checked_targets(target: ArrayLike, free: str | None = None) -> Targets:
+    """Read poses T_world_target (..., 4, 4); positions (..., 3) [m], whose rotation is free; or rotations
+    (..., 3, 3) if the position is `free`.
 
     A rotation that is orthonormal only to 1e-6 is replaced by the nearest rotation (Higham, Matrix nearness
     problems, section 3). Raises ShapeError, DTypeError, NotFiniteError, or ArgumentError for a matrix that is
-    not a rigid transform.
+    not a rigid transform, and for three positions that may be a rotation unless the rotation is `free`.
     """
+    if free is not None:
+        if not isinstance(free, str) or free not in FREE:
+            raise ArgumentError(f"free is {shown(free)}{nearest(str(free), FREE)}")
+        return _checked_parts(checked_entries("target", real_array("target", target)), free)
     if (
         isinstance(target, np.ndarray)
         and target.dtype == np.float64
@@ -51,10 +76,42 @@ def checked_targets(target: ArrayLike) -> Targets:
         return Targets(target[:3, 3], target[:3, :3])
     array = checked_entries("target", real_array("target", target))
     if array.ndim >= 1 and array.shape[-1] == 3:
+        _refuse_likeness(array)
         return Targets(array, None)
     if array.ndim < 2 or array.shape[-2:] != (4, 4):
-        raise ShapeError(f"target has shape {array.shape}; wanted a pose (..., 4, 4) or a position (..., 3)")
+        raise ShapeError(
+            f"target has shape {array.shape}; wanted a pose (..., 4, 4), a position (..., 3), or with "
+            "free='position' a rotation (..., 3, 3)"
+        )
     return Targets(array[..., :3, 3], _checked_rotations(array))
+
+
+def _checked_parts(array: Floats, free: str) -> Targets:
+    """Read targets of which one part is free."""
+    is_pose = array.ndim >= 2 and array.shape[-2:] == (4, 4)
+    if free == "rotation":
+        if not is_pose and (not array.ndim or array.shape[-1] != 3):
+            raise ShapeError(
+                f"target has shape {array.shape}; wanted a position (..., 3), or a pose (..., 4, 4)"
+            )
+        return Targets(array[..., :3, 3] if is_pose else array, None)
+    if not is_pose and (array.ndim < 2 or array.shape[-2:] != (3, 3)):
+        raise ShapeError(
+            f"target has shape {array.shape}; wanted a rotation (..., 3, 3), or a pose (..., 4, 4)"
+        )
+    return Targets(None, _checked_rotations(array))
+
+
+def _refuse_likeness(positions: Floats) -> None:
+    """Raise ArgumentError for positions (..., 3, 3) that are all orthonormal, as the rows of a rotation."""
+    if positions.ndim < 2 or positions.shape[-2] != 3 or not positions.size:
+        return
+    deviation = np.abs(np.swapaxes(positions, -1, -2) @ positions - np.eye(3)).max()
+    if deviation <= LIKENESS_TOLERANCE:
+        raise ArgumentError(
+            f"target of shape {positions.shape} may be a rotation or three positions: free='position' reads "
+            "it as a rotation, free='rotation' as positions; a pose is (..., 4, 4)"
+        )
 
 
 def _is_rigid(T: list[list[float]]) -> bool:
@@ -78,10 +135,12 @@ def _dot(a: list[float], b: list[float]) -> float:
 
 
 def _checked_rotations(T: Floats) -> Floats:
+    """Return the rotations of poses (..., 4, 4) or of matrices (..., 3, 3)."""
     R = T[..., :3, :3]
     deviation = np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max(axis=(-1, -2))
-    bottom = np.abs(T[..., 3, :] - (0.0, 0.0, 0.0, 1.0)).max(axis=-1)
-    _refuse(bottom > ORTHONORMALITY_TOLERANCE, "its last row is not (0, 0, 0, 1)")
+    if T.shape[-1] == 4:
+        bottom = np.abs(T[..., 3, :] - (0.0, 0.0, 0.0, 1.0)).max(axis=-1)
+        _refuse(bottom > ORTHONORMALITY_TOLERANCE, "its last row is not (0, 0, 0, 1)")
     _refuse(deviation > ORTHONORMALITY_TOLERANCE, "its rotation is not orthonormal to 1e-6")
     _refuse(np.linalg.det(R) < 0.0, "its rotation has determinant -1 (a reflection)")
     if (deviation > _ROUNDING_TOLERANCE).any():

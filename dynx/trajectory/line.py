@@ -150,6 +150,7 @@ class _Line:
         targets = checked_targets(target)
         if targets.batch:
             raise ShapeError(f"target has shape {np.shape(target)}; wanted a pose (4, 4) or a position (3,)")
+        assert targets.positions is not None
         self._require_start_within_limits()
         self._target_position, self._has_rotation = targets.positions, targets.rotations is not None
         with open_backend(engine, model) as kinematics:

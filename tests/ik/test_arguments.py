@@ -14,11 +14,13 @@ from dynx.errors import ArgumentError, ClosedError, DTypeError, NotFiniteError, 
 from dynx.ik import IKResult
 from dynx.model import Link, Model
 from dynx.model.loading import load
+from dynx.spatial.so3 import rotation_from_rpy
 from tests.oracles.closed_form import MODELS
 
 REFLECTION = np.diag([1.0, 1.0, -1.0, 1.0])
 STRETCHED = np.diag([1.0, 1.0, 1.00001, 1.0])
 PROJECTIVE = np.eye(4) + np.eye(4, k=-3)
+TURN = rotation_from_rpy(np.array([0.3, -0.4, 2.0]))
 
 
 @pytest.fixture
@@ -38,6 +40,10 @@ def engine() -> Iterator[Backend]:
         (np.full((4, 4), np.nan), NotFiniteError, "finite"),
         (np.array([0.0, np.inf, 0.0]), NotFiniteError, r"target\[1\]"),
         (np.eye(3)[:, :2], ShapeError, r"\(3, 2\)"),
+        (np.eye(3), ArgumentError, r"\(3, 3\) may be a rotation or three positions: free='position' reads"),
+        (np.stack([TURN, TURN.T]), ArgumentError, r"\(2, 3, 3\) may be a rotation"),
+        (TURN.round(3).tolist(), ArgumentError, "may be a rotation"),
+        (-np.eye(3), ArgumentError, "may be a rotation"),
         (np.zeros(7), ShapeError, r"\(7,\)"),
         (1.0, ShapeError, "wanted a pose"),
         ([[1.0], [1.0, 2.0]], ShapeError, "ragged"),
@@ -67,11 +73,37 @@ def test_invalid_targets_raise(engine: Backend, target: Any, error: type[Excepti
         ({"rng": -1}, ArgumentError),
         ({"method": "newton"}, ArgumentError),
         ({"method": "engine"}, ArgumentError),
+        ({"free": "orientation"}, ArgumentError),
+        ({"free": np.zeros(2)}, ArgumentError),
+        ({"free": "position", "point": np.zeros(3)}, ArgumentError),
+        ({"free": "position", "method": "engine"}, ArgumentError),
     ],
 )
 def test_invalid_options_raise(engine: Backend, options: dict[str, Any], error: type[Exception]) -> None:
     with pytest.raises(error):
         engine.inverse_kinematics(np.eye(4), "flange", **options)
+
+
+@pytest.mark.parametrize(
+    ("target", "free", "message"),
+    [
+        (np.zeros(3), "position", r"\(3,\); wanted a rotation"),
+        (np.zeros((2, 3)), "position", "wanted a rotation"),
+        (np.diag([1.0, 1.0, -1.0]), "position", "reflection"),
+        (np.diag([1.0, 1.0, 1.1]), "position", "not orthonormal"),
+        (np.zeros(4), "rotation", r"\(4,\); wanted a position"),
+        (1.0, "rotation", "wanted a position"),
+    ],
+)
+def test_targets_with_a_free_part_that_raise(engine: Backend, target: Any, free: str, message: str) -> None:
+    with pytest.raises(ArgumentError, match=message):
+        engine.inverse_kinematics(target, "flange", free=free)
+
+
+def test_three_positions_are_read_as_such(engine: Backend) -> None:
+    near = 0.2 * np.eye(3) + 0.3
+    assert engine.inverse_kinematics(near, "flange").q.shape == (3, 6)
+    assert engine.inverse_kinematics(np.eye(3), "flange", free="rotation", max_restarts=0).q.shape == (3, 6)
 
 
 def test_axes_that_do_not_broadcast(engine: Backend) -> None:

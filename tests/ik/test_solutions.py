@@ -169,6 +169,35 @@ def test_position_targets_and_points_of_the_frame(q: Floats, seed: int) -> None:
         assert max(errors(target, place(result.q))) <= TOLERANCE
 
 
+@given(st.integers(0, 2**32 - 1))
+def test_rotation_targets(seed: int) -> None:
+    frame, wanted = "flange", SIX_AXIS_ARM.random(seed, (2, 1))
+    starts = SIX_AXIS_ARM.random(seed + 1, 3)
+    with backend("pinocchio", SIX_AXIS_ARM) as engine:
+        targets = engine.forward_kinematics(wanted, frame)
+        found = engine.inverse_kinematics(targets[..., :3, :3], frame, starts, free="position")
+        assert found.success.all()
+        assert found.q.shape == (2, 3, SIX_AXIS_ARM.nq)
+        assert not found.position_error.any()
+        reached = engine.forward_kinematics(found.q, frame)
+        same = engine.inverse_kinematics(targets[1, 0], frame, starts[2], free="position")
+        np.testing.assert_array_equal(same.q, found.q[1, 2])
+        for i in range(2):
+            for k in range(3):
+                angle = errors(targets[i, 0], reached[i, k])[1]
+                assert angle <= TOLERANCE
+                assert same_error(angle, float(found.rotation_error[i, k]))
+
+
+@given(configurations(SIX_AXIS_ARM, within_limits=True))
+def test_the_position_of_a_pose_with_free_rotation(q: Floats) -> None:
+    with backend("pinocchio", SIX_AXIS_ARM) as engine:
+        target = engine.forward_kinematics(q, "flange")
+        by_pose = engine.inverse_kinematics(target, "flange", free="rotation")
+        by_position = engine.inverse_kinematics(target[:3, 3], "flange")
+    np.testing.assert_array_equal(by_pose.q, by_position.q)
+
+
 @given(st.data())
 def test_angles_are_returned_nearest_to_the_start(data: st.DataObject) -> None:
     turns = [data.draw(st.integers(-3, 3)) for _ in range(2)]

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,7 +23,6 @@ from dynx.model import Model
 from dynx.model.configuration import checked_array
 from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED, REFERENCES
 from dynx.spatial.scalar import Floats
-
 
 TIME_ROUNDING = 4.0 * float(np.finfo(np.float64).eps)
 """Relative difference of two times that counts as rounding."""

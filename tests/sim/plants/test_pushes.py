@@ -44,8 +44,15 @@ def test_the_impulse_is_exact_on_every_plant(
     plant: str, integrator: str, start: float, duration: float, dt: float, substeps: int
 ) -> None:
     push = pushed(3.0 / duration, start, duration)
-    options = {"dt": dt, "duration": TIME, "substeps": substeps}
-    rollout = simulate(SLIDER, plant=plant, integrator=integrator, pushes=[push], **options)
+    rollout = simulate(
+        SLIDER,
+        plant=plant,
+        integrator=integrator,
+        pushes=[push],
+        dt=dt,
+        duration=TIME,
+        substeps=substeps,
+    )
     assert rollout.v[-1, 0] == pytest.approx(3.0, rel=1e-7)
     speed = np.interp(rollout.t, [start, start + duration], [0.0, 3.0])
     np.testing.assert_allclose(rollout.v[:, 0], speed, rtol=0.0, atol=1e-5)
