@@ -30,6 +30,14 @@ if TYPE_CHECKING:
     from dynx.model import Model, Pose
     from dynx.model.library import robots
     from dynx.model.loading import load
+    from dynx.model.rotations import (
+        quat_from_rotation,
+        quat_from_rpy,
+        rotation_from_quat,
+        rotation_from_rpy,
+        rpy_from_quat,
+        rpy_from_rotation,
+    )
     from dynx.rbd.regressor import inertial_parameters
     from dynx.sim import Noise, Payload, Push, Rollout, Scenario, Simulation, simulate, simulate_batch
 
@@ -59,8 +67,14 @@ __all__ = [
     "installed_backends",
     "load",
     "parametric",
+    "quat_from_rotation",
+    "quat_from_rpy",
     "register",
     "robots",
+    "rotation_from_quat",
+    "rotation_from_rpy",
+    "rpy_from_quat",
+    "rpy_from_rotation",
     "simulate",
     "simulate_batch",
     "trajectory",
@@ -89,8 +103,14 @@ _HOME = {
     "installed_backends": "dynx.backends",
     "load": "dynx.model.loading",
     "parametric": "dynx.compiled.parametric",
+    "quat_from_rotation": "dynx.model.rotations",
+    "quat_from_rpy": "dynx.model.rotations",
     "register": "dynx.backends",
     "robots": "dynx.model.library",
+    "rotation_from_quat": "dynx.model.rotations",
+    "rotation_from_rpy": "dynx.model.rotations",
+    "rpy_from_quat": "dynx.model.rotations",
+    "rpy_from_rotation": "dynx.model.rotations",
     "simulate": "dynx.sim",
     "simulate_batch": "dynx.sim",
 }

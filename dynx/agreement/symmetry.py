@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 
-from dynx.model import Joint, Link, Model, Pose
+from dynx.model import Model
 from dynx.spatial.scalar import Floats
-from dynx.spatial.so3 import quat_exp, quat_product, rotate, rotation_from_quat, rpy_from_rotation
+from dynx.spatial.se3 import homogeneous
+from dynx.spatial.so3 import quat_exp, quat_product, rotate, rotation_from_quat
 
 ROTATION_VECTOR = (0.7, -1.1, 0.4)
 """Rotation of the world [rad], about an oblique axis, so that exchanged axes show."""
@@ -18,7 +18,7 @@ ROTATION_VECTOR = (0.7, -1.1, 0.4)
 def rotate_world(model: Model) -> tuple[Model, Callable[[Floats], Floats]]:
     """Return a model in the rotated world, and the map from configurations (..., nq) of `model` to its own.
 
-    A floating base is rotated by its configuration; a fixed one is rigidly connected to a new root.
+    A floating base is rotated by its configuration, a fixed one by its pose in the world.
     """
     quat = quat_exp(np.array(ROTATION_VECTOR))
     R = rotation_from_quat(quat)
@@ -30,20 +30,5 @@ def rotate_world(model: Model) -> tuple[Model, Callable[[Floats], Floats]]:
             return np.concatenate([rotate(R, q[..., :3]), attitude, q[..., 7:]], axis=-1)
 
         return model.with_gravity((x, y, z)), rotate_base
-    roll, pitch, yaw = rpy_from_rotation(R).tolist()
-    link = Link(_free_name("rotated_world", {link.name for link in model.links}))
-    joint = Joint(
-        _free_name("rotated_mount", {joint.name for joint in model.joints}),
-        "fixed",
-        link.name,
-        model.root,
-        Pose(rpy=(roll, pitch, yaw)),
-    )
-    links, joints = (link, *model.links), (joint, *model.joints)
-    return replace(model, links=links, joints=joints, gravity=(x, y, z)), lambda q: q
-
-
-def _free_name(name: str, taken: set[str]) -> str:
-    while name in taken:
-        name += "_"
-    return name
+    T = homogeneous(R, np.zeros(3)) @ model.base_pose.matrix
+    return model.with_base_pose(T).with_gravity((x, y, z)), lambda q: q

@@ -8,6 +8,7 @@ from typing import Any
 from dynx.agreement.agreement import agree
 from dynx.agreement.report import AgreementReport, refused_report
 from dynx.errors import DynxError
+from dynx.model import Pose
 from dynx.model.loading import load
 from dynx.model.model import Base
 
@@ -22,6 +23,7 @@ class AgreementTask:
     backends: tuple[str, ...] | None
     samples: int | None
     seed: int
+    base_pose: Pose | None = None
 
 
 def measure(task: AgreementTask) -> AgreementReport:
@@ -30,7 +32,7 @@ def measure(task: AgreementTask) -> AgreementReport:
     if task.samples is not None:
         chosen["samples"] = task.samples
     try:
-        model = load(task.robot, base=task.base, lock=dict(task.lock))
+        model = load(task.robot, base=task.base, lock=dict(task.lock), base_pose=task.base_pose)
         report = agree(model, backends=task.backends, **chosen)
     except DynxError as error:
         return refused(task, error)

@@ -69,7 +69,7 @@ class RobotKernels:
 
     def _load(self, purpose: object, program: Making) -> Kernel:
         model, lanes = self._model, host().lanes
-        content = (model.links, model.joints, model.base, model.gravity, model.extra_frames)
+        content = (model.links, model.joints, model.base, model.gravity, model.extra_frames, model.base_pose)
         recipe = repr((_algorithms(), content, purpose)).encode()
         large = model.mechanism.nv > MAX_NV_OF_LONG_SEGMENTS
         settings = Settings(lanes, segment=1200) if large else Settings(lanes)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, DTypeError, NotFiniteError, ShapeError, shown
-from dynx.model.elements import Vector
+from dynx.model.elements import Pose, Vector
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import se3_exp, se3_log
 from dynx.spatial.so3 import quat_product, rotate, rotate_back, rotation_from_quat
@@ -100,19 +100,27 @@ def checked_q(model: Model, q: ArrayLike, name: str = "q") -> Floats:
     array = checked_array(name, q, model.nq)
     if not model.floating:
         return array
-    norm = np.linalg.norm(array[..., 3:7], axis=-1, keepdims=True)
+    quat = array[..., 3:7]
+    unit = checked_quaternion(name, quat, "3:7")
+    return array if unit is quat else _join(array[..., :3], unit, array[..., 7:])
+
+
+def checked_quaternion(name: str, quat_xyzw: Floats, part: str = "") -> Floats:
+    """Return unit quaternions (..., 4), normalised in a copy if a norm deviates by more than rounding.
+
+    Raises ArgumentError for a norm that differs from 1 by more than 1e-6; `part` is the index of the
+    quaternion on the last axis of `name`.
+    """
+    norm = np.linalg.norm(quat_xyzw, axis=-1, keepdims=True)
     off = np.abs(norm - 1.0)
     if np.any(off > 1e-6):
         at = np.unravel_index(np.argmax(off), off.shape)[:-1]
-        where = ", ".join([*map(str, map(int, at)), "3:7"])
+        where = ", ".join([*map(str, map(int, at)), *([part] if part else [])])
         raise ArgumentError(
-            f"{name}[{where}] is a quaternion (x, y, z, w) of length {float(norm[at][0]):.9g}; "
-            "wanted length 1"
+            f"{name}{f'[{where}]' if where else ''} is a quaternion (x, y, z, w) of length "
+            f"{float(norm[at][0]):.9g}; wanted length 1"
         )
-    if np.any(off > UNIT_NORM_TOLERANCE):
-        array = np.array(array)
-        array[..., 3:7] /= norm
-    return array
+    return quat_xyzw / norm if np.any(off > UNIT_NORM_TOLERANCE) else quat_xyzw
 
 
 def checked_base(base: str) -> Literal["fixed", "floating"]:
@@ -122,6 +130,14 @@ def checked_base(base: str) -> Literal["fixed", "floating"]:
     if base == "floating":
         return "floating"
     raise ArgumentError(f"base is {shown(base)}; wanted 'fixed' or 'floating'")
+
+
+def checked_pose(name: str, pose: Pose | ArrayLike) -> Pose:
+    """Return a pose, given as a `Pose` or a matrix (4, 4), with finite floats below `MAX_MAGNITUDE`."""
+    if not isinstance(pose, Pose):
+        pose = Pose.from_matrix(pose, name)
+    xyz, rpy = (checked_vector(f"{part} of {name}", getattr(pose, part)).tolist() for part in ("xyz", "rpy"))
+    return Pose(tuple(xyz), tuple(rpy))
 
 
 def checked_gravity(gravity: ArrayLike) -> Vector:

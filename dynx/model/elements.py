@@ -36,21 +36,21 @@ class Pose:
     rpy: Vector = ZERO
 
     @classmethod
-    def from_matrix(cls, T: ArrayLike) -> Pose:
+    def from_matrix(cls, T: ArrayLike, name: str = "a pose") -> Pose:
         """Return the pose of a homogeneous matrix (4, 4), such as `forward_kinematics` returns.
 
-        Raises ArgumentError unless T is a rigid transform to 1e-6.
+        `name` is how errors call it. Raises ArgumentError unless T is a rigid transform to 1e-6.
         """
         try:
             array = np.asarray(T, dtype=np.float64)
         except (TypeError, ValueError):
-            raise ArgumentError(f"a pose is {shown(T)}; wanted a matrix (4, 4)") from None
+            raise ArgumentError(f"{name} is {shown(T)}; wanted a Pose or a matrix (4, 4)") from None
         if array.shape != (4, 4):
-            raise ShapeError(f"a pose has shape {array.shape}; wanted (4, 4)")
+            raise ShapeError(f"{name} has shape {array.shape}; wanted a Pose or a matrix (4, 4)")
         R = array[:3, :3]
         off = max(float(np.max(np.abs(R.T @ R - np.eye(3)))), float(np.max(np.abs(array[3] - [0, 0, 0, 1]))))
         if not off < RIGIDITY_TOLERANCE or np.linalg.det(R) < 0 or not np.isfinite(array).all():
-            raise ArgumentError("a pose is not a rigid transform: wanted [[R, p], [0, 1]] with R a rotation")
+            raise ArgumentError(f"{name} is not a rigid transform: wanted [[R, p], [0, 1]] with R a rotation")
         x, y, z = (array[:3, 3] + 0.0).tolist()
         roll, pitch, yaw = (rpy_from_rotation(R) + 0.0).tolist()
         return cls((x, y, z), (roll, pitch, yaw))

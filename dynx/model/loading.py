@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, DescriptionError, RobotNotFoundError, nearest, shown
 from dynx.files.reading import printable, read_file
+from dynx.model.elements import IDENTITY, Pose
 from dynx.model.library import find, robots
 from dynx.model.model import STANDARD_GRAVITY, Base, Model
 from dynx.model.package_paths import StrPath
@@ -26,6 +27,7 @@ def load(
     base: Base | None = None,
     lock: Mapping[str, float] | None = None,
     gravity: ArrayLike | None = None,
+    base_pose: Pose | ArrayLike | None = None,
     package_dirs: Iterable[StrPath] = (),
 ) -> Model:
     """Load the model of a robot.
@@ -37,20 +39,21 @@ def load(
       needs the extra ``xacro``). Such a string is never looked up as a name;
     - the name of a robot in the library, see ``dynx robots``. It takes precedence over a file of that name in
       the working directory; write ``./name`` for the file. A name that is not in the library may be a file;
-    - a `Model`, whose base and gravity are kept unless they are given.
+    - a `Model`, whose base, its pose and gravity are kept unless they are given.
 
     `base` is ``"fixed"`` (default) or ``"floating"``. `lock` fixes joints, by name, at positions [rad or m];
-    they are removed from q. `gravity` is (3,) [m/s^2] in world axes, by default (0, 0, -9.81). `package_dirs`
-    are the folders in which xacro looks for packages.
+    they are removed from q. `gravity` is (3,) [m/s^2] in world axes, by default (0, 0, -9.81). `base_pose`
+    is the pose of the root link of a fixed base in the world, a `Pose` or a matrix (4, 4), by default the
+    identity. `package_dirs` are the folders in which xacro looks for packages.
 
     Raises RobotNotFoundError if no robot or file is found, DescriptionError if the description is malformed
     (with file and line), UnsupportedFeatureError if it uses a feature that dynx does not support,
     UnknownNameError for an unknown joint in `lock`.
     """
     if isinstance(x, Model):
-        return _with_options(x, base, lock, gravity)
+        return _with_options(x, base, lock, gravity, base_pose)
     data, source, name = read_description(x, package_dirs)
-    return read_model(data, source, name, base=base, lock=lock, gravity=gravity)
+    return read_model(data, source, name, base=base, lock=lock, gravity=gravity, base_pose=base_pose)
 
 
 def read_description(
@@ -110,6 +113,7 @@ def read_model(
     base: Base | None = None,
     lock: Mapping[str, float] | None = None,
     gravity: ArrayLike | None = None,
+    base_pose: Pose | ArrayLike | None = None,
 ) -> Model:
     """Create the model of URDF text; `source` names it in errors.
 
@@ -123,6 +127,7 @@ def read_model(
             content.joints,
             base=base or "fixed",
             gravity=STANDARD_GRAVITY if gravity is None else gravity,
+            base_pose=IDENTITY if base_pose is None else base_pose,
             lock=lock,
             notes=content.notes,
             source=source,
@@ -147,7 +152,11 @@ def read_model(
 
 
 def _with_options(
-    model: Model, base: Base | None, lock: Mapping[str, float] | None, gravity: ArrayLike | None
+    model: Model,
+    base: Base | None,
+    lock: Mapping[str, float] | None,
+    gravity: ArrayLike | None,
+    base_pose: Pose | ArrayLike | None,
 ) -> Model:
     if lock:
         relocked = Model.build(
@@ -156,4 +165,6 @@ def _with_options(
         model = replace(model, joints=relocked.joints, notes=relocked.notes)
     if base is not None:
         model = model.with_base(base)
+    if base_pose is not None:
+        model = model.with_base_pose(base_pose)
     return model if gravity is None else model.with_gravity(gravity)

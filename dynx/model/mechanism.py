@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dynx.model.elements import Pose
+from dynx.model.elements import IDENTITY, Pose
 from dynx.spatial.inertia import RigidInertia, inertia_about_origin
 from dynx.spatial.scalar import Array, Floats, sqrt
 from dynx.spatial.so3 import rotate, rotation_about, rotation_from_rpy
@@ -118,7 +118,7 @@ class Mechanism:
 
     @cached_property
     def body_frames(self) -> tuple[int, ...]:
-        """For the root and each body, the number of the frame that is its body frame."""
+        """Number of the base frame, which is fixed to the root, and of each body's own frame."""
         first: dict[int, int] = {}
         for number, frame in enumerate(self.frames):
             first.setdefault(frame.body, number)
@@ -148,9 +148,9 @@ def pose_arrays(pose: Pose, convert: ScalarConverter) -> tuple[Array, Array]:
 def build_mechanism(model: Model, convert: ScalarConverter = float64) -> Mechanism:
     """Merge the links connected by fixed joints and their inertias, in the scalar type of `convert`."""
     # Placement of each link: its body and its pose (R, p) in the frame of that body.
-    placed: dict[str, tuple[int, Array, Array]] = {
-        model.root: (ROOT, convert(np.eye(3)), convert(np.zeros(3)))
-    }
+    identity = convert(np.eye(3)), convert(np.zeros(3))
+    at_root = identity if model.base_pose == IDENTITY else pose_arrays(model.base_pose, convert)
+    placed: dict[str, tuple[int, Array, Array]] = {model.root: (ROOT, *at_root)}
     moving: list[tuple[str, int, bool, Array, Array, Array]] = []
     for joint in model.joints:
         body, R_parent, p_parent = placed[joint.parent]
@@ -162,7 +162,7 @@ def build_mechanism(model: Model, convert: ScalarConverter = float64) -> Mechani
             axis = convert(joint.axis)
             axis = axis / sqrt(np.sum(axis * axis))
             moving.append((joint.name, body, revolute, R, p, axis))
-            placed[joint.child] = (len(moving) - 1, convert(np.eye(3)), convert(np.zeros(3)))
+            placed[joint.child] = (len(moving) - 1, *identity)
         else:
             placed[joint.child] = (body, R, p)
 

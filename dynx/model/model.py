@@ -30,6 +30,7 @@ class Model:
     of `joint_names`: depth-first from the root, children in the order of the document. With a floating base,
     ``q[:3]`` is the position of the base frame in the world [m], ``q[3:7]`` its unit quaternion (x, y, z, w),
     and ``v[:3]``, ``v[3:6]`` its linear [m/s] and angular [rad/s] velocity, both expressed in the base frame.
+    A fixed base has the pose `base_pose` in the world.
 
     Models are immutable; they compare by content (`==`), hash and pickle.
     """
@@ -40,8 +41,16 @@ class Model:
     base: Base = "fixed"
     gravity: Vector = STANDARD_GRAVITY
     extra_frames: tuple[Frame, ...] = ()
+    base_pose: Pose = IDENTITY
     notes: tuple[Note, ...] = field(default=(), compare=False)
     source: str = field(default="<memory>", compare=False)
+
+    def __post_init__(self) -> None:
+        if self.floating and self.base_pose != IDENTITY:
+            raise ArgumentError(
+                "base_pose is the pose of a fixed base; a floating base has its pose in q: position q[:3], "
+                "quaternion (x, y, z, w) q[3:7]"
+            )
 
     @classmethod
     def build(
@@ -52,6 +61,7 @@ class Model:
         *,
         base: Base = "fixed",
         gravity: ArrayLike = STANDARD_GRAVITY,
+        base_pose: Pose | ArrayLike = IDENTITY,
         lock: Mapping[str, float] | None = None,
         notes: Iterable[Note] = (),
         source: str = "<memory>",
@@ -72,6 +82,7 @@ class Model:
             joints=tuple(ordered_joints),
             base=configuration.checked_base(base),
             gravity=configuration.checked_gravity(gravity),
+            base_pose=configuration.checked_pose("base_pose", base_pose),
             notes=tuple(notes),
             source=source,
         )
@@ -188,8 +199,18 @@ class Model:
     to_urdf = write_urdf
 
     def with_base(self, base: Base) -> Model:
-        """Return the same robot with the other kind of base."""
-        return replace(self, base=configuration.checked_base(base))
+        """Return the same robot with that kind of base; `base_pose` is kept for a fixed base only, because a
+        floating one has its pose in q."""
+        base_pose = IDENTITY if base == "floating" else self.base_pose
+        return replace(self, base=configuration.checked_base(base), base_pose=base_pose)
+
+    def with_base_pose(self, base_pose: Pose | ArrayLike) -> Model:
+        """Return the same robot with its fixed base at another pose in the world.
+
+        `base_pose` is the pose of the root link: a `Pose`, or a matrix T_world_base (4, 4). Raises
+        ArgumentError for a floating base, whose pose is in q.
+        """
+        return replace(self, base_pose=configuration.checked_pose("base_pose", base_pose))
 
     def with_gravity(self, gravity: ArrayLike) -> Model:
         """Return the same robot with another gravity (3,) [m/s^2]."""
@@ -203,8 +224,7 @@ class Model:
         self.link(link)
         if not isinstance(name, str) or not name:
             raise ArgumentError(f"a frame's name is {shown(name)}; wanted a str that is not empty")
-        if not isinstance(placement, Pose):
-            placement = Pose.from_matrix(placement)
+        placement = configuration.checked_pose("placement", placement)
         if name in self._frame_index:
             raise ArgumentError(f"frame {shown(name)} exists already in {self.name}")
         return replace(self, extra_frames=(*self.extra_frames, Frame(name, link, placement)))
@@ -228,7 +248,15 @@ class Model:
 
     @cached_property
     def _content(self) -> tuple[object, ...]:
-        return (self.name, self.links, self.joints, self.base, self.gravity, self.extra_frames)
+        return (
+            self.name,
+            self.links,
+            self.joints,
+            self.base,
+            self.gravity,
+            self.extra_frames,
+            self.base_pose,
+        )
 
     @cached_property
     def _hash(self) -> int:

@@ -60,6 +60,9 @@ def body_poses(mechanism: Mechanism, q: Array) -> Poses:
 def poses_from_frames(mechanism: Mechanism, placements: Array) -> Poses:
     """Return the poses of all bodies, taken from the placements (..., n_frames, 4, 4) of all frames."""
     own = [placements[..., index, :, :] for index in mechanism.body_frames]
+    if not mechanism.floating:
+        # The root body is the world, in which the base frame may have any pose.
+        own[0] = np.eye(4) + 0 * own[0]
     return Poses(tuple(T[..., :3, :3] for T in own), tuple(T[..., :3, 3] for T in own))
 
 

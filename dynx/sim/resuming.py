@@ -52,7 +52,7 @@ def changed_parts(theirs: Scenario, ours: Scenario) -> list[str]:
 
 def model_difference(ours: Model, theirs: Model) -> tuple[str, str, str]:
     """Return the first attribute in which two models differ, as its name and its two values."""
-    for name in ("name", "base", "gravity", "links", "joints", "extra_frames"):
+    for name in ("name", "base", "base_pose", "gravity", "links", "joints", "extra_frames"):
         pair = getattr(ours, name), getattr(theirs, name)
         if pair[0] != pair[1]:
             return _innermost(name, *pair)

@@ -12,6 +12,7 @@ from dynx.agreement.task import AgreementTask, measure, refused
 from dynx.backends.registry import backend_class
 from dynx.cli.agree.tables import label, show_many, show_one, show_summary, verdict
 from dynx.cli.shell.exits import BAD_INPUT, DONE, NEGATIVE_RESULT, complain
+from dynx.cli.shell.inputs import Locks, pose_of
 from dynx.cli.shell.lazy import import_object
 from dynx.cli.shell.output_file import check_writable, require_apart
 from dynx.cli.shell.run import Run, carry_out
@@ -30,7 +31,8 @@ def agree(
     backends: tuple[str, ...] | None,
     as_loaded: bool,
     base: Base,
-    lock: tuple[tuple[str, float], ...],
+    base_pose: list[float] | None,
+    lock: Locks,
     samples: int | None,
     seed: int,
     jobs: int | None,
@@ -40,8 +42,9 @@ def agree(
 ) -> int:
     """Compare the engines on each robot; return the exit code."""
     if as_loaded:
-        if lock:
-            raise click.UsageError("--lock changes the robot, and --as-loaded compares files as they are")
+        if lock or base_pose is not None:
+            option = "--lock" if lock else "--base-pose"
+            raise click.UsageError(f"{option} changes the robot, and --as-loaded compares files as they are")
         # Importing the doctor here would take a third of the time that other comparisons need to start.
         compare: Callable[..., int] = import_object("dynx.cli.doctor.as_loaded:compare")
         return compare(
@@ -62,7 +65,8 @@ def agree(
     inputs = expand(robots)
     if json_path is not None:
         require_apart([json_path], (each.robot for each in inputs), "a robot that is read")
-    tasks = [AgreementTask(each.robot, base, lock, backends, samples, seed) for each in inputs]
+    pose = None if base_pose is None else pose_of(base_pose, "--base-pose")
+    tasks = [AgreementTask(each.robot, base, lock, backends, samples, seed, pose) for each in inputs]
     run = agreement_run(tasks, refusals=refusals(inputs))
     return carry_out(run, jobs, timeout, quiet, lambda: _report(run, json_path, quiet))
 

@@ -20,12 +20,11 @@ from dynx.bench.session import (
 )
 from dynx.cli.bench.tables import show
 from dynx.cli.shell.exits import DONE, NEGATIVE_RESULT, complain
-from dynx.cli.shell.inputs import chosen_frame
+from dynx.cli.shell.inputs import Locks, chosen_frame, load_robot
 from dynx.cli.shell.interruption import interruptible
 from dynx.cli.shell.progress import progress_bar
 from dynx.cli.shell.run import processors
 from dynx.cli.shell.terminal import counted, present
-from dynx.model.loading import load
 from dynx.model.model import Base
 
 
@@ -37,7 +36,8 @@ def bench(
     backends: tuple[str, ...] | None,
     frame: str | None,
     base: Base,
-    lock: tuple[tuple[str, float], ...],
+    base_pose: list[float] | None,
+    lock: Locks,
     seed: int,
     quick: bool,
     as_json: bool,
@@ -45,7 +45,7 @@ def bench(
     """Time the backends on the robot; return the exit code."""
     for name in backends or ():
         backend_class(name)
-    model = load(robot, base=base, lock=dict(lock))
+    model = load_robot(robot, base, lock, base_pose)
     plan = Plan(
         model,
         chosen_frame(model, frame),

@@ -10,16 +10,17 @@ from rich.text import Text
 from rich.tree import Tree
 
 from dynx.cli.shell.exits import one_line
+from dynx.cli.shell.inputs import load_robot
 from dynx.cli.shell.tables import Table
 from dynx.cli.shell.terminal import PIPE_WIDTH, console, counted, echo_json, number
 from dynx.model import Joint, Model
-from dynx.model.loading import load
-from dynx.model.model import Base
+from dynx.model.documents import pose_numbers
+from dynx.model.elements import IDENTITY
 
 
-def info(robot: str, base: Base, lock: tuple[tuple[str, float], ...], as_json: bool) -> None:
+def info(as_json: bool, **robot: Any) -> None:
     """Print the model as a tree and a table, or as a document."""
-    model = load(robot, base=base, lock=dict(lock))
+    model = load_robot(**robot)
     if as_json:
         echo_json(document(model))
     else:
@@ -33,6 +34,7 @@ def document(model: Model) -> dict[str, Any]:
         "name": model.name,
         "source": model.source,
         "base": model.base,
+        "base_pose": pose_numbers(model.base_pose),
         "root": model.root,
         "gravity": list(model.gravity),
         "nq": model.nq,
@@ -77,6 +79,9 @@ def _show(model: Model) -> None:
         f"{counted(len(model.frame_names), 'frame')}, {model.total_mass:.6g} kg, "
         f"gravity {_vector(model.gravity)} m/s^2"
     )
+    if model.base_pose != IDENTITY:
+        pose = model.base_pose
+        out.print(f"base at xyz {_vector(pose.xyz)} m, rpy {_vector(pose.rpy)} rad")
     out.print()
     wide = console()
     wide.width = PIPE_WIDTH  # rich would truncate the lines of a tree

@@ -10,7 +10,7 @@ from dynx.backends.base import Backend
 from dynx.backends.registry import backend
 from dynx.cli.shell.exits import one_line
 from dynx.errors import ArgumentError, NotInstalledError, UnknownNameError, nearest, shown
-from dynx.model import Model
+from dynx.model import Model, Pose
 from dynx.model.configuration import checked_array, checked_q
 from dynx.model.loading import load
 from dynx.model.model import Base
@@ -21,15 +21,30 @@ from dynx.spatial.so3 import rotation_from_quat, rotation_from_rpy
 Numbers = Sequence[float] | Mapping[str, float] | None
 """Value of an option such as ``--q``: a list, values by joint, or None where it was not given."""
 
+Locks = tuple[tuple[str, float], ...]
+"""Value of ``--lock``."""
+
 _LISTED_NAMES = 8
 """Number of coordinates listed in the message about a wrong count."""
 
 
+def load_robot(
+    robot: str,
+    base: Base,
+    lock: Locks,
+    base_pose: Sequence[float] | None = None,
+    gravity: Sequence[float] | None = None,
+) -> Model:
+    """Load the robot of a command with its options."""
+    pose = None if base_pose is None else pose_of(base_pose, "--base-pose")
+    return load(robot, base=base, lock=dict(lock), gravity=gravity, base_pose=pose)
+
+
 def open_backend(
-    robot: str, base: Base, lock: tuple[tuple[str, float], ...], backend_name: str | None
+    robot: str, base: Base, lock: Locks, base_pose: Sequence[float] | None, backend_name: str | None
 ) -> Backend:
     """Open the backend of a robot by its name; None is Pinocchio if it is installed, else `reference`."""
-    model = load(robot, base=base, lock=dict(lock))
+    model = load_robot(robot, base, lock, base_pose)
     if backend_name is not None:
         return backend(backend_name, model)
     try:
@@ -76,6 +91,15 @@ def target_pose(given: Numbers, option: str) -> Floats:
         f"{option}: wanted 3 numbers (position), 6 (with roll, pitch, yaw), "
         f"7 (with a quaternion qx,qy,qz,qw) or 16 (a matrix); got {len(numbers)}"
     )
+
+
+def pose_of(numbers: Sequence[float], option: str) -> Pose:
+    """Return the pose given by the numbers of `option`; a position alone has the rotation of the world."""
+    if len(numbers) in (3, 6):
+        x, y, z, *rpy = numbers
+        roll, pitch, yaw = rpy or (0.0, 0.0, 0.0)
+        return Pose((x, y, z), (roll, pitch, yaw))
+    return Pose.from_matrix(target_pose(list(numbers), option), option)
 
 
 def chosen_frame(model: Model, given: str | None) -> str:

@@ -94,7 +94,8 @@ def finite_number(word: str) -> float:
 
 
 def model_options(command: F) -> F:
-    """Add ``--base`` and ``--lock``, as parameters `base` and `lock` (pairs)."""
+    """Add ``--base``, ``--base-pose`` and ``--lock``, as parameters `base`, `base_pose` (numbers) and `lock`
+    (pairs)."""
     return stacked(
         click.option(
             "--base",
@@ -102,6 +103,13 @@ def model_options(command: F) -> F:
             default="fixed",
             show_default=True,
             help="Whether the root link is fixed to the world or free to move.",
+        ),
+        click.option(
+            "--base-pose",
+            type=plain_numbers,
+            metavar="NUMBERS",
+            help="Pose of a fixed base in the world: x,y,z [m], alone or followed by roll,pitch,yaw [rad] or "
+            "qx,qy,qz,qw (default: 0,0,0,0,0,0).",
         ),
         click.option(
             "--lock",

@@ -10,6 +10,7 @@ from dynx._version import __version__
 from dynx.cli.sim.request import SimulationRequest
 from dynx.errors import DivergedError, SimulationError
 from dynx.model import Model
+from dynx.model.documents import pose_numbers
 from dynx.sim import Noise, Push, Rollout, RolloutInterrupted
 from dynx.sim.overshoot import largest_overshoot
 from dynx.sim.record.tracking_error import base_error, frame_error, joint_error
@@ -37,6 +38,7 @@ def document(request: SimulationRequest, rollout: Rollout, seconds: float, ended
         "robot": model.name,
         "source": model.source,
         "base": model.base,
+        "base_pose": pose_numbers(model.base_pose),
         "gravity": list(model.gravity),
         "nq": model.nq,
         "nv": model.nv,

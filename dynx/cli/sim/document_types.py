@@ -72,6 +72,7 @@ class SimDocument(TypedDict):
     robot: str
     source: str | None
     base: str
+    base_pose: list[float]
     gravity: list[float]
     nq: int
     nv: int

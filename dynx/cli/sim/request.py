@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from dynx.backends.registry import backend_class
-from dynx.cli.shell.inputs import configuration, velocity
+from dynx.cli.shell.inputs import configuration, load_robot, velocity
 from dynx.cli.sim.motion import Motion, MotionInput, plan_motion
 from dynx.cli.sim.values import Coefficients
 from dynx.control import EngineMotor, FrictionCompensation, ModelBased
@@ -17,8 +17,6 @@ from dynx.control.friction import SLIP
 from dynx.control.saturation import checked_limit
 from dynx.errors import ArgumentError, UnsupportedFeatureError
 from dynx.model import Model
-from dynx.model.loading import load
-from dynx.model.model import Base
 from dynx.sim import Noise, Payload, Push, Rollout, Scenario
 from dynx.sim.clock import Clock
 from dynx.sim.named_controllers import ControllerRequest, Gains, named_controller
@@ -59,8 +57,7 @@ class SimulationRequest:
 
 def prepare(given: dict[str, Any]) -> SimulationRequest:
     """Make a scenario from the options `given` by parameter name. Raises ArgumentError for invalid ones."""
-    base: Base = given["base"]
-    model = load(given["robot"], base=base, lock=dict(given["lock"]), gravity=given["gravity"])
+    model = load_robot(*(given[name] for name in ("robot", "base", "lock", "base_pose", "gravity")))
     require_plant(given["plant"])
     backend_class(given["backend"]).require_engine()
     dynamics = _joint_dynamics(given)

@@ -63,6 +63,9 @@ def _show_header(out: Console, report: Entry) -> None:
         f"{_motion(report)}; {counted(report['steps'], 'step')} of {number(report['dt'])} s, "
         f"gravity {' '.join(number(g) for g in report['gravity'])} m/s^2"
     )
+    if any(report["base_pose"]):
+        *xyz, roll, pitch, yaw = map(number, report["base_pose"])
+        out.print(f"base at xyz {' '.join(xyz)} m, rpy {roll} {pitch} {yaw} rad")
     if report["frame"] is not None and not report["frame_given"]:
         out.print(default_frame_note(report["frame"]))
     gains = [f"{name} {value_range(gain)}" for name, gain in report["gains"].items() if gain]

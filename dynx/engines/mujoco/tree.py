@@ -60,7 +60,7 @@ def build_tree(model: Model) -> MujocoTree:
     spec.option.gravity = np.array(model.gravity)
     # Frames become bodies named by numbers, so that no name of the description clashes with one of MuJoCo's.
     numbers = {name: str(number) for number, name in enumerate(model.frame_names)}
-    root = _body(spec.worldbody, numbers[model.root], Pose())
+    root = _body(spec.worldbody, numbers[model.root], model.base_pose)
     if model.floating:
         # Aligning would move the body frame to the centre of mass.
         root.add_freejoint(align=False)

@@ -61,7 +61,7 @@ def _build(model: Model) -> tuple[Any, tuple[int, ...]]:
     if model.floating:
         carrier = engine.addJoint(WORLD, pin.JointModelFreeFlyer(), pin.SE3.Identity(), ":base")
     # For each link, the engine's joint that moves it, and its pose in that joint's frame.
-    placements = {model.root: (carrier, pin.SE3.Identity())}
+    placements = {model.root: (carrier, _placement(model.base_pose))}
     for index, joint in enumerate(model.joints):
         carrier, T_carrier_parent = placements[joint.parent]
         T_carrier_joint = T_carrier_parent * _placement(joint.origin)

@@ -51,8 +51,8 @@ def plant_model(model: Model, payload: Payload | Sequence[Payload] | None, mass_
         name = _free(f"payload {number}", {*model.frame_names, *(joint.name for joint in model.joints)})
         links.append(Link(name, _inertial(body)))
         joints.append(Joint(name, "fixed", frame.link, name, origin=frame.placement))
-    built = Model.build(model.name, links, joints, base=model.base, gravity=model.gravity, notes=model.notes)
-    return replace(built, extra_frames=model.extra_frames, source=model.source)
+    built = Model.build(model.name, links, joints)
+    return replace(model, links=built.links, joints=built.joints, notes=(*model.notes, *built.notes))
 
 
 def _by_link(model: Model, mass_scale: MassScale) -> dict[str, float]:

@@ -16,7 +16,7 @@ import numpy as np
 
 from dynx.errors import ArgumentError, ModelError, shown
 from dynx.files.writing import atomic_file
-from dynx.model.loading import load as load_model
+from dynx.model.documents import robot_document, robot_from_document
 from dynx.sim.record.csv_file import write_csv
 from dynx.sim.record.mcap_file import write_mcap
 from dynx.sim.record.rollout_data import RolloutData
@@ -74,7 +74,7 @@ def load(path: str | os.PathLike[str]) -> dict[str, Any]:
         reference = Setpoint(*(entries[entry] for entry in REFERENCE))
     try:
         robot: dict[str, Any] = json.loads(str(entries["robot"]))
-        model = load_model(robot["urdf"], base=robot["base"], gravity=robot["gravity"])
+        model = robot_from_document(robot)
         scenario = None if robot["scenario"] is None else Scenario.from_dict(robot["scenario"])
         executor, departures = str(robot["executor"]), tuple(robot["departures"])
     except (ValueError, KeyError, TypeError, ModelError) as error:
@@ -119,9 +119,7 @@ def _entries(path: str | os.PathLike[str]) -> dict[str, Any]:
 def _write_npz(rollout: RolloutData, file: BinaryIO) -> None:
     model = rollout.model
     robot = {
-        "urdf": model.to_urdf(),
-        "base": model.base,
-        "gravity": list(model.gravity),
+        **robot_document(model),
         "scenario": None if rollout.scenario is None else rollout.scenario.to_dict(),
         "executor": rollout.executor,
         "departures": list(rollout.departures),

@@ -14,6 +14,7 @@ import numpy as np
 
 from dynx._version import __version__
 from dynx.errors import NotInstalledError
+from dynx.model.documents import pose_numbers
 from dynx.sim.record.rollout_data import RolloutData
 from dynx.sim.record.ros_definitions import schema_name, schema_text
 from dynx.sim.record.ros_topics import topics_of
@@ -64,6 +65,7 @@ def _metadata(rollout: RolloutData) -> dict[str, str]:
         "schema": SCHEMA,
         "robot": model.name,
         "base": model.base,
+        "base_pose": pose_numbers(model.base_pose),
         "gravity": list(model.gravity),
         "rotors": rollout.rotors.tolist(),
         **rollout.settings,

@@ -28,7 +28,7 @@ from dynx.control.content import attributes_of, entered
 from dynx.control.registry import controller_class, from_document, to_document
 from dynx.errors import ArgumentError, ModelError, UnknownNameError, shown
 from dynx.model import Model
-from dynx.model.loading import load
+from dynx.model.documents import robot_document, robot_from_document
 from dynx.sim.loop.controller_checks import controller_numbers
 from dynx.trajectory.base import Trajectory
 
@@ -112,8 +112,7 @@ def encode(value: Any, model: Model | None = None) -> Document:
     if isinstance(value, Model):
         if model is not None and value == model:
             return SAME_MODEL
-        gravity = [float(x) for x in value.gravity]
-        return {MODEL: {"urdf": value.to_urdf(), "base": value.base, "gravity": gravity}}
+        return {MODEL: robot_document(value)}
     if isinstance(value, Backend) and (model is None or value.model == model):
         return value.name
     if isinstance(value, Unknown):
@@ -196,8 +195,7 @@ def _decoded(document: Document, model: Model | None) -> Any:
     if document == SAME_MODEL and model is not None:
         return model
     if MODEL in document:
-        robot = document[MODEL]
-        return load(robot["urdf"], base=robot["base"], gravity=robot["gravity"])
+        return robot_from_document(document[MODEL])
     if FINGERPRINT in document:
         return Unknown(document[FINGERPRINT].rpartition(":")[2], json.dumps(document))
     kind = _class_of(document[CLASS])

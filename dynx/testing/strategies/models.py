@@ -90,7 +90,7 @@ def models(
 
     Trees of any shape, joints in any order in the document, any axis and origin; solid and thin
     bodies, point masses, massless links; limits (of zero width, on one side, none), damping,
-    friction and armature; further frames; gravity of any direction, or none.
+    friction and armature; further frames; gravity of any direction, or none; a fixed base at any pose.
 
     - `base`: ``"fixed"``, ``"floating"``, or ``"either"``
     - `joint_types`: the kinds of joint that may occur
@@ -100,7 +100,7 @@ def models(
     - `solvable`: every body has mass and extent in all directions, so that the mass matrix is
       positive definite at every configuration and forward dynamics has a solution
     - `from_urdf`: only what a URDF file can express: standard gravity, no further frames, no locked
-      joint
+      joint, a fixed base at the world frame
 
     Shrinks to `min_links` links in a chain, with a fixed base if that is allowed, joints that are
     fixed or else the first of `joint_types` about z, at the parent's origin, and nothing that is
@@ -217,6 +217,8 @@ def _models(
     )
     for k, (link, placement) in enumerate([] if from_urdf else draw(FRAMES)):
         model = model.with_frame(f"frame{k}", names[link % len(names)], placement)
+    if not (from_urdf or model.floating):
+        model = model.with_base_pose(draw(optional(ORIGINS)) or Pose())
     return model
 
 

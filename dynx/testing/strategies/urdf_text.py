@@ -51,9 +51,9 @@ def urdf_text(model: Model | None = None) -> Strategy[str]:
     """Draw URDF text of `model`, or of a random one, in any legal spelling. Shrinks to the plainest one.
 
     Every number is written so that it reads back as the same float, and joints keep their order, so
-    ``dynx.load(text, base=model.base, gravity=model.gravity)`` gives a model equal to `model`. A
-    limit that a revolute or prismatic joint does not have is written as the largest double. Raises
-    ArgumentError for a model with added frames or locked joints, which URDF cannot express.
+    ``dynx.load(text, base=model.base, gravity=model.gravity, base_pose=model.base_pose)`` gives a model equal
+    to `model`. A limit that a revolute or prismatic joint does not have is written as the largest double.
+    Raises ArgumentError for a model with added frames or locked joints, which URDF cannot express.
     """
     spellings = st.sets(st.sampled_from(SPELLINGS))
     if model is None:

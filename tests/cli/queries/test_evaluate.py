@@ -215,3 +215,40 @@ def test_no_name_of_a_tree_is_truncated(width: str, monkeypatch: pytest.MonkeyPa
     monkeypatch.setenv("COLUMNS", width)
     shown = CliRunner().invoke(cli, ["info", "talos"]).stdout
     assert all(f"{joint.name} ({joint.type})" in shown for joint in load("talos").joints)
+
+
+class TestBasePose:
+    """The pose of a fixed base, in the forms of ``--target``."""
+
+    @pytest.mark.parametrize(
+        ("numbers", "position", "rpy"),
+        [
+            ("0,0,1", [0, 0, 1], [0, 0, 0]),
+            ("0.5,-1,2,0.1,0.2,0.3", [0.5, -1, 2], [0.1, 0.2, 0.3]),
+            ("1,2,3,0,0,0.7071067811865476,0.7071067811865476", [1, 2, 3], [0, 0, np.pi / 2]),
+        ],
+    )
+    def test_it_is_where_the_root_is(self, numbers: str, position: list[float], rpy: list[float]) -> None:
+        root = load("ur5").root
+        found = document("fk", "ur5", "--frame", root, "--base-pose", numbers)
+        assert np.allclose(found["position"], position, rtol=0, atol=1e-15)
+        assert np.allclose(found["rpy"], rpy, rtol=0, atol=1e-15)
+        assert np.allclose(
+            document("info", "ur5", "--base-pose", numbers)["base_pose"],
+            [*position, *rpy],
+            rtol=0,
+            atol=1e-15,
+        )
+
+    @pytest.mark.parametrize(
+        ("arguments", "message"),
+        [
+            (["--base-pose", "1,2"], "--base-pose: wanted 3 numbers (position), 6"),
+            (["--base-pose", "0,0,1", "--base", "floating"], "a floating base has its pose in q"),
+            (["--base-pose", "0,0,x"], "'x' is not a number"),
+        ],
+    )
+    def test_refusals(self, arguments: list[str], message: str) -> None:
+        result = CliRunner().invoke(cli, ["fk", "ur5", *arguments])
+        assert result.exit_code == 2
+        assert message in result.stderr

@@ -20,7 +20,7 @@ LOADABLE = [entry.name for entry in robots() if entry.name != "ur_description_ur
 
 
 def read_back(model: Model) -> Model:
-    return load(model.to_urdf(), base=model.base, gravity=model.gravity)
+    return load(model.to_urdf(), base=model.base, gravity=model.gravity, base_pose=model.base_pose)
 
 
 @given(models(physical=False))
