@@ -16,7 +16,7 @@ from dynx.agreement.report import AgreementDocument
 from dynx.bench.document import BenchDocument
 from dynx.cli.sim.document_types import SimDocument, TutorialDocument
 from dynx.doctor.formats.baseline import BaselineDocument
-from dynx.doctor.report import DoctorDocument
+from dynx.doctor.report_document import DoctorDocument
 from dynx.files.documents import json_schema
 from dynx.sim.scenario.document_type import ScenarioDocument
 

@@ -1,4 +1,4 @@
-"""Report of `dynx.diagnose` on one robot, and its JSON document (schema 1, docs/schemas/doctor.json).
+"""Report of `dynx.diagnose` on one robot, and its entry in the JSON document (`report_document`).
 
 A number that is not finite is null in the document: an engine that refuses the file (quantity ``loading``),
 whose results are not used (``result``) or that computes NaN has no error.
@@ -6,19 +6,20 @@ whose results are not used (``result``) or that computes NaN has no error.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Literal
 
-from dynx._version import __version__
 from dynx.agreement.report import Failure
-from dynx.files.documents import document_of, to_json_values
+from dynx.files.documents import document_of
 from dynx.loaded import engine_of
 from dynx.loaded.difference import Deviation
 from dynx.model.xml.text import TextForm
 from dynx.rules.rule import Kind, Level
 
-SCHEMA = 1
+Status = Literal["alike", "explained", "massless", "unexplained", "refused"]
+"""``explained``: engines differ and every difference has a proved cause. ``massless``: the file has no
+inertial data, and only the kinematics was compared. ``refused``: not examined."""
 
 
 @dataclass(frozen=True)
@@ -251,8 +252,33 @@ class DoctorReport:
 
     @property
     def explained(self) -> bool:
-        """Whether no difference above `tolerance` remains after the causes were removed."""
+        """Whether no difference above `tolerance` remains, in what is compared, after the causes were
+        removed."""
         return self.error is None and not self.unexplained and self.residual <= self.tolerance
+
+    @property
+    def remaining(self) -> float:
+        """Largest error on the mended file, at its level and with its calls; infinite where an engine refuses
+        it."""
+        refused = any(each.refused_after is not None for each in self.engines)
+        errors = (error for each in self.engines for error in each.after.values())
+        return float("inf") if refused else max(errors, default=0.0)
+
+    @property
+    def undone(self) -> tuple[Change, ...]:
+        """Changes that the level of the mended file leaves undone."""
+        return tuple(change for change in self.changes if not change.made)
+
+    @property
+    def status(self) -> Status:
+        """Verdict in one word."""
+        if self.error is not None:
+            return "refused"
+        if self.alike:
+            return "alike"
+        if not self.explained:
+            return "unexplained"
+        return "massless" if self.kinematics_only else "explained"
 
     def __bool__(self) -> bool:
         return self.alike
@@ -281,7 +307,17 @@ class DoctorReport:
             return "engines differ, for a cause that is known and cannot be mended"
         proved = causes - {finding.rule for finding in self.differences if not finding.proved}
         share = "all" if proved == causes else f"{len(proved)} of them"
-        return f"engines differ, for {len(causes)} cause{'s' * (len(causes) != 1)}, {share} proved"
+        cause = f"{len(causes)} cause{'s' * (len(causes) != 1)}"
+        return f"engines differ, for {cause}, {share} proved{self._left_at_level()}"
+
+    def _left_at_level(self) -> str:
+        """Write what remains in a file that is mended at a lower level than `physics`."""
+        if not self.undone:
+            return ""
+        refusing = [each.engine for each in self.engines if each.refused_after is not None]
+        if refusing:
+            return f"; refused by {' and '.join(refusing)} also when mended at level {self.level}"
+        return f"; off by up to {self.remaining:.0e} when mended at level {self.level}"
 
     def to_dict(self) -> dict[str, Any]:
         """Make the entry of ``results``, of plain numbers, strings and lists."""
@@ -304,8 +340,10 @@ class DoctorEntry:
     kinematics_only: bool
     engines: tuple[EngineResult, ...]
     findings: tuple[Finding, ...]
+    status: Status
     explained: bool
     residual: float
+    remaining: float
     unexplained: tuple[Unexplained, ...]
     tolerance: float
     samples: int
@@ -322,52 +360,3 @@ class DoctorEntry:
     unread_meshes: tuple[UnreadMesh, ...]
     error: Failure | None
     seconds: float
-
-
-@dataclass(frozen=True)
-class DoctorSummary:
-    """Number of robots examined, and of those with each verdict."""
-
-    robots: int
-    alike: int
-    explained: int
-    massless: int
-    """Robots without inertial data whose kinematics is alike, or differs with every cause proved."""
-    unexplained: int
-    refused: int
-    not_done: int
-
-
-@dataclass(frozen=True)
-class DoctorDocument:
-    """The JSON document of ``dynx doctor`` and ``dynx agree --as-loaded``."""
-
-    schema: int
-    dynx: str
-    results: tuple[DoctorEntry, ...]
-    summary: DoctorSummary
-    not_done: tuple[str, ...]
-    """The robots that an interrupted run left out."""
-
-
-def results_document(reports: Iterable[DoctorReport], not_done: Sequence[str] = ()) -> dict[str, Any]:
-    """Make the JSON document of reports; `not_done` names the robots that an interrupted run left out."""
-    reports = list(reports)
-    summary = DoctorSummary(
-        robots=len(reports),
-        alike=sum(report.alike for report in reports),
-        explained=sum(
-            report.explained and not report.alike and not report.kinematics_only for report in reports
-        ),
-        massless=sum(report.explained and report.kinematics_only for report in reports),
-        unexplained=sum(bool(report.unexplained) for report in reports),
-        refused=sum(report.error is not None for report in reports),
-        not_done=len(not_done),
-    )
-    return {
-        "schema": SCHEMA,
-        "dynx": __version__,
-        "results": [report.to_dict() for report in reports],
-        "summary": to_json_values(summary),
-        "not_done": list(not_done),
-    }

@@ -4,14 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import cache
+from io import StringIO
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from rich.console import Console
 
+from dynx.cli.doctor.tables import show_one
 from dynx.doctor.diagnosis import diagnose
 from dynx.doctor.examine.reference_values import draw_states, model_without_mimics, reference_values
+from dynx.doctor.formats import sarif_document
+from dynx.doctor.formats.heat import engine_map
 from dynx.doctor.prove.levels import level_of
 from dynx.doctor.report import DoctorReport
 from dynx.errors import UnknownNameError
@@ -181,3 +186,27 @@ def test_calls_only_for_causes_with_an_effect_and_marked_for_comparison() -> Non
 def test_an_unknown_level_is_refused() -> None:
     with pytest.raises(UnknownNameError, match="safe"):
         diagnose("<robot/>", level="save")  # type: ignore[arg-type]
+
+
+@pytest.mark.skipif("pybullet" not in installed_engines(), reason="PyBullet is not installed")
+def test_what_remains_at_a_lower_level_is_in_the_headline_and_in_every_report() -> None:
+    """A file that `safe` leaves as it is has errors that a reader has to see."""
+    report = diagnose(tensors(1), level="safe", counterexamples=False)
+    pybullet = next(each for each in report.engines if each.engine == "pybullet")
+    assert report.mended is None
+    assert report.undone
+    assert report.remaining == max(pybullet.after.values()) > report.tolerance
+    size = f"{report.remaining:.0e}"
+    assert report.verdict.endswith(f"all proved; off by up to {size} when mended at level safe")
+    out = StringIO()
+    show_one(Console(file=out, width=200), report, {}, None)
+    assert "as loaded -> mended at level safe\n" in out.getvalue()
+    assert f"-> {report.remaining:.1e}" in out.getvalue()
+    entry = report.to_dict()
+    assert (entry["status"], entry["remaining"]) == ("explained", report.remaining)
+    assert any("mended" in head for head in engine_map(report).heads)
+    results = sarif_document([report])["runs"][0]["results"]
+    assert any(each["message"]["text"].endswith("Left undone at level safe.") for each in results)
+    higher = diagnose(tensors(1), level="rounding", counterexamples=False)
+    assert higher.remaining <= higher.tolerance
+    assert higher.verdict.endswith("all proved")

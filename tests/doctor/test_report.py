@@ -8,7 +8,8 @@ from dataclasses import replace
 
 import pytest
 
-from dynx.doctor.report import DoctorReport, EngineResult, results_document
+from dynx.doctor.report import DoctorReport, EngineResult
+from dynx.doctor.report_document import results_document
 from tests.doctor.formats.reports import alike, differing, refused
 
 EXPLAINED = replace(differing(), unexplained=(), residual=1e-13)

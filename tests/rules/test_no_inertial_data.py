@@ -7,8 +7,7 @@ from collections.abc import Sequence
 import pytest
 
 from dynx.doctor import DoctorReport, diagnose
-from dynx.doctor.formats.causes import status
-from dynx.doctor.report import results_document
+from dynx.doctor.report_document import results_document
 from dynx.loaded import installed_engines
 from dynx.model.model import Base
 from tests.rules.documents import case_of, joint, link
@@ -46,7 +45,7 @@ def test_one_finding_and_no_invented_mass(links: Sequence[str], base: Base) -> N
     assert report.mended is None
     assert report.total_mass == 0.0
     assert report.verdict == "no inertial data: the dynamics cannot be compared"
-    assert status(report) == "massless"
+    assert report.status == "massless"
     assert not report.variants_off
     for engine in report.engines:
         assert not DYNAMICS.intersection(engine.before)
@@ -104,5 +103,5 @@ def test_the_summary_counts_such_robots_by_themselves() -> None:
     reports = [report_on(*bare("a", "b", "c")), report_on(*(link(name) for name in "abc"))]
     summary = results_document(reports)["summary"]
     assert summary["massless"] == 1
-    assert summary["explained"] == sum(status(each) == "explained" for each in reports)
+    assert summary["explained"] == sum(each.status == "explained" for each in reports)
     assert summary["robots"] == 2

@@ -11,7 +11,8 @@ from dynx.cli.shell.output_file import check_writable, make_folder, require_apar
 from dynx.cli.shell.terminal import echo_json
 from dynx.doctor.formats import baseline_document, html_page, junit_xml, sarif_document, wording
 from dynx.doctor.formats.baseline import Baseline
-from dynx.doctor.report import Counterexample, DoctorReport, Unexplained, results_document
+from dynx.doctor.report import Counterexample, DoctorReport, Unexplained
+from dynx.doctor.report_document import results_document
 from dynx.errors import ArgumentError, shown
 from dynx.files.documents import json_text
 from dynx.files.writing import write_text

@@ -18,14 +18,12 @@ from dynx.doctor.formats import wording
 from dynx.doctor.formats.causes import (
     ROUNDING,
     Cause,
-    Status,
     catalogue_entry,
     causes,
     severity,
-    status,
 )
 from dynx.doctor.formats.vote import largest_error
-from dynx.doctor.report import DoctorReport, EngineResult, Finding
+from dynx.doctor.report import DoctorReport, EngineResult, Finding, Status
 
 _PLACES = (4, 3, 2, 1)
 """Numbers of places listed for one rule; ``--json`` and ``--html`` have all."""
@@ -36,7 +34,7 @@ SCREEN = 40, 100
 _ABOVE_MANY = (
     "largest relative error of any engine, as loaded (refused: an engine refuses it;",
     "not used: an engine would crash on it, or its results mean nothing),",
-    "and the residual error after mending",
+    "and the error that remains when mended{level}",
 )
 
 _MAX_RULES = 3
@@ -121,15 +119,13 @@ def show_errors(out: Console, report: DoctorReport, *, mended: bool = True) -> N
     rows = list(dict.fromkeys(key for each in compared for key in (*each.before, *each.after)))
     if not rows:
         return
-    mended = mended and report.mended is not None
-    title = "error against the reference values"
-    calls = " with the calls below" if report.calls else ""
-    heading(out, f"{title}: as loaded -> mended{calls}" if mended else f"{title}, as loaded")
+    title, then = "error against the reference values", _then(report) if mended else ""
+    heading(out, f"{title}: as loaded -> {then}" if then else f"{title}, as loaded")
     names = [each.engine for each in compared]
     table = Table("quantity", *names, right=names, keys=1)
     for key in rows:
         table.add_row(
-            wording.quantity(key), *(_change(each, key, report.tolerance, mended) for each in compared)
+            wording.quantity(key), *(_change(each, key, report.tolerance, bool(then)) for each in compared)
         )
     out.print(table)
     if "inverse_dynamics" in rows and "forward_dynamics" not in rows:
@@ -157,20 +153,20 @@ def show_variants(out: Console, report: DoctorReport) -> None:
 def show_many(out: Console, reports: Sequence[DoctorReport]) -> None:
     """Print one line for each robot and base."""
     bases = len({report.base for report in reports}) > 1
-    columns = ["robot", *(["base"] if bases else []), "verdict", "error", "residual", "causes"]
-    table = Table(*columns, right=["error", "residual"], keys=1)
+    columns = ["robot", *(["base"] if bases else []), "verdict", "error", "mended", "causes"]
+    table = Table(*columns, right=["error", "mended"], keys=1)
     for report in reports:
-        left = report.residual if report.error is None else None
         table.add_row(
             short_line(report.robot),
             *([report.base or ""] if bases else []),
             _verdict_text(report),
             _largest(report),
-            "" if left is None else error_text(left, report.tolerance),
+            _remaining(report),
             _rules(report),
         )
+    levels = "".join(sorted({_level(report) for report in reports}))
     for line in _ABOVE_MANY:
-        out.print(line, style="bold")
+        out.print(line.format(level=levels), style="bold")
     out.print(table)
     _count_variants(out, reports)
     unread = sum(bool(report.unread_meshes) for report in reports)
@@ -193,7 +189,7 @@ def _count_variants(out: Console, reports: Sequence[DoctorReport]) -> None:
 
 def show_summary(out: Console, reports: Sequence[DoctorReport], seconds: float, not_done: int) -> None:
     """Print the last line: the number of robots with each verdict, and of those not done."""
-    verdicts = [status(report) for report in reports]
+    verdicts = [report.status for report in reports]
     counts = {word: verdicts.count(word) for word in get_args(Status)}
     if not counts["massless"]:
         del counts["massless"]
@@ -267,7 +263,7 @@ def _show_calls(out: Console, report: DoctorReport) -> None:
 def _show_changes(out: Console, report: DoctorReport) -> None:
     """Print what the mended file changes, and what its level leaves undone."""
     made = [wording.change(each) for each in report.changes if each.made]
-    left = [wording.change(each) for each in report.changes if not each.made]
+    left = [wording.change(each) for each in report.undone]
     _show_list(out, "the mended file changes", made)
     _show_list(out, f"left undone at --level {report.level}", left)
 
@@ -293,9 +289,7 @@ def _show_next(out: Console, report: DoctorReport, mended: str | None) -> None:
         return
     out.print()
     if mended is not None:
-        level = "" if report.level == "physics" else f" at level {report.level}"
-        action = f"nothing to change in the text{level}; copied to" if report.mended is None else "mended:"
-        out.print(f"{action} {one_line(mended)}", style="bold green")
+        out.print(f"{_action(report)} {one_line(mended)}", style="bold green")
     elif report.mended is not None:
         base = "" if report.base == "fixed" else f" --base {report.base}"
         robot = shlex.quote(short_line(report.robot))
@@ -307,11 +301,35 @@ def _show_next(out: Console, report: DoctorReport, mended: str | None) -> None:
         out.print(f"{_residual(report)}; {report.seconds:.1f} s", style="dim")
 
 
+def _then(report: DoctorReport) -> str:
+    """Write what is compared with the file as loaded; empty where that is all."""
+    # A lower level that changes nothing leaves errors that are to be seen.
+    mended = f"mended{_level(report)}" if report.mended is not None or report.undone else ""
+    return " ".join(filter(None, (mended, "with the calls below" if report.calls else "")))
+
+
+def _level(report: DoctorReport) -> str:
+    """Name a level below the default."""
+    return "" if report.level == "physics" else f" at level {report.level}"
+
+
+def _action(report: DoctorReport) -> str:
+    """Write what was done to make a written file, before its name."""
+    if report.mended is not None:
+        return f"mended{_level(report)}:"
+    if report.kinematics_only:
+        return "no inertial data, which --fix does not invent; copied unchanged to"
+    return f"nothing to change in the text{_level(report)}; copied unchanged to"
+
+
 def _residual(report: DoctorReport) -> str:
     """Write the error that remains without the causes, and the engines that have none."""
     missing = [each.engine for each in report.engines if each.refused_after is not None]
     without = f" (without {', '.join(map(wording.name, missing))})" if missing else ""
-    return f"residual error without all causes: {wording.relative(report.residual)}{without}"
+    residual = f"{wording.relative(report.residual)}{without}"
+    if report.kinematics_only:
+        return f"residual error of poses and Jacobians: {residual}; dynamics is not compared"
+    return f"residual error without all causes: {residual}"
 
 
 def _change(engine: EngineResult, key: str, tolerance: float, mended: bool) -> Text:
@@ -344,6 +362,15 @@ def _largest(report: DoctorReport) -> Text:
     return error_text(largest_error(report), report.tolerance)
 
 
+def _remaining(report: DoctorReport) -> Text:
+    """Write the error after mending."""
+    if report.error is not None:
+        return Text("")
+    if any(each.refused_after is not None for each in report.engines):
+        return Text("refused", STYLES["error"])
+    return error_text(report.remaining, report.tolerance)
+
+
 def _rules(report: DoctorReport) -> Text:
     found = [cause for cause in causes(report) if cause.largest_effect is not None]
     parts = [Text(wording.name(cause.rule), STYLES[cause.severity]) for cause in found[:_MAX_RULES]]
@@ -353,7 +380,7 @@ def _rules(report: DoctorReport) -> Text:
 
 
 def _verdict_text(report: DoctorReport) -> Text:
-    word = status(report)
+    word = report.status
     if word == "refused":  # the reason is on standard error
         return Text("refused", "yellow")
     if word == "alike":

@@ -14,10 +14,6 @@ Severity = Literal["error", "warning", "note"]
 """``error``: engines differ by more than rounding. ``warning``: by accumulated rounding.
 ``note``: nothing differs; bad practice, or a cause without effect on this base."""
 
-Status = Literal["alike", "explained", "massless", "unexplained", "refused"]
-"""``explained``: engines differ and every difference has a proved cause. ``massless``: the file has no
-inertial data, and only the kinematics was compared. ``refused``: not examined."""
-
 ROUNDING = 1e-9
 """Relative error up to which a difference counts as accumulated rounding: PyBullet's diagonalisation of
 inertias causes as much on files without a fault."""
@@ -104,17 +100,6 @@ def severity(finding: Finding) -> Severity:
         return "note"
     # A NaN counts as a large error.
     return "warning" if finding.effect.relative_error <= ROUNDING else "error"
-
-
-def status(report: DoctorReport) -> Status:
-    """Return the verdict on a robot in one word."""
-    if report.error is not None:
-        return "refused"
-    if report.alike:
-        return "alike"
-    if not report.explained:
-        return "unexplained"
-    return "massless" if report.kinematics_only else "explained"
 
 
 def _size(effect: Effect | None) -> float:

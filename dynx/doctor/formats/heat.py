@@ -77,7 +77,8 @@ def step_of(error: float, tolerance: float) -> Step:
 def engine_map(report: DoctorReport) -> HeatMap:
     """Map the errors of each engine by quantity, as loaded and mended."""
     rows = list(dict.fromkeys(key for each in report.engines for key in (*each.before, *each.after)))
-    mended = any(each.after and dict(each.after) != dict(each.before) for each in report.engines)
+    changed = (each.after and dict(each.after) != dict(each.before) for each in report.engines)
+    mended = any(changed) or bool(report.undone)
     nothing = dict.fromkeys(rows, math.inf)
     columns: dict[tuple[str, ...], Mapping[str, float]] = {}
     for each in report.engines:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from dynx._version import __version__
 from dynx.doctor.formats import wording
 from dynx.doctor.formats.baseline import Baseline
-from dynx.doctor.formats.causes import causes, status
+from dynx.doctor.formats.causes import causes
 from dynx.doctor.formats.heat import ALL_STEPS, engine_map, joint_map, pair_map, step_of
 from dynx.doctor.formats.model_tables import model_tables
 from dynx.doctor.formats.text_changes import changes, excerpt
@@ -42,7 +42,7 @@ def html_page(
     text = page.render(
         reports=reports,
         titles=wording.titles([report.robot for report in reports]),
-        counts=Counter(map(status, reports)),
+        counts=Counter(report.status for report in reports),
         rules=[entries[rule] for rule in sorted(entries)],
         baseline=baseline,
         command=command,
@@ -70,7 +70,7 @@ def template_environment() -> Environment:
     filters = (*words, *more, wording.unread_meshes, wording.refusal)
     environment.filters.update({each.__name__: each for each in filters})
     environment.filters["capitalized"] = lambda text: text[:1].upper() + text[1:]
-    views: tuple[Callable[..., Any], ...] = (causes, status, step_of, bar_position, largest_error)
+    views: tuple[Callable[..., Any], ...] = (causes, step_of, bar_position, largest_error)
     views += (wording.difference, engine_map, pair_map, joint_map, model_tables, changes, excerpt)
     environment.globals.update({each.__name__: each for each in views}, steps=ALL_STEPS, **LIMITS)
     return environment

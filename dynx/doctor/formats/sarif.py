@@ -131,6 +131,8 @@ def _finding(report: DoctorReport, each: Finding, repetition: int) -> dict[str, 
     message = f"{wording.name(each.message, 1000)} ({effect})."
     if each.remedy is not None:
         message += f" Remedy: {wording.name(each.remedy, 1000)}"
+    if each.effect is not None and any(each.rule == left.rule for left in report.undone):
+        message += f" Left undone at level {report.level}."
     rule = wording.name(each.rule)
     identity = (each.link, each.joint, str(repetition))
     result = _result(report, rule, severity(each), message, each.line, *identity)

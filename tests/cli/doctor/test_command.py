@@ -310,3 +310,21 @@ def test_the_plain_call_fails_a_check_only_where_it_is_named(
     assert CliRunner().invoke(cli, [*command, "--engines", "pybullet:plain"]).exit_code == 1
     unknown = CliRunner().invoke(cli, [*command, "--engines", "pybullet:plan"])
     assert "did you mean 'pybullet:plain'" in unknown.stderr
+
+
+def test_a_file_without_inertial_data_is_copied_unchanged_and_the_report_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    trap = find_trap("DX118")
+    result = doctor(str(trap), "--fix", "out.urdf", "--json", "out.json")
+    assert result.exit_code == 1
+    first, *_, action, _, last = result.stdout.splitlines()
+    assert first.endswith("no inertial data: the dynamics cannot be compared")
+    assert action == "no inertial data, which --fix does not invent; copied unchanged to out.urdf"
+    assert last.startswith("residual error of poses and Jacobians: ")
+    assert "dynamics is not compared" in last
+    assert Path("out.urdf").read_bytes() == trap.read_bytes()
+    made = json.loads(Path("out.json").read_text())
+    assert made["results"][0]["status"] == "massless"
+    assert made["summary"]["massless"] == 1

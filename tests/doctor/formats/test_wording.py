@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dynx.doctor.formats import wording
-from dynx.doctor.formats.causes import ROUNDING, causes, severity, status
+from dynx.doctor.formats.causes import ROUNDING, causes, severity
 from dynx.doctor.report import Effect
 from tests.doctor.formats.reports import alike, differing, refused
 
@@ -63,7 +63,7 @@ def test_rounding_is_less_alarming_than_a_wrong_robot() -> None:
 
 
 def test_the_status_of_a_report_in_one_word() -> None:
-    assert [status(report) for report in (alike(), differing(), refused())] == [
+    assert [report.status for report in (alike(), differing(), refused())] == [
         "alike",
         "unexplained",
         "refused",
