@@ -1,9 +1,9 @@
 """DX204 limit-without-effort-or-velocity: A limit does not state the largest effort or velocity.
 
-URDF requires both, although neither enters any equation of motion.
+URDF requires both up to version 1.1, although neither enters any equation of motion.
 
 - Pinocchio 4.1 refuses the file: "limit has no effort". It does so for every type of joint, fixed ones
-  included.
+  included; not where the robot states ``version="1.2"``, see DX222.
 - PyBullet 3.2.7, MuJoCo 4.0 and Drake 1.51 read the file. So does dynx: what is not given is unlimited.
 
 Files with such limits are common, because only urdfdom, the reader of Pinocchio and ROS, checks them.
@@ -17,6 +17,7 @@ from collections.abc import Iterable
 from dynx.rules import Case, Correction, EditingRule, correction, measured_on
 from dynx.rules.joints.elements import elements_in_joints
 from dynx.rules.text.number_text import LARGEST
+from dynx.rules.text.versions import corrected_version
 
 
 class LimitWithoutEffortOrVelocity(EditingRule):
@@ -26,7 +27,9 @@ class LimitWithoutEffortOrVelocity(EditingRule):
     changed = "wrote the largest double for efforts and velocities that were not given"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
-        """Yield the first limit of every joint, moving or not."""
+        """Yield the first limit of every joint, moving or not, in a robot of URDF 1.0 or 1.1."""
+        if corrected_version(case) == "1.2":
+            return
         for _, limit in elements_in_joints(case, "limit"):
             missing = [name for name in ("effort", "velocity") if name not in limit.attributes]
             if missing:

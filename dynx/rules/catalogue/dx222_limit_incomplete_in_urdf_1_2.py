@@ -13,11 +13,10 @@ define it.
 
 from collections.abc import Iterable
 
-from dynx.model.urdf.values import urdf_version
 from dynx.rules import Case, Correction, EditingRule, correction, measured_on
 from dynx.rules.joints.elements import elements_in_joints
+from dynx.rules.text.versions import corrected_version
 
-_FIRST_VERSION = (1, 2)
 _TYPES = ("revolute", "prismatic", "fixed", "floating", "planar")
 
 
@@ -29,7 +28,7 @@ class LimitIncompleteInUrdf12(EditingRule):
 
     def corrections(self, case: Case) -> Iterable[Correction]:
         """Yield limits without one of the ends, in a robot of URDF 1.2."""
-        if urdf_version(case.source.root.attributes.get("version")) < _FIRST_VERSION:
+        if corrected_version(case) != "1.2":
             return
         for _, limit in elements_in_joints(case, "limit", _TYPES):
             missing = [end for end in ("lower", "upper") if end not in limit.attributes]

@@ -14,11 +14,8 @@ version is a later one, it writes ``version="1.2"`` instead.
 from collections.abc import Iterable
 
 from dynx.errors import shown
-from dynx.model.urdf.origins import reads_quaternions
 from dynx.rules import Case, Correction, EditingRule, correction, measured_on
-from dynx.rules.text.quaternions import origins_with_quaternion
-
-_KNOWN = ("1.0", "1.1", "1.2")
+from dynx.rules.text.versions import KNOWN_VERSIONS, corrected_version
 
 
 class UnknownUrdfVersion(EditingRule):
@@ -31,11 +28,11 @@ class UnknownUrdfVersion(EditingRule):
         """Yield the root element."""
         root = case.source.root
         version = root.attributes.get("version")
-        if root.tag == "robot" and version is not None and version not in _KNOWN:
-            newer = reads_quaternions(version) and any(origins_with_quaternion(case))
+        if root.tag == "robot" and version is not None and version not in KNOWN_VERSIONS:
+            corrected = corrected_version(case)
             edit = (
-                case.source.attribute_edit(root, "version", _KNOWN[-1])
-                if newer
-                else case.source.attribute_removal(root, "version")
+                case.source.attribute_removal(root, "version")
+                if corrected == KNOWN_VERSIONS[0]
+                else case.source.attribute_edit(root, "version", corrected)
             )
             yield correction(root, f"<robot> has version {shown(version)}", edit)

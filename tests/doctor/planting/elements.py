@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from tests.doctor.planting.inertia import has_link
-from tests.doctor.planting.joints import limited, moving
+from tests.doctor.planting.joints import limited, moving, require_complete_limits, require_no_version
 from tests.doctor.planting.site import CannotPlant, PlantedDefect, Planter, Site
 
 
@@ -54,8 +54,8 @@ def world_not_declared(site: Site) -> PlantedDefect:
 
 def incomplete_limit(site: Site) -> PlantedDefect:
     """A range of URDF 1.0, without the end that is zero, in a robot that states URDF 1.2."""
-    if "version" in site.source.root.attributes:
-        raise CannotPlant("has a version")
+    require_no_version(site)
+    require_complete_limits(site)
     joint, element = site.pick_joint(
         lambda each: limited(each) and each.limits.lower <= 0.0 < each.limits.upper, "joint with a range"
     )
@@ -120,8 +120,8 @@ def unreadable_quaternion(site: Site) -> PlantedDefect:
 
 def _with_origin(site: Site, rule: str, orientation: str) -> PlantedDefect:
     """Give a joint that moves another origin, in a robot of URDF 1.2."""
-    if "version" in site.source.root.attributes:
-        raise CannotPlant("has a version")
+    require_no_version(site)
+    require_complete_limits(site)
     joint, element = site.pick_joint(moving, "joint that moves")
     origin, text = element.first("origin"), f'<origin xyz="0.1 0.02 0.3" {orientation}/>'
     source = site.source

@@ -49,6 +49,7 @@ def without_limit(site: Site) -> PlantedDefect:
 
 def without_effort(site: Site) -> PlantedDefect:
     """A limit without effort or velocity."""
+    require_no_version(site)
     joint, element = site.pick_joint(limited, "joint with a limit")
     limit = element.first("limit")
     assert limit is not None
@@ -200,6 +201,7 @@ def actuator_twice(site: Site) -> PlantedDefect:
 
 def upper_missing(site: Site) -> PlantedDefect:
     """A range without upper limit, most of which is outside the range that PyBullet reads."""
+    require_no_version(site)
     joint, element = site.pick_joint(lambda each: limited(each) and each.moves, "joint with a limit")
     lower = site.rng.choice(["-1", "-1.0", "-1.05", "-1.1"])
     edits = site.part_edits(element, "limit", lower=lower)
@@ -222,6 +224,19 @@ def transmission(name: str, inside: str) -> str:
     """Write a ``<transmission>`` of the usual type."""
     kind = "<type>transmission_interface/SimpleTransmission</type>"
     return f'<transmission name="{name}">\n  {kind}\n{inside}\n</transmission>'
+
+
+def require_no_version(site: Site) -> None:
+    """Raise CannotPlant in a robot that states a version: what its limits need is another in URDF 1.2."""
+    if "version" in site.source.root.attributes:
+        raise CannotPlant("has a version")
+
+
+def require_complete_limits(site: Site) -> None:
+    """Raise CannotPlant where a limit lacks what one version of URDF needs, for a plan to state another."""
+    limits = [limit for joint in site.source.root.all("joint") for limit in joint.all("limit")]
+    if not all({"lower", "upper", "effort", "velocity"} <= limit.attributes.keys() for limit in limits):
+        raise CannotPlant("has an incomplete limit")
 
 
 def moving(joint: Joint) -> bool:
