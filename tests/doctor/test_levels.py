@@ -199,7 +199,7 @@ def test_what_remains_at_a_lower_level_is_in_the_headline_and_in_every_report() 
     size = f"{report.remaining:.0e}"
     assert report.verdict.endswith(f"all proved; off by up to {size} when mended at level safe")
     out = StringIO()
-    show_one(Console(file=out, width=200), report, {}, None)
+    show_one(Console(file=out, width=200), report, {}, None, "dynx doctor arm.urdf")
     assert "as loaded -> mended at level safe\n" in out.getvalue()
     assert f"-> {report.remaining:.1e}" in out.getvalue()
     entry = report.to_dict()

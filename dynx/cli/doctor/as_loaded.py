@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import shlex
 from collections.abc import Sequence
 
 from rich.console import Console
@@ -11,6 +10,7 @@ from rich.text import Text
 
 from dynx.cli.doctor.conclusion import DoctorRun, refusal
 from dynx.cli.doctor.outputs import Outputs
+from dynx.cli.doctor.repetition import doctor_command
 from dynx.cli.doctor.run import doctor_run
 from dynx.cli.doctor.tables import error_text, show_engines, show_errors
 from dynx.cli.doctor.text import heading, sentence
@@ -56,7 +56,7 @@ def _conclude(run: DoctorRun, outputs: Outputs, engines: tuple[str, ...] | None,
         out = console(err=outputs.on_stdout)
         if len(run.tasks) == 1:
             for report in reports:
-                _show_one(out, report)
+                _show_one(out, report, run.tasks[0])
         else:
             _show_many(out, reports, run.seconds, len(run.not_done))
         for line in missing_engines(reports) if engines is None else ():
@@ -69,7 +69,7 @@ def _conclude(run: DoctorRun, outputs: Outputs, engines: tuple[str, ...] | None,
     return DONE if all(report.alike for report in reports) else NEGATIVE_RESULT
 
 
-def _show_one(out: Console, report: DoctorReport) -> None:
+def _show_one(out: Console, report: DoctorReport, task: DoctorTask) -> None:
     who = f"{short_line(report.robot)}, {report.base} base"
     if report.error is not None:
         out.print(f"{who}: not examined", style="yellow")
@@ -86,12 +86,8 @@ def _show_one(out: Console, report: DoctorReport) -> None:
     for line in vote_lines(report, found):
         sentence(out, line, 2)
     if not report.alike:
-        base = "" if report.base == "fixed" else f" --base {report.base}"
         out.print()
-        out.print(
-            f"causes, and a mended file: dynx doctor {shlex.quote(short_line(report.robot))}{base}",
-            style="bold",
-        )
+        out.print(f"causes, and a mended file: {doctor_command(task)}", style="bold")
 
 
 def _show_pairs(out: Console, report: DoctorReport) -> None:

@@ -10,6 +10,7 @@ from rich.console import Console
 
 from dynx.cli.doctor.mending import write_mended
 from dynx.cli.doctor.outputs import Outputs, save_counterexamples
+from dynx.cli.doctor.repetition import doctor_command
 from dynx.cli.doctor.tables import show_many, show_one, show_summary
 from dynx.cli.shell.exits import BAD_INPUT, DONE, NEGATIVE_RESULT, complain, one_line, short_line
 from dynx.cli.shell.run import Run
@@ -102,7 +103,8 @@ class Conclusion:
             for number, report in enumerate(reports):
                 if number:
                     out.print()
-                show_one(out, report, saved[number], mended.get(number))
+                again = doctor_command(self._run.tasks[self._run.done[number]])
+                show_one(out, report, saved[number], mended.get(number), again)
         else:
             show_many(out, reports)
             show_summary(out, reports, self._run.seconds, len(self._run.not_done))

@@ -41,26 +41,35 @@ _MAX_RULES = 3
 """Number of rules listed for one of several robots."""
 
 
-def show_one(out: Console, report: DoctorReport, saved: Mapping[int, str], mended: str | None) -> None:
+def show_one(
+    out: Console, report: DoctorReport, saved: Mapping[int, str], mended: str | None, command: str
+) -> None:
     """Print the full report of one robot.
 
     `saved` has the file with the counterexample of each unexplained difference, by its number, and
-    `mended` is the file with the mended description.
+    `mended` is the file with the mended description; `command` repeats the examination.
     """
-    fitting = (count for count in _PLACES if _rows(report, saved, mended, count) <= SCREEN[0])
-    _show(out, report, saved, mended, next(fitting, 2))
+    fitting = (count for count in _PLACES if _rows(report, saved, mended, command, count) <= SCREEN[0])
+    _show(out, report, saved, mended, command, next(fitting, 2))
 
 
-def _rows(report: DoctorReport, saved: Mapping[int, str], mended: str | None, places: int) -> int:
+def _rows(
+    report: DoctorReport, saved: Mapping[int, str], mended: str | None, command: str, places: int
+) -> int:
     """Return the number of rows of a report on a terminal."""
     text = StringIO()
     out = Console(file=text, width=SCREEN[1], soft_wrap=True, markup=False, emoji=False, highlight=False)
-    _show(out, report, saved, mended, places)
+    _show(out, report, saved, mended, command, places)
     return sum(max(1, -(-len(line) // SCREEN[1])) for line in text.getvalue().splitlines())
 
 
 def _show(
-    out: Console, report: DoctorReport, saved: Mapping[int, str], mended: str | None, places: int
+    out: Console,
+    report: DoctorReport,
+    saved: Mapping[int, str],
+    mended: str | None,
+    command: str,
+    places: int,
 ) -> None:
     show_verdict(out, report)
     if report.error is not None:
@@ -82,7 +91,7 @@ def _show(
     _show_changes(out, report)
     _show_calls(out, report)
     _show_unexplained(out, report, saved)
-    _show_next(out, report, mended)
+    _show_next(out, report, mended, command)
 
 
 def show_verdict(out: Console, report: DoctorReport) -> None:
@@ -284,16 +293,14 @@ def _show_unexplained(out: Console, report: DoctorReport, saved: Mapping[int, st
                 sentence(out, f"{symbol} = [{', '.join(f'{value:g}' for value in values)}]", 6, "dim")
 
 
-def _show_next(out: Console, report: DoctorReport, mended: str | None) -> None:
+def _show_next(out: Console, report: DoctorReport, mended: str | None, command: str) -> None:
     if mended is None and report.alike and not report.findings:
         return
     out.print()
     if mended is not None:
         out.print(f"{_action(report)} {one_line(mended)}", style="bold green")
     elif report.mended is not None:
-        base = "" if report.base == "fixed" else f" --base {report.base}"
-        robot = shlex.quote(short_line(report.robot))
-        out.print(f"to mend it: dynx doctor {robot}{base} --fix OUT.urdf", style="bold")
+        out.print(f"to mend it: {command} --fix OUT.urdf", style="bold")
     if report.findings:
         rule = causes(report)[0].rule
         out.print(f"more about a rule: dynx explain {shlex.quote(wording.name(rule))}", style="dim")

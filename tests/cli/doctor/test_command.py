@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -89,6 +90,42 @@ def test_a_difference_is_named_mended_and_gone(arm: Path, tmp_path: Path) -> Non
     again = doctor("mended.urdf")
     assert again.exit_code == 0, again.stdout
     assert "all engines load it alike" in again.stdout
+
+
+@pytest.mark.parametrize("command", ["doctor", "agree"])
+def test_the_hint_repeats_the_examination(arm: Path, command: str) -> None:
+    own = ["--base", "floating", "--samples", "3", "--seed", "7"]
+    if command == "doctor":
+        more = [
+            "--tolerance",
+            "1e-09",
+            "--choose",
+            "DX103=keep",
+            "--choose",
+            "DX202=fixed",
+            "--level",
+            "rounding",
+        ]
+        run = ["doctor", "my arm.urdf", *own, *more, "--engines", "pinocchio,pybullet", "--jobs", "1"]
+    else:
+        more = []
+        run = ["agree", "my arm.urdf", "--as-loaded", *own, "--backends", "pinocchio,pybullet"]
+    arm.rename("my arm.urdf")
+    first = CliRunner().invoke(cli, run)
+    [hint] = [line for line in first.stdout.splitlines() if "dynx doctor" in line]
+    words = shlex.split(hint.partition(": dynx ")[2])
+    assert words[:2] == ["doctor", "my arm.urdf"]
+    for option in ["--engines", *own[::2], *more[::2]]:
+        assert option in words
+    fixed = words + ([] if "--fix" in words else ["--fix", "OUT.urdf"])
+    again = CliRunner().invoke(cli, [*fixed, "--jobs", "1"])
+    assert "mended: OUT.urdf" in again.stdout
+    if command == "doctor":
+        # Only the hint and the time differ.
+        kept = [
+            each.stdout.partition("\nto mend it")[0].partition("\nmended: ")[0] for each in (first, again)
+        ]
+        assert kept[0] == kept[1]
 
 
 def test_an_engine_whose_result_is_undefined_does_not_refuse_the_file(arm: Path) -> None:

@@ -18,6 +18,7 @@ from dynx.cli.doctor.as_loaded import vote_lines
 from dynx.cli.doctor.conclusion import Conclusion
 from dynx.cli.doctor.mending import planned_targets, write_mended
 from dynx.cli.doctor.outputs import Outputs, save_counterexamples
+from dynx.cli.doctor.repetition import doctor_command
 from dynx.cli.doctor.run import doctor_run
 from dynx.cli.doctor.tables import show_many, show_one
 from dynx.cli.shell.run import carry_out
@@ -115,7 +116,8 @@ def test_a_counterexample_stays_in_its_folder(name: str) -> None:
 def shown(report: DoctorReport, width: int = 80) -> str:
     """Return the report of one robot on a terminal of that width."""
     out = StringIO()
-    show_one(Console(file=out, width=width, soft_wrap=True, markup=False, emoji=False), report, {}, None)
+    console = Console(file=out, width=width, soft_wrap=True, markup=False, emoji=False)
+    show_one(console, report, {}, None, doctor_command(DoctorTask(report.robot, "fixed")))
     return out.getvalue()
 
 

@@ -8,9 +8,11 @@ from io import StringIO
 import pytest
 from rich.console import Console
 
+from dynx.cli.doctor.repetition import doctor_command
 from dynx.cli.doctor.tables import SCREEN, show_one
 from dynx.doctor import diagnose
 from dynx.doctor.report import DoctorReport
+from dynx.doctor.task import DoctorTask
 from dynx.loaded import ENGINES, installed_engines
 from dynx.rules.traps import find_trap
 from tests.doctor.formats.reports import differing
@@ -32,7 +34,8 @@ def rows(report: DoctorReport) -> int:
 def shown(report: DoctorReport, width: int = COLUMNS) -> str:
     """Return the report of one robot."""
     out = StringIO()
-    show_one(Console(file=out, width=width, soft_wrap=True, markup=False, emoji=False), report, {}, None)
+    console = Console(file=out, width=width, soft_wrap=True, markup=False, emoji=False)
+    show_one(console, report, {}, None, doctor_command(DoctorTask(report.robot, "fixed")))
     return out.getvalue()
 
 
