@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from dynx.errors import ArgumentError, BackendError, UnknownBackendError, shown
 from dynx.model import Model
+from dynx.model.model import refuse_other_than_model
 from dynx.registry import ClassRegistry
 
 if TYPE_CHECKING:
@@ -40,15 +41,6 @@ backend_class = _backends.find
 backend_names = _backends.names
 register = _backends.register
 unregister = _backends.unregister
-
-
-def refuse_other_than_model(model: object) -> None:
-    """Raise ArgumentError for anything but a `Model`, such as a robot's name."""
-    if not isinstance(model, Model):
-        example = shown(model) if isinstance(model, str) else "..."
-        raise ArgumentError(
-            f"model is of type {type(model).__name__}; wanted a Model, such as dynx.load({example})"
-        )
 
 
 def backend(name: str, model: Model, **options: Any) -> Backend:

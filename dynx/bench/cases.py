@@ -11,7 +11,7 @@ import numpy as np
 from dynx.backends.quantities import QUANTITIES
 from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
 from dynx.model import Model
-from dynx.simd.machine import MAX_MEMORY_SHARE, memory_size
+from dynx.simd import machine
 from dynx.spatial.scalar import Floats
 
 BENCHMARK_QUANTITIES = (
@@ -93,8 +93,4 @@ def require_memory(model: Model, case: BenchmarkCase) -> None:
     state = np.dtype(np.float64).itemsize * (model.nq + 3 * model.nv)
     result = np.dtype(np.float64).itemsize * prod(QUANTITIES[case.quantity].shape_of(model))
     needed = case.batch * (state + 2 * result)
-    if needed > MAX_MEMORY_SHARE * memory_size():
-        raise ArgumentError(
-            f"{case.quantity} at a batch of {case.batch} needs {needed / 1e9:.3g} GB; this machine has "
-            f"{memory_size() / 1e9:.3g} GB, of which a batch may take {MAX_MEMORY_SHARE:.0%}"
-        )
+    machine.require_memory(f"{case.batch} samples of {case.quantity}", needed)

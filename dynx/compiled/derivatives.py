@@ -22,11 +22,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.backends.arguments import Arguments
-from dynx.backends.registry import refuse_other_than_model
 from dynx.backends.solvability import Solvability
 from dynx.compiled import derivative_programs as programs
 from dynx.compiled.robot_kernel import Making, RobotKernels
 from dynx.model import Model
+from dynx.model.model import refuse_other_than_model
 from dynx.spatial.scalar import Floats
 
 MAX_NV_OF_ONE_KERNEL = 12

@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike
 
 from dynx.backends.arguments import Arguments
 from dynx.backends.quantities import QUANTITIES
-from dynx.backends.registry import refuse_other_than_model
 from dynx.compiled.mass_factors import factorize_mass_matrix, solve_with_factors
 from dynx.compiled.model_coordinates import argument_shapes, reduce_columns, reduce_rows, tree_coordinates
 from dynx.compiled.parameters import Parameters, Selection
@@ -24,6 +23,7 @@ from dynx.compiled.simplification import simplify_mechanism
 from dynx.errors import ArgumentError, shown
 from dynx.model import Mechanism, Model
 from dynx.model.configuration import checked_array
+from dynx.model.model import refuse_other_than_model
 from dynx.rbd import crba, rnea
 from dynx.simd.program import Program
 from dynx.simd.trace import trace

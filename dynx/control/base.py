@@ -20,6 +20,7 @@ from dynx.control.content import attributes_of, content_of, fields_of
 from dynx.control.dynamics import Dynamics, EngineDynamics
 from dynx.errors import ArgumentError, UnsupportedFeatureError, shown
 from dynx.model import Model
+from dynx.model.model import refuse_other_than_model
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint
 
@@ -117,7 +118,8 @@ class Controller(ABC, Generic[ControllerState]):
         return (code, *((name, content_of(value)) for name, value in kept))
 
     def _wrap(self, inner: Controller[ControllerState]) -> None:
-        """Take robot and timing from an inner controller."""
+        """Take robot and timing from an inner controller. Raises ArgumentError for anything else."""
+        refuse_other_than_controller("the inner controller", inner)
         self._set(inner=inner, model=inner.model, lead=inner.lead, control_dt=inner.control_dt)
         self._set(needs_setpoint=inner.needs_setpoint)
 
@@ -164,6 +166,7 @@ class ModelBased(Controller[ControllerState]):
 
         Raises UnsupportedFeatureError for a floating base, ArgumentError for a backend of another robot.
         """
+        refuse_other_than_model(model)
         if model.floating:
             raise UnsupportedFeatureError(
                 f"{type(self).__name__} commands every coordinate, but {model.name} has a floating base, "
@@ -188,6 +191,19 @@ class Wrapper(Controller[ControllerState]):
     def initial_state(self) -> Any:
         """Return the initial state of the inner controller."""
         return self.inner.initial_state()
+
+
+def refuse_other_than_controller(name: str, controller: object) -> None:
+    """Raise ArgumentError for anything but a controller, such as the class of one or a function."""
+    if isinstance(controller, Controller):
+        return
+    if isinstance(controller, type) and issubclass(controller, Controller):
+        kind = controller.__name__
+        raise ArgumentError(f"{name} is the class {kind}; wanted an object of it, as in {kind}(model, ...)")
+    raise ArgumentError(
+        f"{name} is of type {type(controller).__name__}; wanted a controller of dynx.control, or an object "
+        "of a subclass of control.Controller"
+    )
 
 
 def chain_of(controller: Controller[Any]) -> Iterator[Controller[Any]]:

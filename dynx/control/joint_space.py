@@ -10,6 +10,7 @@ import numpy as np
 
 from dynx.control.base import Controller, ControllerState, Measurement
 from dynx.model import Model
+from dynx.model.model import refuse_other_than_model
 from dynx.spatial.scalar import Array
 from dynx.trajectory.base import Setpoint
 
@@ -19,6 +20,9 @@ class JointSpace(Controller[ControllerState]):
     """A controller that reads and moves joints alone; it commands no force on a floating base."""
 
     model: Model
+
+    def __post_init__(self) -> None:
+        refuse_other_than_model(self.model)
 
     @property
     def n_joints(self) -> int:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import stat
 
-from dynx.errors import DescriptionError, RobotNotFoundError, shown
+from dynx.errors import ArgumentError, DescriptionError, RobotNotFoundError, shown
 
 MAX_BYTES = 64 * 1024 * 1024
 """Largest size of a file [bytes]; the largest description in public use is under 2 MiB."""
@@ -37,6 +37,14 @@ def read_file(path: str) -> bytes:
     if len(data) > MAX_BYTES:
         raise _too_large(path)
     return data
+
+
+def checked_path(path: object) -> str:
+    """Return a path as a str. Raises ArgumentError for anything but a str, bytes or an `os.PathLike`."""
+    try:
+        return os.fsdecode(path)  # type: ignore[arg-type]
+    except TypeError:
+        raise ArgumentError(f"a path is {shown(path)}; wanted a str or an os.PathLike") from None
 
 
 def printable(path: str) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, TypeGuard
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -55,12 +55,15 @@ def whole_number(name: str, value: object, least: int) -> int:
     return int(value)
 
 
+def is_real(value: object) -> TypeGuard[float]:
+    """Check whether a value is one real number, of Python or NumPy, and no truth value."""
+    return isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
+
+
 def positive_seconds(name: str, seconds: object) -> float:
     """Return a positive, finite number of seconds as a float, or raise ArgumentError."""
-    if isinstance(seconds, int | float | np.number) and not isinstance(seconds, bool):
-        number = float(seconds)
-        if 0.0 < number < np.inf:
-            return number
+    if is_real(seconds) and 0.0 < float(seconds) < np.inf:
+        return float(seconds)
     raise ArgumentError(f"{name} is {shown(seconds)}; wanted a positive number of seconds")
 
 
@@ -89,6 +92,22 @@ def checked_entries(name: str, array: Floats) -> Floats:
             "in magnitude, since products of larger numbers overflow"
         )
     return array
+
+
+def checked_generator(rng: np.random.Generator | int | None) -> np.random.Generator:
+    """Return the generator, or that of a seed. Raises ArgumentError for anything else."""
+    try:
+        return np.random.default_rng(rng)
+    except (TypeError, ValueError):
+        raise ArgumentError(f"rng is {shown(rng)}; wanted a NumPy generator, or a seed: 0 or more") from None
+
+
+def checked_size(size: tuple[int, ...] | int) -> tuple[int, ...]:
+    """Return the shape of an array of samples. Raises ArgumentError for anything else."""
+    shape = tuple(size) if isinstance(size, tuple | list) else (size,)
+    if not all(isinstance(n, int | np.integer) and not isinstance(n, bool) and n >= 0 for n in shape):
+        raise ArgumentError(f"size is {shown(size)}; wanted a number of samples, or a tuple of them")
+    return tuple(int(n) for n in shape)
 
 
 def checked_q(model: Model, q: ArrayLike, name: str = "q") -> Floats:
@@ -190,8 +209,8 @@ def random(
     An angle without limits is in (-pi, pi), a length in (-1, 1). A floating base gets a position in the cube
     [-1, 1]^3 and a uniformly distributed orientation (Shoemake 1992). `rng` is a NumPy generator or a seed.
     """
-    rng = np.random.default_rng(rng)
-    shape = (size,) if isinstance(size, int) else tuple(size)
+    rng = checked_generator(rng)
+    shape = checked_size(size)
     q = np.empty((*shape, model.nq))
     base = 7 if model.floating else 0
     for k, joint in enumerate(model.coordinate_joints, start=base):

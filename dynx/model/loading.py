@@ -50,6 +50,10 @@ def load(
     (with file and line), UnsupportedFeatureError if it uses a feature that dynx does not support,
     UnknownNameError for an unknown joint in `lock`.
     """
+    if lock is not None and not isinstance(lock, Mapping):
+        raise ArgumentError(
+            f"lock is {shown(lock)}; wanted positions by the name of a joint, such as {{'finger': 0.02}}"
+        )
     if isinstance(x, Model):
         return _with_options(x, base, lock, gravity, base_pose)
     data, source, name = read_description(x, package_dirs)
@@ -64,6 +68,8 @@ def read_description(
     The text is bytes or characters; the name is None for text that is not from a file. A .xacro file is
     expanded. Raises the errors of `load`.
     """
+    if isinstance(package_dirs, str | os.PathLike):
+        package_dirs = [package_dirs]
     if isinstance(x, bytes | bytearray | memoryview):
         return bytes(x), "<string>", None
     if isinstance(x, str) and x.lstrip("\ufeff \t\r\n").startswith("<"):

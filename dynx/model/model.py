@@ -294,6 +294,15 @@ class Model:
         return message + nearest(name, known)
 
 
+def refuse_other_than_model(model: object) -> None:
+    """Raise ArgumentError for anything but a `Model`, such as a robot's name."""
+    if not isinstance(model, Model):
+        example = shown(model) if isinstance(model, str) else "..."
+        raise ArgumentError(
+            f"model is of type {type(model).__name__}; wanted a Model, such as dynx.load({example})"
+        )
+
+
 def _missing_inertial_notes(links: Iterable[Link], joints: Iterable[Joint]) -> list[Note]:
     """Return a note for each moving link without an inertial; some engines give it a mass of 1 kg."""
     moved = {joint.child: joint.name for joint in joints if joint.moves}

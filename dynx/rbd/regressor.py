@@ -20,6 +20,7 @@ import numpy as np
 
 from dynx.model import Model
 from dynx.model.mechanism import Mechanism, ScalarConverter, float64, pose_arrays
+from dynx.model.model import refuse_other_than_model
 from dynx.rbd.jacobians import frame_jacobian
 from dynx.rbd.kinematics import BodyVectors, Poses, body_twists, frame_pose, joint_axis, joint_value
 from dynx.spatial.inertia import RigidInertia, inertia_about_origin
@@ -105,6 +106,7 @@ def body_accelerations(
 
 def inertial_parameters(model: Model, convert: ScalarConverter = float64) -> Array:
     """Return pi (10 n_links,): the ten parameters of each of `model.links`, zeros without an inertial."""
+    refuse_other_than_model(model)
     return np.concatenate(
         [parameters_from_inertia(link_inertia(model, link.name, convert)) for link in model.links]
     )

@@ -8,11 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from dynx.errors import ArgumentError, shown
-from dynx.model.configuration import positive_seconds
+from dynx.model.configuration import is_real, positive_seconds
 from dynx.spatial.scalar import Floats
 
 TIME_ROUNDING = 1e-9
 """Tolerance within which the ratio of two times counts as a whole number."""
+
+MAX_STEPS = 10**12
+"""Largest number of steps in a time; the record of more would not fit into the memory of any machine."""
 
 
 @dataclass(frozen=True)
@@ -33,8 +36,10 @@ class Clock:
         dt = positive_seconds("dt", dt)
         duration = positive_seconds("duration", duration)
         control = dt if control_dt is None else positive_seconds("control_dt", control_dt)
-        if not isinstance(delay, int | float) or not 0.0 <= delay < np.inf:
+        if not is_real(delay) or not 0.0 <= delay < np.inf:
             raise ArgumentError(f"delay is {shown(delay)}; wanted seconds, 0 or more")
+        for name, seconds in (("duration", duration), ("control_dt", control), ("delay", delay)):
+            refuse_too_many_steps(name, seconds, dt)
         return cls(
             dt,
             steps_to(duration, dt),
@@ -65,6 +70,14 @@ class Clock:
         """Return the times (n_controls,) [s] of the setpoints, which are `lead` control steps ahead."""
         steps = (np.arange(self.n_controls) + lead) * self.steps_per_control
         return steps.astype(np.float64) * self.dt
+
+
+def refuse_too_many_steps(name: str, seconds: float, dt: float) -> None:
+    """Raise ArgumentError for a time of more than `MAX_STEPS` steps of `dt`."""
+    if seconds > MAX_STEPS * dt:
+        raise ArgumentError(
+            f"{name} is {seconds:.12g} s, more than {MAX_STEPS:g} steps of dt = {dt:.12g} s: check both"
+        )
 
 
 def steps_to(seconds: float, dt: float) -> int:

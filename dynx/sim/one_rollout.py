@@ -11,6 +11,7 @@ from dynx.control.base import Controller
 from dynx.control.friction import SLIP, Coefficients
 from dynx.errors import ArgumentError
 from dynx.model import Model
+from dynx.model.package_paths import StrPath
 from dynx.sim.loop.noise import Noise
 from dynx.sim.plants.disturbances import Push
 from dynx.sim.plants.model_error import MassScale, Payload
@@ -31,7 +32,7 @@ class RolloutInterrupted(KeyboardInterrupt):
 
 
 def simulate(
-    model: Model | Scenario,
+    model: Model | Scenario | StrPath,
     controller: Controller[Any] | None = None,
     reference: Trajectory | ArrayLike | None = None,
     *,
@@ -54,7 +55,7 @@ def simulate(
     position_limits: bool = False,
     payload: Payload | Sequence[Payload] | None = None,
     mass_scale: MassScale = 1.0,
-    pushes: Sequence[Push] = (),
+    pushes: Push | Sequence[Push] = (),
     check_reference: bool = True,
     method: str = "DOP853",
     rtol: float = 1e-10,
@@ -65,8 +66,8 @@ def simulate(
 ) -> Rollout:
     """Simulate `model` under `controller` along `reference`, and return the record.
 
-    The first argument may also be a `Scenario`. Its fields are the other arguments except `resume`, `step`
-    and `progress`, which are then the only ones that can be given.
+    The first argument may also be a robot's name or file, which `dynx.load` reads, or a `Scenario`, whose
+    fields are the other arguments except `resume`, `step` and `progress`; beside it only those can be given.
 
     The plant and the controller can use different engines (``controller_backend`` replaces the controller's
     own), so that the effect of an error in one of them can be studied.

@@ -22,6 +22,7 @@ from dynx.sim.plants.model_error import plant_model
 from dynx.sim.plants.registry import default_integrator
 from dynx.sim.scenario.documents import Unknown
 from dynx.sim.scenario.scenario import Scenario
+from dynx.simd.machine import require_memory
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Trajectory
 
@@ -48,6 +49,7 @@ class Setup:
         """Check a scenario. Raises ArgumentError, LimitError or GainError if it cannot be simulated."""
         controller = known_controller(scenario)
         clock = clock_of(scenario)
+        require_memory(f"{clock.n_steps} steps", clock.n_steps * step_bytes(scenario.model))
         moved = plant_model(scenario.model, scenario.payloads, scenario.mass_scale)
         if controller is not None:
             check_controller(scenario.model, controller, clock)
@@ -63,6 +65,11 @@ class Setup:
     def integrator(self) -> str:
         """Name of the integrator; the default of the plant if the scenario has none."""
         return self.scenario.integrator or default_integrator(self.scenario.plant)
+
+
+def step_bytes(model: Model) -> int:
+    """Return the memory [bytes] of one step of a record and of its setpoint."""
+    return 8 * (3 * model.nq + 7 * model.nv)
 
 
 def known_controller(scenario: Scenario) -> Controller[Any] | None:
@@ -107,7 +114,7 @@ def disturbances_of(scenario: Scenario, moved: Model) -> Disturbances:
         scenario.friction,
         scenario.friction_slip,
         scenario.armature,
-        scenario.pushes,
+        scenario.all_pushes,
         scenario.dt / whole_number("substeps", scenario.substeps, 1),
     )
 

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from dynx.backends import backend
 from dynx.errors import ArgumentError, ClosedError, SimulationError, shown
 from dynx.model.configuration import checked_array
-from dynx.sim.clock import multiple
+from dynx.sim.clock import multiple, refuse_too_many_steps
 from dynx.sim.loop.controller_checks import ControllerWatch
 from dynx.sim.loop.plain import Loop, LoopState
 from dynx.sim.loop.record import Record
@@ -27,7 +27,8 @@ from dynx.sim.plants.registry import make_plant
 from dynx.sim.record.rollout import Rollout
 from dynx.sim.resuming import changed_parts, refuse_other_scenario, require_rollout
 from dynx.sim.scenario.scenario import Scenario
-from dynx.sim.setup import Setup
+from dynx.sim.setup import Setup, step_bytes
+from dynx.simd.machine import require_memory
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Trajectory
 
@@ -80,6 +81,8 @@ class Simulation:
 
         `run` calls `progress` regularly.
         """
+        if progress is not None and not callable(progress):
+            raise ArgumentError(f"progress is {shown(progress)}; wanted a function of two numbers of steps")
         if not isinstance(scenario, Scenario):
             raise ArgumentError(f"scenario is of type {type(scenario).__name__}; wanted a dynx.Scenario")
         self.scenario = scenario
@@ -154,6 +157,7 @@ class Simulation:
         if until is not None:
             if not isinstance(until, int | float) or not math.isfinite(until):
                 raise ArgumentError(f"until is {shown(until)}; wanted a time in seconds")
+            refuse_too_many_steps("until", until, self._dt)
             if round(until / self._dt) < self._record.steps:
                 raise ArgumentError(
                     f"until is {until:.12g} s, but {self.time:.12g} s have been simulated; `restore` and "
@@ -249,6 +253,7 @@ class Simulation:
 
     def _extend(self, end: int) -> None:
         """Extend the buffers to hold the steps until `end`, at least to twice their size."""
+        require_memory(f"{end} steps", end * step_bytes(self.scenario.model))
         clock = replace(self._loop.clock, n_steps=max(end, 2 * len(self._record)))
         self._record = self._record.extended(clock.n_steps)
         setpoints = setpoints_of(self._setup.setpoint_of, clock, self._setup.controller)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 from functools import cache
 
+from dynx.errors import ArgumentError
+
 MAX_MEMORY_SHARE = 0.5
 """Largest fraction of the machine's memory that the arrays of one computation may take."""
 
@@ -17,6 +19,15 @@ def core_count() -> int:
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
+
+
+def require_memory(what: str, size: float) -> None:
+    """Raise ArgumentError if the arrays of `what`, of `size` bytes, are too large for this machine."""
+    if size > MAX_MEMORY_SHARE * memory_size():
+        raise ArgumentError(
+            f"{what} need about {size / 1e9:.3g} GB; this machine has {memory_size() / 1e9:.3g} GB, of which "
+            f"one computation may take {MAX_MEMORY_SHARE:.0%}"
+        )
 
 
 def memory_size() -> float:

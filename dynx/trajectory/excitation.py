@@ -20,10 +20,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dynx.backends.registry import refuse_other_than_model
 from dynx.errors import ArgumentError, TrajectoryError
 from dynx.model import Model
 from dynx.model.configuration import whole_number
+from dynx.model.model import refuse_other_than_model
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Trajectory, checked_duration, read_only
 from dynx.trajectory.curve import Curve

@@ -10,9 +10,9 @@ import numpy as np
 
 from dynx.backends import Backend
 from dynx.backends import backend as make_backend
-from dynx.backends.registry import refuse_other_than_model
 from dynx.errors import ArgumentError, LimitError, LimitViolation, ShapeError, shown
 from dynx.model import Model
+from dynx.model.model import refuse_other_than_model
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Trajectory
 

@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.backends import Backend
-from dynx.backends.registry import refuse_other_than_model
 from dynx.errors import ArgumentError, ShapeError, TrajectoryError, shown
 from dynx.ik import checked_targets
 from dynx.model import Model
 from dynx.model.configuration import checked_q
+from dynx.model.model import refuse_other_than_model
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous, pose_error
 from dynx.spatial.so3 import quat_exp, quat_from_rotation, quat_log, rotation_from_quat

@@ -53,7 +53,7 @@ def test_shapes_are_those_of_a_backend(quantity: str, base: Base) -> None:
 
 def test_a_batch_that_does_not_fit_is_refused_with_its_size(monkeypatch: pytest.MonkeyPatch) -> None:
     model = dynx.load("double_pendulum")
-    monkeypatch.setattr("dynx.bench.cases.memory_size", lambda: 1e6)
+    monkeypatch.setattr("dynx.simd.machine.memory_size", lambda: 1e6)
     require_memory(model, BenchmarkCase("inverse_dynamics", 1000))
-    with pytest.raises(ArgumentError, match=r"batch of 10000 needs 0\.00096 GB; .* 0\.001 GB"):
+    with pytest.raises(ArgumentError, match=r"10000 samples .* need about 0\.00096 GB; .* 0\.001 GB"):
         require_memory(model, BenchmarkCase("inverse_dynamics", 10000))

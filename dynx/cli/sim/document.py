@@ -125,7 +125,7 @@ def _settings(request: SimulationRequest, rollout: Rollout) -> Entry:
         **kept,
         "joints": {**kept["joints"], "armature": np.diag(rollout.rotors).tolist()},
         "noise": None if scenario.noise is None else _noise(scenario.noise),
-        "pushes": [_push(each) for each in scenario.pushes],
+        "pushes": [_push(each) for each in scenario.all_pushes],
     }
 
 

@@ -21,7 +21,8 @@ from dynx.sim import Noise, Payload, Push, Rollout, Scenario
 from dynx.sim.clock import Clock
 from dynx.sim.named_controllers import ControllerRequest, Gains, named_controller
 from dynx.sim.plants.registry import require_plant
-from dynx.simd.machine import MAX_MEMORY_SHARE, memory_size
+from dynx.sim.setup import step_bytes
+from dynx.simd.machine import require_memory
 
 GAINS = ("kp", "kd", "ki", "natural_frequency", "damping_ratio", "posture_kp", "posture_kd")
 SCENARIO_FIELDS = ("plant", "integrator", "dt", "substeps", "control_dt", "delay", "position_limits")
@@ -64,7 +65,7 @@ def prepare(given: dict[str, Any]) -> SimulationRequest:
     _refuse_ineffective_options(given, dynamics)
     motion = plan_motion(model, MotionInput.of(given))
     clock = Clock.of(given["dt"], motion.duration, given["control_dt"], given["delay"])
-    _require_memory(model, clock)
+    require_memory(f"{clock.n_steps} steps", clock.n_steps * (STEP_BYTES + step_bytes(model)))
     controller = _controller(model, given, motion, clock, dynamics)
     limits: Coefficients | None = given["effort_limits"]
     q0 = motion.start if given["q0"] is None else configuration(model, given["q0"], "--q0", motion.start)
@@ -207,13 +208,3 @@ def _mass_scale(model: Model, given: tuple[tuple[str | None, float], ...]) -> fl
         return of_all
     factors = dict.fromkeys((link.name for link in model.links), of_all)
     return {**factors, **{link: factor for link, factor in given if link is not None}}
-
-
-def _require_memory(model: Model, clock: Clock) -> None:
-    """Raise ArgumentError for a record that would not fit into the memory of the machine."""
-    needed = clock.n_steps * (STEP_BYTES + 8 * (3 * model.nq + 7 * model.nv))
-    if needed > MAX_MEMORY_SHARE * memory_size():
-        raise ArgumentError(
-            f"{clock.n_steps} steps need about {needed / 1e9:.3g} GB; "
-            f"this machine has {memory_size() / 1e9:.3g} GB"
-        )

@@ -18,6 +18,7 @@ from dynx.control.friction import SLIP, Coefficients
 from dynx.errors import ArgumentError, shown
 from dynx.model import Model
 from dynx.model.configuration import checked_q, whole_number
+from dynx.model.package_paths import StrPath
 from dynx.sim.batch.disturbances import PLACEHOLDER, BatchDisturbances
 from dynx.sim.batch.kernel import FusedStep
 from dynx.sim.batch.part import Part, PartNoise, PartOutcome, StepKernels, pushing
@@ -40,6 +41,7 @@ from dynx.sim.plants.disturbances import Push
 from dynx.sim.plants.model_error import MassScale, Payload
 from dynx.sim.scenario.scenario import Scenario, field_names
 from dynx.sim.setup import Setup, require_duration
+from dynx.simd.machine import require_memory
 from dynx.simd.threads import checked_threads
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint, Trajectory
@@ -61,7 +63,7 @@ class BatchInterrupted(KeyboardInterrupt):
 
 
 def simulate_batch(
-    model: Model | Scenario,
+    model: Model | Scenario | StrPath,
     controller: Controller[Any] | None = None,
     reference: Trajectory | ArrayLike | None = None,
     *,
@@ -84,7 +86,7 @@ def simulate_batch(
     effort_limits: bool | ArrayLike = False,
     payload: Payload | Sequence[Payload] | None = None,
     mass_scale: MassScale = 1.0,
-    pushes: Sequence[Push] = (),
+    pushes: Push | Sequence[Push] = (),
     record_every: int = 0,
     check_reference: bool = True,
     threads: int | None = None,
@@ -111,8 +113,9 @@ def simulate_batch(
     With a payload or scaled masses, `parametric` has to be made from ``plant_model(model, payload,
     mass_scale)``. With `record_every` = k every k-th state is recorded.
 
-    The first argument may also be a `Scenario` on the plant ``compiled``; then only arguments that may differ
-    between rollouts can be given besides. `BatchRollouts.scenario` is the scenario that all rollouts share.
+    The first argument may also be a robot's name or file, or a `Scenario` on the plant ``compiled``; beside
+    a scenario only arguments that may differ between rollouts can be given. `BatchRollouts.scenario` is the
+    scenario that all rollouts share.
 
     The batch is divided into parts, which run on `threads` threads (None: one per processor) or in any
     `concurrent.futures` `executor`, such as one of processes or of a cluster; results are the same bit for
@@ -150,6 +153,12 @@ def simulate_batch(
     if parameters is not None and parametric is None:
         raise ArgumentError("parameters were given without the model that they are of: dynx.parametric(...)")
     whole_number("record_every", record_every, 0)
+    if executor is not None and not isinstance(executor, Executor) and not hasattr(executor, "submit"):
+        raise ArgumentError(
+            f"executor is {shown(executor)}; wanted one of concurrent.futures, such as ThreadPoolExecutor(4)"
+        )
+    if progress is not None and not callable(progress):
+        raise ArgumentError(f"progress is {shown(progress)}; wanted a function of two numbers of rollouts")
     acting = BatchDisturbances.of(moved, setup.disturbances, varied)
     if parametric is None and not acting.armature.any():
         Solvability(moved).refuse_singular(False)
@@ -174,6 +183,8 @@ def simulate_batch(
         fixed[f"gain_{name}"] = rows.of(name, columns_of(values), size, spread=True)
     n = rows.count
     refuse_ambiguous(given, joints, n)
+    kept = clock.n_steps // record_every if record_every else 0
+    require_memory(f"{n} rollouts", 8 * n * (kept + 4) * (moved.nq + 4 * moved.nv))
     start = {name: rows.spread(array) for name, array in start.items()}
     fixed = {name: rows.spread(array) for name, array in fixed.items()}
     state = controller.initial_state()

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from dynx.errors import ArgumentError, GainError
 from dynx.model import Model
 from dynx.model.configuration import checked_array, real_array, whole_number
+from dynx.model.package_paths import StrPath
 from dynx.sim.scenario.keywords import scenario_of
 from dynx.sim.scenario.scenario import Scenario
 from dynx.spatial.scalar import Floats
@@ -25,7 +26,9 @@ PER_ROLLOUT = ("q0", "v0", *COEFFICIENTS)
 """Fields of a scenario that may have one row for each rollout of a batch."""
 
 
-def split_rows(model: Model | Scenario, given: Mapping[str, Any]) -> tuple[Scenario, dict[str, Any]]:
+def split_rows(
+    model: Model | Scenario | StrPath, given: Mapping[str, Any]
+) -> tuple[Scenario, dict[str, Any]]:
     """Return the scenario that all rollouts share, and the arguments with a row for each rollout, by name.
 
     `given` are fields of a scenario. If `model` is a scenario, they replace its fields, and only those of

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from dynx.errors import ArgumentError, shown
+from dynx.files.reading import checked_path
 from dynx.files.writing import atomic_file
 from dynx.sim.batch.part import Part, PartOutcome
 from dynx.sim.scenario.scenario import Scenario
@@ -24,7 +25,7 @@ class Store:
 
     def __init__(self, folder: str | os.PathLike[str], scenario: Scenario) -> None:
         """Raises ArgumentError if the folder cannot be made."""
-        self._folder = Path(folder)
+        self._folder = Path(checked_path(folder))
         self._scenario = scenario.with_defaults().to_json()
         try:
             self._folder.mkdir(parents=True, exist_ok=True)

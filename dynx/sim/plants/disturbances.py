@@ -20,7 +20,7 @@ from dynx.control.friction import Coefficients, JointFriction
 from dynx.control.gains import checked_gain
 from dynx.errors import ArgumentError, shown
 from dynx.model import Model
-from dynx.model.configuration import checked_array
+from dynx.model.configuration import checked_array, is_real
 from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED, REFERENCES
 from dynx.spatial.scalar import Floats
 
@@ -55,10 +55,11 @@ class Push:
                 f"a push on {shown(self.frame)} has a wrench of shape {wrench.shape} in "
                 f"{shown(self.reference)}; wanted (6,) in one of {', '.join(REFERENCES)}"
             )
-        if not self.duration > 0.0 or not np.isfinite(self.start):
+        seconds = is_real(self.start) and is_real(self.duration)
+        if not seconds or not self.duration > 0.0 or not np.isfinite(self.start):
             raise ArgumentError(
-                f"a push on {shown(self.frame)} starts at {self.start} and lasts {self.duration}; "
-                "wanted finite, and positive, seconds"
+                f"a push on {shown(self.frame)} starts at {shown(self.start)} and lasts "
+                f"{shown(self.duration)}; wanted finite, and positive, seconds"
             )
         return Push(self.frame, wrench, float(self.start), float(self.duration), self.reference)
 

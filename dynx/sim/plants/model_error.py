@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, shown
 from dynx.model import Model
-from dynx.model.configuration import checked_array, checked_vector
+from dynx.model.configuration import checked_array, checked_vector, is_real
 from dynx.model.elements import Inertial, Joint, Link, Pose
 
 
@@ -19,13 +19,28 @@ class Payload:
     """A rigid body fixed to a frame of the robot.
 
     `mass` is in kg, `center` (3,) [m] is the centre of mass in `frame`, and `inertia` (3, 3) [kg m^2] the
-    tensor about it in the axes of `frame`. The default is a point mass.
+    tensor about it in the axes of `frame`. The default is a point mass. Raises ArgumentError for numbers that
+    no body has.
     """
 
     frame: str
     mass: float
     center: ArrayLike = (0.0, 0.0, 0.0)
     inertia: ArrayLike | None = None
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.frame, str):
+            raise ArgumentError(f"the frame of a payload is {shown(self.frame)}; wanted the name of a frame")
+        if not is_real(self.mass) or not 0.0 <= float(self.mass) < np.inf:
+            raise ArgumentError(
+                f"the mass of a payload is {shown(self.mass)}; wanted a number of kilograms, 0 or more"
+            )
+        object.__setattr__(self, "mass", float(self.mass))
+        checked_vector("center", self.center)
+        if self.inertia is not None:
+            tensor = checked_array("inertia", self.inertia, 3)
+            if tensor.shape != (3, 3) or not np.array_equal(tensor, tensor.T):
+                raise ArgumentError("the inertia of a payload is not a symmetric matrix (3, 3)")
 
 
 MassScale = float | Mapping[str, float]
@@ -64,7 +79,7 @@ def _by_link(model: Model, mass_scale: MassScale) -> dict[str, float]:
 
 
 def _factor(link: str, x: object) -> float:
-    if isinstance(x, int | float | np.number) and not isinstance(x, bool) and 0.0 < float(x) < np.inf:
+    if is_real(x) and 0.0 < float(x) < np.inf:
         return float(x)
     raise ArgumentError(f"mass_scale of {shown(link)} is {shown(x)}; wanted a positive factor")
 
@@ -75,14 +90,10 @@ def _scaled(inertial: Inertial, factor: float) -> Inertial:
 
 
 def _inertial(payload: Payload) -> Inertial:
-    if not isinstance(payload.mass, int | float) or not 0.0 <= payload.mass < np.inf:
-        raise ArgumentError(f"the mass of a payload is {shown(payload.mass)}; wanted kilograms, 0 or more")
     x, y, z = checked_vector("center", payload.center).tolist()
-    tensor = np.zeros((3, 3)) if payload.inertia is None else checked_array("inertia", payload.inertia, 3)
-    if tensor.shape != (3, 3) or not np.array_equal(tensor, tensor.T):
-        raise ArgumentError("the inertia of a payload is not a symmetric matrix (3, 3)")
+    tensor = np.zeros((3, 3)) if payload.inertia is None else np.asarray(payload.inertia, dtype=float)
     (ixx, ixy, ixz), (_, iyy, iyz), (_, _, izz) = tensor.tolist()
-    return Inertial(float(payload.mass), Pose((x, y, z)), ixx, ixy, ixz, iyy, iyz, izz)
+    return Inertial(payload.mass, Pose((x, y, z)), ixx, ixy, ixz, iyy, iyz, izz)
 
 
 def _free(name: str, taken: set[str]) -> str:

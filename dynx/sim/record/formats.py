@@ -15,6 +15,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from dynx.errors import ArgumentError, ModelError, shown
+from dynx.files.reading import checked_path
 from dynx.files.writing import atomic_file
 from dynx.model.documents import robot_document, robot_from_document
 from dynx.sim.record.csv_file import write_csv
@@ -47,6 +48,7 @@ def save(rollout: RolloutData, path: str | os.PathLike[str]) -> None:
     All three keep every bit of the numbers. Raises ArgumentError for another format or a file that
     cannot be written, NotInstalledError for ``.mcap`` without mcap (``pip install 'dynx[mcap]'``).
     """
+    path = checked_path(path)
     write = WRITERS.get(Path(path).suffix.lower())
     if write is None:
         formats = " or ".join([", ".join([*WRITERS][:-1]), [*WRITERS][-1]])
@@ -60,7 +62,7 @@ def load(path: str | os.PathLike[str]) -> dict[str, Any]:
 
     The model is read from the URDF text in the file; no array is unpickled.
     """
-    name = os.fspath(path)
+    name = checked_path(path)
     entries = _entries(path)
     if str(entries.get("schema")) != SCHEMA:
         raise ArgumentError(

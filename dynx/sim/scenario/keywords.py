@@ -2,29 +2,39 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from typing import Any
 
+from dynx.backends.registry import backend_class
 from dynx.control.base import Controller
-from dynx.errors import ArgumentError, shown
+from dynx.errors import ArgumentError
 from dynx.model import Model
+from dynx.model.loading import load
+from dynx.model.package_paths import StrPath
 from dynx.sim.scenario.scenario import Scenario
 
 
-def scenario_of(model: Model | Scenario, controller_backend: str | None, given: dict[str, Any]) -> Scenario:
+def scenario_of(
+    model: Model | Scenario | StrPath, controller_backend: str | None, given: dict[str, Any]
+) -> Scenario:
     """Return the scenario of keyword arguments, or the scenario given instead of a model.
 
-    Raises ArgumentError if an argument is given that is a field of the given scenario.
+    The model may be whatever `dynx.load` takes. Raises ArgumentError if an argument is given that is a field
+    of the given scenario.
     """
     if isinstance(model, Scenario):
         refuse_beside_scenario({**given, "controller_backend": controller_backend})
         return model
     controller = given["controller"]
     if controller_backend is not None and isinstance(controller, Controller):
+        if isinstance(controller_backend, str):
+            backend_class(controller_backend)
         given = {**given, "controller": controller.on(controller_backend)}
-    if not isinstance(model, Model):
-        raise ArgumentError(f"model is {shown(model)}; wanted a Model or a Scenario")
-    return Scenario(model, **given)
+    if not isinstance(model, Model | str | os.PathLike):
+        kind = type(model).__name__
+        raise ArgumentError(f"model is of type {kind}; wanted a Model, a Scenario, or a robot's name or file")
+    return Scenario(load(model), **given)
 
 
 def refuse_beside_scenario(given: Mapping[str, Any]) -> None:

@@ -10,10 +10,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dynx.control.base import Controller
+from dynx.control.base import Controller, refuse_other_than_controller
 from dynx.control.friction import SLIP, Coefficients
 from dynx.errors import ArgumentError, nearest, shown
 from dynx.model import Model
+from dynx.model.model import refuse_other_than_model
 from dynx.sim.clock import TIME_ROUNDING, Clock
 from dynx.sim.loop.noise import Noise
 from dynx.sim.plants.disturbances import Push
@@ -92,15 +93,25 @@ class Scenario:
     position_limits: bool = False
     payload: Payload | Sequence[Payload] | None = None
     mass_scale: MassScale = 1.0
-    pushes: Sequence[Push] = ()
+    pushes: Push | Sequence[Push] = ()
     check_reference: bool = True
 
     def __post_init__(self) -> None:
-        if not isinstance(self.model, Model):
-            raise ArgumentError(f"model is of type {type(self.model).__name__}; wanted a Model")
-        if not isinstance(self.controller, Controller | Unknown | None):
-            kind = type(self.controller).__name__
-            raise ArgumentError(f"controller is of type {kind}; wanted a controller of dynx.control")
+        refuse_other_than_model(self.model)
+        if not isinstance(self.controller, Unknown | None):
+            refuse_other_than_controller("controller", self.controller)
+        if isinstance(self.reference, str) or (
+            callable(self.reference) and not isinstance(self.reference, Trajectory)
+        ):
+            raise ArgumentError(
+                f"reference is {shown(self.reference)}; wanted a trajectory of dynx.trajectory, one "
+                "configuration to hold, or None"
+            )
+        for name in ("position_limits", "check_reference"):
+            if not isinstance(getattr(self, name), bool | np.bool_):
+                raise ArgumentError(f"{name} is {shown(getattr(self, name))}; wanted True or False")
+        if self.effort_limits is None:
+            raise ArgumentError("effort_limits is None; wanted True (those of the model), False or numbers")
         if not isinstance(self.plant, str):
             raise ArgumentError(f"plant is of type {type(self.plant).__name__}; wanted the name of a plant")
         if not isinstance(self.noise, Noise | Unknown | None):
@@ -122,6 +133,11 @@ class Scenario:
     def payloads(self) -> tuple[Payload, ...]:
         """All payloads of the plant."""
         return tuple(self.payload) if isinstance(self.payload, tuple) else ()
+
+    @property
+    def all_pushes(self) -> tuple[Push, ...]:
+        """All pushes on the plant."""
+        return tuple(self.pushes) if isinstance(self.pushes, tuple) else ()
 
     def with_defaults(self) -> Scenario:
         """Return an equal scenario without None for integrator, control step and, if known, duration, which
@@ -204,7 +220,7 @@ class Scenario:
         """Return the scenario of a text that `to_json` wrote. Raises ArgumentError for any other text."""
         try:
             document = json.loads(text)
-        except ValueError as error:
+        except (TypeError, ValueError) as error:
             raise ArgumentError(f"the text is not JSON: {error}") from error
         return cls.from_dict(document)
 
