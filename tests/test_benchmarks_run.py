@@ -41,6 +41,14 @@ def test_integrators_are_of_their_order() -> None:
     assert finished.stdout.count("fitted order") == 3
 
 
+def test_the_table_of_every_quantity_compares_the_engines() -> None:
+    chosen = ["--robot", "ur5", "--quantity", "mass_matrix", "--batch", "64", "--repetitions", "1"]
+    finished = run("benchmarks.every_quantity", *chosen)
+    # A ratio measured once on a busy machine may be below 1.
+    assert finished.returncode in (0, 1), finished.stdout + finished.stderr
+    assert len([line for line in finished.stdout.splitlines() if line.startswith("ur5")]) == 2
+
+
 def run(*command: str) -> subprocess.CompletedProcess[str]:
     """Run `python -m` with these arguments in the root of the repository."""
     # Options meant for this run, such as its number of processes, are not meant for that one.

@@ -21,7 +21,7 @@ from dynx.backends.base import Backend
 from dynx.backends.quantities import QUANTITIES, Quantity
 from dynx.backends.quantity_calls import Forces
 from dynx.compiled.arguments import BatchArguments
-from dynx.compiled.call import KernelCall, NumericCall, write_into
+from dynx.compiled.call import CoupledCall, KernelCall, NumericCall, write_into
 from dynx.compiled.frames import chain_of, place_of
 from dynx.compiled.kernels import (
     ON_CHAINS,
@@ -30,6 +30,7 @@ from dynx.compiled.kernels import (
     kernel_quantity,
     quantity_kernel,
 )
+from dynx.compiled.looped.kernels import LOOPED, looped_kernel
 from dynx.compiled.simplification import has_physical_inertias, simplify_mechanism
 from dynx.model import Model
 from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED
@@ -223,13 +224,22 @@ class CompiledBackend(Backend):
         checks = tuple(self._check(argument, tree) for argument in described.arguments)
         check_result = self._arguments.finite_acceleration if described.solves and not tree else None
         mechanism = replace(self._simplified, coupling=None) if tree else self._simplified
-        if not compiles(mechanism, quantity):
-            return NumericCall(mechanism, quantity, details, checks, check_result=check_result).evaluate
         options: dict[str, Any] = {
             "threads": self._threads,
             "validate": self._validate and not tree,
             "check_result": check_result,
         }
+        if not compiles(mechanism, quantity):
+            if quantity not in LOOPED:
+                return NumericCall(mechanism, quantity, details, checks, check_result=check_result).evaluate
+            in_tree = replace(mechanism, coupling=None)
+            if mechanism.coupling is None:
+                return KernelCall(looped_kernel(in_tree, quantity, details), checks, **options).evaluate
+            options["validate"] = False
+            looped = KernelCall(
+                looped_kernel(in_tree, quantity, details), (np.asarray,) * len(checks), **options
+            )
+            return CoupledCall(mechanism, quantity, looped.evaluate, checks).evaluate
         if quantity not in ON_CHAINS:
             kernel = quantity_kernel(mechanism, quantity, details)
             return KernelCall(kernel, checks, **options).evaluate

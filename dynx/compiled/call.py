@@ -13,7 +13,9 @@ from typing import Any
 import numpy as np
 
 from dynx.backends.evaluation import batch_rows, common_batch
-from dynx.compiled.kernels import MAX_DEFECT, evaluate_quantity, kernel_quantity
+from dynx.compiled.defect import MAX_DEFECT
+from dynx.compiled.kernels import evaluate_quantity, kernel_quantity
+from dynx.compiled.model_coordinates import reduce_columns, reduce_rows, tree_coordinates
 from dynx.errors import ArgumentError, DTypeError, ShapeError
 from dynx.model import Mechanism
 from dynx.simd.kernel import Kernel, Workspace
@@ -216,6 +218,27 @@ class NumericCall:
         result = found if whole else np.array(np.broadcast_to(found, shape))
         if self._check_result is not None:
             self._check_result(result)
+        return write_into(out, result)
+
+
+class CoupledCall:
+    """A quantity of a robot with mimic joints, evaluated in tree coordinates by a call without them."""
+
+    def __init__(
+        self, mechanism: Mechanism, quantity: str, in_tree: Callable[..., Floats], checks: tuple[Check, ...]
+    ) -> None:
+        self._mechanism, self._quantity = mechanism, kernel_quantity(quantity)
+        self._in_tree, self._checks = in_tree, checks
+
+    def evaluate(self, q: Any, v: Any = _ABSENT, a: Any = _ABSENT, out: Floats | None = None) -> Floats:
+        """Return the result (..., *shape), as `KernelCall.evaluate` does."""
+        arguments = (x for x in (q, v, a) if x is not _ABSENT)
+        arrays = [check(argument) for check, argument in zip(self._checks, arguments, strict=True)]
+        result = self._in_tree(*tree_coordinates(self._mechanism, *arrays))
+        if self._quantity.reduces_columns:
+            result = reduce_columns(self._mechanism, result)
+        if self._quantity.reduces_rows:
+            result = reduce_rows(self._mechanism, result)
         return write_into(out, result)
 
 

@@ -18,12 +18,14 @@ from collections.abc import Callable
 from dataclasses import fields, replace
 from functools import cache, partial
 from hashlib import sha256
+from math import prod
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import dynx.backends.quantities
+import dynx.compiled.defect
 import dynx.compiled.model_coordinates
 import dynx.compiled.simplification
 import dynx.model.configuration
@@ -31,9 +33,11 @@ import dynx.model.mechanism
 import dynx.rbd
 import dynx.spatial
 from dynx._version import __version__
-from dynx.backends.quantities import QUANTITIES, Growth, Quantity
+from dynx.backends.quantities import QUANTITIES, Quantity
 from dynx.compiled import frames as compiled_frames
+from dynx.compiled.defect import MAX_DEFECT, argument_defect
 from dynx.compiled.frames import Chain, on_chain
+from dynx.compiled.looped.kernels import LOOPED
 from dynx.compiled.model_coordinates import (
     argument_shapes,
     reduce_columns,
@@ -41,7 +45,6 @@ from dynx.compiled.model_coordinates import (
     tree_coordinates,
 )
 from dynx.model import Mechanism
-from dynx.model.configuration import MAX_MAGNITUDE, UNIT_NORM_TOLERANCE
 from dynx.rbd import coriolis
 from dynx.rbd.base_parameters import regroup_inertias
 from dynx.rbd.kinematics import Poses, ancestry, frame_placement
@@ -54,15 +57,21 @@ from dynx.simd.target import host
 from dynx.simd.trace import trace
 from dynx.spatial.scalar import Array
 
-MAX_DEFECT = MAX_MAGNITUDE**2
-"""Bound on the defect of a sample with valid arguments."""
-
 MAX_RESULT = 1e300
 """Bound on the results of quantities that solve an equation; accelerations of robots are smaller."""
 
-MAX_CODE_SIZE = 1000
-"""Largest size of a quantity's code (`_code_size`), which takes about 20 seconds to compile. NumPy
-evaluates quantities with larger code."""
+MAX_COMPILE_SECONDS = 7.0
+"""Longest predicted time of a compilation (`compile_seconds`). NumPy evaluates quantities that would take
+longer."""
+
+MAX_SECONDS_BESIDE_ROUTINES = 3.0
+"""The same for quantities that routines compute instead, which are half as fast but compiled already."""
+
+SECONDS_OF_OPERATION, SECONDS_OF_RESULT = 1.5e-4, 3e-4
+"""Time to trace and compile an operation, and to compile the store of a number of the result."""
+
+OPERATIONS_OF_BODY = {"forward_dynamics": 460, "mass_matrix": 150, "coriolis_matrix": 350}
+"""Operations for each body of some quantities; 250 of all others."""
 
 SEGMENT_OF_CUBIC_CODE = 600
 """Length of the segments (`dynx.simd.emit`) of code that grows with the cube of the number of joints.
@@ -97,18 +106,43 @@ def kernel_quantity(name: str) -> Quantity:
     return _PLACEMENTS.get(name) or QUANTITIES[name]
 
 
-def _code_size(mechanism: Mechanism, growth: Growth) -> int:
-    """Return the size of the code of an algorithm, in the units of `MAX_CODE_SIZE`."""
-    if growth == "cubic":
-        return len(mechanism.bodies) * mechanism.nv**2
-    if growth == "pairs":
-        return sum(len(ancestry(mechanism, body)) for body in range(len(mechanism.bodies)))
-    return 4 * mechanism.nv
+def compile_seconds(mechanism: Mechanism, name: str) -> float:
+    """Return about how long it takes to trace and compile a quantity [s], on the machine of docs/bench.md."""
+    operations, results = code_size(mechanism, name)
+    return SECONDS_OF_OPERATION * operations + SECONDS_OF_RESULT * results
+
+
+def code_size(mechanism: Mechanism, name: str) -> tuple[float, int]:
+    """Return an upper estimate of the operations of a quantity's program, and its number of results."""
+    quantity, bodies = kernel_quantity(name), len(mechanism.bodies)
+    base = 6 if mechanism.floating else 0
+    pairs = sum(len(ancestry(mechanism, body)) + base for body in range(bodies))
+    frames = len(mechanism.frames)
+    extents = {"nv": mechanism.nv, "10 n_links": 10 * frames, "n_frames": frames}
+    results = prod(n if isinstance(n, int) else extents[n] for n in quantity.shape)
+    operations, dense = 300.0 + OPERATIONS_OF_BODY.get(name, 250) * bodies, _pose_density(mechanism)
+    if name == "frame_placements":
+        operations += 60 * frames
+    if quantity.growth == "cubic":
+        operations += dense * 170 * frames * pairs / max(1, bodies)
+    elif quantity.growth == "pairs" or (quantity.solves and mechanism.coupling is not None):
+        operations += dense * (110 if name == "coriolis_matrix" else 45) * pairs
+    if quantity.solves and mechanism.coupling is not None:
+        operations += mechanism.nv**3 / 3
+    return operations, results
+
+
+def _pose_density(mechanism: Mechanism) -> float:
+    """Return the share of the poses' numbers that are not zero: operations with zeros are not compiled."""
+    numbers = [x for body in mechanism.bodies for x in (body.R, body.p)]
+    return sum(np.count_nonzero(x) for x in numbers) / max(1, sum(x.size for x in numbers))
 
 
 def compiles(mechanism: Mechanism, name: str) -> bool:
-    """Check whether a quantity of this mechanism is compiled, rather than evaluated by NumPy."""
-    return _code_size(mechanism, kernel_quantity(name).growth) <= MAX_CODE_SIZE
+    """Check whether a quantity of this mechanism is compiled, rather than evaluated by routines that are
+    compiled for all robots (`dynx.compiled.looped`) or by NumPy."""
+    limit = MAX_SECONDS_BESIDE_ROUTINES if name in LOOPED else MAX_COMPILE_SECONDS
+    return compile_seconds(mechanism, name) <= limit
 
 
 def evaluate_quantity(
@@ -182,30 +216,12 @@ def _program(mechanism: Mechanism, name: str, result: Computation, **more: tuple
 
     def result_and_defect(**inputs: Array) -> dict[str, Array]:
         found = result(*inputs.values())
-        defect = _defect(mechanism, *(inputs[argument] for argument in quantity.arguments))
+        defect = argument_defect(mechanism, *(inputs[argument] for argument in quantity.arguments))
         if quantity.solves:
             defect = defect + np.sum(abs(found)) * (MAX_DEFECT / MAX_RESULT)
         return {"result": found, "defect": defect}
 
     return trace(result_and_defect, {**argument_shapes(mechanism, quantity.arguments), **more})
-
-
-def _defect(mechanism: Mechanism, q: Array, *rates: Array) -> Array:
-    """Return the sum of squares of all arguments; far above `MAX_DEFECT` for a quaternion not of length 1."""
-    numbers = np.concatenate([q, *rates])
-    total = _sum_by_pairs([x * x for x in numbers])
-    if mechanism.floating:
-        off = abs(sum(x * x for x in q[3:7]) - 1.0)
-        total = total + (off - UNIT_NORM_TOLERANCE).maximum(0.0) * (MAX_DEFECT * 1e100)
-    return np.array([total], dtype=object)
-
-
-def _sum_by_pairs(terms: list[Any]) -> Any:
-    """Add terms in pairs: few additions then depend on one another, and the processor overlaps them."""
-    while len(terms) > 1:
-        odd = terms[len(terms) // 2 * 2 :]
-        terms = [a + b for a, b in zip(terms[::2], terms[1::2], strict=False)] + odd
-    return terms[0] if terms else 0.0
 
 
 @cache
@@ -216,6 +232,7 @@ def _algorithms() -> str:
         dynx.model.configuration,
         dynx.model.mechanism,
         dynx.backends.quantities,
+        dynx.compiled.defect,
         dynx.compiled.model_coordinates,
         dynx.compiled.simplification,
         compiled_frames,

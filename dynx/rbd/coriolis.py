@@ -32,7 +32,7 @@ from functools import cached_property
 
 import numpy as np
 
-from dynx.model.mechanism import ROOT, Mechanism
+from dynx.model.mechanism import ROOT, Body, Mechanism
 from dynx.rbd.kinematics import Poses, ancestry, joint_value
 from dynx.rbd.placement import Placement
 from dynx.spatial.inertia import RigidInertia
@@ -57,7 +57,7 @@ def coriolis_matrix_at(mechanism: Mechanism, q: Array, v: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class _ToParent:
+class ToParent:
     """Transform from a body to its parent: pose, and velocity `dp` of the body's origin in the parent."""
 
     placement: Placement
@@ -80,7 +80,7 @@ class _ToParent:
 
 
 @dataclass(frozen=True)
-class _Subspace:
+class Subspace:
     """Motion subspace: velocity fields `linear` + `angular` x r at unit speed of the `coordinates`.
 
     They and their time derivatives are columns (..., 3, d) in the axes of the body that moves.
@@ -94,7 +94,7 @@ class _Subspace:
 
 
 @dataclass(frozen=True)
-class _Response:
+class Response:
     """Momenta and forces of a subtree moved by a motion subspace: columns (..., 3, d).
 
     For the velocity field u of a column, they are the integrals over the mass of u (`momentum`), r x u
@@ -107,10 +107,10 @@ class _Response:
     moment: Array
     couple: Array
 
-    def to_parent(self, step: _ToParent) -> _Response:
+    def to_parent(self, step: ToParent) -> Response:
         """Return the response about the origin of the parent and relative to its velocity."""
         momentum, force = step.R @ self.momentum, step.R @ self.force
-        return _Response(
+        return Response(
             momentum=momentum,
             angular_momentum=step.R @ self.angular_momentum + step.lever @ momentum,
             force=force,
@@ -118,7 +118,7 @@ class _Response:
             couple=step.R @ self.couple + step.lever_rate @ momentum,
         )
 
-    def entries(self, subspace: _Subspace) -> tuple[Array, Array]:
+    def entries(self, subspace: Subspace) -> tuple[Array, Array]:
         """Return the block of C in the rows of `subspace`, columns of this response, and its mirror block."""
         block = _transposed(subspace.linear) @ self.force + _transposed(subspace.angular) @ self.moment
         mirror_block = (
@@ -130,29 +130,34 @@ class _Response:
 
 
 @dataclass(frozen=True)
-class _Composite:
+class Composite:
     """Subtree of a body, itself included: its inertia, f (..., 3) and E (..., 3, 3) (see the module)."""
 
     inertia: RigidInertia
     f: Array
     E: Array
 
-    def __add__(self, other: _Composite) -> _Composite:
-        return _Composite(self.inertia + other.inertia, self.f + other.f, self.E + other.E)
+    @classmethod
+    def of_rigid_body(cls, inertia: RigidInertia, w: Array) -> Composite:
+        """Return the composite of one rigid body, in which dr/dt = w x r."""
+        return cls(inertia, cross(w, inertia.first_moment), -skew(w) @ inertia.second_moment_matrix)
 
-    def to_parent(self, step: _ToParent) -> _Composite:
+    def __add__(self, other: Composite) -> Composite:
+        return Composite(self.inertia + other.inertia, self.f + other.f, self.E + other.E)
+
+    def to_parent(self, step: ToParent) -> Composite:
         """Return the composite about the origin of the parent and relative to its velocity."""
         inertia, f = step.placement.inertia_to_parent(self.inertia), rotate(step.R, self.f)
         E = step.placement.rotate_tensor(self.E) - step.lever @ skew(f)
         E = E - skew(inertia.first_moment) @ step.lever_rate
-        return _Composite(inertia, f + step.dp * inertia.mass, np.asarray(E))
+        return Composite(inertia, f + step.dp * inertia.mass, np.asarray(E))
 
-    def response(self, subspace: _Subspace) -> _Response:
+    def response(self, subspace: Subspace) -> Response:
         """Return the response of the subtree to the motion of its own body."""
         mass, J = self.inertia.mass, self.inertia.rotational_inertia
         H, F = skew(self.inertia.first_moment), skew(self.f)
         u, e, du, de = subspace.linear, subspace.angular, subspace.linear_rate, subspace.angular_rate
-        return _Response(
+        return Response(
             momentum=u * mass - H @ e,
             angular_momentum=H @ u + J @ e,
             force=du * mass - H @ de - F @ e,
@@ -164,7 +169,7 @@ class _Composite:
 def _matrix(mechanism: Mechanism, placements: Sequence[Placement], v: Array) -> Array:
     omega, steps = _angular_velocities_and_steps(mechanism, placements, v)
     moving = range(ROOT if mechanism.floating else 0, len(mechanism.bodies))
-    composites = {body: _single_body(mechanism, body, omega[body]) for body in moving}
+    composites = {body: Composite.of_rigid_body(_inertia(mechanism, body), omega[body]) for body in moving}
     for body in reversed(range(len(mechanism.bodies))):
         parent = mechanism.bodies[body].parent
         if parent in composites:
@@ -172,7 +177,13 @@ def _matrix(mechanism: Mechanism, placements: Sequence[Placement], v: Array) -> 
 
     zero = 0 * np.sum(v, axis=-1)
     C = [[zero] * mechanism.nv for _ in range(mechanism.nv)]
-    subspaces = {body: _motion_subspace(mechanism, body, omega[body]) for body in moving}
+    first = mechanism.nv - len(mechanism.bodies)
+    subspaces = {
+        body: base_subspace(omega[body])
+        if body == ROOT
+        else joint_subspace(mechanism.bodies[body], first + body, omega[body])
+        for body in moving
+    }
     for body in moving:
         response = composites[body].response(subspaces[body])
         path = ancestry(mechanism, body) + ([ROOT] if mechanism.floating else [])
@@ -193,39 +204,46 @@ def _matrix(mechanism: Mechanism, placements: Sequence[Placement], v: Array) -> 
 
 def _angular_velocities_and_steps(
     mechanism: Mechanism, placements: Sequence[Placement], v: Array
-) -> tuple[dict[int, Array], list[_ToParent]]:
+) -> tuple[dict[int, Array], list[ToParent]]:
     """Return the angular velocity of every body in its own axes, and the transforms to the parents."""
     omega = {ROOT: v[..., 3:6] if mechanism.floating else 0 * mechanism.gravity}
     steps = []
     for index, (body, placement) in enumerate(zip(mechanism.bodies, placements, strict=True)):
-        R = placement.R
-        speed = body.axis * append_axis(joint_value(mechanism, v, index))
-        dp = cross(omega[body.parent], placement.p)
-        omega[index] = rotate_back(R, omega[body.parent])
-        if body.revolute:
-            omega[index] = omega[index] + speed
-        else:
-            dp = dp + rotate(R, speed)
-        steps.append(_ToParent(placement, dp))
+        omega[index], step = step_to_child(
+            body, placement, omega[body.parent], joint_value(mechanism, v, index)
+        )
+        steps.append(step)
     return omega, steps
 
 
-def _single_body(mechanism: Mechanism, body: int, w: Array) -> _Composite:
-    """Return the composite of one rigid body, in which dr/dt = w x r."""
-    inertia = mechanism.root if body == ROOT else mechanism.bodies[body].inertia
-    return _Composite(inertia, cross(w, inertia.first_moment), -skew(w) @ inertia.second_moment_matrix)
+def step_to_child(body: Body, placement: Placement, omega: Array, speed: Array) -> tuple[Array, ToParent]:
+    """Return the angular velocity of a body in its own axes, and its transform to the parent, from the
+    angular velocity `omega` of the parent and the speed (...,) of the joint."""
+    R = placement.R
+    own = body.axis * append_axis(speed)
+    dp = cross(omega, placement.p)
+    turned = rotate_back(R, omega)
+    if body.revolute:
+        return turned + own, ToParent(placement, dp)
+    return turned, ToParent(placement, dp + rotate(R, own))
 
 
-def _motion_subspace(mechanism: Mechanism, body: int, w: Array) -> _Subspace:
-    """Return the motion subspace of a body's joint, or of a floating base: the axes of its frame."""
-    if body == ROOT:
-        coordinates, axes = range(6), np.eye(3, dtype=int)
-        linear, angular = (np.concatenate(pair, axis=-1) for pair in ((axes, 0 * axes), (0 * axes, axes)))
-    else:
-        first = mechanism.nv - len(mechanism.bodies) + body
-        coordinates, axis = range(first, first + 1), mechanism.bodies[body].axis[..., None]
-        linear, angular = (0 * axis, axis) if mechanism.bodies[body].revolute else (axis, 0 * axis)
-    return _Subspace(coordinates, linear, angular, skew(w) @ linear, skew(w) @ angular)
+def _inertia(mechanism: Mechanism, body: int) -> RigidInertia:
+    return mechanism.root if body == ROOT else mechanism.bodies[body].inertia
+
+
+def base_subspace(w: Array) -> Subspace:
+    """Return the motion subspace of a floating base with angular velocity w: the axes of its frame."""
+    axes = np.eye(3, dtype=int)
+    linear, angular = (np.concatenate(pair, axis=-1) for pair in ((axes, 0 * axes), (0 * axes, axes)))
+    return Subspace(range(6), linear, angular, skew(w) @ linear, skew(w) @ angular)
+
+
+def joint_subspace(body: Body, coordinate: int, w: Array) -> Subspace:
+    """Return the motion subspace of the joint of a body with angular velocity w, number `coordinate`."""
+    axis = body.axis[..., None]
+    linear, angular = (0 * axis, axis) if body.revolute else (axis, 0 * axis)
+    return Subspace(range(coordinate, coordinate + 1), linear, angular, skew(w) @ linear, skew(w) @ angular)
 
 
 def _transposed(A: Array) -> Array:

@@ -15,6 +15,7 @@ Pinocchio lists the tensor as Ixx, Ixy, Iyy, Ixz, Iyz, Izz.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -48,8 +49,7 @@ def inertial_regressor(
         body = mechanism.frames[frame].body
         R, p = frame_pose(mechanism, poses, frame)
         omega, alpha = twists[body][1], accelerations[body][1]
-        lever = p - poses[body][1]
-        acceleration = accelerations[body][0] + cross(alpha, lever) + cross(omega, cross(omega, lever))
+        acceleration = accelerations[body][0] + fixed_point_acceleration(omega, alpha, p - poses[body][1])
         proper_acceleration = rotate_back(R, acceleration - mechanism.gravity)
         wrench = wrench_regressor(proper_acceleration, rotate_back(R, omega), rotate_back(R, alpha))
         J = frame_jacobian(mechanism, poses, frame, "local")
@@ -68,9 +68,18 @@ def wrench_regressor(proper_acceleration: Array, omega: Array, alpha: Array) -> 
         f = m d + alpha x h + w x (w x h),   n = h x d + I alpha + w x I w
     """
     d, omega, alpha = np.broadcast_arrays(proper_acceleration, omega, alpha)
+    return assemble_wrench_regressor(d, *moment_matrices(omega, alpha))
+
+
+def moment_matrices(omega: Array, alpha: Array) -> tuple[Array, Array]:
+    """Return the matrices (..., 3, 3) by which the first moment is multiplied in the force, and (..., 3, 6)
+    by which the second moments are multiplied in the moment."""
     W = skew(omega)
-    acceleration_matrix = skew(alpha) + W @ W
-    moments = _tensor_columns(alpha) + W @ _tensor_columns(omega)
+    return skew(alpha) + W @ W, _tensor_columns(alpha) + W @ _tensor_columns(omega)
+
+
+def assemble_wrench_regressor(d: Array, acceleration_matrix: Array, moments: Array) -> Array:
+    """Return the matrix of `wrench_regressor` from its blocks."""
     column = d[..., None]
     force = np.concatenate([column, acceleration_matrix, 0 * moments], axis=-1)
     moment = np.concatenate([0 * column, -skew(d), moments], axis=-1)
@@ -90,18 +99,49 @@ def body_accelerations(
         linear, angular = [0 * p], [0 * p]
     for index, body in enumerate(mechanism.bodies):
         axis = joint_axis(mechanism, poses, index)
-        speed = axis * append_axis(joint_value(mechanism, v, index))
-        joint_acceleration = axis * append_axis(joint_value(mechanism, a, index))
-        omega, alpha = twists[body.parent][1], angular[body.parent + 1]
-        lever = poses[index][1] - poses[body.parent][1]
-        acceleration = linear[body.parent + 1] + cross(alpha, lever) + cross(omega, cross(omega, lever))
-        if body.revolute:
-            linear.append(acceleration)
-            angular.append(alpha + joint_acceleration + cross(omega, speed))
-        else:
-            linear.append(acceleration + joint_acceleration + 2 * cross(omega, speed))
-            angular.append(alpha)
+        parent = BodyState(
+            poses[body.parent][1], twists[body.parent][1], linear[body.parent + 1], angular[body.parent + 1]
+        )
+        acceleration, alpha = child_acceleration(
+            parent,
+            poses[index][1],
+            axis * append_axis(joint_value(mechanism, v, index)),
+            axis * append_axis(joint_value(mechanism, a, index)),
+            revolute=body.revolute,
+        )
+        linear.append(acceleration)
+        angular.append(alpha)
     return BodyVectors(tuple(linear), tuple(angular))
+
+
+@dataclass(frozen=True)
+class BodyState:
+    """Position and acceleration of the origin of a body, its angular velocity and acceleration, in world
+    axes."""
+
+    p: Array
+    omega: Array
+    acceleration: Array
+    alpha: Array
+
+
+def child_acceleration(
+    parent: BodyState, p: Array, speed: Array, joint_acceleration: Array, *, revolute: bool
+) -> tuple[Array, Array]:
+    """Return the linear acceleration of the origin `p` of a body and its angular acceleration.
+
+    `speed` and `joint_acceleration` are those of the joint along its axis, in world axes (..., 3).
+    """
+    omega, alpha = parent.omega, parent.alpha
+    acceleration = parent.acceleration + fixed_point_acceleration(omega, alpha, p - parent.p)
+    if revolute:
+        return acceleration, alpha + joint_acceleration + cross(omega, speed)
+    return acceleration + joint_acceleration + 2 * cross(omega, speed), alpha
+
+
+def fixed_point_acceleration(omega: Array, alpha: Array, lever: Array) -> Array:
+    """Return the acceleration of a point of a body relative to its origin, from which it is `lever` away."""
+    return cross(alpha, lever) + cross(omega, cross(omega, lever))
 
 
 def inertial_parameters(model: Model, convert: ScalarConverter = float64) -> Array:

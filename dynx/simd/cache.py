@@ -19,16 +19,20 @@ import stat
 from collections.abc import Callable
 from functools import cache
 from hashlib import sha256
+from itertools import accumulate, pairwise
 from pathlib import Path
+from typing import TypeVar
 
 import platformdirs
 
 from dynx.errors import ArgumentError, CompileError
 from dynx.files.writing import write_bytes
+from dynx.simd.call_table import RoutineCode
 from dynx.simd.emit import Settings
-from dynx.simd.image import Image, compile_image
+from dynx.simd.image import Code, Image, compile_image, compile_routines
 from dynx.simd.kernel import Kernel
 from dynx.simd.program import Port, Program
+from dynx.simd.routines import RoutineSet
 from dynx.simd.target import Target, compiler_version, host
 
 MAX_CACHE_BYTES = 512 * 2**20
@@ -37,8 +41,10 @@ MAX_CACHE_BYTES = 512 * 2**20
 OFF_WORDS = frozenset({"0", "no", "off", "false"})
 """Values of ``DYNX_CACHE`` that switch the cache off."""
 
+T = TypeVar("T")
+
 _SUFFIX = ".kernel"
-_MAGIC = b"dynx kernel 1\n"
+_MAGIC = b"dynx kernel 2\n"
 _DIGEST = 32
 
 
@@ -52,17 +58,45 @@ def load_kernel(
     """Load the kernel of `recipe` from the cache, or compile `program()` and store it there."""
     target = host() if target is None else target
     settings = Settings(target.lanes) if settings is None else settings
+    return _load(recipe, lambda: compile_image(program(), target, settings), target, settings, Kernel)
+
+
+def load_routines(recipe: bytes, routines: RoutineSet) -> RoutineCode:
+    """Load a set of routines, which `recipe` determines, from the cache, or compile it and store it there."""
+    target = host()
+
+    def load(lanes: int) -> tuple[Image, Code]:
+        settings = Settings(lanes)
+        return _load(
+            recipe,
+            lambda: compile_routines(routines, target, settings),
+            target,
+            settings,
+            lambda image: (image, Code(image)),
+        )
+
+    (_, single), (image, several) = load(1), load(target.lanes)
+    return RoutineCode(single, several, image)
+
+
+def _load(
+    recipe: bytes,
+    compiled: Callable[[], Image],
+    target: Target,
+    settings: Settings,
+    link: Callable[[Image], T],
+) -> T:
     folder = _cache_folder()
     if folder is None:
-        return Kernel(program(), target=target, settings=settings)
+        return link(compiled())
     path = folder / (_key(recipe, target, settings) + _SUFFIX)
     found = _read(path, target)
     if found is not None:
         with contextlib.suppress(CompileError):
-            return Kernel(found)
-    image = compile_image(program(), target, settings)
+            return link(found)
+    image = compiled()
     _write(path, image)
-    return Kernel(image)
+    return link(image)
 
 
 def program_recipe(program: Program) -> bytes:
@@ -137,7 +171,9 @@ def _read(path: Path, target: Target) -> Image | None:
     inputs, outputs = (
         tuple(Port(name, tuple(shape)) for name, shape in head[side]) for side in ("inputs", "outputs")
     )
-    return Image(inputs, outputs, head["lanes"], target, body[4 + size :])
+    ends = [4 + size + end for end in accumulate(head["sizes"], initial=0)]
+    objects = tuple(body[start:end] for start, end in pairwise(ends))
+    return Image(inputs, outputs, head["lanes"], target, objects)
 
 
 def _write(path: Path, image: Image) -> None:
@@ -146,8 +182,9 @@ def _write(path: Path, image: Image) -> None:
         side: [(port.name, port.shape) for port in found]
         for side, found in (("inputs", image.inputs), ("outputs", image.outputs))
     }
-    head = json.dumps({**ports, "lanes": image.lanes}).encode()
-    body = len(head).to_bytes(4, "little") + head + image.code
+    sizes = [len(code) for code in image.objects]
+    head = json.dumps({**ports, "lanes": image.lanes, "sizes": sizes}).encode()
+    body = b"".join([len(head).to_bytes(4, "little"), head, *image.objects])
     # Only the user may read or write it, whatever the umask: it holds code that is run.
     with contextlib.suppress(ArgumentError, OSError):
         write_bytes(path, _MAGIC + sha256(body).digest() + body, mode=0o600)

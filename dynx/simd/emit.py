@@ -11,6 +11,7 @@ linearly with the length of straight-line code. Values that a later segment need
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -61,17 +62,35 @@ class Settings:
 
 
 def emit(program: Program, target: Target, settings: Settings) -> str:
-    """Return the text of the LLVM module that evaluates a program."""
+    """Return the text of one LLVM module that evaluates a program."""
+    bodies, loop = _functions(program, target, settings, "internal")
+    return _module([*bodies, loop], target, settings)
+
+
+def emit_modules(program: Program, target: Target, settings: Settings) -> list[str]:
+    """Return the texts of LLVM modules that evaluate a program together, one for each segment and one for
+    the loop over the samples. Each is compiled in a fraction of a second."""
+    bodies, loop = _functions(program, target, settings, "")
+    if len(bodies) == 1:
+        return [emit(program, target, settings)]
+    declared = [f"declare void @segment{k}(ptr, i64, ptr)" for k in range(len(bodies))]
+    return [_module(texts, target, settings) for texts in (*([body] for body in bodies), [*declared, loop])]
+
+
+def _functions(program: Program, target: Target, settings: Settings, linkage: str) -> tuple[list[str], str]:
+    """Return the texts of the segments, whose symbols have this linkage, and of the entry function."""
     segments = schedule(program, settings.lanes, settings.segment)
     check_schedule(program, segments, settings.lanes)
     slots = spill_slots(program, segments)
     bodies = [
-        _SegmentBody(program, target, settings, segment, slots, number).text()
+        SegmentBody(program, target, settings, segment, slots, number).text(linkage)
         for number, segment in enumerate(segments)
     ]
-    parts = [f'target triple = "{target.triple}"']
-    parts += bodies
-    parts += [_loop(program, settings, len(segments), max(slots.values(), default=0) + 1)]
+    return bodies, _loop(program, settings, len(segments), max(slots.values(), default=0) + 1)
+
+
+def _module(functions: Sequence[str], target: Target, settings: Settings) -> str:
+    parts = [f'target triple = "{target.triple}"', *functions]
     parts += [*declarations(settings.lanes), "declare void @llvm.prefetch.p0(ptr, i32, i32, i32)"]
     return "\n".join(parts) + "\n"
 
@@ -148,7 +167,7 @@ _BINARY: dict[Op, str] = {"add": "fadd", "sub": "fsub", "mul": "fmul", "div": "f
 _ORDER: dict[Op, str] = {"min": "olt", "max": "ogt"}
 
 
-class _SegmentBody:
+class SegmentBody:
     """One segment as a function of the arguments, the first sample of the group, and the spilled values."""
 
     def __init__(
@@ -174,22 +193,25 @@ class _SegmentBody:
             (k, column) for k, port in enumerate(program.inputs) for column in range(port.size)
         ]
 
-    def text(self) -> str:
-        """Return the text of the function."""
-        for step in self._segment.steps:
-            if isinstance(step, TrigGroup):
-                self._trig(step)
-            else:
-                self._compute(step)
+    def text(self, linkage: str = "internal") -> str:
+        """Return the text of the function, whose symbol has this linkage."""
+        self._compute_steps()
         self._store_results()
         head = (
-            f"define internal void @segment{self._number}"
+            f"define {linkage} void @segment{self._number}"
             "(ptr noalias nocapture readonly %arguments, i64 %first, ptr noalias nocapture %kept) {"
         )
         heads = [line for index in sorted(self._lanes) for line in self._row_pointers[index]]
         return "\n".join([head, "entry:", *heads, *self._write.lines, "  ret void", "}"])
 
     # -- values -------------------------------------------------------------------------------------
+
+    def _compute_steps(self) -> None:
+        for step in self._segment.steps:
+            if isinstance(step, TrigGroup):
+                self._trig(step)
+            else:
+                self._compute(step)
 
     def _value(self, index: int) -> str:
         """Return the name of a node's vector: computed here, an input, spilled earlier, or constant."""
@@ -200,12 +222,15 @@ class _SegmentBody:
         if node.op == "constant":
             name = self._write.splat(node.value)
         elif node.op == "input":
-            port, column = self._slot_port[node.slot]
-            name = self._rows[port].load(column)
+            name = self._input(*self._slot_port[node.slot])
         else:
             name = self._write.let(f"load {self._write.vector}, ptr {self._slot(index)}, align 64")
         self._values[index] = name
         return name
+
+    def _input(self, port: int, column: int) -> str:
+        """Return the name of the vector of one column of an input."""
+        return self._rows[port].load(column)
 
     def _compute(self, index: int) -> None:
         write, node, flags = self._write, self._program.nodes[index], self._settings.flags

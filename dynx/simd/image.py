@@ -14,8 +14,9 @@ from dataclasses import dataclass
 from llvmlite import binding
 
 from dynx.errors import CompileError
-from dynx.simd.emit import ENTRY, Settings, emit
+from dynx.simd.emit import ENTRY, Settings, emit_modules
 from dynx.simd.program import Port, Program
+from dynx.simd.routines import RoutineSet, emit_routines
 from dynx.simd.target import Target, host
 
 COMPILE_LOCK = threading.RLock()
@@ -37,10 +38,16 @@ class Image:
     outputs: tuple[Port, ...]
     lanes: int
     target: Target
-    code: bytes
+    objects: tuple[bytes, ...]
+    """Object files, whose symbols refer to each other."""
+
+    @property
+    def size(self) -> int:
+        """Size of the object files [bytes]."""
+        return sum(map(len, self.objects))
 
     def __repr__(self) -> str:
-        return f"<Image of {len(self.code)} bytes, {self.lanes} lanes, for {self.target.cpu}>"
+        return f"<Image of {self.size} bytes, {self.lanes} lanes, for {self.target.cpu}>"
 
 
 def compile_image(program: Program, target: Target | None = None, settings: Settings | None = None) -> Image:
@@ -50,13 +57,24 @@ def compile_image(program: Program, target: Target | None = None, settings: Sett
     """
     target = host() if target is None else target
     settings = Settings(target.lanes) if settings is None else settings
-    text = emit(program, target, settings)
+    # Python handles Ctrl-C between two modules.
+    objects = tuple(compile_text(text, target) for text in emit_modules(program, target, settings))
+    return Image(program.inputs, program.outputs, settings.lanes, target, objects)
+
+
+def compile_routines(routines: RoutineSet, target: Target, settings: Settings) -> Image:
+    """Compile a set of routines to an image, whose ports are those of the tables that call them."""
+    code = compile_text(emit_routines(routines, target, settings), target)
+    return Image((), (), settings.lanes, target, (code,))
+
+
+def compile_text(text: str, target: Target) -> bytes:
+    """Compile the text of an LLVM module to an object file. Raises CompileError if LLVM rejects it."""
     with COMPILE_LOCK:
         try:
-            code = target.machine().emit_object(binding.parse_assembly(text))
+            return bytes(target.machine().emit_object(binding.parse_assembly(text)))
         except RuntimeError as error:
             raise CompileError(f"LLVM rejects the code of a kernel: {error}") from error
-    return Image(program.inputs, program.outputs, settings.lanes, target, bytes(code))
 
 
 class Code:
@@ -71,8 +89,11 @@ class Code:
         with COMPILE_LOCK:
             try:
                 self._jit = binding.create_lljit_compiler(use_jit_link=image.target.short_addresses)
-                builder = binding.JITLibraryBuilder().add_object_img(image.code).add_current_process()
-                self._library = builder.export_symbol(ENTRY).link(self._jit, ENTRY)
+                builder = binding.JITLibraryBuilder()
+                for code in image.objects:
+                    builder.add_object_img(code)
+                builder.add_current_process().export_symbol(ENTRY)
+                self._library = builder.link(self._jit, ENTRY)
             except RuntimeError as error:
                 raise CompileError(f"a kernel cannot be linked: {error}") from error
         address = self._library[ENTRY]

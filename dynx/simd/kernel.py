@@ -9,6 +9,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dynx.errors import ArgumentError, ClosedError, CompileError, DTypeError, ShapeError
 from dynx.simd.emit import Settings
@@ -40,6 +41,9 @@ class Kernel:
     any more; calls in progress complete first. A pickle contains the machine code; unpickling it on a
     different processor raises CompileError.
     """
+
+    _max_single = 1
+    """Largest number of samples, below the number of lanes, for which the lanes are not filled."""
 
     def __init__(
         self, source: Program | Image, *, target: Target | None = None, settings: Settings | None = None
@@ -79,7 +83,7 @@ class Kernel:
             for k, out in enumerate(outputs)
         ]
         lanes = self.image.lanes
-        if 1 < n < lanes:
+        if self._max_single < n < lanes:
             # Fill the lanes by repeating the last sample.
             rows = np.minimum(np.arange(lanes), n - 1)
             padded = [np.empty((lanes, out.shape[1])) for out in outputs]
@@ -101,22 +105,12 @@ class Kernel:
         for array in arrays:
             # A single sample is evaluated in every lane.
             words += [_address(array), array.strides[0] if n > 1 else 0]
-        groups = n // lanes
-        work = groups * len(self.image.code)
-        # Ctrl-C takes effect between two parts.
-        parts = max(1, min(int(work / MAX_PART_WORK) + 1, groups))
-        if threads > 1:
-            parts = max(parts, min(int(work / MIN_PART_WORK), threads * PARTS_PER_THREAD, groups))
+        parts = part_count(n, lanes, self.image.size, threads)
         if parts == 1:
             packed_words = packed("q", words)
             code.entry(packed_words.buffer_info()[0])
             return
-        arguments = np.empty((parts, len(words)), dtype=np.int64)
-        arguments[:] = words
-        first = np.arange(parts + 1) * groups // parts * lanes
-        first[-1] = n
-        arguments[:, 0] = np.diff(first)
-        arguments[:, 1::2] += first[:-1, None] * arguments[:, 2::2]
+        arguments = arguments_of_parts(words, n, lanes, parts)
         start, step = arguments.ctypes.data, arguments.strides[0]
 
         def call(part: int, _alive: object = (arrays, arguments)) -> None:
@@ -202,7 +196,18 @@ class Workspace:
         "run",
     )
 
-    def __init__(self, code: Code, image: Image, samples: int) -> None:
+    def __init__(
+        self,
+        code: Code,
+        image: Image,
+        samples: int,
+        *,
+        single: Code | None = None,
+        more_words: Sequence[int] = (),
+        kept: object = None,
+    ) -> None:
+        """`single` is code for one sample, if there is any; `more_words` follow the arguments that describe
+        the arrays; `kept` is whatever the code refers to."""
         self._lanes = image.lanes
         samples = max(samples, image.lanes)
         rows, places, views, words = [], [], [], [image.lanes]
@@ -220,19 +225,51 @@ class Workspace:
         self.input_slices, self.output_slices = tuple(places[:n]), tuple(places[n:])
         self.input_rows, self.output_rows = tuple(rows[:n]), tuple(rows[n:])
         self.results = tuple(array[0, ...] for array in self.output_rows)
-        several = np.array(words, dtype=np.int64)
-        # A single sample is evaluated in every lane.
+        several = np.array([*words, *more_words], dtype=np.int64)
         one = several.copy()
-        one[2::2] = 0
-        self._kept = (code, one)
+        if single is None:
+            # A single sample is evaluated in every lane.
+            one[2::2] = 0
+        else:
+            one[0] = 1
+        self._kept = (code, one, kept)
         self._arguments = several.data
-        self.run: Callable[[], None] = partial(code.locked_entry, one.ctypes.data)
+        self.run: Callable[[], None] = partial((single or code).locked_entry, one.ctypes.data)
         self._run_rows: Callable[[], None] = partial(code.locked_entry, several.ctypes.data)
 
     def run_rows(self, n: int) -> None:
         """Evaluate the first n samples, or as many as there are lanes if that is more."""
         self._arguments[0] = max(n, self._lanes)
         self._run_rows()
+
+
+def part_count(n: int, lanes: int, group_work: int, threads: int) -> int:
+    """Return the number of parts of a batch of n samples.
+
+    `group_work` is the work of one group of `lanes` samples, in bytes of code.
+    """
+    groups = n // lanes
+    work = groups * group_work
+    # Ctrl-C takes effect between two parts.
+    parts = max(1, min(int(work / MAX_PART_WORK) + 1, groups))
+    if threads > 1:
+        parts = max(parts, min(int(work / MIN_PART_WORK), threads * PARTS_PER_THREAD, groups))
+    return parts
+
+
+def arguments_of_parts(words: Sequence[int], n: int, lanes: int, parts: int) -> NDArray[np.int64]:
+    """Return the arguments of each part (parts, len(words)), from those of the whole batch.
+
+    The first word is the number of samples; then follow pairs of an address and the distance between the
+    addresses of two samples.
+    """
+    arguments = np.empty((parts, len(words)), dtype=np.int64)
+    arguments[:] = words
+    first = np.arange(parts + 1) * (n // lanes) // parts * lanes
+    first[-1] = n
+    arguments[:, 0] = np.diff(first)
+    arguments[:, 1::2] += first[:-1, None] * arguments[:, 2::2]
+    return arguments
 
 
 def _check_arrays(

@@ -21,6 +21,15 @@ LEAVES = frozenset({"input", "constant"})
 """Nodes that are not computed but read where they are used."""
 
 
+MAX_STORES = 24
+"""Most stores of one segment. A store takes some fifty instructions, so many of them would take as long to
+compile as thousands of operations."""
+
+
+MAX_ANGLES = 24
+"""Most angles of one group; a group is compiled in one piece."""
+
+
 class TrigGroup(NamedTuple):
     """Angles available at the same time, and for each the nodes of its sine and cosine, or None."""
 
@@ -71,11 +80,21 @@ def schedule(program: Program, lanes: int, longest: int) -> list[Segment]:
             segment_of[node] = len(segments) - 1
     for store in _stores(program, lanes):
         segments[max((segment_of.get(node, 0) for node in store.nodes), default=0)].stores.append(store)
+    segments = [part for segment in segments for part in _divide_stores(segment)]
+    for number, segment in enumerate(segments):
+        segment_of.update((node, number) for step in segment.steps for node in _computed_nodes(step))
     for number, segment in enumerate(segments):
         for node in _used_values(program, segment):
             if segment_of.get(node, number) < number:
                 segments[segment_of[node]].spilled.add(node)
     return segments
+
+
+def _divide_stores(segment: Segment) -> Iterator[Segment]:
+    """Yield the segment with its first stores, then segments with the others."""
+    yield Segment(segment.steps, segment.stores[:MAX_STORES])
+    for first in range(MAX_STORES, len(segment.stores), MAX_STORES):
+        yield Segment([], segment.stores[first : first + MAX_STORES])
 
 
 def spill_slots(program: Program, segments: Sequence[Segment]) -> dict[int, int]:
@@ -119,7 +138,9 @@ def _steps(program: Program) -> Iterator[Step]:
             yield index
         pairs = tuple((pair.get("sin"), pair.get("cos")) for pair in angles.values())
         done.update(index for pair in pairs for index in pair if index is not None)
-        yield TrigGroup(tuple(angles), pairs)
+        for first in range(0, len(pairs), MAX_ANGLES):
+            part = slice(first, first + MAX_ANGLES)
+            yield TrigGroup(tuple(angles)[part], pairs[part])
     yield from (index for index in range(len(nodes)) if index not in done)
 
 

@@ -16,7 +16,8 @@ from dynx.backends.derived import native_quantities
 from dynx.backends.quantities import QUANTITIES
 from dynx.compiled import kernels
 from dynx.compiled.backend import CompiledBackend
-from dynx.compiled.call import MAX_COPIED_SAMPLES, KernelCall, NumericCall
+from dynx.compiled.call import MAX_COPIED_SAMPLES, CoupledCall, KernelCall, NumericCall
+from dynx.compiled.looped.kernels import LOOPED
 from dynx.compiled.simplification import has_physical_inertias
 from dynx.errors import ArgumentError, ClosedError
 from dynx.model import Inertial, Link, Mechanism, Model
@@ -150,12 +151,12 @@ def test_an_unphysical_robot_with_mimic_joints_is_solved_with_pivots() -> None:
 
 @pytest.mark.parametrize("quantity", QUANTITIES)
 @pytest.mark.parametrize("robot", ["fixed", "floating mimic"])
-def test_quantities_that_are_not_compiled_are_evaluated_by_numpy(
+def test_quantities_that_are_not_compiled_are_evaluated_by_routines_or_numpy(
     quantity: str, robot: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     model = ROBOTS[robot]
     kernels, reference = made(model), backend("reference", model)
-    monkeypatch.setattr("dynx.compiled.kernels.MAX_CODE_SIZE", -1)
+    monkeypatch.setattr("dynx.compiled.kernels.compile_seconds", lambda mechanism, name: 1e9)
     numbers = made(model)
     q, v, a = state(model, (3,))
     arguments: dict[str, Any] = {"q": q, "v": v, "a": a, "tau": a}
@@ -169,7 +170,9 @@ def test_quantities_that_are_not_compiled_are_evaluated_by_numpy(
         close = ErrorBounds(samples_at(model, q, v, numbers.forward_dynamics(q, v, a)))
     close.check(quantity, results[0], results[1])
     assert numbers._calls
-    assert all(isinstance(owner(result), NumericCall) for result in numbers._calls.values())
+    looped = CoupledCall if model.mechanism.coupling is not None else KernelCall
+    expected = looped if quantity in LOOPED else NumericCall
+    assert all(isinstance(owner(result), expected) for result in numbers._calls.values())
     assert not kernels._calls
 
 

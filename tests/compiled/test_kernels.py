@@ -8,12 +8,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
+from dynx.backends.quantities import QUANTITIES
 from dynx.compiled import kernels as compiled_kernels
-from dynx.compiled.kernels import _fingerprint, compiles
+from dynx.compiled.kernels import ON_CHAINS, _fingerprint, code_size, compiles, evaluate_quantity
 from dynx.compiled.simplification import _zero_rounding_residue, simplify_mechanism
 from dynx.model import Inertial, Joint, Link, Mechanism, Model, Pose
 from dynx.model.mechanism import build_mechanism
+from dynx.testing.strategies import models
 from tests.backends.robots import chain, mixed_robot
 from tests.compiled.robots import ROBOTS, made, state
 
@@ -24,6 +28,35 @@ def test_long_code_is_not_compiled() -> None:
     assert compiles(chain(60).mechanism, "inverse_dynamics")
     assert compiles(chain(9).mechanism, "inertial_regressor")
     assert not compiles(chain(20).mechanism, "inertial_regressor")
+    assert not compiles(_star(101).mechanism, "mass_matrix")
+    assert not compiles(_star(1000).mechanism, "frame_placements")
+    for robot in (mixed_robot(), mixed_robot("floating", mimic=True)):
+        small = [quantity for quantity in QUANTITIES if quantity != "inertial_regressor"]
+        assert all(compiles(robot.mechanism, quantity) for quantity in small)
+
+
+def _star(n: int) -> Model:
+    """Return `n` joints on one body: few pairs of joints on one path, and a mass matrix of n^2 numbers."""
+    links = [Link("root"), *(Link(f"link{k}", Inertial(1.0)) for k in range(n))]
+    joints = [Joint(f"joint{k}", "revolute", "root", f"link{k}") for k in range(n)]
+    return Model.build("star", links, joints)
+
+
+@given(models(max_links=9), st.sampled_from(sorted({*QUANTITIES} - {"forward_kinematics"} - ON_CHAINS)))
+@settings(max_examples=15)
+def test_the_size_of_code_is_predicted(model: Model, quantity: str) -> None:
+    """Neither far too small, which would compile for minutes, nor so large that code is never compiled."""
+    mechanism = simplify_mechanism(model.mechanism)
+    details = QUANTITIES[quantity].implied_details(model)
+    program = compiled_kernels._program(
+        mechanism, quantity, lambda *state: evaluate_quantity(mechanism, quantity, details, *state)
+    )
+    predicted, results = code_size(mechanism, quantity)
+    operations = sum(node.op not in ("input", "constant") for node in program.nodes)
+    assert operations <= 1.5 * predicted
+    assert len(program.results) - 1 <= results
+    # Angles that are multiples of a right angle leave little.
+    assert predicted < 400 + 600 * max(1, operations)
 
 
 def test_rounding_residue_is_removed_from_rotations() -> None:

@@ -186,10 +186,9 @@ RIGID_BODY_FAULTS = (
     Fault(
         "coriolis_matrix_not_from_christoffel_symbols",
         "dynx.rbd.coriolis",
-        right="return _Composite(inertia, cross(w, inertia.first_moment), "
-        "-skew(w) @ inertia.second_moment_matrix)",
+        right="return cls(inertia, cross(w, inertia.first_moment), -skew(w) @ inertia.second_moment_matrix)",
         wrong="W, I = skew(w), inertia.rotational_inertia\n"
-        "    return _Composite(inertia, cross(w, inertia.first_moment), (W @ I - I @ W) / 2)",
+        "        return cls(inertia, cross(w, inertia.first_moment), (W @ I - I @ W) / 2)",
         test_file="tests/oracles/test_closed_forms.py",
         test="test_backend_matches_closed_form[free_body-reference]",
     ),

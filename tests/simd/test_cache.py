@@ -122,7 +122,7 @@ def test_code_that_cannot_be_linked_is_replaced(folder: Path) -> None:
     """The checksum is right, but the content is not an object file."""
     image = load_kernel(b"twice", CountedProgram(TWICE)).image
     (path,) = files(folder)
-    cache._write(path, replace(image, code=b"nothing of the kind"))
+    cache._write(path, replace(image, objects=(b"nothing of the kind",)))
     made = CountedProgram(TWICE)
     assert values(load_kernel(b"twice", made)) == [3.0, 21.0]
     assert made.times == 1

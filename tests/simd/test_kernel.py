@@ -245,7 +245,7 @@ def test_arrays_that_do_not_fit(kernel: Kernel) -> None:
 def test_an_invalid_image_raises() -> None:
     image = Kernel(PROGRAM).image
     with pytest.raises(CompileError, match="linked"):
-        Kernel(replace(image, code=b"no object file"))
+        Kernel(replace(image, objects=(b"no object file",)))
 
 
 # -- lifetimes ---------------------------------------------------------------------------------------

@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
+import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
 from dynx.simd.expr import Graph
+from dynx.simd.kernel import Kernel
 from dynx.simd.program import Port, Program, extract_program
-from dynx.simd.schedule import LEAVES, Segment, TrigGroup, schedule, spill_slots
+from dynx.simd.schedule import (
+    LEAVES,
+    MAX_ANGLES,
+    MAX_STORES,
+    Segment,
+    TrigGroup,
+    schedule,
+    spill_slots,
+)
+from dynx.simd.trace import trace
 from tests.simd.programs import programs
 
 
@@ -70,3 +81,21 @@ def test_angles_available_at_the_same_time_share_a_group() -> None:
     groups = [step for step in segment.steps if isinstance(step, TrigGroup)]
     assert [len(group.angles) for group in groups] == [2, 1]
     assert [sum(node is not None for pair in group.nodes for node in pair) for group in groups] == [3, 1]
+
+
+def test_many_stores_are_divided_over_segments() -> None:
+    """LLVM's time grows faster than linearly with the length of a function."""
+    program = trace(lambda x: np.outer(x, x) + 1.0, {"x": (40,)})
+    segments = schedule(program, 4, 10**6)
+    assert sum(len(segment.stores) for segment in segments) == 400
+    assert max(len(segment.stores) for segment in segments) == MAX_STORES
+    kernel, x = Kernel(program), np.linspace(1.0, 2.0, 400).reshape(10, 40)
+    found = np.empty((10, 1600))
+    kernel([x], [found])
+    np.testing.assert_allclose(found.reshape(10, 40, 40), x[:, :, None] * x[:, None, :] + 1.0, rtol=1e-15)
+
+
+def test_many_angles_are_divided_into_groups() -> None:
+    program = trace(lambda x: np.sin(x), {"x": (100,)})
+    groups = [s for part in schedule(program, 4, 2500) for s in part.steps if isinstance(s, TrigGroup)]
+    assert [len(group.angles) for group in groups] == [MAX_ANGLES] * 4 + [4]

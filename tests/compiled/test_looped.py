@@ -1,0 +1,100 @@
+"""Quantities of large robots as calls of routines, which are compiled once for all robots."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from benchmarks.every_quantity import serial_arm, tree
+from dynx.backends import backend
+from dynx.backends.quantities import QUANTITIES
+from dynx.compiled.call import MAX_COPIED_SAMPLES
+from dynx.compiled.looped.kernels import LOOPED
+from dynx.model import Model
+from dynx.simd.target import host
+from dynx.spatial.scalar import Floats
+from tests.compiled.robots import ROBOTS, made, state
+from tests.error_bounds import ErrorBounds, samples_at
+
+
+@pytest.fixture(autouse=True)
+def _only_routines(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("dynx.compiled.kernels.MAX_SECONDS_BESIDE_ROUTINES", -1.0)
+
+
+def _arguments(model: Model, quantity: str, size: tuple[int, ...]) -> list[Floats]:
+    values = dict(zip("qva", state(model, size), strict=True))
+    return [values[argument] for argument in QUANTITIES[quantity].arguments]
+
+
+@pytest.mark.parametrize("quantity", sorted(LOOPED))
+@pytest.mark.parametrize("model", [*ROBOTS.values(), tree(30), serial_arm(20)], ids=lambda m: m.name)
+def test_routines_give_the_results_of_the_reference(model: Model, quantity: str) -> None:
+    q, v, a = state(model, (3,))
+    expected = getattr(backend("reference", model), quantity)(*_arguments(model, quantity, (3,)))
+    found = getattr(made(model), quantity)(*_arguments(model, quantity, (3,)))
+    ErrorBounds(samples_at(model, q, v, a, a)).check(quantity, found, expected)
+
+
+@pytest.mark.parametrize("quantity", sorted(LOOPED))
+def test_results_do_not_depend_on_the_other_samples_or_on_threads(quantity: str) -> None:
+    """One sample has code of one lane, few are repeated to fill the lanes, many are divided into parts."""
+    model = ROBOTS["floating"]
+    sizes = (1, 2, 3, host().lanes, host().lanes + 1, MAX_COPIED_SAMPLES + 3)
+    arguments = _arguments(model, quantity, (sizes[-1],))
+    engine = made(model, threads=3)
+    whole = getattr(engine, quantity)(*arguments)
+    single = getattr(engine, quantity)(*(x[0] for x in arguments))
+    np.testing.assert_array_equal(single, whole[0])
+    for size in sizes:
+        rows = [np.ascontiguousarray(x[:size]) for x in arguments]
+        np.testing.assert_array_equal(getattr(engine, quantity)(*rows), whole[:size])
+        strided = [np.asfortranarray(x) for x in rows]
+        np.testing.assert_array_equal(getattr(made(model, threads=1), quantity)(*strided), whole[:size])
+
+
+def test_a_bad_argument_is_named() -> None:
+    model = ROBOTS["floating"]
+    q, _, _ = state(model, (300,))
+    for value, what in ((np.nan, "q"), (1e200, "q")):
+        for size in (1, 300):
+            bad = q[:size].copy()
+            bad[-1, -1] = value
+            with pytest.raises(Exception, match=what):
+                made(model).mass_matrix(bad[0] if size == 1 else bad)
+    unscaled = q[0] * np.r_[np.ones(3), np.full(4, 1.1), np.ones(model.nq - 7)]
+    with pytest.raises(Exception, match="quaternion"):
+        made(model).mass_matrix(unscaled)
+
+
+@pytest.mark.parametrize("n", [101, 1000])
+def test_nothing_is_compiled_for_a_large_tree(n: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its matrices had compiled for minutes."""
+    model = tree(n)
+    engine: Any = made(model)
+    small = made(ROBOTS["fixed"])
+    for quantity in sorted(LOOPED - {"inertial_regressor"}):
+        getattr(small, quantity)(*_arguments(ROBOTS["fixed"], quantity, ()))
+    monkeypatch.setattr("dynx.simd.cache.compile_image", _refuse)
+    monkeypatch.setattr("dynx.simd.cache.compile_routines", _refuse)
+    q, v, _ = state(model)
+    M = engine.mass_matrix(q)
+    np.testing.assert_array_equal(M, M.T)
+    if n > 101:
+        return
+    np.testing.assert_allclose(M, backend("reference", model).mass_matrix(q), atol=1e-9 * np.abs(M).max())
+    C = engine.coriolis_matrix(q, v)
+    np.testing.assert_allclose(
+        C @ v, _velocity_torque(model, q, v), atol=1e-9 * np.abs(C).max() * np.abs(v).max()
+    )
+
+
+def _velocity_torque(model: Model, q: Floats, v: Floats) -> Floats:
+    reference = backend("reference", model)
+    return reference.bias_torque(q, v) - reference.gravity_torque(q)
+
+
+def _refuse(*_: object) -> None:
+    raise AssertionError("nothing is to be compiled")
