@@ -12,7 +12,7 @@ from dynx.agreement.tolerances import BAR
 from dynx.doctor.counterexample.search import smallest_counterexample
 from dynx.doctor.counterexample.trials import difference_of
 from dynx.doctor.examine.bounds import require_bounded
-from dynx.doctor.examine.contacts import describe_contacts
+from dynx.doctor.examine.contacts import deepest_contact, describe_contacts
 from dynx.doctor.examine.examination import TORQUE, Examination, Examiner
 from dynx.doctor.examine.line_map import with_original_lines
 from dynx.doctor.examine.reference_values import ReferenceValues
@@ -165,6 +165,12 @@ def _diagnosis_of(
     rules = _rules_for(examiner)
     found = with_original_lines(detections(case, rules), case.source, sound.source)
     report = with_meshes(first_report(case, before, tolerance), case.source)
+    touching = _rare_contact(sound, found, examiner) if report.alike else None
+    if touching is not None:
+        examiner = examiner.at(touching)
+        reference = examiner.reference(sound)
+        before = examiner.examine(case, reference=reference, describe=True)
+        report = with_meshes(first_report(case, before, tolerance), case.source)
     if report.alike and not _chosen_practice(case, found):
         return replace(
             report,
@@ -223,6 +229,15 @@ def _reference_of(case: Case, examiner: Examiner) -> ReferenceValues:
     except DynxError as error:
         # Reference values are computed from an edited text, whose line numbers differ.
         raise (refusal(case) or error) from None
+
+
+def _rare_contact(
+    case: Case, found: Sequence[tuple[Rule, Detection]], examiner: Examiner
+) -> Mapping[str, float] | None:
+    """Find positions at which links touch, in engines that add the forces; None where none touch."""
+    rules = dict.fromkeys(rule for rule, _ in found if rule.present_as)
+    engines = dict.fromkeys(engine for rule in rules for engine in rule.named_of(examiner.engines))
+    return deepest_contact(case, engines, examiner.seed) if engines else None
 
 
 def _chosen_practice(case: Case, found: Sequence[tuple[Rule, Detection]]) -> bool:

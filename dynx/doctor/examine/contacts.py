@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -15,8 +15,8 @@ from dynx.loaded import loader_class
 from dynx.rules.case import Case
 from dynx.spatial.scalar import Floats
 
-STATES = 40
-"""Number of states at which contacts are looked for."""
+STATES = 500
+"""Number of states at which contacts are looked for: 5 to 40 ms, without dynamics."""
 
 _MAX_PAIRS = 4
 """Number of pairs that are listed."""
@@ -24,10 +24,12 @@ _MAX_PAIRS = 4
 
 @dataclass
 class Contact:
-    """Number of states in which two links touch, and how deep they penetrate each other at most [m]."""
+    """Number of states in which two links touch, how deep they penetrate each other at most [m], and the
+    positions of the joints where they do."""
 
     states: int = 0
     depth: float = 0.0
+    positions: Mapping[str, float] = field(default_factory=dict)
 
 
 def describe_contacts(case: Case, engine: str, seed: int) -> str:
@@ -47,9 +49,23 @@ def describe_contacts(case: Case, engine: str, seed: int) -> str:
     return "; ".join([*listed, *([f"and {more} more pairs"] if more > 0 else [])])
 
 
+def deepest_contact(case: Case, engines: Iterable[str], seed: int) -> Mapping[str, float] | None:
+    """Return the positions of the joints at which two links penetrate each other most deeply, in the first of
+    these engines in which any do; None where none touch."""
+    for engine in engines:
+        try:
+            found = links_in_contact(case, engine, seed)
+        except DynxError:
+            continue
+        if found:
+            return max(found.values(), key=lambda contact: contact.depth).positions
+    return None
+
+
 def links_in_contact(case: Case, engine: str, seed: int) -> Mapping[tuple[str, str], Contact]:
     """Find the pairs of links that touch; raises EngineError where the engine refuses the file."""
     model = model_without_mimics(case.source, case.base)
+    base = 7 if model.floating else 0
     found: dict[tuple[str, str], Contact] = {}
     with (
         temporary_urdf(without_meshes(case.source)) as path,
@@ -60,7 +76,9 @@ def links_in_contact(case: Case, engine: str, seed: int) -> Mapping[tuple[str, s
             for pair, depth in robot.contacts(q).items():
                 contact = found.setdefault(pair, Contact())
                 contact.states += 1
-                contact.depth = max(contact.depth, depth)
+                if depth > contact.depth:
+                    contact.depth = depth
+                    contact.positions = dict(zip(model.joint_names, q[base:].tolist(), strict=True))
     return found
 
 

@@ -16,6 +16,7 @@ from dynx.doctor.examine.reference_values import (
     draw_states,
     model_without_mimics,
     reference_values,
+    with_positions,
 )
 from dynx.engines.silence import silence
 from dynx.errors import DynxError, UnusableEngineError
@@ -150,16 +151,28 @@ class Examination:
 class Examiner:
     """Examiner of cases of one robot, with the same engines or variants, number of states and seed."""
 
-    def __init__(self, engines: Collection[str], samples: int, seed: int) -> None:
+    def __init__(
+        self,
+        engines: Collection[str],
+        samples: int,
+        seed: int,
+        positions: Mapping[str, float] | None = None,
+    ) -> None:
+        """`seed` selects the random states; `positions` of the joints, by name, are one more state."""
         self.engines = {name: loader_class(name) for name in engines}
         self._samples = samples
-        self._seed = seed
+        self.seed = seed
+        self._positions = positions
         # One remedy after another leaves the robot as it is.
         self._values = lru_cache(maxsize=8)(self._compute_reference)
 
     def with_samples(self, samples: int) -> Examiner:
         """Return an examiner with the same engines and seed, and another number of states."""
-        return Examiner(self.engines, samples, self._seed)
+        return Examiner(self.engines, samples, self.seed, self._positions)
+
+    def at(self, positions: Mapping[str, float]) -> Examiner:
+        """Return an examiner that examines the same states, and one with the joints at these positions."""
+        return Examiner(self.engines, self._samples, self.seed, positions)
 
     def reference(self, case: Case) -> ReferenceValues:
         """Compute the reference values of a case at random states."""
@@ -168,7 +181,10 @@ class Examiner:
     def _compute_reference(self, text: str, name: str, base: Base) -> ReferenceValues:
         source = XmlSource(text, name)
         model = model_without_mimics(source, base)
-        values = reference_values(model, draw_states(model, self._samples, self._seed))
+        states = draw_states(model, self._samples, self.seed)
+        if self._positions is not None:
+            states = with_positions(model, states, self._positions)
+        values = reference_values(model, states)
         return replace(values, kinematics_only=not has_inertial_data(Case(source, base)))
 
     def examine(

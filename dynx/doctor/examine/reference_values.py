@@ -119,6 +119,17 @@ def draw_states(model: Model, count: int, seed: int) -> States:
     return States(q, v, a, tau)
 
 
+def with_positions(model: Model, states: States, positions: Mapping[str, float]) -> States:
+    """Add a state: the first one, with these joints at these positions."""
+    q = states.q[0].copy()
+    base = 7 if model.floating else 0
+    for k, name in enumerate(model.joint_names):
+        q[base + k] = positions.get(name, q[base + k])
+    added = (q, states.v[0], states.a[0], states.tau[0])
+    columns = (states.q, states.v, states.a, states.tau)
+    return States(*(np.vstack([column, row]) for column, row in zip(columns, added, strict=True)))
+
+
 def reference_values(model: Model, states: States) -> ReferenceValues:
     """Compute the reference values; forward dynamics gets the `torque` of the previous state."""
     # A file without any mass gives NaN here, which is compared, so NumPy's warning is silenced.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+from dynx.doctor.examine.contacts import deepest_contact
 from dynx.doctor.examine.examination import Examination, Examiner
 from dynx.doctor.prove.attribution import Attribution, Attributor
 from dynx.doctor.prove.mending import detections, readable
@@ -60,6 +61,8 @@ class Proofs:
     def _at_more_states(self, rule: Rule) -> Attributor:
         more = self._examiner.with_samples(RARE_STATES)
         engines = rule.named_of(more.engines)
+        if rule.present_as and (touching := deepest_contact(self._robot, engines, more.seed)) is not None:
+            more = more.at(touching)
         case = self._text if rule.stage == "reading" else self._robot
         before = more.examine(case, engines, reference=more.reference(self._robot))
         return self._attributor(case, more, before, more.examine(self._mended, engines))

@@ -129,8 +129,10 @@ class LoadedMujoco(LoadedRobot):
 
     def contacts(self, q: Floats) -> Mapping[tuple[str, str], float]:
         """Pairs of `data.contact`, by the links into which MuJoCo merged others; the world is the root."""
-        self._place(q)
-        mujoco.mj_forward(self._loaded, self._data)
+        # Contacts depend on the configuration alone, and are asked for at hundreds of them.
+        self._set_positions(q)
+        mujoco.mj_kinematics(self._loaded, self._data)
+        mujoco.mj_collision(self._loaded, self._data)
         found: dict[tuple[str, str], float] = {}
         for contact in self._data.contact[: self._data.ncon]:
             bodies = self._loaded.geom_bodyid[[contact.geom1, contact.geom2]]
@@ -148,18 +150,23 @@ class LoadedMujoco(LoadedRobot):
 
     def _place(self, q: Floats, v: Floats | None = None) -> None:
         """Reset the data to the state after loading, and set the configuration and the velocity."""
-        data, base = self._data, 7 if self._model.floating else 0
+        data = self._data
         mujoco.mj_resetData(self._loaded, data)
         silence_warnings(data)
-        data.qpos[self._q] = q[base:]
-        if self._model.floating:
-            x, y, z, w = q[3:7]
-            data.qpos[:7] = [*q[:3], w, x, y, z]
+        self._set_positions(q)
         if v is not None:
             data.qvel[self._v] = v
             if self._model.floating:
                 mujoco.mj_kinematics(self._loaded, data)
                 data.qvel[:3] = self._base_rotation() @ v[:3]
+
+    def _set_positions(self, q: Floats) -> None:
+        """Set the configuration; coordinates that the model lacks stay at zero."""
+        qpos, base = self._data.qpos, 7 if self._model.floating else 0
+        qpos[self._q] = q[base:]
+        if base:
+            x, y, z, w = q[3:7]
+            qpos[:7] = [*q[:3], w, x, y, z]
 
     def _base_rotation(self) -> Floats:
         """Return R of the base; MuJoCo has the base's linear velocity in world axes."""

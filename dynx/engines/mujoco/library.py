@@ -35,5 +35,4 @@ def silent_data(model: Any) -> Any:
 
 def silence_warnings(data: Any) -> None:
     """Prevent MuJoCo from printing warnings, by setting their counters to 1."""
-    for warning in data.warning:
-        warning.number = 1
+    data.warning.number[:] = 1

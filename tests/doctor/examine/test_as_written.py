@@ -89,7 +89,7 @@ def test_contacts_that_no_state_showed_need_no_call() -> None:
     )
     bare = '<link name="d"/><joint name="cd" type="fixed"><parent link="c"/><child link="d"/></joint>'
     bare = bare.replace(
-        '"d"/>', '"d"><collision><geometry><box size="1 1 1"/></geometry></collision></link>', 1
+        '"d"/>', '"d"><collision><geometry><box size="1e-6 1e-6 1e-6"/></geometry></collision></link>', 1
     )
     report = diagnose(f'<robot name="r">{links}{joints}{bare}</robot>', samples=2, counterexamples=False)
     (contacts,) = (each for each in report.findings if each.rule == "DX308")

@@ -8,7 +8,13 @@ import numpy as np
 import pytest
 
 from dynx.doctor.diagnosis import diagnose
-from dynx.doctor.examine.contacts import describe_contacts, following_positions, links_in_contact
+from dynx.doctor.examine.contacts import (
+    deepest_contact,
+    describe_contacts,
+    following_positions,
+    links_in_contact,
+)
+from dynx.doctor.examine.examination import Examiner
 from dynx.doctor.examine.reference_values import model_without_mimics
 from dynx.doctor.formats import wording
 from dynx.loaded import installed_engines
@@ -60,3 +66,60 @@ def test_contacts_are_present_and_their_links_named() -> None:
     assert "mm deep" in finding.message
     assert wording.effect(finding.effect) == "contact forces present"
     assert json.loads(json.dumps(report.to_dict()))["findings"][0]["effect"]["relative_error"] is None
+
+
+def swing(size: float, away: float = 0.0) -> Case:
+    """Make an arm whose tip, a ball, meets a post beside its first joint in a few of 100 states.
+
+    `away` lifts the post, so that they never meet.
+    """
+    ball = f'<geometry><sphere radius="{size}"/></geometry></collision>'
+    return case_of(
+        link("base"),
+        link("column", mass=2.0),
+        link("arm", f'<collision><origin xyz="1 0 0"/>{ball}', center=(0.3, 0.0, 0.0)),
+        link("post", f'<collision><origin xyz="0.6 0.8 {away}"/>{ball}'),
+        joint("lift", "base", "post"),
+        joint("turn", "base", "column"),
+        joint("bend", "column", "arm", '<origin xyz="0 0 0"/>'),
+    )
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_contacts_at_rare_states_are_found_and_proved(seed: int) -> None:
+    """The tip meets the post in 3 of 100 states; parent and child of a fixed joint are one body in MuJoCo."""
+    case = swing(0.02)
+    report = diagnose(case.source.text, seed=seed, counterexamples=False)
+    (finding,) = report.differences
+    assert (finding.rule, finding.engines, finding.proved) == ("DX308", ("mujoco",), True)
+    assert "arm and post touch in" in finding.message
+    assert not report.alike
+    assert report.explained
+    assert [call.engine for call in report.calls] == ["mujoco"]
+    assert report.mended is None
+    assert report.remaining <= report.tolerance
+
+
+def test_links_that_never_touch_are_alike() -> None:
+    report = diagnose(swing(0.02, away=0.2).source.text, counterexamples=False)
+    assert report.alike
+    assert not report.differences
+
+
+def test_a_rare_contact_is_found_beside_other_causes() -> None:
+    text = swing(0.02).source.text.replace("<axis", '<dynamics damping="0.1"/><axis', 1)
+    report = diagnose(text, counterexamples=False)
+    assert {each.rule for each in report.differences} == {"DX301", "DX308"}
+    assert all(each.proved for each in report.differences)
+
+
+def test_positions_are_added_to_the_random_states() -> None:
+    case = swing(0.02)
+    plain = Examiner(["mujoco"], 3, 0)
+    positions = deepest_contact(case, ["pinocchio", "mujoco"], 0)
+    assert positions is not None
+    reference = plain.at(positions).reference(case)
+    names = reference.model.joint_names
+    np.testing.assert_array_equal(reference.states.q[:3], plain.reference(case).states.q)
+    np.testing.assert_array_equal(reference.states.q[3], [positions[name] for name in names])
+    assert deepest_contact(swing(0.02, away=0.2), ["mujoco"], 0) is None
