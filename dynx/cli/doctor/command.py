@@ -43,7 +43,13 @@ from dynx.cli.shell.options import choice_pair, name_list, run_options
     help="Choice for a rule that can mend a file in two ways, such as DX103=keep (see `dynx explain`); "
     "may be given several times.",
 )
-@click.option("--fix", "fix", metavar="OUT", help="File for the mended URDF; for several robots a directory.")
+@click.option(
+    "--fix",
+    "fix",
+    metavar="OUT",
+    help="File for the mended URDF; for several robots a directory. A file of that name is replaced, unless "
+    "it is one of the robots that are read.",
+)
 @click.option(
     "--level",
     type=click.Choice(["safe", "rounding", "physics"]),
@@ -84,7 +90,7 @@ def doctor() -> None:
     every robot of example-robot-data. For one robot the full report is printed, for several a line each.
 
     Each cause is proved by removing it alone from the file and measuring the engines again. The file
-    that was read is changed only with --in-place.
+    that was read is changed only with --in-place. Other files named as outputs are replaced where they exist.
 
     Exit code 0 if no engine differs (or only as the baseline allows, or a baseline was written), 1 if
     some differ, 2 if some robot cannot be used (the others are examined nevertheless). Ctrl-C ends the

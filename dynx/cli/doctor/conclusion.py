@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shlex
 import sys
 from collections.abc import Mapping, Sequence
@@ -52,6 +53,7 @@ class Conclusion:
         self._folder = folder
         self._engines = engines
         self._problems: list[str] = []
+        self._replaced: list[str] = []
 
     def reach(self, *, quiet: bool) -> int:
         """Write and show everything; return the exit code."""
@@ -83,9 +85,11 @@ class Conclusion:
             if path is None or index not in done:
                 continue
             report = self._run.results[done[index]]
+            replaced = os.path.lexists(path) and not self._in_place
             try:
                 if write_mended(path, report, over_input=self._in_place):
                     written[done[index]] = path
+                    self._replaced += [path] if replaced else []
             except DynxError as error:
                 self._problems.append(str(error))
         return written
@@ -105,6 +109,8 @@ class Conclusion:
                     out.print()
                 again = doctor_command(self._run.tasks[self._run.done[number]])
                 show_one(out, report, saved[number], mended.get(number), again)
+            for path in self._replaced:
+                out.print(f"replaced the file {one_line(path)} that was there", style="yellow")
         else:
             show_many(out, reports)
             show_summary(out, reports, self._run.seconds, len(self._run.not_done))
@@ -114,7 +120,8 @@ class Conclusion:
             if mended:
                 same = sum(reports[number].mended is None for number in mended)
                 copies = f", {same} of them unchanged" if same else ""
-                out.print(f"{counted(len(mended), 'file')} written{copies}", style="bold green")
+                old = f"; {len(self._replaced)} of that name replaced" if self._replaced else ""
+                out.print(f"{counted(len(mended), 'file')} written{copies}{old}", style="bold green")
         if self._engines is None:
             for line in missing_engines(reports):
                 out.print(f"note: {one_line(line)}", style="yellow")

@@ -119,13 +119,15 @@ def test_the_hint_repeats_the_examination(arm: Path, command: str) -> None:
         assert option in words
     fixed = words + ([] if "--fix" in words else ["--fix", "OUT.urdf"])
     again = CliRunner().invoke(cli, [*fixed, "--jobs", "1"])
-    assert "mended: OUT.urdf" in again.stdout
+    assert ": OUT.urdf" in again.stdout
+    assert Path("OUT.urdf").exists()
     if command == "doctor":
         # Only the hint and the time differ.
-        kept = [
-            each.stdout.partition("\nto mend it")[0].partition("\nmended: ")[0] for each in (first, again)
-        ]
-        assert kept[0] == kept[1]
+        ends = "\nto mend it", "\nmended at level"
+        before, after = (
+            each.stdout.partition(end)[0] for each, end in zip((first, again), ends, strict=True)
+        )
+        assert before == after
 
 
 def test_an_engine_whose_result_is_undefined_does_not_refuse_the_file(arm: Path) -> None:
@@ -181,6 +183,21 @@ def test_files_are_mended_in_place_only_with_in_place(arm: Path) -> None:
     mended = arm.read_bytes()
     assert doctor("arm.urdf", "--in-place", "--quiet").exit_code == 0
     assert arm.read_bytes() == mended
+
+
+def test_a_file_that_is_replaced_is_named(arm: Path, tmp_path: Path) -> None:
+    help_text = " ".join(CliRunner().invoke(cli, ["doctor", "--help"]).stdout.split())
+    assert "A file of that name is replaced" in help_text
+    replaced = "replaced the file out.urdf that was there"
+    assert replaced not in doctor("arm.urdf", "--fix", "out.urdf").stdout
+    mended = (tmp_path / "out.urdf").read_bytes()
+    (tmp_path / "out.urdf").write_text("of somebody")
+    assert replaced in doctor("arm.urdf", "--fix", "out.urdf").stdout
+    assert (tmp_path / "out.urdf").read_bytes() == mended
+    several = ["out.urdf", "arm.urdf", "--fix", "mended"]
+    assert "2 files written, 1 of them unchanged\n" in doctor(*several).stdout
+    assert "2 files written, 1 of them unchanged; 2 of that name replaced" in doctor(*several).stdout
+    assert "replaced" not in doctor("out.urdf", "--in-place").stdout
 
 
 def test_several_robots_and_bases(arm: Path, tmp_path: Path) -> None:
