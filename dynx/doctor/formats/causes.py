@@ -43,8 +43,7 @@ class Cause:
     @property
     def advice(self) -> str:
         """Advice in one sentence; the remedy that was applied where the catalogue has none."""
-        advice = self.entry.advice if self.entry is not None else ""
-        return advice or next((wording.name(each.remedy, 1000) for each in self.findings if each.remedy), "")
+        return next(filter(None, map(advice, self.findings)), "")
 
     @property
     def remedies(self) -> tuple[str, ...]:
@@ -92,6 +91,13 @@ def causes(report: DoctorReport) -> list[Cause]:
 def catalogue_entry(rule: str) -> Rule | None:
     """Find a rule by its id; None where this version of dynx has none."""
     return next((each for each in all_rules() if each.id == rule), None)
+
+
+def advice(finding: Finding) -> str:
+    """Return the advice of a finding's rule; the remedy that was applied where the catalogue has none."""
+    entry = catalogue_entry(finding.rule)
+    applied = "" if finding.remedy is None else wording.name(finding.remedy, 1000)
+    return applied if entry is None or not entry.advice else entry.advice
 
 
 def severity(finding: Finding) -> Severity:

@@ -20,7 +20,7 @@ from urllib.parse import quote
 from dynx._version import __version__
 from dynx.doctor.formats import wording
 from dynx.doctor.formats.baseline import UNEXPLAINED, Baseline, Place
-from dynx.doctor.formats.causes import catalogue_entry, causes, severity
+from dynx.doctor.formats.causes import advice, catalogue_entry, causes, severity
 from dynx.doctor.report import DoctorReport, Finding, Unexplained
 
 SCHEMA_URI = "https://json.schemastore.org/sarif-2.1.0.json"
@@ -129,8 +129,8 @@ def _finding(report: DoctorReport, each: Finding, repetition: int) -> dict[str, 
     engines = f": {', '.join(each.engines)}" if each.engines else ""
     effect = f"{wording.finding_effect(each)}, {report.base} base{engines}"
     message = f"{wording.name(each.message, 1000)} ({effect})."
-    if each.remedy is not None:
-        message += f" Remedy: {wording.name(each.remedy, 1000)}"
+    if each.effect is not None or each.kind == "practice":
+        message += f" Remedy: {advice(each).rstrip('.')}." if advice(each) else ""
     if each.effect is not None and any(each.rule == left.rule for left in report.undone):
         message += f" Left undone at level {report.level}."
     rule = wording.name(each.rule)

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from dynx.doctor.formats import Baseline, sarif, sarif_document
 from dynx.doctor.formats.baseline import differences
-from dynx.doctor.report import DoctorReport, Unexplained
+from dynx.doctor.report import DoctorReport, Effect, Unexplained
 from dynx.doctor.task import DoctorTask, examine
 from dynx.rules.registry import all_rules
 from tests.doctor.formats.reports import alike, differing, hostile, refused
@@ -209,6 +209,19 @@ def test_a_rule_of_the_catalogue_brings_its_page() -> None:
     [described] = document["runs"][0]["tool"]["driver"]["rules"]
     assert described["help"]["text"] == rule.page()
     assert described["shortDescription"]["text"] == rule.title
+
+
+@pytest.mark.parametrize("remedy", [None, "gave each link another inertia"])
+def test_the_remedy_is_the_advice_that_terminals_print(remedy: str | None) -> None:
+    """It tells the reader what to do, also where no remedy was applied: not what a mended file changes."""
+    for rule in all_rules():
+        effect = None if rule.kind == "practice" else Effect("mass_matrix", 1.0)
+        finding = replace(differing().findings[0], rule=rule.id, kind=rule.kind, effect=effect, remedy=remedy)
+        [result] = results(replace(alike(), findings=(finding,)))
+        assert result["message"]["text"].endswith(f" Remedy: {rule.advice}")
+        absent = replace(finding, kind="difference", effect=None)
+        [result] = results(replace(alike(), findings=(absent,)))
+        assert "Remedy" not in result["message"]["text"]
 
 
 def test_what_is_in_the_baseline_is_suppressed() -> None:
