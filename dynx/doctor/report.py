@@ -15,6 +15,7 @@ from dynx.files.documents import document_of
 from dynx.loaded import engine_of
 from dynx.loaded.difference import Deviation
 from dynx.model.xml.text import TextForm
+from dynx.rules.registry import all_rules
 from dynx.rules.rule import Kind, Level
 
 Status = Literal["alike", "explained", "massless", "unexplained", "refused"]
@@ -291,6 +292,17 @@ class DoctorReport:
         """Verdict in one sentence."""
         if self.error is not None:
             return f"not examined ({self.error.type}: {self.error.message})"
+        skipped = f"; every engine skips {' and '.join(self.skipped)}" if self.skipped else ""
+        return f"{self._verdict_on_engines}{skipped}"
+
+    @property
+    def skipped(self) -> tuple[str, ...]:
+        """Names of what every engine skips in the file (`dynx.rules.Rule.skipped`)."""
+        found = {finding.rule for finding in self.findings}
+        return tuple(rule.skipped for rule in all_rules() if rule.skipped and rule.id in found)
+
+    @property
+    def _verdict_on_engines(self) -> str:
         if self.alike:
             off = [f"{each.engine} is {_off(each)}" for each in self.variants_off]
             return "; ".join(["all engines load it alike", *off])

@@ -108,6 +108,10 @@ class Rule(ABC):
     """Name of what the file leaves undefined where the cause is present, such as ``dynamics``; mostly empty.
     It is the effect of the cause in every engine, and needs no measurement."""
 
+    skipped: ClassVar[str] = ""
+    """Name of what every engine skips where the cause is present, such as ``misspelled words``; mostly empty.
+    The verdict of a report names it, because engines that load a file alike may not load what was meant."""
+
     advice: ClassVar[str] = ""
     """Advice to the user, in one sentence."""
 

@@ -8,8 +8,10 @@ from dataclasses import replace
 
 import pytest
 
+from dynx.doctor import diagnose
 from dynx.doctor.report import DoctorReport, EngineResult
 from dynx.doctor.report_document import results_document
+from dynx.rules.traps import find_trap
 from tests.doctor.formats.reports import alike, differing, refused
 
 EXPLAINED = replace(differing(), unexplained=(), residual=1e-13)
@@ -68,3 +70,15 @@ def test_the_summary_counts_each_robot_once() -> None:
     }
     infinite = replace(EXPLAINED, residual=math.inf, referee=math.nan)
     json.dumps(results_document([infinite, differing()]), allow_nan=False)
+
+
+@pytest.mark.parametrize(
+    ("rule", "skipped"),
+    [("DX531", "xacro elements that were not expanded"), ("DX515", "misspelled words")],
+)
+def test_the_verdict_names_what_every_engine_skips(rule: str, skipped: str) -> None:
+    """Engines that load a file alike may not load what its author wrote."""
+    report = diagnose(find_trap(rule), engines=["pinocchio"], samples=1)
+    assert report.alike
+    assert report.verdict == f"all engines load it alike; every engine skips {skipped}"
+    assert not diagnose(find_trap("DX516"), engines=["pinocchio"], samples=1).skipped

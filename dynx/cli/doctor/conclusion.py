@@ -11,8 +11,9 @@ from rich.console import Console
 
 from dynx.cli.doctor.mending import write_mended
 from dynx.cli.doctor.outputs import Outputs, save_counterexamples
+from dynx.cli.doctor.overview import show_many, show_summary
 from dynx.cli.doctor.repetition import doctor_command
-from dynx.cli.doctor.tables import show_many, show_one, show_summary
+from dynx.cli.doctor.tables import show_one
 from dynx.cli.shell.exits import BAD_INPUT, DONE, NEGATIVE_RESULT, complain, one_line, short_line
 from dynx.cli.shell.run import Run
 from dynx.cli.shell.terminal import console, counted

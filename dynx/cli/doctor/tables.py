@@ -5,7 +5,6 @@ from __future__ import annotations
 import shlex
 from collections.abc import Mapping, Sequence
 from io import StringIO
-from typing import get_args
 
 from rich.console import Console
 from rich.text import Text
@@ -13,32 +12,21 @@ from rich.text import Text
 from dynx.cli.doctor.text import STYLES, block, heading, sentence
 from dynx.cli.shell.exits import one_line, short_line
 from dynx.cli.shell.tables import Table
-from dynx.cli.shell.terminal import counted, summary_line
+from dynx.cli.shell.terminal import counted
 from dynx.doctor.formats import wording
 from dynx.doctor.formats.causes import (
     ROUNDING,
     Cause,
     catalogue_entry,
     causes,
-    severity,
 )
-from dynx.doctor.formats.vote import largest_error
-from dynx.doctor.report import DoctorReport, EngineResult, Finding, Status
+from dynx.doctor.report import DoctorReport, EngineResult, Finding
 
 _PLACES = (4, 3, 2, 1)
 """Numbers of places listed for one rule; ``--json`` and ``--html`` have all."""
 
 SCREEN = 40, 100
 """Rows and columns of a terminal: the largest of `_PLACES` is taken with which a report fits it."""
-
-_ABOVE_MANY = (
-    "largest relative error of any engine, as loaded (refused: an engine refuses it;",
-    "not used: an engine would crash on it, or its results mean nothing),",
-    "and the error that remains when mended{level}",
-)
-
-_MAX_RULES = 3
-"""Number of rules listed for one of several robots."""
 
 
 def show_one(
@@ -99,7 +87,9 @@ def show_verdict(out: Console, report: DoctorReport) -> None:
     if report.error is not None:  # its message is on standard error
         out.print(f"{short_line(report.robot)}, {report.base} base: not examined", style="yellow")
         return
-    style = "bold green" if report.alike else "bold" if report.explained else "bold red"
+    style = "bold" if report.explained else "bold red"
+    if report.alike:
+        style = "bold yellow" if report.skipped else "bold green"
     out.print(f"{short_line(report.robot)}, {report.base} base: {one_line(report.verdict)}", style=style)
     mass = "" if report.total_mass is None else f"total mass {report.total_mass:.4g} kg"
     where = "" if report.source is None else short_line(report.source)
@@ -157,54 +147,6 @@ def show_variants(out: Console, report: DoctorReport) -> None:
         for rule in map(catalogue_entry, dict.fromkeys(finding.rule for finding in each.findings)):
             if rule is not None and rule.advice:
                 sentence(out, f"-> {one_line(rule.advice)}", 2)
-
-
-def show_many(out: Console, reports: Sequence[DoctorReport]) -> None:
-    """Print one line for each robot and base."""
-    bases = len({report.base for report in reports}) > 1
-    columns = ["robot", *(["base"] if bases else []), "verdict", "error", "mended", "causes"]
-    table = Table(*columns, right=["error", "mended"], keys=1)
-    for report in reports:
-        table.add_row(
-            short_line(report.robot),
-            *([report.base or ""] if bases else []),
-            _verdict_text(report),
-            _largest(report),
-            _remaining(report),
-            _rules(report),
-        )
-    levels = "".join(sorted({_level(report) for report in reports}))
-    for line in _ABOVE_MANY:
-        out.print(line.format(level=levels), style="bold")
-    out.print(table)
-    _count_variants(out, reports)
-    unread = sum(bool(report.unread_meshes) for report in reports)
-    if unread:
-        share = f"{unread} of {counted(len(reports), 'robot')}"
-        checked = f"their links are not checked against the size of shapes ({wording.SHAPE_RULES})"
-        out.print(f"meshes could not be read: {share}; {checked}", style="yellow")
-    out.print()
-
-
-def _count_variants(out: Console, reports: Sequence[DoctorReport]) -> None:
-    """Print for each variant the number of robots that it loads otherwise."""
-    off = [each for report in reports for each in report.variants_off]
-    for name in dict.fromkeys(each.engine for each in off):
-        mine = [each for each in off if each.engine == name]
-        rules = ", ".join(sorted({finding.rule for each in mine for finding in each.findings}))
-        share = f"{len(mine)} of {counted(len(reports), 'robot')}"
-        out.print(f"{name}: {share} loaded otherwise by this call{f' ({rules})' if rules else ''}")
-
-
-def show_summary(out: Console, reports: Sequence[DoctorReport], seconds: float, not_done: int) -> None:
-    """Print the last line: the number of robots with each verdict, and of those not done."""
-    verdicts = [report.status for report in reports]
-    counts = {word: verdicts.count(word) for word in get_args(Status)}
-    if not counts["massless"]:
-        del counts["massless"]
-    bases = len({report.base for report in reports}) > 1
-    what = counted(len(reports), "examination" if bases else "robot")
-    out.print(summary_line(what, counts, not_done, seconds))
 
 
 def _show_causes(out: Console, title: str, found: Sequence[Cause], places: int) -> None:
@@ -311,11 +253,11 @@ def _show_next(out: Console, report: DoctorReport, mended: str | None, command: 
 def _then(report: DoctorReport) -> str:
     """Write what is compared with the file as loaded; empty where that is all."""
     # A lower level that changes nothing leaves errors that are to be seen.
-    mended = f"mended{_level(report)}" if report.mended is not None or report.undone else ""
+    mended = f"mended{level_clause(report)}" if report.mended is not None or report.undone else ""
     return " ".join(filter(None, (mended, "with the calls below" if report.calls else "")))
 
 
-def _level(report: DoctorReport) -> str:
+def level_clause(report: DoctorReport) -> str:
     """Name a level below the default."""
     return "" if report.level == "physics" else f" at level {report.level}"
 
@@ -323,10 +265,10 @@ def _level(report: DoctorReport) -> str:
 def _action(report: DoctorReport) -> str:
     """Write what was done to make a written file, before its name."""
     if report.mended is not None:
-        return f"mended{_level(report)}:"
+        return f"mended{level_clause(report)}:"
     if report.kinematics_only:
         return "no inertial data, which --fix does not invent; copied unchanged to"
-    return f"nothing to change in the text{_level(report)}; copied unchanged to"
+    return f"nothing to change in the text{level_clause(report)}; copied unchanged to"
 
 
 def _residual(report: DoctorReport) -> str:
@@ -357,44 +299,3 @@ def error_text(error: float, tolerance: float) -> Text:
     if error <= tolerance:
         return Text(wording.relative(error), "green")
     return Text(wording.relative(error), STYLES["warning" if error <= ROUNDING else "error"])
-
-
-def _largest(report: DoctorReport) -> Text:
-    if report.error is not None:
-        return Text("")
-    without = [each for each in report.engines if each.refused is not None]
-    if without:
-        word = "not used" if all(each.not_used for each in without) else "refused"
-        return Text(word, STYLES["error"])
-    return error_text(largest_error(report), report.tolerance)
-
-
-def _remaining(report: DoctorReport) -> Text:
-    """Write the error after mending."""
-    if report.error is not None:
-        return Text("")
-    if any(each.refused_after is not None for each in report.engines):
-        return Text("refused", STYLES["error"])
-    return error_text(report.remaining, report.tolerance)
-
-
-def _rules(report: DoctorReport) -> Text:
-    found = [cause for cause in causes(report) if cause.largest_effect is not None]
-    parts = [Text(wording.name(cause.rule), STYLES[cause.severity]) for cause in found[:_MAX_RULES]]
-    if len(found) > _MAX_RULES:
-        parts.append(Text(f"+{len(found) - _MAX_RULES}"))
-    return Text(" ").join(parts)
-
-
-def _verdict_text(report: DoctorReport) -> Text:
-    word = report.status
-    if word == "refused":  # the reason is on standard error
-        return Text("refused", "yellow")
-    if word == "alike":
-        return Text("alike", "green")
-    if word == "unexplained":
-        return Text("UNEXPLAINED", "bold red")
-    if word == "massless":
-        return Text("no inertial data", "yellow")
-    alarming = any(severity(finding) == "error" for finding in report.differences)
-    return Text("explained", "" if alarming else "dim")

@@ -41,6 +41,7 @@ _ATTRIBUTES = {
 
 class MisspelledWord(Rule):
     kind = "practice"
+    skipped = "misspelled words"
     advice = "Correct the spelling, and check the resulting robot."
 
     def occurrences(self, case: Case) -> Iterable[Detection]:

@@ -25,6 +25,7 @@ _PREFIX = "xacro:"
 
 class LeftOverXacro(OptionalEditingRule):
     stage = "reading"
+    skipped = "xacro elements that were not expanded"
     advice = "Expand the file with xacro, or remove these elements."
     choices = {
         "keep": "leave xacro elements, which every engine skips, in the file",

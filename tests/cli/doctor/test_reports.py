@@ -18,9 +18,10 @@ from dynx.cli.doctor.as_loaded import vote_lines
 from dynx.cli.doctor.conclusion import Conclusion
 from dynx.cli.doctor.mending import planned_targets, write_mended
 from dynx.cli.doctor.outputs import Outputs, save_counterexamples
+from dynx.cli.doctor.overview import show_many
 from dynx.cli.doctor.repetition import doctor_command
 from dynx.cli.doctor.run import doctor_run
-from dynx.cli.doctor.tables import show_many, show_one
+from dynx.cli.doctor.tables import show_one
 from dynx.cli.shell.run import carry_out
 from dynx.doctor.formats import read_baseline
 from dynx.doctor.formats.baseline import Baseline
