@@ -1,8 +1,6 @@
 """The interface of every backend, written out: one method for each quantity of the table.
 
-The four calls that control loops make thousands of times a second (forward kinematics of one frame, Jacobian,
-inverse dynamics, mass matrix) call the engine's hook directly when there is one sample and the model has no
-mimic joint. All other calls go through `QuantityCalls`.
+Arguments are checked, and one sample goes straight to the engine's hook, in `QuantityCalls`.
 """
 
 from __future__ import annotations
@@ -15,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from dynx.backends.evaluation import common_batch
 from dynx.backends.hooks import apply_matrix, solve_mass_matrix
-from dynx.backends.quantity_calls import Forces, QuantityCalls
+from dynx.backends.quantity_calls import ALL_FRAMES, ONE_FRAME, Forces, QuantityCalls
 from dynx.ik import IKResult, inverse_kinematics
 from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED, shift_jacobian
 from dynx.spatial.scalar import Floats
@@ -62,13 +60,9 @@ class Backend(QuantityCalls):
         Featherstone 2008, section 4.4. Elsewhere: Pinocchio `framesForwardKinematics`, Drake
         `CalcPoseInWorld`, MuJoCo `mj_kinematics`, PyBullet `getLinkState`.
         """
-        known: Any = self._arguments.q(q) if self._validate else q
         if isinstance(frame, str):
-            index = self._index(frame)
-            if self._uncoupled and known.ndim == 1:
-                return self._frame_placement(known, index)
-            return self._evaluation(self._frame_placement, (4, 4), known, args=(index,))
-        placements = self._evaluation(self._frame_placements, (len(self._frame_index), 4, 4), known)
+            return self._evaluate(ONE_FRAME, (q,), frame)
+        placements = self._evaluate(ALL_FRAMES, (q,))
         if frame is None:
             return placements
         names = self._arguments.frames(frame)
@@ -88,13 +82,8 @@ class Backend(QuantityCalls):
         Siciliano et al., eq. 3.30. Elsewhere: Pinocchio `computeFrameJacobian`, Drake
         `CalcJacobianSpatialVelocity`, MuJoCo `mj_jac`, PyBullet `calculateJacobian`.
         """
-        known: Any = self._arguments.q(q) if self._validate else q
-        axes: Any = self._arguments.reference(reference) if self._validate else reference
-        index = self._index(frame)
-        if self._uncoupled and point is None and known.ndim == 1:
-            return self._jacobian(known, index, axes)
-        J = self._evaluate("jacobian", known, details=(index, axes))
-        return J if point is None else self._at_point(J, None, known, None, frame, axes, point)
+        J = self._evaluate("jacobian", (q,), (frame, reference))
+        return J if point is None else self._at_point(J, None, q, None, frame, reference, point)
 
     def jacobian_derivative(
         self,
@@ -110,12 +99,11 @@ class Backend(QuantityCalls):
         Siciliano et al., eq. 3.30, differentiated in time. Elsewhere: Pinocchio
         `getFrameJacobianTimeVariation`, MuJoCo `mj_jacDot`.
         """
-        q, v, axes = self._checked_q(q), self._checked_v(v), self._checked_reference(reference)
-        dJ = self._evaluate("jacobian_derivative", q, v, details=(self._index(frame), axes))
+        dJ = self._evaluate("jacobian_derivative", (q, v), (frame, reference))
         if point is None:
             return dJ
         J = self.jacobian(q, frame, reference=reference)
-        return self._at_point(J, dJ, q, v, frame, reference, point)
+        return self._at_point(J, dJ, q, self._checked_v(v), frame, reference, point)
 
     def frame_velocity(
         self,
@@ -131,11 +119,11 @@ class Backend(QuantityCalls):
         Featherstone 2008, section 2.8. Elsewhere: Pinocchio `getFrameVelocity`, Drake
         `CalcSpatialVelocityInWorld`, MuJoCo `mj_objectVelocity`.
         """
-        q, v, axes = self._checked_q(q), self._checked_v(v), self._checked_reference(reference)
-        if point is not None:
-            common_batch(q, v)
-            return apply_matrix(self.jacobian(q, frame, reference=reference, point=point), v)
-        return self._evaluate("frame_velocity", q, v, details=(self._index(frame), axes))
+        if point is None:
+            return self._evaluate("frame_velocity", (q, v), (frame, reference))
+        q, v = self._checked_q(q), self._checked_v(v)
+        common_batch(q, v)
+        return apply_matrix(self.jacobian(q, frame, reference=reference, point=point), v)
 
     def frame_acceleration(
         self,
@@ -154,14 +142,13 @@ class Backend(QuantityCalls):
         Elsewhere: Pinocchio `getFrameClassicalAcceleration`, Drake `CalcSpatialAccelerationInWorld`, MuJoCo
         `mj_objectAcceleration` (which adds gravity).
         """
-        q, v, axes = self._checked_q(q), self._checked_v(v), self._checked_reference(reference)
-        a = self._checked_v(a, "a")
-        if point is not None:
-            common_batch(q, v, a)
-            J = self.jacobian(q, frame, reference=reference, point=point)
-            dJ = self.jacobian_derivative(q, v, frame, reference=reference, point=point)
-            return apply_matrix(J, a) + apply_matrix(dJ, v)
-        return self._evaluate("frame_acceleration", q, v, a, details=(self._index(frame), axes))
+        if point is None:
+            return self._evaluate("frame_acceleration", (q, v, a), (frame, reference))
+        q, v, a = self._checked_q(q), self._checked_v(v), self._checked_v(a, "a")
+        common_batch(q, v, a)
+        J = self.jacobian(q, frame, reference=reference, point=point)
+        dJ = self.jacobian_derivative(q, v, frame, reference=reference, point=point)
+        return apply_matrix(J, a) + apply_matrix(dJ, v)
 
     def inverse_kinematics(
         self, target: ArrayLike, frame: str, q0: ArrayLike | None = None, **options: Any
@@ -186,21 +173,12 @@ class Backend(QuantityCalls):
         Luh, Walker and Paul 1980. Elsewhere: Pinocchio `rnea`, Drake `CalcInverseDynamics`, MuJoCo
         `mj_inverse`, PyBullet `calculateInverseDynamics`.
         """
-        known: Any = self._arguments.q(q) if self._validate else q
-        velocity: Any = self._arguments.v(v) if self._validate else v
-        acceleration: Any = self._arguments.v(a, "a") if self._validate else a
-        if self._uncoupled and known.ndim == 1 and velocity.ndim == 1 and acceleration.ndim == 1:
-            tau = self._inverse_dynamics(known, velocity, acceleration)
-        else:
-            tau = self._evaluate("inverse_dynamics", known, velocity, acceleration)
+        tau = self._evaluate("inverse_dynamics", (q, v, a))
         if external_forces is not None:
-            tau = tau - self._force_torque(known, tau, external_forces, force_reference)
+            tau = tau - self._force_torque(q, tau, external_forces, force_reference)
         if joint_dynamics:
-            tau = (
-                tau
-                + self._joint_terms.friction_torque(velocity)
-                + self._joint_terms.armature_torque(acceleration)
-            )
+            v, a = self._checked_v(v), self._checked_v(a, "a")
+            tau = tau + self._joint_terms.friction_torque(v) + self._joint_terms.armature_torque(a)
         return tau
 
     def forward_dynamics(
@@ -220,6 +198,8 @@ class Backend(QuantityCalls):
         Featherstone 2008, section 7.3. Elsewhere: Pinocchio `aba`, Drake
         `get_generalized_acceleration_output_port`, MuJoCo `mj_forward`.
         """
+        if self._uncoupled and external_forces is None and not joint_dynamics:
+            return self._arguments.finite_acceleration(self._evaluate("forward_dynamics", (q, v, tau)))
         q, v = self._checked_q(q), self._checked_v(v)
         tau = self._checked_v(tau, "tau")
         common_batch(q, v, tau)
@@ -229,7 +209,7 @@ class Backend(QuantityCalls):
         if joint_dynamics:
             tau = tau - self._joint_terms.friction_torque(v)
         if self._uncoupled and not (joint_dynamics and self._joint_terms.has_armature):
-            a = self._evaluate("forward_dynamics", q, v, tau)
+            a = self._evaluate("forward_dynamics", (q, v, tau))
         else:
             M = self.mass_matrix(q, joint_dynamics=joint_dynamics)
             a = solve_mass_matrix(M, tau - self.bias_torque(q, v))
@@ -241,11 +221,7 @@ class Backend(QuantityCalls):
         Featherstone 2008, section 6.2. Elsewhere: Pinocchio `crba`, Drake `CalcMassMatrix`, MuJoCo
         `mj_fullM`, PyBullet `calculateMassMatrix`.
         """
-        known: Any = self._arguments.q(q) if self._validate else q
-        if self._uncoupled and known.ndim == 1:
-            M = self._mass_matrix(known)
-        else:
-            M = self._evaluate("mass_matrix", known)
+        M = self._evaluate("mass_matrix", (q,))
         return M + self._joint_terms.armature if joint_dynamics else M
 
     def bias_torque(
@@ -262,11 +238,10 @@ class Backend(QuantityCalls):
         Siciliano et al., section 7.1.3. Elsewhere: Pinocchio `nonLinearEffects`, MuJoCo `qfrc_bias`, Drake
         `CalcBiasTerm` minus `CalcGravityGeneralizedForces`.
         """
-        q, v = self._checked_q(q), self._checked_v(v)
-        tau = self._evaluate("bias_torque", q, v)
+        tau = self._evaluate("bias_torque", (q, v))
         if external_forces is not None:
             tau = tau - self._force_torque(q, tau, external_forces, force_reference)
-        return tau + self._joint_terms.friction_torque(v) if joint_dynamics else tau
+        return tau + self._joint_terms.friction_torque(self._checked_v(v)) if joint_dynamics else tau
 
     def gravity_torque(self, q: ArrayLike) -> Floats:
         """Return g (..., nv) [N m]: `inverse_dynamics` at rest, the gradient of the potential energy.
@@ -274,7 +249,7 @@ class Backend(QuantityCalls):
         Siciliano et al., section 7.1.3. Elsewhere: Pinocchio `computeGeneralizedGravity`, Drake
         `CalcGravityGeneralizedForces` (with the opposite sign).
         """
-        return self._evaluate("gravity_torque", self._checked_q(q))
+        return self._evaluate("gravity_torque", (q,))
 
     def coriolis_matrix(self, q: ArrayLike, v: ArrayLike) -> Floats:
         """Return C (..., nv, nv) [N m s/rad] with C v + g = bias and dM/dt - 2 C skew-symmetric.
@@ -282,7 +257,7 @@ class Backend(QuantityCalls):
         Echeandia and Wensing 2021, eq. 24 (`dynx.rbd.coriolis`). Elsewhere: Pinocchio
         `computeCoriolisMatrix`.
         """
-        return self._evaluate("coriolis_matrix", self._checked_q(q), self._checked_v(v))
+        return self._evaluate("coriolis_matrix", (q, v))
 
     def inertial_regressor(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> Floats:
         """Return Y (..., nv, 10 n_links) [m/s^2, m^2/s^2, 1/s^2]: inverse dynamics is Y pi.
@@ -293,8 +268,7 @@ class Backend(QuantityCalls):
         zero. Atkeson, An and Hollerbach 1986. Elsewhere: Pinocchio `computeJointTorqueRegressor`, which
         orders the entries of the tensor differently.
         """
-        q, v, a = self._checked_q(q), self._checked_v(v), self._checked_v(a, "a")
-        return self._evaluate("inertial_regressor", q, v, a)
+        return self._evaluate("inertial_regressor", (q, v, a))
 
     # -- the whole body -----------------------------------------------------------------------
 
@@ -305,7 +279,7 @@ class Backend(QuantityCalls):
         Elsewhere: Pinocchio `centerOfMass` (which leaves those links out), Drake
         `CalcCenterOfMassPositionInWorld`, MuJoCo `subtree_com`.
         """
-        return self._evaluate("center_of_mass", self._checked_q(q))
+        return self._evaluate("center_of_mass", (q,))
 
     def center_of_mass_jacobian(self, q: ArrayLike) -> Floats:
         """Return J (..., 3, nv) [m/rad] with J v the velocity of the centre of mass, world axes.
@@ -313,7 +287,7 @@ class Backend(QuantityCalls):
         Orin, Goswami and Lee 2013. Elsewhere: Pinocchio `jacobianCenterOfMass`, Drake
         `CalcJacobianCenterOfMassTranslationalVelocity`, MuJoCo `mj_jacSubtreeCom`.
         """
-        return self._evaluate("center_of_mass_jacobian", self._checked_q(q))
+        return self._evaluate("center_of_mass_jacobian", (q,))
 
     def centroidal_momentum(self, q: ArrayLike, v: ArrayLike) -> Floats:
         """Return the linear, then angular momentum about the centre of mass (..., 6) [kg m/s, kg m^2/s],
@@ -322,7 +296,7 @@ class Backend(QuantityCalls):
         Orin, Goswami and Lee 2013. Elsewhere: Pinocchio `computeCentroidalMomentum`, Drake
         `CalcSpatialMomentumInWorldAboutPoint`, MuJoCo `subtree_angmom`.
         """
-        return self._evaluate("centroidal_momentum", self._checked_q(q), self._checked_v(v))
+        return self._evaluate("centroidal_momentum", (q, v))
 
     def kinetic_energy(self, q: ArrayLike, v: ArrayLike, *, joint_dynamics: bool = False) -> Floats:
         """Return v' M v / 2 (...,) [J].
@@ -330,9 +304,9 @@ class Backend(QuantityCalls):
         Siciliano et al., section 7.1.1. Elsewhere: Pinocchio `computeKineticEnergy`, Drake
         `CalcKineticEnergy`, MuJoCo `mj_energyVel`.
         """
-        q, v = self._checked_q(q), self._checked_v(v)
-        energy = self._evaluate("kinetic_energy", q, v)
+        energy = self._evaluate("kinetic_energy", (q, v))
         if joint_dynamics:
+            v = self._checked_v(v)
             energy = energy + 0.5 * np.sum(v * self._joint_terms.armature_torque(v), axis=-1)
         return energy
 
@@ -342,13 +316,13 @@ class Backend(QuantityCalls):
         Siciliano et al., section 7.1.2. Elsewhere: Pinocchio `computePotentialEnergy`, Drake
         `CalcPotentialEnergy`, MuJoCo `mj_energyPos`.
         """
-        return self._evaluate("potential_energy", self._checked_q(q))
+        return self._evaluate("potential_energy", (q,))
 
     # -- terms that every engine shares -------------------------------------------------------
 
     def _force_torque(self, q: Any, tau: Any, forces: Forces, reference: str) -> Floats:
         """Return the sum of J' w over the frames and their wrenches w, which broadcast with `tau`."""
-        wrenches = self._arguments.wrenches(forces)
+        q, wrenches = self._checked_q(q), self._arguments.wrenches(forces)
         common_batch(tau, q, *wrenches.values())
         total: Any = 0.0
         for frame, wrench in wrenches.items():

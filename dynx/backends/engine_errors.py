@@ -38,6 +38,7 @@ def engine_errors(
                     raise ClosedError(words) from error
                 raise EngineError(f"{self.name} failed on {self.model.name}: {message(error)}") from error
 
+        vars(call)["untranslated"] = hook
         return call
 
     def decorate(kind: Kind) -> Kind:

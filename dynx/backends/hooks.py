@@ -130,6 +130,12 @@ class EngineHooks(ABC):
         return kinematics.poses_from_frames(self._mechanism, self._frame_placements(q))
 
 
+def untranslated(hook: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a hook without the translation of its engine's exceptions (`dynx.backends.engine_errors`)."""
+    found: Callable[..., Any] = getattr(hook, "untranslated", hook)
+    return found
+
+
 def solve_mass_matrix(M: Floats, torque: Floats) -> Floats:
     """Solve M a = torque for a. Raises SingularMassMatrixError where M is singular to double precision.
 

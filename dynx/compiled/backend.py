@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from dynx._version import __version__
 from dynx.backends.base import Backend
 from dynx.backends.quantities import QUANTITIES, Quantity
-from dynx.backends.quantity_calls import Forces
+from dynx.backends.quantity_calls import Forces, Of
 from dynx.compiled.arguments import BatchArguments
 from dynx.compiled.call import CoupledCall, KernelCall, NumericCall, write_into
 from dynx.compiled.frames import chain_of, place_of
@@ -188,9 +188,13 @@ class CompiledBackend(Backend):
 
     # -- kernels ------------------------------------------------------------------------------
 
-    def _evaluate(self, name: str, q: Floats, *rates: Floats, details: tuple[Any, ...] = ()) -> Floats:
-        """Evaluate by a kernel in model coordinates, into which mimic joints are compiled."""
-        return self._call_for(name, details or QUANTITIES[name].implied_details(self.model))(q, *rates)
+    def _evaluate(self, name: str, arguments: tuple[Any, ...], of: Of = None) -> Floats:
+        """Evaluate by a kernel in model coordinates, into which mimic joints are compiled.
+
+        The call of the kernel checks the arguments.
+        """
+        details = self._frame_details(of) if of else QUANTITIES[name].implied_details(self.model)
+        return self._call_for(name, details)(*arguments)
 
     def _call_by_name(self, quantity: str) -> Call:
         """Return the call of a quantity without details, stored under its name."""

@@ -13,6 +13,7 @@ from functools import partial
 from typing import Any
 
 from dynx.backends import Backend
+from dynx.backends.hooks import untranslated
 from dynx.model import Model
 
 Evaluation = Callable[..., Any]
@@ -70,8 +71,8 @@ class EngineDynamics(Dynamics):
         hook: Evaluation = getattr(backend, f"_{quantity}")
         # The wrapper that translates the engine's exceptions is left out, because the loop translates them
         # for the whole step.
-        bare = getattr(hook, "__wrapped__", None)
-        return hook if bare is None else partial(bare, backend)
+        bare = untranslated(hook)
+        return hook if bare is hook else partial(bare, backend)
 
     def bound_to_thread(self, quantity: str) -> Evaluation:
         """Return a callable for the calling thread alone, which some engines make faster."""

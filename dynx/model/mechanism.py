@@ -91,6 +91,14 @@ class Coupling:
             S[base + row, base + column] = scale
         return S
 
+    def affine_map(self) -> tuple[Floats, Floats]:
+        """Return A (nq of the tree, nq of the model) and b with q_tree = A q + b, for one sample."""
+        base = 7 if self.floating else 0
+        A = np.zeros((base + len(self.index), base + self.n_joints))
+        A[:base, :base] = np.eye(base)
+        A[base:, base:] = self.matrix()[-len(self.index) :, -self.n_joints :]
+        return A, np.concatenate([np.zeros(base), self.offset])
+
     def expand_q(self, q: Floats) -> Floats:
         """Convert a model configuration (..., nq) to a tree configuration."""
         index, scale, offset = self._arrays

@@ -52,7 +52,7 @@ ENTRY = Quantity(
 # File 3, the method of `Backend`.
 def method(self: Backend, q: ArrayLike, v: ArrayLike) -> Floats:
     """Momentum about the world's origin (..., 6) [kg m/s, kg m^2/s]."""
-    return self._evaluate(NAME, self._checked_q(q), self._checked_v(v))
+    return self._evaluate(NAME, (q, v))
 
 
 # File 4, if an engine computes the quantity itself.

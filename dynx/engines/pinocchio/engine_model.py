@@ -85,25 +85,70 @@ def _build(model: Model) -> tuple[Any, tuple[int, ...]]:
     return engine, tuple(frame_ids)
 
 
-def joint_parameters_of_links(engine: Any, links: Sequence[int]) -> tuple[list[int], Floats]:
-    """Return the map from inertial parameters of links to those of the engine's joints that move them.
+class LinkRegressor:
+    """The map from the engine's regressor of joints to that of links.
 
-    It consists, for each link, of the number of its joint, not counting the universe, and the matrix (10, 10)
-    from its parameters in dynx's order to the joint's in the engine's order, zero for links on the universe.
+    The engine merges the inertia of a link into the joint that moves it. Columns of links whose frame is the
+    joint's own only change their order; those of other links on a joint are products with one matrix, and
+    those of links that no joint moves are zero.
     """
-    # Pinocchio lists the upper triangle of the tensor column by column.
-    engine_order = [0, 1, 2, 3, 4, 5, 7, 6, 8, 9]
-    joints, matrices = [], []
-    for link in links:
-        frame = engine.frames[link]
-        R, p = np.array(frame.placement.rotation), np.array(frame.placement.translation)
-        moved = [
-            parameters_from_inertia(inertia_from_parameters(unit).transform(R, p)) for unit in np.eye(10)
-        ]
-        matrix = np.stack(moved, axis=-1)[engine_order]
-        joints.append(max(int(frame.parentJoint) - 1, 0))
-        matrices.append(0.0 * matrix if frame.parentJoint == WORLD else matrix)
-    return joints, np.stack(matrices)
+
+    def __init__(self, engine: Any, links: Sequence[int]) -> None:
+        """`links` are the engine's numbers of the links' frames."""
+        self._size = 10 * (engine.njoints - 1)
+        unchanged = np.eye(10)[_ENGINE_ORDER]
+        matrices: dict[int, list[Floats]] = {}
+        # For each link its joint, not counting the universe, and its number among the matrices of the joint;
+        # None for a link that has no matrix.
+        places: list[tuple[int, int | None]] = []
+        for link in links:
+            frame = engine.frames[link]
+            joint = int(frame.parentJoint) - 1
+            matrix = _parameters_on_joint(frame.placement)
+            if frame.parentJoint == WORLD or np.array_equal(matrix, unchanged):
+                places.append((joint, None))
+            else:
+                of_joint = matrices.setdefault(joint, [])
+                places.append((joint, len(of_joint)))
+                of_joint.append(matrix.T)
+        self._products: list[tuple[slice, slice, Floats]] = []
+        end, first = self._size + 10, {}
+        for joint, of_joint in matrices.items():
+            first[joint], begin, end = end, end, end + 10 * len(of_joint)
+            columns = slice(10 * joint, 10 * joint + 10)
+            self._products.append((columns, slice(begin, end), np.concatenate(of_joint)))
+        self._rows = end
+        order: list[int] = []
+        for joint, number in places:
+            if number is not None:
+                order += range(first[joint] + 10 * number, first[joint] + 10 * number + 10)
+            elif joint < 0:
+                order += range(self._size, self._size + 10)
+            else:
+                order += [10 * joint + k for k in _ENGINE_ORDER]
+        self._order = np.array(order, dtype=np.intp)
+
+    def __call__(self, of_joints: Floats) -> Floats:
+        """Return the regressor of the links (nv, 10 n_links) for that of the joints (nv, 10 n_joints)."""
+        # Columns as rows, because the engine stores its array by columns: those of joints, zeros, products.
+        columns = np.empty((self._rows, len(of_joints)))
+        columns[: self._size] = of_joints.T
+        columns[self._size : self._size + 10].fill(0.0)
+        for source, target, matrices in self._products:
+            np.dot(matrices, columns[source], out=columns[target])
+        return np.asarray(columns.take(self._order, axis=0).T)
+
+
+_ENGINE_ORDER = [0, 1, 2, 3, 4, 5, 7, 6, 8, 9]
+"""Pinocchio's order of the ten parameters: it lists the upper triangle of the tensor column by column."""
+
+
+def _parameters_on_joint(placement: Any) -> Floats:
+    """Return the matrix (10, 10) from the parameters of a body at `placement`, in dynx's order, to those
+    about the joint's origin in the engine's order."""
+    R, p = np.array(placement.rotation), np.array(placement.translation)
+    moved = [parameters_from_inertia(inertia_from_parameters(unit).transform(R, p)) for unit in np.eye(10)]
+    return np.asarray(np.stack(moved, axis=-1)[_ENGINE_ORDER])
 
 
 def _placement(pose: Pose) -> Any:
