@@ -198,7 +198,7 @@ class Backend(QuantityCalls):
         Featherstone 2008, section 7.3. Elsewhere: Pinocchio `aba`, Drake
         `get_generalized_acceleration_output_port`, MuJoCo `mj_forward`.
         """
-        if self._uncoupled and external_forces is None and not joint_dynamics:
+        if external_forces is None and not joint_dynamics:
             return self._arguments.finite_acceleration(self._evaluate("forward_dynamics", (q, v, tau)))
         q, v = self._checked_q(q), self._checked_v(v)
         tau = self._checked_v(tau, "tau")
@@ -208,7 +208,7 @@ class Backend(QuantityCalls):
             tau = tau + self._force_torque(q, tau, external_forces, force_reference)
         if joint_dynamics:
             tau = tau - self._joint_terms.friction_torque(v)
-        if self._uncoupled and not (joint_dynamics and self._joint_terms.has_armature):
+        if not (joint_dynamics and self._joint_terms.has_armature):
             a = self._evaluate("forward_dynamics", (q, v, tau))
         else:
             M = self.mass_matrix(q, joint_dynamics=joint_dynamics)

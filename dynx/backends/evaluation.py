@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from dynx.backends.hooks import solve_mass_matrix
 from dynx.errors import ShapeError
 from dynx.model import Mechanism
 from dynx.spatial.scalar import Floats
@@ -82,6 +83,21 @@ class Evaluation:
             return result if reduce is None else reduce(np.asarray(result))
 
         return reduced
+
+    def solution_of_sample(
+        self, mass_matrix: Callable[..., Any], bias_torque: Callable[..., Any]
+    ) -> Callable[..., Floats]:
+        """Return the function of a backend, q, v and tau in model coordinates that solves for the
+        acceleration of one sample, given the functions of two hooks."""
+        assert self._coupling is not None
+        A, b, S, S_T = *self._coupling.affine_map(), self._S, self._S_T
+
+        def solved(backend: object, q: Floats, v: Floats, tau: Floats) -> Floats:
+            q, v = A.dot(q) + b, S.dot(v)
+            M = S_T.dot(mass_matrix(backend, q)).dot(S)
+            return solve_mass_matrix(M, tau - bias_torque(backend, q, v).dot(S))
+
+        return solved
 
     def reduce_columns(self, result: Floats) -> Floats:
         """Return A S for a torque (..., nv) or a Jacobian (..., 6, nv)."""

@@ -16,8 +16,8 @@ from numpy import ndarray
 from numpy.typing import ArrayLike
 
 from dynx.backends.arguments import Arguments
-from dynx.backends.evaluation import Evaluation, Reduction
-from dynx.backends.hooks import EngineHooks, untranslated
+from dynx.backends.evaluation import Evaluation, Reduction, common_batch
+from dynx.backends.hooks import EngineHooks, solve_mass_matrix, untranslated
 from dynx.backends.joint_dynamics import JointDynamicsTerms
 from dynx.backends.lifecycle import Lifecycle
 from dynx.backends.quantities import QUANTITIES
@@ -98,7 +98,10 @@ class QuantityCalls(Lifecycle, EngineHooks):
         rates = tuple(map(self._checked_v, arguments[1:], plan.arguments[1:]))
         details = self._frame_details(of)
         if plan.solves:
+            common_batch(q, *rates)
             self._solvability.refuse_singular(False)
+            if not self._uncoupled:
+                return self._solved_acceleration(q, *rates)
         hook: Callable[..., Any] | None = getattr(self, plan.hook, None)
         if hook is None:
             hook = partial(self._derive, name)
@@ -107,6 +110,16 @@ class QuantityCalls(Lifecycle, EngineHooks):
             function = untranslated(getattr(type(self), plan.hook))
             self._straight[name] = self._evaluation.of_sample(function, len(rates), plan.reduction)
         return self._evaluation(hook, plan.result_shape, q, *rates, args=details, reduce=plan.reduction)
+
+    def _solved_acceleration(self, q: Floats, v: Floats, tau: Floats) -> Floats:
+        """Solve for the acceleration of a robot with mimic joints, which reduce the equation of motion."""
+        hooks = ("_mass_matrix", "_bias_torque")
+        if vars(self).keys().isdisjoint(hooks):
+            functions = (untranslated(getattr(type(self), hook)) for hook in hooks)
+            self._straight["forward_dynamics"] = self._evaluation.solution_of_sample(*functions)
+        return solve_mass_matrix(
+            self._evaluate("mass_matrix", (q,)), tau - self._evaluate("bias_torque", (q, v))
+        )
 
     def _frame_details(self, of: Of) -> tuple[Any, ...]:
         """Return what hooks take for a frame, or a frame and a reference: its number, the checked name."""

@@ -193,6 +193,8 @@ class CompiledBackend(Backend):
 
         The call of the kernel checks the arguments.
         """
+        if name == "forward_dynamics" and not self._eliminates:
+            return self._evaluate_samples(name, arguments, of)
         details = self._frame_details(of) if of else QUANTITIES[name].implied_details(self.model)
         return self._call_for(name, details)(*arguments)
 

@@ -21,3 +21,24 @@ def test_a_matrix_singular_but_for_rounding_is_not_solved(B: np.ndarray, power: 
     M = (B @ B.T) * 10.0**power
     with pytest.raises(SingularMassMatrixError):
         solve_mass_matrix(M, np.ones(4))
+
+
+@given(
+    hnp.arrays(np.float64, (5, 5), elements=st.floats(-1.0, 1.0)),
+    hnp.arrays(np.float64, 5, elements=st.integers(-6, 6)),
+)
+def test_one_sample_is_solved_to_rounding_at_any_scale(B: np.ndarray, powers: np.ndarray) -> None:
+    M = (B @ B.T + np.eye(5)) * np.outer(10.0**powers, 10.0**powers)
+    torque = M @ np.ones(5)
+    a = solve_mass_matrix(M, torque)
+    size = np.sqrt(np.diagonal(M))
+    assert np.max(np.abs(M @ a - torque) / size) <= 1e-13 * np.max(np.abs(M) @ np.abs(a) / size)
+    np.testing.assert_allclose(a, solve_mass_matrix(M[None], torque[None])[0], rtol=1e-9, atol=1e-30)
+
+
+def test_an_indefinite_matrix_is_solved_and_a_singular_one_refused() -> None:
+    """The determinant tells neither from the other without its sign."""
+    np.testing.assert_allclose(solve_mass_matrix(np.diag([2.0, -1.0]), np.ones(2)), [0.5, -1.0], rtol=1e-15)
+    for singular in (np.ones((3, 3)), np.diag([1.0, 0.0]), np.full((2, 2), np.nan)):
+        with pytest.raises(SingularMassMatrixError):
+            solve_mass_matrix(singular, np.ones(len(singular)))
