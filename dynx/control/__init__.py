@@ -1,6 +1,6 @@
 """Controllers, one per file: frozen dataclasses that compute torques from measurement, setpoint, state."""
 
-from dynx.control.base import Controller, Measurement, ModelBased
+from dynx.control.base import Controller, Measurement, ModelBased, model_dynamics
 from dynx.control.computed_torque import ComputedTorque
 from dynx.control.discrete_computed_torque import DiscreteComputedTorque
 from dynx.control.engine_motors import EngineMotor, PDMotor, PositionMotor, TorqueMotor, VelocityMotor
@@ -44,6 +44,7 @@ __all__ = [
     "VelocityMotor",
     "controller_from_document",
     "controller_to_document",
+    "model_dynamics",
     "register_controller",
     "unregister_controller",
 ]

@@ -55,9 +55,9 @@ class Controller(ABC, Generic[ControllerState]):
 
     A controller of your own is a subclass with `torque`, and with `initial_state` if it has a state. It is
     best a frozen dataclass, which is compared, printed and serialised by its fields. If it modifies the
-    torque of another controller, that is its attribute `inner`; if it evaluates its model, it does so by its
-    attribute `dynamics`. It must not change its own attributes. Several threads may share it if they may
-    share its backend.
+    torque of another controller, that is its attribute `inner`; if it evaluates a model, it does so by an
+    attribute that `model_dynamics` makes. It must not change its own attributes. Several threads may share it
+    if they may share its backend.
     """
 
     lead: int = 0
@@ -98,8 +98,15 @@ class Controller(ABC, Generic[ControllerState]):
 
     def on(self: Self, engine: str | Backend) -> Self:
         """Return a controller whose model another backend evaluates; `self` if it evaluates no model."""
+        changes: dict[str, Any] = {
+            name: EngineDynamics(engine_of(value.model, engine))
+            for name, value in attributes_of(self).items()
+            if isinstance(value, EngineDynamics)
+        }
         inner = getattr(self, "inner", None)
-        return substitute(self, inner=inner.on(engine)) if isinstance(inner, Controller) else self
+        if isinstance(inner, Controller):
+            changes["inner"] = inner.on(engine)
+        return substitute(self, **changes) if changes else self
 
     @property
     def name(self) -> str:
@@ -243,11 +250,12 @@ def rebind(
     Neither is checked: they may be symbols of a trace.
     """
     changes = dict(gains(controller))
-    inner, evaluated = getattr(controller, "inner", None), getattr(controller, "dynamics", None)
+    inner = getattr(controller, "inner", None)
     if isinstance(inner, Controller):
         changes["inner"] = rebind(inner, dynamics, gains)
-    if isinstance(evaluated, Dynamics):
-        changes["dynamics"] = dynamics(evaluated)
+    for name, value in attributes_of(controller).items():
+        if isinstance(value, Dynamics):
+            changes[name] = dynamics(value)
     return substitute(controller, **changes)
 
 
@@ -258,6 +266,15 @@ def engine_of(model: Model, engine: str | Backend) -> Backend:
     if engine.model != model:
         raise ArgumentError(f"the backend is for {shown(engine.model)}; wanted one for {shown(model)}")
     return engine
+
+
+def model_dynamics(model: Model, backend: str | Backend = "pinocchio") -> Dynamics:
+    """Return the dynamics of `model`, for a controller of your own that evaluates them in `torque`.
+
+    As an attribute of the controller it is evaluated by the backend, of that name or for an equal model, and
+    in compiled steps and batches by compiled code. Raises ArgumentError for a backend of another robot.
+    """
+    return EngineDynamics(engine_of(model, backend))
 
 
 def _in_words(value: Any) -> str:

@@ -42,7 +42,7 @@ Seen = dict[int, tuple[int, Any]]
 
 def is_foreign(kind: type) -> bool:
     """Check whether a class belongs neither to dynx nor to one of `LIBRARIES`."""
-    return _is_foreign(kind.__module__)
+    return is_foreign_module(kind.__module__)
 
 
 def digest_of_code(kind: type) -> str:
@@ -55,7 +55,8 @@ def digest_of_function(function: FunctionType) -> str:
     return sha256(repr(_function(function, {})).encode()).hexdigest()
 
 
-def _is_foreign(module: str | None) -> bool:
+def is_foreign_module(module: str | None) -> bool:
+    """Check whether a module belongs neither to dynx nor to one of `LIBRARIES`."""
     root = (module or "").partition(".")[0]
     return root not in LIBRARIES and root not in sys.stdlib_module_names
 
@@ -90,7 +91,7 @@ def _is_generated(kind: type, name: str, value: Any) -> bool:
 
 
 def _function(function: FunctionType, seen: Seen) -> Any:
-    if not _is_foreign(function.__module__):
+    if not is_foreign_module(function.__module__):
         return _name(function)
     found = _place(function, seen)
     if found is not None:

@@ -31,9 +31,10 @@ class Residual:
 
     def __call__(self, T_world_frame: Floats) -> tuple[tuple[float, ...], float, float]:
         """Return (residual (6,), or (3,) if a part is free; position error [m]; rotation error [rad])."""
-        if self._position is None:
-            assert self._rotation is not None
+        rx = ry = rz = angle = 0.0
+        if self._rotation is not None:
             rx, ry, rz, angle = rotation_vector(self._rotation.dot(T_world_frame[:3, :3].T))
+        if self._position is None:
             return (rx, ry, rz), 0.0, angle
         if self._point is None:
             px, py, pz, _ = T_world_frame[:, 3].tolist()
@@ -44,7 +45,6 @@ class Residual:
         distance = math.sqrt(x * x + y * y + z * z)
         if self._rotation is None:
             return (x, y, z), distance, 0.0
-        rx, ry, rz, angle = rotation_vector(self._rotation.dot(T_world_frame[:3, :3].T))
         return (x, y, z, rx, ry, rz), distance, angle
 
 

@@ -14,6 +14,7 @@ Where a derivative does not exist:
 - ``abs`` at 0, and ``min`` and ``max`` of equal arguments: the mean of the derivatives on both sides
 - ``sqrt`` at 0, ``div`` by 0: the IEEE 754 result of the formula, an infinity or NaN
 - where an argument of ``abs``, ``min`` or ``max`` is NaN: NaN
+- a comparison of equal arguments, and ``select`` where its condition changes: the derivative on one side
 """
 
 from __future__ import annotations
@@ -207,6 +208,15 @@ def _max_rule(graph: Graph, index: int, a: int, b: int) -> tuple[int, ...]:
     return graph.apply("add", half, half_sign), graph.apply("sub", half, half_sign)
 
 
+def _step_rule(graph: Graph, index: int, a: int, b: int) -> tuple[int, ...]:
+    return graph.constant(0.0), graph.constant(0.0)
+
+
+def _select_rule(graph: Graph, index: int, c: int, a: int, b: int) -> tuple[int, ...]:
+    zero, one = graph.constant(0.0), graph.constant(1.0)
+    return zero, graph.apply("select", c, one, zero), graph.apply("select", c, zero, one)
+
+
 _DERIVATIVES: dict[str, Derivatives] = {
     "add": lambda graph, index, a, b: (graph.constant(1.0), graph.constant(1.0)),
     "sub": lambda graph, index, a, b: (graph.constant(1.0), graph.constant(-1.0)),
@@ -222,6 +232,8 @@ _DERIVATIVES: dict[str, Derivatives] = {
     "arctan": _arctan_rule,
     "min": _min_rule,
     "max": _max_rule,
+    **dict.fromkeys(("less", "less_equal", "equal"), _step_rule),
+    "select": _select_rule,
 }
 
 

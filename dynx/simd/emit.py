@@ -165,6 +165,7 @@ def _prefetch(program: Program, lanes: int) -> list[str]:
 
 _BINARY: dict[Op, str] = {"add": "fadd", "sub": "fsub", "mul": "fmul", "div": "fdiv"}
 _ORDER: dict[Op, str] = {"min": "olt", "max": "ogt"}
+_COMPARISON: dict[Op, str] = {"less": "olt", "less_equal": "ole", "equal": "oeq"}
 
 
 class SegmentBody:
@@ -239,6 +240,12 @@ class SegmentBody:
             name = write.let(f"{_BINARY[node.op]} {flags}{write.vector} {args[0]}, {args[1]}")
         elif node.op in _ORDER:
             name = write.select(_ORDER[node.op], *args, *args)
+        elif node.op in _COMPARISON:
+            a, b = args
+            name = write.select(_COMPARISON[node.op], a, b, write.splat(1.0), write.splat(0.0))
+        elif node.op == "select":
+            condition, yes, no = args
+            name = write.select("une", condition, write.splat(0.0), yes, no)
         elif node.op in ELEMENTARY:
             name = elementary(write, node.op, args[0])
         elif node.op == "neg":

@@ -30,15 +30,23 @@ Op = Literal[
     "arctan",
     "min",
     "max",
+    "less",
+    "less_equal",
+    "equal",
+    "select",
 ]
 
 _UNARY: Final[tuple[Op, ...]] = ("neg", "abs", "sqrt", "sin", "cos", "exp", "tanh", "arctan")
-_BINARY: Final[tuple[Op, ...]] = ("add", "sub", "mul", "div", "min", "max")
+_BINARY: Final[tuple[Op, ...]] = (
+    *("add", "sub", "mul", "div", "min", "max"),
+    *("less", "less_equal", "equal"),
+)
 ARITY: Final[dict[Op, int]] = {
     "input": 0,
     "constant": 0,
     **dict.fromkeys(_BINARY, 2),
     **dict.fromkeys(_UNARY, 1),
+    "select": 3,
 }
 """Number of arguments of every operation. `Graph` documents their semantics."""
 
@@ -74,13 +82,17 @@ class Graph:
 
     Operations are those of IEEE 754 in double precision, rounded to nearest; `min` and `max` return the
     second argument if either is NaN (as the processor's instructions do); sin, cos and arctan are in
-    radians, and like exp and tanh accurate to 2 units in the last place.
+    radians, and like exp and tanh accurate to 2 units in the last place. `less`, `less_equal` and `equal` are
+    1 or 0, which is what they are if either argument is NaN; `select` is its second argument where the first
+    is not 0, otherwise its third.
     """
 
     def __init__(self, simplify: Simplify | None = None) -> None:
         self.nodes: list[Node] = []
         self._known: dict[object, int] = {}
         self._simplify = simplify
+        self.reordered = ""
+        """Function of NumPy that was traced with sums in another order than NumPy's, if there is one."""
 
     def __len__(self) -> int:
         return len(self.nodes)
@@ -131,7 +143,7 @@ def _unary(op: Op) -> Callable[[Any], Symbol]:
     """Make the method of `Symbol` for an operation on one number."""
 
     def apply(self: Symbol) -> Symbol:
-        return Symbol(self.graph, self.graph.apply(op, self.index))
+        return self.kind(self.graph, self.graph.apply(op, self.index))
 
     return apply
 
@@ -143,11 +155,11 @@ def _binary(op: Op, *, reflected: bool = False) -> Callable[[Any, Any], Any]:
     """
 
     def apply(self: Symbol, other: Any) -> Any:
-        index = _index(self.graph, other)
+        index = self._index(other)
         if index is None:
             return NotImplemented
         pair = (index, self.index) if reflected else (self.index, index)
-        return Symbol(self.graph, self.graph.apply(op, *pair))
+        return self.kind(self.graph, self.graph.apply(op, *pair))
 
     return apply
 
@@ -163,6 +175,9 @@ class Symbol:
     """
 
     __slots__ = ("graph", "index")
+
+    kind: type[Symbol]
+    """Class of the results of arithmetic."""
 
     def __init__(self, graph: Graph, index: int) -> None:
         self.graph = graph
@@ -183,38 +198,42 @@ class Symbol:
 
     def sign(self) -> Symbol:
         """Return the sign: -1, 0 or 1."""
-        return Symbol(self.graph, self.graph.sign(self.index))
+        return self.kind(self.graph, self.graph.sign(self.index))
 
     def clamp(self, bound: Any) -> Symbol:
         """Clamp to [-bound, bound]; NaN stays NaN."""
         clamped: Symbol = _at_most(_at_least(self, -bound), bound)
         return clamped
 
+    def _index(self, other: Any) -> int | None:
+        """Return the node of an operand, a symbol of the same graph or a real number; else None."""
+        if isinstance(other, Symbol):
+            if other.graph is not self.graph:
+                raise TraceError(f"{caller_location()} mixes symbols of two traces")
+            return other.index
+        if isinstance(other, (float, int)):
+            return self.graph.constant(float(other))
+        return None
+
     # Operations that need the value.
 
     def _refuse(self, *_: object) -> NoReturn:
         raise TraceError(
-            f"{_caller_location()} needs the value of a symbol; a traced function must not branch on one"
+            f"{caller_location()} needs the value of a symbol; a traced function must not branch on one"
         )
 
-    __bool__ = __float__ = __int__ = __index__ = __round__ = __floor__ = _refuse
-    __eq__ = __ne__ = __lt__ = __le__ = __gt__ = __ge__ = _refuse
-    __hash__ = _refuse
+    # A subclass may define some of them.
+    _needs_value: Any = _refuse
+    __bool__ = __float__ = __int__ = __index__ = __round__ = __floor__ = _needs_value
+    __eq__ = __ne__ = __lt__ = __le__ = __gt__ = __ge__ = _needs_value
+    __hash__ = _needs_value
 
 
-def _index(graph: Graph, other: Any) -> int | None:
-    """Return the node of an operand, a symbol of the same graph or a real number; else None."""
-    if isinstance(other, Symbol):
-        if other.graph is not graph:
-            raise TraceError(f"{_caller_location()} mixes symbols of two traces")
-        return other.index
-    if isinstance(other, (float, int)):
-        return graph.constant(float(other))
-    return None
+Symbol.kind = Symbol
 
 
-def _caller_location() -> str:
-    """Return file and line of the innermost calling code outside this module and NumPy."""
+def caller_location() -> str:
+    """Return file and line of the innermost calling code outside this package and NumPy."""
     frame: Any = sys._getframe(2)
     while frame is not None and _is_internal(frame.f_globals.get("__name__", "")):
         frame = frame.f_back
@@ -222,4 +241,4 @@ def _caller_location() -> str:
 
 
 def _is_internal(module: str) -> bool:
-    return module in (__name__, "numpy") or module.startswith("numpy.")
+    return module.partition(".")[0] == "numpy" or module.startswith("dynx.simd.")

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from dynx.simd.expr import Symbol
+from dynx.simd.expr import Op, Symbol
 from dynx.simd.program import Program, scalar_ranges
 from dynx.spatial.scalar import Array, arctan, cos, exp, sin, sqrt, tanh
 
@@ -49,6 +49,23 @@ def _maximum(a: Any, b: Any) -> Any:
     return a if a > b else b
 
 
+def _compared(op: Op, a: Any, b: Any) -> Any:
+    return _applied(op, lambda: float({"less": a < b, "less_equal": a <= b, "equal": a == b}[op]), a, b)
+
+
+def _selected(c: Any, a: Any, b: Any) -> Any:
+    return _applied("select", lambda: a if c != 0.0 else b, c, a, b)
+
+
+def _applied(op: Op, evaluate: Callable[[], Any], *args: Any) -> Any:
+    """Return the symbol of an operation, or its value if no argument is a symbol."""
+    for arg in args:
+        if isinstance(arg, Symbol):
+            graph = arg.graph
+            return Symbol(graph, graph.apply(op, *(_symbol(arg, x).index for x in args)))
+    return evaluate()
+
+
 def _symbol(other: Symbol, x: Any) -> Symbol:
     """Return x as a symbol of the graph of `other`."""
     if isinstance(x, Symbol):
@@ -80,4 +97,8 @@ _OPERATIONS: dict[str, Callable[..., Any]] = {
     "arctan": _elementary(arctan),
     "min": _minimum,
     "max": _maximum,
+    "less": lambda a, b: _compared("less", a, b),
+    "less_equal": lambda a, b: _compared("less_equal", a, b),
+    "equal": lambda a, b: _compared("equal", a, b),
+    "select": _selected,
 }

@@ -54,6 +54,10 @@ _OPERATIONS: dict[Op, Callable[..., Floats]] = {
     # Unlike NumPy's, these return the second argument if either is NaN, or if both are zero.
     "min": lambda a, b: _select(a < b, a, b),
     "max": lambda a, b: _select(a > b, a, b),
+    "less": lambda a, b: _select(a < b, np.ones_like(a), np.zeros_like(a)),
+    "less_equal": lambda a, b: _select(a <= b, np.ones_like(a), np.zeros_like(a)),
+    "equal": lambda a, b: _select(a == b, np.ones_like(a), np.zeros_like(a)),
+    "select": lambda c, a, b: _select(c != 0.0, a, b),
 }
 
 

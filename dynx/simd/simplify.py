@@ -95,6 +95,10 @@ _FOLD: dict[Op, Callable[..., float]] = {
     "sqrt": lambda a: math.sqrt(a) if a >= 0.0 else math.nan,
     "min": lambda a, b: a if a < b else b,
     "max": lambda a, b: a if a > b else b,
+    "less": lambda a, b: float(a < b),
+    "less_equal": lambda a, b: float(a <= b),
+    "equal": lambda a, b: float(a == b),
+    "select": lambda c, a, b: a if c != 0.0 else b,
 }
 
 
@@ -192,6 +196,15 @@ def _power_of_two(graph: Graph, op: Op, args: Args) -> int | None:
     if not 2.0**-1000 <= abs(value) <= 2.0**1000:
         return None
     return graph.apply("mul", args[0], graph.constant(1.0 / value))
+
+
+def _decided(graph: Graph, op: Op, args: Args) -> int | None:
+    """select(c, x, y) with a constant c, select(c, x, x)"""
+    condition, yes, no = args
+    value = _value(graph, condition)
+    if value is None:
+        return yes if yes == no else None
+    return yes if value != 0.0 else no
 
 
 # -- finite -------------------------------------------------------------------------------------------
@@ -303,6 +316,7 @@ EXACT: tuple[Rule, ...] = (
     Rule("negated-term", ("add", "sub"), "exact", _negated_term, ("neg",)),
     Rule("odd-and-even", ("sin", "cos", "tanh", "arctan", "abs"), "exact", _odd_and_even, ("neg",)),
     Rule("power-of-two", ("div",), "exact", _power_of_two, ("constant",)),
+    Rule("decided", ("select",), "exact", _decided),
 )
 
 FINITE: tuple[Rule, ...] = (

@@ -25,8 +25,8 @@ CHECKS_FAULTS = (
     Fault(
         "ik_batch_starts_at_the_first_sample",
         "dynx.ik.solver",
-        right="starts = np.broadcast_to(start, (*batch, model.nq)).reshape(len(positions), model.nq)",
-        wrong="starts = np.resize(np.ravel(start)[: model.nq], (len(positions), model.nq))",
+        right="starts = np.broadcast_to(start, (*batch, model.nq)).reshape(math.prod(batch), model.nq)",
+        wrong="starts = np.resize(np.ravel(start)[: model.nq], (math.prod(batch), model.nq))",
         test_file="tests/ik/test_solutions.py",
         test="test_a_batch_equals_its_samples_solved_alone",
     ),

@@ -60,7 +60,8 @@ def programs(
     picks = st.integers(0, 2**16)
     for op, a, b in draw(st.lists(st.tuples(st.sampled_from(operations), picks, picks), max_size=longest)):
         # Recent nodes are preferred as arguments, so that expressions become deep.
-        args = (len(graph) - 1 - a % min(len(graph), 8), b % len(graph))
+        recent = len(graph) - 1 - a % min(len(graph), 8)
+        args = (recent, b % len(graph), (a // 8 + b) % len(graph))
         graph.apply_unsimplified(op, *args[: ARITY[op]])
     outputs = [
         Port(f"out{k}", (size,)) for k, size in enumerate(draw(st.lists(SIZES, min_size=1, max_size=3)))

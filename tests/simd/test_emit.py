@@ -141,7 +141,7 @@ def all_operations() -> Program:
     """Return a program with every operation once, on two inputs."""
     graph = Graph()
     pair = graph.input(0), graph.input(1)
-    results = [graph.apply_unsimplified(op, *pair[: ARITY[op]]) for op in OPERATIONS]
+    results = [graph.apply_unsimplified(op, *(*pair, pair[0])[: ARITY[op]]) for op in OPERATIONS]
     return extract_program(graph, [Port("x", (2,))], [Port("y", (len(results),))], results)
 
 

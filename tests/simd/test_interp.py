@@ -13,6 +13,7 @@ from dynx.simd.program import Port, extract_program
 from tests.simd.machine import same_bits
 
 NAN, INF = math.nan, math.inf
+PAIRS = [(1.0, 2.0), (2.0, 1.0), (1.0, 1.0), (0.0, -0.0), (NAN, 1.0), (1.0, NAN), (INF, INF)]
 CASES: list[tuple[Op, tuple[float, ...], float]] = [
     ("add", (0.1, 0.2), 0.30000000000000004),
     ("add", (-0.0, -0.0), -0.0),
@@ -53,6 +54,12 @@ CASES: list[tuple[Op, tuple[float, ...], float]] = [
     ("max", (2.0, NAN), NAN),
     ("max", (0.0, -0.0), -0.0),
     ("max", (-0.0, 0.0), 0.0),
+    *(("less", pair, float(pair[0] < pair[1])) for pair in PAIRS),
+    *(("less_equal", pair, float(pair[0] <= pair[1])) for pair in PAIRS),
+    *(("equal", pair, float(pair[0] == pair[1])) for pair in PAIRS),
+    ("select", (1.0, 2.0, 3.0), 2.0),
+    ("select", (-0.0, NAN, 3.0), 3.0),
+    ("select", (NAN, 2.0, 3.0), 2.0),
 ]
 
 

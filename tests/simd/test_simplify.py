@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
@@ -41,8 +42,11 @@ def _both_ways(*shapes: Shape) -> list[Shape]:
 CASES: dict[str, list[Shape]] = {
     "constants": [
         *(
-            (op, *("c", "d")[: ARITY[op]])
-            for op in ("add", "sub", "mul", "div", "neg", "abs", "sqrt", "min", "max")
+            (op, *("c", "d", "c")[: ARITY[op]])
+            for op in (
+                *("add", "sub", "mul", "div", "neg", "abs", "sqrt", "min", "max"),
+                *("less", "less_equal", "equal", "select"),
+            )
         )
     ],
     "factor-one": [*_both_ways(("mul", "x", 1.0)), ("div", "x", 1.0)],
@@ -65,6 +69,8 @@ CASES: dict[str, list[Shape]] = {
     "negated-term": [*_both_ways(("add", "x", ("neg", "y"))), ("sub", "x", ("neg", "y"))],
     "odd-and-even": [(op, ("neg", "x")) for op in ("sin", "cos", "tanh", "arctan", "abs")],
     "power-of-two": [("div", "x", sign * 2.0**k) for k in (-1000, -3, 1, 52, 1000) for sign in (1.0, -1.0)],
+    "decided": [("select", value, "x", "y") for value in (1.0, 0.0, -0.0, math.nan)]
+    + [("select", "x", "y", "y")],
     "zero-factor": [
         *_both_ways(("mul", "x", 0.0), ("mul", "x", -0.0)),
         ("div", 0.0, "x"),
@@ -265,5 +271,5 @@ def test_rewriting_terminates() -> None:
         for op, arity in ARITY.items():
             for a in parts if arity else ():
                 for b in parts[::4] if arity == 2 else (a,):
-                    graph.apply(op, *(a, b)[:arity])
+                    graph.apply(op, *(a, b, a)[:arity])
         assert len(graph) > len(parts)

@@ -19,11 +19,12 @@ from dynx.compiled.parametric import ParametricDynamics
 from dynx.compiled.simplification import simplify_mechanism
 from dynx.control.base import Controller, Measurement, chain_of, gains_of
 from dynx.control.content import content_of
-from dynx.errors import ArgumentError, DynxError, TraceError, UnsupportedFeatureError, shown
+from dynx.errors import ArgumentError, TraceError, UnsupportedFeatureError, shown
 from dynx.model import Mechanism, Model
 from dynx.sim.batch.disturbances import BatchDisturbances
 from dynx.sim.batch.traced_controller import innermost, traced_controller
 from dynx.sim.loop.controller_checks import ControllerWatch, defect_of_outcome, is_row
+from dynx.sim.loop.own_controllers import refuse_irreproducible, traced_torque
 from dynx.sim.plants.integrators import SemiImplicitEuler
 from dynx.simd.cache import load_kernel, program_recipe
 from dynx.simd.kernel import Kernel
@@ -100,6 +101,8 @@ class FusedStep:
     def _traced(self, *, controlled: bool, pushed: bool) -> Kernel:
         mechanism = simplify_mechanism(self.model.mechanism)
         controller = traced_controller(self.controller, {})
+        if controlled:
+            self._refuse_irreproducible()
 
         def step(**given: Array) -> dict[str, Array]:
             if controlled:
@@ -125,18 +128,19 @@ class FusedStep:
         try:
             program = trace(step, self.sizes(controlled=controlled, pushed=pushed))
         except TraceError as error:
-            raise UnsupportedFeatureError(
-                f"{self.controller.name} cannot be compiled together with the plant: "
-                f"it branches on a value: {error}"
-            ) from error
-        except DynxError:
-            raise
-        except Exception as error:
-            raise UnsupportedFeatureError(
-                f"{self.controller.name} cannot be compiled together with the plant: with symbols instead "
-                f"of numbers it raised {type(error).__name__}: {error}"
-            ) from error
+            raise self._not_compiled(error) from error
         return load_kernel(program_recipe(program), lambda: program)
+
+    def _refuse_irreproducible(self) -> None:
+        try:
+            refuse_irreproducible(self.controller)
+        except TraceError as error:
+            raise self._not_compiled(error) from error
+
+    def _not_compiled(self, error: TraceError) -> UnsupportedFeatureError:
+        return UnsupportedFeatureError(
+            f"{self.controller.name} cannot be compiled together with the plant: {error}"
+        )
 
     def sizes(self, *, controlled: bool, pushed: bool) -> dict[str, tuple[int]]:
         """Return the inputs of a step in their order, and their sizes."""
@@ -173,7 +177,7 @@ class FusedStep:
         setpoint = Setpoint(given["q_wanted"], given["v_wanted"], given["a_wanted"])
         own = traced_controller(controller, {name: given[f"gain_{name}"] for name in self.gains})
         watch = ControllerWatch(own)
-        outcome = own.torque(Measurement(given["t"][0], q, v), setpoint, given.get("state"))
+        outcome = traced_torque(own, Measurement(given["t"][0], q, v), setpoint, given.get("state"))
         defect = defect_of_outcome(outcome)
         if defect:
             raise ArgumentError(f"{own.name}: {defect}")

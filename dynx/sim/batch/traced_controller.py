@@ -9,9 +9,11 @@ from typing import Any
 from dynx.compiled.kernels import evaluate_quantity
 from dynx.compiled.simplification import simplify_mechanism
 from dynx.control.base import Controller, chain_of, rebind
+from dynx.control.code_content import is_foreign
 from dynx.control.dynamics import Dynamics, Evaluation
 from dynx.model import Mechanism
 from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED
+from dynx.simd.user_code.arrays import is_traced, symbol_array, traced_array
 from dynx.spatial.scalar import Array
 
 FRAME_FUNCTIONS = {"forward_kinematics": "frame_placement"}
@@ -31,6 +33,9 @@ class ArrayDynamics(Dynamics):
         model = self.model
 
         def evaluate(*arguments: Any, reference: str = LOCAL_WORLD_ALIGNED) -> Array:
+            if any(map(is_traced, arguments)):
+                plain = (x if isinstance(x, str) else symbol_array(x) for x in arguments)
+                return traced_array(evaluate(*plain, reference=reference))
             if not isinstance(arguments[-1], str):
                 return evaluate_quantity(self._mechanism, quantity, (), *arguments)
             *arrays, frame = arguments
@@ -49,6 +54,8 @@ class ArrayDynamics(Dynamics):
 def traced_controller(controller: Controller[Any], gains: Mapping[str, Array]) -> Controller[Any]:
     """Return the controller with array code as its engine, and other gains in its innermost controller."""
     last = innermost(controller)
+    if is_foreign(type(last)):
+        gains = {name: traced_array(gain) for name, gain in gains.items()}
     return rebind(
         controller,
         lambda dynamics: dynamics if isinstance(dynamics, ArrayDynamics) else ArrayDynamics(dynamics.model),

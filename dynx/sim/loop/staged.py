@@ -8,9 +8,7 @@ before that step; the plain executor then repeats the step and reports the error
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from time import perf_counter
-from traceback import extract_tb
 from typing import Any
 
 import numpy as np
@@ -20,6 +18,7 @@ from dynx.control.base import Measurement
 from dynx.control.engine_motors import EngineMotor
 from dynx.errors import CompileError, TraceError
 from dynx.sim.loop.controller_checks import is_row
+from dynx.sim.loop.own_controllers import refuse_irreproducible, traced_torque
 from dynx.sim.loop.plain import DIVERGENCE_SPEED, Loop, LoopState
 from dynx.sim.loop.record import Record
 from dynx.sim.loop.stages import EngineCall, EngineCallTracer, StagedStep, refuse_impure, traced_controller
@@ -89,6 +88,7 @@ class StagedLoop:
         sizes |= dict.fromkeys(("q", "measured_q", "q_wanted"), nq)
         if loop.controller is not None:
             refuse_impure(loop.controller)
+            refuse_irreproducible(loop.controller)
         if any(array.dtype != np.float64 for array in loop.setpoints):
             raise TraceError("the reference is not in float64")
         self._start = None if loop.controller is None else loop.controller.initial_state()
@@ -143,11 +143,7 @@ class StagedLoop:
             measurement = Measurement(given["t"][0], q, v)
             setpoint = Setpoint(*(given[name] for name in SETPOINT))
             controller = traced_controller(loop.controller, tracer)
-            try:
-                tau, state = controller.torque(measurement, setpoint, state)
-            except Exception as error:
-                # A user's controller may raise anything when it gets symbols instead of numbers.
-                raise TraceError(_trace_failure(loop.controller.name, error)) from error
+            tau, state = traced_torque(controller, measurement, setpoint, state)
             tracer.refuse_inexact_rounding()
             if tau.shape != given["v"].shape:
                 raise TraceError(f"the torque has shape {tau.shape}")
@@ -270,10 +266,3 @@ class StagedLoop:
             return True
 
         return take
-
-
-def _trace_failure(name: str, error: Exception) -> str:
-    """Return the message for an error of a controller on symbols, with its line in `torque`."""
-    torques = [frame for frame in extract_tb(error.__traceback__) if frame.name == "torque"]
-    place = f" ({Path(torques[-1].filename).name}, line {torques[-1].lineno})" if torques else ""
-    return f"{name}.torque() cannot be traced: {error or type(error).__name__}{place}"

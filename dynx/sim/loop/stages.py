@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dynx.control.base import Controller, chain_of, gains_of, rebind
+from dynx.control.code_content import is_foreign
 from dynx.control.dynamics import QUANTITIES, Dynamics, EngineDynamics, Evaluation
 from dynx.errors import TraceError
 from dynx.simd.cache import load_kernel, program_recipe
@@ -25,6 +26,7 @@ from dynx.simd.kernel import Kernel
 from dynx.simd.program import Port, Program, extract_program, scalar_ranges
 from dynx.simd.simplify import STRICT
 from dynx.simd.target import host
+from dynx.simd.user_code.arrays import is_traced, symbol_array, traced_array
 from dynx.spatial.scalar import Array, Floats
 
 Shape = tuple[int, ...]
@@ -36,6 +38,7 @@ EngineCall = Callable[..., Floats]
 
 EXACTLY_ROUNDED = frozenset(
     {"input", "constant", "add", "sub", "mul", "div", "neg", "abs", "sqrt", "min", "max"}
+    | {"less", "less_equal", "equal", "select"}
 )
 """Operations with the same bits in NumPy and in a kernel: IEEE 754 requires correct rounding of them."""
 
@@ -117,6 +120,8 @@ class EngineCallTracer:
 
     def refuse_inexact_rounding(self) -> None:
         """Raise TraceError if an operation traced so far rounds differently in a kernel and in NumPy."""
+        if self._graph.reordered:
+            raise TraceError(f"{self._graph.reordered} is not rounded as NumPy rounds it")
         for node in self._graph.nodes:
             if node.op not in EXACTLY_ROUNDED:
                 raise TraceError(f"{node.op} is not rounded as NumPy rounds it")
@@ -179,6 +184,8 @@ class TracedEngineCalls(Dynamics):
         def record(*arguments: Array) -> Array:
             if quantity not in QUANTITIES:
                 raise TraceError(f"{quantity} of a frame is no engine call of a compiled stage")
+            if any(map(is_traced, arguments)):
+                return traced_array(record(*map(symbol_array, arguments)))
             return self._tracer.record(self._engine.bound_to_thread(quantity), shape, *arguments)
 
         return record
@@ -202,7 +209,10 @@ def traced_controller(controller: Controller[Any], tracer: EngineCallTracer) -> 
 
     def symbols(each: Controller[Any]) -> dict[str, Array]:
         gains = gains_of(each).items()
-        return {name: tracer.number(gain) for name, gain in gains if gain.ndim == 1}
+        numbers = {name: tracer.number(gain) for name, gain in gains if gain.ndim == 1}
+        if is_foreign(type(each)):
+            return {name: traced_array(number) for name, number in numbers.items()}
+        return numbers
 
     return rebind(controller, partial(TracedEngineCalls, tracer), symbols)
 

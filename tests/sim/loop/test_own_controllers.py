@@ -90,15 +90,6 @@ def test_a_torque_of_another_shape_is_refused_in_a_batch(given: Any) -> None:
         simulate_batch(ARM, Giving(given), REST, rollouts=4, duration=0.01)
 
 
-def test_what_a_law_cannot_do_with_symbols_is_said() -> None:
-    class Table(Giving):
-        def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Any, None]:
-            return np.linalg.inv(np.diag(measurement.q)) @ measurement.v, None
-
-    with pytest.raises(UnsupportedFeatureError, match=r"Table cannot be compiled .* raised UFuncTypeError"):
-        simulate_batch(ARM, Table(None), REST, rollouts=4, duration=0.01)
-
-
 class Integrating(Controller[None]):
     """A controller that keeps its integral in itself: by another array, in place, or in an object inside."""
 
