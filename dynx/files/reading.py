@@ -1,14 +1,40 @@
-"""Safe reading of a file named by the user, which has to be a regular file of limited size."""
+"""Safe reading of files named by the user: only regular files are opened, and their size is limited."""
 
 from __future__ import annotations
 
+import errno
 import os
 import stat
+from typing import BinaryIO
 
 from dynx.errors import ArgumentError, DescriptionError, RobotNotFoundError, shown
 
 MAX_BYTES = 64 * 1024 * 1024
 """Largest size of a file [bytes]; the largest description in public use is under 2 MiB."""
+
+
+class NotRegularError(OSError):
+    """The path leads to a directory, a FIFO, a device or a socket; `strerror` says to which."""
+
+
+def open_regular(path: str | os.PathLike[str]) -> BinaryIO:
+    """Open a regular file for reading. Raises OSError, NotRegularError for anything else that is there.
+
+    Opening a device can have effects, and opening a FIFO blocks, so neither is opened.
+    """
+    try:
+        _require_regular(os.stat(path))
+        descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+    except ValueError as error:
+        # Python raises ValueError for a path with a null character.
+        raise OSError(errno.EINVAL, str(error)) from None
+    try:
+        # Another program may have replaced the file meanwhile.
+        _require_regular(os.fstat(descriptor))
+    except OSError:
+        os.close(descriptor)
+        raise
+    return os.fdopen(descriptor, "rb")
 
 
 def read_file(path: str) -> bytes:
@@ -18,24 +44,20 @@ def read_file(path: str) -> bytes:
     device, a file that may not be read, or one above MAX_BYTES.
     """
     try:
-        # The type is checked before the file is opened, because opening a device can have effects and opening
-        # a FIFO blocks.
-        _require_regular(os.stat(path), path)
-        flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
-        descriptor = os.open(path, flags)
-        with open(descriptor, "rb") as file:
-            _require_regular(os.fstat(descriptor), path)
-            data = file.read(MAX_BYTES + 1)
+        with open_regular(path) as file:
+            too_large = os.fstat(file.fileno()).st_size > MAX_BYTES
+            data = b"" if too_large else file.read(MAX_BYTES + 1)
     except FileNotFoundError:
         raise RobotNotFoundError(f"no such file: {shown(path, 300)}") from None
-    except DescriptionError:
-        raise
-    except (OSError, ValueError) as error:
-        # Python raises ValueError for a path with a null character.
-        reason = getattr(error, "strerror", None) or str(error)
+    except NotRegularError as error:
+        raise DescriptionError(str(error.strerror), source=printable(path)) from None
+    except OSError as error:
+        reason = error.strerror or str(error)
         raise DescriptionError(f"cannot be read: {reason}", source=printable(path)) from None
-    if len(data) > MAX_BYTES:
-        raise _too_large(path)
+    if too_large or len(data) > MAX_BYTES:
+        raise DescriptionError(
+            f"is larger than {MAX_BYTES // 1024**2} MiB, the most that is read", source=printable(path)
+        )
     return data
 
 
@@ -52,17 +74,9 @@ def printable(path: str) -> str:
     return path if path.isprintable() and len(path) <= 300 else shown(path, 300)
 
 
-def _require_regular(status: os.stat_result, path: str) -> None:
+def _require_regular(status: os.stat_result) -> None:
     if stat.S_ISDIR(status.st_mode):
-        raise DescriptionError("is a directory; wanted a file", source=printable(path))
+        raise NotRegularError(errno.EISDIR, "is a directory; wanted a file")
     if not stat.S_ISREG(status.st_mode):
         kind = "a FIFO" if stat.S_ISFIFO(status.st_mode) else "a device or socket"
-        raise DescriptionError(f"is {kind}; wanted a regular file", source=printable(path))
-    if status.st_size > MAX_BYTES:
-        raise _too_large(path)
-
-
-def _too_large(path: str) -> DescriptionError:
-    return DescriptionError(
-        f"is larger than {MAX_BYTES // 1024**2} MiB, the most that is read", source=printable(path)
-    )
+        raise NotRegularError(errno.EINVAL, f"is {kind}; wanted a regular file")

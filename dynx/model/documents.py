@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from dynx.model.configuration import checked_array
 from dynx.model.elements import IDENTITY, Pose
-from dynx.model.loading import load
+from dynx.model.loading import read_model
 from dynx.model.model import Model
 
 
@@ -20,11 +21,20 @@ def robot_document(model: Model) -> dict[str, Any]:
 def robot_from_document(document: Mapping[str, Any]) -> Model:
     """Return the model of a `robot_document`.
 
-    Raises KeyError or TypeError for another document, and the errors of `load`.
+    Raises KeyError, TypeError or ValueError for another document, which include the errors of `load`.
     """
     numbers = document["base_pose"] if "base_pose" in document else pose_numbers(IDENTITY)
-    base_pose = Pose(tuple(numbers[:3]), tuple(numbers[3:]))
-    return load(document["urdf"], base=document["base"], gravity=document["gravity"], base_pose=base_pose)
+    x, y, z, roll, pitch, yaw = checked_array("base_pose", numbers, 6).tolist()
+    # A path or a name would make dynx read another file, which whoever wrote the document chose.
+    if not isinstance(document["urdf"], str):
+        raise TypeError(f"the URDF of a model is of type {type(document['urdf']).__name__}; wanted text")
+    return read_model(
+        document["urdf"],
+        "<string>",
+        base=document["base"],
+        gravity=document["gravity"],
+        base_pose=Pose((x, y, z), (roll, pitch, yaw)),
+    )
 
 
 def pose_numbers(pose: Pose) -> list[float]:

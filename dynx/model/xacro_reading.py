@@ -1,32 +1,60 @@
 """Expansion of xacro files to URDF text, by the package of the extra ``xacro``.
 
-xacro evaluates expressions of the file with Python's ``eval``, prints to the terminal, and finds packages by
-a function that only ROS provides. It therefore runs in a child process, which can be terminated and in which
-that function can be replaced without affecting the process that uses dynx. Expand only files that you trust.
+xacro evaluates expressions of the file with Python's ``eval``, reads the files that it names, prints to the
+terminal, and finds packages by a function that only ROS provides. It therefore runs in a child process, which
+can be terminated and in which that function can be replaced without affecting the process that uses dynx. The
+child imports nothing from the current directory, and its time, memory and output are bounded. That protects
+against mistakes, not against malice: expand only files that you trust.
 """
 
 from __future__ import annotations
 
 import importlib.util
+import json
 import os
+import signal
 import subprocess
 import sys
+import sysconfig
+import threading
 from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
 
 from dynx.errors import DescriptionError, NotInstalledError, escaped
-from dynx.files.reading import printable, read_file
+from dynx.files.reading import MAX_BYTES, printable, read_file
 from dynx.model.package_paths import StrPath, find_package
 
 TIMEOUT = 60.0
 """Longest duration of an expansion [s]."""
 
+MAX_MEMORY = 2 * 2**30
+"""Largest memory of an expansion [bytes], besides that of the interpreter; bounded on Linux."""
+
+_TEXT, _REASON = b"+", b"-"
+"""First byte of the reply of the child process: the text or the reason of a failure follows."""
+
+# In isolated mode (-I) Python puts no folder of the user in front of its own. dynx is imported from its file,
+# because its folder may be the current directory, whose other files must not be imported.
+_START = """
+import json, sys
+from importlib.util import module_from_spec, spec_from_file_location
+task = json.loads(sys.argv[1])
+sys.path[:] = task["import_path"]
+spec = spec_from_file_location("dynx", task["dynx"])
+sys.modules["dynx"] = module_from_spec(spec)
+spec.loader.exec_module(sys.modules["dynx"])
+from dynx.model.xacro_reading import expand_here
+expand_here(task["file"], task["roots"])
+"""
+
 
 def expand_xacro(path: str, package_dirs: Iterable[StrPath] = ()) -> bytes:
     """Return the URDF text of the xacro file; ``$(find NAME)`` looks in `package_dirs` only.
 
-    Raises NotInstalledError without xacro, DescriptionError if the expansion fails or takes longer than
-    `TIMEOUT`. Line numbers of the text differ from those of the file.
+    Raises NotInstalledError without xacro, DescriptionError if the expansion fails, takes longer than
+    `TIMEOUT`, needs more than `MAX_MEMORY` or makes more than `MAX_BYTES` of text. Line numbers of the text
+    differ from those of the file.
     """
     read_file(path)  # Raises for a FIFO or a directory, which xacro would block on.
     if importlib.util.find_spec("xacro") is None:
@@ -34,29 +62,85 @@ def expand_xacro(path: str, package_dirs: Iterable[StrPath] = ()) -> bytes:
             f"{printable(path)} is a xacro file and the package xacro is not installed; "
             "pip install 'dynx[xacro]', or expand the file to URDF with another xacro"
         )
-    roots = [os.path.abspath(os.fspath(root)) for root in package_dirs]
-    command = [sys.executable, "-m", "dynx.model.xacro_reading", os.path.abspath(path), *roots]
+    task = {
+        "file": os.path.abspath(path),
+        "roots": [os.path.abspath(os.fspath(root)) for root in package_dirs],
+        "import_path": _import_path(),
+        "dynx": str(Path(__file__).resolve().parent.parent / "__init__.py"),
+    }
+    reply, code = _reply([sys.executable, "-I", "-X", "utf8", "-c", _START, json.dumps(task)])
+    if reply is None:
+        raise DescriptionError(f"xacro did not finish within {TIMEOUT:g} s", source=printable(path))
+    if code == 0 and reply[:1] == _TEXT:
+        return reply[1:]
+    lines = reply.removeprefix(_REASON).decode("utf-8", "replace").split("\n")
+    # Without a reason from the child, the last line is that of Python's own message.
+    reasons = [" ".join(line.split()) for line in lines if line.strip()]
+    reason = reasons[-1] if reasons and reply[:1] != _TEXT else f"its process ended with code {code}"
+    raise DescriptionError(f"xacro failed: {escaped(reason, 300)}", source=printable(path))
+
+
+def _import_path() -> list[str]:
+    """Return the folders from which this process imports, without the current directory."""
     try:
-        done = subprocess.run(
-            command, stdin=subprocess.DEVNULL, capture_output=True, timeout=TIMEOUT, env=_environment()
-        )
-    except subprocess.TimeoutExpired:
-        raise DescriptionError(f"xacro did not finish within {TIMEOUT:g} s", source=printable(path)) from None
-    if done.returncode != 0:
-        messages = done.stderr.decode("utf-8", "replace").strip().splitlines() or ["no message"]
-        reason = " ".join(messages[-1].split())
-        raise DescriptionError(f"xacro failed: {escaped(reason, 300)}", source=printable(path))
-    return done.stdout
+        here = os.path.realpath(os.getcwd())
+    except OSError:  # It was deleted.
+        here = ""
+    # Somebody may work in a folder of installed packages.
+    installed = {os.path.realpath(sysconfig.get_path(kind)) for kind in ("purelib", "platlib")}
+    return [
+        folder
+        for folder in sys.path
+        if folder and (os.path.realpath(folder) != here or os.path.realpath(folder) in installed)
+    ]
 
 
-def _environment() -> dict[str, str]:
-    # The child process must import the same dynx, also from a source checkout.
-    here = str(Path(__file__).resolve().parent.parent.parent)
-    search = os.environ.get("PYTHONPATH")
-    return {**os.environ, "PYTHONPATH": here + (os.pathsep + search if search else ""), "PYTHONUTF8": "1"}
+def _reply(command: list[str]) -> tuple[bytes | None, int]:
+    """Return what a process writes, None if it takes too long, and its exit code."""
+    expired = threading.Event()
+
+    def expire() -> None:
+        expired.set()
+        _kill(process)
+
+    # Linear algebra reserves memory for each of its threads, and expansion needs none.
+    environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    with subprocess.Popen(
+        command,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        env=environment,
+        start_new_session=True,
+    ) as process:
+        assert process.stdout is not None
+        timer = threading.Timer(TIMEOUT, expire)
+        timer.daemon = True
+        timer.start()
+        try:
+            reply = process.stdout.read(len(_TEXT) + MAX_BYTES)
+            if process.stdout.read(1):
+                _kill(process)
+            code = process.wait()
+        finally:
+            timer.cancel()
+            timer.join()
+            if process.returncode is None:
+                _kill(process)
+    return (None if expired.is_set() else reply), code
 
 
-def _expand_in_child(path: str, roots: list[str]) -> int:
+def _kill(process: subprocess.Popen[bytes]) -> None:
+    """End a process and those that it started, which could keep its pipe open."""
+    if sys.platform == "win32":
+        process.kill()
+    else:
+        with suppress(ProcessLookupError, PermissionError):
+            os.killpg(process.pid, signal.SIGKILL)
+
+
+def expand_here(path: str, roots: list[str]) -> None:
+    """Run in the child process: write the text of the file or the reason of a failure to standard output."""
     import xacro
     from xacro import substitution_args
 
@@ -66,14 +150,38 @@ def _expand_in_child(path: str, roots: list[str]) -> int:
     # Text substitution and $(eval ...) both use the function of this module.
     substitution_args._eval_find = find
     substitution_args._eval_dict["find"] = find
-    try:
-        text = xacro.process_file(path).toprettyxml(indent="  ", encoding="utf-8")
-    except BaseException as error:  # any failure becomes one line for the parent process
-        sys.stderr.write(f"\n{type(error).__name__}: {' '.join(str(error).split())}\n")
-        return 1
-    sys.stdout.buffer.write(text)
-    return 0
+    with os.fdopen(os.dup(1), "wb") as output:
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, 1)
+        os.dup2(nowhere, 2)
+        try:
+            _bound_memory()
+            text = xacro.process_file(path).toprettyxml(indent="  ", encoding="utf-8")
+            reply = _TEXT + text
+            if len(text) > MAX_BYTES:
+                reply = _REASON + f"its text is larger than {MAX_BYTES // 1024**2} MiB".encode()
+        except BaseException as error:  # any failure becomes one line for the parent process
+            reply = _REASON + _reason_of(error).encode("utf-8", "replace")
+        output.write(reply)
 
 
-if __name__ == "__main__":
-    sys.exit(_expand_in_child(sys.argv[1], sys.argv[2:]))
+def _reason_of(error: BaseException) -> str:
+    """Describe a failure of xacro in one line."""
+    # xacro raises an exception of its own while it handles the original one.
+    origin: BaseException | None = error
+    while origin is not None:
+        if isinstance(origin, MemoryError):
+            return f"it needs more than {MAX_MEMORY / 2**30:g} GiB of memory"
+        origin = origin.__context__
+    return f"{type(error).__name__}: {' '.join(str(error).split())}"
+
+
+def _bound_memory() -> None:
+    """Limit the memory that this process can reserve, on systems that can do so."""
+    if sys.platform != "linux":
+        return
+    import resource
+
+    with suppress(OSError, ValueError):
+        reserved = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+        resource.setrlimit(resource.RLIMIT_AS, (reserved + MAX_MEMORY, reserved + MAX_MEMORY))

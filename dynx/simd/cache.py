@@ -187,7 +187,7 @@ def _write(path: Path, image: Image) -> None:
     body = b"".join([len(head).to_bytes(4, "little"), head, *image.objects])
     # Only the user may read or write it, whatever the umask: it holds code that is run.
     with contextlib.suppress(ArgumentError, OSError):
-        write_bytes(path, _MAGIC + sha256(body).digest() + body, mode=0o600)
+        write_bytes(path, _MAGIC + sha256(body).digest() + body, mode=0o600, sync=False)
         _evict(path.parent)
 
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import signal
 import stat
+import subprocess
 import sys
 import threading
 from pathlib import Path
@@ -11,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from dynx.errors import ArgumentError
-from dynx.files.writing import atomic_file, write_bytes
+from dynx.files.writing import atomic_file, clear_unfinished, write_bytes
 
 
 def test_ctrl_c_leaves_nothing_half_written(tmp_path: Path) -> None:
@@ -83,3 +85,64 @@ def test_of_several_writers_one_wins_with_its_whole_content(tmp_path: Path) -> N
         each.join()
     assert path.read_bytes() in contents
     assert [each.name for each in tmp_path.iterdir()] == ["shared"]
+
+
+KILLED = """
+import os, signal, sys
+from dynx.files.writing import atomic_file
+with atomic_file(sys.argv[1]) as file:
+    file.write(b"half")
+    file.flush()
+    print("open", flush=True)
+    sys.stdin.read()
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL and no file locks")
+def test_unfinished_files_are_deleted_when_their_process_has_ended(tmp_path: Path) -> None:
+    (tmp_path / ".dynx-mine.part").write_bytes(b"not of that form")
+    command = [sys.executable, "-c", KILLED, str(tmp_path / "run.npz")]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == b"open\n"
+        clear_unfinished(tmp_path)
+        assert len(list(tmp_path.iterdir())) == 2
+        process.send_signal(signal.SIGKILL)
+    write_bytes(tmp_path / "run.npz", b"whole")
+    assert sorted(each.name for each in tmp_path.iterdir()) == [".dynx-mine.part", "run.npz"]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="links and FIFOs of POSIX")
+def test_only_regular_files_count_as_unfinished(tmp_path: Path) -> None:
+    kept = tmp_path / "kept"
+    kept.write_bytes(b"")
+    (tmp_path / f".dynx-{'0' * 16}.part").symlink_to(kept)
+    (tmp_path / f".dynx-{'1' * 16}.part").mkdir()
+    os.mkfifo(tmp_path / f".dynx-{'2' * 16}.part")
+    clear_unfinished(tmp_path)
+    assert len(list(tmp_path.iterdir())) == 4
+
+
+def test_the_content_is_on_the_disk_before_the_file_gets_its_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    events: list[object] = []
+    sync, rename = os.fsync, os.replace
+
+    def synced(descriptor: int) -> None:
+        events.append(
+            os.fstat(descriptor).st_size if stat.S_ISREG(os.fstat(descriptor).st_mode) else "folder"
+        )
+        sync(descriptor)
+
+    def renamed(source: Path, target: Path) -> None:
+        events.append("renamed")
+        rename(source, target)
+
+    monkeypatch.setattr(os, "fsync", synced)
+    monkeypatch.setattr(os, "replace", renamed)
+    write_bytes(tmp_path / "run.npz", b"12345")
+    assert events == [5, "renamed"] + ["folder"] * (sys.platform != "win32")
+    events.clear()
+    write_bytes(tmp_path / "cached", b"12345", sync=False)
+    assert events == ["renamed"]

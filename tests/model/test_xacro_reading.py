@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import sys
 from pathlib import Path
 
 import pytest
@@ -84,6 +85,50 @@ def test_an_endless_expansion_is_terminated(tmp_path: Path, monkeypatch: pytest.
     path.write_text(joint())
     with pytest.raises(DescriptionError, match=r"did not finish within 0\.01 s"):
         load(path)
+
+
+@needs_xacro
+def test_nothing_is_imported_from_the_current_directory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "dynx").mkdir()
+    for name in ("yaml.py", "numpy.py", "xml.py", "sitecustomize.py", "dynx/__init__.py"):
+        (tmp_path / name).write_text(f"open({str(tmp_path / 'imported')!r}, 'w')")
+    (tmp_path / "x.xacro").write_text(f'<robot name="r" {XMLNS}><link name="a$(eval 1 + 1)"/></robot>')
+    monkeypatch.chdir(tmp_path)
+    # A program that was started by python -m, interactively, or with an empty entry in PYTHONPATH.
+    monkeypatch.setattr(sys, "path", ["", str(tmp_path), *sys.path])
+    monkeypatch.setenv("PYTHONPATH", f":{tmp_path}")
+    assert [link.name for link in load("./x.xacro").links] == ["a2"]
+    assert not (tmp_path / "imported").exists()
+
+
+@needs_xacro
+@pytest.mark.skipif(sys.platform != "linux", reason="memory is bounded on Linux")
+def test_an_expansion_that_takes_too_much_memory_is_ended(tmp_path: Path) -> None:
+    path = tmp_path / "x.xacro"
+    path.write_text(f'<robot name="r" {XMLNS}><link name="${{len(\'x\' * 3 * 2**30)}}"/></robot>')
+    with pytest.raises(DescriptionError, match="xacro failed: it needs more than 2 GiB of memory"):
+        load(path)
+
+
+@needs_xacro
+def test_a_text_that_is_too_large_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "x.xacro"
+    path.write_text(f'<robot name="r" {XMLNS}><link name="${{\'x\' * 65 * 2**20}}"/></robot>')
+    with pytest.raises(DescriptionError, match="xacro failed: its text is larger than 64 MiB"):
+        load(path)
+
+
+@needs_xacro
+def test_a_program_that_xacro_leaves_behind_does_not_delay_the_result(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The reply ends when its process has ended, or at the time limit with everything that it started."""
+    monkeypatch.setattr(xacro_reading, "TIMEOUT", 1.0)
+    command = [sys.executable, "-c", "import os, time; os.fork() or time.sleep(60)"]
+    reply, _ = xacro_reading._reply(command)
+    assert reply is None
 
 
 @needs_xacro

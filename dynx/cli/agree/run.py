@@ -11,7 +11,7 @@ from dynx.agreement.report import AgreementReport, results_document
 from dynx.agreement.task import AgreementTask, measure, refused
 from dynx.backends.registry import backend_class
 from dynx.cli.agree.tables import label, show_many, show_one, show_summary, verdict
-from dynx.cli.shell.exits import BAD_INPUT, DONE, NEGATIVE_RESULT, complain
+from dynx.cli.shell.exits import BAD_INPUT, DONE, NEGATIVE_RESULT, complain, failure_of
 from dynx.cli.shell.inputs import Locks, pose_of
 from dynx.cli.shell.lazy import import_object
 from dynx.cli.shell.output_file import check_writable, require_apart
@@ -95,10 +95,11 @@ def _report(run: AgreementRun, json_path: str | None, quiet: bool) -> int:
     document = results_document(run.results, run.not_done)
     entries: list[dict[str, Any]] = document["results"]
     # The document is written first, so that it is not lost if a pipe closes while the table is written.
+    error: DynxError | None = None
     if json_path == "-":
         echo_json(document)
     elif json_path is not None:
-        write_text(json_path, json_text(document) + "\n")
+        error = failure_of(write_text, json_path, json_text(document) + "\n")
     if not quiet:
         out = console(err=json_path == "-")
         if len(run.tasks) == 1:
@@ -110,7 +111,9 @@ def _report(run: AgreementRun, json_path: str | None, quiet: bool) -> int:
     for entry in entries:
         if verdict(entry) == "refused":
             complain(_refusal(entry))
-    if document["summary"]["refused"]:
+    if error is not None:
+        complain(str(error))
+    if error is not None or document["summary"]["refused"]:
         return BAD_INPUT
     return NEGATIVE_RESULT if document["summary"]["differ"] else DONE
 

@@ -51,7 +51,8 @@ def compare(
 
 def _conclude(run: DoctorRun, outputs: Outputs, engines: tuple[str, ...] | None, quiet: bool) -> int:
     reports = run.results
-    outputs.write(reports, run.not_done)
+    errors = outputs.write(reports, run.not_done)
+    outputs.echo(reports, run.not_done)
     if not quiet:
         out = console(err=outputs.on_stdout)
         if len(run.tasks) == 1:
@@ -64,7 +65,9 @@ def _conclude(run: DoctorRun, outputs: Outputs, engines: tuple[str, ...] | None,
     for report in reports:
         if report.error is not None:
             complain(refusal(report))
-    if any(report.error is not None for report in reports):
+    for error in errors:
+        complain(str(error))
+    if errors or any(report.error is not None for report in reports):
         return BAD_INPUT
     return DONE if all(report.alike for report in reports) else NEGATIVE_RESULT
 

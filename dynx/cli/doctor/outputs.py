@@ -7,13 +7,14 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
+from dynx.cli.shell.exits import failure_of
 from dynx.cli.shell.output_file import check_writable, make_folder, require_apart
 from dynx.cli.shell.terminal import echo_json
 from dynx.doctor.formats import baseline_document, html_page, junit_xml, sarif_document, wording
 from dynx.doctor.formats.baseline import Baseline
 from dynx.doctor.report import Counterexample, DoctorReport, Unexplained
 from dynx.doctor.report_document import results_document
-from dynx.errors import ArgumentError, shown
+from dynx.errors import ArgumentError, DynxError, shown
 from dynx.files.documents import json_text
 from dynx.files.writing import write_text
 
@@ -67,26 +68,31 @@ class Outputs:
         not_done: Sequence[str],
         baseline: Baseline | None = None,
         command: str | None = None,
-    ) -> None:
-        """Write all files; `command` is the command line that the HTML page shows."""
-        if self.json is not None:
-            self._write_json(reports, not_done)
+    ) -> list[DynxError]:
+        """Write all files; return the errors of those that cannot be written.
+
+        `command` is the command line that the HTML page shows.
+        """
         texts: dict[str | None, Callable[[], str]] = {
+            None if self.on_stdout else self.json: lambda: (
+                json_text(results_document(reports, not_done)) + "\n"
+            ),
             self.html: lambda: html_page(reports, command=command, baseline=baseline),
             self.junit: lambda: junit_xml(reports, baseline),
             self.sarif: lambda: json_text(sarif_document(reports, baseline, not_done)) + "\n",
             self.baseline: lambda: self._baseline_text(reports),
         }
-        for path, text in texts.items():
-            if path is not None:
-                write_text(path, text())
 
-    def _write_json(self, reports: Sequence[DoctorReport], not_done: Sequence[str]) -> None:
-        document = results_document(reports, not_done)
-        if self.json == STDOUT:
-            echo_json(document)
-        elif self.json is not None:
-            write_text(self.json, json_text(document) + "\n")
+        def write(path: str) -> None:
+            write_text(path, texts[path]())
+
+        errors = [failure_of(write, path) for path in texts if path is not None]
+        return [error for error in errors if error is not None]
+
+    def echo(self, reports: Sequence[DoctorReport], not_done: Sequence[str]) -> None:
+        """Write the JSON document to standard output where it goes there."""
+        if self.on_stdout:
+            echo_json(results_document(reports, not_done))
 
     def _baseline_text(self, reports: Sequence[DoctorReport]) -> str:
         return json_text(baseline_document(reports, os.path.dirname(self.baseline or ""))) + "\n"

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.util import find_spec
 
+from dynx.cli.shell.exits import failure_of
 from dynx.cli.shell.output_file import check_writable
-from dynx.errors import ArgumentError, NotInstalledError, shown
+from dynx.errors import ArgumentError, DynxError, NotInstalledError, shown
 from dynx.files.figures import picture_format
 from dynx.sim import Rollout
 from dynx.sim.record.formats import WRITERS
@@ -39,12 +41,13 @@ class Outputs:
         if self.plot is not None:
             picture_format(self.plot)
 
-    def write(self, rollout: Rollout) -> None:
-        """Write all files. Raises ArgumentError where one cannot be written."""
-        for path in self.save:
-            rollout.save(path)
+    def write(self, rollout: Rollout) -> dict[str, DynxError]:
+        """Write all files; return the errors of those that cannot be written, by path."""
+        calls: list[tuple[str, Callable[[str], object]]] = [(path, rollout.save) for path in self.save]
         if self.plot is not None:
-            rollout.plot(self.plot)
+            calls.append((self.plot, rollout.plot))
+        errors = {path: failure_of(call, path) for path, call in calls}
+        return {path: error for path, error in errors.items() if error is not None}
 
 
 def check_record(path: str) -> None:

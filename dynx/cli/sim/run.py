@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from dynx.cli.shell.exits import BAD_INPUT, DONE, INTERRUPTED, NEGATIVE_RESULT, complain, failure_of
+from dynx.cli.shell.exits import BAD_INPUT, DONE, INTERRUPTED, NEGATIVE_RESULT, complain
 from dynx.cli.shell.interruption import interruptible
 from dynx.cli.shell.progress import progress_bar
 from dynx.cli.shell.terminal import present
@@ -18,7 +18,7 @@ from dynx.cli.sim.outputs import Outputs
 from dynx.cli.sim.request import SimulationRequest, prepare
 from dynx.cli.sim.tables import show
 from dynx.cli.sim.tutorial_run import run_tutorial
-from dynx.errors import ArgumentError, DynxError, LimitError, SimulationError
+from dynx.errors import ArgumentError, LimitError, SimulationError
 from dynx.sim import Rollout, RolloutInterrupted, simulate
 
 
@@ -61,19 +61,21 @@ def run_sim(request: SimulationRequest, outputs: Outputs, *, as_json: bool) -> i
             raise ArgumentError(limit_message(error, request.scenario.model.name, ignorable=True)) from error
         seconds = time.perf_counter() - started
         interruption.finishing = True
-        write_error = failure_of(outputs.write, rollout)
-        made = {**document(request, rollout, seconds, ended), "files": [] if write_error else outputs.files}
+        errors = outputs.write(rollout)
+        written = [path for path in outputs.files if path not in errors]
+        made = {**document(request, rollout, seconds, ended), "files": written}
         present(made, show, as_json=as_json)
         if ended is not None:
             resumable = isinstance(ended, RolloutInterrupted)
-            complain(f"{ended}{_saved_files(outputs, write_error, resumable=resumable)}")
-        if write_error is not None:
-            complain(str(write_error))
+            records = [path for path in written if path in outputs.save]
+            complain(f"{ended}{_saved_files(records, resumable=resumable)}")
+        for problem in errors.values():
+            complain(str(problem))
     if interruption.code is not None:
         return interruption.code
     if isinstance(ended, RolloutInterrupted):
         return INTERRUPTED
-    if write_error is not None:
+    if errors:
         return BAD_INPUT
     return DONE if ended is None else NEGATIVE_RESULT
 
@@ -87,10 +89,10 @@ def _simulate(request: SimulationRequest) -> Rollout:
         )
 
 
-def _saved_files(outputs: Outputs, write_error: DynxError | None, *, resumable: bool) -> str:
+def _saved_files(records: list[str], *, resumable: bool) -> str:
     """Name the files with the results so far, and the option that continues from them."""
-    if not outputs.save or write_error is not None:
+    if not records:
         return ""
-    complete = [path for path in outputs.save if path.lower().endswith(".npz")]
+    complete = [path for path in records if path.lower().endswith(".npz")]
     hint = f"; the same command with --resume {complete[0]} continues" if resumable and complete else ""
-    return f"; the results so far are in {' and '.join(outputs.save)}{hint}"
+    return f"; the results so far are in {' and '.join(records)}{hint}"

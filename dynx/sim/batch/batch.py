@@ -120,8 +120,9 @@ def simulate_batch(
     The batch is divided into parts, which run on `threads` threads (None: one per processor) or in any
     `concurrent.futures` `executor`, such as one of processes or of a cluster; results are the same bit for
     bit. `keep` is a folder in which each finished part is stored; a run that is started again with the same
-    arguments continues from there. Ctrl-C raises BatchInterrupted, which has the finished rollouts.
-    `progress` is called after each part.
+    arguments continues from there. A part that cannot be stored, for example because the disk is full, is
+    still in the result, and a RuntimeWarning names the reason. Ctrl-C raises BatchInterrupted, which has the
+    finished rollouts. `progress` is called after each part.
 
     Raises ArgumentError, GainError, LimitError, SingularMassMatrixError as `simulate` does, and
     UnsupportedFeatureError for controllers that branch on their measurement. A rollout that diverges does not
@@ -228,6 +229,9 @@ def simulate_batch(
         _run_parts(parts, done, checked_threads(threads), executor, store, progress, n)
     except KeyboardInterrupt:
         raise BatchInterrupted(outcome()) from None
+    finally:
+        if store is not None:
+            store.warn_of_failures()
     return outcome()
 
 
@@ -269,8 +273,10 @@ def _run_parts(
 ) -> None:
     """Run all parts that are not stored yet; `done` is filled as they finish."""
 
-    def finished(number: int, outcome: PartOutcome) -> None:
+    def finished(number: int, outcome: PartOutcome, *, stored: bool = False) -> None:
         done[number] = outcome
+        if store is not None and not stored:
+            store.write(parts[number], outcome)
         if progress is not None:
             progress(sum(parts[k].count for k in done), n)
 
@@ -280,7 +286,7 @@ def _run_parts(
         if kept is None:
             left.append(number)
         else:
-            finished(number, kept)
+            finished(number, kept, stored=True)
     pool = ThreadPoolExecutor(threads, thread_name_prefix="dynx batch") if executor is None else executor
     futures: dict[Future[PartOutcome], int] = {}
     try:
@@ -290,11 +296,7 @@ def _run_parts(
         while waiting:
             ended, waiting = wait(waiting, timeout=0.5, return_when=FIRST_COMPLETED)
             for future in ended:
-                number = futures[future]
-                outcome = future.result()
-                if store is not None:
-                    store.write(parts[number], outcome)
-                finished(number, outcome)
+                finished(futures[future], future.result())
     finally:
         for future in futures:
             future.cancel()
@@ -303,8 +305,6 @@ def _run_parts(
         for future, number in futures.items():
             if number not in done and future.done() and not future.cancelled() and not future.exception():
                 finished(number, future.result())
-                if store is not None:
-                    store.write(parts[number], future.result())
 
 
 def _batch_rollouts(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from dynx.errors import ArgumentError, shown
+from dynx.files.arrays import SCHEMA_ENTRY, read_arrays, write_arrays
 from dynx.files.figures import new_figure, save_figure
 from dynx.sim.scenario.scenario import Scenario
 from dynx.spatial.scalar import Floats
@@ -68,25 +68,32 @@ class BatchRollouts:
         return np.asarray(np.quantile(worst, levels, method="inverted_cdf"))
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write a ``.npz`` that `load` reads. Raises ArgumentError for another name."""
+        """Write a ``.npz`` that `load` reads, atomically.
+
+        Raises ArgumentError for another name or a file that cannot be written.
+        """
         if Path(path).suffix != ".npz":
             raise ArgumentError(f"rollouts are saved as .npz, not as {shown(Path(path).name)}")
-        arrays: dict[str, Any] = {name: getattr(self, name) for name in _array_names()}
-        np.savez(path, schema=SCHEMA, scenario=self.scenario.to_json(), **arrays)
+        arrays = {name: getattr(self, name) for name in _array_names()}
+        write_arrays(path, {SCHEMA_ENTRY: SCHEMA, "scenario": self.scenario.to_json(), **arrays})
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> BatchRollouts:
         """Read what `save` wrote. Raises ArgumentError for any other file."""
+        file = read_arrays(path, "rollouts", SCHEMA)
         try:
-            with np.load(path, allow_pickle=False) as file:
-                entries = {name: file[name] for name in file.files}
-        except (OSError, ValueError, zipfile.BadZipFile) as error:
-            raise ArgumentError(f"{os.fspath(path)} cannot be read as rollouts: {error}") from error
-        names = _array_names()
-        if str(entries.get("schema")) != SCHEMA or not {"scenario", *names} <= set(entries):
-            raise ArgumentError(f"{os.fspath(path)} does not hold {SCHEMA!r}")
-        arrays: dict[str, Any] = {name: entries[name] for name in names}
-        return cls(Scenario.from_json(str(entries["scenario"])), **arrays)
+            scenario = Scenario.from_json(file.text("scenario"))
+        except ArgumentError as error:
+            raise ArgumentError(f"the scenario in {file.path} cannot be read: {error}") from error
+        n, kept = len(file.array("done", (None,), bool)), len(file.array("t", (None,)))
+        nq, nv = scenario.model.nq, scenario.model.nv
+        shapes: dict[str, tuple[int, ...]] = {"t": (kept,), "done": (n,), "diverged": (n,), "q": (n, nq)}
+        shapes |= dict.fromkeys(("v", "max_error", "rms_error", "saturated"), (n, nv))
+        shapes |= {"q_record": (n, kept, nq)} | dict.fromkeys(("v_record", "tau_record"), (n, kept, nv))
+        arrays = {
+            name: file.array(name, shape, bool if name == "done" else float) for name, shape in shapes.items()
+        }
+        return cls(scenario, **arrays)
 
     def plot(self, path: str | os.PathLike[str] | None = None) -> Any:
         """Plot the share of rollouts below each error, and the errors of each joint; return the `matplotlib`

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import json
 import os
-import struct
-import tokenize
-import zipfile
-import zlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
 
-from dynx.errors import ArgumentError, ModelError, shown
+from dynx.errors import ArgumentError, shown
+from dynx.files.arrays import read_arrays
 from dynx.files.reading import checked_path
 from dynx.files.writing import atomic_file
 from dynx.model.documents import robot_document, robot_from_document
@@ -29,12 +26,6 @@ SCHEMA = "dynx.rollout/2"
 
 ARRAYS = ("t", "q", "v", "a", "tau", "saturated", "rotors")
 REFERENCE = ("reference_q", "reference_v", "reference_a")
-
-DAMAGED = (
-    *(OSError, EOFError, ValueError, KeyError, RuntimeError, MemoryError),
-    *(zipfile.BadZipFile, zlib.error, struct.error, tokenize.TokenError, SyntaxError),
-)
-"""Exceptions of zipfile and NumPy for a missing or damaged file."""
 
 
 def save(rollout: RolloutData, path: str | os.PathLike[str]) -> None:
@@ -62,60 +53,36 @@ def load(path: str | os.PathLike[str]) -> dict[str, Any]:
 
     The model is read from the URDF text in the file; no array is unpickled.
     """
-    name = checked_path(path)
-    entries = _entries(path)
-    if str(entries.get("schema")) != SCHEMA:
-        raise ArgumentError(
-            f"{name} does not have the schema {SCHEMA!r}, so it is not a rollout of this version"
-        )
-    missing = [entry for entry in (*ARRAYS, "robot") if entry not in entries]
-    if missing:
-        raise ArgumentError(f"{name} lacks {', '.join(missing)}")
-    reference = None
-    if all(entry in entries for entry in REFERENCE):
-        reference = Setpoint(*(entries[entry] for entry in REFERENCE))
+    file = read_arrays(path, "a rollout", SCHEMA)
     try:
-        robot: dict[str, Any] = json.loads(str(entries["robot"]))
+        robot: dict[str, Any] = json.loads(file.text("robot"))
         model = robot_from_document(robot)
         scenario = None if robot["scenario"] is None else Scenario.from_dict(robot["scenario"])
-        executor, departures = str(robot["executor"]), tuple(robot["departures"])
-    except (ValueError, KeyError, TypeError, ModelError) as error:
-        raise ArgumentError(f"the robot in {name} cannot be read: {error}") from error
-    n = len(entries["tau"]) if entries["tau"].ndim else 0
-    shapes = {"t": (n + 1,), "q": (n + 1, model.nq), "rotors": (model.nv, model.nv)}
-    shapes |= {"v": (n + 1, model.nv)} | dict.fromkeys(("a", "tau", "saturated"), (n, model.nv))
-    shapes |= zip(REFERENCE, ((n + 1, model.nq), (n + 1, model.nv), (n + 1, model.nv)), strict=True)
-    for entry, shape in shapes.items():
-        array, kind = entries.get(entry), np.dtype(bool if entry == "saturated" else float)
-        if array is not None and (array.shape != shape or array.dtype != kind):
-            raise ArgumentError(
-                f"{entry} in {name} is {array.dtype} {array.shape}; wanted {kind} {shape} as n is {n}"
-            )
-    arrays = {entry: entries[entry] for entry in ARRAYS}
+        executor, departures = str(robot["executor"]), tuple(map(str, robot["departures"]))
+    # The errors of dynx are among them; the others are those of JSON in another form.
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        raise ArgumentError(f"the robot in {file.path} cannot be read: {error}") from error
+    nq, nv = model.nq, model.nv
+    tau = file.array("tau", (None, nv))
+    n = len(tau)
+    reference = None
+    if all(entry in file.arrays for entry in REFERENCE):
+        q, v, a = REFERENCE
+        reference = Setpoint(file.array(q, (n + 1, nq)), *(file.array(each, (n + 1, nv)) for each in (v, a)))
     return {
         "model": model,
-        **arrays,
+        "t": file.array("t", (n + 1,)),
+        "q": file.array("q", (n + 1, nq)),
+        "v": file.array("v", (n + 1, nv)),
+        "a": file.array("a", (n, nv)),
+        "tau": tau,
+        "saturated": file.array("saturated", (n, nv), bool),
+        "rotors": file.array("rotors", (nv, nv)),
         "reference": reference,
         "scenario": scenario,
         "executor": executor,
         "departures": departures,
     }
-
-
-def _entries(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """Read all arrays of a ``.npz``."""
-    problem = "it is not a .npz file, or it is truncated"
-    try:
-        with open(path, "rb") as raw:
-            if zipfile.is_zipfile(raw):
-                raw.seek(0)
-                file = np.load(raw, allow_pickle=False)
-                if isinstance(file, np.lib.npyio.NpzFile):
-                    with file:
-                        return {name: file[name] for name in file.files}
-    except DAMAGED as error:
-        problem = str(error) or type(error).__name__
-    raise ArgumentError(f"{os.fspath(path)} cannot be read as a rollout: {problem}")
 
 
 def _write_npz(rollout: RolloutData, file: BinaryIO) -> None:

@@ -26,7 +26,7 @@ from dynx.control.base import Controller, chain_of
 from dynx.control.code_content import digest_of_code, digest_of_function, is_foreign
 from dynx.control.content import attributes_of, entered
 from dynx.control.registry import controller_class, from_document, to_document
-from dynx.errors import ArgumentError, ModelError, UnknownNameError, shown
+from dynx.errors import ArgumentError, UnknownNameError, shown
 from dynx.model import Model
 from dynx.model.documents import robot_document, robot_from_document
 from dynx.sim.loop.controller_checks import controller_numbers
@@ -143,8 +143,9 @@ def decode(document: Document, model: Model | None = None) -> Any:
     """
     try:
         return _decoded(document, model)
-    except (TypeError, ValueError, KeyError, AttributeError, ImportError, ModelError) as error:
-        text = shown(json.dumps(document))
+    # The document may be damaged, and constructors raise any exception for damaged arguments.
+    except Exception as error:
+        text = shown(document)
         raise ArgumentError(f"a part of the scenario cannot be read: {error}; it is {text}") from error
 
 

@@ -220,7 +220,7 @@ class Scenario:
         """Return the scenario of a text that `to_json` wrote. Raises ArgumentError for any other text."""
         try:
             document = json.loads(text)
-        except (TypeError, ValueError) as error:
+        except (TypeError, ValueError, RecursionError) as error:
             raise ArgumentError(f"the text is not JSON: {error}") from error
         return cls.from_dict(document)
 

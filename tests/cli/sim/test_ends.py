@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import signal
 import subprocess
 import sys
@@ -82,6 +83,25 @@ def test_a_record_that_cannot_be_written_leaves_the_table(
     assert result.exit_code == 2
     assert "largest error" in result.stdout
     assert result.stderr.endswith("cannot be written: no space left\n")
+
+
+def test_an_output_that_cannot_be_written_does_not_lose_the_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    save = Rollout.save
+    first, second, third = (str(tmp_path / f"{k}.{suffix}") for k, suffix in enumerate(("npz", "csv", "png")))
+
+    def full(self: Rollout, path: str) -> None:
+        if path == first:
+            raise ArgumentError(f"{path} cannot be written: no space left")
+        save(self, path)
+
+    monkeypatch.setattr(Rollout, "save", full)
+    result = sim("ur5", *SHORT, "--save", first, "--save", second, "--plot", third, "--json")
+    assert result.exit_code == 2
+    assert json.loads(result.stdout)["files"] == [second, third]
+    assert {str(path) for path in tmp_path.iterdir()} == {second, third}
+    assert result.stderr == f"dynx: error: {first} cannot be written: no space left\n"
 
 
 def test_a_plot_without_matplotlib_names_the_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

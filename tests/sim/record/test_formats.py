@@ -243,7 +243,7 @@ def test_foreign_files(rollout: Rollout, tmp_path: Path, name: str) -> None:
         ("robot", "[]", "robot"),
         ("robot", json.dumps({"urdf": "<robot/>", "base": "fixed", "gravity": [0, 0, 0]}), "robot"),
         ("q", np.zeros((4, 5)), r"q in .* is float64 \(4, 5\); wanted float64 \(4, 6\)"),
-        ("tau", np.zeros(()), "t in"),
+        ("tau", np.zeros(()), "tau in"),
         ("t", np.zeros(4, dtype=int), "int64"),
         ("saturated", np.zeros((3, 6)), "saturated"),
         ("reference_v", np.zeros((3, 6)), "reference_v"),
