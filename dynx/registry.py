@@ -14,11 +14,15 @@ import inspect
 from collections.abc import Callable, Mapping
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
+from importlib.util import find_spec
 from typing import Any, Generic, TypeVar
 
 from dynx.errors import ArgumentError, DynxError, nearest, shown
 
 Kind = TypeVar("Kind")
+
+DEFAULT_ENGINE = "compiled" if find_spec("pinocchio") is None else "pinocchio"
+"""Backend and plant where none is named: Pinocchio, or dynx's own where it has no wheels (Windows)."""
 
 
 class ClassRegistry(Generic[Kind]):

@@ -21,6 +21,9 @@ from typing import Any, Literal
 
 from dynx.errors import DynxError, EngineError, traceback_wanted
 
+WINDOWS_EXCEPTION = 0xC0000000
+"""Smallest exit code of a process that an exception of Windows ended, such as an access violation."""
+
 FailureKind = Literal["crash", "timeout", "defect"]
 
 _START = "import sys; sys.path[:] = sys.argv[1:]; from dynx.workers import serve; serve()"
@@ -159,6 +162,7 @@ class _Worker:
             stdout=subprocess.PIPE,
             env=environment,
             start_new_session=True,
+            creationflags=getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0),
         )
         self._target = target
         self._has_target = False
@@ -254,6 +258,8 @@ def _silence() -> None:
 
 
 def _describe_exit(code: int) -> str:
+    if code >= WINDOWS_EXCEPTION:
+        return f"ended its process with the exception {code:#x} of Windows"
     if code < 0:
         try:
             return f"ended its process with {signal.Signals(-code).name}"

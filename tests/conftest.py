@@ -13,10 +13,17 @@ from __future__ import annotations
 
 import os
 import tempfile
+from collections.abc import Generator
+from typing import Any
 from zlib import crc32
 
 import pytest
 from hypothesis import HealthCheck, Phase, settings
+
+from dynx.errors import NotInstalledError, RobotNotFoundError
+from dynx.model.library import EXAMPLE_ROBOT_DATA, robots
+
+EXAMPLES_INSTALLED = any(entry.source == EXAMPLE_ROBOT_DATA for entry in robots())
 
 settings.register_profile(
     "ci",
@@ -70,6 +77,41 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         config.hook.pytest_deselected(items=list(set(items) - set(sample)))
         items[:] = sample
     items.sort(key=is_quick)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_make_collect_report(collector: pytest.Collector) -> Generator[None, Any, Any]:
+    """Skip a module whose import needs an engine or a robot that is not installed."""
+    report = yield
+    if report.failed:
+        text = str(report.longrepr)
+        robot = "RobotNotFoundError" in text and not EXAMPLES_INSTALLED
+        if robot or "NotInstalledError" in text:
+            needed = "example-robot-data" if robot else "an engine that is not installed"
+            report.outcome, report.longrepr = "skipped", (str(collector.path), 0, f"needs {needed}")
+    return report
+
+
+def _skip_what_is_not_installed() -> Generator[None, Any, Any]:
+    """Skip a test, or its fixture, that needs an engine or a robot that is not installed."""
+    try:
+        return (yield)
+    except NotInstalledError as error:
+        pytest.skip(str(error))
+    except RobotNotFoundError as error:
+        if EXAMPLES_INSTALLED:
+            raise
+        pytest.skip(f"needs example-robot-data: {error}")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_setup(item: pytest.Item) -> Generator[None, Any, Any]:
+    return (yield from _skip_what_is_not_installed())
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call(item: pytest.Item) -> Generator[None, Any, Any]:
+    return (yield from _skip_what_is_not_installed())
 
 
 def is_quick(item: pytest.Item) -> bool:

@@ -21,6 +21,7 @@ from dynx.control.dynamics import Dynamics, EngineDynamics
 from dynx.errors import ArgumentError, UnsupportedFeatureError, shown
 from dynx.model import Model
 from dynx.model.model import refuse_other_than_model
+from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint
 
@@ -168,7 +169,7 @@ class ModelBased(Controller[ControllerState]):
     backend: str | Backend = field(compare=False)
     dynamics: Dynamics = field(init=False, repr=False)
 
-    def __init__(self, model: Model, backend: str | Backend = "pinocchio") -> None:
+    def __init__(self, model: Model, backend: str | Backend = DEFAULT_ENGINE) -> None:
         """`backend` is a name, or a backend of an equal model.
 
         Raises UnsupportedFeatureError for a floating base, ArgumentError for a backend of another robot.

@@ -10,6 +10,7 @@ from dynx.backends import Backend
 from dynx.control.base import Measurement, ModelBased, gain
 from dynx.control.gains import feedback_gains
 from dynx.model import Model
+from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Array, Floats
 from dynx.trajectory.base import Setpoint
 
@@ -34,7 +35,7 @@ class ComputedTorque(ModelBased[None], pure=True):
         kd: ArrayLike | None = None,
         natural_frequency: ArrayLike | None = None,
         damping_ratio: ArrayLike = 1.0,
-        backend: str | Backend = "pinocchio",
+        backend: str | Backend = DEFAULT_ENGINE,
     ) -> None:
         """Gains `kp` [1/s^2] and `kd` [1/s], or `natural_frequency` [rad/s] and `damping_ratio`.
 

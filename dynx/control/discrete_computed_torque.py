@@ -8,6 +8,7 @@ from dynx.backends import Backend
 from dynx.control.base import Measurement, ModelBased, parameter
 from dynx.model import Model
 from dynx.model.configuration import positive_seconds
+from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Array, Floats
 from dynx.trajectory.base import Setpoint
 
@@ -29,7 +30,7 @@ class DiscreteComputedTorque(ModelBased[None], pure=True):
 
     lead = 1
 
-    def __init__(self, model: Model, *, control_dt: float, backend: str | Backend = "pinocchio") -> None:
+    def __init__(self, model: Model, *, control_dt: float, backend: str | Backend = DEFAULT_ENGINE) -> None:
         """`control_dt` [s] is the plant's step. Raises ArgumentError if it is not positive."""
         super().__init__(model, backend)
         self._set(control_dt=positive_seconds("control_dt", control_dt))

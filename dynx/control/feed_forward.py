@@ -11,6 +11,7 @@ from dynx.control.base import Measurement, ModelBased, gain
 from dynx.control.gains import checked_gain
 from dynx.control.pd import pd_torque
 from dynx.model import Model
+from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint
 
@@ -31,7 +32,7 @@ class FeedForward(ModelBased[None], pure=True):
         *,
         kp: ArrayLike = 0.0,
         kd: ArrayLike = 0.0,
-        backend: str | Backend = "pinocchio",
+        backend: str | Backend = DEFAULT_ENGINE,
     ) -> None:
         """Gains `kp` and `kd` are those of `PD`; by default there are none."""
         super().__init__(model, backend)

@@ -11,6 +11,7 @@ from dynx.control.base import Measurement, ModelBased, gain
 from dynx.control.gains import checked_gain
 from dynx.control.pd import pd_torque
 from dynx.model import Model
+from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint
 
@@ -27,7 +28,7 @@ class GravityCompensatedPD(ModelBased[None], pure=True):
     kd: Floats = gain("N m s/rad or N s/m")
 
     def __init__(
-        self, model: Model, *, kp: ArrayLike, kd: ArrayLike, backend: str | Backend = "pinocchio"
+        self, model: Model, *, kp: ArrayLike, kd: ArrayLike, backend: str | Backend = DEFAULT_ENGINE
     ) -> None:
         """Gains are those of `PD`."""
         super().__init__(model, backend)

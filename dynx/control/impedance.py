@@ -11,6 +11,7 @@ from dynx.control.base import Measurement, gain
 from dynx.control.gains import checked_gain
 from dynx.control.task_space import TaskSpace
 from dynx.model import Model
+from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint
 
@@ -35,7 +36,7 @@ class Impedance(TaskSpace[None], pure=True):
         stiffness: ArrayLike,
         damping: ArrayLike,
         joint_damping: ArrayLike = 0.0,
-        backend: str | Backend = "pinocchio",
+        backend: str | Backend = DEFAULT_ENGINE,
     ) -> None:
         """`stiffness` K [N/m, N m/rad] and `damping` D [N s/m, N m s/rad] along the world's axes.
 

@@ -15,6 +15,7 @@ from dynx.control.gains import checked_gain, feedback_gains
 from dynx.control.task_space import TaskSpace
 from dynx.model import Model
 from dynx.rbd.linear import solve_columns
+from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint
 
@@ -46,7 +47,7 @@ class OperationalSpace(TaskSpace[None], pure=True):
         posture_kp: ArrayLike = 0.0,
         posture_kd: ArrayLike = 1.0,
         damping: float = 1e-3,
-        backend: str | Backend = "pinocchio",
+        backend: str | Backend = DEFAULT_ENGINE,
     ) -> None:
         """Gains of the frame (6,), linear then angular, or one number; of the posture (nv,).
 

@@ -22,6 +22,7 @@ from dynx.control.base import Controller
 from dynx.control.gains import checked_gain, feedback_gains
 from dynx.errors import GainError, UnknownNameError, nearest, shown
 from dynx.model import Model
+from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Floats
 
 NATURAL_FREQUENCY = 20.0
@@ -65,7 +66,7 @@ class ControllerRequest:
     gains: Gains = Gains()
     frame: str | None = None
     limit: ArrayLike | None = None
-    backend: str | Backend = "pinocchio"
+    backend: str | Backend = DEFAULT_ENGINE
 
     @property
     def n_joints(self) -> int:

@@ -12,6 +12,7 @@ from dynx.control.friction import SLIP, Coefficients
 from dynx.errors import ArgumentError
 from dynx.model import Model
 from dynx.model.package_paths import StrPath
+from dynx.registry import DEFAULT_ENGINE
 from dynx.sim.loop.noise import Noise
 from dynx.sim.plants.disturbances import Push
 from dynx.sim.plants.model_error import MassScale, Payload
@@ -36,7 +37,7 @@ def simulate(
     controller: Controller[Any] | None = None,
     reference: Trajectory | ArrayLike | None = None,
     *,
-    plant: str = "pinocchio",
+    plant: str = DEFAULT_ENGINE,
     integrator: str | None = None,
     controller_backend: str | None = None,
     dt: float = 1e-3,

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
+import sys
 from functools import cache
 
 from dynx.errors import ArgumentError
@@ -32,7 +34,11 @@ def require_memory(what: str, size: float) -> None:
 
 def memory_size() -> float:
     """Return the size of the machine's memory [bytes], or infinity if the system does not report it."""
+    if sys.platform == "win32":
+        kilobytes = ctypes.c_ulonglong(0)
+        known = ctypes.windll.kernel32.GetPhysicallyInstalledSystemMemory(ctypes.byref(kilobytes))
+        return 1024.0 * kilobytes.value if known else float("inf")
     try:
         return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
-    except (AttributeError, OSError, ValueError):
+    except (OSError, ValueError):
         return float("inf")

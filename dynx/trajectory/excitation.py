@@ -24,6 +24,7 @@ from dynx.errors import ArgumentError, TrajectoryError
 from dynx.model import Model
 from dynx.model.configuration import whole_number
 from dynx.model.model import refuse_other_than_model
+from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Trajectory, checked_duration, read_only
 from dynx.trajectory.curve import Curve
@@ -74,7 +75,7 @@ def excitation(
     acceleration: ArrayLike | None = None,
     rng: np.random.Generator | int | None = 0,
     candidates: int = 1,
-    backend: str = "pinocchio",
+    backend: str = DEFAULT_ENGINE,
 ) -> Trajectory:
     """Return one period of a random Fourier series around `q0` (nq,), from rest to rest, in `duration` [s].
 

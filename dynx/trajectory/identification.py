@@ -13,6 +13,7 @@ from dynx.backends import backend as make_backend
 from dynx.errors import ShapeError
 from dynx.model import Model
 from dynx.model.configuration import whole_number
+from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Trajectory
 
@@ -26,7 +27,7 @@ class Identifiability:
     It holds a backend: close it after use, or use it in a ``with`` statement.
     """
 
-    def __init__(self, model: Model, *, backend: str = "pinocchio", samples: int = SAMPLES) -> None:
+    def __init__(self, model: Model, *, backend: str = DEFAULT_ENGINE, samples: int = SAMPLES) -> None:
         self._samples = whole_number("samples", samples, 1)
         self._engine = make_backend(backend, model)
         rng = np.random.default_rng(0)

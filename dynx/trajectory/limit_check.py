@@ -13,6 +13,7 @@ from dynx.backends import backend as make_backend
 from dynx.errors import ArgumentError, LimitError, LimitViolation, ShapeError, shown
 from dynx.model import Model
 from dynx.model.model import refuse_other_than_model
+from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Trajectory
 
@@ -38,7 +39,7 @@ def check(
     *,
     effort: bool = True,
     joint_dynamics: bool = False,
-    backend: str | Backend = "pinocchio",
+    backend: str | Backend = DEFAULT_ENGINE,
 ) -> None:
     """Raise LimitError if the motion violates a limit of the model; its `violations` lists all of them.
 
@@ -57,7 +58,7 @@ def violations(
     *,
     effort: bool = True,
     joint_dynamics: bool = False,
-    backend: str | Backend = "pinocchio",
+    backend: str | Backend = DEFAULT_ENGINE,
 ) -> list[LimitViolation]:
     """List every limit of position, velocity and effort that the motion violates, for each joint at the time
     of its largest excess.

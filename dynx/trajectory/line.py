@@ -20,6 +20,7 @@ from dynx.ik import checked_targets
 from dynx.model import Model
 from dynx.model.configuration import checked_q
 from dynx.model.model import refuse_other_than_model
+from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous, pose_error
 from dynx.spatial.so3 import quat_exp, quat_from_rotation, quat_log, rotation_from_quat
@@ -67,7 +68,7 @@ def line(
     law: Trajectory | None = None,
     deviation: float = 1e-5,
     rotation_deviation: float = 1e-5,
-    backend: str | Backend = "pinocchio",
+    backend: str | Backend = DEFAULT_ENGINE,
 ) -> LineTrajectory:
     """Return a motion from `q0` (nq,) that moves `frame` on a straight line to the pose `target`.
 

@@ -23,9 +23,9 @@ from dynx.cli.shell.exits import DONE, NEGATIVE_RESULT, complain
 from dynx.cli.shell.inputs import Locks, chosen_frame, load_robot
 from dynx.cli.shell.interruption import interruptible
 from dynx.cli.shell.progress import progress_bar
-from dynx.cli.shell.run import processors
 from dynx.cli.shell.terminal import counted, present
 from dynx.model.model import Base
+from dynx.simd.machine import core_count
 
 
 def bench(
@@ -52,7 +52,7 @@ def bench(
         benchmark_cases(
             quantities or tuple(BENCHMARK_QUANTITIES),
             batches or BATCHES,
-            threads or (1, processors()),
+            threads or (1, core_count()),
             1 if threads else MIN_BATCH_FOR_THREADS,
         ),
         backends,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
@@ -13,6 +12,7 @@ from dynx.cli.shell.interruption import interruptible
 from dynx.cli.shell.progress import log, progress_bar
 from dynx.cli.shell.terminal import counted
 from dynx.errors import DynxError
+from dynx.simd.machine import core_count
 from dynx.workers import Workers
 
 
@@ -129,17 +129,9 @@ def carry_out(
     """
     with interruptible() as interruption:
         try:
-            run.measure(jobs or processors(), timeout or None, show_progress=not quiet)
+            run.measure(jobs or core_count(), timeout or None, show_progress=not quiet)
         except KeyboardInterrupt:
             complain(f"interrupted: {len(run.not_done)} of {counted(len(run.tasks), 'robot')} not done")
         interruption.finishing = True
         code = conclude()
     return code if interruption.code is None else interruption.code
-
-
-def processors() -> int:
-    """Return the number of processors that this process may use."""
-    try:
-        return len(os.sched_getaffinity(0))
-    except AttributeError:  # not on this system
-        return os.cpu_count() or 1

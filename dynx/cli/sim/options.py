@@ -8,6 +8,7 @@ import click
 
 from dynx.cli.shell.options import finite_number, group, json_flag, model_options, number_list, one_of
 from dynx.cli.sim.values import coefficients, gain, payload, push, scale, vector
+from dynx.registry import DEFAULT_ENGINE
 
 PROFILES = ("cycloidal", "cubic", "quintic", "trapezoidal", "s-curve", "hold")
 
@@ -95,7 +96,7 @@ controller = group(
     ),
     click.option(
         "--backend",
-        default="pinocchio",
+        default=DEFAULT_ENGINE,
         metavar="NAME",
         help="Backend with which the controller computes (default: pinocchio).",
     ),
@@ -141,7 +142,7 @@ plant = group(
     "Plant and time steps",
     click.option(
         "--plant",
-        default="pinocchio",
+        default=DEFAULT_ENGINE,
         metavar="NAME",
         help="Backend or plant that moves the robot; pybullet is PyBullet's stepper (default: pinocchio).",
     ),

@@ -15,6 +15,7 @@ from dynx.control.friction import SLIP, Coefficients
 from dynx.errors import ArgumentError, nearest, shown
 from dynx.model import Model
 from dynx.model.model import refuse_other_than_model
+from dynx.registry import DEFAULT_ENGINE
 from dynx.sim.clock import TIME_ROUNDING, Clock
 from dynx.sim.loop.noise import Noise
 from dynx.sim.plants.disturbances import Push
@@ -67,7 +68,7 @@ class Scenario:
     """None for a robot without motors; `Unknown` only in a scenario that was read from a file."""
     reference: Trajectory | ArrayLike | Unknown | None = None
     _: KW_ONLY
-    plant: str = "pinocchio"
+    plant: str = DEFAULT_ENGINE
     integrator: str | None = None
     substeps: int = 1
     method: str = "DOP853"

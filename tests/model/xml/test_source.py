@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from dynx.errors import DescriptionError
 from dynx.model.elements import Note
-from dynx.model.library import robots
+from dynx.model.library import find
 from dynx.model.xml.reading import Element, read_xml
 from dynx.model.xml.source import Edit, SourceElement, XmlSource
 from dynx.testing.strategies import urdf_text
@@ -46,7 +46,7 @@ def test_it_reads_what_the_reader_reads(text: str) -> None:
 
 @pytest.mark.parametrize("name", ["ur5", "talos", "pr2"])
 def test_positions_of_all_elements_of_real_files(name: str) -> None:
-    path = next(robot.path for robot in robots() if robot.name == name)
+    path = find(name)
     source = XmlSource(path.read_bytes(), name)
     assert same_tree(read_xml(path.read_bytes(), name, []), source.root)
     for element in source.root.walk():
