@@ -155,7 +155,8 @@ def _binary(op: Op, *, reflected: bool = False) -> Callable[[Any, Any], Any]:
     """
 
     def apply(self: Symbol, other: Any) -> Any:
-        index = self._index(other)
+        known = isinstance(other, Symbol) and other.graph is self.graph
+        index = other.index if known else self._index(other)
         if index is None:
             return NotImplemented
         pair = (index, self.index) if reflected else (self.index, index)

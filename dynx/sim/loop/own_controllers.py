@@ -59,7 +59,7 @@ def _user_array(values: Any) -> Any:
     return traced_array(values)
 
 
-def refuse_irreproducible(controller: Controller[Any]) -> None:
+def refuse_irreproducible(controller: Controller[Any], repetitions: int = REPETITIONS) -> None:
     """Raise TraceError for a controller of the user whose torque depends on more than arguments and
     attributes, such as random numbers or the time.
 
@@ -67,10 +67,13 @@ def refuse_irreproducible(controller: Controller[Any]) -> None:
     """
     if not is_own(controller):
         return
+    one, other = controller.initial_state(), controller.initial_state()
+    if isinstance(one, np.ndarray) and not np.array_equal(one, other, equal_nan=True):
+        raise TraceError(f"{controller.name}.initial_state() returns another state in each call")
     watch = ControllerWatch(controller)
     codes = _codes(controller)
     first = _Trace(controller)
-    for _ in range(REPETITIONS):
+    for _ in range(repetitions):
         again = _Trace(controller)
         found = first_difference(first.graph, first.results, again.graph, again.results)
         if found is not None:

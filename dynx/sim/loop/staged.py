@@ -88,7 +88,8 @@ class StagedLoop:
         sizes |= dict.fromkeys(("q", "measured_q", "q_wanted"), nq)
         if loop.controller is not None:
             refuse_impure(loop.controller)
-            refuse_irreproducible(loop.controller)
+            # Once suffices for a controller that is declared pure.
+            refuse_irreproducible(loop.controller, repetitions=1)
         if any(array.dtype != np.float64 for array in loop.setpoints):
             raise TraceError("the reference is not in float64")
         self._start = None if loop.controller is None else loop.controller.initial_state()

@@ -89,7 +89,11 @@ def _evaluate_ufunc(ufunc: np.ufunc, method: str, inputs: Any, options: dict[str
             raise _untraceable(f"np.{name}") from error
     if out is None:
         return _wrapped(found)
-    target = out[0]
+    return _written(found, out[0])
+
+
+def _written(found: Any, target: Any) -> Any:
+    """Write a result into an array of the user's, and return that."""
     if target.dtype != object:
         raise TraceError(
             f"{caller_location()} writes traced values into an array of {target.dtype}: make it by "
@@ -330,10 +334,11 @@ def _where(condition: Any, *sides: Any) -> Any:
 
 
 def _clip(x: Any, a_min: Any = None, a_max: Any = None, **options: Any) -> Any:
-    low, high = options.pop("min", a_min), options.pop("max", a_max)
+    low, high, out = options.pop("min", a_min), options.pop("max", a_max), options.pop("out", None)
     if options:
         raise TraceError(f"{caller_location()} calls np.clip with {', '.join(options)}")
-    return np.frompyfunc(_clipped, 3, 1)(*(_plain(each) for each in (x, low, high)))
+    found = np.frompyfunc(_clipped, 3, 1)(*(_plain(each) for each in (x, low, high)))
+    return found if out is None else _written(found, out)
 
 
 def _interp(x: Any, xp: Any, fp: Any) -> Any:

@@ -180,6 +180,15 @@ def test_what_cannot_be_compiled_is_refused_with_its_line(name: str) -> None:
     assert "Own cannot be compiled together with the plant" in str(caught.value)
 
 
+def test_a_random_start_of_the_state_is_refused() -> None:
+    class Starting(Averaging):
+        def initial_state(self) -> np.ndarray[Any, Any]:
+            return GENERATOR.normal(size=6)
+
+    with pytest.raises(UnsupportedFeatureError, match=r"initial_state\(\) returns another state"):
+        simulate_batch(ARM, Starting(ARM), GOAL, rollouts=3, duration=0.01)
+
+
 def test_numbers_of_a_seed_are_the_same_in_every_call() -> None:
     def seeded(self: Own, measurement: Measurement, setpoint: Setpoint) -> Any:
         return -measurement.v + np.random.default_rng(3).normal(size=6)

@@ -66,6 +66,7 @@ def in_place(x: Any, y: Any) -> Any:
     x[0] = y[1]
     x[2:] *= 2.0
     np.maximum(x, 0.1, out=x)
+    np.clip(x, None, 2.0, out=x)
     return x
 
 
