@@ -11,7 +11,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dynx.backends import backend
 from dynx.errors import ArgumentError, ClosedError, SimulationError, shown
 from dynx.model.configuration import checked_array
 from dynx.sim.clock import multiple, refuse_too_many_steps
@@ -113,10 +112,7 @@ class Simulation:
         self._departures: tuple[str, ...] = ()
         try:
             self._plant.refuse(setup.controller)
-            stops = None
-            if scenario.position_limits:
-                bodies = backend("reference", setup.model, validate=False)
-                stops = Stops(setup.model, lambda q: bodies.mass_matrix(q) + setup.disturbances.armature)
+            stops = Stops.of(self._plant, setup.disturbances.armature) if scenario.position_limits else None
             self._loop = Loop(self._plant, setup.controller, setpoints, clock, sensors, setup.limit, stops)
         except BaseException:
             self._plant.close()

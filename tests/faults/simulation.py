@@ -136,7 +136,7 @@ SIMULATION_FAULTS = (
     Fault(
         "sim_joint_stop_without_coupling",
         "dynx.sim.loop.stops",
-        right="                v = v + inverse[:, at] @ impulse\n",
+        right="                v = v + effects @ impulse\n",
         wrong="                v = v.copy()\n",
         test_file="tests/sim/loop/test_options.py",
         test="test_a_stop_is_an_inelastic_impact",

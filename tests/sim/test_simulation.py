@@ -304,7 +304,7 @@ def test_the_record_says_how_its_steps_were_computed() -> None:
         simulation.run()
         simulation.step()
         assert simulation.rollout.executor == "staged; plain: stepped by the caller"
-    assert executor(position_limits=True) == "plain: position limits are not compiled"
+    assert executor(position_limits=True) == "staged"
     assert executor(damping=1.0).startswith("plain: joint friction is not compiled")
     few = staged.MIN_STEPS_TO_COMPILE
     assert executor(dt=0.01) == f"plain: fewer than {few} steps"

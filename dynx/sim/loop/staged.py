@@ -65,8 +65,6 @@ def staged_loop(loop: Loop, left: int) -> StagedLoop | str:
         return f"more than {MAX_TRACED_SUBSTEPS} sub-steps"
     if left < MIN_STEPS_TO_COMPILE * plant.evaluations:
         return f"fewer than {MIN_STEPS_TO_COMPILE * plant.evaluations} steps"
-    if loop.stops is not None:
-        return "position limits are not compiled"
     if not plant.model.nv:
         return "the robot has no coordinates"
     if plant.model.floating and loop.sensors.noise is not None:
@@ -164,7 +162,16 @@ class StagedLoop:
         if self._state_size and state is not None:
             results["next_state"] = state
         results["defect"] = np.array([v @ v + excess], dtype=object)
+        if loop.stops is not None:
+            results["beyond"] = np.array([loop.stops.excess(q)], dtype=object)
         return tracer.compile(results)
+
+    def _stop(self, record: Record, row: int) -> None:
+        """Stop the joints that are beyond their limits in a row of the record."""
+        assert self._loop.stops is not None
+        stopped = self._loop.stops(record.q[row], record.v[row])
+        if stopped is not None:
+            record.q[row], record.v[row] = stopped
 
     def _arrays(self, record: Record, loop_state: LoopState) -> dict[str, Floats]:
         """Return the inputs and outputs of the stages by the names of their ports, with one row for each
@@ -222,7 +229,9 @@ class StagedLoop:
         """Prepare kernel and engine calls of the next steps; `by_step` has the rows of arrays they use."""
         first = record.steps
         first_rows = np.zeros(len(by_step["q"].rows), dtype=np.int64)
-        places = {name: np.zeros((1, size)) for name, size in (*step.sizes.items(), ("defect", 1))}
+        places = {
+            name: np.zeros((1, size)) for name, size in (*step.sizes.items(), ("defect", 1), ("beyond", 1))
+        }
         numbers = {name: value[None] for name, value in step.numbers.items()}
         constant = {name: StridedRows(place, first_rows) for name, place in {**places, **numbers}.items()}
         every = {**by_step, **constant}
@@ -243,6 +252,8 @@ class StagedLoop:
         last = prepare(step.last)
         finish, finishing = last.run, last.addresses
         defect: Any = places["defect"].reshape(1).data
+        beyond: Any = places["beyond"].reshape(1).data
+        stop = self._stop
 
         def take(begin: int, end: int, _kept: object = last) -> bool:
             k = begin - first
@@ -257,6 +268,8 @@ class StagedLoop:
                     if not defect[0] < DIVERGENCE_SPEED**2:
                         return False
                     defect[0] = 0.0
+                    if beyond[0] > 0.0:
+                        stop(record, first + k + 1)
                 k = end - first
             except Exception as error:
                 # An engine may raise anything; the plain executor repeats the step and reports it.

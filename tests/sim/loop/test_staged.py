@@ -178,7 +178,6 @@ def test_a_law_of_one_s_own_is_asked_in_every_step() -> None:
     [
         {"friction": 0.1},
         {"armature": 0.1},
-        {"position_limits": True},
         {"integrator": "adaptive"},
         {"pushes": [Push("tool0", [1, 0, 0, 0, 0, 0])]},
         {"substeps": 17},
