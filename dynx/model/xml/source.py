@@ -21,6 +21,7 @@ from dynx.model.xml.text import TextForm, decode_with_encoding, strip_ends
 _DECLARED = re.compile(r"""<\?xml[^>]*?\bencoding\s*=\s*["']([A-Za-z0-9._-]+)["']""")
 _LINE_END = re.compile(rb"\r\n|\r|\n")
 _BARE_LINE_FEED = re.compile(rb"(?<!\r)\n")
+_LONE_CARRIAGE_RETURN = re.compile(rb"\r(?!\n)")
 _ATTRIBUTE = re.compile(rb"""\s+([^\s=/>]+)\s*=\s*("[^"]*"|'[^']*')""")
 _ATTRIBUTES = re.compile(rb"""(?:\s+[^\s=/>]+\s*=\s*(?:"[^"]*"|'[^']*'))*""")
 
@@ -155,6 +156,17 @@ class XmlSource:
         front, end_ = (part.replace("\ufeff", "") for part in (self.form.front, self.form.end))
         new.form = TextForm("utf-8", front, end_)
         return new
+
+    def with_line_feeds(self) -> XmlSource:
+        """Return the document with a line feed for each carriage return that no line feed follows."""
+        new = self._with_data(_LONE_CARRIAGE_RETURN.sub(b"\n", self.data))
+        ends = (re.sub(r"\r(?!\n)", "\n", part) for part in (self.form.front, self.form.end))
+        new.form = TextForm(self.form.encoding, *ends)
+        return new
+
+    def line_at(self, position: int) -> int:
+        """Return the number of the line that holds the byte at a position."""
+        return self._lines_before + len(_LINE_END.findall(self.data, 0, position)) + 1
 
     @cached_property
     def root(self) -> SourceElement:

@@ -71,6 +71,16 @@ def negative(site: Site) -> PlantedDefect:
     return site.defect("DX104", *tensor(site, link, **words), link=name)
 
 
+def negative_mass(site: Site) -> PlantedDefect:
+    """A minus sign in front of the mass of a body that moves."""
+    name, link, _ = rotating_body(site)
+    mass = next((each for each in link.walk() if each.tag == "mass"), None)
+    if mass is None:
+        raise CannotPlant("the link has no mass")
+    edit = site.source.attribute_edit(mass, "value", f"-{mass.attributes['value'].strip()}")
+    return site.defect("DX120", edit, link=name)
+
+
 def not_diagonal(site: Site) -> PlantedDefect:
     """The tensor of a nearly round body as CAD exports it, with small products of inertia.
 
@@ -271,6 +281,7 @@ PLANTERS = (
     Planter("DX102", on_the_edge),
     Planter("DX103", of_no_body),
     Planter("DX104", negative),
+    Planter("DX120", negative_mass),
     Planter("DX105", not_diagonal),
     Planter("DX106", root_rotated, ("fixed",)),
     Planter("DX107", massless_root, ("floating",)),

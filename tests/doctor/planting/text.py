@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from dynx.model.xml.source import Edit, SourceElement
+from dynx.model.xml.source import Edit, SourceElement, XmlSource
 from tests.doctor.planting.inertia import MOMENTS, PRODUCTS
 from tests.doctor.planting.joints import limited, moving
 from tests.doctor.planting.site import CannotPlant, PlantedDefect, Planter, Site
@@ -197,6 +197,23 @@ def line_too_long(site: Site) -> PlantedDefect:
     return site.defect("DX413", edit, *joined, link=name)
 
 
+def lone_carriage_return(site: Site) -> PlantedDefect:
+    """The end of one line converted for an old Macintosh, in front of an element that PyBullet then loses."""
+    joint, element = site.pick_joint(moving, "joint that moves")
+    data = site.source.data
+    lost = [
+        child.span.start for child in element.children if child.tag in ("origin", "axis", "parent", "child")
+    ]
+    ends = [data.rfind(b"\n", 0, start) for start in lost]
+    ends = [end for end, start in zip(ends, lost, strict=True) if not data[end:start].strip()]
+    if not ends or b"\r" in data:
+        raise CannotPlant("no element on a line of its own")
+    end = site.rng.choice(ends)
+    text = (data[:end] + b"\r" + data[end + 1 :]).decode("utf-8")
+    taken = site.taken | {joint.name}
+    return PlantedDefect(XmlSource(text, site.source.source), ("DX422", None, None), taken)
+
+
 def percent(site: Site) -> PlantedDefect:
     """A name with a per cent sign."""
     tag = site.rng.choice(["link", "joint"])
@@ -356,5 +373,6 @@ PLANTERS = (
     Planter("DX415", material_twice),
     Planter("DX416", unknown_version),
     Planter("DX417", unknown_shape),
+    Planter("DX422", lone_carriage_return),
     Planter("DX440", not_utf8),
 )
