@@ -7,6 +7,7 @@ is read in place.
 from __future__ import annotations
 
 from collections.abc import Callable
+from ctypes import addressof, c_char
 from math import prod
 from typing import Any
 
@@ -18,20 +19,27 @@ from dynx.compiled.kernels import evaluate_quantity, kernel_quantity
 from dynx.compiled.model_coordinates import reduce_columns, reduce_rows, tree_coordinates
 from dynx.errors import ArgumentError, DTypeError, ShapeError
 from dynx.model import Mechanism
-from dynx.simd.kernel import Kernel, Workspace
+from dynx.simd.kernel import Kernel, Workspace, address_of
 from dynx.spatial.scalar import Floats
 
 Check = Callable[..., Floats]
 """Function that converts an argument to a float64 array (..., size), or raises an error that names it."""
 
 MAX_COPIED_SAMPLES = 256
-"""Largest batch that is copied to the workspace; for larger ones, looking up addresses is faster."""
+"""Largest batch that is copied to the workspace if its rows are not contiguous."""
 
 MAX_COPIED_SIZE = 16384
 """Largest size of one array of such a batch."""
 
+DEFECT_SCALE = 2.0**-300
+"""Factor by which defects are scaled before they are added."""
+
+SCALES = np.full(8192, DEFECT_SCALE)
+"""Factors of a scalar product. A library may divide a longer one over threads."""
+
 _FLOAT64 = np.dtype(np.float64)
 _ABSENT = object()
+_first_byte: Any = c_char.from_buffer
 
 _NOT_ONE_SAMPLE = (TypeError, ValueError, NotImplementedError, BufferError)
 """Exceptions that a memory view raises for anything but one sample of float64."""
@@ -52,8 +60,11 @@ class KernelCall:
         "_defect",
         "_first",
         "_kernel",
+        "_lanes",
+        "_max_in_place",
         "_max_rows",
         "_place",
+        "_result_word",
         "_second",
         "_shape",
         "_sizes",
@@ -80,6 +91,9 @@ class KernelCall:
         self._sizes = [port.size for port in kernel.inputs[: len(checks)]]
         self._shape = kernel.outputs[0].shape
         largest = max(port.size for port in (*kernel.inputs, *kernel.outputs))
+        self._lanes = kernel.image.lanes
+        self._result_word = 1 + 2 * len(kernel.inputs)
+        self._max_in_place = kernel.max_samples_of_one_part(threads)
         self._max_rows = min(MAX_COPIED_SAMPLES, max(1, MAX_COPIED_SIZE // largest))
         workspace = self._workspace()
         self._first, self._second, self._third = (*workspace.input_slices, slice(0), slice(0))[:3]
@@ -106,7 +120,7 @@ class KernelCall:
             if a is not _ABSENT:
                 numbers[self._third] = a
         except _NOT_ONE_SAMPLE:
-            return self._evaluate_rows(workspace, tuple(x for x in (q, v, a) if x is not _ABSENT), out)
+            return self._evaluate_rows(workspace, _given(q, v, a), out)
         workspace.run()
         if workspace.output_values[self._defect] < MAX_DEFECT or self._unchecked:
             if out is None:
@@ -116,35 +130,86 @@ class KernelCall:
             self._workspaces.append(workspace)
             return out
         self._workspaces.append(workspace)
-        return self._batch(tuple(x for x in (q, v, a) if x is not _ABSENT), out)
+        return self._batch(_given(q, v, a), out)
 
     def _evaluate_rows(self, workspace: Workspace, arguments: tuple[Any, ...], out: Floats | None) -> Floats:
-        """Evaluate a batch and return its results (n, size); a small batch is copied to the workspace."""
-        n = len(arguments[0]) if _is_float64(arguments[0], self._sizes[0]) else 0
-        fits = 0 < n <= self._max_rows
-        if fits:
-            for rows, array, size in zip(workspace.input_rows, arguments, self._sizes, strict=False):
-                if not _is_float64(array, size) or array.shape != (n, size):
-                    fits = False
-                    break
-                rows[:n] = array
-        if fits:
-            workspace.run_rows(n)
-            # Defects are not negative, so the sum is below the bound only if each one is and none is NaN.
-            if sum(workspace.output_rows[1][:n, 0].tolist()) < MAX_DEFECT or self._unchecked:
-                if out is None:
-                    out = workspace.output_rows[0][:n].copy()
-                else:
-                    _checked_out(out, (n, *self._shape))[...] = workspace.output_rows[0][:n]
-                self._workspaces.append(workspace)
-                return out
+        """Evaluate a batch and return its results; contiguous rows and few rows take the fastest paths."""
+        found = self._evaluate_in_place(workspace, arguments, out)
+        if found is None:
+            n = len(arguments[0]) if _is_float64(arguments[0], self._sizes[0]) else 0
+            if 0 < n <= self._max_rows and all(
+                _is_float64(array, size) and array.shape == (n, size)
+                for array, size in zip(arguments, self._sizes, strict=True)
+            ):
+                found = self._evaluate_copies(workspace, n, arguments, out)
         self._workspaces.append(workspace)
-        return self._batch(arguments, out)
+        return self._batch(arguments, out) if found is None else found
+
+    def _evaluate_in_place(
+        self, workspace: Workspace, arguments: tuple[Any, ...], out: Floats | None
+    ) -> Floats | None:
+        """Evaluate contiguous rows (n, size) where they are.
+
+        Return None if the arguments are others, or one may be invalid.
+        """
+        first = arguments[0]
+        if type(first) is not np.ndarray or first.ndim != 2:
+            return None
+        n = len(first)
+        if not self._lanes <= n <= self._max_in_place:
+            return None
+        words, word = workspace.batch_words, 1
+        words[0] = n
+        for array, size in zip(arguments, self._sizes, strict=True):
+            if type(array) is not np.ndarray or array.dtype is not _FLOAT64 or array.shape != (n, size):
+                return None
+            try:
+                # A buffer exists only of a contiguous, writeable array.
+                words[word] = addressof(_first_byte(array))
+            except (TypeError, ValueError):
+                if not (array.flags.c_contiguous and array.flags.aligned):
+                    return None
+                words[word] = array.ctypes.data
+            word += 2
+        if out is None:
+            result = np.empty((n, *self._shape))
+        else:
+            result = _checked_out(out, (n, *self._shape))
+            if any(np.may_share_memory(out, array) for array in arguments):
+                return None
+        defects = workspace.output_rows[1] if n <= self._max_rows else np.empty((n, 1))
+        word = self._result_word
+        words[word], words[word + 2] = address_of(result), address_of(defects)
+        workspace.run_batch()
+        return result if self._unchecked or self._are_valid(defects, n) else None
+
+    def _evaluate_copies(
+        self, workspace: Workspace, n: int, arguments: tuple[Floats, ...], out: Floats | None
+    ) -> Floats | None:
+        """Evaluate rows (n, size) that are copied to the workspace; return None if one may be invalid."""
+        for rows, array in zip(workspace.input_rows, arguments, strict=False):
+            rows[:n] = array
+        workspace.run_rows(n)
+        if not (self._unchecked or self._are_valid(workspace.output_rows[1], n)):
+            return None
+        result = np.empty((n, *self._shape)) if out is None else _checked_out(out, (n, *self._shape))
+        result[...] = workspace.output_rows[0][:n]
+        return result
+
+    def _are_valid(self, defects: Floats, n: int) -> bool:
+        """Check whether the first n of `defects` (rows, 1) are below the bound."""
+        defects = defects[:n, 0]
+        if n > len(SCALES):
+            return bool(defects.max() < MAX_DEFECT)
+        # Defects are not negative, so their sum is below the bound only if each one is and none is NaN.
+        # A scalar product is the fastest sum of few numbers; the factors keep it from overflowing.
+        return bool(defects.dot(SCALES[:n]) < MAX_DEFECT * DEFECT_SCALE)
 
     def _workspace(self) -> Workspace:
         workspace = self._kernel.workspace(self._max_rows)
         if self._place is not None:
             workspace.input_rows[-1][...] = self._place
+            workspace.repeat_input(len(workspace.input_rows) - 1)
         return workspace
 
     def _batch(self, arguments: tuple[Any, ...], out: Floats | None) -> Floats:
@@ -248,6 +313,13 @@ def write_into(out: Floats | None, result: Floats) -> Floats:
         return result
     _checked_out(out, result.shape)[...] = result
     return out
+
+
+def _given(q: Any, v: Any, a: Any) -> tuple[Any, ...]:
+    """Return the arguments that are not absent."""
+    if v is _ABSENT:
+        return (q,)
+    return (q, v) if a is _ABSENT else (q, v, a)
 
 
 def _is_float64(argument: Any, size: int) -> bool:

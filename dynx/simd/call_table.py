@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dynx.simd.image import Code, Image
-from dynx.simd.kernel import Kernel, Workspace, arguments_of_parts, part_count
+from dynx.simd.kernel import Kernel, Workspace, arguments_of_parts, max_samples_of_one_part, part_count
 from dynx.simd.program import Port
 from dynx.simd.routines import RoutineSet
 from dynx.simd.threads import run_parts
@@ -126,6 +126,9 @@ class TableKernel(Kernel):
             self._free.append(memory)
 
         run_parts(call, len(arguments), threads)
+
+    def max_samples_of_one_part(self, threads: int) -> int:
+        return max_samples_of_one_part(self.image.lanes, self._work, threads)
 
     def workspace(self, samples: int = 1) -> Workspace:
         memory = self._workspace_memory()

@@ -104,7 +104,7 @@ class Kernel:
         words = [max(n, lanes)]
         for array in arrays:
             # A single sample is evaluated in every lane.
-            words += [_address(array), array.strides[0] if n > 1 else 0]
+            words += [address_of(array), array.strides[0] if n > 1 else 0]
         parts = part_count(n, lanes, self.image.size, threads)
         if parts == 1:
             packed_words = packed("q", words)
@@ -150,6 +150,10 @@ class Kernel:
         """Return a workspace for up to `samples` samples, for callers that evaluate few at a time."""
         return Workspace(self._open_code(), self.image, samples)
 
+    def max_samples_of_one_part(self, threads: int) -> int:
+        """Return the largest number of samples that a call does not divide into parts."""
+        return max_samples_of_one_part(self.image.lanes, self.image.size, threads)
+
     @property
     def locked_entry(self) -> Callable[[int], None]:
         """Machine code called with the address of its arguments (`dynx.simd.emit`), global lock held."""
@@ -175,10 +179,12 @@ class Workspace:
     For one sample, write into `inputs` at `input_slices` (one slice for each port), call `run()`, and
     read `results`, an array for each output port in its own shape, or `output_values` at `output_slices`.
     For n samples, write into the first n of `input_rows`, call `run_rows(n)`, and read the first n of
-    `output_rows`, arrays (samples, *shape).
+    `output_rows`, arrays (samples, *shape). For contiguous rows elsewhere, write the number of samples, at
+    least that of lanes, and their addresses into `batch_words`, and call `run_batch()`, which does not hold
+    Python's global lock: the words are the number, then an address and the distance of rows for each array.
 
-    Not safe for several threads at a time. The calls hold Python's global lock: they are meant for
-    evaluations that take microseconds.
+    Not safe for several threads at a time. The other calls hold the lock: they are meant for evaluations
+    that take microseconds.
     """
 
     __slots__ = (
@@ -186,6 +192,7 @@ class Workspace:
         "_kept",
         "_lanes",
         "_run_rows",
+        "batch_words",
         "input_rows",
         "input_slices",
         "inputs",
@@ -194,6 +201,7 @@ class Workspace:
         "output_values",
         "results",
         "run",
+        "run_batch",
     )
 
     def __init__(
@@ -232,15 +240,27 @@ class Workspace:
             one[2::2] = 0
         else:
             one[0] = 1
+        batch = several.copy()
         self._kept = (code, one, kept)
-        self._arguments = several.data
+        self._arguments, self.batch_words = several.data, batch.data
         self.run: Callable[[], None] = partial((single or code).locked_entry, one.ctypes.data)
         self._run_rows: Callable[[], None] = partial(code.locked_entry, several.ctypes.data)
+        self.run_batch: Callable[[], None] = partial(code.entry, batch.ctypes.data)
+
+    def repeat_input(self, number: int) -> None:
+        """Let `run_batch` use the first row of an input of this workspace for all samples."""
+        self.batch_words[2 + 2 * number] = 0
 
     def run_rows(self, n: int) -> None:
         """Evaluate the first n samples, or as many as there are lanes if that is more."""
         self._arguments[0] = max(n, self._lanes)
         self._run_rows()
+
+
+def max_samples_of_one_part(lanes: int, group_work: int, threads: int) -> int:
+    """Return the largest number of samples that are certainly not divided into parts."""
+    least = MAX_PART_WORK if threads == 1 else MIN_PART_WORK
+    return int(least / max(1, group_work)) * lanes
 
 
 def part_count(n: int, lanes: int, group_work: int, threads: int) -> int:
@@ -302,7 +322,7 @@ def _usable_in_place(array: Floats) -> bool:
     return array.flags.aligned and (array.shape[1] <= 1 or array.strides[1] == _FLOAT64_BYTES)
 
 
-def _address(array: Floats) -> int:
+def address_of(array: Floats) -> int:
     """Return the address of the first number of an array."""
     try:
         # This takes a third of the time of `array.ctypes`, but needs a contiguous, writeable array.
@@ -313,7 +333,7 @@ def _address(array: Floats) -> int:
 
 def _extent(array: Floats) -> tuple[int, int]:
     """Return the first address of an array (n, size) and the first one after it."""
-    first = _address(array)
+    first = address_of(array)
     rows, columns = array.shape
     row_stride, column_stride = array.strides
     height, width = (rows - 1) * row_stride, (columns - 1) * column_stride

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from dynx.compiled.backend import CompiledBackend
-from dynx.compiled.call import MAX_COPIED_SAMPLES
-from dynx.errors import ArgumentError, DTypeError, ShapeError
+from dynx.compiled.call import MAX_COPIED_SAMPLES, KernelCall
+from dynx.errors import ArgumentError, DTypeError, DynxError, ShapeError
 from dynx.model import Model
+from dynx.simd.target import host
 from dynx.spatial.scalar import Floats
 from tests.backends.robots import chain
 from tests.compiled.robots import ROBOTS, TIP, made, state
@@ -132,3 +133,41 @@ def test_a_batch_that_does_not_fit_into_memory() -> None:
     q = np.broadcast_to(np.zeros(2), (10**14, 2))
     with pytest.raises(MemoryError):
         made(model).mass_matrix(q)
+
+
+@pytest.mark.parametrize("n", [host().lanes, 100, 1000, 5000])
+def test_contiguous_rows_take_the_fastest_path(n: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Batches of more than 256 samples had taken five microseconds before they were computed."""
+    engine = made(ROBOTS["floating"], threads=1)
+    q, v, a = state(engine.model, (n,))
+    v, a = v.copy(), a.copy()
+    expected = engine.inverse_dynamics(q, v, a)
+    expected_jacobian = engine.jacobian(q, TIP, reference="world")
+    monkeypatch.setattr(KernelCall, "_batch", None)
+    monkeypatch.setattr(KernelCall, "_evaluate_copies", None)
+    np.testing.assert_array_equal(engine.inverse_dynamics(q, v, a), expected)
+    np.testing.assert_array_equal(engine.jacobian(q, TIP, reference="world"), expected_jacobian)
+    out = np.full_like(expected, np.nan)
+    assert engine.inverse_dynamics(q, v, a, out=out) is out
+    np.testing.assert_array_equal(out, expected)
+    for x in (q, v, a):
+        x.setflags(write=False)
+    np.testing.assert_array_equal(engine.inverse_dynamics(q, v, a), expected)
+
+
+@pytest.mark.parametrize("n", [host().lanes, 100, 1000, 9000])
+def test_one_bad_row_is_found_on_the_fastest_path(n: int) -> None:
+    engine = made(ROBOTS["fixed"], threads=1)
+    q, v, a = (np.ascontiguousarray(x) for x in state(engine.model, (n,)))
+    for value in (np.nan, np.inf, 1e200):
+        for row in (0, n // 2, n - 1):
+            bad = v.copy()
+            bad[row, 1] = value
+            with pytest.raises(DynxError, match=rf"v\[{row}"):
+                engine.inverse_dynamics(q, bad, a)
+    # Numbers just below the bound are not refused, although their squares add up to more than its square.
+    assert engine.inverse_dynamics(q, np.full_like(v, 0.9e70), a).shape == v.shape
+    inside = q.copy()
+    np.testing.assert_array_equal(
+        engine.inverse_dynamics(q, inside, a, out=inside), engine.inverse_dynamics(q, q.copy(), a)
+    )
