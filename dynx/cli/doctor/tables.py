@@ -265,10 +265,20 @@ def level_clause(report: DoctorReport) -> str:
 def _action(report: DoctorReport) -> str:
     """Write what was done to make a written file, before its name."""
     if report.mended is not None:
-        return f"mended{level_clause(report)}:"
+        return f"mended{level_clause(report)}{_without_calls(report)}:"
     if report.kinematics_only:
         return "no inertial data, which --fix does not invent; copied unchanged to"
     return f"nothing to change in the text{level_clause(report)}; copied unchanged to"
+
+
+def _without_calls(report: DoctorReport) -> str:
+    """Name the causes that the mended text keeps, because only calls remove them."""
+    changed = {change.rule for change in report.changes}
+    kept = list(dict.fromkeys(each.rule for each in report.differences if each.rule not in changed))
+    if not (kept and report.calls):
+        return ""
+    verb = "remains" if len(kept) == 1 else "remain"
+    return f" (without the calls above, {', '.join(map(wording.name, kept))} {verb})"
 
 
 def _residual(report: DoctorReport) -> str:
