@@ -16,7 +16,7 @@ from dynx.rules.case import Case
 from dynx.spatial.scalar import Floats
 
 STATES = 500
-"""Number of states at which contacts are looked for: 5 to 40 ms, without dynamics."""
+"""Number of states at which contacts are looked for, without dynamics: 5 to 15 ms of most robots."""
 
 _MAX_PAIRS = 4
 """Number of pairs that are listed."""
