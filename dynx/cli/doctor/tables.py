@@ -65,13 +65,7 @@ def _show(
     show_engines(out, report)
     show_errors(out, report)
     show_variants(out, report)
-    found = causes(report)
-    _show_causes(out, "causes", [each for each in found if each.largest_effect is not None], places)
-    rest = [each for each in found if each.largest_effect is None]
-    present = [each for each in rest if each.kind == "difference"]
-    _show_causes(out, "present, without effect on this base", present, places)
-    practice = [each for each in rest if each.kind == "practice"]
-    _show_causes(out, "bad practice", practice, places)
+    _show_findings(out, causes(report), places)
     if report.unread_meshes:
         out.print()
         sentence(out, f"not examined: {wording.unread_meshes(report)}", 0, "yellow")
@@ -149,10 +143,25 @@ def show_variants(out: Console, report: DoctorReport) -> None:
                 sentence(out, f"-> {one_line(rule.advice)}", 2)
 
 
-def _show_causes(out: Console, title: str, found: Sequence[Cause], places: int) -> None:
-    if not found:
-        return
-    heading(out, title)
+def _show_findings(out: Console, found: Sequence[Cause], places: int) -> None:
+    """Print the causes with an effect, those without, and bad practice; above them the command that explains
+    a rule."""
+    rest = [each for each in found if each.largest_effect is None]
+    sections = {
+        "causes": [each for each in found if each.largest_effect is not None],
+        "present, without effect on this base": [each for each in rest if each.kind == "difference"],
+        "bad practice": [each for each in rest if each.kind == "practice"],
+    }
+    more = f" (more about a rule: dynx explain {shlex.quote(wording.name(found[0].rule))})" if found else ""
+    for title, group in sections.items():
+        if group:
+            out.print()
+            out.print(Text.assemble((title, "bold"), (more, "dim")))
+            _show_causes(out, group, places)
+            more = ""
+
+
+def _show_causes(out: Console, found: Sequence[Cause], places: int) -> None:
     for cause in found:
         out.print(_cause_line(cause))
         sentence(out, f"{one_line(cause.title)} ({_extent(cause)})", 6)
@@ -236,16 +245,13 @@ def _show_unexplained(out: Console, report: DoctorReport, saved: Mapping[int, st
 
 
 def _show_next(out: Console, report: DoctorReport, mended: str | None, command: str) -> None:
-    if mended is None and report.alike and not report.findings:
+    if mended is None and report.mended is None and report.alike:
         return
     out.print()
     if mended is not None:
         out.print(f"{_action(report)} {one_line(mended)}", style="bold green")
     elif report.mended is not None:
         out.print(f"to mend it: {command} --fix OUT.urdf", style="bold")
-    if report.findings:
-        rule = causes(report)[0].rule
-        out.print(f"more about a rule: dynx explain {shlex.quote(wording.name(rule))}", style="dim")
     if not report.alike:
         out.print(f"{_residual(report)}; {report.seconds:.1f} s", style="dim")
 

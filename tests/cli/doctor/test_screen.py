@@ -42,7 +42,8 @@ def shown(report: DoctorReport, width: int = COLUMNS) -> str:
 def test_the_report_of_ur5_fits_a_screen() -> None:
     report = diagnose("ur5")
     assert len(report.engines) >= len(set(ENGINES) & set(installed_engines()))
-    assert rows(report) <= 40, shown(report)
+    assert rows(report) <= 38, shown(report)
+    assert "bad practice (more about a rule: dynx explain DX" in shown(report)
 
 
 def test_the_report_of_a_robot_without_a_fault_has_25_rows() -> None:
