@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, DTypeError, NotFiniteError, ShapeError, shown
 from dynx.model.elements import Pose, Vector
+from dynx.model.masks import refuse_mask
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import se3_exp, se3_log
 from dynx.spatial.so3 import quat_product, rotate, rotate_back, rotation_from_quat
@@ -17,8 +18,8 @@ if TYPE_CHECKING:
     from dynx.model.model import Model
 
 
-MAX_MAGNITUDE = 1e70
-"""Bound on the magnitude of the entries of an array.
+MAX_MAGNITUDE = 1e60
+"""Bound on the magnitude of the entries of an array, and of the numbers of a description.
 
 A moment is a product of two lengths, two speeds and a mass. The bound prevents its overflow, with which an
 engine would silently return infinity or NaN.
@@ -68,7 +69,12 @@ def positive_seconds(name: str, seconds: object) -> float:
 
 
 def real_array(name: str, value: ArrayLike) -> Floats:
-    """Return `value` as a float64 array of any shape; ShapeError if it is ragged, DTypeError if not real."""
+    """Return `value` as a float64 array of any shape.
+
+    Raises ShapeError if it is ragged, DTypeError if it is not real or has a mask, which would be lost.
+    """
+    if type(value) is not np.ndarray:
+        refuse_mask(name, value)
     try:
         array = np.asarray(value)
     except ValueError as error:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, ShapeError, shown
+from dynx.model.masks import refuse_mask
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous
 from dynx.spatial.so3 import rotation_from_rpy, rpy_from_rotation
@@ -41,6 +42,7 @@ class Pose:
 
         `name` is how errors call it. Raises ArgumentError unless T is a rigid transform to 1e-6.
         """
+        refuse_mask(name, T)
         try:
             array = np.asarray(T, dtype=np.float64)
         except (TypeError, ValueError):

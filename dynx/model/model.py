@@ -14,6 +14,7 @@ from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
 from dynx.model import configuration, locking, topology
 from dynx.model.elements import IDENTITY, Frame, Inertial, Joint, Link, Note, Pose, Vector
 from dynx.model.mechanism import Mechanism, build_mechanism
+from dynx.model.number_bounds import refuse_unbounded_numbers
 from dynx.model.urdf.writer import write_urdf
 from dynx.spatial.scalar import Floats
 
@@ -75,6 +76,7 @@ class Model:
         ordered_links, ordered_joints = topology.depth_first(list(links), list(joints), source)
         ordered_joints = locking.lock_joints(ordered_joints, lock or {})
         ordered_joints = topology.resolve_mimics(ordered_joints, notes, source)
+        refuse_unbounded_numbers(ordered_links, ordered_joints, source)
         notes += _missing_inertial_notes(ordered_links, ordered_joints)
         return cls(
             name=name,

@@ -81,7 +81,7 @@ def _pair(word: str) -> tuple[str, float]:
 
 
 def finite_number(word: str) -> float:
-    """Read one finite number in the notation of Python."""
+    """Read one finite number in the notation of Python, bounded as the numbers of a description are."""
     try:
         number = float(word)
     except ValueError:
@@ -90,6 +90,9 @@ def finite_number(word: str) -> float:
         ) from None
     if not math.isfinite(number):
         raise click.BadParameter(f"{shown(word)} is not finite")
+    bound = import_object("dynx.model.configuration:MAX_MAGNITUDE")
+    if not abs(number) < bound:
+        raise click.BadParameter(f"{shown(word)} is not below {bound:g} in magnitude")
     return number
 
 

@@ -6,6 +6,7 @@ import math
 import sys
 
 from dynx.errors import nearest, shown
+from dynx.model.configuration import MAX_MAGNITUDE
 from dynx.model.elements import INFINITY, Joint, JointDynamics, JointType, Limits, Mimic, Vector
 from dynx.model.urdf.origins import read_origin
 from dynx.model.urdf.values import Reading
@@ -84,7 +85,8 @@ def _read_axis(element: Element, what: str, reading: Reading) -> Vector:
     axis = reading.only(element, "axis")
     if axis is None:
         return (1.0, 0.0, 0.0)
-    x, y, z = reading.vector(axis, "xyz", what)
+    # A direction is scaled, so that any length will do.
+    x, y, z = reading.vector(axis, "xyz", what, bound=INFINITY)
     largest = max(abs(x), abs(y), abs(z))
     if largest == 0.0:
         raise reading.error(axis, f"the axis of {what} is zero; wanted a direction")
@@ -123,6 +125,8 @@ def _read_limits(element: Element, kind: JointType, what: str, reading: Reading)
             reading.note(limit, f"{what} is continuous; its lower and upper limits were ignored")
         return Limits(**most)
     lower, upper = (_limit(limit, end, what, reading, 0.0) for end in ("lower", "upper"))
+    if lower == upper and math.isinf(lower):
+        raise reading.error(limit, f"both limits of {what} are {lower}, so that it has no position")
     missing = [end for end in ("lower", "upper") if end not in limit.attributes]
     if missing:
         reading.note(limit, f"{what} has no {' and no '.join(missing)} limit; URDF defines it as 0")
@@ -132,9 +136,13 @@ def _read_limits(element: Element, kind: JointType, what: str, reading: Reading)
 
 
 def _limit(limit: Element, attribute: str, what: str, reading: Reading, default: float) -> float:
-    # The largest double stands for "no limit": every engine can read it, unlike infinity.
-    value = reading.number_or(limit, attribute, what, default)
-    return math.copysign(INFINITY, value) if abs(value) == sys.float_info.max else value
+    value = reading.number_or(limit, attribute, what, default, bound=INFINITY)
+    if abs(value) < MAX_MAGNITUDE or math.isinf(value):
+        return value
+    # The largest double is the usual way to write "no limit": every engine can read it, unlike infinity.
+    if abs(value) < sys.float_info.max:
+        reading.note(limit, f"the {attribute} limit of {what} is {value:g}; it is read as unlimited")
+    return math.copysign(INFINITY, value)
 
 
 def _read_dynamics(element: Element, what: str, reading: Reading) -> JointDynamics:

@@ -9,6 +9,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from dynx.errors import DescriptionError, UnsupportedFeatureError, escaped, shown
+from dynx.model.configuration import MAX_MAGNITUDE
 from dynx.model.elements import Note, Vector
 from dynx.model.xml.reading import Element
 
@@ -95,19 +96,27 @@ class Reading:
             raise self.error(element, f"the {attribute} of {what} {fault}")
         return value
 
-    def number(self, element: Element, attribute: str, what: str) -> float:
-        """Return a required attribute that is one finite number; raise an error otherwise."""
-        return self._parsed(element, attribute, self.attribute(element, attribute, what), what, "a number")
+    def number(self, element: Element, attribute: str, what: str, *, bound: float = MAX_MAGNITUDE) -> float:
+        """Return a required attribute that is one finite number below `bound` in magnitude; raise an error
+        otherwise."""
+        text = self.attribute(element, attribute, what)
+        value = self._parsed(element, attribute, text, what, "a number")
+        self._require_below(bound, (value,), element, attribute, what)
+        return value
 
-    def number_or(self, element: Element, attribute: str, what: str, default: float) -> float:
-        """Return an attribute that is one finite number, or `default` if it is missing."""
+    def number_or(
+        self, element: Element, attribute: str, what: str, default: float, *, bound: float = MAX_MAGNITUDE
+    ) -> float:
+        """Return an attribute as `number` does, or `default` if it is missing."""
         if attribute not in element.attributes:
             return default
-        return self.number(element, attribute, what)
+        return self.number(element, attribute, what, bound=bound)
 
-    def vector(self, element: Element, attribute: str, what: str) -> Vector:
-        """Return a required attribute of three finite numbers; raise an error otherwise."""
+    def vector(self, element: Element, attribute: str, what: str, *, bound: float = MAX_MAGNITUDE) -> Vector:
+        """Return a required attribute of three finite numbers below `bound` in magnitude; raise an error
+        otherwise."""
         x, y, z = self.numbers(element, attribute, what, 3)
+        self._require_below(bound, (x, y, z), element, attribute, what)
         return (x, y, z)
 
     def numbers(self, element: Element, attribute: str, what: str, count: int) -> tuple[float, ...]:
@@ -128,6 +137,17 @@ class Reading:
             if math.isfinite(value):
                 return value
         raise self._unreadable(element, attribute, word if text is None else text, what, wanted)
+
+    def _require_below(
+        self, bound: float, values: tuple[float, ...], element: Element, attribute: str, what: str
+    ) -> None:
+        if not all(abs(value) < bound for value in values):
+            text = shown(element.attributes[attribute])
+            raise self.error(
+                element,
+                f"{attribute} in <{element.tag}> of {what} is {text}; wanted less than {bound:g} in "
+                "magnitude, since products of larger numbers overflow",
+            )
 
     def _unreadable(
         self, element: Element, attribute: str, text: str, what: str, wanted: str

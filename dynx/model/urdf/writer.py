@@ -22,8 +22,8 @@ def write_urdf(model: Model) -> str:
     URDF cannot express the base, its pose and gravity, so the same must be given to ``load`` again. A locked
     joint is written as fixed, with its position in the extension ``<dynx_locked>``; an added frame as a
     massless link on a fixed joint, marked by ``<dynx_frame>``; other readers ignore both marks. An infinite
-    limit is written as the largest double, which every engine can read. Raises DescriptionError for a name
-    that URDF cannot express.
+    limit is written as the largest double, which every engine can read; limits of `MAX_MAGNITUDE` or more are
+    read back as infinite. Raises DescriptionError for a name that URDF cannot express.
     """
     lines = ['<?xml version="1.0"?>', f"<robot name={_name(model.name)}>"]
     for link in model.links:

@@ -181,7 +181,7 @@ def simulate_batch(
         fixed["parameters"] = rows.of("parameters", chosen, len(parametric.parameters.names))
     for name, values in (gains or {}).items():
         size = gains_of(innermost(controller))[name].size
-        fixed[f"gain_{name}"] = rows.of(name, columns_of(values), size, spread=True)
+        fixed[f"gain_{name}"] = rows.of(name, columns_of(name, values), size, spread=True)
     n = rows.count
     refuse_ambiguous(given, joints, n)
     kept = clock.n_steps // record_every if record_every else 0

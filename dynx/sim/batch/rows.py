@@ -97,7 +97,7 @@ class RolloutRows:
 
     def of(self, name: str, values: ArrayLike, size: int, *, spread: bool = False) -> Floats:
         """Return `values` as a finite array (size,) or (n, size); with `spread`, one column holds for all."""
-        array = np.asarray(values, dtype=np.float64) if spread else checked_array(name, values, size)
+        array = real_array(name, values) if spread else checked_array(name, values, size)
         if spread and array.ndim and array.shape[-1] == 1:
             array = np.broadcast_to(array, (*array.shape[:-1], size))
         array = checked_array(name, array, size)
@@ -116,7 +116,7 @@ class RolloutRows:
         return np.array(np.broadcast_to(array, (self.count, array.shape[-1])))
 
 
-def columns_of(values: ArrayLike) -> Floats:
+def columns_of(name: str, values: ArrayLike) -> Floats:
     """Return an array (n,) as a column (n, 1); an array (n, size) stays as it is."""
-    array = np.asarray(values, dtype=np.float64)
+    array = real_array(name, values)
     return array[:, None] if array.ndim == 1 else array

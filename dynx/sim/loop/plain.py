@@ -18,6 +18,7 @@ import numpy as np
 from dynx.control.base import Controller, Measurement
 from dynx.control.engine_motors import EngineMotor
 from dynx.errors import ControlError, DivergedError, SimulationError, shown
+from dynx.model.masks import refuse_mask
 from dynx.sim.clock import Clock
 from dynx.sim.loop.controller_checks import ControllerWatch, defect_of_outcome
 from dynx.sim.loop.record import Record
@@ -168,6 +169,8 @@ class Loop:
         """Return the torque of a controller as a float64 array (nv,). Raises ControlError."""
         wanted = (self.plant.model.nv,)
         try:
+            if type(given) is not np.ndarray:
+                refuse_mask("torque", given)
             array = np.asarray(given)
         except ValueError:
             array = np.empty(0, dtype=object)

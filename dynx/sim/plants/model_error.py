@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, shown
 from dynx.model import Model
-from dynx.model.configuration import checked_array, checked_vector, is_real
+from dynx.model.configuration import MAX_MAGNITUDE, checked_array, checked_vector, is_real
 from dynx.model.elements import Inertial, Joint, Link, Pose
 
 
@@ -31,7 +31,7 @@ class Payload:
     def __post_init__(self) -> None:
         if not isinstance(self.frame, str):
             raise ArgumentError(f"the frame of a payload is {shown(self.frame)}; wanted the name of a frame")
-        if not is_real(self.mass) or not 0.0 <= float(self.mass) < np.inf:
+        if not is_real(self.mass) or not 0.0 <= float(self.mass) < MAX_MAGNITUDE:
             raise ArgumentError(
                 f"the mass of a payload is {shown(self.mass)}; wanted a number of kilograms, 0 or more"
             )
@@ -79,7 +79,7 @@ def _by_link(model: Model, mass_scale: MassScale) -> dict[str, float]:
 
 
 def _factor(link: str, x: object) -> float:
-    if is_real(x) and 0.0 < float(x) < np.inf:
+    if is_real(x) and 0.0 < float(x) < MAX_MAGNITUDE:
         return float(x)
     raise ArgumentError(f"mass_scale of {shown(link)} is {shown(x)}; wanted a positive factor")
 

@@ -200,6 +200,8 @@ def _decoded(document: Document, model: Model | None) -> Any:
     if FINGERPRINT in document:
         return Unknown(document[FINGERPRINT].rpartition(":")[2], json.dumps(document))
     kind = _class_of(document[CLASS])
+    if kind is Model:
+        raise TypeError("a model is written as URDF text")
     if kind is None or _has_other_code(document):
         return Unknown(document[CLASS].rpartition(":")[2], json.dumps(document))
     return kind(**{name: _decoded(each, model) for name, each in document["fields"].items()})

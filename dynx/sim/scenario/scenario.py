@@ -14,6 +14,7 @@ from dynx.control.base import Controller, refuse_other_than_controller
 from dynx.control.friction import SLIP, Coefficients
 from dynx.errors import ArgumentError, nearest, shown
 from dynx.model import Model
+from dynx.model.masks import refuse_mask
 from dynx.model.model import refuse_other_than_model
 from dynx.registry import DEFAULT_ENGINE
 from dynx.sim.clock import TIME_ROUNDING, Clock
@@ -118,6 +119,7 @@ class Scenario:
         if not isinstance(self.noise, Noise | Unknown | None):
             raise ArgumentError(f"noise is {shown(self.noise)}; wanted a dynx.Noise, as in Noise(v=1e-3)")
         for name in NUMBERS:
+            refuse_mask(name, getattr(self, name))
             object.__setattr__(self, name, _as_array(getattr(self, name)))
         payload = () if self.payload is None else self.payload
         kinds: dict[str, tuple[Any, type]] = {"payload": (payload, Payload), "pushes": (self.pushes, Push)}
@@ -210,7 +212,17 @@ class Scenario:
         if "model" not in given:
             raise ArgumentError("the scenario's document has no model")
         model = decode(given.pop("model"))
-        return cls(model, **{name: decode(value, model) for name, value in given.items()})
+        parts = {name: decode(value, model) for name, value in given.items()}
+        try:
+            scenario = cls(model, **parts)
+            # Objects with parts of wrong types may be made, and fail when they are compared or shown.
+            scenario.to_dict()
+            repr(scenario)
+        except ArgumentError:
+            raise
+        except Exception as error:
+            raise ArgumentError(f"the scenario's document has a part of a wrong type: {error}") from error
+        return scenario
 
     def to_json(self) -> str:
         """Return `to_dict` as text."""
