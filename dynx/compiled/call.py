@@ -39,6 +39,7 @@ SCALES = np.full(8192, DEFECT_SCALE)
 
 _FLOAT64 = np.dtype(np.float64)
 _ABSENT = object()
+_NDARRAY = np.ndarray
 _first_byte: Any = c_char.from_buffer
 
 _NOT_ONE_SAMPLE = (TypeError, ValueError, NotImplementedError, BufferError)
@@ -119,6 +120,13 @@ class KernelCall:
                 numbers[self._second] = v
             if a is not _ABSENT:
                 numbers[self._third] = a
+            # The buffer of a masked array has no mask.
+            if not (
+                type(q) is _NDARRAY
+                and (v is _ABSENT or type(v) is _NDARRAY)
+                and (a is _ABSENT or type(a) is _NDARRAY)
+            ):
+                return self._evaluate_rows(workspace, _given(q, v, a), out)
         except _NOT_ONE_SAMPLE:
             return self._evaluate_rows(workspace, _given(q, v, a), out)
         workspace.run()
@@ -324,7 +332,7 @@ def _given(q: Any, v: Any, a: Any) -> tuple[Any, ...]:
 
 def _is_float64(argument: Any, size: int) -> bool:
     return (
-        isinstance(argument, np.ndarray)
+        type(argument) is np.ndarray
         and argument.dtype is _FLOAT64
         and argument.ndim > 0
         and argument.shape[-1] == size

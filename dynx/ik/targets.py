@@ -68,7 +68,7 @@ def checked_targets(target: ArrayLike, free: str | None = None) -> Targets:
             raise ArgumentError(f"free is {shown(free)}{nearest(str(free), FREE)}")
         return _checked_parts(checked_entries("target", real_array("target", target)), free)
     if (
-        isinstance(target, np.ndarray)
+        type(target) is np.ndarray
         and target.dtype == np.float64
         and target.shape == (4, 4)
         and _is_rigid(target.tolist())

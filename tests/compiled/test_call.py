@@ -11,6 +11,7 @@ from dynx.compiled.backend import CompiledBackend
 from dynx.compiled.call import MAX_COPIED_SAMPLES, KernelCall
 from dynx.errors import ArgumentError, DTypeError, DynxError, ShapeError
 from dynx.model import Model
+from dynx.model.configuration import MAX_MAGNITUDE
 from dynx.simd.target import host
 from dynx.spatial.scalar import Floats
 from tests.backends.robots import chain
@@ -166,7 +167,7 @@ def test_one_bad_row_is_found_on_the_fastest_path(n: int) -> None:
             with pytest.raises(DynxError, match=rf"v\[{row}"):
                 engine.inverse_dynamics(q, bad, a)
     # Numbers just below the bound are not refused, although their squares add up to more than its square.
-    assert engine.inverse_dynamics(q, np.full_like(v, 0.9e70), a).shape == v.shape
+    assert engine.inverse_dynamics(q, np.full_like(v, 0.9 * MAX_MAGNITUDE), a).shape == v.shape
     inside = q.copy()
     np.testing.assert_array_equal(
         engine.inverse_dynamics(q, inside, a, out=inside), engine.inverse_dynamics(q, q.copy(), a)

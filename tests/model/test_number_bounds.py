@@ -117,8 +117,27 @@ def test_limits_beyond_the_bound_are_unlimited() -> None:
 
 
 UR5 = load("ur5")
-MASKED = np.ma.array(np.zeros(6), mask=[0, 1, 0, 0, 0, 0])
+MASKED = np.ma.array(np.zeros(6), mask=[False, True, *[False] * 4])
 MOTION = trajectory.cycloidal(np.zeros(6), np.full(6, 0.01), duration=0.01)
+
+
+@pytest.mark.parametrize("name", ["reference", "compiled", "pinocchio", "pybullet", "mujoco", "drake"])
+@pytest.mark.parametrize("batch", [(), (1,), (64,)])
+def test_no_backend_drops_a_mask(name: str, batch: tuple[int, ...]) -> None:
+    try:
+        engine = backend(name, UR5)
+    except DynxError:
+        pytest.skip(f"{name} is not installed")
+    plain = np.zeros((*batch, 6))
+    masked = np.ma.array(plain, mask=np.eye(6, dtype=bool)[0] | np.zeros((*batch, 6), dtype=bool))
+    with engine:
+        for arguments in ((masked, plain, plain), (plain, masked, plain), (plain, plain, masked)):
+            for evaluate in (engine.inverse_dynamics, engine.forward_dynamics):
+                with pytest.raises(DTypeError, match="is a masked array"):
+                    evaluate(*arguments)
+        for call in (engine.mass_matrix, engine.forward_kinematics, engine.center_of_mass):
+            with pytest.raises(DTypeError, match="q is a masked array"):
+                call(masked)
 
 
 @pytest.mark.parametrize(
