@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from dynx.compiled.kernels import evaluate_quantity
-from dynx.compiled.mass_factors import factorize_mass_matrix, filled_entries, solve_with_factors
+from dynx.compiled.mass_factors import factorize_mass_matrix, solve_with_factors
 from dynx.compiled.model_coordinates import argument_shapes, reduce_columns, tree_coordinates
 from dynx.model import Mechanism
 from dynx.rbd import kinematics, rnea
 from dynx.rbd.base_parameters import regroup_inertias
+from dynx.rbd.elimination import filled_entries
 from dynx.simd.differentiate import differentiate
 from dynx.simd.inlining import inline
 from dynx.simd.program import Program

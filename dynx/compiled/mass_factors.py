@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dynx.model import Mechanism
-from dynx.rbd.kinematics import ancestry
+from dynx.rbd.elimination import filled_entries
 from dynx.rbd.linear import Factors, ldl_factors, solve_ldl
 from dynx.spatial.scalar import Array
 
@@ -26,21 +26,3 @@ def factorize_mass_matrix(mechanism: Mechanism, M: Array) -> Factors:
 def solve_with_factors(L: list[list[Array]], D: list[Array], b: Array) -> Array:
     """Solve M x = b for right-hand sides b (..., nv), from the factors of M."""
     return solve_ldl(L, D, b[..., ::-1])[..., ::-1]
-
-
-def filled_entries(mechanism: Mechanism) -> tuple[int, list[tuple[int, int]]]:
-    """Return nv, and the positions where L may differ from zero, in the order of elimination."""
-    base = 6 if mechanism.floating else 0
-    on_branch = np.zeros((mechanism.nv, mechanism.nv), dtype=bool)
-    on_branch[:base] = True
-    for body in range(len(mechanism.bodies)):
-        on_branch[[base + k for k in ancestry(mechanism, body)], base + body] = True
-    if mechanism.coupling is not None:
-        S = mechanism.coupling.matrix() != 0.0
-        on_branch = S.T @ (on_branch | on_branch.T) @ S
-    A = (on_branch | on_branch.T)[::-1, ::-1]
-    nv = len(A)
-    for i in range(nv):
-        for j in range(i):
-            A[i, j] = A[i, j] or np.any(A[i, :j] & A[j, :j])
-    return nv, [(i, j) for i in range(nv) for j in range(i) if A[i, j]]

@@ -102,16 +102,30 @@ class ParametricDynamics:
         """Return M (..., nv, nv), symmetric, armature included where it is a parameter."""
         return self._evaluate("mass_matrix", _mass_matrix, [self._arguments.q(q)], parameters)
 
-    def acceleration(
-        self, parameters: Array, q: Array, v: Array, tau: Array, armature: Array | None = None
-    ) -> Array:
-        """Return the acceleration (nv,) of one sample, for arrays of symbols in a trace.
+    @property
+    def has_joint_dynamics(self) -> bool:
+        """Whether damping, dry friction and armature of the joints are parameters."""
+        return self._selection.joint_dynamics
 
-        `armature` (nv,) is added to the diagonal of the mass matrix.
+    def equation(
+        self, parameters: Array, q: Array, v: Array, tau: Array
+    ) -> tuple[Array, Array, Array | None, Array | None]:
+        """Return M, r, damping and dry friction of one sample, for arrays of symbols in a trace.
+
+        The acceleration solves M a = r minus the torque of joint friction. Damping and friction (nv,) are
+        those of the model's coordinates, and None if they are no parameters.
         """
         known = self._selection.read(parameters)
-        mechanism = simplify_mechanism(self._selection.remainder())
-        return _forward_dynamics(known.added_to(mechanism), known.joints, q, v, tau, armature)
+        mechanism = known.added_to(simplify_mechanism(self._selection.remainder()))
+        M, r = _mass_matrix(mechanism, known.joints, q), tau - _rigid_bias(mechanism, q, v)
+        if known.joints is None:
+            return M, r, None, None
+        base = np.zeros(6 if mechanism.floating else 0)
+        damping, friction = (np.concatenate([base, known.joints[:, k]]) for k in (0, 1))
+        if mechanism.coupling is not None:
+            S = mechanism.coupling.matrix()
+            damping, friction = (S**2).T @ damping, abs(S).T @ friction
+        return M, r, damping, friction
 
     def root(self, parameters: Array) -> RigidInertia:
         """Return the inertia of the root and everything fixed to it, for an array of symbols."""
@@ -155,6 +169,10 @@ def _inverse_dynamics(mechanism: Mechanism, joints: Array | None, q: Array, v: A
     return reduce_columns(mechanism, tau + _joint_torque(mechanism, joints, v, a))
 
 
+def _rigid_bias(mechanism: Mechanism, q: Array, v: Array) -> Array:
+    return _inverse_dynamics(mechanism, None, q, v, np.zeros(len(v)))
+
+
 def _mass_matrix(mechanism: Mechanism, joints: Array | None, q: Array) -> Array:
     (q,) = tree_coordinates(mechanism, q)
     M = crba.mass_matrix(mechanism, q)
@@ -165,17 +183,9 @@ def _mass_matrix(mechanism: Mechanism, joints: Array | None, q: Array) -> Array:
     return reduce_rows(mechanism, reduce_columns(mechanism, M))
 
 
-def _forward_dynamics(
-    mechanism: Mechanism,
-    joints: Array | None,
-    q: Array,
-    v: Array,
-    tau: Array,
-    armature: Array | None = None,
-) -> Array:
+def _forward_dynamics(mechanism: Mechanism, joints: Array | None, q: Array, v: Array, tau: Array) -> Array:
     bias = _inverse_dynamics(mechanism, joints, q, v, np.zeros(len(v)))
-    M = _mass_matrix(mechanism, joints, q)
-    L, D = factorize_mass_matrix(mechanism, M if armature is None else M + np.diag(armature))
+    L, D = factorize_mass_matrix(mechanism, _mass_matrix(mechanism, joints, q))
     return solve_with_factors(L, D, tau - bias)
 
 

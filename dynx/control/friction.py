@@ -15,7 +15,7 @@ from dynx.model import Model
 from dynx.spatial.scalar import Array, Floats, sign, tanh
 
 SLIP = 1e-2
-"""Default speed [rad/s or m/s] at which dry friction has 76 % of its magnitude."""
+"""Default speed [rad/s or m/s] at which compensation of dry friction has 76 % of its magnitude."""
 
 MIN_SLIP = 1e-9
 """Smallest slip speed above 0 [rad/s or m/s]; the division overflows for smaller ones."""
@@ -28,10 +28,10 @@ Coefficients = bool | ArrayLike
 class JointFriction:
     """Torque of damping and dry friction, which opposes the motion of each joint: d v + f tanh(v / slip).
 
-    With `slip` 0 it is d v + f sign(v), as with ``joint_dynamics=True`` in every backend. That discontinuity
-    makes any integrator oscillate around rest, because within one step the friction moves the joint back
-    further than it came. A slope over the speed `slip` prevents this as long as dt f / (M slip) stays below
-    2. A mimic joint's coefficients act on its driver through its multiplier.
+    With `slip` 0 it is d v + f sign(v), as with ``joint_dynamics=True`` in every backend. A joint at rest
+    then has any torque between -f and f, whichever keeps it at rest; a function of the velocity cannot tell
+    it, so plants solve for it (`dynx.sim.plants.friction_law`). A mimic joint's coefficients act on its
+    driver through its multiplier.
     """
 
     model: Model
@@ -72,6 +72,25 @@ class JointFriction:
     @cached_property
     def _dry(self) -> bool:
         return bool(self.friction.any())
+
+    @property
+    def viscous(self) -> Floats:
+        """Damping (nv,) of the model's coordinates [N m s/rad or N s/m]."""
+        return np.asarray(self.viscous_for(self.damping))
+
+    @property
+    def dry(self) -> Floats:
+        """Dry friction (nv,) of the model's coordinates [N m or N]."""
+        return np.asarray(self.dry_for(self.friction))
+
+    def viscous_for(self, damping: Array) -> Array:
+        """Return the damping (nv,) of the model's coordinates, with other coefficients of the same shape."""
+        return damping if self.to_tree is None else (self.to_tree**2).T @ damping
+
+    def dry_for(self, friction: Array) -> Array:
+        """Return the dry friction (nv,) of the model's coordinates, with other coefficients of the same
+        shape: each joint of the tree depends on one of them."""
+        return friction if self.to_tree is None else abs(self.to_tree).T @ friction
 
     def __call__(self, v: Array) -> Array:
         """Return the torque (..., nv) of friction at velocity `v` (..., nv), arrays of any scalar."""

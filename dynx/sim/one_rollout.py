@@ -8,7 +8,7 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from dynx.control.base import Controller
-from dynx.control.friction import SLIP, Coefficients
+from dynx.control.friction import Coefficients
 from dynx.errors import ArgumentError
 from dynx.model import Model
 from dynx.model.package_paths import StrPath
@@ -50,7 +50,7 @@ def simulate(
     noise: Noise | None = None,
     damping: Coefficients = False,
     friction: Coefficients = False,
-    friction_slip: float = SLIP,
+    friction_slip: float = 0.0,
     armature: Coefficients = False,
     effort_limits: bool | ArrayLike = False,
     position_limits: bool = False,
@@ -86,8 +86,10 @@ def simulate(
     multiples of `dt`. The default `duration` is that of the reference. It is rounded up to a multiple of
     `dt`; a reference that has ended before is held at its end.
 
-    **Joints**, the same in every plant: `damping`, dry `friction` (over the speed `friction_slip`, see
-    `JointFriction`) and `armature`, each True for those of the description, one number or one for each joint;
+    **Joints**, the same in every plant: `damping`, dry `friction` and `armature`, each True for those of the
+    description, one number or one for each joint. Dry friction holds a joint at rest up to its magnitude and
+    opposes the motion beyond (`dynx.sim.plants.friction_law`), at any step; with `friction_slip` [rad/s or
+    m/s] above 0 it is smoothed over that speed instead, so that loaded joints creep (`JointFriction`).
     `effort_limits`, True for the model's, saturate torques and are recorded; `position_limits` are inelastic
     stops (`Stops`); `pushes` are external wrenches.
 

@@ -23,6 +23,7 @@ from dynx.sim.loop.staged import staged_loop
 from dynx.sim.loop.stops import Stops
 from dynx.sim.plants.plant import plant_errors
 from dynx.sim.plants.registry import make_plant
+from dynx.sim.plants.slip_bound import refuse_small_slip
 from dynx.sim.record.rollout import Rollout
 from dynx.sim.resuming import changed_parts, refuse_other_scenario, require_rollout
 from dynx.sim.scenario.scenario import Scenario
@@ -112,6 +113,8 @@ class Simulation:
         self._departures: tuple[str, ...] = ()
         try:
             self._plant.refuse(setup.controller)
+            step = clock.dt / scenario.substeps
+            refuse_small_slip(setup.disturbances, setup.integrator, step, setup.start[0])
             stops = Stops.of(self._plant, setup.disturbances.armature) if scenario.position_limits else None
             self._loop = Loop(self._plant, setup.controller, setpoints, clock, sensors, setup.limit, stops)
         except BaseException:

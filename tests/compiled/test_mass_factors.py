@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 import dynx
-from dynx.compiled.mass_factors import factorize_mass_matrix, filled_entries, solve_with_factors
+from dynx.compiled.mass_factors import factorize_mass_matrix, solve_with_factors
 from dynx.model import Model
 from dynx.model.model import Base
+from dynx.rbd.elimination import filled_entries
 from tests.rules.documents import joint, link
 
 

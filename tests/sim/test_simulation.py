@@ -207,7 +207,7 @@ def test_an_error_leaves_the_last_whole_step() -> None:
         assert simulation.time == 5e-3
         simulation.step(2, np.zeros(6))
         assert len(simulation.rollout) == 7
-    with Simulation(Scenario(ARM, q0=np.zeros(6), v0=np.ones(6), damping=1e5)) as simulation:
+    with Simulation(Scenario(ARM, q0=np.zeros(6), v0=np.full(6, 1e3))) as simulation:
         with pytest.raises(DivergedError) as diverged:
             simulation.step(1000)
         assert len(diverged.value.rollout) == diverged.value.step
@@ -305,7 +305,9 @@ def test_the_record_says_how_its_steps_were_computed() -> None:
         simulation.step()
         assert simulation.rollout.executor == "staged; plain: stepped by the caller"
     assert executor(position_limits=True) == "staged"
-    assert executor(damping=1.0).startswith("plain: joint friction is not compiled")
+    assert executor(damping=1.0, friction=0.1, armature=0.1) == "staged"
+    push = Push("tool0", [1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    assert executor(pushes=[push]) == "plain: pushes are not compiled"
     few = staged.MIN_STEPS_TO_COMPILE
     assert executor(dt=0.01) == f"plain: fewer than {few} steps"
     assert executor(integrator="rk4") == f"plain: fewer than {4 * few} steps"

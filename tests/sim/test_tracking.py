@@ -52,11 +52,12 @@ def test_the_discrete_law_makes_up_for_an_error_in_one_step(plant: str) -> None:
 @pytest.mark.parametrize("plant", PLANTS)
 def test_friction_that_is_compensated_leaves_no_error(plant: str) -> None:
     robot = tutorial_robot()
-    damping, friction = [2.0, 2.0, 1.0, 0.2, 0.2, 0.2], 0.5
+    friction = 0.5
     exact = DiscreteComputedTorque(robot, control_dt=1e-3)
-    law = FrictionCompensation(exact, damping=damping, friction=friction)
+    # The setpoint is that of the end of the step, at which dry friction acts.
+    law = FrictionCompensation(exact, damping=False, friction=friction, slip=0.0, speed="setpoint")
     without, rollout = (
-        simulate(robot, law, tutorial_motion(), plant=plant, duration=0.3, damping=damping, friction=friction)
+        simulate(robot, law, tutorial_motion(), plant=plant, duration=0.3, friction=friction)
         for law in (exact, law)
     )
     assert np.abs(rollout.error).max() <= EXACT_ON_BULLET < np.abs(without.error).max()

@@ -194,12 +194,13 @@ disturbances = group(
     ),
     _coefficients_option(
         "--friction",
-        help="Coulomb friction of the joints [N m or N]: urdf for that of the description, or numbers "
-        "(default: 0).",
+        help="Coulomb friction of the joints [N m or N], which holds them at rest up to its magnitude: urdf "
+        "for that of the description, or numbers (default: 0).",
     ),
     _number_option(
         "--friction-slip",
-        help="Velocity below which Coulomb friction is smoothed [rad/s or m/s] (default: 0.01).",
+        help="Velocity over which Coulomb friction is smoothed, so that joints never stick [rad/s or m/s] "
+        "(default: 0).",
     ),
     _coefficients_option(
         "--armature",

@@ -13,7 +13,6 @@ from dynx.cli.sim.motion import Motion, MotionInput, plan_motion
 from dynx.cli.sim.values import Coefficients
 from dynx.control import EngineMotor, FrictionCompensation, ModelBased
 from dynx.control.base import Controller
-from dynx.control.friction import SLIP
 from dynx.control.saturation import checked_limit
 from dynx.errors import ArgumentError, UnsupportedFeatureError
 from dynx.model import Model
@@ -131,11 +130,14 @@ def _controller(
         raise ArgumentError(
             "--friction-compensation needs joint dynamics: --damping, --friction or --joint-dynamics"
         )
+    slip = dynamics["friction_slip"]
     return FrictionCompensation(
         controller,
         damping=dynamics["damping"],
         friction=dynamics["friction"],
-        slip=dynamics["friction_slip"],
+        slip=slip,
+        # A joint that sticks has no measured speed.
+        speed="measured" if slip else "setpoint",
     )
 
 
@@ -162,7 +164,7 @@ def _joint_dynamics(given: dict[str, Any]) -> dict[str, Any]:
     dynamics = {name: all_of_urdf if given[name] is None else given[name] for name in names}
     return {
         **dynamics,
-        "friction_slip": SLIP if given["friction_slip"] is None else given["friction_slip"],
+        "friction_slip": given["friction_slip"] or 0.0,
     }
 
 

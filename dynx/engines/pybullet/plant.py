@@ -11,6 +11,7 @@ from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dynx.control.engine_motors import EngineMotor, MotorCommand
 from dynx.engines.pybullet.backend import PyBulletBackend
@@ -22,17 +23,21 @@ from dynx.errors import EngineLimitError, UnsupportedFeatureError
 from dynx.model import Model
 from dynx.model.mechanism import build_mechanism
 from dynx.sim.plants.disturbances import Disturbances, DisturbedAcceleration
+from dynx.sim.plants.friction_solver import FrictionSolver
 from dynx.sim.plants.plant import Plant, StepResult
 from dynx.spatial.extended import longdouble
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import cross, quat_from_rotation, quat_product, rotate_back, rotation_from_quat
 
+Mask = NDArray[np.bool_]
+
 
 class BulletPlant(Plant):
     """One robot in its own Bullet world, stepped by Bullet.
 
-    Bullet's stepper has neither mimic joints nor armature. With them the acceleration is solved from
-    Bullet's mass matrix and bias, and the stepper applies the torque that causes it.
+    Bullet's stepper has no mimic joints, no armature, and no joint friction that is exact in each step. With
+    them the acceleration is solved from Bullet's mass matrix and bias, and the stepper applies the torque
+    that causes it.
     """
 
     motor_commands: ClassVar[tuple[type, ...]] = (MotorCommand,)
@@ -55,6 +60,7 @@ class BulletPlant(Plant):
         self._S = np.eye(0) if self._coupling is None else self._coupling.matrix()
         self._owners = np.flatnonzero([joint.mimic is None for joint in model.joints if joint.moves])
         self._solves = self._coupling is not None or disturbances.has_armature
+        self._sticks = disturbances.sticks
         # The root's inertial frame in the base frame.
         self._center: Floats = np.asarray(tree.root.center, dtype=np.float64)
         self._axes: Floats = quat_from_rotation(np.asarray(tree.root.axes, dtype=np.float64))
@@ -71,6 +77,14 @@ class BulletPlant(Plant):
         """The backend of the robot with its mimic joints free, as in Bullet's stepper."""
         joints = tuple(replace(joint, mimic=None) for joint in self.model.joints)
         return PyBulletBackend(replace(self.model, joints=joints), validate=False)
+
+    @cached_property
+    def _friction(self) -> FrictionSolver:
+        return self.disturbances.friction_solver(self._h)
+
+    @cached_property
+    def _damping(self) -> Floats:
+        return np.diag(self._h * self.disturbances.friction.viscous)
 
     @cached_property
     def _accelerate(self) -> DisturbedAcceleration:
@@ -101,10 +115,15 @@ class BulletPlant(Plant):
         return StepResult(self._q, self._v, first, tau)
 
     def refuse(self, controller: object) -> None:
-        """Raise UnsupportedFeatureError for an engine motor with armature, which Bullet's motors lack."""
+        """Raise UnsupportedFeatureError for an engine motor with armature or dry friction that sticks."""
         if isinstance(controller, EngineMotor) and self.disturbances.has_armature:
             raise UnsupportedFeatureError(
                 f"{controller.name} is a motor inside PyBullet, without armature; use a torque controller"
+            )
+        if isinstance(controller, EngineMotor) and self._sticks and self.disturbances.friction.dry.any():
+            raise UnsupportedFeatureError(
+                f"{controller.name} is a motor inside PyBullet, whose torque is unknown before the step, so "
+                "that joints cannot stick: give friction_slip above 0, or use a torque controller"
             )
 
     def close(self) -> None:
@@ -116,19 +135,27 @@ class BulletPlant(Plant):
     # -- one step -----------------------------------------------------------------------------
 
     def _substep(self, t: float, tau: Floats) -> Floats:
-        if self._solves:
-            tau = self._tree_torque(self._q, self._v, self._accelerate(self._q, self._v, tau, t))
+        q, v, moves = self._q, self._v, None
+        if self._sticks:
+            M, torque, bias = self._accelerate.equation(q, v, tau, t)
+            a, moves = self._friction.step(M + self._damping, torque - bias, v)
+            # The torque that Bullet's own dynamics need for this acceleration.
+            tau = self._tree_torque(q, v, a) if self._solves else M @ a + bias
+        elif self._solves:
+            tau = self._tree_torque(q, v, self._accelerate(q, v, tau, t))
         elif self.disturbances.has_torque:
-            tau = tau + self.disturbances.torque(self._engine, t, self._q, self._v)
+            tau = tau + self.disturbances.torque(self._engine, t, q, v)
         self._client.apply((tau[self._base_nv :] / self._unit).tolist())
-        return self._advance(tau)
+        return self._advance(tau, moves)
 
     def _motor_substep(self, t: float, command: MotorCommand) -> tuple[Floats, Floats]:
         """Return the acceleration, and the torque of the disturbances (nv,)."""
         self._client.command(command)
         disturbance: Floats = np.zeros(self.model.nv)
-        if self.disturbances.has_torque:
+        if self.disturbances.has_torque or self._sticks:
             disturbance = self.disturbances.torque(self._engine, t, self._q, self._v)
+            if self._sticks:
+                disturbance = disturbance - self.disturbances.friction(self._v)
             self._client.add_torques((disturbance[self._base_nv :] / self._unit).tolist())
         return self._advance(disturbance), disturbance
 
@@ -140,20 +167,24 @@ class BulletPlant(Plant):
         S = self._S
         return self._tree.inverse_dynamics(coupling.expand_q(q), S @ v, S @ a)
 
-    def _advance(self, tau: Floats) -> Floats:
-        """Apply the wrench of the base, take one step and read the state; return the acceleration (nv,)."""
+    def _advance(self, tau: Floats, moves: Floats | None = None) -> Floats:
+        """Apply the wrench of the base, take one step and read the state; return the acceleration (nv,).
+
+        Joints where `moves` is 0 stick: what rounding moved them is undone.
+        """
         v, h = self._v, self._h
+        sticking = None if moves is None else moves[self._base_nv :] == 0.0
         if not self._floating:
             self._client.advance()
-            joints, rates = self._joints()
-            self._read(joints, rates)
+            joints, rates = self._joints(sticking)
+            self._read(joints, rates, sticking)
             return (rates - v) / h
         R, c, before = rotation_from_quat(self._q[3:7]), self._center, self._base
         force, moment = R @ tau[:3], R @ (tau[3:6] - cross(c, tau[:3]))
         self._client.push_base((force / self._unit).tolist(), (moment / self._unit).tolist(), before.position)
         self._client.advance()
         after = self._client.base_state()
-        joints, rates = self._joints()
+        joints, rates = self._joints(sticking)
         # The acceleration at the beginning of the step follows from that of the root's centre of mass.
         alpha = rotate_back(R, np.subtract(after.angular, before.angular) / h)
         acceleration = rotate_back(R, np.subtract(after.linear, before.linear) / h)
@@ -165,12 +196,14 @@ class BulletPlant(Plant):
 
     # -- between Bullet's state and dynx's ------------------------------------------------------
 
-    def _joints(self) -> tuple[Floats, Floats]:
+    def _joints(self, sticking: Mask | None) -> tuple[Floats, Floats]:
         """Return the positions and rates of the joints that own a coordinate."""
-        positions, rates = self._client.joint_states()
-        if self._coupling is None:
-            return np.array(positions), np.array(rates)
-        return np.array(positions)[self._owners], np.array(rates)[self._owners]
+        positions, rates = (np.array(numbers) for numbers in self._client.joint_states())
+        if self._coupling is not None:
+            positions, rates = positions[self._owners], rates[self._owners]
+        if sticking is not None:
+            positions[sticking], rates[sticking] = self._q[self._base_nq :][sticking], 0.0
+        return positions, rates
 
     def _base_coordinates(self, base: BaseState, joints: Floats, rates: Floats) -> tuple[Floats, Floats]:
         quat = quat_product(np.array(base.quat_xyzw), self._axes_back)
@@ -182,9 +215,9 @@ class BulletPlant(Plant):
         position = np.array(base.position) - R @ self._center
         return np.concatenate([position, quat, joints]), np.concatenate([linear, w, rates])
 
-    def _read(self, q: Floats, v: Floats) -> None:
+    def _read(self, q: Floats, v: Floats, sticking: Mask | None = None) -> None:
         self._q, self._v = q, v
-        if self._floating or self._coupling is not None:
+        if self._floating or self._coupling is not None or (sticking is not None and sticking.any()):
             # Bullet is set to the reported state, rounding of the conversion included, so that a rollout
             # resumed from its record continues bit for bit.
             self._place()

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from dynx.backends.solvability import Solvability
 from dynx.compiled.parametric import ParametricDynamics
 from dynx.control.base import Controller, gains_of
-from dynx.control.friction import SLIP, Coefficients
+from dynx.control.friction import Coefficients
 from dynx.errors import ArgumentError, shown
 from dynx.model import Model
 from dynx.model.configuration import checked_q, whole_number
@@ -39,6 +39,7 @@ from dynx.sim.clock import Clock
 from dynx.sim.loop.noise import Noise
 from dynx.sim.plants.disturbances import Push
 from dynx.sim.plants.model_error import MassScale, Payload
+from dynx.sim.plants.slip_bound import refuse_small_slip
 from dynx.sim.scenario.scenario import Scenario, field_names
 from dynx.sim.setup import Setup, require_duration
 from dynx.simd.machine import require_memory
@@ -81,7 +82,7 @@ def simulate_batch(
     noise: Noise | None = None,
     damping: Coefficients = False,
     friction: Coefficients = False,
-    friction_slip: float = SLIP,
+    friction_slip: float = 0.0,
     armature: Coefficients = False,
     effort_limits: bool | ArrayLike = False,
     payload: Payload | Sequence[Payload] | None = None,
@@ -100,7 +101,7 @@ def simulate_batch(
     These arguments may have one row for each rollout:
 
     - `parameters` (n, p) of `parametric`, a `dynx.parametric` of the model: payloads, inertias, damping, dry
-      friction (discontinuous at zero velocity, as ``sign(v)``) and armature that the controller does not know
+      friction and armature that the controller does not know
     - `gains`: arrays (n,) or (n, size) by the name of a gain of the controller, as ``{"kp": ...}``
     - `damping`, `friction`, `armature` (n,), (n, 1) or (n, joints); a number, numbers (joints,) or True hold
       for all rollouts, as in `simulate`
@@ -161,6 +162,8 @@ def simulate_batch(
     if progress is not None and not callable(progress):
         raise ArgumentError(f"progress is {shown(progress)}; wanted a function of two numbers of rollouts")
     acting = BatchDisturbances.of(moved, setup.disturbances, varied)
+    most = varied["friction"].max(axis=0) if "friction" in varied else None
+    refuse_small_slip(setup.disturbances, setup.integrator, clock.dt, setup.start[0], most)
     if parametric is None and not acting.armature.any():
         Solvability(moved).refuse_singular(False)
     delayed = clock.delay_steps > 0

@@ -56,6 +56,11 @@ class BatchDisturbances:
         strength = np.array([push.wrench for push in self.pushes], dtype=np.float64)
         return np.asarray((shares[:, :, None] * strength).reshape(clock.n_steps, -1))
 
+    @property
+    def sticks(self) -> bool:
+        """Whether joint friction is solved for at the end of each step."""
+        return self.joint_friction.present and not self.joint_friction.slip
+
     def added_to(
         self,
         tau: Array,
@@ -66,21 +71,29 @@ class BatchDisturbances:
         *,
         pushed: bool,
     ) -> Array:
-        """Return `tau` minus the torque of friction plus the torque of the pushes (nv,)."""
-        if self.joint_friction.present:
-            damping, friction = (
-                self._in_place(name, constant, given)
-                for name, constant in (
-                    ("damping", self.joint_friction.damping),
-                    ("friction", self.joint_friction.friction),
-                )
-            )
-            tau = tau - self.joint_friction.torque_for(v, damping, friction)
+        """Return `tau` minus the torque of friction with a slip speed plus the torque of the pushes (nv,)."""
+        if self.joint_friction.present and not self.sticks:
+            tau = tau - self.joint_friction.torque_for(v, *self._coefficients(given))
         if pushed:
             for push, wrench in zip(self.pushes, given["wrenches"].reshape(-1, WRENCH), strict=True):
                 details = (self.model.frame_index(push.frame), push.reference)
                 tau = tau + evaluate_quantity(mechanism, "jacobian", details, q).T @ wrench
         return tau
+
+    def friction_of(self, given: Mapping[str, Array]) -> tuple[Array, Array]:
+        """Return damping and dry friction (nv,) of the model's coordinates, where there is no slip speed."""
+        nothing = np.zeros(self.model.nv)
+        if not self.sticks:
+            return nothing, nothing
+        damping, friction = self._coefficients(given)
+        return self.joint_friction.viscous_for(damping), self.joint_friction.dry_for(friction)
+
+    def _coefficients(self, given: Mapping[str, Array]) -> tuple[Array, Array]:
+        own = self.joint_friction
+        return (
+            self._in_place("damping", own.damping, given),
+            self._in_place("friction", own.friction, given),
+        )
 
     def armature_of(self, given: Mapping[str, Array]) -> Array | None:
         """Return the armature (nv,), or None if it is zero."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, fields
-from functools import partial
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -25,13 +25,17 @@ from dynx.sim.batch.disturbances import BatchDisturbances
 from dynx.sim.batch.traced_controller import innermost, traced_controller
 from dynx.sim.loop.controller_checks import ControllerWatch, defect_of_outcome, is_row
 from dynx.sim.loop.own_controllers import refuse_irreproducible, traced_torque
+from dynx.sim.plants.friction_law import FrictionLaw, FrictionStep
 from dynx.sim.plants.integrators import SemiImplicitEuler
 from dynx.simd.cache import load_kernel, program_recipe
 from dynx.simd.kernel import Kernel
 from dynx.simd.trace import trace
 from dynx.spatial.branchless import difference, integrate
-from dynx.spatial.scalar import Array, Floats, clamp, sign
+from dynx.spatial.scalar import Array, Floats, clamp, sign, tanh
 from dynx.trajectory.base import Setpoint
+
+CORRECTIONS = 1
+"""Number of corrections of the modes of dry friction in one call of a kernel; few steps need more."""
 
 MAX_CACHED_KERNELS = 32
 """Number of kernels that this process keeps for later batches."""
@@ -112,8 +116,14 @@ class FusedStep:
             tau = results["tau"] if controlled else given["tau"]
             center = self._center(given) if self.model.floating else None
             scheme = SemiImplicitEuler(self.model, self.dt, center)
-            accelerate = partial(self._acceleration, mechanism, given, pushed)
-            q, v, _ = scheme(accelerate, given["q"], given["v"], tau)
+            q, v = given["q"], given["v"]
+            slowed = self._slowed(mechanism, given, pushed, tau) if self.sticks else None
+            if slowed is None:
+                q, v, _ = scheme.moved(q, v, self._acceleration(mechanism, given, pushed, tau))
+            else:
+                q, v, _ = scheme.moved(q, v, slowed.a, slowed.moves)
+                if self._law.joints:
+                    results |= self._settling(slowed, given["v"])
             q_reference = given["q_reference"]
             error = abs(difference(q, q_reference) if self.model.floating else q_reference - q)
             max_error = np.array([x.maximum(e) for x, e in zip(given["max_error"], error, strict=True)])
@@ -166,6 +176,8 @@ class FusedStep:
         if self.plant is not None:
             sizes["parameters"] = len(self.plant.parameters.names)
         sizes |= self.disturbances.sizes(pushed=pushed)
+        if self.sticks and self._law.joints:
+            sizes |= {"modes": len(self._law.joints), "one_by_one": 1}
         return {name: (size,) for name, size in sizes.items()}
 
     def _commanded(self, controller: Controller[Any], given: Mapping[str, Array]) -> dict[str, Array]:
@@ -203,25 +215,75 @@ class FusedStep:
         steps_at_limit[bounded] = steps_at_limit[bounded] + given["steps_held"] * (1.0 - sign(left))
         return {"tau": tau, "steps_at_limit": steps_at_limit, **results}
 
-    def _acceleration(
-        self,
-        mechanism: Mechanism,
-        given: Mapping[str, Array],
-        pushed: bool,
-        q: Array,
-        v: Array,
-        tau: Array,
-    ) -> Array:
+    @cached_property
+    def _law(self) -> FrictionLaw:
+        friction = self.disturbances.joint_friction.dry
+        if self.plant is not None and self.plant.has_joint_dynamics:
+            friction = np.ones(self.model.nv)
+            friction[: 6 * self.model.floating] = 0.0
+        return FrictionLaw.of(self.model, friction)
+
+    @property
+    def sticks(self) -> bool:
+        """Whether joint friction is solved for at the end of each step."""
+        slip = self.disturbances.joint_friction.slip
+        of_plant = self.plant is not None and self.plant.has_joint_dynamics
+        return self.disturbances.sticks or (of_plant and not slip)
+
+    def _slowed(
+        self, mechanism: Mechanism, given: Mapping[str, Array], pushed: bool, tau: Array
+    ) -> FrictionStep:
+        """Solve the law of friction, with `CORRECTIONS` corrections of the modes.
+
+        The first modes are the signs of the velocities, plus ``modes`` in a step that is repeated because it
+        was not settled (`dynx.sim.batch.settling`).
+        """
+        law, v, h = self._law, given["v"], self.dt
+        damping, friction = self.disturbances.friction_of(given)
+        M, r, own_damping, own_friction = self._equation(mechanism, given, pushed, tau)
+        if own_damping is not None and own_friction is not None:
+            damping, friction = damping + own_damping, friction + own_friction
+        A, r, joints = M + np.diag(h * damping), r - damping * v, list(law.joints)
+        most = friction[joints].tolist()
+        if not joints:
+            return law.solve(A, r, v, most, h, [], 0.0)
+        single = given["one_by_one"][0]
+        found = law.solve(A, r, v, most, h, sign(v[joints]) + given["modes"], single)
+        for _ in range(CORRECTIONS):
+            found = law.solve(A, r, v, most, h, found.modes, single)
+        return found
+
+    def _settling(self, slowed: FrictionStep, v: Array) -> dict[str, Array]:
+        """Return the corrected modes, minus the signs of the velocities, and whether they are to be tried."""
+        modes = slowed.modes - sign(v[list(self._law.joints)])
+        return {"next_modes": modes, "unsettled": np.array([slowed.changes], dtype=object)}
+
+    def _equation(
+        self, mechanism: Mechanism, given: Mapping[str, Array], pushed: bool, tau: Array
+    ) -> tuple[Array, Array, Array | None, Array | None]:
+        """Return M, r, and damping and dry friction of the plant's parameters, of M a = r minus friction."""
+        q, v = given["q"], given["v"]
         tau = self.disturbances.added_to(tau, mechanism, q, v, given, pushed=pushed)
         armature = self.disturbances.armature_of(given)
-        if self.plant is not None:
-            return self.plant.acceleration(given["parameters"], q, v, tau, armature)
-        if armature is None:
+        if self.plant is None:
+            M = evaluate_quantity(mechanism, "mass_matrix", (), q)
+            r, damping, friction = tau - evaluate_quantity(mechanism, "bias_torque", (), q, v), None, None
+        else:
+            M, r, damping, friction = self.plant.equation(given["parameters"], q, v, tau)
+        return M if armature is None else M + np.diag(armature), r, damping, friction
+
+    def _acceleration(
+        self, mechanism: Mechanism, given: Mapping[str, Array], pushed: bool, tau: Array
+    ) -> Array:
+        if self.plant is None and not self.disturbances.armature.any():
+            q, v = given["q"], given["v"]
+            tau = self.disturbances.added_to(tau, mechanism, q, v, given, pushed=pushed)
             return evaluate_quantity(mechanism, "forward_dynamics", (), q, v, tau)
-        M = evaluate_quantity(mechanism, "mass_matrix", (), q) + np.diag(armature)
-        return solve_with_factors(
-            *factorize_mass_matrix(mechanism, M), tau - evaluate_quantity(mechanism, "bias_torque", (), q, v)
-        )
+        M, r, damping, friction = self._equation(mechanism, given, pushed, tau)
+        if damping is not None:
+            slip = self.disturbances.joint_friction.slip
+            r = r - damping * given["v"] - friction * tanh(given["v"] / slip)
+        return solve_with_factors(*factorize_mass_matrix(mechanism, M), r)
 
     def _center(self, given: Mapping[str, Array]) -> Array:
         """Return the centre of mass of the root (3,)."""

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
+from dynx.sim.batch.settling import Settling
 from dynx.sim.loop.noise import BLOCK_STEPS, NoiseStream
 from dynx.simd.kernel import Kernel
 from dynx.spatial.scalar import Floats
@@ -116,7 +116,6 @@ class _Run:
         widths: dict[str, int] = {**dict.fromkeys(("v_wanted", "a_wanted"), nv), "t": 1, "steps_held": 1}
         widths |= dict.fromkeys(("q_wanted", "q_reference"), int(part.references.shape[1]))
         widths["wrenches"] = int(part.wrenches.shape[1])
-        self._common = {name: np.zeros((1, width)) for name, width in widths.items()}
         self._pushing = pushing(part.wrenches)
         if part.noise is not None:
             self._stream = NoiseStream(part.noise.seed)
@@ -124,11 +123,18 @@ class _Run:
             self._noise = {name: np.zeros((self._rows, nv)) for name in ("noise_q", "noise_v")}
         else:
             self._noise = {}
-        self._calls = {
-            (*which, turn): self._bound(kernel, turn)
-            for which, kernel in part.kernels.items()
-            for turn in range(sets)
-        }
+        ports = [port for kernel in part.kernels.values() for port in kernel.inputs]
+        self._dry = max((port.size for port in ports if port.name == "modes"), default=0)
+        self._settling = Settling(self._rows, self._dry)
+        self._common = {name: np.zeros((1, width)) for name, width in widths.items()}
+        self._calls, self._groups = (
+            {
+                (*which, turn): getattr(kernel, name)(*self._arrays(kernel, turn))
+                for which, kernel in part.kernels.items()
+                for turn in range(sets)
+            }
+            for name in ("bind", "bind_groups")
+        )
         self._diverged = np.full(self._rows, -1.0)
         self._records: tuple[list[Floats], list[Floats], list[Floats]] = ([], [], [])
 
@@ -136,6 +142,7 @@ class _Run:
         """Take all steps."""
         part, n = self._part, self._part.count
         sets, common = len(self._sets), self._common
+        dry, settling, unsettled = self._dry, self._settling, self._settling.outputs["unsettled"]
         for step in range(part.n_steps):
             number, rest = divmod(step, part.steps_per_control)
             if rest == 0:
@@ -144,7 +151,10 @@ class _Run:
             pushed = self._pushing[step]
             if pushed:
                 common["wrenches"][0] = part.wrenches[step]
-            self._calls[rest == 0, pushed, step % sets]()
+            key = rest == 0, pushed, step % sets
+            self._calls[key]()
+            if dry and unsettled.any():
+                settling(self._groups[key], part.kernels[key[:2]].image.lanes)
             now = self._sets[(step + 1) % sets]
             if part.record_every and (step + 1) % part.record_every == 0:
                 for kept, array in zip(self._records, (now["q"], now["v"], self._tau), strict=True):
@@ -191,7 +201,8 @@ class _Run:
         for half, (name, deviation) in enumerate((("noise_q", noise.q), ("noise_v", noise.v))):
             np.multiply(self._drawn[:, step, half], deviation, out=self._noise[name])
 
-    def _bound(self, kernel: Kernel, turn: int) -> Callable[[], None]:
+    def _arrays(self, kernel: Kernel, turn: int) -> tuple[list[Floats], list[Floats]]:
+        """Return inputs and outputs of a kernel, from the set of buffers number `turn` to the next."""
         sets = len(self._sets)
         source, target = self._sets[turn], self._sets[(turn + 1) % sets]
         measured = self._sets[(turn - self._part.delay_steps) % sets]
@@ -199,15 +210,14 @@ class _Run:
             **self._fixed,
             **self._noise,
             **{name: np.broadcast_to(row, (self._rows, row.size)) for name, row in self._common.items()},
+            **self._settling.inputs,
             "tau": self._tau,
             "q_measured": measured["q"],
             "v_measured": measured["v"],
             **source,
         }
-        written = {"tau": self._tau, **target}
-        return kernel.bind(
-            [known[port.name] for port in kernel.inputs], [written[port.name] for port in kernel.outputs]
-        )
+        written = {"tau": self._tau, **self._settling.outputs, **target}
+        return [known[port.name] for port in kernel.inputs], [written[port.name] for port in kernel.outputs]
 
     def _check(self, step: int, now: dict[str, Floats]) -> None:
         state = np.maximum(np.abs(now["q"]).max(axis=1), np.abs(now["v"]).max(axis=1))

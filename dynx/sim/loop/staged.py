@@ -8,6 +8,7 @@ before that step; the plain executor then repeats the step and reports the error
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from time import perf_counter
 from typing import Any
 
@@ -152,12 +153,8 @@ class StagedLoop:
             if loop.limit is not None:
                 tau = clamp(tau, loop.limit)
 
-        forward = self._plant.dynamics.bound_to_thread("forward_dynamics")
-
-        def accelerate(q: Array, v: Array, tau: Array) -> Array:
-            return tracer.record(forward, v.shape, q, v, tau, guarded=True)
-
-        q, v, a = self._plant.advanced(accelerate, given["q"], given["v"], tau)
+        record = partial(tracer.record, guarded=True)
+        q, v, a = self._plant.advanced(record, given["q"], given["v"], tau)
         results |= {"tau": tau, "a": a, "next_q": q, "next_v": v}
         if self._state_size and state is not None:
             results["next_state"] = state

@@ -1,13 +1,15 @@
 """Joint friction, external wrenches and armature of a plant.
 
-Every plant uses this code: friction and wrenches become a torque, as a function of time and state, which is
-added to that of the motors. So a push or a damper has the same effect in every engine and every integrator.
+Every plant uses this code. Wrenches become a torque, as a function of time and state, which is added to that
+of the motors; joint friction is solved for the velocity at the end of a step (`friction_law`). So a push or a
+brake has the same effect in every engine.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,6 +24,8 @@ from dynx.errors import ArgumentError, shown
 from dynx.model import Model
 from dynx.model.configuration import checked_array, is_real
 from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED, REFERENCES
+from dynx.sim.plants.friction_law import FrictionLaw
+from dynx.sim.plants.friction_solver import FrictionSolver
 from dynx.spatial.scalar import Floats
 
 TIME_ROUNDING = 4.0 * float(np.finfo(np.float64).eps)
@@ -94,6 +98,7 @@ class Disturbances:
         step: float = 0.0,
     ) -> None:
         """Raises GainError and ArgumentError for coefficients and pushes that `model` cannot have."""
+        self.model = model
         self.friction = JointFriction(model, damping, friction, slip)
         self.pushes = tuple(push.checked(model) for push in pushes)
         self.armature = _armature_matrix(model, armature)
@@ -101,10 +106,37 @@ class Disturbances:
         self.has_armature = bool(self.armature.any())
         self._step = step
 
+    @cached_property
+    def sticks(self) -> bool:
+        """Whether joint friction is solved for at the end of each step: there is some, and no slip speed."""
+        return self.friction.present and not self.friction.slip
+
     @property
     def has_torque(self) -> bool:
-        """Whether friction or pushes add any torque."""
-        return self.friction.present or bool(self.pushes)
+        """Whether pushes or friction with a slip speed add a torque, a function of time and state."""
+        return (self.friction.present and not self.sticks) or bool(self.pushes)
+
+    def friction_solver(self, h: float) -> FrictionSolver:
+        """Return the solver of dry friction for steps of `h` [s]."""
+        dry = self.friction.dry
+        return FrictionSolver(FrictionLaw.of(self.model, dry), dry, h)
+
+    def slowed(self, M: Floats, v: Floats, h: float) -> Floats:
+        """Return the velocity (nv,) that joint friction leaves of `v` in a step of `h` [s].
+
+        `v` is the velocity that the step would reach without friction, `M` (nv, nv) the mass matrix with
+        armature. For plants of your own.
+        """
+        if not self.sticks:
+            return np.asarray(v - h * np.linalg.solve(M, self.friction(v)))
+        solver = self._solvers.get(h) or self._solvers.setdefault(h, self.friction_solver(h))
+        damping = self.friction.viscous
+        a, moves = solver.step(M + np.diag(h * damping), -damping * v, v)
+        return np.asarray((v + h * a) * moves)
+
+    @cached_property
+    def _solvers(self) -> dict[float, FrictionSolver]:
+        return {}
 
     @property
     def names(self) -> list[str]:
@@ -117,8 +149,9 @@ class Disturbances:
         return [name for name, is_present in present.items() if is_present]
 
     def torque(self, engine: Backend, t: float, q: Floats, v: Floats) -> Floats:
-        """Return the torque (nv,) of pushes minus that of friction, in a step that began at `t`."""
-        tau = -self.friction(v)
+        """Return the torque (nv,) of pushes in a step that began at `t`, minus that of friction with a slip
+        speed."""
+        tau = np.zeros(len(v)) if self.sticks else -self.friction(v)
         for push in self.pushes:
             share = push.share(t, self._step)
             if share:
@@ -134,21 +167,36 @@ class DisturbedAcceleration:
         self.dynamics = EngineDynamics(engine)
         self._engine = engine
         self._disturbances = disturbances
+        self._viscous = disturbances.friction.viscous
 
     @property
     def is_undisturbed(self) -> bool:
         """Whether there are no disturbances, so that it is the backend's forward dynamics alone."""
         return not (self._disturbances.has_torque or self._disturbances.has_armature)
 
-    def __call__(self, q: Floats, v: Floats, tau: Floats, t: float) -> Floats:
-        """Return the acceleration (nv,) at state q, v under `tau`, in a step that began at `t`."""
-        if self._disturbances.has_torque:
-            tau = tau + self._disturbances.torque(self._engine, t, q, v)
+    def __call__(self, q: Floats, v: Floats, tau: Floats, t: float = 0.0) -> Floats:
+        """Return the acceleration (nv,) at state q, v under `tau`, in a step that began at `t`, without
+        friction that sticks."""
         if not self._disturbances.has_armature:
+            if self._disturbances.has_torque:
+                tau = tau + self._disturbances.torque(self._engine, t, q, v)
             a: Floats = self.dynamics.forward_dynamics(q, v, tau)
             return a
-        M = self.dynamics.mass_matrix(q) + self._disturbances.armature
-        return solve_mass_matrix(M, tau - self.dynamics.bias_torque(q, v))
+        M, torque, bias = self.equation(q, v, tau, t)
+        return solve_mass_matrix(M, torque - bias)
+
+    def equation(self, q: Floats, v: Floats, tau: Floats, t: float) -> tuple[Floats, Floats, Floats]:
+        """Return M (nv, nv), the torque (nv,) and the bias (nv,) of M a = torque - bias, in a step that began
+        at `t`. The torque includes damping, but not dry friction that sticks."""
+        disturbances, dynamics = self._disturbances, self.dynamics
+        if disturbances.has_torque:
+            tau = tau + disturbances.torque(self._engine, t, q, v)
+        if disturbances.sticks:
+            tau = tau - self._viscous * v
+        M: Floats = dynamics.mass_matrix(q)
+        if disturbances.has_armature:
+            M = M + disturbances.armature
+        return M, tau, dynamics.bias_torque(q, v)
 
 
 def _armature_matrix(model: Model, armature: Coefficients) -> Floats:

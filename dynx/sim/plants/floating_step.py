@@ -14,10 +14,13 @@ from dynx.spatial.scalar import Array
 from dynx.spatial.so3 import cross, quat_product, rotate_back, rotation_from_quat
 
 
-def floating_step(q: Array, v: Array, a: Array, h: float, center: Array) -> tuple[Array, Array]:
+def floating_step(
+    q: Array, v: Array, a: Array, h: float, center: Array, moves: Array | float = 1.0
+) -> tuple[Array, Array]:
     """Return q (nq,) and v (nv,) after a step of length `h` [s] with acceleration `a` (nv,).
 
-    `center` (3,) [m] is the centre of mass of the root, in the axes of the base frame.
+    `center` (3,) [m] is the centre of mass of the root, in the axes of the base frame. Joints where `moves`
+    is 0 and not 1 end at rest.
     """
     R, w = rotation_from_quat(q[3:7]), v[3:6]
     lever = cross(w, center)
@@ -31,6 +34,6 @@ def floating_step(q: Array, v: Array, a: Array, h: float, center: Array) -> tupl
     R_next = rotation_from_quat(quat)
     at = q[:3] + R @ center + h * linear
     w_next = rotate_back(R_next, angular)
-    joints = v[6:] + h * a[6:]
+    joints = moves * (v[6:] + h * a[6:])
     v_next = np.concatenate([rotate_back(R_next, linear) - cross(w_next, center), w_next, joints])
     return np.concatenate([at - R_next @ center, quat, q[7:] + h * joints]), v_next

@@ -6,11 +6,13 @@ from collections.abc import Callable
 from functools import lru_cache
 from typing import Any
 
+import numpy as np
+
 from dynx.backends import Backend
 from dynx.backends.solvability import singular_coordinates
 from dynx.model import Model
 from dynx.sim.plants.disturbances import Disturbances, DisturbedAcceleration
-from dynx.sim.plants.integrators import Accelerate, Adaptive, RungeKutta4, SemiImplicitEuler, State
+from dynx.sim.plants.integrators import Adaptive, RungeKutta4, SemiImplicitEuler, State
 from dynx.sim.plants.plant import Plant, StepResult
 from dynx.spatial.scalar import Array, Floats
 
@@ -20,6 +22,9 @@ SCHEMES: dict[str, Callable[..., SemiImplicitEuler | RungeKutta4 | Adaptive]] = 
     "adaptive": Adaptive,
 }
 """Integration schemes by name, each made of a model, a step [s] and its own options."""
+
+RecordCall = Callable[..., Array]
+"""Function of a call, the shape of its result and its arguments, which are symbols; returns symbols."""
 
 
 @lru_cache(maxsize=64)
@@ -50,7 +55,12 @@ class IntegratedPlant(Plant):
         self.dynamics = self._accelerate.dynamics
         """The engine's dynamics without disturbances."""
         self._forward = self.dynamics.forward_dynamics
-        self._undisturbed = self._accelerate.is_undisturbed
+        self._undisturbed = self._accelerate.is_undisturbed and not disturbances.sticks
+        if disturbances.sticks:
+            self._friction = disturbances.friction_solver(self._h)
+            self._dry = list(self._friction.law.joints)
+            implicit = isinstance(self._scheme, SemiImplicitEuler)
+            self._damping = np.diag(self._h * disturbances.friction.viscous) if implicit else 0.0
         self._singular = not disturbances.has_armature and _is_singular(engine.model)
 
     def reset(self, q: Floats, v: Floats) -> None:
@@ -68,7 +78,9 @@ class IntegratedPlant(Plant):
     @property
     def uncompiled(self) -> str:
         """Name of the feature that cannot be compiled; empty if `advanced` is the complete step."""
-        found = self.disturbances.names
+        found = ["pushes"] if self.disturbances.pushes else []
+        if self.disturbances.sticks and isinstance(self._scheme, RungeKutta4):
+            found.append("joint friction under the integrator rk4")
         # For a floating base, floats and symbols are rounded differently.
         if self.model.floating and isinstance(self._scheme, RungeKutta4):
             found.append("the integrator rk4 with a floating base")
@@ -82,20 +94,62 @@ class IntegratedPlant(Plant):
         """Number of evaluations of the acceleration in one step that can be compiled."""
         return self.substeps * (4 if isinstance(self._scheme, RungeKutta4) else 1)
 
-    def advanced(self, accelerate: Accelerate, q: Array, v: Array, tau: Array) -> State:
-        """Take one step from q, v, with `accelerate(q, v, tau)` in place of the engine."""
-        q, v, first = self._scheme(accelerate, q, v, tau)
+    def advanced(self, record: RecordCall, q: Array, v: Array, tau: Array) -> State:
+        """Take one step from q, v on symbols; `record(call, shape, *arguments)` stands for an engine call."""
+        state = self._advanced(record, q, v, tau)
+        first = state[2]
         for _ in range(1, self.substeps):
-            q, v, _ = self._scheme(accelerate, q, v, tau)
-        return q, v, first
+            state = self._advanced(record, *state[:2], tau)
+        return *state[:2], first
+
+    def _advanced(self, record: RecordCall, q: Array, v: Array, tau: Array) -> State:
+        if self.disturbances.sticks and isinstance(self._scheme, SemiImplicitEuler):
+            return self._scheme.moved(q, v, *record(self._slowed, (2, len(v)), q, v, tau))
+        call: Callable[..., Floats] = self._accelerate
+        if self._undisturbed:
+            call = self.dynamics.bound_to_thread("forward_dynamics")
+        return self._scheme(lambda q, v, tau: record(call, v.shape, q, v, tau), q, v, tau)
 
     def _advance(self, t: float, tau: Floats) -> State:
         if self._undisturbed:
             state = self._scheme(self._forward, self._q, self._v, tau)
-        else:
+        elif not self.disturbances.sticks:
             state = self._scheme(self._accelerate, self._q, self._v, tau, t)
+        elif isinstance(self._scheme, SemiImplicitEuler):
+            state = self._scheme.moved(self._q, self._v, *self._slowed(self._q, self._v, tau, t))
+        else:
+            state = self._advance_in_modes(self._scheme, t, tau)
         self._q, self._v, _ = state
         return state
+
+    def _slowed(self, q: Floats, v: Floats, tau: Floats, t: float = 0.0) -> Floats:
+        """Return the acceleration under joint friction, and 1 for coordinates that move and 0 for those that
+        stick, (2, nv)."""
+        M, torque, bias = self._accelerate.equation(q, v, tau, t)
+        return np.array(self._friction.step(M + self._damping, torque - bias, v))
+
+    def _advance_in_modes(self, scheme: RungeKutta4 | Adaptive, t: float, tau: Floats) -> State:
+        """Take one step in which each joint sticks or slides as the law of friction has it for Euler's step.
+
+        A joint whose velocity would have changed its sign at the end of the step stops there instead.
+        """
+        start, dry, equation = self._v, self._dry, self._accelerate.equation
+        M, torque, bias = equation(self._q, start, tau, t)
+        a, moves = self._friction.step(M, torque - bias, start)
+        modes = np.sign(start + self._h * a)[dry] * moves[dry]
+
+        def accelerate(q: Floats, v: Floats, tau: Floats) -> Floats:
+            M, torque, bias = equation(q, v, tau, t)
+            return self._friction.with_modes(M, torque - bias, start, modes)
+
+        while True:
+            q, v, a = scheme(accelerate, self._q, start, tau)
+            turned = modes * v[dry] < 0.0
+            if not turned.any():
+                break
+            modes = np.where(turned, 0.0, modes)
+        v[dry] *= np.abs(modes)
+        return q, v, a
 
     def close(self) -> None:
         self._engine.close()

@@ -60,23 +60,29 @@ class SemiImplicitEuler:
 
     def __call__(self, accelerate: Accelerate, q: Array, v: Array, *given: Any) -> State:
         """Take one step, on floats or on symbols."""
-        a = accelerate(q, v, *given)
+        return self.moved(q, v, accelerate(q, v, *given))
+
+    def moved(self, q: Array, v: Array, a: Array, moves: Array | None = None) -> State:
+        """Take one step with a known acceleration; coordinates where `moves` is 0 and not 1 end at rest."""
         if self._floating:
-            return self._float(q, v, a)
+            return self._float(q, v, a, moves)
         h = self._h
         v = v + h * a
+        if moves is not None:
+            v = moves * v
         return q + h * v, v, a
 
-    def _float(self, q: Array, v: Array, a: Array) -> State:
+    def _float(self, q: Array, v: Array, a: Array, moves: Array | None) -> State:
+        held = 1.0 if moves is None else moves[6:]
         if q.dtype == object:
-            return *floating_step(q, v, a, self._step, self._center), a
+            return *floating_step(q, v, a, self._step, self._center, held), a
         base, h = self._base, self._step
         numbers: Any = base.inputs
         at, speed, change = base.input_slices[:3]
         numbers[at], numbers[speed], numbers[change] = q[:7], v[:6], a[:6]
         base.run()
         pose, twist = base.results
-        joints = v[6:] + h * a[6:]
+        joints = held * (v[6:] + h * a[6:])
         return np.concatenate([pose, q[7:] + h * joints]), np.concatenate([twist, joints]), a
 
 

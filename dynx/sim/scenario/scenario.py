@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.control.base import Controller, refuse_other_than_controller
-from dynx.control.friction import SLIP, Coefficients
+from dynx.control.friction import Coefficients
 from dynx.errors import ArgumentError, nearest, shown
 from dynx.model import Model
 from dynx.model.masks import refuse_mask
@@ -89,7 +89,7 @@ class Scenario:
     noise: Noise | None = None
     damping: Coefficients = False
     friction: Coefficients = False
-    friction_slip: float = SLIP
+    friction_slip: float = 0.0
     armature: Coefficients = False
     effort_limits: bool | ArrayLike = False
     position_limits: bool = False

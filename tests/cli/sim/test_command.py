@@ -223,11 +223,14 @@ def test_a_frame_moves_on_a_straight_line(tmp_path: Path) -> None:
 
 
 def test_friction_compensation_removes_the_error() -> None:
-    losses = ["--friction", "0.5", "--damping", "1", "--controller", "discrete-computed-torque"]
+    losses = ["--friction", "0.5", "--controller", "discrete-computed-torque"]
     without = document("ur5", *SHORT, *losses)
     given = document("ur5", *SHORT, *losses, "--friction-compensation")
-    assert given["max_error"] < 1e-10 < without["max_error"]
+    # In the last step the setpoint is at rest, and the elbow is not.
+    assert given["rms_error"] < 0.3 * without["rms_error"]
     assert given["settings"]["controller"].endswith("friction compensated")
+    smooth = [*losses, "--friction-slip", "5", "--friction-compensation"]
+    assert document("ur5", *SHORT, *smooth)["max_error"] < 1e-10
 
 
 def test_a_passive_robot_keeps_its_energy() -> None:

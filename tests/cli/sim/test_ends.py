@@ -46,7 +46,7 @@ def test_a_record_is_resumed_to_the_last_bit(tmp_path: Path) -> None:
     assert "the rollout to resume" in other.stderr
 
 
-DIVERGING = ["ur5", "--controller", "none", "--v0", "1,1,1,1,1,1", "--damping", "1e5"]
+DIVERGING = ["ur5", "--controller", "none", "--v0", "1e4,1e4,1e4,1e4,1e4,1e4"]
 
 
 def test_a_simulation_that_diverges_keeps_its_record(tmp_path: Path) -> None:
@@ -54,15 +54,15 @@ def test_a_simulation_that_diverges_keeps_its_record(tmp_path: Path) -> None:
     result = sim(*DIVERGING, "--save", str(target))
     assert result.exit_code == 1
     assert result.stderr.count("\n") == 1
-    assert "diverged in step 2, at 0.002 s" in result.stderr
+    assert "diverged in step 3, at 0.003 s" in result.stderr
     assert f"the results so far are in {target}" in result.stderr
     assert "--resume" not in result.stderr
-    assert "2 steps of 0.001 s" in result.stdout
-    assert len(Rollout.load(target)) == 2
+    assert "3 steps of 0.001 s" in result.stdout
+    assert len(Rollout.load(target)) == 3
     made = document(*DIVERGING, code=1)
-    assert (made["status"], made["steps"], made["steps_asked"]) == ("diverged", 2, 2000)
+    assert (made["status"], made["steps"], made["steps_asked"]) == ("diverged", 3, 2000)
     error = made["error"]
-    assert (error["type"], error["step"], error["time"], len(error["v"])) == ("DivergedError", 2, 0.002, 6)
+    assert (error["type"], error["step"], error["time"], len(error["v"])) == ("DivergedError", 3, 0.003, 6)
 
 
 def test_an_invalid_torque_is_not_reported_as_divergence() -> None:

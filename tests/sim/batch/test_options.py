@@ -30,8 +30,8 @@ OPTIONS: dict[str, dict[str, Any]] = {
     "delay beyond the end": {"delay": 1.0},
     "damping": {"damping": [1.0, 1.0, 1.0, 0.1, 0.1, 0.1]},
     "friction": {"friction": 0.5},
-    "slip": {"friction": 0.5, "friction_slip": 0.2},
-    "jump": {"friction": 0.5, "friction_slip": 0.0, "armature": 1.0},
+    "slip": {"friction": 0.5, "friction_slip": 0.2, "armature": 0.1},
+    "friction and armature": {"friction": 0.5, "damping": 1.0, "armature": 1.0},
     "armature": {"armature": 0.1},
     "of the description": {"damping": True, "friction": True, "armature": True},
     "payload": {"payload": TOOL},
@@ -170,9 +170,7 @@ def test_parameters_of_a_plant_with_a_payload_scaled_masses_and_rotors(arm: Mode
 
 def test_friction_is_compensated(arm: Model) -> None:
     law = FrictionCompensation(ComputedTorque(arm, kp=400, kd=40), damping=0.3, friction=0.5)
-    many, _ = batch_and_one(
-        arm, law, POSTURE, q0=POSTURE + 0.05, duration=0.05, damping=0.3, friction=0.5, friction_slip=0.02
-    )
+    many, _ = batch_and_one(arm, law, POSTURE, q0=POSTURE + 0.05, duration=0.05, damping=0.3, friction=0.5)
     without, _ = batch_and_one(arm, law, POSTURE, q0=POSTURE + 0.05, duration=0.05)
     assert apart(many.q, without.q) > 1e-6
 

@@ -176,8 +176,7 @@ def test_a_law_of_one_s_own_is_asked_in_every_step() -> None:
 @pytest.mark.parametrize(
     "options",
     [
-        {"friction": 0.1},
-        {"armature": 0.1},
+        {"friction": 0.1, "integrator": "rk4"},
         {"integrator": "adaptive"},
         {"pushes": [Push("tool0", [1, 0, 0, 0, 0, 0])]},
         {"substeps": 17},
