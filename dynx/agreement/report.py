@@ -20,6 +20,7 @@ One entry of ``results`` per robot:
     notes                    sentences about the description and the comparison
 
 An error without a finite value (a refusal, a NaN, a wrong shape) is null, and `note` describes it.
+``dynx agree --json`` writes a summary (`summarized`), and all rows with ``--json-samples``.
 """
 
 from __future__ import annotations
@@ -208,3 +209,30 @@ def results_document(reports: Iterable[AgreementReport], not_done: Sequence[str]
         },
         "not_done": list(not_done),
     }
+
+
+def summarized(document: dict[str, Any]) -> dict[str, Any]:
+    """Return a `results_document` without the samples of rows that agree, and of these rows only the one with
+    the largest error of each quantity and of each identity."""
+    results = [
+        {
+            **entry,
+            "quantities": _summary_rows(entry["quantities"], "quantity", "max_rel_error"),
+            "identities": _summary_rows(entry["identities"], "identity", "max_error"),
+        }
+        for entry in document["results"]
+    ]
+    return {**document, "results": results}
+
+
+def _summary_rows(rows: Sequence[dict[str, Any]], name: str, error: str) -> list[dict[str, Any]]:
+    largest: dict[str, int] = {}
+    for number, row in enumerate(rows):
+        before = largest.get(row[name])
+        if row["agree"] and (before is None or (row[error] or 0.0) > (rows[before][error] or 0.0)):
+            largest[row[name]] = number
+    return [
+        {**row, "worst_sample": None} if row["agree"] else row
+        for number, row in enumerate(rows)
+        if not row["agree"] or largest[row[name]] == number
+    ]

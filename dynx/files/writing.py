@@ -106,10 +106,9 @@ def _unfinished_file(folder: Path, mode: int) -> tuple[Path, BinaryIO]:
         path = folder / f".dynx-{secrets.token_hex(8)}.part"
         flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
         file = os.fdopen(os.open(path, flags, mode), "wb")
-        if sys.platform == "win32":
-            return path, file
-        with contextlib.suppress(OSError):
-            fcntl.flock(file, fcntl.LOCK_EX)
+        if sys.platform != "win32":
+            with contextlib.suppress(OSError):
+                fcntl.flock(file, fcntl.LOCK_EX)
         # Another process may have deleted the file before it was locked.
         if os.fstat(file.fileno()).st_nlink:
             return path, file
@@ -121,13 +120,13 @@ def _delete_abandoned(path: str) -> None:
     if sys.platform == "win32":
         if time.time() - os.stat(path).st_mtime > _ABANDONED_AFTER:
             os.unlink(path)
-        return
-    descriptor = os.open(path, os.O_RDWR | os.O_NONBLOCK | os.O_NOFOLLOW)
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        os.unlink(path)
-    finally:
-        os.close(descriptor)
+    else:
+        descriptor = os.open(path, os.O_RDWR | os.O_NONBLOCK | os.O_NOFOLLOW)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            os.unlink(path)
+        finally:
+            os.close(descriptor)
 
 
 def _sync(descriptor: int) -> None:

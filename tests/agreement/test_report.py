@@ -7,6 +7,7 @@ import numpy as np
 
 from dynx._version import __version__
 from dynx.agreement import AgreementReport, Comparison, agree, refused_report, results_document
+from dynx.agreement.report import summarized
 from dynx.errors import DescriptionError
 from dynx.reference.backend import ReferenceBackend
 from tests.agreement.robots import GravityUpsideDown, arm
@@ -97,3 +98,18 @@ def test_reports_are_equal_however_long_they_took() -> None:
     report = agree(arm(), ["reference"], samples=1)
     assert replace(report, seconds=report.seconds + 1.0) == report
     assert replace(report, seed=report.samples) != report
+
+
+def test_a_summary_has_the_largest_error_of_each_quantity_and_all_that_differs() -> None:
+    report = agree(arm(), ["reference", "compiled"], samples=2, referee_samples=1)
+    whole = results_document([report])
+    short = summarized(whole)
+    (entry,), (full,) = short["results"], whole["results"]
+    assert len(json.dumps(short)) < len(json.dumps(whole)) / 5
+    assert {row["quantity"] for row in entry["quantities"]} == {row["quantity"] for row in full["quantities"]}
+    for row in entry["quantities"]:
+        same = [each["max_rel_error"] for each in full["quantities"] if each["quantity"] == row["quantity"]]
+        assert row["max_rel_error"] == max(same)
+        assert row["worst_sample"] is None
+    full["quantities"][3]["agree"] = False
+    assert full["quantities"][3] in summarized(whole)["results"][0]["quantities"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from dynx.cli.shell.lazy import runs
-from dynx.cli.shell.options import model_options, name_list, run_options
+from dynx.cli.shell.options import json_option, model_options, name_list, run_options
 
 
 @click.command
@@ -30,8 +30,12 @@ from dynx.cli.shell.options import model_options, name_list, run_options
 @click.option(
     "--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of the configurations."
 )
+@json_option
 @click.option(
-    "--json", "json_path", metavar="FILE", help="File for the results as JSON; - is standard output."
+    "--json-samples",
+    is_flag=True,
+    help="Every pair of engines with its worst sample in the JSON, instead of the largest error of each "
+    "quantity and what differs.",
 )
 @run_options
 @runs("dynx.cli.agree.run:agree")

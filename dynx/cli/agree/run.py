@@ -7,19 +7,17 @@ from typing import Any
 
 import click
 
-from dynx.agreement.report import AgreementReport, results_document
+from dynx.agreement.report import AgreementReport, results_document, summarized
 from dynx.agreement.task import AgreementTask, measure, refused
 from dynx.backends.registry import backend_class
 from dynx.cli.agree.tables import label, show_many, show_one, show_summary, verdict
 from dynx.cli.shell.exits import BAD_INPUT, DONE, NEGATIVE_RESULT, complain, failure_of
 from dynx.cli.shell.inputs import Locks, pose_of
 from dynx.cli.shell.lazy import import_object
-from dynx.cli.shell.output_file import check_writable, require_apart
+from dynx.cli.shell.output_file import check_json, require_apart
 from dynx.cli.shell.run import Run, carry_out
-from dynx.cli.shell.terminal import console, echo_json
+from dynx.cli.shell.terminal import console, write_json
 from dynx.errors import DynxError
-from dynx.files.documents import json_text
-from dynx.files.writing import write_text
 from dynx.model.expansion import expand, refusals
 from dynx.model.model import Base
 
@@ -38,6 +36,7 @@ def agree(
     jobs: int | None,
     timeout: float,
     json_path: str | None,
+    json_samples: bool,
     quiet: bool,
 ) -> int:
     """Compare the engines on each robot; return the exit code."""
@@ -58,8 +57,7 @@ def agree(
             json_path=json_path,
             quiet=quiet,
         )
-    if json_path is not None and json_path != "-":
-        check_writable(json_path)
+    check_json(json_path)
     for name in backends or ():  # Checked once, so that an error is not reported for every robot.
         backend_class(name)
     inputs = expand(robots)
@@ -68,7 +66,7 @@ def agree(
     pose = None if base_pose is None else pose_of(base_pose, "--base-pose")
     tasks = [AgreementTask(each.robot, base, lock, backends, samples, seed, pose) for each in inputs]
     run = agreement_run(tasks, refusals=refusals(inputs))
-    return carry_out(run, jobs, timeout, quiet, lambda: _report(run, json_path, quiet))
+    return carry_out(run, jobs, timeout, quiet, lambda: _report(run, json_path, json_samples, quiet))
 
 
 def agreement_run(
@@ -90,16 +88,12 @@ def _problem(report: AgreementReport) -> str | None:
     return None if report.agree else "differ"
 
 
-def _report(run: AgreementRun, json_path: str | None, quiet: bool) -> int:
+def _report(run: AgreementRun, json_path: str | None, json_samples: bool, quiet: bool) -> int:
     """Write the document, the tables and the errors; return the exit code."""
     document = results_document(run.results, run.not_done)
     entries: list[dict[str, Any]] = document["results"]
     # The document is written first, so that it is not lost if a pipe closes while the table is written.
-    error: DynxError | None = None
-    if json_path == "-":
-        echo_json(document)
-    elif json_path is not None:
-        error = failure_of(write_text, json_path, json_text(document) + "\n")
+    error = failure_of(write_json, document if json_samples else summarized(document), json_path)
     if not quiet:
         out = console(err=json_path == "-")
         if len(run.tasks) == 1:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from dynx.cli.shell.lazy import runs
-from dynx.cli.shell.options import frame_option, json_flag, model_options, name_list, one_of
+from dynx.cli.shell.options import frame_option, json_option, model_options, name_list, one_of
 
 
 @click.command
@@ -16,7 +16,7 @@ from dynx.cli.shell.options import frame_option, json_flag, model_options, name_
     type=one_of(source="dynx.backends.quantities:QUANTITIES"),
     multiple=True,
     metavar="NAME",
-    help="Quantity to time, such as inverse_dynamics or mass_matrix; may be given several times "
+    help="Quantity to time, such as inverse-dynamics or mass-matrix; may be given several times "
     "(default: poses, Jacobian, inverse and forward dynamics, mass matrix; a wrong name prints a list).",
 )
 @click.option(
@@ -44,7 +44,7 @@ from dynx.cli.shell.options import frame_option, json_flag, model_options, name_
     "--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of the random samples."
 )
 @click.option("--quick", is_flag=True, help="Run with 5 repetitions instead of 20.")
-@json_flag
+@json_option
 @runs("dynx.cli.bench.run:bench")
 def bench() -> None:
     """Time all backends, and other libraries for comparison, on this machine and this robot.
@@ -60,6 +60,6 @@ def bench() -> None:
     \b
     Examples:
       dynx bench ur5
-      dynx bench panda --quantity inverse_dynamics --batch 1000000 --threads 1
+      dynx bench panda --quantity inverse-dynamics --batch 1000000 --threads 1
       dynx bench path/to/my.urdf --base floating --quick --json
     """

@@ -19,9 +19,10 @@ from dynx.bench.session import (
     benchmark_cases,
 )
 from dynx.cli.bench.tables import show
-from dynx.cli.shell.exits import DONE, NEGATIVE_RESULT, complain
+from dynx.cli.shell.exits import BAD_INPUT, DONE, NEGATIVE_RESULT, complain
 from dynx.cli.shell.inputs import Locks, chosen_frame, load_robot
 from dynx.cli.shell.interruption import interruptible
+from dynx.cli.shell.output_file import check_json
 from dynx.cli.shell.progress import progress_bar
 from dynx.cli.shell.terminal import counted, present
 from dynx.model.model import Base
@@ -40,9 +41,10 @@ def bench(
     lock: Locks,
     seed: int,
     quick: bool,
-    as_json: bool,
+    json_path: str | None,
 ) -> int:
     """Time the backends on the robot; return the exit code."""
+    check_json(json_path)
     for name in backends or ():
         backend_class(name)
     model = load_robot(robot, base, lock, base_pose)
@@ -60,10 +62,10 @@ def bench(
         seed,
     )
     with Session(plan) as session:
-        return run_bench(session, as_json=as_json)
+        return run_bench(session, json_path=json_path)
 
 
-def run_bench(session: Session, *, as_json: bool) -> int:
+def run_bench(session: Session, *, json_path: str | None) -> int:
     """Measure every case and show the results, also after Ctrl-C; return the exit code."""
     found: list[list[Measurement]] = []
     cases = session.plan.cases
@@ -82,10 +84,14 @@ def run_bench(session: Session, *, as_json: bool) -> int:
             complain(f"interrupted: {len(cases) - len(found)} of {counted(len(cases), 'case')} not done")
         interruption.finishing = True
         made = document(session, found, processor_description())
-        present(made, show, as_json=as_json)
+        error = present(made, show, json_path)
         wrong_ones = wrong(found)
         for each in wrong_ones:
             complain(f"{each.implementation}, {each.case.quantity.replace('_', ' ')}: {each.problem}")
+        if error is not None:
+            complain(str(error))
     if interruption.code is not None:
         return interruption.code
+    if error is not None:
+        return BAD_INPUT
     return NEGATIVE_RESULT if wrong_ones else DONE

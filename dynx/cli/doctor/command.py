@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from dynx.cli.shell.lazy import runs
-from dynx.cli.shell.options import choice_pair, name_list, run_options
+from dynx.cli.shell.options import choice_pair, json_option, name_list, run_options
 
 
 @click.command
@@ -61,9 +61,7 @@ from dynx.cli.shell.options import choice_pair, name_list, run_options
 @click.option(
     "--in-place", is_flag=True, help="Overwrite the files that were read with the mended descriptions."
 )
-@click.option(
-    "--json", "json_path", metavar="FILE", help="File for the reports as JSON; - is standard output."
-)
+@json_option
 @click.option("--html", metavar="FILE", help="File for the reports as one self-contained HTML page.")
 @click.option("--junit", metavar="FILE", help="File for the reports as JUnit XML.")
 @click.option("--sarif", metavar="FILE", help="File for the reports as SARIF 2.1.0.")

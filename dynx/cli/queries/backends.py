@@ -7,16 +7,15 @@ from typing import Any
 from dynx.backends.registry import backend, backend_names
 from dynx.cli.shell.exits import one_line
 from dynx.cli.shell.tables import Table
-from dynx.cli.shell.terminal import console, echo_json
+from dynx.cli.shell.terminal import console, write_json
 from dynx.errors import BackendError
 from dynx.model import Link, Model
 
 
-def backends(as_json: bool) -> None:
+def backends(json_path: str | None) -> None:
     """Print the table or the document of the backends."""
     entries = [_entry(name) for name in backend_names()]
-    if as_json:
-        echo_json({"schema": 1, "backends": entries})
+    if write_json({"schema": 1, "backends": entries}, json_path):
         return
     table = Table("backend", "installed", "engine")
     for each in entries:

@@ -7,9 +7,10 @@ import click
 from dynx.cli.shell.lazy import runs
 from dynx.cli.shell.options import (
     frame_option,
-    json_flag,
+    json_option,
     model_options,
     number_list,
+    one_of,
     robot_options,
     sample_option,
 )
@@ -19,7 +20,7 @@ _v_option = sample_option("v", "Velocity (default: zero)")
 
 
 @click.command
-@json_flag
+@json_option
 @runs("dynx.cli.queries.backends:backends")
 def backends() -> None:
     """List every backend: whether its engine is installed, and its version or how to install it.
@@ -33,7 +34,7 @@ def backends() -> None:
 
 @click.command
 @click.argument("words", nargs=-1, metavar="[WORD]...")
-@json_flag
+@json_option
 @runs("dynx.cli.queries.robots:robots")
 def robots() -> None:
     """List every robot that has a name: the package it comes from, and its file.
@@ -51,7 +52,7 @@ def robots() -> None:
 @click.command
 @click.argument("robot")
 @model_options
-@json_flag
+@json_option
 @runs("dynx.cli.queries.info:info")
 def info() -> None:
     """Show a robot description as dynx reads it: tree, joints, masses, frames, notes.
@@ -68,7 +69,7 @@ def info() -> None:
 
 @click.command
 @click.argument("rule", required=False)
-@json_flag
+@json_option
 @runs("dynx.cli.queries.explain:explain")
 def explain() -> None:
     """Print the page of a RULE, given by its id or name: cause, behaviour of each engine, remedy.
@@ -105,11 +106,12 @@ def fk() -> None:
 @frame_option
 @click.option(
     "--reference",
-    type=click.Choice(["local_world_aligned", "local", "world"]),
-    default="local_world_aligned",
+    type=one_of("local_world_aligned", "local", "world"),
+    default="local-world-aligned",
     show_default=True,
-    help="Reference point and axes of the velocity: the frame's origin in world axes, "
-    "its origin in its own axes, or the world's origin and axes.",
+    metavar="NAME",
+    help="Reference point and axes of the velocity: local-world-aligned, the frame's origin in world axes; "
+    "local, its origin in its own axes; or world, the world's origin and axes.",
 )
 @runs("dynx.cli.queries.evaluate:jacobian")
 def jacobian() -> None:
@@ -176,7 +178,9 @@ def mass() -> None:
 @click.command
 @robot_options
 @click.option(
+    "--to-pose",
     "--target",
+    "target",
     type=number_list,
     required=True,
     metavar="NUMBERS",
@@ -194,6 +198,6 @@ def ik() -> None:
 
     \b
     Examples:
-      dynx ik ur5 --target 0.4,0.2,0.3 --frame tool0
-      dynx ik ur5 --target 0.4,0.2,0.3,3.14,0,0 --frame tool0 --json
+      dynx ik ur5 --to-pose 0.4,0.2,0.3 --frame tool0
+      dynx ik ur5 --to-pose 0.4,0.2,0.3,3.14,0,0 --frame tool0 --json
     """

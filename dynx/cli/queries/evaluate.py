@@ -17,14 +17,14 @@ from dynx.cli.shell.inputs import (
     velocity_names,
 )
 from dynx.cli.shell.tables import Table, listing
-from dynx.cli.shell.terminal import console, echo_json, number
+from dynx.cli.shell.terminal import console, number, write_json
 from dynx.model import Model
 from dynx.spatial.so3 import quat_from_rotation, rpy_from_rotation
 
 Entry = dict[str, Any]
 
 
-def fk(q: Numbers, frame: str | None, as_json: bool, **robot: Any) -> None:
+def fk(q: Numbers, frame: str | None, json_path: str | None, **robot: Any) -> None:
     """Print the pose of a frame."""
     with open_backend(**robot) as engine:
         at, name = configuration(engine.model, q), chosen_frame(engine.model, frame)
@@ -38,8 +38,7 @@ def fk(q: Numbers, frame: str | None, as_json: bool, **robot: Any) -> None:
             "rpy": rpy_from_rotation(T[:3, :3]).tolist(),
             "quat_xyzw": quat_from_rotation(T[:3, :3]).tolist(),
         }
-    if as_json:
-        echo_json(result)
+    if write_json(result, json_path):
         return
     out = console()
     out.print(f"{title(result)}: pose of {one_line(name)} in the world", style="bold")
@@ -53,7 +52,7 @@ def fk(q: Numbers, frame: str | None, as_json: bool, **robot: Any) -> None:
     out.print(table)
 
 
-def jacobian(q: Numbers, frame: str | None, reference: str, as_json: bool, **robot: Any) -> None:
+def jacobian(q: Numbers, frame: str | None, reference: str, json_path: str | None, **robot: Any) -> None:
     """Print the Jacobian of a frame."""
     with open_backend(**robot) as engine:
         at, name = configuration(engine.model, q), chosen_frame(engine.model, frame)
@@ -65,8 +64,7 @@ def jacobian(q: Numbers, frame: str | None, reference: str, as_json: bool, **rob
             "velocity_names": velocity_names(engine.model),
             "jacobian": engine.jacobian(at, name, reference=reference).tolist(),
         }
-    if as_json:
-        echo_json(result)
+    if write_json(result, json_path):
         return
     rows = ("linear x", "linear y", "linear z", "angular x", "angular y", "angular z")
     heading = f"{title(result)}: Jacobian of {one_line(name)}, {reference}"
@@ -75,33 +73,31 @@ def jacobian(q: Numbers, frame: str | None, reference: str, as_json: bool, **rob
 
 
 def inverse_dynamics(
-    q: Numbers, v: Numbers, a: Numbers, joint_dynamics: bool, as_json: bool, **robot: Any
+    q: Numbers, v: Numbers, a: Numbers, joint_dynamics: bool, json_path: str | None, **robot: Any
 ) -> None:
     """Print the torque that gives an acceleration."""
     with open_backend(**robot) as engine:
         sample, result = _sample(engine, q, v=v, a=a)
         result["tau"] = engine.inverse_dynamics(*sample, joint_dynamics=joint_dynamics).tolist()
-    _report_vectors(result, as_json, "inverse dynamics", ("v", "a", "tau"))
+    _report_vectors(result, json_path, "inverse dynamics", ("v", "a", "tau"))
 
 
 def forward_dynamics(
-    q: Numbers, v: Numbers, tau: Numbers, joint_dynamics: bool, as_json: bool, **robot: Any
+    q: Numbers, v: Numbers, tau: Numbers, joint_dynamics: bool, json_path: str | None, **robot: Any
 ) -> None:
     """Print the acceleration that a torque gives."""
     with open_backend(**robot) as engine:
         sample, result = _sample(engine, q, v=v, tau=tau)
         result["a"] = engine.forward_dynamics(*sample, joint_dynamics=joint_dynamics).tolist()
-    _report_vectors(result, as_json, "forward dynamics", ("v", "tau", "a"))
+    _report_vectors(result, json_path, "forward dynamics", ("v", "tau", "a"))
 
 
-def mass_matrix(q: Numbers, joint_dynamics: bool, as_json: bool, **robot: Any) -> None:
+def mass_matrix(q: Numbers, joint_dynamics: bool, json_path: str | None, **robot: Any) -> None:
     """Print the mass matrix."""
     with open_backend(**robot) as engine:
         sample, result = _sample(engine, q)
         result["mass_matrix"] = engine.mass_matrix(*sample, joint_dynamics=joint_dynamics).tolist()
-    if as_json:
-        echo_json(result)
-    else:
+    if not write_json(result, json_path):
         names = result["velocity_names"]
         _print_matrix(f"{title(result)}: mass matrix", names, names, result["mass_matrix"])
 
@@ -127,10 +123,9 @@ def _sample(engine: Backend, q: Numbers, **vectors: Numbers) -> tuple[list[Any],
     return list(sample.values()), {**document_head(engine), **names, **listed}
 
 
-def _report_vectors(result: Entry, as_json: bool, quantity: str, columns: Sequence[str]) -> None:
+def _report_vectors(result: Entry, json_path: str | None, quantity: str, columns: Sequence[str]) -> None:
     """Print a table with one row for each entry of v, or the document."""
-    if as_json:
-        echo_json(result)
+    if write_json(result, json_path):
         return
     out = console()
     out.print(f"{title(result)}: {quantity}", style="bold")

@@ -2,31 +2,28 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from typing import Any
 
 from rich.markdown import Markdown
 
 from dynx.cli.shell.tables import Table
-from dynx.cli.shell.terminal import console, counted, echo_json
+from dynx.cli.shell.terminal import console, counted, write_json
 from dynx.rules import Rule, all_rules, find_rule
 
 _MAX_WIDTH = 100
 """Width of prose on a terminal, at most [columns]."""
 
 
-def explain(rule: str | None, as_json: bool) -> None:
+def explain(rule: str | None, json_path: str | None) -> None:
     """Print the page of a rule, or the list of all rules."""
     if rule is None:
-        if as_json:
-            echo_json({"schema": 1, "rules": [_as_dict(each) for each in all_rules()]})
-        else:
+        if not write_json({"schema": 1, "rules": [_as_dict(each) for each in all_rules()]}, json_path):
             _list(all_rules())
         return
     found = find_rule(rule)
-    if as_json:
-        echo_json({"schema": 1, "rule": _as_dict(found)})
-    else:
+    if not write_json({"schema": 1, "rule": _as_dict(found)}, json_path):
         _print_page(found)
 
 
@@ -62,10 +59,16 @@ def _print_page(rule: Rule) -> None:
     heading, _, body = rule.page().partition("\n\n")
     facts = "\n".join(f"- **{label}**: {value}" for label, value in _facts(rule))
     out.print(
-        Markdown(f"# {' '.join(heading.split())}\n\n{body}\n\n{facts}"),
+        Markdown(_without_tags(f"# {' '.join(heading.split())}\n\n{body}\n\n{facts}")),
         width=min(out.width, _MAX_WIDTH),
         soft_wrap=False,
     )
+
+
+def _without_tags(text: str) -> str:
+    """Return Markdown in which ``<inertial>`` outside code is text and no HTML, which would not be shown."""
+    parts = re.split(r"(```.*?```|``.*?``|`[^`]*`)", text, flags=re.DOTALL)
+    return "".join(part if k % 2 else part.replace("<", "\\<") for k, part in enumerate(parts))
 
 
 def _facts(rule: Rule) -> Iterator[tuple[str, str]]:

@@ -15,12 +15,12 @@ from dynx.cli.shell.inputs import (
     target_pose,
 )
 from dynx.cli.shell.tables import Table
-from dynx.cli.shell.terminal import console, counted, echo_json, number
+from dynx.cli.shell.terminal import console, counted, number, write_json
 
 
-def ik(target: Numbers, frame: str | None, q: Numbers, as_json: bool, **robot: Any) -> int:
+def ik(target: Numbers, frame: str | None, q: Numbers, json_path: str | None, **robot: Any) -> int:
     """Print the configuration found; return the exit code."""
-    wanted = target_pose(target, "--target")
+    wanted = target_pose(target, "--to-pose")
     with open_backend(**robot) as engine:
         model = engine.model
         name = chosen_frame(model, frame)
@@ -39,8 +39,7 @@ def ik(target: Numbers, frame: str | None, q: Numbers, as_json: bool, **robot: A
         }
         joints = dict(zip(model.joint_names, result["q"][model.nq - len(model.joint_names) :], strict=True))
     code = DONE if result["success"] else NEGATIVE_RESULT
-    if as_json:
-        echo_json(result)
+    if write_json(result, json_path):
         return code
     out = console()
     out.print(f"{title(result)}: inverse kinematics of {one_line(name)}", style="bold")

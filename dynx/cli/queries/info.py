@@ -12,18 +12,16 @@ from rich.tree import Tree
 from dynx.cli.shell.exits import one_line
 from dynx.cli.shell.inputs import load_robot
 from dynx.cli.shell.tables import Table
-from dynx.cli.shell.terminal import PIPE_WIDTH, console, counted, echo_json, number
+from dynx.cli.shell.terminal import PIPE_WIDTH, console, counted, number, write_json
 from dynx.model import Joint, Model
 from dynx.model.documents import pose_numbers
 from dynx.model.elements import IDENTITY
 
 
-def info(as_json: bool, **robot: Any) -> None:
+def info(json_path: str | None, **robot: Any) -> None:
     """Print the model as a tree and a table, or as a document."""
     model = load_robot(**robot)
-    if as_json:
-        echo_json(document(model))
-    else:
+    if not write_json(document(model), json_path):
         _show(model)
 
 

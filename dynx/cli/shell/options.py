@@ -11,6 +11,9 @@ import click
 from dynx.cli.shell.lazy import import_object
 from dynx.errors import nearest, shown
 
+STANDARD_OUTPUT = "-"
+"""Name of standard output as a file of ``--json``."""
+
 F = TypeVar("F", bound=Callable[..., Any])
 
 
@@ -47,21 +50,27 @@ def name_list(text: str) -> tuple[str, ...]:
 def one_of(*names: str, source: str | None = None) -> Callable[[str], str]:
     """Return the type of an option that takes one of `names`, or of those in `source`.
 
-    `source` is ``module:attribute``, imported when the option is read. The message about a wrong name
-    offers the nearest, or lists all of them.
+    `source` is ``module:attribute``, imported when the option is read. The command line spells names with
+    hyphens; Python's spelling is accepted too, and the value is the name as it stands in `names` or `source`.
+    The message about a wrong name offers the nearest, or lists all of them.
     """
 
     def name(word: str) -> str:
         more = () if source is None else import_object(source)
-        if word not in names and word not in more:
-            known = (*names, *more)
-            close = nearest(word, known)
+        by_spelling: dict[str, str] = {spelled(each): each for each in (*names, *more)}
+        if spelled(word) not in by_spelling:
+            close = nearest(word, by_spelling)
             # `nearest` shortens a long list; here all names are listed.
-            clause = close if close.endswith("?") else f"; known: {', '.join(known)}"
+            clause = close if close.endswith("?") else f"; known: {', '.join(by_spelling)}"
             raise click.BadParameter(f"there is no {shown(word)}{clause}")
-        return word
+        return by_spelling[spelled(word)]
 
     return name
+
+
+def spelled(name: str) -> str:
+    """Return a name of Python as the command line spells it: ``semi_implicit`` is semi-implicit."""
+    return name.replace("_", "-")
 
 
 def choice_pair(word: str) -> tuple[str, str]:
@@ -145,8 +154,13 @@ def run_options(command: F) -> F:
     )(command)
 
 
-json_flag = click.option(
-    "--json", "as_json", is_flag=True, help="JSON on standard output instead of a table."
+json_option = click.option(
+    "--json",
+    "json_path",
+    is_flag=False,
+    flag_value=STANDARD_OUTPUT,
+    metavar="[FILE]",
+    help="File for the results as JSON; - (or no FILE, at the end of the line) is standard output.",
 )
 
 
@@ -161,7 +175,7 @@ def robot_options(command: F) -> F:
             help="Backend that computes (default: pinocchio if installed, else reference).",
         ),
         model_options,
-        json_flag,
+        json_option,
     )(command)
 
 

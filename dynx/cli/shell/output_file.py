@@ -23,6 +23,12 @@ def check_writable(path: str) -> None:
     raise ArgumentError(f"{shown(path, 300)} {problem}")
 
 
+def check_json(path: str | None) -> None:
+    """Check the file of ``--json``, if that is a file, like `check_writable`."""
+    if path is not None and path != "-":
+        check_writable(path)
+
+
 def require_apart(paths: Iterable[str], kept: Iterable[str], what: str) -> None:
     """Raise ArgumentError where a path is one of the files `kept`, under any name.
 

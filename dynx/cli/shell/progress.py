@@ -28,6 +28,7 @@ def progress_bar(total: int, done: int = 0, words: str = "", *, enabled: bool = 
         BarColumn(),
         MofNCompleteColumn(),
         TimeElapsedColumn(),
+        TextColumn("elapsed"),
     )
     screen = console(err=True)
     screen.soft_wrap = False  # a bar longer than the line could not be redrawn in place

@@ -11,7 +11,10 @@ from typing import TextIO, TypeVar
 import click
 from rich.console import Console
 
+from dynx.cli.shell.exits import failure_of
+from dynx.errors import DynxError
 from dynx.files.documents import json_text
+from dynx.files.writing import write_text
 
 Document = TypeVar("Document")
 
@@ -35,12 +38,27 @@ def echo_json(document: object) -> None:
     click.echo(json_text(document), file=_standard_output())
 
 
-def present(document: Document, show: Callable[[Console, Document], None], *, as_json: bool) -> None:
-    """Write a document to standard output as JSON, or show it as tables."""
-    if as_json:
+def write_json(document: object, path: str | None) -> bool:
+    """Write `document` where ``--json`` says; return whether standard output is taken, so that nothing else
+    may be written there."""
+    if path == "-":
         echo_json(document)
-    else:
+    elif path is not None:
+        write_text(path, json_text(document) + "\n")
+    return path == "-"
+
+
+def present(
+    document: Document, show: Callable[[Console, Document], None], json_path: str | None
+) -> DynxError | None:
+    """Write a document where ``--json`` says, and show it as tables unless that is standard output.
+
+    Return the error of a file that cannot be written; the tables are shown nevertheless.
+    """
+    error = failure_of(write_json, document, json_path)
+    if json_path != "-":
         show(console(), document)
+    return error
 
 
 def number(value: float) -> str:
@@ -57,7 +75,7 @@ def summary_line(what: str, counts: Mapping[str, int], not_done: int, seconds: f
     """Write the last line of a run over robots: the number of results of each kind, and the time."""
     parts = [f"{count} {word}" for word, count in counts.items()]
     parts += [f"{not_done} not done"] if not_done else []
-    return f"{what}: {', '.join(parts)}; {seconds:.1f} s"
+    return f"{what}: {', '.join(parts)}; took {seconds:.1f} s"
 
 
 def _standard_output() -> TextIO:

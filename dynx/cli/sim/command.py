@@ -36,8 +36,8 @@ def sim() -> None:
                                 compensation; plus an integral with anti-windup
       velocity                  kd (v* - v)
       feed-forward[-pd]         ID(q*, v*, a*); plus pd
-      operational-space         computed torque of a frame; --posture-kp acts on the
-                                remaining degrees of freedom
+      operational-space         computed torque of a frame; --posture-kp acts on
+                                the remaining degrees of freedom
       impedance                 spring --kp and damper --kd between a frame and
                                 its reference
       position-motor, velocity-motor, pd-motor
@@ -58,9 +58,9 @@ def sim() -> None:
     \b
     Examples:
       dynx sim ur5 --to -1.5,-1,1,-1.57,-1.57,-1.57 --plant pybullet
-      dynx sim ur5 --to elbow_joint=1 --controller pid --effort-limits urdf --plot out.png
-      dynx sim panda --from 0,-0.8,0,-2.4,0,1.6,0.8,0 --to-pose 0.5,0.2,0.4 --frame panda_hand_tcp
-      dynx sim ur5 --to elbow_joint=1 --payload tool0:3 --friction 0.5 --noise-q 1e-4 --delay 0.002
-      dynx sim pendulum --q0 1.5 --controller none --integrator rk4 --duration 10 --save swing.npz
+      dynx sim ur5 --to elbow_joint=1 --controller pid --plot out.png
+      dynx sim panda --from 0,-0.8,0,-2.4,0,1.6,0.8,0 --to-pose 0.5,0.2,0.4
+      dynx sim ur5 --to elbow_joint=1 --payload tool0:3 --noise-q 1e-4
+      dynx sim pendulum --q0 1.5 --controller none --duration 10 --save x.npz
       dynx sim --tutorial
     """

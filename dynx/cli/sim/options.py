@@ -6,7 +6,7 @@ from functools import partial
 
 import click
 
-from dynx.cli.shell.options import finite_number, group, json_flag, model_options, number_list, one_of
+from dynx.cli.shell.options import finite_number, group, json_option, model_options, number_list, one_of
 from dynx.cli.sim.values import coefficients, gain, payload, push, scale, vector
 from dynx.registry import DEFAULT_ENGINE
 
@@ -14,7 +14,7 @@ PROFILES = ("cycloidal", "cubic", "quintic", "trapezoidal", "s-curve", "hold")
 
 TUTORIAL_OPTIONS = {
     *("tutorial", "robot", "lock", "gravity", "to", "start", "duration", "dt", "backend"),
-    *("plot", "as_json"),
+    *("plot", "json_path"),
 }
 """Parameters that have an effect with ``--tutorial``."""
 
@@ -43,6 +43,8 @@ motion = group(
     ),
     _configuration_option(
         "--to-pose",
+        "--target",
+        "to_pose",
         help="Target position or pose of --frame, reached on a straight line, as x,y,z[,roll,pitch,yaw] "
         "[m, rad]; instead of --to.",
     ),
@@ -158,8 +160,8 @@ plant = group(
         "--integrator",
         type=one_of(source="dynx.sim.plants.registry:INTEGRATORS"),
         metavar="NAME",
-        help="Integrator: semi_implicit, rk4, adaptive, or engine (PyBullet's stepper) (default: engine for "
-        "the plant pybullet, else semi_implicit).",
+        help="Integrator: semi-implicit, rk4, adaptive, or engine (PyBullet's stepper) (default: engine for "
+        "the plant pybullet, else semi-implicit).",
     ),
     click.option(
         "--method",
@@ -265,7 +267,7 @@ results = group(
     click.option(
         "--plot", metavar="FILE", help="File for a plot of joints, errors and torques: .png, .pdf, .svg, ..."
     ),
-    json_flag,
+    json_option,
     click.option(
         "--resume",
         metavar="FILE.npz",

@@ -9,6 +9,7 @@ import click
 
 from dynx.cli.shell.exits import BAD_INPUT, DONE, INTERRUPTED, NEGATIVE_RESULT, complain
 from dynx.cli.shell.interruption import interruptible
+from dynx.cli.shell.output_file import check_json
 from dynx.cli.shell.progress import progress_bar
 from dynx.cli.shell.terminal import present
 from dynx.cli.sim.document import EarlyEnd, document
@@ -22,18 +23,19 @@ from dynx.errors import ArgumentError, LimitError, SimulationError
 from dynx.sim import Rollout, RolloutInterrupted, simulate
 
 
-def sim(robot: str | None, tutorial: bool, as_json: bool, **given: Any) -> int:
+def sim(robot: str | None, tutorial: bool, json_path: str | None, **given: Any) -> int:
     """Simulate the robot, or all controllers of the tutorial; return the exit code."""
     context = click.get_current_context()
     outputs = Outputs(given.pop("save"), given.pop("plot"))
+    check_json(json_path)
     if tutorial:
         _refuse_beside_tutorial(context)
         outputs.check()
-        return run_tutorial(robot, given, outputs.plot, as_json=as_json)
+        return run_tutorial(robot, given, outputs.plot, json_path=json_path)
     if robot is None:
         raise click.UsageError("ROBOT is missing; only --tutorial has a default", context)
     outputs.check()
-    return run_sim(prepare({"robot": robot, **given}), outputs, as_json=as_json)
+    return run_sim(prepare({"robot": robot, **given}), outputs, json_path=json_path)
 
 
 def _refuse_beside_tutorial(context: click.Context) -> None:
@@ -45,7 +47,7 @@ def _refuse_beside_tutorial(context: click.Context) -> None:
             raise click.UsageError(f"{param.opts[0]} has no effect with --tutorial", context)
 
 
-def run_sim(request: SimulationRequest, outputs: Outputs, *, as_json: bool) -> int:
+def run_sim(request: SimulationRequest, outputs: Outputs, *, json_path: str | None) -> int:
     """Simulate, write the files and show the results, also of a part; return the exit code."""
     ended: EarlyEnd = None
     started = time.perf_counter()
@@ -64,7 +66,9 @@ def run_sim(request: SimulationRequest, outputs: Outputs, *, as_json: bool) -> i
         errors = outputs.write(rollout)
         written = [path for path in outputs.files if path not in errors]
         made = {**document(request, rollout, seconds, ended), "files": written}
-        present(made, show, as_json=as_json)
+        unwritten = present(made, show, json_path)
+        if unwritten is not None:
+            errors = {**errors, str(json_path): unwritten}
         if ended is not None:
             resumable = isinstance(ended, RolloutInterrupted)
             records = [path for path in written if path in outputs.save]

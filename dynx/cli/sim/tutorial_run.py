@@ -25,7 +25,9 @@ from dynx.sim.tutorial_plot import plot_rows
 SCHEMA = 1
 
 
-def run_tutorial(robot: str | None, given: dict[str, Any], picture: str | None, *, as_json: bool) -> int:
+def run_tutorial(
+    robot: str | None, given: dict[str, Any], picture: str | None, *, json_path: str | None
+) -> int:
     """Simulate all controllers and show the results, also after Ctrl-C; return the exit code.
 
     `given` are the values of the command's options by parameter name.
@@ -43,18 +45,18 @@ def run_tutorial(robot: str | None, given: dict[str, Any], picture: str | None, 
         interruption.finishing = True
         made = document(experiments, rows)
         plot_error = None if picture is None else failure_of(plot_rows, rows, experiments, picture)
-        present(made, show, as_json=as_json)
+        errors = [plot_error, present(made, show, json_path)]
         failed = [
             f"{row.mode} on {plant}: {outcome.problem}"
             for row in rows
             for plant, outcome in row.outcomes.items()
             if outcome.failed
         ]
-        for complaint in [*failed, *([] if plot_error is None else [str(plot_error)])]:
+        for complaint in [*failed, *(str(error) for error in errors if error is not None)]:
             complain(complaint)
     if interruption.code is not None:
         return interruption.code
-    if plot_error is not None:
+    if any(error is not None for error in errors):
         return BAD_INPUT
     return NEGATIVE_RESULT if failed else DONE
 

@@ -215,4 +215,4 @@ def test_one_robot_is_singular() -> None:
     out = StringIO()
     refused = results_document([refused_report("x", RobotNotFoundError("no x"))])
     show_summary(Console(file=out), refused["summary"], 1.0)
-    assert out.getvalue() == "1 robot: 0 agree, 0 differ, 1 refused; 1.0 s\n"
+    assert out.getvalue() == "1 robot: 0 agree, 0 differ, 1 refused; took 1.0 s\n"

@@ -119,7 +119,7 @@ def run_session(*implementations: Implementation) -> tuple[int, str]:
     model = dynx.load("double_pendulum")
     with session_of([*implementations], model, (BenchmarkCase("mass_matrix", 4),), repetitions=1) as session:
         session.measure_machine(1)
-        code = run_bench(session, as_json=False)
+        code = run_bench(session, json_path=None)
         out = StringIO()
         found = [session.measure(case) for case in session.plan.cases]
         show(Console(file=out, width=10_000), document(session, found, "a processor"))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -252,3 +253,60 @@ class TestBasePose:
         result = CliRunner().invoke(cli, ["fk", "ur5", *arguments])
         assert result.exit_code == 2
         assert message in result.stderr
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["info", "pendulum"],
+        ["backends"],
+        ["robots", "pendulum"],
+        ["explain", "DX101"],
+        ["fk", "pendulum"],
+        ["mass", "pendulum"],
+        ["id", "pendulum"],
+        ["sim", "pendulum", "--controller", "none", "--duration", "0.01"],
+        ["agree", "pendulum", "--backends", "reference", "--samples", "1"],
+    ],
+    ids=" ".join,
+)
+def test_json_is_a_file_or_standard_output_in_every_command(arguments: list[str], tmp_path: Path) -> None:
+    path = tmp_path / "out.json"
+    to_file = CliRunner().invoke(cli, [*arguments, "--json", str(path)])
+    assert to_file.exit_code == 0, to_file.stderr
+    assert not to_file.stdout.startswith("{")
+    assert to_file.stdout
+    for last in (["--json", "-"], ["--json"]):
+        result = CliRunner().invoke(cli, [*arguments, *last])
+        assert json.loads(result.stdout).keys() == json.loads(path.read_text()).keys()
+    nowhere = CliRunner().invoke(cli, [*arguments, "--json", str(tmp_path / "none" / "out.json")])
+    assert nowhere.exit_code == 2
+    assert "none" in nowhere.stderr
+
+
+@pytest.mark.parametrize("spelling", ["local-world-aligned", "local_world_aligned"])
+def test_names_of_python_are_spelled_with_hyphens_or_as_in_python(spelling: str) -> None:
+    found = document("jacobian", "pendulum", "--reference", spelling)
+    assert found["reference"] == "local_world_aligned"
+    result = CliRunner().invoke(cli, ["jacobian", "pendulum", "--reference", "wrld"])
+    assert result.exit_code == 2
+    assert "did you mean 'world'?" in result.stderr
+
+
+@pytest.mark.parametrize("option", ["--to-pose", "--target"])
+def test_a_target_pose_has_one_name_in_ik_and_sim(option: str) -> None:
+    assert document("ik", "planar_3r", option, "0.5,0.4,0")["target"] == [0.5, 0.4, 0.0]
+    simulated = CliRunner().invoke(cli, ["sim", "six_axis_arm", option, "1,2", "--plant", "reference"])
+    assert "--to-pose: wanted 3 numbers" in simulated.stderr
+
+
+@pytest.mark.parametrize("command", ["sim", "ik", "agree", "bench", "jacobian"])
+def test_help_fits_80_columns(command: str) -> None:
+    lines = CliRunner().invoke(cli, [command, "--help"], terminal_width=80).stdout.splitlines()
+    assert max(map(len, lines)) <= 80
+
+
+def test_the_list_of_robots_fits_80_columns() -> None:
+    lines = CliRunner(env={"COLUMNS": "80"}).invoke(cli, ["robots"]).stdout.splitlines()
+    # The folder of a package is wherever that is installed.
+    assert max(len(line) for line in lines if ": /" not in line) <= 80

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import sys
 
@@ -9,6 +10,7 @@ import pytest
 from click.testing import CliRunner
 from rich.console import Console
 
+from dynx.cli.queries.explain import explain
 from dynx.cli.shell.main import cli
 from dynx.rules import Rule, all_rules, find_rule
 
@@ -82,3 +84,13 @@ def test_a_terminal_gets_the_same_words_laid_out(
     for paragraph in rule.page().split("\n\n"):
         assert "".join(character for character in paragraph if character.isalnum()) in plain
     assert "".join(character for character in rule.advice if character.isalnum()) in plain
+
+
+def test_a_terminal_shows_the_element_in_the_headline(monkeypatch: pytest.MonkeyPatch) -> None:
+    """``<inertial>`` is text, not HTML that Markdown leaves out."""
+    screen = Console(file=io.StringIO(), force_terminal=True, width=80, color_system=None)
+    monkeypatch.setattr("dynx.cli.queries.explain.console", lambda: screen)
+    explain("DX101", None)
+    shown = screen.file.getvalue()  # type: ignore[attr-defined]
+    assert "A link has no <inertial>" in " ".join(shown.split())
+    assert "\\<" not in shown
