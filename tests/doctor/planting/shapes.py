@@ -51,7 +51,25 @@ def _material(site: Site, rule: str, text: str, sign: str) -> PlantedDefect:
     return site.defect(rule, edit, sign=sign)
 
 
+def visual_incomplete(site: Site) -> PlantedDefect:
+    """A visual from a template that was not filled in."""
+    name, link = site.pick_link(site.skeleton.solid, "body")
+    shape, material = site.rng.choice(
+        [
+            ("<sphere/>", ""),
+            ('<cylinder radius="0.1"/>', ""),
+            ('<mesh filename=""/>', ""),
+            ('<box size="0.1 0.1 0.1"/>', '<material name="grey_50"><color rgba="0.5 0.5 0.5"/></material>'),
+            ('<box size="0.1 0.1 0.1"/>', '<material><color rgba="0.5 0.5 0.5 1"/></material>'),
+            ('<mesh filename="package://nowhere/a.stl"/>', '<material name="x"><color/></material>'),
+        ]
+    )
+    text = f"<visual>\n  <geometry>{shape}</geometry>\n  {material}\n</visual>"
+    return site.defect("DX428", site.source.insertion(link, text), link=name)
+
+
 PLANTERS = (
+    Planter("DX428", visual_incomplete),
     Planter("DX425", without_size),
     Planter("DX426", lost_texture),
     Planter("DX427", without_colour),
