@@ -87,13 +87,14 @@ class StagedLoop:
         sizes |= dict.fromkeys(("q", "measured_q", "q_wanted"), nq)
         if loop.controller is not None:
             refuse_impure(loop.controller)
-            # Once suffices for a controller that is declared pure.
-            refuse_irreproducible(loop.controller, repetitions=1)
         if any(array.dtype != np.float64 for array in loop.setpoints):
             raise TraceError("the reference is not in float64")
         self._start = None if loop.controller is None else loop.controller.initial_state()
         if self._start is not None and not is_row(self._start):
             raise TraceError("the controller's state is no array (n,) of float64")
+        if loop.controller is not None:
+            # Once suffices for a controller that is declared pure.
+            refuse_irreproducible(loop.controller, repetitions=1)
         self._state_size = 0 if self._start is None else self._start.size
         if self._state_size:
             sizes["state"] = self._state_size

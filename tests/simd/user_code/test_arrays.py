@@ -148,7 +148,7 @@ REFUSED: dict[str, tuple[Function, str]] = {
     "norm": (lambda a, b: np.linalg.norm(a, 1), "wanted the 2-norm"),
     "singular": (lambda a, b: np.linalg.solve(np.zeros((N, N)), b), "singular matrix"),
     "shapes": (lambda a, b: np.linalg.solve(np.eye(3), b), r"shapes \(3, 3\) and \(4,\)"),
-    "size": (lambda a, b: np.linalg.inv(a[0] * np.eye(MAX_SOLVED_SIZE + 1)), "solves for 17 unknowns"),
+    "size": (lambda a, b: np.linalg.inv(a[0] * np.eye(MAX_SOLVED_SIZE + 1)), "solves for 19 unknowns"),
     "places": (lambda a, b: np.where(a > 0), r"wanted np\.where\(condition, x, y\)"),
 }  # fmt: skip
 
