@@ -91,11 +91,12 @@ def test_mujoco_reads_the_axis_of_a_fixed_joint(xyz: str) -> None:
 # -- loops and the world --------------------------------------------------------------------------
 
 
-def test_a_loop_joint_is_removed_or_kept() -> None:
-    case = trap("DX220")
-    assert_same_robot(case.model, mended("DX220", case)[1].case.model)
-    kept = trap("DX220", DX220="keep")
-    assert find_rule("DX220").remedy(kept, find_rule("DX220").detect(kept)) is None
+@pytest.mark.parametrize("rule", ["DX220", "DX227"])
+def test_a_joint_that_is_not_of_urdf_is_removed_or_kept(rule: str) -> None:
+    case = trap(rule)
+    assert_same_robot(case.model, mended(rule, case)[1].case.model)
+    kept = trap(rule, **{rule: "keep"})
+    assert find_rule(rule).remedy(kept, find_rule(rule).detect(kept)) is None
 
 
 def test_the_world_is_declared_once_for_all_joints_on_it() -> None:

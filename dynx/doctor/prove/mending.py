@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from dynx.doctor.examine.line_map import line_map
 from dynx.doctor.prove.levels import level_of
@@ -61,7 +61,7 @@ def refusal(case: Case) -> DynxError | None:
     mended = _after_reading_rules(case, "physics").case
     error = mended.reading
     if isinstance(error, DescriptionError) and error.line is not None:
-        texts = (each.source.text_with_lines_before.splitlines() for each in (case, mended))
+        texts = map(_lines, (case, mended))
         line = line_map(*texts).get(error.line, error.line)
         return type(error)(error.message, source=error.source, line=line)
     return error if isinstance(error, DynxError) else None
@@ -76,6 +76,41 @@ def _after_reading_rules(case: Case, level: Level) -> Mending:
     return mended
 
 
+@dataclass(frozen=True)
+class Appearance:
+    """A cause in the text that shows only in `case`, after the remedies of other rules about the text.
+
+    `line` is that of the detection in the text as it is.
+    """
+
+    rule: Rule
+    detection: Detection
+    case: Case
+    line: int | None
+
+
+def appearances(case: Case, rules: Sequence[Rule]) -> list[Appearance]:
+    """Find the causes that hide behind others in text that dynx refuses."""
+    known = {place_of(rule, each) for rule in rules if rule.stage == "reading" for each in rule.detect(case)}
+    found: list[Appearance] = []
+    here = case
+    for rule, remedy in readable(case).applied:
+        lines: dict[int, int] | None = None
+        for each in rule.detect(here) if rule in rules else ():
+            if place_of(rule, each) in known:
+                continue
+            known.add(place_of(rule, each))
+            lines = lines or line_map(*(_lines(one) for one in (case, here)))
+            line = None if each.line is None else lines.get(each.line, each.line)
+            found.append(Appearance(rule, each, here, line))
+        here = remedy.case
+    return found
+
+
+def _lines(case: Case) -> list[str]:
+    return case.source.text_with_lines_before.splitlines()
+
+
 def detections(case: Case, rules: Sequence[Rule]) -> list[tuple[Rule, Detection]]:
     """Detect each of the rules at every place.
 
@@ -83,6 +118,7 @@ def detections(case: Case, rules: Sequence[Rule]) -> list[tuple[Rule, Detection]
     """
     sound = readable(case).case
     found = [(rule, each) for rule in rules if rule.stage == "reading" for each in rule.detect(case)]
+    found += [(each.rule, replace(each.detection, line=each.line)) for each in appearances(case, rules)]
     if sound.readable:
         found += [(rule, each) for rule in rules if rule.stage == "model" for each in rule.detect(sound)]
     return found

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dynx.doctor.examine.contacts import deepest_contact
 from dynx.doctor.examine.examination import Examination, Examiner
 from dynx.doctor.prove.attribution import Attribution, Attributor
-from dynx.doctor.prove.mending import detections, readable
+from dynx.doctor.prove.mending import appearances, detections, place_of, readable
 from dynx.rules import Case, Rule
 
 RARE_STATES = 40
@@ -18,7 +18,8 @@ class Proofs:
     """Measurement of the effects of causes in one case, which is examined `before` and `after` mending.
 
     The causes of rules about the text are removed from the text as it is, those of rules about the robot from
-    the text made readable. Meshes are removed from both texts first.
+    the text made readable. Meshes are removed from both texts first. A cause in the text that shows only
+    after the remedy of another (a second root, once the world is declared) is removed from that text.
     """
 
     def __init__(
@@ -37,26 +38,40 @@ class Proofs:
         self._mended = mended
         self._rules = [rule for rule in rules if rule.kind == "difference"]
         self._examiner, self._tolerance, self._progress = examiner, tolerance, progress
-        self._found = detections(self._text, self._rules)
+        self._hidden = appearances(self._text, self._rules)
+        hidden = {place_of(each.rule, each.detection) for each in self._hidden}
+        found = detections(self._text, self._rules)
+        self._found = [(rule, each) for rule, each in found if place_of(rule, each) not in hidden]
         readably = before
         if self._robot is not self._text:
             readably = examiner.examine(self._robot, reference=before.reference)
+        self._before, self._after = before, after
         self._by_text = self._attributor(self._text, examiner, before, after)
         self._by_robot = self._attributor(self._robot, examiner, readably, after)
 
     def attributions(self) -> list[Attribution]:
         """Measure the effect of every rule about differences at every place."""
-        rules = dict.fromkeys(rule for rule, _ in self._found)
+        rules = dict.fromkeys([*(rule for rule, _ in self._found), *(each.rule for each in self._hidden)])
         return [each for rule in rules for each in self.measure(rule)]
 
     def measure(self, rule: Rule, *, minor: bool = False) -> list[Attribution]:
         """Measure the effect of one rule at every place; see `Attributor.attribute`."""
         places = [each for other, each in self._found if other is rule]
         by = self._by_text if rule.stage == "reading" else self._by_robot
-        found = by.attribute(rule, places, minor=minor)
-        if rule.depends_on_state and not any(each.effects for each in found):
-            return self._at_more_states(rule).attribute(rule, places, minor=minor)
-        return found
+        found = by.attribute(rule, places, minor=minor) if places else []
+        if places and rule.depends_on_state and not any(each.effects for each in found):
+            found = self._at_more_states(rule).attribute(rule, places, minor=minor)
+        return [*found, *self._measure_hidden(rule, minor=minor)]
+
+    def _measure_hidden(self, rule: Rule, *, minor: bool) -> list[Attribution]:
+        """Measure the effect of one rule at the places that show only after other remedies, in that text."""
+        hidden = [each for each in self._hidden if each.rule is rule]
+        if not hidden:
+            return []
+        case = hidden[0].case
+        before = self._examiner.examine(case, reference=self._before.reference)
+        by = self._attributor(case, self._examiner, before, self._after)
+        return by.attribute(rule, [each.detection for each in hidden], minor=minor)
 
     def _at_more_states(self, rule: Rule) -> Attributor:
         more = self._examiner.with_samples(RARE_STATES)

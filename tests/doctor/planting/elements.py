@@ -40,6 +40,17 @@ def loop_joint(site: Site) -> PlantedDefect:
     return site.defect("DX220", edit, sign="loop_joint")
 
 
+def joint_of_drake(site: Site) -> PlantedDefect:
+    """A joint of another kind beside the chain, as a file for Drake has it."""
+    name, _ = site.pick_link(lambda each: each != site.model.root, "link below the root")
+    kind = site.rng.choice(["ball", "universal", "planar"])
+    text = (
+        f'<drake:joint name="extra" type="{kind}">\n  <axis xyz="0 0 1"/>\n'
+        f'  <parent link="{site.model.root}"/>\n  <child link="{name}"/>\n</drake:joint>'
+    )
+    return site.defect("DX227", site.source.insertion(site.source.root, text), sign="drake:joint")
+
+
 def world_not_declared(site: Site) -> PlantedDefect:
     """A robot mounted on Drake's world."""
     if has_link(site, "world") or not site.free(site.model.root):
@@ -138,6 +149,7 @@ PLANTERS = (
     Planter("DX222", incomplete_limit),
     Planter("DX223", second_root),
     Planter("DX224", mujoco_settings),
+    Planter("DX227", joint_of_drake),
     Planter("DX423", processing_instruction),
     Planter("DX424", without_geometry),
     Planter("DX418", quaternion),

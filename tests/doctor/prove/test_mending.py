@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 
 from dynx.agreement.tolerances import BAR
+from dynx.doctor.diagnosis import diagnose
 from dynx.doctor.examine.examination import Examiner
 from dynx.doctor.prove.mending import all_except, mend, place_of, refusal
 from dynx.loaded import installed_engines
@@ -71,3 +72,27 @@ def test_a_refusal_names_the_first_fault_that_has_no_remedy_at_its_line() -> Non
     shifted = Case(XmlSource("\n\n" + case.source.text))
     assert str(refusal(shifted)).startswith("<string>:8: parent of joint 'wrist'")
     assert refusal(case_of(link("base"), link("arm"), unlimited)) is None
+
+
+@pytest.mark.skipif(
+    not {"pinocchio", "drake"} <= set(installed_engines()), reason="engines that refuse second roots"
+)
+def test_causes_that_show_after_the_remedy_of_others_are_found_and_proved() -> None:
+    """The tree falls apart without Drake's joint, and has two roots once the world is declared."""
+    ball = '<drake:joint name="ball" type="ball"><parent link="a"/><child link="b"/></drake:joint>'
+    case = case_of(
+        *(link("a"), link("b"), link("c"), link("d")),
+        joint("mount", "world", "a", type="fixed"),
+        ball,
+        joint("j", "b", "c"),
+        joint("k", "c", "d"),
+    )
+    assert not find_rule("DX223").detect(case)
+    report = diagnose(case.source.text, counterexamples=False)
+    assert report.explained, report.unexplained
+    assert {each.rule for each in report.differences} >= {"DX109", "DX223", "DX227"}
+    assert all(each.proved for each in report.differences)
+    (second_root,) = (each for each in report.findings if each.rule == "DX223")
+    assert (second_root.link, second_root.line) == ("world", 1)
+    assert report.mended is not None
+    assert diagnose(report.mended, counterexamples=False).alike
