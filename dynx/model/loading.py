@@ -36,7 +36,8 @@ def load(
 
     - URDF text: a `str` or `bytes` whose first character, after white space or a byte-order mark, is ``<``;
     - a path: any `os.PathLike`, or a `str` with a separator or with the suffix .urdf, .xacro or .xml (.xacro
-      needs the extra ``xacro``). Such a string is never looked up as a name;
+      needs the extra ``xacro``, which evaluates expressions of a file as Python code: expand only files that
+      you trust). Such a string is never looked up as a name;
     - the name of a robot in the library, see ``dynx robots``. It takes precedence over a file of that name in
       the working directory; write ``./name`` for the file. A name that is not in the library may be a file;
     - a `Model`, whose base, its pose and gravity are kept unless they are given.

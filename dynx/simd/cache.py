@@ -26,6 +26,7 @@ from typing import TypeVar
 import platformdirs
 
 from dynx.errors import ArgumentError, CompileError
+from dynx.files.reading import open_regular
 from dynx.files.writing import write_bytes
 from dynx.simd.call_table import RoutineCode
 from dynx.simd.emit import Settings
@@ -158,7 +159,8 @@ def _cache_folder() -> Path | None:
 def _read(path: Path, target: Target) -> Image | None:
     """Read the image in a file; None if the file is absent or its checksum is wrong."""
     try:
-        content = path.read_bytes()
+        with open_regular(path) as file:
+            content = file.read()
         os.utime(path)
     except OSError:
         return None

@@ -17,6 +17,9 @@ _SEARCH_PATHS = (("ROS_PACKAGE_PATH", ""), ("AMENT_PREFIX_PATH", "share"))
 _PACKAGE_FILES = ("package.xml", "manifest.xml")
 """Files that mark the root folder of a ROS package."""
 
+_PACKAGE_PARTS = ("meshes", "mesh", "urdf")
+"""Folders of a package that describes a robot."""
+
 _PARTS = frozenset({"description", "model", "models", "robot", "robots", "urdf", "urdfs", "xacro"})
 """Names of folders that by convention lie beside the folder of the meshes."""
 
@@ -79,7 +82,9 @@ def _existing(path: Path, root: Path, described: str) -> Path | None:
         return None
     if real.is_file():
         return real
-    raise MeshNotFoundError(f"no file {described}{_similar(real)}")
+    # A path such as "." leads to the root itself, and what lies beside that is not listed.
+    hint = _similar(real) if real != root else ""
+    raise MeshNotFoundError(f"no file {described}{hint}")
 
 
 # Cached, because a robot has dozens of meshes.
@@ -121,13 +126,19 @@ def _listed_packages() -> tuple[tuple[str, str], ...]:
 # Cached, because a description names its few packages hundreds of times.
 @lru_cache(maxsize=256)
 def _package(name: str, folder: Path, elsewhere: tuple[tuple[str, str], ...]) -> Path | None:
-    """Find a package: a folder above the description, beside one of these if it is marked as a package or
-    belongs to the description, or in a folder of the environment."""
+    """Find a package: a folder of the description, one above it or beside one of these if it is marked as a
+    package or, above, has the usual parts of one, or in a folder of the environment.
+
+    The name alone is no evidence, because the description chooses it.
+    """
     enclosing = _enclosing(folder)
     for root in (folder, *folder.parents):
         found = _find(name, [root]) if _is_private(root) else None
-        own = found is not None and (folder.is_relative_to(found) or found.is_relative_to(enclosing))
-        if found is not None and (own or any((found / marker).is_file() for marker in _PACKAGE_FILES)):
+        if found is None:
+            continue
+        marked = any((found / marker).is_file() for marker in _PACKAGE_FILES)
+        above = folder.is_relative_to(found) and any((found / part).is_dir() for part in _PACKAGE_PARTS)
+        if marked or above or found.is_relative_to(enclosing):
             return found
     listed = [Path(entry, below) for all_, below in elsewhere for entry in all_.split(os.pathsep) if entry]
     return _find(name, listed)

@@ -49,6 +49,26 @@ def test_a_record_is_resumed_to_the_last_bit(tmp_path: Path) -> None:
 DIVERGING = ["ur5", "--controller", "none", "--v0", "1e4,1e4,1e4,1e4,1e4,1e4"]
 
 
+@pytest.mark.parametrize("damage", ["truncated", "compression", "header", "path"])
+def test_a_record_that_is_damaged_is_refused(damage: str, tmp_path: Path) -> None:
+    record = tmp_path / "out.npz"
+    assert sim("ur5", *SHORT, "--save", str(record)).exit_code == 0
+    data = record.read_bytes()
+    changed = {
+        "truncated": data[: len(data) // 2],
+        # The method of compression in every header, and the text of an array's header.
+        "compression": data.replace(
+            b"PK\x01\x02\x2d\x03\x2d\x00\x00\x00\x00\x00", b"PK\x01\x02\x2d\x03\x2d\x00\x00\x00\x63\x00"
+        ),
+        "header": data.replace(b"'shape': (", b"'shape': ((("),
+        "path": data.replace(b"PK", b"Pk"),
+    }
+    record.write_bytes(changed[damage])
+    result = sim("ur5", *SHORT, "--resume", str(record))
+    assert result.exit_code == 2
+    assert f"{record} cannot be read as a rollout" in result.stderr
+
+
 def test_a_simulation_that_diverges_keeps_its_record(tmp_path: Path) -> None:
     target = tmp_path / "out.npz"
     result = sim(*DIVERGING, "--save", str(target))
@@ -65,7 +85,9 @@ def test_a_simulation_that_diverges_keeps_its_record(tmp_path: Path) -> None:
     assert (error["type"], error["step"], error["time"], len(error["v"])) == ("DivergedError", 3, 0.003, 6)
 
 
-def test_an_invalid_torque_is_not_reported_as_divergence() -> None:
+def test_an_invalid_torque_is_not_reported_as_divergence(monkeypatch: pytest.MonkeyPatch) -> None:
+    # No gain below the bound overflows.
+    monkeypatch.setattr("dynx.model.configuration.MAX_MAGNITUDE", np.inf)
     made = document("ur5", *SHORT, "--kp", "1e308", "--q0", "1,1,1,1,1,1", code=1)
     assert made["status"] == "control failed"
     assert made["error"]["type"] == "ControlError"

@@ -100,6 +100,36 @@ def test_nothing_outside_the_description_and_its_packages_is_looked_at(robot: Pa
     assert find_mesh(name, str(robot)) is None
 
 
+@pytest.mark.parametrize(
+    "name", [".", "./", "meshes/..", "package://shared/", "package://shared/.", "package://shared/a/.."]
+)
+def test_names_beside_the_folders_of_the_description_are_not_suggested(tmp_path: Path, name: str) -> None:
+    for folder in ("shared", "share", "share.stl", "sharedd"):
+        (tmp_path / folder).mkdir()
+    robot = tmp_path / "shared/robot.urdf"
+    robot.write_text("<robot/>")
+    (tmp_path / "shared/package.xml").write_text("<package/>")
+    with pytest.raises(MeshNotFoundError) as caught:
+        find_mesh(name, str(robot))
+    assert "did you mean" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "name", ["package://data/other/a.stl", "package://data/other/b.stl", "package://data/a"]
+)
+def test_a_folder_above_is_no_package_by_its_name_alone(tmp_path: Path, name: str) -> None:
+    robot = tmp_path / "data/downloads/robot.urdf"
+    robot.parent.mkdir(parents=True)
+    robot.write_text("<robot/>")
+    (tmp_path / "data/other").mkdir()
+    (tmp_path / "data/other/a.stl").write_bytes(b"")
+    assert find_mesh(name, str(robot)) is None
+    # With the parts of a package it is one.
+    (tmp_path / "data/meshes").mkdir()
+    mesh_files._package.cache_clear()
+    assert find_mesh("package://data/other/a.stl", str(robot)) == tmp_path / "data/other/a.stl"
+
+
 def test_packages_beside_the_description_are_found_by_their_marker(robot: Path) -> None:
     mesh = robot.parents[2] / "hand_description/a.stl"
     mesh.parent.mkdir()
