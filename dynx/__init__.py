@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 from dynx._version import __version__
 
 if TYPE_CHECKING:
-    from dynx import control, errors, trajectory
+    from dynx import control, errors, ik, sim, trajectory
     from dynx.agreement import AgreementReport, agree
     from dynx.backends import Backend, backend, installed_backends, register
     from dynx.compiled.derivatives import Derivatives
@@ -63,6 +63,7 @@ __all__ = [
     "control",
     "diagnose",
     "errors",
+    "ik",
     "inertial_parameters",
     "installed_backends",
     "load",
@@ -75,6 +76,7 @@ __all__ = [
     "rotation_from_rpy",
     "rpy_from_quat",
     "rpy_from_rotation",
+    "sim",
     "simulate",
     "simulate_batch",
     "trajectory",
@@ -114,15 +116,24 @@ _HOME = {
     "simulate": "dynx.sim",
     "simulate_batch": "dynx.sim",
 }
-_SUBPACKAGES = ("control", "errors", "trajectory")
+_SUBPACKAGES = ("control", "errors", "ik", "sim", "trajectory")
 
 
-def __getattr__(name: str) -> Any:
-    if name in _SUBPACKAGES:
-        return import_module(f"dynx.{name}")
-    if name not in _HOME:
-        raise AttributeError(f"module 'dynx' has no attribute {name!r}")
-    return getattr(import_module(_HOME[name]), name)
+# Hidden from type checkers, which would take any name for an attribute: they know the imports above.
+if not TYPE_CHECKING:
+
+    def __getattr__(name: str) -> Any:
+        if name in _SUBPACKAGES:
+            return import_module(f"dynx.{name}")
+        if name not in _HOME:
+            raise AttributeError(f"module 'dynx' has no attribute {name!r}{nearest_name(name)}")
+        return getattr(import_module(_HOME[name]), name)
+
+    def nearest_name(name: str) -> str:
+        """Return the clause of an error that names the nearest attribute."""
+        from dynx.errors import nearest
+
+        return nearest(name, __all__)
 
 
 def __dir__() -> list[str]:

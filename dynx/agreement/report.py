@@ -35,6 +35,7 @@ from dynx.agreement.identities import IdentityCheck
 from dynx.agreement.suspects import Suspect
 from dynx.errors import DynxError, UnknownNameError, nearest, shown
 from dynx.files.documents import document_of
+from dynx.files.notebook import html_grid
 
 SCHEMA = 1
 
@@ -118,6 +119,10 @@ class AgreementReport:
 
     def __repr__(self) -> str:
         return f"<AgreementReport {str(self).splitlines()[0]}>"
+
+    def _repr_html_(self) -> str:
+        title, *lines = str(self).splitlines()
+        return html_grid(title, (), ([line] for line in lines))
 
     def to_dict(self) -> dict[str, Any]:
         """Return the entry of this robot in ``results``, which has only numbers, strings and lists."""

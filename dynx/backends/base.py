@@ -151,10 +151,38 @@ class Backend(QuantityCalls):
         return apply_matrix(J, a) + apply_matrix(dJ, v)
 
     def inverse_kinematics(
-        self, target: ArrayLike, frame: str, q0: ArrayLike | None = None, **options: Any
+        self,
+        target: ArrayLike,
+        frame: str,
+        q0: ArrayLike | None = None,
+        *,
+        free: str | None = None,
+        point: ArrayLike | None = None,
+        position_tolerance: float = 1e-6,
+        rotation_tolerance: float = 1e-6,
+        max_iterations: int = 50,
+        max_restarts: int = 200,
+        rng: np.random.Generator | int | None = 0,
+        method: str = "dynx",
     ) -> IKResult:
-        """Return the configuration that brings `frame` to `target`; see `dynx.ik.inverse_kinematics`."""
-        return inverse_kinematics(self, target, frame, q0, **options)
+        """Return the configuration that brings `frame` to `target`: a pose (..., 4, 4) or position (..., 3).
+
+        `dynx.ik.inverse_kinematics` describes the options.
+        """
+        return inverse_kinematics(
+            self,
+            target,
+            frame,
+            q0,
+            free=free,
+            point=point,
+            position_tolerance=position_tolerance,
+            rotation_tolerance=rotation_tolerance,
+            max_iterations=max_iterations,
+            max_restarts=max_restarts,
+            rng=rng,
+            method=method,
+        )
 
     # -- dynamics -----------------------------------------------------------------------------
 

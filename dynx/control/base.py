@@ -19,6 +19,7 @@ from dynx.control.code_content import digest_of_code, is_foreign
 from dynx.control.content import attributes_of, content_of, fields_of
 from dynx.control.dynamics import Dynamics, EngineDynamics
 from dynx.errors import ArgumentError, UnsupportedFeatureError, shown
+from dynx.files.notebook import html_grid
 from dynx.model import Model
 from dynx.model.model import refuse_other_than_model
 from dynx.registry import DEFAULT_ENGINE
@@ -156,6 +157,10 @@ class Controller(ABC, Generic[ControllerState]):
                 unit = known[name].metadata.get("unit", "")
                 parts.append(f"{name} {_in_words(value)} {unit}".rstrip())
         return f"<{', '.join(parts)}>"
+
+    def _repr_html_(self) -> str:
+        title, *parts = repr(self)[1:-1].split(", ")
+        return html_grid(title, (), ([part] for part in parts))
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from typing import Any, Literal
 
 from dynx.agreement.report import Failure
 from dynx.files.documents import document_of
+from dynx.files.notebook import html_grid
 from dynx.loaded import engine_of
 from dynx.loaded.difference import Deviation
 from dynx.model.xml.text import TextForm
@@ -286,6 +287,11 @@ class DoctorReport:
 
     def __repr__(self) -> str:
         return f"<DoctorReport {self.robot}, {self.base} base: {self.verdict}>"
+
+    def _repr_html_(self) -> str:
+        rows = ((each.rule, each.name, each.link or each.joint or "", each.line) for each in self.findings)
+        head = ("rule", "name", "link or joint", "line")
+        return html_grid(f"{self.robot}, {self.base} base: {self.verdict}", head, rows)
 
     @property
     def verdict(self) -> str:

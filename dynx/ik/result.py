@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dynx.files.notebook import html_table
 from dynx.spatial.scalar import Floats
 
 
@@ -48,6 +49,16 @@ class IKResult:
             f"not reached: the best of {int(self.restarts) + 1} starts is "
             f"{float(self.position_error):.3g} m and {float(self.rotation_error):.3g} rad off"
         )
+
+    def __repr__(self) -> str:
+        shape = "" if self.success.ndim else f": q [{', '.join(f'{x:.6g}' for x in self.q)}]"
+        return f"<IKResult {self.message}{shape}>"
+
+    def _repr_html_(self) -> str:
+        if self.success.ndim:
+            return html_table("inverse kinematics", {"result": self.message, "q": self.q.shape})
+        values = {f"q[{k}]": f"{x:.6g}" for k, x in enumerate(self.q)}
+        return html_table("inverse kinematics", {"result": self.message, **values})
 
     def __bool__(self) -> bool:
         """Return whether every target was reached."""

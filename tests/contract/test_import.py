@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import ast
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
+
+import dynx
 
 HEAVY = ("pinocchio", "pybullet", "mujoco", "hypothesis", "mpmath", "rich", "click", "scipy", "numpy")
 ENGINES = ("pinocchio", "pybullet", "mujoco", "pydrake")
@@ -46,7 +50,7 @@ def test_everything_exported_exists() -> None:
         assert getattr(dynx, name) is not None
     assert set(dynx.__all__) <= set(dir(dynx))
     with pytest.raises(AttributeError, match="nothing_of_the_kind"):
-        dynx.nothing_of_the_kind  # noqa: B018
+        dynx.nothing_of_the_kind  # type: ignore[attr-defined]  # noqa: B018
 
 
 def test_importing_changes_no_global_state() -> None:
@@ -68,3 +72,25 @@ after = state()
 assert before == after, [pair for pair in zip(before, after) if pair[0] != pair[1]]
 """
     modules_after(program)
+
+
+def test_type_checkers_know_every_name_and_no_other() -> None:
+    """A module-level ``__getattr__`` that they see would let every misspelled name pass."""
+    tree = ast.parse(Path(str(dynx.__file__)).read_text(encoding="utf-8"))
+    visible = [each.name for each in tree.body if isinstance(each, ast.FunctionDef)]
+    assert "__getattr__" not in visible
+    (checking,) = (
+        each
+        for each in tree.body
+        if isinstance(each, ast.If) and isinstance(each.test, ast.Name) and each.test.id == "TYPE_CHECKING"
+    )
+    imported = {
+        name.name for each in checking.body if isinstance(each, ast.ImportFrom) for name in each.names
+    }
+    assert imported | {"__version__"} == set(dynx.__all__)
+
+
+def test_packages_resolve_and_a_misspelled_name_has_a_hint() -> None:
+    code = "import dynx; dynx.sim.simulate, dynx.ik.inverse_kinematics, dynx.control.PD; dynx.simulat"
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert "has no attribute 'simulat'; did you mean 'simulate'" in result.stderr

@@ -13,6 +13,7 @@ import numpy as np
 from dynx.errors import ArgumentError, shown
 from dynx.files.arrays import SCHEMA_ENTRY, read_arrays, write_arrays
 from dynx.files.figures import new_figure, save_figure
+from dynx.files.notebook import html_table
 from dynx.sim.scenario.scenario import Scenario
 from dynx.spatial.scalar import Floats
 
@@ -114,6 +115,10 @@ class BatchRollouts:
         lower.boxplot(self.max_error[sound], tick_labels=self.joint_names, whis=(5, 95), showfliers=False)
         lower.set_ylabel("largest error [rad or m]")
         lower.tick_params(axis="x", rotation=30)
+        if _spans_decades(worst):
+            upper.set_xscale("log")
+        if _spans_decades(self.max_error[sound]):
+            lower.set_yscale("log")
         for axis in (upper, lower):
             axis.grid(visible=True, color="0.9")
         lost = int((~np.isnan(self.diverged)).sum())
@@ -125,7 +130,23 @@ class BatchRollouts:
         return figure
 
     def __repr__(self) -> str:
-        return f"<BatchRollouts: {int(np.sum(self.done))} of {len(self)} done>"
+        return f"<BatchRollouts of {self.scenario.model.name}: {int(np.sum(self.done))} of {len(self)} done>"
+
+    def _repr_html_(self) -> str:
+        low, middle, high = (f"{x:.3g}" for x in self.quantiles())
+        lost = int((~np.isnan(self.diverged)).sum())
+        rows = {
+            "done": f"{int(np.sum(self.done))} of {len(self)}",
+            "diverged": lost,
+            "largest error [rad or m], 5 %, 50 %, 95 %": f"{low}, {middle}, {high}",
+        }
+        return html_table(f"rollouts of {self.scenario.model.name}", rows)
+
+
+def _spans_decades(errors: Floats) -> bool:
+    """Check whether the largest error is 100 times the smallest that is not zero, or more."""
+    present = errors[errors > 0.0]
+    return bool(present.size) and float(present.max()) >= 100.0 * float(present.min())
 
 
 def _array_names() -> list[str]:

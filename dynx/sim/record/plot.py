@@ -13,9 +13,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from dynx.control.base import Controller, chain_of
 from dynx.files.figures import new_figure, save_figure
 from dynx.model import Model
 from dynx.sim.record.rollout_data import RolloutData
+from dynx.sim.record.tracking_error import frame_pose_errors
 from dynx.spatial.scalar import Floats
 
 STYLES = ("-", "--", "-.", ":")
@@ -45,7 +47,8 @@ def plot(rollout: RolloutData, path: str | os.PathLike[str] | None = None) -> An
     """Plot positions, errors and torques with their limits; return the `matplotlib.figure.Figure`, and save
     it at `path` if that is given.
 
-    Without a reference it shows velocities instead of errors. A limit is drawn where a torque comes near it.
+    Without a reference it shows velocities instead of errors, and for a controller of a frame the error of
+    that frame. A limit is drawn where a torque comes near it.
     A floating base has its own column: its position in the world, and its error, velocity and force in the
     axes of the base. The figure belongs to no window. Raises NotInstalledError without matplotlib
     (``pip install 'dynx[plot]'``), ArgumentError for a file that cannot be written.
@@ -53,8 +56,9 @@ def plot(rollout: RolloutData, path: str | os.PathLike[str] | None = None) -> An
     columns = _columns(rollout.model)
     figure = new_figure(7.0 if len(columns) == 1 else 3.8 * len(columns), 8.0)
     panels = figure.subplots(3, len(columns), sharex=True, squeeze=False)
+    frame = _controlled_frame(rollout)
     for column, axes in zip(columns, panels.T, strict=True):
-        _draw(rollout, column, axes)
+        _draw(rollout, column, axes, frame if column is columns[0] else None)
     figure.suptitle(_plain(_title(rollout)), fontsize=11)
     if path is not None:
         save_figure(figure, path)
@@ -81,7 +85,25 @@ def _columns(model: Model) -> list[Column]:
     return columns
 
 
-def _draw(rollout: RolloutData, column: Column, axes: Any) -> None:
+def _controlled_frame(rollout: RolloutData) -> str | None:
+    """Return the frame that the controller of the rollout controls; None for a controller of joints."""
+    controller = None if rollout.scenario is None else rollout.scenario.controller
+    if rollout.reference is None or not isinstance(controller, Controller):
+        return None
+    *_, innermost = chain_of(controller)
+    frame = getattr(innermost, "frame", None)
+    return frame if isinstance(frame, str) else None
+
+
+def _draw_frame_error(axis: Any, t: Floats, errors: tuple[Floats, Floats]) -> None:
+    """Draw position [m] and rotation vector [rad] of a frame's error, in world axes, with a legend."""
+    for error, names, style in zip(errors, (("x", "y", "z"), ("rx", "ry", "rz")), ("-", "--"), strict=True):
+        for k, name in enumerate(names):
+            axis.plot(t, error[:, k], color=f"C{k}", linestyle=style, lw=1.3, label=name)
+    axis.legend(ncols=2, fontsize=7)
+
+
+def _draw(rollout: RolloutData, column: Column, axes: Any, frame: str | None) -> None:
     positions, middle, efforts = axes
     t, (length, force) = rollout.t, column.units
     q = rollout.q[:, column.q]
@@ -95,13 +117,16 @@ def _draw(rollout: RolloutData, column: Column, axes: Any) -> None:
         if rollout.reference is not None:
             wanted = positions.plot(t, rollout.reference.q[:, column.q][:, k], color="0.6", lw=0.8, zorder=0)
         between = rollout.v if rollout.reference is None else rollout.error
-        middle.plot(t, between[:, column.v][:, k], **style)
+        if frame is None:
+            middle.plot(t, between[:, column.v][:, k], **style)
         efforts.step(t[: len(tau)], tau[:, k], where="post", **style)
         if np.isfinite(limits[k]) and np.max(np.abs(tau[:, k]), initial=0.0) > NEAR * limits[k]:
             for sign in (1.0, -1.0):
                 limit = efforts.axhline(
                     sign * limits[k], color=style["color"], lw=0.9, linestyle=(0, (1, 3)), zorder=3
                 )
+    if frame is not None and rollout.reference is not None:
+        _draw_frame_error(middle, t, frame_pose_errors(rollout, rollout.reference, frame))
     if rollout.reference is not None and curves:
         curves["reference"] = wanted[0]
     if limit is not None:
@@ -109,6 +134,8 @@ def _draw(rollout: RolloutData, column: Column, axes: Any) -> None:
     positions.set_ylabel(f"position [{length}]")
     speed = "; ".join(f"{unit}/s" for unit in length.split("; "))
     middle.set_ylabel(f"velocity [{speed}]" if rollout.reference is None else f"error q* - q [{length}]")
+    if frame is not None:
+        middle.set_ylabel(f"error of {_plain(frame)} [m; rad]")
     efforts.set_ylabel(f"torque [{force}]" if "N m" in force else f"force [{force}]")
     if column.of_base:
         for axis, axes_of in ((positions, "world"), (middle, "base"), (efforts, "base")):

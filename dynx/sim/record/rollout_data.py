@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple, TypeVar
@@ -10,6 +11,7 @@ import numpy as np
 
 from dynx.backends import backend
 from dynx.errors import ArgumentError
+from dynx.files.notebook import html_grid
 from dynx.model import Model
 from dynx.sim.record.settings import settings_of
 from dynx.sim.scenario.scenario import Scenario
@@ -17,6 +19,9 @@ from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint
 
 Self = TypeVar("Self", bound="RolloutData")
+
+BASE_COORDINATES = ("base x", "base y", "base z", "base rx", "base ry", "base rz")
+"""Names of the coordinates of a floating base."""
 
 
 class Summary(NamedTuple):
@@ -30,14 +35,33 @@ class Summary(NamedTuple):
     """Largest change of the energy since the start, divided by the largest kinetic energy."""
     saturated: float
     """Share of the steps in which some motor was at its limit."""
+    coordinates: tuple[str, ...] = ()
+    """Names of the coordinates of v: joints, after the six of a floating base."""
+    units: tuple[str, ...] = ()
+    """Unit of each coordinate: rad or m."""
 
     def __str__(self) -> str:
-        lost = bool(np.isnan(self.max_error).any())
-        worst = "no reference" if lost else f"{self.max_error.max(initial=0.0):.3g}"
-        return (
-            f"largest error {worst}, largest torque {self.max_torque.max(initial=0.0):.3g}, "
-            f"energy drift {self.energy_drift:.2g}, saturated in {100 * self.saturated:.3g} % of the steps"
-        )
+        """Return the largest error and torque with joint and unit; without motors, the energy's drift."""
+        sentences = []
+        if np.isnan(self.max_error).any():
+            sentences.append("no reference")
+        elif self.max_error.size:
+            sentences.append(f"largest error {self._largest(self.max_error)}")
+        if self.max_torque.any():
+            efforts = {"rad": "N m", "m": "N"}
+            sentences.append(f"largest torque {self._largest(self.max_torque, efforts)}")
+            sentences.append(f"saturated in {100 * self.saturated:.3g} % of the steps")
+        else:
+            # Where motors do work, the energy changes by that and does not drift.
+            sentences.append(f"energy drift {self.energy_drift:.2g} of the largest kinetic energy")
+        return ", ".join(sentences)
+
+    def _largest(self, values: Floats, units: Mapping[str, str] | None = None) -> str:
+        k = int(np.argmax(values))
+        if k >= len(self.coordinates):
+            return f"{values[k]:.3g}"
+        unit = self.units[k]
+        return f"{values[k]:.3g} {unit if units is None else units[unit]} of {self.coordinates[k]}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +134,14 @@ class RolloutData:
             max_torque=np.max(np.abs(self.tau), axis=0, initial=0.0),
             energy_drift=drift / peak if peak else drift,
             saturated=float(np.mean(self.saturated.any(axis=1))) if len(self) else 0.0,
+            coordinates=(*(BASE_COORDINATES if self.model.floating else ()), *self.model.joint_names),
+            units=self._units,
         )
+
+    @property
+    def _units(self) -> tuple[str, ...]:
+        joints = ("m" if joint.type == "prismatic" else "rad" for joint in self.model.coordinate_joints)
+        return (*(("m",) * 3 + ("rad",) * 3 if self.model.floating else ()), *joints)
 
     @cached_property
     def settings(self) -> dict[str, Any]:
@@ -128,3 +159,13 @@ class RolloutData:
 
     def __repr__(self) -> str:
         return f"<Rollout of {self.model.name}: {len(self)} steps to {self.t[-1]:.6g} s>"
+
+    def _repr_html_(self) -> str:
+        found = self.summary()
+        head = ("coordinate", "unit", "max error", "RMS error", "max speed", "max torque")
+        columns = (found.max_error, found.rms_error, found.max_speed, found.max_torque)
+        rows = (
+            (name, unit, *(f"{x:.3g}" for x in numbers))
+            for name, unit, *numbers in zip(found.coordinates, found.units, *columns, strict=True)
+        )
+        return html_grid(f"{repr(self)[1:-1]}: {found}", head, rows)

@@ -11,14 +11,15 @@ from typing import Any
 import numpy as np
 
 from dynx.backends import backend
-from dynx.sim.record.rollout import Rollout
+from dynx.sim.record.rollout_data import RolloutData
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import pose_error
+from dynx.trajectory.base import Setpoint
 
 Entry = dict[str, Any]
 
 
-def joint_error(rollout: Rollout) -> Entry:
+def joint_error(rollout: RolloutData) -> Entry:
     """Summarise the error over all joints and times; numbers are None without a reference or joints."""
     base = 6 if rollout.model.floating else 0
     error = np.abs(rollout.error[:, base:])
@@ -35,21 +36,27 @@ def joint_error(rollout: Rollout) -> Entry:
     }
 
 
-def base_error(rollout: Rollout) -> Entry | None:
+def base_error(rollout: RolloutData) -> Entry | None:
     """Summarise the error of a floating base; None for a fixed base, or without a reference."""
     if rollout.reference is None or not rollout.model.floating:
         return None
     return _body_error(rollout.t, rollout.error[:, :3], rollout.error[:, 3:6])
 
 
-def frame_error(rollout: Rollout, frame: str | None) -> Entry | None:
+def frame_error(rollout: RolloutData, frame: str | None) -> Entry | None:
     """Summarise the error of a frame of the robot; None without a frame or a reference."""
     if rollout.reference is None or frame is None:
         return None
+    return _body_error(rollout.t, *frame_pose_errors(rollout, rollout.reference, frame))
+
+
+def frame_pose_errors(rollout: RolloutData, reference: Setpoint, frame: str) -> tuple[Floats, Floats]:
+    """Return position errors [m] and rotation vectors [rad] of a frame, each (n + 1, 3), in world axes."""
     with backend("reference", rollout.model) as engine:
-        reference = engine.forward_kinematics(rollout.reference.q, frame)
+        wanted = engine.forward_kinematics(reference.q, frame)
         actual = engine.forward_kinematics(rollout.q, frame)
-    return _body_error(rollout.t, *pose_error(reference, actual))
+    position, rotation = pose_error(wanted, actual)
+    return position, rotation
 
 
 def _body_error(t: Floats, position: Floats, rotation: Floats) -> Entry:
