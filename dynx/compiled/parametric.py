@@ -131,6 +131,11 @@ class ParametricDynamics:
         """Return the inertia of the root and everything fixed to it, for an array of symbols."""
         return self._selection.read(parameters).added_to(self._selection.remainder()).root
 
+    def inertia(self, parameters: Array, q: Array) -> Array:
+        """Return the mass matrix (nv, nv) of one sample, for arrays of symbols in a trace."""
+        known = self._selection.read(parameters)
+        return _mass_matrix(known.added_to(simplify_mechanism(self._selection.remainder())), known.joints, q)
+
     def _evaluate(
         self, name: str, function: Callable[..., Array], arrays: list[Floats], parameters: ArrayLike | None
     ) -> Floats:

@@ -16,6 +16,7 @@ from dynx.backends.quantity_calls import QuantityCalls
 from dynx.engines.pinocchio.backend import PinocchioBackend
 from dynx.errors import ArgumentError, ClosedError, DTypeError, EngineError, NotFiniteError, ShapeError
 from dynx.model import Model
+from dynx.model.configuration import MAX_MAGNITUDE
 from dynx.reference.backend import ReferenceBackend
 from dynx.spatial.scalar import Floats
 from dynx.testing.strategies import models
@@ -77,7 +78,7 @@ def test_what_is_no_valid_sample_is_refused_on_the_straight_path(size: int, base
         (lambda x: np.append(x[:-1], np.nan), NotFiniteError),
         (lambda x: np.append(x[:-1], np.inf), NotFiniteError),
         (lambda x: np.append(x[:-1], -1e160), ArgumentError),
-        (lambda x: np.append(x[:-1], 1e70), ArgumentError),
+        (lambda x: np.append(x[:-1], MAX_MAGNITUDE), ArgumentError),
         (lambda x: x[:-1], ShapeError),
         (lambda x: x.astype(bool), DTypeError),
         (lambda x: None, DTypeError),
@@ -106,7 +107,7 @@ def test_numbers_just_below_the_bound_are_accepted(size: int) -> None:
     engine = PinocchioBackend(chain(size))
     q, v, _ = motion(engine.model)
     engine.bias_torque(q, v)
-    v[...] = 0.99e70
+    v[...] = 0.99 * MAX_MAGNITUDE
     assert engine.bias_torque(q, v).shape == v.shape
 
 

@@ -33,6 +33,7 @@ from dynx.sim.batch.rows import (
     refuse_ambiguous,
     split_rows,
 )
+from dynx.sim.batch.stopping import BatchStops
 from dynx.sim.batch.store import Store
 from dynx.sim.batch.traced_controller import innermost
 from dynx.sim.clock import Clock
@@ -85,6 +86,7 @@ def simulate_batch(
     friction_slip: float = 0.0,
     armature: Coefficients = False,
     effort_limits: bool | ArrayLike = False,
+    position_limits: bool = False,
     payload: Payload | Sequence[Payload] | None = None,
     mass_scale: MassScale = 1.0,
     pushes: Push | Sequence[Push] = (),
@@ -110,9 +112,9 @@ def simulate_batch(
     - `noise` of the measurements: rollout k has the noise of ``simulate`` with ``Noise(..., rollout=k)``
 
     `rollouts` is the number n of rollouts; it is needed if no argument has n rows. Times [s], `delay`,
-    `noise`, `friction_slip`, `effort_limits`, `payload`, `mass_scale` and `pushes` are those of `simulate`.
-    With a payload or scaled masses, `parametric` has to be made from ``plant_model(model, payload,
-    mass_scale)``. With `record_every` = k every k-th state is recorded.
+    `noise`, `friction_slip`, `effort_limits`, `position_limits`, `payload`, `mass_scale` and `pushes` are
+    those of `simulate`. With a payload or scaled masses, `parametric` has to be made from
+    ``plant_model(model, payload, mass_scale)``. With `record_every` = k every k-th state is recorded.
 
     The first argument may also be a robot's name or file, or a `Scenario` on the plant ``compiled``; beside
     a scenario only arguments that may differ between rollouts can be given. `BatchRollouts.scenario` is the
@@ -201,6 +203,7 @@ def simulate_batch(
     deviations = None if noise is None else noise.deviations(moved.nv)
     wrenches = acting.wrenches(clock) if acting.pushes else np.zeros((clock.n_steps, 0))
     kernels = _step_kernels(step, clock, wrenches)
+    stops = BatchStops.of(step) if scenario.position_limits else None
     references = setup.setpoint_of(clock.times()[1:]).q
     setpoints = Setpoint(*setup.setpoint_of(clock.control_times(controller.lead)))
     parts = [
@@ -219,6 +222,7 @@ def simulate_batch(
             if noise is None or deviations is None
             else PartNoise(noise.seed, noise.rollout + first, *deviations),
             record_every,
+            stops,
         )
         for first in range(0, n, PART)
     ]
@@ -244,7 +248,6 @@ def refuse_uncompiled(scenario: Scenario) -> None:
         ("plant", (PLANT,)),
         ("integrator", ("semi_implicit", None)),
         ("substeps", (1,)),
-        ("position_limits", (False,)),
     ):
         value = getattr(scenario, name)
         if value not in possible:

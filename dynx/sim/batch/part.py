@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dynx.sim.batch.settling import Settling
+from dynx.sim.batch.stopping import BatchStops
 from dynx.sim.loop.noise import BLOCK_STEPS, NoiseStream
 from dynx.simd.kernel import Kernel
 from dynx.spatial.scalar import Floats
@@ -79,6 +80,7 @@ class Part:
     """Wrenches of the pushes in each step (n_steps, 6 per push)."""
     noise: PartNoise | None
     record_every: int
+    stops: BatchStops | None
 
     def __call__(self) -> PartOutcome:
         """Simulate the rollouts of the part."""
@@ -135,6 +137,7 @@ class _Run:
             }
             for name in ("bind", "bind_groups")
         )
+        self._stops = None if part.stops is None else part.stops.of_rows(self._rows)
         self._diverged = np.full(self._rows, -1.0)
         self._records: tuple[list[Floats], list[Floats], list[Floats]] = ([], [], [])
 
@@ -156,6 +159,8 @@ class _Run:
             if dry and unsettled.any():
                 settling(self._groups[key], part.kernels[key[:2]].image.lanes)
             now = self._sets[(step + 1) % sets]
+            if self._stops is not None:
+                self._stops(self._sets[step % sets], now, self._fixed, part.references[step])
             if part.record_every and (step + 1) % part.record_every == 0:
                 for kept, array in zip(self._records, (now["q"], now["v"], self._tau), strict=True):
                     kept.append(array[:n].copy())

@@ -81,7 +81,6 @@ def test_kept_parts_belong_to_their_scenario(tmp_path: Path) -> None:
         ({"plant": "pinocchio"}, "plant"),
         ({"integrator": "rk4"}, "integrator"),
         ({"substeps": 2}, "substeps"),
-        ({"position_limits": True}, "position_limits"),
         ({"duration": None}, "duration"),
         ({"controller": None}, "controller"),
         ({"reference": None}, "reference"),

@@ -1,0 +1,129 @@
+"""Stops at position limits in a batch, with the impacts of `dynx.sim.loop.stops`.
+
+After each step, joints beyond their limits are set to them. For the rollouts in which such a joint moves
+outwards, and for no other, a kernel computes the velocities after the impact.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dynx.compiled.kernels import evaluate_quantity
+from dynx.compiled.mass_factors import factorize_mass_matrix, solve_with_factors
+from dynx.compiled.simplification import simplify_mechanism
+from dynx.sim.batch.kernel import FusedStep
+from dynx.simd.cache import load_kernel, program_recipe
+from dynx.simd.kernel import Kernel
+from dynx.simd.trace import trace
+from dynx.spatial.scalar import Array, Floats
+
+Rows = NDArray[np.signedinteger[Any]]
+"""Numbers of rollouts."""
+
+
+@dataclass(frozen=True)
+class BatchStops:
+    """Position limits (rows, n) of the joints, which are the last n coordinates, and the kernel of an impact.
+
+    There is one row of limits, or one for each rollout, which NumPy compares four times as fast.
+    """
+
+    lower: Floats
+    upper: Floats
+    kernel: Kernel
+
+    @classmethod
+    def of(cls, step: FusedStep) -> BatchStops | None:
+        """Make the stops of a batch; None for a robot without limits."""
+        base = 7 if step.model.floating else 0
+        lower, upper = step.model.lower[None, base:], step.model.upper[None, base:]
+        if not np.isfinite([lower, upper]).any():
+            return None
+        return cls(lower, upper, _impact_kernel(step))
+
+    def of_rows(self, rows: int) -> BatchStops:
+        """Return the stops for a number of rollouts."""
+        lower, upper = (np.repeat(limits, rows, axis=0) for limits in (self.lower, self.upper))
+        return BatchStops(lower, upper, self.kernel)
+
+    def __call__(
+        self,
+        before: Mapping[str, Floats],
+        now: Mapping[str, Floats],
+        fixed: Mapping[str, Floats],
+        reference: Floats,
+    ) -> None:
+        """Stop joints of the state `now` after a step from `before`; all arrays have a row for each rollout.
+
+        `reference` (nq,) is the reference configuration, to which the tracking errors are corrected.
+        """
+        n = self.lower.shape[1]
+        joints, speeds = now["q"][:, -n:], now["v"]
+        below, above = joints < self.lower, joints > self.upper
+        if not (below.any() or above.any()):
+            return
+        rows = np.flatnonzero((below | above).any(axis=1))
+        held = np.clip(joints[rows], self.lower[rows], self.upper[rows])
+        outward = np.sign(joints[rows] - held)
+        joints[rows] = held
+        struck = np.zeros((len(rows), speeds.shape[1]))
+        struck[:, -n:] = outward * (outward * speeds[rows, -n:] > 0.0)
+        hit = struck.any(axis=1)
+        if hit.any():
+            self._strike(now, fixed, rows[hit], struck[hit])
+        error = np.abs(reference[-n:] - held)
+        now["max_error"][rows, -n:] = np.maximum(before["max_error"][rows, -n:], error)
+        now["squared_errors"][rows, -n:] = before["squared_errors"][rows, -n:] + error * error
+
+    def _strike(
+        self, now: Mapping[str, Floats], fixed: Mapping[str, Floats], rows: Rows, struck: Floats
+    ) -> None:
+        """Change the velocities of some rows by impacts; `struck` (rows, nv) has the outward sign of each
+        coordinate that is struck, and zeros."""
+        known = {"q": now["q"], "v": now["v"].copy(), **fixed}
+        while len(rows):
+            names = (port.name for port in self.kernel.inputs)
+            inputs = [struck if name == "struck" else known[name][rows] for name in names]
+            after, pull = np.empty(struck.shape), np.empty(struck.shape)
+            self.kernel(inputs, [after, pull])
+            now["v"][rows] = np.where(struck != 0.0, 0.0, after)
+            # Stops push and do not pull: these joints get no impulse, and the others another one.
+            pulled = pull > 0.0
+            wrong = pulled.any(axis=1)
+            rows, struck = rows[wrong], np.where(pulled, 0.0, struck)[wrong]
+
+
+def _impact_kernel(step: FusedStep) -> Kernel:
+    """Compile the velocities after inelastic impulses on the coordinates that are struck.
+
+    The change of velocity x has x = -v for these, and no impulse M x on the others; one symmetric matrix
+    stands for both conditions. The second output is the impulse along the outward sign.
+    """
+    mechanism, disturbances = simplify_mechanism(step.model.mechanism), step.disturbances
+    sizes = {"q": step.model.nq, "v": step.model.nv, "struck": step.model.nv}
+    if step.plant is not None:
+        sizes["parameters"] = len(step.plant.parameters.names)
+    if "armature" in disturbances.varied:
+        sizes["armature"] = disturbances.varied["armature"]
+
+    def impact(**given: Array) -> dict[str, Array]:
+        v, stuck = given["v"], abs(given["struck"])
+        if step.plant is None:
+            M = evaluate_quantity(mechanism, "mass_matrix", (), given["q"])
+        else:
+            M = step.plant.inertia(given["parameters"], given["q"])
+        armature = disturbances.armature_of(given)
+        if armature is not None:
+            M = M + np.diag(armature)
+        free = 1.0 - stuck
+        A = free[:, None] * M * free + np.diag(stuck)
+        x = solve_with_factors(*factorize_mass_matrix(mechanism, A), free * (M @ (stuck * v)) - stuck * v)
+        return {"v": v + x, "pull": given["struck"] * (M @ x)}
+
+    program = trace(impact, {name: (size,) for name, size in sizes.items()})
+    return load_kernel(program_recipe(program), lambda: program)
