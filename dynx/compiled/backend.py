@@ -236,7 +236,7 @@ class CompiledBackend(Backend):
             "check_result": check_result,
         }
         if not compiles(mechanism, quantity):
-            if quantity not in LOOPED:
+            if quantity not in LOOPED or (described.solves and mechanism.coupling is not None):
                 return NumericCall(mechanism, quantity, details, checks, check_result=check_result).evaluate
             in_tree = replace(mechanism, coupling=None)
             if mechanism.coupling is None:

@@ -17,6 +17,9 @@ from dynx.spatial.scalar import Array
 MAX_DEFECT = MAX_MAGNITUDE**2
 """Bound on the defect of a sample with valid arguments."""
 
+MAX_RESULT = 1e300
+"""Bound on the results of quantities that solve an equation; accelerations of robots are smaller."""
+
 
 def argument_defect(mechanism: Mechanism, q: Array, *rates: Array) -> Array:
     """Return the sum of squares of all arguments; far above `MAX_DEFECT` for a quaternion not of length 1."""
@@ -24,6 +27,11 @@ def argument_defect(mechanism: Mechanism, q: Array, *rates: Array) -> Array:
     if mechanism.floating:
         total = total + quaternion_defect(q[3:7])
     return np.array([total], dtype=object)
+
+
+def result_defect(result: Array) -> Any:
+    """Return a number above `MAX_DEFECT` if an entry of the result (n,) is beyond `MAX_RESULT`."""
+    return np.sum(abs(result)) * (MAX_DEFECT / MAX_RESULT)
 
 
 def quaternion_defect(quaternion: Array) -> Any:

@@ -35,7 +35,7 @@ import dynx.spatial
 from dynx._version import __version__
 from dynx.backends.quantities import QUANTITIES, Quantity
 from dynx.compiled import frames as compiled_frames
-from dynx.compiled.defect import MAX_DEFECT, argument_defect
+from dynx.compiled.defect import argument_defect, result_defect
 from dynx.compiled.frames import Chain, on_chain
 from dynx.compiled.looped.kernels import LOOPED
 from dynx.compiled.model_coordinates import (
@@ -57,15 +57,12 @@ from dynx.simd.target import host
 from dynx.simd.trace import trace
 from dynx.spatial.scalar import Array
 
-MAX_RESULT = 1e300
-"""Bound on the results of quantities that solve an equation; accelerations of robots are smaller."""
-
 MAX_COMPILE_SECONDS = 7.0
-"""Longest predicted time of a compilation (`compile_seconds`). NumPy evaluates quantities that would take
-longer."""
+"""Longest predicted time of a compilation (`compile_seconds`). Quantities that would take longer are
+evaluated by routines or by NumPy."""
 
 MAX_SECONDS_BESIDE_ROUTINES = 3.0
-"""The same for quantities that routines compute instead, which are half as fast but compiled already."""
+"""The same for matrices that routines compute instead, which are half as fast but compiled already."""
 
 SECONDS_OF_OPERATION, SECONDS_OF_RESULT = 1.5e-4, 3e-4
 """Time to trace and compile an operation, and to compile the store of a number of the result."""
@@ -141,7 +138,8 @@ def _pose_density(mechanism: Mechanism) -> float:
 def compiles(mechanism: Mechanism, name: str) -> bool:
     """Check whether a quantity of this mechanism is compiled, rather than evaluated by routines that are
     compiled for all robots (`dynx.compiled.looped`) or by NumPy."""
-    limit = MAX_SECONDS_BESIDE_ROUTINES if name in LOOPED else MAX_COMPILE_SECONDS
+    matrix = name in LOOPED and kernel_quantity(name).growth != "joints"
+    limit = MAX_SECONDS_BESIDE_ROUTINES if matrix else MAX_COMPILE_SECONDS
     return compile_seconds(mechanism, name) <= limit
 
 
@@ -218,7 +216,7 @@ def _program(mechanism: Mechanism, name: str, result: Computation, **more: tuple
         found = result(*inputs.values())
         defect = argument_defect(mechanism, *(inputs[argument] for argument in quantity.arguments))
         if quantity.solves:
-            defect = defect + np.sum(abs(found)) * (MAX_DEFECT / MAX_RESULT)
+            defect = defect + result_defect(found)
         return {"result": found, "defect": defect}
 
     return trace(result_and_defect, {**argument_shapes(mechanism, quantity.arguments), **more})

@@ -99,25 +99,20 @@ def forward_dynamics(mechanism: Mechanism, q: Array, v: Array, tau: Array) -> Ar
     inertias = [mechanism.root, *(body.inertia for body in bodies)]
     articulated = [ArticulatedInertia.of_rigid_body(inertia) for inertia in inertias]
     bias = [body_wrench(inertia, motion) for inertia, motion in zip(inertias, motions, strict=True)]
-    joint_terms: dict[int, tuple[SpatialVector, Array]] = {}
+    joint_terms: dict[int, EliminatedJoint] = {}
     for index in reversed(range(len(bodies))):
-        body, A = bodies[index], articulated[index + 1]
-        S = _motion_subspace(body.axis, body.revolute)
-        U, (force, moment) = A.wrench(*S), bias[index + 1]
-        D = _dot(S, U)
-        mask = _mask_off_axis(body)
-        # K is exactly 1 along the joint.
-        K_force, K_moment = (part / append_axis(D) * off_axis for part, off_axis in zip(U, mask, strict=True))
-        K = (K_force + S[0] * (1 - mask[0]), K_moment + S[1] * (1 - mask[1]))
-        u = joint_value(mechanism, tau, index) - _dot(S, (force, moment))
-        joint_terms[index] = (K, u / D)
-        apparent = A.without_joint(U, K, mask)
-        joint_wrench = K[0] * append_axis(u), K[1] * append_axis(u)
-        velocity_wrench = apparent.wrench(*velocity_products[index])
-        wrench = add_spatial(add_spatial((force, moment), velocity_wrench), joint_wrench)
+        body = bodies[index]
+        joint = eliminate_joint(
+            body,
+            articulated[index + 1],
+            bias[index + 1],
+            joint_value(mechanism, tau, index),
+            velocity_products[index],
+        )
+        joint_terms[index] = joint
         parent, placement = body.parent + 1, placements[index]
-        articulated[parent] = articulated[parent] + apparent.to_parent(placement)
-        bias[parent] = add_spatial(bias[parent], placement.wrench_to_parent(*wrench))
+        articulated[parent] = articulated[parent] + joint.apparent.to_parent(placement)
+        bias[parent] = add_spatial(bias[parent], placement.wrench_to_parent(*joint.wrench))
 
     if mechanism.floating:
         net_wrench = tau[..., :6] - np.concatenate(bias[0], axis=-1)
@@ -127,19 +122,64 @@ def forward_dynamics(mechanism: Mechanism, q: Array, v: Array, tau: Array) -> Ar
         accelerations = [(root.proper_acceleration, root.alpha)]
     a: list[Array] = []
     for index, body in enumerate(bodies):
-        parent_motion = placements[index].motion_to_child(*accelerations[body.parent + 1])
-        linear, angular = add_spatial(parent_motion, velocity_products[index])
-        K, u_over_D = joint_terms[index]
-        joint = u_over_D - _dot(K, (linear, angular))
-        a.append(joint)
-        S = _motion_subspace(body.axis, body.revolute)
-        accelerations.append((linear + S[0] * append_axis(joint), angular + S[1] * append_axis(joint)))
+        acceleration, joint_acceleration = accelerate_joint(
+            body,
+            joint_terms[index].K,
+            joint_terms[index].u_over_D,
+            placements[index].motion_to_child(*accelerations[body.parent + 1]),
+            velocity_products[index],
+        )
+        a.append(joint_acceleration)
+        accelerations.append(acceleration)
     if mechanism.floating:
         # `root` was computed with a = 0: its proper acceleration is omega x v minus gravity.
         linear, angular = accelerations[ROOT + 1]
         base_acceleration = linear - root.proper_acceleration
         return np.concatenate([base_acceleration, angular, *(append_axis(x) for x in a)], axis=-1)
     return np.stack(a, axis=-1) if a else np.zeros(v.shape)
+
+
+@dataclass(frozen=True)
+class EliminatedJoint:
+    """A joint whose acceleration is eliminated from the equations of its body.
+
+    `K` is U / D and `u_over_D` the acceleration of the joint if the body does not accelerate otherwise.
+    `apparent` and `wrench` are the inertia and the bias wrench that the parent feels through the joint.
+    """
+
+    K: SpatialVector
+    u_over_D: Array
+    apparent: ArticulatedInertia
+    wrench: SpatialVector
+
+
+def eliminate_joint(
+    body: Body, A: ArticulatedInertia, bias: SpatialVector, tau: Array, velocity_product: SpatialVector
+) -> EliminatedJoint:
+    """Eliminate the acceleration of a joint with torque `tau` (...,) from the equations of its body."""
+    S = _motion_subspace(body.axis, body.revolute)
+    U, (force, moment) = A.wrench(*S), bias
+    D = _dot(S, U)
+    mask = _mask_off_axis(body)
+    # K is exactly 1 along the joint.
+    K_force, K_moment = (part / append_axis(D) * off_axis for part, off_axis in zip(U, mask, strict=True))
+    K = (K_force + S[0] * (1 - mask[0]), K_moment + S[1] * (1 - mask[1]))
+    u = tau - _dot(S, (force, moment))
+    apparent = A.without_joint(U, K, mask)
+    joint_wrench = K[0] * append_axis(u), K[1] * append_axis(u)
+    velocity_wrench = apparent.wrench(*velocity_product)
+    wrench = add_spatial(add_spatial((force, moment), velocity_wrench), joint_wrench)
+    return EliminatedJoint(K, np.asarray(u / D), apparent, wrench)
+
+
+def accelerate_joint(
+    body: Body, K: SpatialVector, u_over_D: Array, parent: SpatialVector, velocity_product: SpatialVector
+) -> tuple[SpatialVector, Array]:
+    """Return the acceleration of a body and of its joint, from that of the `parent` at the body's origin."""
+    linear, angular = add_spatial(parent, velocity_product)
+    joint = u_over_D - _dot(K, (linear, angular))
+    S = _motion_subspace(body.axis, body.revolute)
+    return (linear + S[0] * append_axis(joint), angular + S[1] * append_axis(joint)), np.asarray(joint)
 
 
 def inertia_matrix(inertia: RigidInertia) -> Array:
@@ -155,7 +195,8 @@ def _motion_subspace(axis: Array, revolute: bool) -> SpatialVector:
 
 def _mask_off_axis(body: Body) -> SpatialVector:
     """Return 0 at the component along the joint, if its axis is a coordinate axis, and 1 elsewhere."""
-    on_axis = body.axis != 0 if np.count_nonzero(body.axis) == 1 else np.zeros(3, dtype=bool)
+    known = body.axis.dtype != object and np.count_nonzero(body.axis) == 1
+    on_axis = body.axis != 0 if known else np.zeros(3, dtype=bool)
     off_axis, ones = 1 - on_axis.astype(int), np.ones(3, dtype=int)
     return (ones, off_axis) if body.revolute else (off_axis, ones)
 

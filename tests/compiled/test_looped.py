@@ -22,10 +22,12 @@ from tests.error_bounds import ErrorBounds, samples_at
 @pytest.fixture(autouse=True)
 def _only_routines(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("dynx.compiled.kernels.MAX_SECONDS_BESIDE_ROUTINES", -1.0)
+    monkeypatch.setattr("dynx.compiled.kernels.MAX_COMPILE_SECONDS", -1.0)
 
 
 def _arguments(model: Model, quantity: str, size: tuple[int, ...]) -> list[Floats]:
-    values = dict(zip("qva", state(model, size), strict=True))
+    q, v, a = state(model, size)
+    values = {"q": q, "v": v, "a": a, "tau": a}
     return [values[argument] for argument in QUANTITIES[quantity].arguments]
 
 
@@ -35,6 +37,11 @@ def test_routines_give_the_results_of_the_reference(model: Model, quantity: str)
     q, v, a = state(model, (3,))
     expected = getattr(backend("reference", model), quantity)(*_arguments(model, quantity, (3,)))
     found = getattr(made(model), quantity)(*_arguments(model, quantity, (3,)))
+    if quantity == "forward_dynamics":
+        quantity, expected = "inverse_dynamics", a
+        found = backend("reference", model).inverse_dynamics(q, v, found)
+        ErrorBounds(samples_at(model, q, v, a, a)).check(quantity, found, expected)
+        return
     ErrorBounds(samples_at(model, q, v, a, a)).check(quantity, found, expected)
 
 
@@ -75,13 +82,15 @@ def test_nothing_is_compiled_for_a_large_tree(n: int, monkeypatch: pytest.Monkey
     model = tree(n)
     engine: Any = made(model)
     small = made(ROBOTS["fixed"])
-    for quantity in sorted(LOOPED - {"inertial_regressor"}):
+    for quantity in ("mass_matrix", "coriolis_matrix", "forward_dynamics"):
         getattr(small, quantity)(*_arguments(ROBOTS["fixed"], quantity, ()))
     monkeypatch.setattr("dynx.simd.cache.compile_image", _refuse)
     monkeypatch.setattr("dynx.simd.cache.compile_routines", _refuse)
-    q, v, _ = state(model)
+    q, v, a = state(model)
     M = engine.mass_matrix(q)
     np.testing.assert_array_equal(M, M.T)
+    tau = engine.inverse_dynamics(q, v, a)
+    np.testing.assert_allclose(engine.forward_dynamics(q, v, tau), a, rtol=1e-6, atol=1e-6)
     if n > 101:
         return
     np.testing.assert_allclose(M, backend("reference", model).mass_matrix(q), atol=1e-9 * np.abs(M).max())

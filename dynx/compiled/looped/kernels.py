@@ -7,7 +7,7 @@ than computing. Routines loop over the joints instead, and every robot is only a
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,7 +20,13 @@ import dynx.rbd
 import dynx.spatial
 from dynx._version import __version__
 from dynx.backends.quantities import QUANTITIES
-from dynx.compiled.looped import coriolis_matrix, inertial_regressor, mass_matrix
+from dynx.compiled.looped import (
+    coriolis_matrix,
+    forward_dynamics,
+    inertial_regressor,
+    inverse_dynamics,
+    mass_matrix,
+)
 from dynx.compiled.model_coordinates import argument_shapes
 from dynx.model import Mechanism
 from dynx.simd.cache import load_routines, source_hash
@@ -40,6 +46,10 @@ class _Looped(NamedTuple):
 _LOOPED = {
     "mass_matrix": _Looped(mass_matrix.routines, mass_matrix.call_table),
     "coriolis_matrix": _Looped(coriolis_matrix.routines, coriolis_matrix.call_table),
+    "inverse_dynamics": _Looped(partial(inverse_dynamics.routines, 3), inverse_dynamics.call_table),
+    "bias_torque": _Looped(partial(inverse_dynamics.routines, 2), inverse_dynamics.call_table),
+    "gravity_torque": _Looped(partial(inverse_dynamics.routines, 1), inverse_dynamics.call_table),
+    "forward_dynamics": _Looped(forward_dynamics.routines, forward_dynamics.call_table),
     "inertial_regressor": _Looped(inertial_regressor.routines, inertial_regressor.call_table),
 }
 

@@ -6,14 +6,15 @@ are compiled once for all robots; the numbers of a robot are constants of its ta
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from dynx.compiled.defect import quaternion_defect, sum_by_pairs
+from dynx.compiled.defect import quaternion_defect, result_defect, sum_by_pairs
 from dynx.model.mechanism import ROOT, Body, Mechanism
 from dynx.rbd.base_parameters import Z_AXIS
 from dynx.rbd.placement import Placement
+from dynx.rbd.rnea import Motion, root_motion
 from dynx.simd.call_table import CallTable
 from dynx.simd.routines import Place, Routine
 from dynx.spatial.inertia import RigidInertia, symmetric_from_upper
@@ -150,14 +151,22 @@ def checking(defect: int) -> dict[str, Routine]:
         {"total": "vectors"},
     )
     found["zero"] = Routine.of(lambda: {"total": np.asarray(0.0)}, {}, {"total": "vectors"})
+    found["magnitude"] = Routine.of(
+        lambda x, total: {"total": total + result_defect(x)},
+        {"x": ("vectors", (1,)), "total": ("vectors", SCALAR)},
+        {"total": "vectors"},
+    )
     found["defect"] = Routine.of(
         lambda total: {"defect": total}, {"total": ("vectors", SCALAR)}, {"defect": defect}
     )
     return found
 
 
-def check_arguments(table: CallTable, mechanism: Mechanism, rows: Sequence[tuple[int, int]]) -> None:
-    """Compute the defect of the arguments, whose `rows` (place, size) are in the workspace, q first."""
+def check_arguments(
+    table: CallTable, mechanism: Mechanism, rows: Sequence[tuple[int, int]], results: Sequence[int] = ()
+) -> None:
+    """Compute the defect of the arguments, whose `rows` (place, size) are in the workspace, q first, and of
+    the `results` of an equation at these places."""
     total = table.reserve(1)
     table.call("zero", total)
     for place, size in rows:
@@ -167,4 +176,60 @@ def check_arguments(table: CallTable, mechanism: Mechanism, rows: Sequence[tuple
             table.call("squares of 1", place + column, total, total)
     if mechanism.floating:
         table.call("quaternion", rows[0][0] + 3, total, total)
+    for place in results:
+        table.call("magnitude", place, total, total)
     table.call("defect", total, 0)
+
+
+MOTION, WRENCH = (9,), (6,)
+"""Shapes of a motion (angular velocity, angular acceleration, proper acceleration) and of a wrench."""
+
+
+def pack_motion(motion: Motion) -> Array:
+    """Return a motion (9,)."""
+    return np.concatenate([motion.omega, motion.alpha, motion.proper_acceleration])
+
+
+def unpack_motion(packed: Array) -> Motion:
+    """Return the motion in an array (9,)."""
+    return Motion(packed[:3], packed[3:6], packed[6:])
+
+
+def _root_motion(*, floating: bool) -> Callable[..., dict[str, Array]]:
+    def motion(gravity: Array, **state: Array) -> dict[str, Array]:
+        massless = RigidInertia(np.asarray(0.0), np.zeros(3), np.zeros((3, 3)))
+        root = Mechanism("", floating, gravity, massless, (), (), None)
+        none = np.zeros(0)
+        found = root_motion(root, state.get("q", none), state.get("v", none), state.get("a", none))
+        return {"motion": pack_motion(found)}
+
+    return motion
+
+
+ROOT_MOTION = {
+    "fixed root": Routine.of(
+        _root_motion(floating=False), {"gravity": ("constants", VECTOR)}, {"motion": "vectors"}
+    ),
+    "floating root": Routine.of(
+        _root_motion(floating=True),
+        {
+            "gravity": ("constants", VECTOR),
+            "q": ("vectors", (7,)),
+            "v": ("vectors", (6,)),
+            "a": ("vectors", (6,)),
+        },
+        {"motion": "vectors"},
+    ),
+    "zeros": Routine.of(lambda: {"x": np.zeros(6)}, {}, {"x": "vectors"}),
+}
+"""Routines that compute the motion of the root, from which gravity is subtracted, and six zeros."""
+
+
+def compute_root_motion(table: CallTable, mechanism: Mechanism, q: int, v: int, a: int) -> int:
+    """Compute the motion of the root from the places of q, v and a; return its place."""
+    place, gravity = table.reserve(9), table.constants(mechanism.gravity)
+    if mechanism.floating:
+        table.call("floating root", gravity, q, v, a, place)
+    else:
+        table.call("fixed root", gravity, place)
+    return place
