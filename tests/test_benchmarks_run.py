@@ -39,6 +39,8 @@ def test_integrators_are_of_their_order() -> None:
     finished = run("benchmarks.integrators", "--quick")
     assert finished.returncode == 0, finished.stdout + finished.stderr
     assert finished.stdout.count("fitted order") == 3
+    # The drift from one start says little about that from another.
+    assert "20 random starts" in finished.stdout
 
 
 def test_the_table_of_every_quantity_compares_the_engines() -> None:
