@@ -332,9 +332,9 @@ class DoctorReport:
         """Write what remains in a file that is mended at a lower level than `physics`."""
         if not self.undone:
             return ""
-        refusing = [each.engine for each in self.engines if each.refused_after is not None]
-        if refusing:
-            return f"; refused by {' and '.join(refusing)} also when mended at level {self.level}"
+        without = [each.engine for each in self.engines if each.refused_after is not None]
+        if without:
+            return f"; no result from {' and '.join(without)} when mended at level {self.level}"
         return f"; off by up to {self.remaining:.0e} when mended at level {self.level}"
 
     def to_dict(self) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 
 from dynx.doctor import diagnose
-from dynx.doctor.report import DoctorReport, EngineResult
+from dynx.doctor.report import Change, DoctorReport, EngineResult
 from dynx.doctor.report_document import results_document
 from dynx.rules.traps import find_trap
 from tests.doctor.formats.reports import alike, differing, refused
@@ -82,3 +82,11 @@ def test_the_verdict_names_what_every_engine_skips(rule: str, skipped: str) -> N
     assert report.alike
     assert report.verdict == f"all engines load it alike; every engine skips {skipped}"
     assert not diagnose(find_trap("DX516"), engines=["pinocchio"], samples=1).skipped
+
+
+def test_the_verdict_at_a_lower_level_names_the_engines_without_a_result() -> None:
+    """Whether such an engine refuses the file or is not used on it is in the list of engines."""
+    left = Change("DX901", "physics", "gave the link a mass", made=False)
+    engines = tuple(replace(each, refused_after=each.refused) for each in EXPLAINED.engines)
+    report = replace(EXPLAINED, level="safe", changes=(left,), engines=engines)
+    assert report.verdict.endswith("; no result from mujoco when mended at level safe")
