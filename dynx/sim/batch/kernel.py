@@ -37,6 +37,10 @@ from dynx.trajectory.base import Setpoint
 CORRECTIONS = 1
 """Number of corrections of the modes of dry friction in one call of a kernel; few steps need more."""
 
+MAX_CORRECTED_OPERATIONS = 1500
+"""Number of products in one solution of the law of friction above which a kernel has one solution only,
+because a second one takes longer to compile than it saves."""
+
 MAX_CACHED_KERNELS = 32
 """Number of kernels that this process keeps for later batches."""
 
@@ -233,7 +237,7 @@ class FusedStep:
     def _slowed(
         self, mechanism: Mechanism, given: Mapping[str, Array], pushed: bool, tau: Array
     ) -> FrictionStep:
-        """Solve the law of friction, with `CORRECTIONS` corrections of the modes.
+        """Solve the law of friction, with `CORRECTIONS` corrections of the modes, or none for a large robot.
 
         The first modes are the signs of the velocities, plus ``modes`` in a step that is repeated because it
         was not settled (`dynx.sim.batch.settling`).
@@ -249,7 +253,7 @@ class FusedStep:
             return law.solve(A, r, v, most, h, [], 0.0)
         single = given["one_by_one"][0]
         found = law.solve(A, r, v, most, h, sign(v[joints]) + given["modes"], single)
-        for _ in range(CORRECTIONS):
+        for _ in range(CORRECTIONS if law.operations <= MAX_CORRECTED_OPERATIONS else 0):
             found = law.solve(A, r, v, most, h, found.modes, single)
         return found
 
