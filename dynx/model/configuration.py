@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from dynx.model.model import Model
 
 
+_MAX_FLOAT = float(np.finfo(np.float64).max)
+
 MAX_MAGNITUDE = 1e60
 """Bound on the magnitude of the entries of an array, and of the numbers of a description.
 
@@ -57,8 +59,10 @@ def whole_number(name: str, value: object, least: int) -> int:
 
 
 def is_real(value: object) -> TypeGuard[float]:
-    """Check whether a value is one real number, of Python or NumPy, and no truth value."""
-    return isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
+    """Check whether a value is one real number, of Python or NumPy, that a float can hold; no truth value."""
+    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
+        return False
+    return not isinstance(value, int) or abs(value) <= _MAX_FLOAT
 
 
 def positive_seconds(name: str, seconds: object) -> float:

@@ -59,6 +59,13 @@ SAME_MODEL = {MODEL: "of the scenario"}
 """Value that represents the scenario's model inside its controller or reference."""
 
 
+_FORMS: dict[str, dict[str, type]] = {
+    FINGERPRINT: {FINGERPRINT: str, "sha256": str},
+    CLASS: {CLASS: str, "fields": dict},
+}
+"""Types of the entries of an object's document, by the entry that marks it."""
+
+
 @dataclass(frozen=True)
 class Unknown:
     """A controller or a reference from a scenario file that cannot be rebuilt in this program."""
@@ -142,6 +149,7 @@ def decode(document: Document, model: Model | None = None) -> Any:
     Raises ArgumentError for a document of another form.
     """
     try:
+        _require_forms(document)
         return _decoded(document, model)
     # The document may be damaged, and constructors raise any exception for damaged arguments.
     except Exception as error:
@@ -205,6 +213,19 @@ def _decoded(document: Document, model: Model | None) -> Any:
     if kind is None or _has_other_code(document):
         return Unknown(document[CLASS].rpartition(":")[2], json.dumps(document))
     return kind(**{name: _decoded(each, model) for name, each in document["fields"].items()})
+
+
+def _require_forms(document: Document) -> None:
+    """Raise TypeError if entries of an object in a document have other types than `encode` gives them."""
+    if isinstance(document, list | dict):
+        for each in document.values() if isinstance(document, dict) else document:
+            _require_forms(each)
+    if not isinstance(document, dict):
+        return
+    for kind, forms in _FORMS.items():
+        for name, form in forms.items() if kind in document else ():
+            if not isinstance(document.get(name), form):
+                raise TypeError(f"{name} is {shown(document.get(name))}; wanted a {form.__name__}")
 
 
 def _object(value: Any, given: Mapping[str, Any], model: Model | None) -> Document:

@@ -10,6 +10,7 @@ from io import StringIO
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
 from rich.console import Console
@@ -22,6 +23,7 @@ from dynx.cli.doctor.overview import show_many
 from dynx.cli.doctor.repetition import doctor_command
 from dynx.cli.doctor.run import doctor_run
 from dynx.cli.doctor.tables import show_one
+from dynx.cli.shell.main import cli
 from dynx.cli.shell.run import carry_out
 from dynx.doctor.formats import read_baseline
 from dynx.doctor.formats.baseline import Baseline
@@ -84,6 +86,40 @@ def test_the_document_names_what_was_not_done(tmp_path: Path) -> None:
     document = json.loads(path.read_text())
     assert document["summary"]["not_done"] == 2
     assert document["not_done"] == ["later", "later"]
+
+
+def test_an_output_that_cannot_be_written_does_not_lose_the_others(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    lost, html, junit = tmp_path / "lost.json", tmp_path / "x.html", tmp_path / "x.xml"
+    lost.mkdir()
+    mended = str(tmp_path / "mended.urdf")
+    outputs = Outputs(json=str(lost), html=str(html), junit=str(junit))
+    assert conclude([differing()], tmp_path, outputs=outputs, targets=[mended]) == 2
+    assert html.stat().st_size > 0
+    assert junit.stat().st_size > 0
+    assert Path(mended).exists() == (differing().mended is not None)
+    shown = capsys.readouterr()
+    assert "lost.json" in shown.err
+    assert "it is a directory" in shown.err
+    assert shown.out
+
+
+@pytest.mark.parametrize("as_loaded", [False, True])
+def test_a_document_of_agree_that_cannot_be_written_leaves_the_table(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, as_loaded: bool
+) -> None:
+    def full(path: str, text: str) -> None:
+        raise ArgumentError(f"{path} cannot be written: no space left")
+
+    monkeypatch.setattr("dynx.cli.shell.terminal.write_text", full)
+    monkeypatch.setattr("dynx.cli.doctor.outputs.write_text", full)
+    engines = ["--backends", "pinocchio"] if as_loaded else ["--backends", "reference"]
+    command = ["agree", "pendulum", *engines, "--samples", "1", "--json", str(tmp_path / "x.json")]
+    result = CliRunner().invoke(cli, [*command, *["--as-loaded"] * as_loaded])
+    assert result.exit_code == 2
+    assert "pendulum" in result.stdout
+    assert "no space left" in result.stderr
 
 
 def test_a_counterexample_is_a_file_that_loads(tmp_path: Path) -> None:

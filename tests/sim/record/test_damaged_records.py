@@ -76,6 +76,7 @@ ODD = st.sampled_from(
         *({"class": "dynx.sim.plants.disturbances:Push", "fields": {}}, {"class": "x:y", "fields": 3}),
         {"class": "dynx.model.model:Model", "fields": {"name": 1, "links": 2, "joints": 3}},
         {"fingerprint": "a:b", "sha256": 0},
+        {"class": "x:y", "fields": {}, "code": 3},
         {"controller": {"controller": "PD"}, "model": {}},
     ]
 )
