@@ -15,16 +15,16 @@ MODULE = '''"""Mass of a robot."""
 
 import click
 
-import dynx
+from dynx.cli.shell.inputs import load_robot
 from dynx.cli.shell.options import model_options
 
 
 @click.command
 @click.argument("robot")
 @model_options
-def weigh(robot, base, lock):
+def weigh(robot, **options):
     """Print the total mass of a robot [kg]."""
-    click.echo(f"{dynx.load(robot, base=base, lock=dict(lock)).total_mass:.3f} kg")
+    click.echo(f"{load_robot(robot, **options).total_mass:.3f} kg")
 '''
 
 
@@ -84,7 +84,7 @@ def test_it_never_replaces_a_command_of_dynx(package: Path) -> None:
 
 @pytest.mark.parametrize(
     ("target", "reason"),
-    [("no_such_module:weigh", "ModuleNotFoundError"), ("acme_weigh:dynx", "is no click.Command")],
+    [("no_such_module:weigh", "ModuleNotFoundError"), ("acme_weigh:load_robot", "is no click.Command")],
 )
 def test_one_that_cannot_be_loaded_is_named_and_hides_no_other(
     package: Path, target: str, reason: str
