@@ -62,8 +62,8 @@ class Push:
         seconds = is_real(self.start) and is_real(self.duration)
         if not seconds or not self.duration > 0.0 or not np.isfinite(self.start):
             raise ArgumentError(
-                f"a push on {shown(self.frame)} starts at {shown(self.start)} and lasts "
-                f"{shown(self.duration)}; wanted finite, and positive, seconds"
+                f"a push on {shown(self.frame)} starts at {self.start!r} and lasts {self.duration!r}; "
+                "wanted finite, and positive, seconds"
             )
         return Push(self.frame, wrench, float(self.start), float(self.duration), self.reference)
 

@@ -53,7 +53,7 @@ def test_the_options_are_those_of_the_library() -> None:
 def test_a_wrong_quantity_lists_those_of_the_library() -> None:
     result = bench("double_pendulum", "--quantity", "curvature")
     assert result.exit_code == 2
-    assert f"known: {', '.join(QUANTITIES)} " in result.stderr
+    assert f"known: {', '.join(QUANTITIES).replace('_', '-')} " in result.stderr
 
 
 def test_a_table_for_each_case() -> None:

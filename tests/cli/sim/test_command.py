@@ -20,9 +20,9 @@ from tests.cli.sim.command import SHORT, document, sim
 needs_bullet = pytest.mark.skipif("pybullet" not in installed_backends(), reason="PyBullet is not installed")
 MOTORS = ("position-motor", "velocity-motor", "pd-motor")
 KEYS = """
-    schema dynx robot source base gravity nq nv law backend gains motor_limits frame frame_given motion
-    settings payload mass_scale total_mass passive status error overshoot dt steps steps_asked simulated
-    seconds max_error max_error_joint max_error_time rms_error final_error base_error frame_error
+    schema dynx robot source base base_pose gravity nq nv law backend gains motor_limits frame frame_given
+    motion settings payload mass_scale total_mass passive status error overshoot dt steps steps_asked
+    simulated seconds max_error max_error_joint max_error_time rms_error final_error base_error frame_error
     energy_change energy_drift max_kinetic_energy saturated joints final files
 """
 """Keys of the document, schema 1."""
