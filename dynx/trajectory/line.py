@@ -18,7 +18,7 @@ from dynx.backends import Backend
 from dynx.errors import ArgumentError, ShapeError, TrajectoryError, shown
 from dynx.ik import checked_targets
 from dynx.model import Model
-from dynx.model.configuration import checked_q
+from dynx.model.configuration import checked_q, real_array
 from dynx.model.model import refuse_other_than_model
 from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Floats
@@ -148,9 +148,10 @@ class _Line:
         self.q0 = checked_q(model, q0, "q0")
         if self.q0.shape != (model.nq,):
             raise ShapeError(f"q0 has shape {self.q0.shape}; wanted ({model.nq},)")
-        targets = checked_targets(target)
-        if targets.batch:
-            raise ShapeError(f"target has shape {np.shape(target)}; wanted a pose (4, 4) or a position (3,)")
+        goal = real_array("target", target)
+        if goal.shape not in ((4, 4), (3,)):
+            raise ShapeError(f"target has shape {goal.shape}; wanted a pose (4, 4) or a position (3,)")
+        targets = checked_targets(goal)
         assert targets.positions is not None
         self._require_start_within_limits()
         self._target_position, self._has_rotation = targets.positions, targets.rotations is not None

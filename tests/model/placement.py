@@ -17,9 +17,10 @@ Floats = NDArray[np.float64]
 
 def link_poses(model: Model, q: Floats) -> dict[str, Floats]:
     """Return T_world_link of every link."""
-    T = np.eye(4)
+    T = model.base_pose.matrix
     base = 0
     if model.floating:
+        T = np.eye(4)
         T[:3, :3], T[:3, 3] = Rotation.from_quat(q[3:7]).as_matrix(), q[:3]
         base = 7
     value = dict(zip(model.joint_names, q[base:].tolist(), strict=True))

@@ -36,7 +36,8 @@ def test_frames_and_total_inertia_are_those_of_the_links(data: st.DataObject) ->
     q = data.draw(configurations(model))
     mechanism, base = model.mechanism, 7 if model.floating else 0
     tree = q if mechanism.coupling is None else mechanism.coupling.expand_q(q)
-    T_world_base = frame_poses(model, q)[0]
+    # The root body of a fixed base is the world, also where the base has a pose of its own.
+    T_world_base = frame_poses(model, q)[0] if model.floating else np.eye(4)
     poses = body_poses(mechanism, tree[base:], T_world_base)
     size = 4.0 * (1.0 + float(np.max(np.abs(tree), initial=0.0)))
 
