@@ -9,11 +9,14 @@ results are written as tables of causes and effects by robot.
 from __future__ import annotations
 
 import argparse
+import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import dynx
 from tests.doctor.survey_files import Entry, add_options, counts, make_tasks, remarks, survey
+
+_NO_ANSWER, _PRESENT = "no answer", "present"
 
 GROUPS = {"erd": "example-robot-data", "pybullet": "pybullet_data"}
 
@@ -73,8 +76,8 @@ def page(entries: Sequence[Entry]) -> str:
         "and floating, and compared with reference values; see [doctor.md](doctor.md). The effect of a cause "
         "is how much an engine's result changes when that cause alone is removed, relative to the "
         "largest reference value; `no answer` means that the engine refuses the file, or cannot compute the "
-        "quantity, until "
-        "it is removed. Every cause listed is proved. Rules are explained in [rules.md](rules.md).",
+        "quantity, until it is removed; `present` means forces of contacts, which have no number. "
+        "Every cause listed is proved. Rules are explained in [rules.md](rules.md).",
         "",
         "Figures on public files that the doctor was not developed with: [public_files.md](public_files.md).",
         "",
@@ -104,11 +107,24 @@ def rows(entry: Entry) -> Iterator[tuple[str, ...]]:
         if finding["effect"]:
             by_rule.setdefault(finding["rule"], []).append(finding)
     for rule, found in sorted(by_rule.items()):
-        sizes = [finding["effect"]["relative_error"] for finding in found]
-        worst = "no answer" if None in sizes else f"{max(sizes):.1e}"
+        worst = max((finding["effect"] for finding in found), key=_rank)
         engines = ", ".join(sorted({engine for finding in found for engine in finding["engines"]}))
         name = f"[{rule}](rules.md#{rule.lower()}) {found[0]['name']}"
-        yield label(entry), entry["base"], name, str(len(found)), worst, engines
+        yield label(entry), entry["base"], name, str(len(found)), _text(worst), engines
+
+
+def _rank(effect: Entry) -> float:
+    """Order of effects: by the error, an engine without a result after every number."""
+    if effect["relative_error"] is not None:
+        return float(effect["relative_error"])
+    return 0.0 if effect["quantity"] == "contact_forces" else math.inf
+
+
+def _text(effect: Entry) -> str:
+    """The effect in the table; forces of contacts depend on the state so much that they have no number."""
+    if effect["relative_error"] is not None:
+        return f"{effect['relative_error']:.1e}"
+    return _PRESENT if effect["quantity"] == "contact_forces" else _NO_ANSWER
 
 
 def merged(table: Sequence[tuple[str, ...]]) -> list[str]:
@@ -125,9 +141,9 @@ def merged(table: Sequence[tuple[str, ...]]) -> list[str]:
         effect = first[4]
         if len(rows_alike) > 1:
             name = f"{name} and {len(rows_alike) - 1} more in that folder"
-            effects = sorted({row[4] for row in rows_alike}, key=lambda text: (text == "no answer", text))
-            numbers = [float(text) for text in effects if text != "no answer"]
-            effect = f"{min(numbers):.1e} to {max(numbers):.1e}" if numbers else "no answer"
+            effects = sorted({row[4] for row in rows_alike})
+            numbers = [float(text) for text in effects if text not in (_PRESENT, _NO_ANSWER)]
+            effect = f"{min(numbers):.1e} to {max(numbers):.1e}" if numbers else ", ".join(effects)
         lines.append(f"| {name} | {first[1]} | {first[2]} | {first[3]} | {effect} | {first[5]} |")
     return lines
 
