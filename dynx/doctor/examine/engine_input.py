@@ -6,7 +6,7 @@ complete ``<visual>`` and mesh ``<collision>`` elements are removed; shapes with
 engines compute the mass of a link without ``<inertial>`` from them. Where an engine computes inertias from
 meshes too, they are replaced by their boxes (`mesh_boxes`). Drake also searches for the textures of the
 robot's materials: those that it finds beside the description are replaced by colours, because they are not
-beside the engine input.
+beside the engine input. Everything else stays on its line, because engines name lines in their messages.
 """
 
 from __future__ import annotations
@@ -36,7 +36,8 @@ def without_meshes(source: XmlSource, *, collisions: bool = True) -> XmlSource:
     boxes = [source.replacement(mesh, _BOX) for shape in left for mesh in _named_meshes(shape)]
     if collisions:
         shapes += [shape for link in links for shape, _ in collision_meshes(link)]
-    return source.apply(*map(source.removal, shapes), *boxes, *texture_replacements(source))
+    edits = (*map(source.removal, shapes), *boxes, *texture_replacements(source))
+    return source.apply(*map(source.keeping_lines, edits))
 
 
 def _named_meshes(shape: SourceElement) -> list[SourceElement]:

@@ -43,7 +43,7 @@ def _edits(source: XmlSource, folder: Path) -> Iterator[Edit]:
                 written[name] = _write_corners(folder / f"mesh{len(written)}", name, source.source)
             path = written[name]
             if path is None:
-                yield source.removal(collision)
+                yield source.keeping_lines(source.removal(collision))
             else:
                 yield source.attribute_edit(mesh, "filename", str(path))
 

@@ -184,6 +184,13 @@ class XmlSource:
             at = edit.end
         return self._with_data(b"".join([*parts, self.data[at:]]))
 
+    def keeping_lines(self, edit: Edit) -> Edit:
+        """Return the edit of an element with as many empty lines after it as it removes, so that all else
+        stays on its line."""
+        start, end = (at - (self.data[at - 1 : at + 1] == b"\r\n") for at in (edit.start, edit.end))
+        removed = len(_LINE_END.findall(self.data, start, end))
+        return Edit(start, end, edit.text + "\n" * (removed - edit.text.count("\n")))
+
     # -- edits --------------------------------------------------------------------------------
 
     def attribute_edit(self, element: SourceElement, name: str, value: str) -> Edit:
