@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from dynx.model.xml.source import Edit, SourceElement, XmlSource
+from dynx.rules.text.number_text import is_number
 from tests.doctor.planting.inertia import MOMENTS, PRODUCTS
 from tests.doctor.planting.joints import limited, moving
 from tests.doctor.planting.site import CannotPlant, PlantedDefect, Planter, Site
@@ -197,12 +198,24 @@ def line_too_long(site: Site) -> PlantedDefect:
     return site.defect("DX413", edit, *joined, link=name)
 
 
+def _is_default(element: SourceElement) -> bool:
+    """Whether the element gives what a reader takes without it: no offset, or the axis x."""
+    default = {"origin": {0.0}, "axis": {1.0, 0.0}}.get(element.tag)
+    words = [word for text in element.attributes.values() for word in text.split()]
+    if default is None or not all(is_number(word) for word in words):
+        return False
+    numbers = [float(word) for word in words]
+    return set(numbers) <= default and (element.tag == "origin" or numbers[:1] == [1.0])
+
+
 def lone_carriage_return(site: Site) -> PlantedDefect:
     """The end of one line converted for an old Macintosh, in front of an element that PyBullet then loses."""
     joint, element = site.pick_joint(moving, "joint that moves")
     data = site.source.data
     lost = [
-        child.span.start for child in element.children if child.tag in ("origin", "axis", "parent", "child")
+        child.span.start
+        for child in element.children
+        if child.tag in ("origin", "axis", "parent", "child") and not _is_default(child)
     ]
     ends = [data.rfind(b"\n", 0, start) for start in lost]
     ends = [end for end, start in zip(ends, lost, strict=True) if not data[end:start].strip()]
