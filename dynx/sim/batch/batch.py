@@ -129,7 +129,7 @@ def simulate_batch(
 
     Raises ArgumentError, GainError, LimitError, SingularMassMatrixError as `simulate` does, and
     UnsupportedFeatureError for controllers that branch on their measurement. A rollout that diverges does not
-    stop the others: `BatchRollouts.diverged` has the time of divergence.
+    stop the others: `BatchRollouts.diverged` has the time of the step that led to it.
     """
     given = {name: value for name, value in locals().items() if name in field_names() and name != "model"}
     scenario, own = split_rows(model, given)
@@ -195,7 +195,7 @@ def simulate_batch(
     fixed = {name: rows.spread(array) for name, array in fixed.items()}
     state = controller.initial_state()
     zeros = np.zeros((n, moved.nv))
-    start |= {"max_error": zeros, "squared_errors": zeros}
+    start |= {"max_error": zeros, "squared_errors": zeros, "sound_steps": np.zeros((n, 1))}
     if limit is not None:
         start["steps_at_limit"] = zeros
     if state is not None:

@@ -25,11 +25,13 @@ from dynx.sim.batch.disturbances import BatchDisturbances
 from dynx.sim.batch.traced_controller import innermost, traced_controller
 from dynx.sim.loop.controller_checks import ControllerWatch, defect_of_outcome, is_row
 from dynx.sim.loop.own_controllers import refuse_irreproducible, traced_torque
+from dynx.sim.loop.plain import DIVERGENCE_SPEED
 from dynx.sim.plants.friction_law import FrictionLaw, FrictionStep
 from dynx.sim.plants.integrators import SemiImplicitEuler
 from dynx.simd.cache import load_kernel, program_recipe
 from dynx.simd.kernel import Kernel
 from dynx.simd.trace import trace
+from dynx.simd.user_code.numbers import as_symbol, as_traced, select
 from dynx.spatial.branchless import difference, integrate
 from dynx.spatial.scalar import Array, Floats, clamp, sign, tanh
 from dynx.trajectory.base import Setpoint
@@ -136,6 +138,7 @@ class FusedStep:
                 "v": v,
                 "max_error": max_error,
                 "squared_errors": given["squared_errors"] + error * error,
+                "sound_steps": _sound_steps(given["sound_steps"], v),
                 **results,
             }
 
@@ -160,6 +163,7 @@ class FusedStep:
         """Return the inputs of a step in their order, and their sizes."""
         nq, nv = self.model.nq, self.model.nv
         sizes = {"q": nq, "v": nv, "max_error": nv, "squared_errors": nv, "q_reference": nq}
+        sizes["sound_steps"] = 1
         if not controlled:
             sizes["tau"] = nv
         else:
@@ -296,3 +300,12 @@ class FusedStep:
         if isinstance(mass, float | int) and not mass:
             return np.zeros(3)
         return np.asarray(root.first_moment / mass)
+
+
+def _sound_steps(before: Array, v: Array) -> Array:
+    """Return the number of steps before divergence (1,) after a step to the velocity `v`, counted on from
+    `before`; in and after the step k that leads to divergence it is -1 - k."""
+    (steps,) = map(as_traced, before)
+    sound = as_traced(sum(v * v)) < DIVERGENCE_SPEED**2  # not where it is NaN
+    counted = select(steps < 0.0, steps, select(sound, steps + 1.0, -1.0 - steps))
+    return np.array([as_symbol(counted)], dtype=object)

@@ -15,12 +15,6 @@ from dynx.simd.kernel import Kernel
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint
 
-STEPS_BETWEEN_CHECKS = 100
-"""Number of steps between two checks for divergence."""
-
-DIVERGENCE_BOUND = 1e8
-"""Coordinate [rad or m] or speed [rad/s or m/s] above which a rollout counts as diverged."""
-
 
 class PartOutcome(NamedTuple):
     """The outcome of `count` rollouts."""
@@ -29,7 +23,7 @@ class PartOutcome(NamedTuple):
     v: Floats  # (count, nv), at the end
     max_error: Floats  # (count, nv)
     rms_error: Floats  # (count, nv)
-    diverged: Floats  # (count,), the step of the check that found it, or -1
+    diverged: Floats  # (count,), the number of the step that led to it, or -1
     q_record: Floats  # (count, kept, nq)
     v_record: Floats  # (count, kept, nv)
     tau_record: Floats  # (count, kept, nv)
@@ -68,8 +62,8 @@ class Part:
     dt: float
     start: dict[str, Floats]
     """Initial state as arrays (count, size): q and v, maximum error and sum of squared errors of each
-    coordinate (``max_error``, ``squared_errors``), the controller state (``state``), and the number of
-    steps at the effort limit (``steps_at_limit``)."""
+    coordinate (``max_error``, ``squared_errors``), the number of steps before divergence (``sound_steps``),
+    the controller state (``state``), and the number of steps at the effort limit (``steps_at_limit``)."""
     fixed: dict[str, Floats]
     """Constant inputs: parameters and gains (count, size)."""
     setpoints: Setpoint
@@ -138,7 +132,6 @@ class _Run:
             for name in ("bind", "bind_groups")
         )
         self._stops = None if part.stops is None else part.stops.of_rows(self._rows)
-        self._diverged = np.full(self._rows, -1.0)
         self._records: tuple[list[Floats], list[Floats], list[Floats]] = ([], [], [])
 
     def run(self) -> PartOutcome:
@@ -164,10 +157,7 @@ class _Run:
             if part.record_every and (step + 1) % part.record_every == 0:
                 for kept, array in zip(self._records, (now["q"], now["v"], self._tau), strict=True):
                     kept.append(array[:n].copy())
-            if (step + 1) % STEPS_BETWEEN_CHECKS == 0:
-                self._check(step + 1, now)
         last = self._sets[part.n_steps % sets]
-        self._check(part.n_steps, last)
         q, v, tau = (
             np.stack(kept, axis=1) if kept else np.zeros((n, 0, array.shape[1]))
             for kept, array in zip(self._records, (last["q"], last["v"], self._tau), strict=True)
@@ -177,7 +167,8 @@ class _Run:
             v=last["v"][:n].copy(),
             max_error=last["max_error"][:n].copy(),
             rms_error=np.sqrt(last["squared_errors"][:n] / part.n_steps),
-            diverged=self._diverged[:n].copy(),
+            # In a rollout that diverged in step k the number of steps before divergence is -1 - k.
+            diverged=np.maximum(-1.0 - last["sound_steps"][:n, 0], -1.0),
             q_record=q,
             v_record=v,
             tau_record=tau,
@@ -223,11 +214,6 @@ class _Run:
         }
         written = {"tau": self._tau, **self._settling.outputs, **target}
         return [known[port.name] for port in kernel.inputs], [written[port.name] for port in kernel.outputs]
-
-    def _check(self, step: int, now: dict[str, Floats]) -> None:
-        state = np.maximum(np.abs(now["q"]).max(axis=1), np.abs(now["v"]).max(axis=1))
-        new = (self._diverged < 0) & ~(state < DIVERGENCE_BOUND)
-        self._diverged[new] = step
 
     def _padded(self, array: Floats) -> Floats:
         rows = np.minimum(np.arange(self._rows), len(array) - 1)

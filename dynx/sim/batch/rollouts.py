@@ -27,6 +27,11 @@ class BatchRollouts:
 
     Errors are `model.difference` from the configuration at the end of each step to the reference there. The
     record has the states after every `record_every` steps, and the torque of the step before.
+
+    `diverged` is the time [s] at which the step begins that leads to a velocity that is not finite or whose
+    norm is above 1e8 rad/s or m/s: the `time` of the error that `simulate` raises there. It is a multiple of
+    `dt`, and NaN for rollouts that did not diverge. A diverged rollout counts as done: it takes the remaining
+    steps, and its states and errors are in general not finite.
     """
 
     scenario: Scenario  # shared by all rollouts, without the arguments that have a row for each rollout
@@ -34,7 +39,7 @@ class BatchRollouts:
     v: Floats  # (n, nv), at the end
     max_error: Floats  # (n, nv)
     rms_error: Floats  # (n, nv)
-    diverged: Floats  # (n,), the time [s] of the check that found divergence; NaN if there was none
+    diverged: Floats  # (n,), the time [s] of the step that led to divergence; NaN if there was none
     done: Any  # (n,) bool
     t: Floats  # (kept,), the times of the record [s]
     q_record: Floats  # (n, kept, nq)
@@ -121,23 +126,26 @@ class BatchRollouts:
             lower.set_yscale("log")
         for axis in (upper, lower):
             axis.grid(visible=True, color="0.9")
-        lost = int((~np.isnan(self.diverged)).sum())
-        figure.suptitle(
-            f"{int(self.done.sum())} of {len(self)} rollouts" + (f", {lost} diverged" if lost else "")
-        )
+        figure.suptitle(f"{int(self.done.sum())} of {len(self)} rollouts{self._losses}")
         if path is not None:
             save_figure(figure, path)
         return figure
 
+    @property
+    def _losses(self) -> str:
+        """Number of diverged rollouts and the first time, as the end of a sentence; empty without any."""
+        lost = int((~np.isnan(self.diverged)).sum())
+        return f", {lost} diverged, the first at {np.nanmin(self.diverged):.6g} s" if lost else ""
+
     def __repr__(self) -> str:
-        return f"<BatchRollouts of {self.scenario.model.name}: {int(np.sum(self.done))} of {len(self)} done>"
+        done = f"{int(np.sum(self.done))} of {len(self)} done"
+        return f"<BatchRollouts of {self.scenario.model.name}: {done}{self._losses}>"
 
     def _repr_html_(self) -> str:
         low, middle, high = (f"{x:.3g}" for x in self.quantiles())
-        lost = int((~np.isnan(self.diverged)).sum())
         rows = {
             "done": f"{int(np.sum(self.done))} of {len(self)}",
-            "diverged": lost,
+            "diverged": self._losses.removeprefix(", ") or "none",
             "largest error [rad or m], 5 %, 50 %, 95 %": f"{low}, {middle}, {high}",
         }
         return html_table(f"rollouts of {self.scenario.model.name}", rows)

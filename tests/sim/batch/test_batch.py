@@ -23,7 +23,7 @@ from dynx.control.gravity_compensation import GravityCompensatedPD
 from dynx.control.pd import PD
 from dynx.control.pid import PID
 from dynx.control.saturation import Saturated
-from dynx.errors import ArgumentError, UnsupportedFeatureError
+from dynx.errors import ArgumentError, DivergedError, UnsupportedFeatureError
 from dynx.model import Model
 from dynx.sim import Noise, Payload, simulate
 from dynx.sim.batch import batch as batch_module
@@ -210,7 +210,9 @@ def test_a_rollout_that_diverges_leaves_the_others_alone(arm: Model) -> None:
     gains = np.array([200.0, 1e7, 200.0])
     found = simulate_batch(arm, ComputedTorque(arm, kp=1.0, kd=40), reference, gains={"kp": gains}, dt=DT)
     assert np.isnan(found.diverged[[0, 2]]).all()
-    assert 0.0 < found.diverged[1] <= 0.5
+    with pytest.raises(DivergedError) as alone:
+        simulate(arm, ComputedTorque(arm, kp=1e7, kd=40), reference, plant="compiled", dt=DT)
+    assert found.diverged[1] == alone.value.time
     assert found.worst[1] == np.inf
     assert np.isfinite(found.worst[[0, 2]]).all()
 

@@ -15,7 +15,7 @@ from dynx import control
 from dynx.backends import installed_backends
 from dynx.control.base import Controller, Measurement
 from dynx.control.dynamics import EngineDynamics
-from dynx.errors import UnsupportedFeatureError
+from dynx.errors import ControlError, UnsupportedFeatureError
 from dynx.model import Model
 from dynx.sim import Scenario, Simulation, simulate, simulate_batch
 from dynx.trajectory.base import Setpoint
@@ -205,3 +205,21 @@ def test_dynamics_on_another_engine_and_of_another_robot() -> None:
     batch_and_one(ARM, two, GOAL, duration=0.02)
     with pytest.raises(dynx.errors.ArgumentError, match="the backend is for"):
         control.model_dynamics(dynx.load("panda"), ENGINE)
+
+
+def test_divergence_has_the_time_of_the_step_whose_torque_is_not_finite() -> None:
+    def root(self: Own, measurement: Measurement, setpoint: Setpoint) -> Any:
+        return np.sqrt(np.where(measurement.t > 0.0305, self.kp, 1.0)) - measurement.v
+
+    law = Own(root)
+    law.kp = np.full(6, -1.0)
+    with np.errstate(invalid="ignore"), pytest.raises(ControlError, match=r"step 31, at 0\.031 s") as alone:
+        simulate(ARM, law, GOAL, q0=np.zeros(6), plant="compiled", duration=0.05)
+    several: tuple[tuple[float, dict[str, Any]], ...] = ((0.04, {}), (0.4, {"effort_limits": True}))
+    for duration, options in several:
+        gains = {"kp": np.array([-1.0, 1.0, -1.0])}
+        many = simulate_batch(ARM, law, GOAL, q0=np.zeros(6), gains=gains, duration=duration, **options)
+        np.testing.assert_array_equal(many.diverged, [alone.value.time, np.nan, alone.value.time])
+        assert many.worst[[0, 2]].tolist() == [np.inf, np.inf]
+        assert "3 of 3 done, 2 diverged, the first at 0.031 s>" in repr(many)
+        assert "2 diverged, the first at 0.031 s" in many._repr_html_()
