@@ -7,7 +7,6 @@ from math import hypot, isfinite
 from typing import Any
 
 import numpy as np
-from numpy import ndarray
 from numpy.typing import ArrayLike
 
 from dynx.errors import (
@@ -31,11 +30,9 @@ from dynx.spatial.scalar import Floats
 
 _FLOAT64 = np.dtype(np.float64)
 
-_MAX_LISTED = 40
+MAX_LISTED = 40
 """Size up to which the norm of an array is computed faster from a list of its entries than by NumPy, of whose
 products only `vdot` gives no warning where it overflows."""
-
-_MAX_SQUARE = MAX_MAGNITUDE**2
 
 
 class Arguments:
@@ -47,31 +44,11 @@ class Arguments:
         self._floating = model.floating
         self._q_shape = (model.nq,)
         self._v_shape = (model.nv,)
-        self._listed = model.nq <= _MAX_LISTED
+        self._listed = model.nq <= MAX_LISTED
 
     # The norm of a vector is below a bound only if every entry is, and no entry is NaN. One C loop over a
     # list computes it several times faster than NumPy at this size. If the norm is too large, every entry is
     # checked.
-
-    def are_sample(self, arguments: tuple[Any, ...]) -> bool:
-        """Check whether q and what follows are float64 arrays of one valid sample, which `q` and `v` return
-        as they are; if not, those two convert them or find out why."""
-        values: list[float] = []
-        shape, listed = self._q_shape, self._listed
-        for array in arguments:
-            if type(array) is not ndarray or array.dtype is not _FLOAT64 or array.shape != shape:
-                return False
-            if listed:
-                values += array.tolist()
-            elif not np.vdot(array, array) < _MAX_SQUARE:
-                return False
-            shape = self._v_shape
-        if self.closed or (listed and not hypot(*values) < MAX_MAGNITUDE):
-            return False
-        if self._floating:
-            x, y, z, w = values[3:7] if listed else arguments[0][3:7].tolist()
-            return bool(abs(x * x + y * y + z * z + w * w - 1.0) <= UNIT_NORM_TOLERANCE)
-        return True
 
     def q(self, q: Any) -> Floats:
         """Return a configuration (..., nq), finite, with a unit quaternion for a floating base."""

@@ -61,7 +61,7 @@ class Backend(QuantityCalls):
         `CalcPoseInWorld`, MuJoCo `mj_kinematics`, PyBullet `getLinkState`.
         """
         if isinstance(frame, str):
-            return self._evaluate(ONE_FRAME, (q,), frame)
+            return self._evaluate((ONE_FRAME, frame), (q,))
         placements = self._evaluate(ALL_FRAMES, (q,))
         if frame is None:
             return placements
@@ -82,7 +82,7 @@ class Backend(QuantityCalls):
         Siciliano et al., eq. 3.30. Elsewhere: Pinocchio `computeFrameJacobian`, Drake
         `CalcJacobianSpatialVelocity`, MuJoCo `mj_jac`, PyBullet `calculateJacobian`.
         """
-        J = self._evaluate("jacobian", (q,), (frame, reference))
+        J = self._evaluate(("jacobian", frame, reference), (q,))
         return J if point is None else self._at_point(J, None, q, None, frame, reference, point)
 
     def jacobian_derivative(
@@ -99,7 +99,7 @@ class Backend(QuantityCalls):
         Siciliano et al., eq. 3.30, differentiated in time. Elsewhere: Pinocchio
         `getFrameJacobianTimeVariation`, MuJoCo `mj_jacDot`.
         """
-        dJ = self._evaluate("jacobian_derivative", (q, v), (frame, reference))
+        dJ = self._evaluate(("jacobian_derivative", frame, reference), (q, v))
         if point is None:
             return dJ
         J = self.jacobian(q, frame, reference=reference)
@@ -120,7 +120,7 @@ class Backend(QuantityCalls):
         `CalcSpatialVelocityInWorld`, MuJoCo `mj_objectVelocity`.
         """
         if point is None:
-            return self._evaluate("frame_velocity", (q, v), (frame, reference))
+            return self._evaluate(("frame_velocity", frame, reference), (q, v))
         q, v = self._checked_q(q), self._checked_v(v)
         common_batch(q, v)
         return apply_matrix(self.jacobian(q, frame, reference=reference, point=point), v)
@@ -143,7 +143,7 @@ class Backend(QuantityCalls):
         `mj_objectAcceleration` (which adds gravity).
         """
         if point is None:
-            return self._evaluate("frame_acceleration", (q, v, a), (frame, reference))
+            return self._evaluate(("frame_acceleration", frame, reference), (q, v, a))
         q, v, a = self._checked_q(q), self._checked_v(v), self._checked_v(a, "a")
         common_batch(q, v, a)
         J = self.jacobian(q, frame, reference=reference, point=point)

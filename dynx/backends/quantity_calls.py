@@ -22,13 +22,14 @@ from dynx.backends.joint_dynamics import JointDynamicsTerms
 from dynx.backends.lifecycle import Lifecycle
 from dynx.backends.quantities import QUANTITIES
 from dynx.backends.solvability import Solvability
+from dynx.backends.straight import StraightCall, sample_check, straight_call
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
 
 Forces = Mapping[str, ArrayLike]
 
-Of = str | tuple[str, str] | None
-"""Name of a frame, or names of a frame and a reference, or None for a quantity of the whole robot."""
+Key = str | tuple[str, ...]
+"""Name of a quantity of the whole robot; for a frame, names of the quantity, the frame and any reference."""
 
 ONE_FRAME, ALL_FRAMES = "frame_placement", "frame_placements"
 """Names under which `QuantityCalls` evaluates the poses of one frame and of all frames."""
@@ -56,47 +57,40 @@ class QuantityCalls(Lifecycle, EngineHooks):
         self._joint_terms = JointDynamicsTerms(model)
         self._solvability = Solvability(model)
         self._frame_index = {name: index for index, name in enumerate(model.frame_names)}
-        self._details: dict[Of, tuple[Any, ...]] = {None: ()}
         all_poses = (len(self._frame_index), 4, 4)
         self._plans = {
             ONE_FRAME: _Plan(("q",), "_frame_placement", (4, 4)),
             ALL_FRAMES: _Plan(("q",), "_frame_placements", all_poses),
         }
-        # Functions of this object, one sample and its details, by the quantity: hooks without the translation
-        # of exceptions. A quantity gets its function when it is first evaluated.
-        self._straight: dict[str, Callable[..., Any]] = {}
+        # Functions that call hooks without the translation of exceptions, made when a quantity is first
+        # evaluated.
+        self._straight: dict[Key, StraightCall] = {}
 
-    def _evaluate(self, name: str, arguments: tuple[Any, ...], of: Of = None) -> Floats:
-        """Check the arguments of the quantity `name`, with any leading axes, and evaluate it.
-
-        `of` is the frame, or the frame and the reference, of a quantity of a frame.
-        """
+    def _evaluate(self, key: Key, arguments: tuple[Any, ...]) -> Floats:
+        """Check the arguments of the quantity `key`, with any leading axes, and evaluate it."""
         try:
-            call, details = self._straight[name], self._details[of]
+            call = self._straight[key]
         except (KeyError, TypeError):
-            return self._evaluate_samples(name, arguments, of)
-        if self._validate:
-            if not self._arguments.are_sample(arguments):
-                return self._evaluate_samples(name, arguments, of)
-        else:
-            for argument in arguments:
-                if argument.ndim != 1:
-                    return self._evaluate_samples(name, arguments, of)
+            return self._evaluate_samples(key, arguments)
         try:
-            result = call(self, *arguments, *details)
+            result = call(self, arguments)
         except (Exception, SystemExit):
+            name = key if isinstance(key, str) else key[0]
             if not hasattr(getattr(self, self._plans[name].hook), "untranslated"):
                 raise
             # The hook itself raises the error that its engine's exception stands for.
-            return self._evaluate_samples(name, arguments, of)
-        return result if type(result) is ndarray else np.asarray(result)
+            return self._evaluate_samples(key, arguments)
+        if type(result) is ndarray:
+            return result
+        return self._evaluate_samples(key, arguments) if result is None else np.asarray(result)
 
-    def _evaluate_samples(self, name: str, arguments: tuple[Any, ...], of: Of) -> Floats:
-        """Evaluate the quantity `name` as `_evaluate` does, by the path that takes everything."""
+    def _evaluate_samples(self, key: Key, arguments: tuple[Any, ...]) -> Floats:
+        """Evaluate the quantity `key` as `_evaluate` does, by the path that takes everything."""
+        name, *frame = (key,) if isinstance(key, str) else key
         plan = self._plans.get(name) or self._plan(name)
         q = self._checked_q(arguments[0])
         rates = tuple(map(self._checked_v, arguments[1:], plan.arguments[1:]))
-        details = self._frame_details(of)
+        details = self._frame_details(*frame)
         if plan.solves:
             common_batch(q, *rates)
             self._solvability.refuse_singular(False)
@@ -106,9 +100,10 @@ class QuantityCalls(Lifecycle, EngineHooks):
         if hook is None:
             hook = partial(self._derive, name)
             details = details or plan.implied_details
-        elif plan.hook not in vars(self):
+        elif plan.hook not in vars(self) and key not in self._straight:
             function = untranslated(getattr(type(self), plan.hook))
-            self._straight[name] = self._evaluation.of_sample(function, len(rates), plan.reduction)
+            function = self._evaluation.of_sample(function, len(rates), plan.reduction)
+            self._store_straight(key, function, len(arguments), details)
         return self._evaluation(hook, plan.result_shape, q, *rates, args=details, reduce=plan.reduction)
 
     def _solved_acceleration(self, q: Floats, v: Floats, tau: Floats) -> Floats:
@@ -116,22 +111,29 @@ class QuantityCalls(Lifecycle, EngineHooks):
         hooks = ("_mass_matrix", "_bias_torque")
         if vars(self).keys().isdisjoint(hooks):
             functions = (untranslated(getattr(type(self), hook)) for hook in hooks)
-            self._straight["forward_dynamics"] = self._evaluation.solution_of_sample(*functions)
+            self._store_straight("forward_dynamics", self._evaluation.solution_of_sample(*functions), 3)
         return solve_mass_matrix(
             self._evaluate("mass_matrix", (q,)), tau - self._evaluate("bias_torque", (q, v))
         )
 
-    def _frame_details(self, of: Of) -> tuple[Any, ...]:
+    def _store_straight(
+        self, key: Key, function: Callable[..., Any], arguments: int, details: tuple[Any, ...] = ()
+    ) -> None:
+        check = sample_check(self.model, arguments, validate=self._validate)
+        self._straight[key] = straight_call(function, arguments, details, check)
+        if self._arguments.closed:
+            # Another thread closed this backend meanwhile.
+            self._straight.clear()
+
+    def close(self) -> None:
+        super().close()
+        self._straight.clear()
+
+    def _frame_details(self, *names: str) -> tuple[Any, ...]:
         """Return what hooks take for a frame, or a frame and a reference: its number, the checked name."""
-        try:
-            return self._details[of]
-        except (KeyError, TypeError):
-            if isinstance(of, tuple):
-                details: tuple[Any, ...] = self._index(of[0]), self._arguments.reference(of[1])
-            else:
-                details = (self._index(str(of)),)
-            self._details[of] = details
-            return details
+        if not names:
+            return ()
+        return (self._index(names[0]), *map(self._arguments.reference, names[1:]))
 
     def _plan(self, name: str) -> _Plan:
         quantity, evaluation, reduction = QUANTITIES[name], self._evaluation, None

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from dynx._version import __version__
 from dynx.backends.base import Backend
 from dynx.backends.quantities import QUANTITIES, Quantity
-from dynx.backends.quantity_calls import Forces, Of
+from dynx.backends.quantity_calls import Forces, Key
 from dynx.compiled.arguments import BatchArguments
 from dynx.compiled.call import CoupledCall, KernelCall, NumericCall, write_into
 from dynx.compiled.frames import chain_of, place_of
@@ -188,15 +188,21 @@ class CompiledBackend(Backend):
 
     # -- kernels ------------------------------------------------------------------------------
 
-    def _evaluate(self, name: str, arguments: tuple[Any, ...], of: Of = None) -> Floats:
+    def _evaluate(self, key: Key, arguments: tuple[Any, ...]) -> Floats:
         """Evaluate by a kernel in model coordinates, into which mimic joints are compiled.
 
         The call of the kernel checks the arguments.
         """
-        if name == "forward_dynamics" and not self._eliminates:
-            return self._evaluate_samples(name, arguments, of)
-        details = self._frame_details(of) if of else QUANTITIES[name].implied_details(self.model)
-        return self._call_for(name, details)(*arguments)
+        try:
+            call = self._public_calls[key]
+        except (KeyError, TypeError):
+            if key == "forward_dynamics" and not self._eliminates:
+                return self._evaluate_samples(key, arguments)
+            self._arguments.refuse_closed()
+            name, *frame = (key,) if isinstance(key, str) else key
+            details = self._frame_details(*frame) or QUANTITIES[name].implied_details(self.model)
+            call = self._store_call(key, name, details)
+        return call(*arguments)
 
     def _call_by_name(self, quantity: str) -> Call:
         """Return the call of a quantity without details, stored under its name."""

@@ -116,16 +116,17 @@ class KernelCall:
         numbers = workspace.inputs
         try:
             numbers[self._first] = q
-            if v is not _ABSENT:
-                numbers[self._second] = v
-            if a is not _ABSENT:
-                numbers[self._third] = a
             # The buffer of a masked array has no mask.
-            if not (
-                type(q) is _NDARRAY
-                and (v is _ABSENT or type(v) is _NDARRAY)
-                and (a is _ABSENT or type(a) is _NDARRAY)
-            ):
+            if v is _ABSENT:
+                plain = type(q) is _NDARRAY
+            else:
+                numbers[self._second] = v
+                if a is _ABSENT:
+                    plain = type(q) is type(v) is _NDARRAY
+                else:
+                    numbers[self._third] = a
+                    plain = type(q) is type(v) is type(a) is _NDARRAY
+            if not plain:
                 return self._evaluate_rows(workspace, _given(q, v, a), out)
         except _NOT_ONE_SAMPLE:
             return self._evaluate_rows(workspace, _given(q, v, a), out)

@@ -14,7 +14,15 @@ from dynx.backends import Backend, backend, installed_backends
 from dynx.backends.quantities import QUANTITIES, Quantity
 from dynx.backends.quantity_calls import QuantityCalls
 from dynx.engines.pinocchio.backend import PinocchioBackend
-from dynx.errors import ArgumentError, ClosedError, DTypeError, EngineError, NotFiniteError, ShapeError
+from dynx.errors import (
+    ArgumentError,
+    ClosedError,
+    DTypeError,
+    EngineError,
+    NotFiniteError,
+    ShapeError,
+    UnknownNameError,
+)
 from dynx.model import Model
 from dynx.model.configuration import MAX_MAGNITUDE
 from dynx.reference.backend import ReferenceBackend
@@ -25,7 +33,7 @@ from tests.backends.robots import all_quantities, assert_close, chain, mixed_rob
 ENGINES = tuple(name for name in installed_backends() if name != "compiled")
 """Backends with hooks; `compiled` has kernels instead."""
 
-SIZES = (1, 3, 45)
+SIZES = (1, 3, 32, 45)
 """Numbers of joints: Pinocchio returns vectors at one, and long arrays are checked by NumPy."""
 
 
@@ -100,6 +108,22 @@ def test_what_is_no_valid_sample_is_refused_on_the_straight_path(size: int, base
     for quantity in QUANTITIES.values():
         with pytest.raises(ClosedError):
             call_of(engine, quantity, *sample)
+
+
+@pytest.mark.parametrize("name", ["pinocchio", "compiled"])
+@pytest.mark.parametrize("wrong", [None, 3, ["link1"], "nowhere"])
+def test_a_name_that_is_none_of_a_frame_or_a_reference_is_refused(name: str, wrong: Any) -> None:
+    engine: Any = backend(name, chain(3))
+    q, v, _ = motion(engine.model)
+    frame = engine.model.frame_names[-1]
+    for _ in range(2):
+        engine.jacobian(q, frame)
+        engine.frame_velocity(q, v, frame)
+        for names in ({"frame": wrong}, {"frame": frame, "reference": wrong}):
+            with pytest.raises(UnknownNameError):
+                engine.jacobian(q, **names)
+            with pytest.raises(UnknownNameError):
+                engine.frame_velocity(q, v, **names)
 
 
 @pytest.mark.parametrize("size", SIZES)
