@@ -14,10 +14,16 @@ from dynx.rules.rule import Detection, Kind, Remedy, Rule
 
 @dataclass(frozen=True)
 class Correction:
-    """One place where a rule applies, and the edits that correct it; no edits where none does."""
+    """One place where a rule applies, and the edits that correct it; no edits where none does.
+
+    `renamed` lists the attributes whose number stood under a misspelled name. Engines then read another
+    number, so that this changes the physics. With `whole` the edits do nothing else.
+    """
 
     detection: Detection
     edits: tuple[Edit, ...] = ()
+    renamed: tuple[str, ...] = ()
+    whole: bool = False
 
 
 def found_at(element: SourceElement, message: str) -> Detection:
@@ -55,11 +61,15 @@ class EditingRule(Rule):
     def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy | None:
         """Return the edits of these places."""
         wanted = set(detections)
-        edits = [edit for each in self.corrections(case) if each.detection in wanted for edit in each.edits]
-        if not edits:
+        made = [each for each in self.corrections(case) if each.detection in wanted and each.edits]
+        if not made:
             return None
-        mended = case.with_source(case.source.apply(*edits))
-        return Remedy(mended, self.changed, self.decision(case), self.changes_physics)
+        mended = case.with_source(case.source.apply(*(edit for each in made for edit in each.edits)))
+        renamed = dict.fromkeys(name for each in made for name in each.renamed)
+        parts = [] if all(each.whole for each in made) else [self.changed]
+        parts += [f"corrected the misspelled name of {' and of '.join(renamed)}"] if renamed else []
+        physics = self.changes_physics or bool(renamed)
+        return Remedy(mended, " and ".join(parts), self.decision(case), physics)
 
 
 class OptionalEditingRule(EditingRule):

@@ -13,16 +13,20 @@ not ``xyz`` is DX218.
 - MuJoCo 4.0 refuses the file.
 - Drake 1.51 refuses the zero axis, and reads ``<axis/>`` as (1, 0, 0).
 
-What to do: write the direction. The file does not contain it, so ``dynx doctor --fix`` writes URDF's default,
+What to do: write the direction. ``<axis x="0" y="0" z="1"/>`` contains it, and ``dynx doctor --fix`` writes
+``xyz="0 0 1"``. Otherwise the file does not contain it, so ``dynx doctor --fix`` writes URDF's default,
 (1, 0, 0). If the joint should not move, ``--choose DX202=fixed`` makes it a fixed joint.
 """
 
 from collections.abc import Iterable
 
-from dynx.rules import EVERY_ENGINE, Case, Correction, EditingRule, correction
+from dynx.model.xml.source import SourceElement
+from dynx.rules import EVERY_ENGINE, Case, Correction, EditingRule, correction, found_at
 from dynx.rules.joints.axes import misspelled_direction
 from dynx.rules.joints.elements import SINGLE, elements_in_joints
 from dynx.rules.text.number_text import is_number
+
+_PARTS = frozenset("xyz")
 
 
 class AxisWithoutDirection(EditingRule):
@@ -43,9 +47,27 @@ class AxisWithoutDirection(EditingRule):
             words = axis.attributes.get("xyz", "").split()
             if any(not is_number(word) or float(word) != 0.0 for word in words):
                 continue
+            what = "is zero" if words else "has no numbers"
+            message = f"the axis of a {joint.attributes['type']} joint {what}"
+            written = _in_parts(axis)
+            if written is not None:
+                removals = (
+                    case.source.attribute_removal(axis, name) for name in _PARTS & axis.attributes.keys()
+                )
+                edits = (*removals, case.source.attribute_edit(axis, "xyz", written))
+                place = found_at(axis, f"{message}; xyz is {written} in attributes of their own")
+                yield Correction(place, edits, ("xyz",), whole=True)
+                continue
             if self.chosen(case) == "fixed":
                 edit = case.source.attribute_edit(joint, "type", "fixed")
             else:
                 edit = case.source.attribute_edit(axis, "xyz", "1 0 0")
-            what = "is zero" if words else "has no numbers"
-            yield correction(axis, f"the axis of a {joint.attributes['type']} joint {what}", edit)
+            yield correction(axis, message, edit)
+
+
+def _in_parts(axis: SourceElement) -> str | None:
+    """Return the direction of an axis without ``xyz`` whose x, y and z are attributes of their own."""
+    words = [axis.attributes.get(name, "0").strip() for name in sorted(_PARTS)]
+    if "xyz" in axis.attributes or not all(map(is_number, words)) or not any(map(float, words)):
+        return None
+    return " ".join(words)

@@ -7,17 +7,21 @@ URDF requires a ``<limit>``; the type of a joint that can rotate without limit i
 
 A tag spelled wrongly, such as ``<Limit>``, has the same effect: readers do not know it.
 
-What to do: write the limits of the joint. The file does not contain them, so ``dynx doctor --fix`` leaves the
+What to do: write the limits of the joint. A misspelled tag contains them, and ``dynx doctor --fix`` corrects
+it. Otherwise the file does not contain them, so ``dynx doctor --fix`` leaves the
 joint unlimited: a revolute joint becomes ``continuous``, a prismatic one gets the largest double for its
 limits. ``--choose DX203=zero`` writes ``lower="0" upper="0"`` instead, the numbers that URDF has for a
 ``<limit>`` in which they are not given; the joint then must not move in simulations that keep to limits.
 """
 
 from collections.abc import Iterable
+from xml.sax.saxutils import quoteattr
 
+from dynx.errors import escaped
 from dynx.model.xml.source import Edit, SourceElement
-from dynx.rules import Case, Correction, EditingRule, correction, measured_on
+from dynx.rules import Case, Correction, EditingRule, correction, found_at, measured_on
 from dynx.rules.joints.elements import UNLIMITED, joints_of_type
+from dynx.rules.text.misspelled_names import meant_name
 from dynx.rules.text.number_text import LARGEST
 
 _ZERO = f'<limit lower="0" upper="0" effort="{LARGEST}" velocity="{LARGEST}"/>'
@@ -38,7 +42,12 @@ class JointWithoutLimit(EditingRule):
         for joint in joints_of_type(case, ("revolute", "prismatic")):
             if joint.first("limit") is None:
                 message = f"the joint is {joint.attributes['type']} and has no <limit>"
-                yield correction(joint, message, self._correction_edit(case, joint))
+                written = [each for each in joint.children if meant_name(each.tag, ("limit",), ())]
+                if len(written) == 1:
+                    place = found_at(joint, f"{message}; its limits are in <{escaped(written[0].tag)}>")
+                    yield Correction(place, (_renamed(case, written[0]),), ("<limit>",), whole=True)
+                else:
+                    yield correction(joint, message, self._correction_edit(case, joint))
 
     def _correction_edit(self, case: Case, joint: SourceElement) -> Edit:
         if self.chosen(case) == "zero":
@@ -46,3 +55,9 @@ class JointWithoutLimit(EditingRule):
         if joint.attributes["type"] == "revolute":
             return case.source.attribute_edit(joint, "type", "continuous")
         return case.source.insertion(joint, UNLIMITED)
+
+
+def _renamed(case: Case, element: SourceElement) -> Edit:
+    """Return the edit that makes an element a limit with the same attributes."""
+    attributes = (f"{name}={quoteattr(text)}" for name, text in element.attributes.items())
+    return case.source.replacement(element, f"<{' '.join(('limit', *attributes))}/>")

@@ -8,14 +8,16 @@ URDF requires both up to version 1.1, although neither enters any equation of mo
 
 Files with such limits are common, because only urdfdom, the reader of Pinocchio and ROS, checks them.
 
-What to do: write both. The file does not contain them, so ``dynx doctor --fix`` writes the largest double,
-which every engine reads and which dynx reads as "no limit".
+What to do: write both. A number under a misspelled name, ``velocty="2"``, is what was meant, and
+``dynx doctor --fix`` corrects the name. Otherwise the file does not contain them, and it writes the largest
+double, which every engine reads and which dynx reads as "no limit".
 """
 
 from collections.abc import Iterable
 
-from dynx.rules import Case, Correction, EditingRule, correction, measured_on
+from dynx.rules import Case, Correction, EditingRule, measured_on
 from dynx.rules.joints.elements import elements_in_joints
+from dynx.rules.text.missing_attributes import completion
 from dynx.rules.text.number_text import LARGEST
 from dynx.rules.text.versions import corrected_version
 
@@ -33,5 +35,5 @@ class LimitWithoutEffortOrVelocity(EditingRule):
         for _, limit in elements_in_joints(case, "limit"):
             missing = [name for name in ("effort", "velocity") if name not in limit.attributes]
             if missing:
-                edits = tuple(case.source.attribute_edit(limit, name, LARGEST) for name in missing)
-                yield correction(limit, f"<limit> has no {' and no '.join(missing)}", *edits)
+                message = f"<limit> has no {' and no '.join(missing)}"
+                yield completion(case, limit, message, missing, LARGEST)

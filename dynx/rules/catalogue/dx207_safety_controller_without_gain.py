@@ -7,13 +7,15 @@ The element belongs to the PR2's controllers and to ROS; no engine simulates it.
 - PyBullet 3.2.7 and MuJoCo 4.0 ignore it; Drake 1.51 warns that it ignores it.
 
 What to do: remove the element unless one of your programs reads it, or complete it. ``dynx doctor --fix``
-adds ``k_velocity="0"``, with which the described controller has no effect.
+adds ``k_velocity="0"``, with which the described controller has no effect. A number
+under a misspelled name, ``k_velocty="20"``, is what was meant, and gets the right name.
 """
 
 from collections.abc import Iterable
 
-from dynx.rules import Case, Correction, EditingRule, correction, measured_on
+from dynx.rules import Case, Correction, EditingRule, measured_on
 from dynx.rules.joints.elements import elements_in_joints
+from dynx.rules.text.missing_attributes import completion
 
 
 class SafetyControllerWithoutGain(EditingRule):
@@ -26,5 +28,5 @@ class SafetyControllerWithoutGain(EditingRule):
         """Yield the first safety controller of every joint."""
         for _, controller in elements_in_joints(case, "safety_controller"):
             if "k_velocity" not in controller.attributes:
-                edit = case.source.attribute_edit(controller, "k_velocity", "0")
-                yield correction(controller, "<safety_controller> has no k_velocity", edit)
+                message = "<safety_controller> has no k_velocity"
+                yield completion(case, controller, message, ("k_velocity",), "0")

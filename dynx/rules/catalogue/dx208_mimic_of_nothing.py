@@ -10,16 +10,19 @@ It names no joint, a missing joint or its own joint; or it belongs to a fixed jo
 
 dynx reads a joint that follows a missing joint as moving freely, and refuses a joint that follows itself.
 
-What to do: name the joint to follow, or remove the tag. ``dynx doctor --fix`` removes it, so that the joint
-moves freely, as in the engines that load the file.
+What to do: name the joint to follow, or remove the tag. ``dynx doctor --fix`` corrects a misspelled name of
+the attribute, ``<mimic jiont="finger"/>``. Otherwise it removes the tag, so that the joint moves freely, as
+in the engines that load the file.
 """
 
 from collections.abc import Iterable
 
-from dynx.errors import shown
+from dynx.errors import escaped, shown
 from dynx.model.xml.source import SourceElement
-from dynx.rules import Case, Correction, EditingRule, correction, measured_on
+from dynx.rules import Case, Correction, EditingRule, correction, found_at, measured_on
 from dynx.rules.joints.elements import SINGLE, elements_in_joints
+from dynx.rules.text.missing_attributes import renaming
+from dynx.rules.text.misspelled_names import meant_name
 
 
 class MimicOfNothing(EditingRule):
@@ -32,9 +35,23 @@ class MimicOfNothing(EditingRule):
         """Yield the first ``<mimic>`` of every joint."""
         for joint, mimic in elements_in_joints(case, "mimic"):
             message = _why_nothing(case, joint, mimic)
-            if message is not None:
+            meant = _misspelled(case, joint, mimic)
+            if meant is not None:
+                text = f"{message}; its joint is {shown(mimic.attributes[meant])} in {escaped(meant)}"
+                edits = renaming(case, mimic, meant, "joint")
+                yield Correction(found_at(mimic, text), edits, ("joint",), whole=True)
+            elif message is not None:
                 edits = tuple(case.source.removal(each) for each in joint.all("mimic"))
                 yield correction(mimic, message, *edits)
+
+
+def _misspelled(case: Case, joint: SourceElement, mimic: SourceElement) -> str | None:
+    """Return the attribute of a ``<mimic>`` without ``joint`` that names a joint which follows none."""
+    if "joint" in mimic.attributes or joint.attributes.get("type") not in SINGLE:
+        return None
+    others = {name for name, other in case.joints.items() if other.first("mimic") is None}
+    names = (name for name, text in mimic.attributes.items() if text in others)
+    return next((name for name in names if meant_name(name, ("joint",), ())), None)
 
 
 def _why_nothing(case: Case, joint: SourceElement, mimic: SourceElement) -> str | None:

@@ -17,15 +17,17 @@ PyBullet's ``upper``, and PyBullet then ignores both, as it does where neither i
 The effect is a joint that does not move: in PyBullet's simulation, and only in the part of the range above
 -1, its whole acceleration is lost.
 
-What to do: write the intended end. The file does not contain it, so ``dynx doctor --fix`` writes
+What to do: write the intended end. A number under a misspelled name, ``uper="1"``, is what was meant, and
+``dynx doctor --fix`` corrects the name. Otherwise the file does not contain the end, and it writes
 ``upper="0"``, as URDF, Pinocchio and dynx read it; the other three engines then have that range too.
 """
 
 from collections.abc import Iterable
 
-from dynx.rules import Case, Correction, EditingRule, correction, measured_on
+from dynx.rules import Case, Correction, EditingRule, measured_on
 from dynx.rules.joints.elements import elements_in_joints
 from dynx.rules.text.attributes import number_or_none
+from dynx.rules.text.missing_attributes import completion
 
 _UPPER_OF_PYBULLET = -1.0
 """Upper limit that PyBullet uses where none is given; URDF has 0."""
@@ -44,4 +46,4 @@ class UpperLimitMissing(EditingRule):
             if "upper" in limit.attributes or lower is None or lower > _UPPER_OF_PYBULLET:
                 continue
             message = f"lower is {lower:g} and upper is not given, which is 0 in URDF and -1 in PyBullet"
-            yield correction(limit, message, case.source.attribute_edit(limit, "upper", "0"))
+            yield completion(case, limit, message, ("upper",), "0")

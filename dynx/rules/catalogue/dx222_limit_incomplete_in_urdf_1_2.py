@@ -8,13 +8,14 @@ is not continuous needs both, and ``effort`` and ``velocity`` may be missing.
 - PyBullet 3.2.7, MuJoCo 4.0 and Drake 1.51 ignore the version. dynx reads a missing end as 0.
 
 What to do: write both ends. ``dynx doctor --fix`` writes 0 for the missing one, as earlier versions of URDF
-define it.
+define it; a number under a misspelled name, ``uper="1"``, is what was meant, and gets the right name.
 """
 
 from collections.abc import Iterable
 
-from dynx.rules import Case, Correction, EditingRule, correction, measured_on
+from dynx.rules import Case, Correction, EditingRule, measured_on
 from dynx.rules.joints.elements import elements_in_joints
+from dynx.rules.text.missing_attributes import completion
 from dynx.rules.text.versions import corrected_version
 
 _TYPES = ("revolute", "prismatic", "fixed", "floating", "planar")
@@ -33,5 +34,5 @@ class LimitIncompleteInUrdf12(EditingRule):
         for _, limit in elements_in_joints(case, "limit", _TYPES):
             missing = [end for end in ("lower", "upper") if end not in limit.attributes]
             if missing:
-                edits = (case.source.attribute_edit(limit, end, "0") for end in missing)
-                yield correction(limit, f"the <limit> has no {' and no '.join(missing)}", *edits)
+                message = f"the <limit> has no {' and no '.join(missing)}"
+                yield completion(case, limit, message, missing, "0")

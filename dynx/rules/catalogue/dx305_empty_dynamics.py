@@ -8,13 +8,18 @@ optional and defines their defaults; it does not require one of them.
 - MuJoCo 4.0 and Drake 1.51 read it.
 
 What to do: write ``damping="0"``, or remove the element. ``dynx doctor --fix`` adds ``damping="0"``, which
-keeps other attributes.
+keeps other attributes. A number under a misspelled name, ``<dynamics dampng="0.5"/>``, is what was meant, and
+gets the right name.
 """
 
 from collections.abc import Iterable
 
-from dynx.rules import Case, Correction, EditingRule, correction, measured_on
+from dynx.rules import Case, Correction, EditingRule, measured_on
 from dynx.rules.joints.elements import elements_in_joints
+from dynx.rules.text.missing_attributes import completion
+from dynx.rules.text.misspelled_names import misspelled_numbers
+
+_EITHER = ("damping", "friction")
 
 
 class EmptyDynamics(EditingRule):
@@ -26,6 +31,7 @@ class EmptyDynamics(EditingRule):
     def corrections(self, case: Case) -> Iterable[Correction]:
         """Yield the first ``<dynamics>`` of every joint, moving or not."""
         for _, dynamics in elements_in_joints(case, "dynamics"):
-            if not {"damping", "friction"} & set(dynamics.attributes):
-                edit = case.source.attribute_edit(dynamics, "damping", "0")
-                yield correction(dynamics, "<dynamics> has neither damping nor friction", edit)
+            if not set(_EITHER) & dynamics.attributes.keys():
+                meant = misspelled_numbers(dynamics, _EITHER)
+                message = "<dynamics> has neither damping nor friction"
+                yield completion(case, dynamics, message, tuple(meant) or _EITHER[:1], "0")

@@ -10,13 +10,15 @@ engines accept fewer, some refuse the file.
 The effect is a link without moments of inertia in Pinocchio: of order 0.01 to 1 in the mass matrix.
 
 What to do: write the products that are zero as ``0``. ``dynx doctor --fix`` does so; two engines read a
-missing product as zero. A missing moment (``ixx``, ``iyy``, ``izz``) is DX410: no body has a zero moment, and
+missing product as zero. A number under a misspelled name, ``iyx="0.01"``, is what was meant, and gets the
+right name. A missing moment (``ixx``, ``iyy``, ``izz``) is DX410: no body has a zero moment, and
 the file does not contain the number.
 """
 
 from collections.abc import Iterable
 
-from dynx.rules import Case, Correction, EditingRule, correction, measured_on
+from dynx.rules import Case, Correction, EditingRule, measured_on
+from dynx.rules.text.missing_attributes import completion
 
 _MOMENTS = ("ixx", "iyy", "izz")
 _PRODUCTS = ("ixy", "ixz", "iyz")
@@ -37,5 +39,4 @@ class MissingProductOfInertia(EditingRule):
                     missing = [name for name in _PRODUCTS if name not in tensor.attributes]
                     if missing and all(name in tensor.attributes for name in _MOMENTS):
                         message = f"<inertia> has no {' and no '.join(missing)}"
-                        edits = tuple(case.source.attribute_edit(tensor, name, "0") for name in missing)
-                        yield correction(tensor, message, *edits)
+                        yield completion(case, tensor, message, missing, "0")

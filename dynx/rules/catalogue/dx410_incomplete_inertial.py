@@ -23,15 +23,14 @@ from collections.abc import Iterable, Sequence
 
 from dynx.errors import escaped
 from dynx.model.xml.source import Edit, SourceElement
-from dynx.rules import EVERY_ENGINE, Case, Correction, EditingRule, correction
+from dynx.rules import EVERY_ENGINE, Case, Correction, EditingRule, correction, found_at
 from dynx.rules.inertia.edits import ZERO_TENSOR, zero_inertial
 from dynx.rules.text.element_text import text_in
-from dynx.rules.text.misspelled_names import meant_name
+from dynx.rules.text.missing_attributes import renaming
+from dynx.rules.text.misspelled_names import misspelled_numbers
 from dynx.rules.text.number_text import is_number
-from dynx.rules.text.numeric_attributes import MOMENTS
 
 _MOMENTS = ("ixx", "iyy", "izz")
-_KNOWN = frozenset(["value", *MOMENTS])
 
 
 class IncompleteInertial(EditingRule):
@@ -93,16 +92,10 @@ def _misspelled(case: Case, element: SourceElement, names: Sequence[str]) -> Cor
     """Return the correction of the names of attributes, where each that is missing has its number under a
     name that is close to it."""
     missing = [name for name in names if name not in element.attributes]
-    unknown = {
-        name: text for name, text in element.attributes.items() if name not in _KNOWN and is_number(text)
-    }
-    meant = {meant_name(name, missing, ()): name for name in unknown}
-    if not missing or not meant.keys() >= set(missing):
+    meant = misspelled_numbers(element, missing)
+    if not missing or len(meant) < len(missing):
         return None
-    edits, texts = list[Edit](), list[str]()
-    for right in missing:
-        wrong = meant[right]
-        edits.append(case.source.attribute_removal(element, wrong))
-        edits.append(case.source.attribute_edit(element, right, unknown[wrong]))
-        texts.append(f"{right} {unknown[wrong]} in {escaped(wrong)}")
-    return correction(element, f"<{element.tag}> has its {' and its '.join(texts)}", *edits)
+    edits = [edit for right in missing for edit in renaming(case, element, meant[right], right)]
+    texts = [f"{right} {element.attributes[meant[right]]} in {escaped(meant[right])}" for right in missing]
+    detection = found_at(element, f"<{element.tag}> has its {' and its '.join(texts)}")
+    return Correction(detection, tuple(edits), tuple(missing), whole=True)

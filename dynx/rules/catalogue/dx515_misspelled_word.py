@@ -2,8 +2,10 @@
 
 URDF readers ignore unknown names, mostly without a warning: with ``<intertial>`` the link has no mass, with
 ``<limit uper="1">`` the range ends at 0, with ``<dynamics dampng="1">`` there is no damping. The rule
-reports an unknown name that is close to a known name which is missing: of elements of ``<robot>``,
-``<link>``, ``<joint>`` and ``<inertial>``, and of attributes of elements that matter for dynamics.
+reports an unknown name that is close to a known name which is missing, or has its letters in another order
+(``ryp``): of elements of ``<robot>``, ``<link>``, ``<joint>`` and ``<inertial>``, and of attributes of
+elements that matter for dynamics. In an ``<origin>``, ``roll``, ``pitch`` and ``yaw`` stand for ``rpy``, and
+``x``, ``y`` and ``z`` for ``xyz``.
 
 Extensions (``<gazebo>``, ``<sensor>``, names with a prefix) are not close to any of them.
 
@@ -15,27 +17,14 @@ from collections.abc import Iterable, Iterator
 
 from dynx.model.xml.source import SourceElement
 from dynx.rules import Case, Detection, Rule, found_at
-from dynx.rules.text.misspelled_names import meant_name
-from dynx.rules.text.numeric_attributes import MOMENTS
+from dynx.rules.joints.axes import misspelled_direction
+from dynx.rules.text.misspelled_names import ATTRIBUTES, meant_name
 
 _ELEMENTS = {
     "robot": ("link", "joint", "material", "transmission"),
     "link": ("inertial", "visual", "collision"),
     "joint": ("origin", "parent", "child", "axis", "limit", "dynamics", "mimic", "calibration"),
     "inertial": ("origin", "mass", "inertia"),
-}
-_ATTRIBUTES = {
-    "link": ("name",),
-    "joint": ("name", "type"),
-    "origin": ("xyz", "rpy", "quat_xyzw"),
-    "mass": ("value",),
-    "inertia": MOMENTS,
-    "axis": ("xyz",),
-    "parent": ("link",),
-    "child": ("link",),
-    "limit": ("lower", "upper", "effort", "velocity"),
-    "dynamics": ("damping", "friction", "armature"),
-    "mimic": ("joint", "multiplier", "offset"),
 }
 
 
@@ -57,10 +46,12 @@ def _misspelled(part: SourceElement, root: SourceElement) -> Iterator[tuple[Sour
     if part.tag not in ("link", "joint"):
         return
     for element in _dynamic_elements(part):
-        known = _ATTRIBUTES.get(element.tag, ())
+        known = ATTRIBUTES.get(element.tag, ())
         for attribute in element.attributes:
             meant = meant_name(attribute, known, element.attributes)
-            if meant is not None:
+            # The direction of an axis under another name has a rule of its own, DX218.
+            other_rule = element.tag == "axis" and attribute == misspelled_direction(element)
+            if meant is not None and not other_rule:
                 yield element, f"{attribute} of <{element.tag}> is ignored; {meant} was meant"
         for child in element.children:
             present = {other.tag for other in element.children}
@@ -73,6 +64,6 @@ def _dynamic_elements(part: SourceElement) -> Iterator[SourceElement]:
     """Yield a link or joint and what it holds for dynamics; shapes have words of their own."""
     yield part
     for child in part.children:
-        if child.tag in _ATTRIBUTES or child.tag == "inertial":
+        if child.tag in ATTRIBUTES or child.tag == "inertial":
             yield child
-            yield from (below for below in child.children if below.tag in _ATTRIBUTES)
+            yield from (below for below in child.children if below.tag in ATTRIBUTES)
