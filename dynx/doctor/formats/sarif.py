@@ -126,7 +126,9 @@ def _refusal(report: DoctorReport) -> dict[str, Any]:
 
 
 def _finding(report: DoctorReport, each: Finding, repetition: int) -> dict[str, Any]:
-    engines = f": {', '.join(each.engines)}" if each.engines else ""
+    # Effects that differ are written with their engines.
+    names = () if wording.differs_by_engine(each) else each.engines
+    engines = f": {', '.join(names)}" if names else ""
     effect = f"{wording.finding_effect(each)}, {report.base} base{engines}"
     message = f"{wording.name(each.message, 1000)} ({effect})."
     if each.effect is not None or each.kind == "practice":

@@ -73,8 +73,15 @@ def effect(each: Effect | None) -> str:
 
 
 def finding_effect(finding: Finding) -> str:
-    """Write the effect of a finding as `effect` does, or that it is bad practice."""
+    """Write the effect of a finding, by engine where it differs, or that it is bad practice."""
+    if differs_by_engine(finding):
+        return effects(finding)
     return "bad practice" if finding.kind == "practice" and not finding.effect else effect(finding.effect)
+
+
+def differs_by_engine(finding: Finding) -> bool:
+    """Check whether the effect at a place differs between engines, as it is written."""
+    return finding.effect is not None and len(set(map(_at_place, finding.effects.values()))) > 1
 
 
 def effects(finding: Finding) -> str:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dynx.doctor.formats import wording
+from dynx.doctor.formats import html_page, junit_xml, sarif_document, wording
 from dynx.doctor.formats.causes import ROUNDING, causes, severity
 from dynx.doctor.report import Effect
 from tests.doctor.formats.reports import alike, differing, refused
@@ -68,3 +69,30 @@ def test_the_status_of_a_report_in_one_word() -> None:
         "unexplained",
         "refused",
     ]
+
+
+def test_every_format_gives_the_effect_at_a_place_by_engine() -> None:
+    refused, off = Effect("loading", math.inf), Effect("mass_matrix", 0.042)
+    report = differing()
+    first = replace(
+        report.findings[0],
+        engines=("pybullet", "mujoco"),
+        effect=refused,
+        effects={"pybullet": off, "mujoco": refused},
+    )
+    report = replace(report, findings=(first,))
+    said = "4.2 % in pybullet, refused by mujoco"
+    assert wording.finding_effect(first) == said
+    (result, *_) = sarif_document([report])["runs"][0]["results"]
+    assert f"({said}, fixed base)." in result["message"]["text"]
+    assert f"({said})" in html_page([report])
+    assert f"({said})" in junit_xml([report])
+
+
+def test_an_effect_that_engines_share_is_written_once() -> None:
+    refused = Effect("loading", math.inf)
+    shared = {"pybullet": refused, "mujoco": refused}
+    first = replace(differing().findings[0], engines=tuple(shared), effect=refused, effects=shared)
+    assert wording.finding_effect(first) == "the file is refused"
+    (result, *_) = sarif_document([replace(differing(), findings=(first,))])["runs"][0]["results"]
+    assert "(the file is refused, fixed base: pybullet, mujoco)." in result["message"]["text"]
