@@ -39,11 +39,22 @@ if TYPE_CHECKING:
         rpy_from_rotation,
     )
     from dynx.rbd.regressor import inertial_parameters
-    from dynx.sim import Noise, Payload, Push, Rollout, Scenario, Simulation, simulate, simulate_batch
+    from dynx.sim import (
+        BatchRollouts,
+        Noise,
+        Payload,
+        Push,
+        Rollout,
+        Scenario,
+        Simulation,
+        simulate,
+        simulate_batch,
+    )
 
 __all__ = [
     "AgreementReport",
     "Backend",
+    "BatchRollouts",
     "Derivatives",
     "DoctorReport",
     "IKResult",
@@ -85,6 +96,7 @@ __all__ = [
 _HOME = {
     "AgreementReport": "dynx.agreement",
     "Backend": "dynx.backends",
+    "BatchRollouts": "dynx.sim",
     "Derivatives": "dynx.compiled.derivatives",
     "DoctorReport": "dynx.doctor",
     "IKResult": "dynx.ik",

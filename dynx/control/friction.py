@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -10,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from dynx.backends.joint_dynamics import JointDynamicsTerms
 from dynx.control.gains import checked_gain
-from dynx.errors import ArgumentError, shown
+from dynx.errors import ArgumentError, GainError, shown
 from dynx.model import Model
 from dynx.spatial.scalar import Array, Floats, sign, tanh
 
@@ -109,9 +110,19 @@ class JointFriction:
         if isinstance(given, bool):
             return own if given else np.zeros(model.mechanism.nv if through else model.nv)
         base = 6 if model.floating else 0
+        refuse_unordered(name, given, model.nv - base)
         coefficients = checked_gain(name, given, model.nv - base, per="one for each joint")
         # Given coefficients apply to joints that own a coordinate, not to the base or to mimic joints.
         owners = [joint.mimic is None for joint in model.joints if joint.moves]
         joints = np.zeros(len(owners) if through else len(coefficients))
         joints[owners if through else slice(None)] = coefficients
         return np.concatenate([np.zeros(base), joints])
+
+
+def refuse_unordered(name: str, given: object, joints: int) -> None:
+    """Raise GainError for coefficients that are a text or a mapping."""
+    if isinstance(given, str | Mapping):
+        raise GainError(
+            f"{name} is {shown(given)}; wanted one number, an array ({joints},) in the order of the joints, "
+            "or True for the values of the description"
+        )

@@ -22,6 +22,9 @@ from dynx.files.writing import atomic_file
 SCHEMA_ENTRY = "schema"
 """Entry of a file with the name and version of its layout."""
 
+_LOADERS = {"dynx.rollout": "dynx.Rollout.load", "dynx.rollouts": "dynx.BatchRollouts.load"}
+"""Functions that read a file, by the name of its schema."""
+
 _KINDS = "biufU"
 """Kinds of NumPy's types that are read."""
 
@@ -92,9 +95,12 @@ def read_arrays(path: str | os.PathLike[str], what: str, schema: str | None = No
             (error.strerror if isinstance(error, OSError) else None) or str(error) or type(error).__name__
         )
         raise ArgumentError(f"{content.path} cannot be read as {what}: {reason}") from error
-    if schema is not None and content.texts.get(SCHEMA_ENTRY) != schema:
+    found = content.texts.get(SCHEMA_ENTRY)
+    if schema is not None and found != schema:
+        loader = _LOADERS.get(str(found).partition("/")[0])
         raise ArgumentError(
             f"{content.path} does not have the schema {schema!r}, so it cannot be read as {what}"
+            + (f"; its schema is {shown(found)}, which {loader} reads" if loader else "")
         )
     return content
 

@@ -71,6 +71,12 @@ REST = np.zeros(6)
         ({"damping": -1.0}, GainError, "damping is negative"),
         ({"friction": np.zeros(3)}, GainError, "friction has shape"),
         ({"armature": "much"}, GainError, "armature"),
+        (
+            {"friction": {"elbow_joint": 2.0}},
+            GainError,
+            r"an array \(6,\) in the order of the joints, or True",
+        ),
+        ({"friction": "urdf"}, GainError, "friction is 'urdf'; wanted .* or True for the values of the desc"),
         ({"friction": 1.0, "friction_slip": -1.0}, ArgumentError, "slip"),
         ({"effort_limits": 0.0}, LimitError, "shoulder_pan_joint.*is 0"),
         ({"effort_limits": [1.0, 2.0]}, GainError, "limit"),
@@ -80,8 +86,6 @@ REST = np.zeros(6)
         ({"noise": Noise(-1.0)}, GainError, "noise"),
         ({"noise": Noise(seed=-1)}, ArgumentError, "seed"),
         ({"noise": Noise(rollout=2**63)}, ArgumentError, "rollout"),
-        ({"pushes": [Push("tool0", np.zeros(3))]}, ArgumentError, "wrench"),
-        ({"pushes": [Push("tool0", np.zeros(6), reference="here")]}, ArgumentError, "here"),
         ({"pushes": [Push("tool", np.zeros(6))]}, UnknownNameError, "tool0"),
     ],
 )

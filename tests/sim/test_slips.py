@@ -45,12 +45,28 @@ def test_a_single_push_and_a_name_are_accepted() -> None:
     assert simulate_batch("ur5", controller, REST, rollouts=2, duration=0.004, pushes=push).done.all()
 
 
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ((WRENCH, "1"), "push on 'tool0' starts at '1'"),
+        ((WRENCH, np.nan), "starts at nan"),
+        ((WRENCH, np.inf), "starts at inf"),
+        ((WRENCH, 0.0, -1.0), "lasts -1"),
+        ((WRENCH, 0.0, 1.0, "here"), "'here'; wanted"),
+        ((np.zeros(3),), r"push on 'tool0' has a wrench of shape \(3,\)"),
+        (([0.0, 0.0, np.nan, 0.0, 0.0, 0.0],), r"wrench of a push on 'tool0'\[2\] is nan"),
+    ],
+)
+def test_a_push_is_checked_when_it_is_made(values: tuple[Any, ...], message: str) -> None:
+    with pytest.raises(ArgumentError, match=message):
+        dynx.Push("tool0", *values)
+
+
 SIMULATIONS: dict[str, tuple[dict[str, Any], type[DynxError], str]] = {
     "payload=2.0": ({"payload": 2.0}, ArgumentError, "payload is '2.0'; wanted a Payload, or a list of them"),
     "payload of a pair": ({"payload": ("tool0", 2.0)}, ArgumentError, "wanted a Payload"),
     "noise=1e-3": ({"noise": 1e-3}, ArgumentError, r"noise is '0.001'; wanted a dynx\.Noise"),
     "pushes=None": ({"pushes": None}, ArgumentError, "wanted a Push"),
-    "start of a push": ({"pushes": untyped.Push("tool0", WRENCH, "1")}, ArgumentError, "starts at '1'"),
     "dt=1e-300": (
         {"dt": 1e-300},
         ArgumentError,

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dynx.control.friction import refuse_unordered
 from dynx.errors import ArgumentError, GainError
 from dynx.model import Model
 from dynx.model.configuration import checked_array, real_array, whole_number
@@ -61,6 +62,7 @@ def _has_rows(name: str, value: Any, joints: int) -> bool:
 def coefficient_rows(name: str, values: ArrayLike, joints: int) -> Floats:
     """Return the coefficients of each rollout (n, joints), from one number or one for each joint per rollout.
     Raises GainError for invalid coefficients."""
+    refuse_unordered(name, values, joints)
     array = real_array(name, values)
     rows = array[:, None] if array.ndim == 1 else array
     if rows.ndim != 2 or rows.shape[1] not in (1, joints):

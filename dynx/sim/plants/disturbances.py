@@ -22,7 +22,7 @@ from dynx.control.friction import Coefficients, JointFriction
 from dynx.control.gains import checked_gain
 from dynx.errors import ArgumentError, shown
 from dynx.model import Model
-from dynx.model.configuration import checked_array, is_real
+from dynx.model.configuration import checked_entries, is_real, real_array
 from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED, REFERENCES
 from dynx.sim.plants.friction_law import FrictionLaw
 from dynx.sim.plants.friction_solver import FrictionSolver
@@ -42,6 +42,9 @@ class Push:
     `reference` names the point and the axes of the wrench, as for `external_forces` of a backend. In each
     step of the plant the wrench is constant, multiplied by the share of the step in which the push lasts. So
     the impulse is exact for any start, duration and step, under every integrator.
+
+    Raises ArgumentError unless the wrench is six finite numbers, the start is finite, the duration is
+    positive and `reference` is one of the three.
     """
 
     frame: str
@@ -50,11 +53,10 @@ class Push:
     duration: float = np.inf
     reference: str = LOCAL_WORLD_ALIGNED
 
-    def checked(self, model: Model) -> Push:
-        """Return a copy with its wrench as an array. Raises ArgumentError for an invalid push on `model`."""
-        model.frame_index(self.frame)
-        wrench = checked_array("wrench", self.wrench, 6)
-        if wrench.ndim != 1 or self.reference not in REFERENCES:
+    def __post_init__(self) -> None:
+        name = f"the wrench of a push on {shown(self.frame)}"
+        wrench = checked_entries(name, real_array(name, self.wrench))
+        if wrench.shape != (6,) or self.reference not in REFERENCES:
             raise ArgumentError(
                 f"a push on {shown(self.frame)} has a wrench of shape {wrench.shape} in "
                 f"{shown(self.reference)}; wanted (6,) in one of {', '.join(REFERENCES)}"
@@ -65,6 +67,11 @@ class Push:
                 f"a push on {shown(self.frame)} starts at {self.start!r} and lasts {self.duration!r}; "
                 "wanted finite, and positive, seconds"
             )
+
+    def checked(self, model: Model) -> Push:
+        """Return a copy with its wrench as an array. Raises UnknownNameError for a frame of another robot."""
+        model.frame_index(self.frame)
+        wrench = real_array("wrench", self.wrench)
         return Push(self.frame, wrench, float(self.start), float(self.duration), self.reference)
 
     def share(self, t: float, h: float) -> float:

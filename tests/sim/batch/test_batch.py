@@ -220,8 +220,15 @@ def test_a_rollout_that_diverges_leaves_the_others_alone(arm: Model) -> None:
 def test_a_file_gives_them_back(arm: Model, reference: Trajectory, tmp_path: Path) -> None:
     found = simulate_batch(arm, PD(arm, kp=200, kd=20), reference, rollouts=3, dt=DT, record_every=30)
     found.save(tmp_path / "many.npz")
-    again = BatchRollouts.load(tmp_path / "many.npz")
+    again = dynx.BatchRollouts.load(tmp_path / "many.npz")
     assert equal(found, again)
+    with pytest.raises(ArgumentError, match=r"'dynx\.rollouts/2', which dynx\.BatchRollouts\.load reads"):
+        dynx.Rollout.load(tmp_path / "many.npz")
+    simulate(arm, PD(arm, kp=200, kd=20), reference, plant="compiled", duration=DT, dt=DT).save(
+        tmp_path / "one.npz"
+    )
+    with pytest.raises(ArgumentError, match=r"'dynx\.rollout/2', which dynx\.Rollout\.load reads"):
+        dynx.BatchRollouts.load(tmp_path / "one.npz")
     assert again.joint_names == found.joint_names == tuple(arm.joint_names)
     for other in ("many.txt", "none.npz"):
         with pytest.raises(ArgumentError):

@@ -214,7 +214,8 @@ def test_what_no_option_can_be_is_refused(arm: Model) -> None:
         (ArgumentError, "6 joints and 6 rollouts", {"friction": six, "armature": np.ones((6, 6))}),
         (ArgumentError, "3 rows, damping says 4", {"damping": np.ones(4), "friction": np.ones((3, 6))}),
         (ArgumentError, "slip", {"friction": 0.1, "friction_slip": -1.0}),
-        (ArgumentError, "wanted", {"pushes": [Push("tool0", [1.0, 2.0, 3.0, 4.0, 5.0, 6.0], np.inf)]}),
+        (GainError, r"an array \(6,\) in the order of the joints", {"friction": {"elbow_joint": 2.0}}),
+        (GainError, "or True for the values of the description", {"damping": "urdf"}),
     ]
     for error, said, options in bad:
         with pytest.raises(error, match=said):
