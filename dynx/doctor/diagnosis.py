@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import time
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -101,7 +102,8 @@ def diagnose(
         report = _diagnosis_of(case, examiner, variants, tolerance, counterexamples, seed, level, progress)
     except DynxError as error:
         report = refused_report(str(_label(robot)), error, base=base)
-    return replace(report, samples=samples, seed=seed, seconds=time.perf_counter() - started)
+    seconds = time.perf_counter() - started
+    return replace(report, samples=samples, seed=seed, tolerance=tolerance, seconds=seconds)
 
 
 def compare_as_loaded(
@@ -125,7 +127,8 @@ def compare_as_loaded(
         report = replace(report, variants=variants_as_loaded(case, reference, variants))
     except DynxError as error:
         report = refused_report(str(_label(robot)), error, base=base)
-    return replace(report, samples=samples, seed=seed, seconds=time.perf_counter() - started)
+    seconds = time.perf_counter() - started
+    return replace(report, samples=samples, seed=seed, tolerance=tolerance, seconds=seconds)
 
 
 def open_case(robot: Robot, base: Base, choices: Mapping[str, str]) -> Case:
@@ -145,7 +148,15 @@ def refused_report(robot: str, error: DynxError, *, base: str | None = None) -> 
     failure = Failure(type(error).__name__, str(error))
     place = error if isinstance(error, DescriptionError) else None
     source, line = (None, None) if place is None else (place.source, place.line)
-    return DoctorReport(robot, source=source, base=base, error=failure, error_line=line)
+    return DoctorReport(
+        robot,
+        source=source,
+        base=base,
+        residual=math.inf,
+        referee=math.inf,
+        error=failure,
+        error_line=line,
+    )
 
 
 def _diagnosis_of(

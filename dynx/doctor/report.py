@@ -149,12 +149,16 @@ class RunTimeCall:
 
 @dataclass(frozen=True)
 class UnreadMesh:
-    """A mesh file that was not read, so that nothing is compared with the size of the link's shape."""
+    """A mesh file that was not read, so that nothing is compared with the size of the link's shape.
+
+    Where it is missing, the engines in `refused_by` refuse the description, as it is and mended.
+    """
 
     file: str
     link: str
     line: int
     reason: str
+    refused_by: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -261,10 +265,15 @@ class DoctorReport:
     @property
     def remaining(self) -> float:
         """Largest error on the mended file, at its level and with its calls; infinite where an engine refuses
-        it."""
-        refused = any(each.refused_after is not None for each in self.engines)
+        it, and where nothing was examined."""
+        refused = self.error is not None or any(each.refused_after is not None for each in self.engines)
         errors = (error for each in self.engines for error in each.after.values())
         return float("inf") if refused else max(errors, default=0.0)
+
+    @property
+    def refused_without_meshes(self) -> tuple[str, ...]:
+        """Names of the engines that refuse the file where meshes that were not found are missing."""
+        return tuple(dict.fromkeys(name for each in self.unread_meshes for name in each.refused_by))
 
     @property
     def undone(self) -> tuple[Change, ...]:

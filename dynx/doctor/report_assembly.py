@@ -26,7 +26,7 @@ from dynx.loaded import loader_class
 from dynx.loaded.difference import model_difference
 from dynx.model.xml.source import XmlSource
 from dynx.rules import LEVELS, CallingRule, Case, Detection, Rule, all_rules
-from dynx.rules.geometry import named_meshes, reason_unread
+from dynx.rules.geometry import is_found, named_meshes, parts_with_meshes, reason_unread
 
 
 def first_report(case: Case, before: Examination, tolerance: float) -> DoctorReport:
@@ -53,12 +53,16 @@ def first_report(case: Case, before: Examination, tolerance: float) -> DoctorRep
 def with_meshes(report: DoctorReport, source: XmlSource) -> DoctorReport:
     """Add the mesh files that the description names and that were not read."""
     named = list(named_meshes(source))
+    parts = parts_with_meshes(source)
+    kinds = {each.engine: loader_class(each.engine) for each in report.engines}
     unread = []
     for link, mesh in named:
         file = mesh.attributes["filename"]
         reason = reason_unread(file, source.source)
         if reason is not None:
-            unread.append(UnreadMesh(file, link.attributes.get("name", ""), mesh.line, reason))
+            lacking = set() if is_found(file, source.source) else parts[file]
+            refusing = tuple(name for name, kind in kinds.items() if lacking & {*kind.refuses_without})
+            unread.append(UnreadMesh(file, link.attributes.get("name", ""), mesh.line, reason, refusing))
     return replace(report, meshes=len(named), unread_meshes=tuple(unread))
 
 

@@ -39,6 +39,10 @@ class LoadedRobot(ABC):
     CALLS: ClassVar[Mapping[str, str]] = {}
     """Engine settings that are remedies at run time: id -> the line of code a user would write."""
 
+    refuses_without: ClassVar[tuple[str, ...]] = ()
+    """The parts of a link, ``visual`` or ``collision``, for whose missing mesh file the engine refuses the
+    whole description."""
+
     loads_meshes: ClassVar[bool] = False
     """Whether mesh collision shapes change the dynamics of a link that states its inertia."""
 

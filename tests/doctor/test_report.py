@@ -72,6 +72,13 @@ def test_the_summary_counts_each_robot_once() -> None:
     json.dumps(results_document([infinite, differing()]), allow_nan=False)
 
 
+def test_a_file_that_was_not_examined_has_no_errors() -> None:
+    entry = diagnose("<robot name='r'><link/></robot>", engines=["pinocchio"]).to_dict()
+    assert entry["status"] == "refused"
+    assert (entry["residual"], entry["remaining"], entry["referee"]) == (None, None, None)
+    assert entry["tolerance"] == 1e-12
+
+
 @pytest.mark.parametrize(
     ("rule", "skipped"),
     [("DX531", "xacro elements that were not expanded"), ("DX515", "misspelled words")],

@@ -9,10 +9,14 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from dynx import load
 from dynx.cli.shell.main import cli
 from dynx.doctor import diagnose
 from dynx.doctor.formats import html_page, junit_xml, sarif_document
 from dynx.doctor.report import DoctorReport
+from dynx.engines.silence import silence
+from dynx.errors import EngineError
+from dynx.loaded import ENGINES, installed_engines, loader_class
 from dynx.rules.geometry.meshes import STL_FACET
 from tests.doctor.formats.test_sarif import require_valid
 
@@ -114,6 +118,48 @@ def test_the_reason_is_stated(package: Path, filename: str, reason: str) -> None
     package.write_text(ARM.replace("package://arm_description/meshes/tool.stl", filename))
     [mesh] = examined(package).unread_meshes
     assert reason in mesh.reason
+
+
+def test_engines_that_refuse_a_file_without_its_meshes_are_named(package: Path, tmp_path: Path) -> None:
+    """The engine input has no meshes, so what the engine returns does not show it."""
+    copy, mended = tmp_path / "elsewhere/arm.urdf", tmp_path / "mended.urdf"
+    copy.parent.mkdir()
+    command = ["doctor", str(copy), "--engines", "pinocchio,pybullet", "--samples", "1", "--jobs", "1"]
+    refuses = "; pybullet refuses a file of which a mesh is missing"
+    for text in (ARM, ARM.replace('<axis xyz="0 0 1"/>', "<axis/>")):
+        package.write_text(text)
+        copy.write_text(text)
+        found = diagnose(str(package), engines=["pinocchio", "pybullet"], samples=1)
+        assert found.refused_without_meshes == ()
+        result = CliRunner().invoke(cli, [*command, "--json", str(tmp_path / "x.json"), "--fix", str(mended)])
+        assert refuses in result.stdout
+        [entry] = json.loads((tmp_path / "x.json").read_text())["results"]
+        assert [each["refused_by"] for each in entry["unread_meshes"]] == [["pybullet"]]
+    assert "      loads the mended file once its meshes are there\n" in result.stdout
+    assert f"mended (for pybullet, once its meshes are there): {mended}" in result.stdout
+    report = diagnose(str(copy), engines=["pinocchio", "pybullet"], samples=1)
+    assert "It loads the mended file once its meshes are there." in html_page([report])
+    assert refuses in json.dumps(sarif_document([report]))
+    assert refuses in CliRunner().invoke(cli, [*command, str(package)]).stdout
+    assert refuses not in CliRunner().invoke(cli, ["doctor", str(package), *command[2:]]).stdout
+
+
+@pytest.mark.parametrize("engine", [each for each in installed_engines() if each in ENGINES])
+@pytest.mark.parametrize("part", ["visual", "collision"])
+def test_the_engines_refuse_such_a_file(engine: str, part: str, tmp_path: Path) -> None:
+    text = ARM.replace("visual>", f"{part}>").replace('"0 0 1"', '"0 1 0"')
+    path = tmp_path / "arm.urdf"
+    path.write_text(text)
+    kind = loader_class(engine)
+    model = load(path)
+    try:
+        with silence(), kind(path, model):
+            refused = False
+    except EngineError:
+        refused = True
+    assert refused == (part in kind.refuses_without)
+    report = diagnose(path, engines=[engine], samples=1, counterexamples=False)
+    assert report.refused_without_meshes == ((engine,) if refused else ())
 
 
 def test_of_text_without_a_file_no_mesh_is_looked_for() -> None:

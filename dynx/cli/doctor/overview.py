@@ -51,7 +51,9 @@ def show_many(out: Console, reports: Sequence[DoctorReport]) -> None:
     if unread:
         share = f"{unread} of {counted(len(reports), 'robot')}"
         checked = f"their links are not checked against the size of shapes ({wording.SHAPE_RULES})"
-        out.print(f"meshes could not be read: {share}; {checked}", style="yellow")
+        refusing = dict.fromkeys(name for report in reports for name in report.refused_without_meshes)
+        without = wording.refused_without_mesh([*refusing])
+        out.print(f"meshes could not be read: {share}; {checked}{without}", style="yellow")
     out.print()
 
 
@@ -90,8 +92,10 @@ def _remaining(report: DoctorReport) -> Text:
     """Write the error after mending."""
     if report.error is not None:
         return Text("")
-    if any(each.refused_after is not None for each in report.engines):
-        return Text("refused", STYLES["error"])
+    without = [each for each in report.engines if each.refused_after is not None]
+    if without:
+        word = "not used" if all(each.not_used_after for each in without) else "refused"
+        return Text(word, STYLES["error"])
     return error_text(report.remaining, report.tolerance)
 
 

@@ -99,7 +99,7 @@ def show_engines(out: Console, report: DoctorReport) -> None:
         if each.refused is not None:
             sentence(out, wording.refusal(each), 6, "red")
             if report.mended is not None and each.refused_after is None:
-                sentence(out, "loads the mended file", 6, "green")
+                sentence(out, wording.loads_mended(each, report), 6, "green")
             elif report.mended is not None:
                 same = each.refused_after == each.refused
                 after = wording.refusal(each, mended=True)
@@ -271,10 +271,18 @@ def level_clause(report: DoctorReport) -> str:
 def _action(report: DoctorReport) -> str:
     """Write what was done to make a written file, before its name."""
     if report.mended is not None:
-        return f"mended{level_clause(report)}{_without_calls(report)}:"
+        return f"mended{level_clause(report)}{_conditions(report)}:"
     if report.kinematics_only:
         return "no inertial data, which --fix does not invent; copied unchanged to"
     return f"nothing to change in the text{level_clause(report)}; copied unchanged to"
+
+
+def _conditions(report: DoctorReport) -> str:
+    """Write on which conditions engines load the mended file alike."""
+    refusing = " and ".join(map(wording.name, report.refused_without_meshes))
+    meshes = f"for {refusing}, once its meshes are there" if refusing else ""
+    conditions = "; ".join(filter(None, (_without_calls(report), meshes)))
+    return f" ({conditions})" if conditions else ""
 
 
 def _without_calls(report: DoctorReport) -> str:
@@ -284,7 +292,7 @@ def _without_calls(report: DoctorReport) -> str:
     if not (kept and report.calls):
         return ""
     verb = "remains" if len(kept) == 1 else "remain"
-    return f" (without the calls above, {', '.join(map(wording.name, kept))} {verb})"
+    return f"without the calls above, {', '.join(map(wording.name, kept))} {verb}"
 
 
 def _residual(report: DoctorReport) -> str:

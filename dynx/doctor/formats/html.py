@@ -67,7 +67,7 @@ def template_environment() -> Environment:
     )
     words = (wording.name, wording.relative, wording.quantity, wording.effect, wording.part)
     more = (wording.unexplained, wording.finding_effect, wording.variant, wording.change)
-    filters = (*words, *more, wording.unread_meshes, wording.refusal)
+    filters = (*words, *more, wording.unread_meshes, wording.loads_mended, wording.refusal)
     environment.filters.update({each.__name__: each for each in filters})
     environment.filters["capitalized"] = lambda text: text[:1].upper() + text[1:]
     views: tuple[Callable[..., Any], ...] = (causes, step_of, bar_position, largest_error)

@@ -160,10 +160,23 @@ def unread_meshes(report: DoctorReport) -> str:
     (reason, count), *others = reasons.most_common()
     shown = name(reason, 300) + (f" for {count} of them" if others else "")
     which = f"{len(unread)} of {report.meshes} mesh files" if report.meshes > 1 else "the mesh file"
+    without = refused_without_mesh(report.refused_without_meshes)
     return (
         f"{which} could not be read ({shown}); engines are compared without meshes, but masses and inertias "
-        f"of such links are not checked against the size of their shapes ({SHAPE_RULES})"
+        f"of such links are not checked against the size of their shapes ({SHAPE_RULES}){without}"
     )
+
+
+def refused_without_mesh(engines: Sequence[str]) -> str:
+    """Write which engines refuse a description for a missing mesh, as a further clause; empty for none."""
+    verb = "refuses" if len(engines) == 1 else "refuse"
+    return f"; {' and '.join(map(name, engines))} {verb} a file of which a mesh is missing" if engines else ""
+
+
+def loads_mended(each: EngineResult, report: DoctorReport) -> str:
+    """Write that an engine loads the mended file, with the condition that it finds the meshes."""
+    once = " once its meshes are there" if each.engine in report.refused_without_meshes else ""
+    return f"loads the mended file{once}"
 
 
 def change(each: Change) -> str:

@@ -31,6 +31,7 @@ class LoadedMujoco(LoadedRobot):
 
     name: ClassVar[str] = "mujoco"
     CALLS: ClassVar[Mapping[str, str]] = CALLS
+    refuses_without: ClassVar[tuple[str, ...]] = ("collision",)
 
     def __init__(self, path: Path, model: Model, calls: Collection[str] = ()) -> None:
         self._model = model

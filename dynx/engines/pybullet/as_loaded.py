@@ -53,6 +53,7 @@ class LoadedPyBullet(LoadedRobot):
 
     name: ClassVar[str] = "pybullet"
     CALLS: ClassVar[Mapping[str, str]] = CALLS
+    refuses_without: ClassVar[tuple[str, ...]] = ("visual", "collision")
 
     def __init__(self, path: Path, model: Model, calls: Collection[str] = ()) -> None:
         engine = bullet()

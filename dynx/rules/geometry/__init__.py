@@ -3,7 +3,7 @@
 from dynx.rules.geometry.extent import Extent
 from dynx.rules.geometry.mesh_files import MeshNotFoundError, find_mesh
 from dynx.rules.geometry.rigid_shapes import body_extents, group_extents
-from dynx.rules.geometry.unread_meshes import named_meshes, reason_unread
+from dynx.rules.geometry.unread_meshes import is_found, named_meshes, parts_with_meshes, reason_unread
 
 __all__ = [
     "Extent",
@@ -11,6 +11,8 @@ __all__ = [
     "body_extents",
     "find_mesh",
     "group_extents",
+    "is_found",
     "named_meshes",
+    "parts_with_meshes",
     "reason_unread",
 ]

@@ -21,6 +21,23 @@ def named_meshes(source: XmlSource) -> Iterator[tuple[SourceElement, SourceEleme
                 yield link, element
 
 
+def parts_with_meshes(source: XmlSource) -> dict[str, set[str]]:
+    """Return the parts of links, ``visual`` or ``collision``, in which each mesh file is named."""
+    parts: dict[str, set[str]] = {}
+    for part in (part for link in source.root.all("link") for part in link.children):
+        for mesh in (each for each in part.walk() if each.tag == "mesh"):
+            parts.setdefault(mesh.attributes.get("filename", ""), set()).add(part.tag)
+    return parts
+
+
+def is_found(filename: str, source: str) -> bool:
+    """Check whether a mesh of the description `source` (a path) is found, readable or not."""
+    try:
+        return find_mesh(filename, source) is not None
+    except MeshNotFoundError:
+        return False
+
+
 def reason_unread(filename: str, source: str) -> str | None:
     """Return the reason why a mesh of the description `source` (a path) is not read; None if it is."""
     try:

@@ -373,7 +373,7 @@ def test_a_file_without_inertial_data_is_copied_unchanged_and_the_report_says_so
     trap = find_trap("DX118")
     result = doctor(str(trap), "--fix", "out.urdf", "--json", "out.json")
     assert result.exit_code == 1
-    first, *_, action, _, last = result.stdout.splitlines()
+    first, *_, action, last = result.stdout.splitlines()
     assert first.endswith("no inertial data: the dynamics cannot be compared")
     assert action == "no inertial data, which --fix does not invent; copied unchanged to out.urdf"
     assert last.startswith("residual error of poses and Jacobians: ")

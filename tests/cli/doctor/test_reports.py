@@ -196,6 +196,15 @@ def test_names_cannot_write_on_the_terminal(report: DoctorReport) -> None:
         assert "x" * 1000 not in text
 
 
+@pytest.mark.parametrize(("not_used", "word"), [(True, "not used"), (False, "refused")])
+def test_an_engine_that_is_not_used_on_the_mended_file_does_not_refuse_it(not_used: bool, word: str) -> None:
+    out = StringIO()
+    engine = EngineResult("pybullet", "1", "load", "why", "why", not_used=not_used, not_used_after=not_used)
+    show_many(Console(file=out, width=200), [replace(differing(), engines=(engine,))])
+    line = next(line for line in out.getvalue().splitlines() if "UNEXPLAINED" in line)
+    assert line.count(word) == 2
+
+
 def test_an_unknown_robot_is_refused_in_the_worker() -> None:
     report = examine(DoctorTask("nosuch", "fixed", ("pinocchio",)))
     assert report.error is not None
