@@ -141,7 +141,7 @@ def test_joint_parameters_change_the_joint_dynamics() -> None:
     check_same(dynamics, parameters, ReferenceBackend(changed), motion(model, size=(6,)), True)
 
 
-@pytest.mark.parametrize("speed", [0.0, -0.0, 5e-324, -5e-324, 1e-300, -1e-160, 1.0, -1e60])
+@pytest.mark.parametrize("speed", [0.0, -0.0, 5e-324, -5e-324, 1e-300, -1e-160, 1.0, -9e59])
 def test_dry_friction_has_the_sign_of_the_speed(speed: float) -> None:
     model = chain(1)
     dynamics = parametric(model, joint_dynamics=True, threads=1)
