@@ -38,12 +38,12 @@ class InertiaFromShapes(CallingRule):
     changed = "loaded with flags=p.URDF_USE_INERTIA_FROM_FILE"
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
-        """Yield the robot, where a link that can move has mass or no inertial."""
+        """Yield the robot, where a link that can move has mass or moments, or no inertial."""
         groups = rigid_groups(case)
         links = [
             case.links[name]
             for name, inertial in case.inertials.items()
-            if not groups[name].static and (inertial is None or inertial.mass)
+            if not groups[name].static and (inertial is None or inertial.mass or inertial.tensor.any())
         ]
         if not links:
             return
