@@ -28,6 +28,7 @@ from dynx.doctor.prove.mending import (
     remedy_of,
 )
 from dynx.doctor.prove.proofs import Proofs
+from dynx.doctor.prove.refusals import with_refusals
 from dynx.doctor.prove.selection import Selection, smallest_mending
 from dynx.doctor.report import (
     DoctorReport,
@@ -192,10 +193,13 @@ def _diagnosis_of(
     full = mend(case, rules)
     after = examiner.examine(full.case)
     proofs = Proofs(case, rules, examiner, before, full.case, after, tolerance, progress)
+    attributions = proofs.attributions()
+    if after.reference.kinematics_only and any(each.refused for each in after.outputs.values()):
+        attributions = with_refusals(attributions, case, rules, examiner, before, tolerance, progress)
     best = smallest_mending(
         case,
         rules,
-        Selection(full, after, proofs.attributions()),
+        Selection(full, after, attributions),
         examiner,
         tolerance,
         lambda rule: proofs.measure(rule, minor=True),

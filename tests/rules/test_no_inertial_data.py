@@ -105,3 +105,20 @@ def test_the_summary_counts_such_robots_by_themselves() -> None:
     assert summary["massless"] == 1
     assert summary["explained"] == sum(each.status == "explained" for each in reports)
     assert summary["robots"] == 2
+
+
+@pytest.mark.parametrize("links_with_shape", [1, 2])
+def test_a_cause_of_a_refusal_has_that_effect_without_masses_too(links_with_shape: int) -> None:
+    if "mujoco" not in installed_engines():
+        pytest.skip("needs mujoco")
+    shape = '<collision><geometry><box size="0 0 0"/></geometry></collision>'
+    flat = [f'<link name="{name}">{shape}</link>' for name in "abc"[3 - links_with_shape :]]
+    report = report_on(*bare(*"abc"[: 3 - links_with_shape]), *flat, engines=("pinocchio", "mujoco"))
+    refusals = [each for each in report.findings if each.rule == "DX425"]
+    assert len(refusals) == links_with_shape
+    for each in refusals:
+        assert each.effect is not None
+        assert (each.effect.quantity, each.engines, each.proved) == ("loading", ("mujoco",), True)
+    assert report.mended is not None
+    assert "collision" not in report.mended
+    assert report.kinematics_only
