@@ -325,7 +325,7 @@ def write_into(out: Floats | None, result: Floats) -> Floats:
 
 
 def _given(q: Any, v: Any, a: Any) -> tuple[Any, ...]:
-    """Return the arguments that are not absent."""
+    """Return the arguments of a call without those that were left out."""
     if v is _ABSENT:
         return (q,)
     return (q, v) if a is _ABSENT else (q, v, a)

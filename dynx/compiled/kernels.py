@@ -62,7 +62,8 @@ MAX_COMPILE_SECONDS = 7.0
 evaluated by routines or by NumPy."""
 
 MAX_SECONDS_BESIDE_ROUTINES = 3.0
-"""The same for matrices that routines compute instead, which are half as fast but compiled already."""
+"""Longest predicted time of a compilation of a matrix that routines can evaluate instead: they are half as
+fast, but need no compilation for the robot."""
 
 SECONDS_OF_OPERATION, SECONDS_OF_RESULT = 1.5e-4, 3e-4
 """Time to trace and compile an operation, and to compile the store of a number of the result."""

@@ -18,7 +18,7 @@ from dynx.doctor.formats.causes import causes, severity
 from dynx.doctor.formats.vote import largest_error
 from dynx.doctor.report import DoctorReport, Status
 
-_ABOVE_MANY = (
+_CAPTION = (
     "largest relative error of any engine, as loaded (refused: an engine refuses it;",
     "not used: an engine would crash on it, or its results mean nothing),",
     "and the error that remains when mended{level}",
@@ -43,7 +43,7 @@ def show_many(out: Console, reports: Sequence[DoctorReport]) -> None:
             _rules(report),
         )
     levels = "".join(sorted({level_clause(report) for report in reports}))
-    for line in _ABOVE_MANY:
+    for line in _CAPTION:
         out.print(line.format(level=levels), style="bold")
     out.print(table)
     _count_variants(out, reports)
