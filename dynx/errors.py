@@ -144,11 +144,13 @@ class LimitViolation(NamedTuple):
     time: float
     value: float
     limit: float
+    unit: str
+    """Unit of value and limit: rad, rad/s or N m; m, m/s or N for a prismatic joint."""
 
     def __str__(self) -> str:
         return (
-            f"{self.quantity} of {shown(self.joint)} is {self.value:.6g} at {self.time:.6g} s; "
-            f"its limit is {self.limit:.6g}"
+            f"{self.quantity} of {shown(self.joint)} is {self.value:.6g} {self.unit} at {self.time:.6g} s; "
+            f"its limit is {self.limit:.6g} {self.unit}"
         )
 
 

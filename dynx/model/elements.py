@@ -155,6 +155,11 @@ class Joint:
         """Whether the joint can move, independently or by following another."""
         return self.type != "fixed"
 
+    @property
+    def unit(self) -> Literal["rad", "m"]:
+        """Unit of the position."""
+        return "m" if self.type == "prismatic" else "rad"
+
 
 @dataclass(frozen=True)
 class Frame:

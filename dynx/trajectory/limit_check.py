@@ -29,6 +29,13 @@ RELATIVE_TOLERANCE = 1e-12
 A motion planned up to a limit meets it only to rounding.
 """
 
+UNITS = {
+    "position": {"rad": "rad", "m": "m"},
+    "velocity": {"rad": "rad/s", "m": "m/s"},
+    "effort": {"rad": "N m", "m": "N"},
+}
+"""Unit of each quantity by the unit of the joint's position."""
+
 Excess = tuple[Literal["position", "velocity", "effort"], Floats, Floats, Floats]
 """A quantity, its values (n, nv), the nearest limit of each, and the amount by which they exceed it."""
 
@@ -94,9 +101,10 @@ def violations(
         worst, size = np.argmax(excess, axis=0), np.abs(value).max(axis=0)
         for k, row in enumerate(worst.tolist()):
             if excess[row, k] > RELATIVE_TOLERANCE * max(abs(limit[row, k]), size[k]):
-                joint = model.joint_names[k - (6 if model.floating else 0)]
+                joint = model.coordinate_joints[k - (6 if model.floating else 0)]
                 number = float(times[row]), float(value[row, k]), float(limit[row, k])
-                found.append((k, LimitViolation(joint, quantity, *number)))
+                unit = UNITS[quantity][joint.unit]
+                found.append((k, LimitViolation(joint.name, quantity, *number, unit)))
     return [violation for _, violation in sorted(found, key=lambda entry: entry[0])]
 
 

@@ -49,15 +49,30 @@ def test_position_velocity_and_effort_by_their_closed_forms() -> None:
     model = pendulum(Limits(-1.0, 1.5, 3.0, 5.0))
     position, effort = violations(model, slow(2.0))
     assert (position.joint, position.quantity, position.limit) == ("hinge", "position", 1.5)
+    assert [each.unit for each in (position, effort)] == ["rad", "N m"]
+    assert str(position) == "position of 'hinge' is 2 rad at 100 s; its limit is 1.5 rad"
     assert position.time == pytest.approx(100.0, rel=1e-12)
     assert position.value == pytest.approx(2.0, rel=1e-12)
     assert (effort.quantity, effort.limit) == ("effort", 5.0)
     # The motion is slow, so the largest effort occurs where the pendulum is horizontal, q = pi / 2.
     assert effort.value == pytest.approx(MASS * 9.81 * ARM, rel=1e-3)
     (velocity,) = violations(model, cycloidal([0.0], [1.4], 0.5), effort=False)
-    assert velocity.quantity == "velocity"
+    assert (velocity.quantity, velocity.unit) == ("velocity", "rad/s")
     assert velocity.time == pytest.approx(0.25, abs=1e-3)
     assert velocity.value == pytest.approx(2.0 * 1.4 / 0.5, rel=1e-6)
+
+
+def test_violations_of_a_prismatic_joint_are_in_its_units() -> None:
+    body = Inertial(2.0, ixx=0.1, iyy=0.1, izz=0.1)
+    slide = Joint(
+        "slide", "prismatic", "base", "car", axis=(0.0, 0.0, 1.0), limits=Limits(-1.0, 1.0, 0.1, 1.0)
+    )
+    lift = Model.build("lift", [Link("base"), Link("car", body)], [slide])
+    found = violations(lift, cycloidal([0.0], [2.0], 10.0))
+    units = {"position": "m", "velocity": "m/s", "effort": "N"}
+    assert {each.quantity: each.unit for each in found} == units
+    with pytest.raises(LimitError, match=r"position of 'slide' is 2 m at 0 s; its limit is 1 m$"):
+        dynx.simulate(lift, dynx.control.PD(lift, kp=1.0, kd=1.0), [2.0], duration=0.1)
 
 
 def test_lower_limits_are_negative() -> None:

@@ -99,5 +99,5 @@ def doctor() -> None:
       dynx doctor ur5
       dynx doctor my.urdf --fix mended.urdf
       dynx doctor robots/ --base both --html report.html --jobs 4
-      dynx doctor robots/ --tolerance 1e-6 --baseline known.json --sarif dynx.sarif
+      dynx doctor robots/ --tolerance 1e-6 --baseline known.json --sarif out.sarif
     """

@@ -187,6 +187,13 @@ def mass() -> None:
     help="Target position x,y,z [m], alone (any rotation) or followed by roll,pitch,yaw [rad] or "
     "qx,qy,qz,qw; or the 16 numbers of T_world_target, row by row.",
 )
+@click.option(
+    "--free",
+    type=one_of("position", "rotation"),
+    metavar="PART",
+    help="Part of the target that may be anything: rotation (only the position of a pose counts), or "
+    "position (only the rotation counts; alone it is roll,pitch,yaw [rad], qx,qy,qz,qw, or 9 numbers).",
+)
 @frame_option
 @sample_option("q", "Configuration at which the search starts (default: chosen by the solver)")
 @runs("dynx.cli.queries.ik:ik")
@@ -200,4 +207,5 @@ def ik() -> None:
     Examples:
       dynx ik ur5 --to-pose 0.4,0.2,0.3 --frame tool0
       dynx ik ur5 --to-pose 0.4,0.2,0.3,3.14,0,0 --frame tool0 --json
+      dynx ik ur5 --to-pose 3.14,0,0 --free position --frame tool0
     """

@@ -13,27 +13,33 @@ from dynx.cli.shell.inputs import (
     default_frame_note,
     open_backend,
     target_pose,
+    target_rotation,
 )
 from dynx.cli.shell.tables import Table
 from dynx.cli.shell.terminal import console, counted, number, write_json
 
 
-def ik(target: Numbers, frame: str | None, q: Numbers, json_path: str | None, **robot: Any) -> int:
+def ik(
+    target: Numbers, free: str | None, frame: str | None, q: Numbers, json_path: str | None, **robot: Any
+) -> int:
     """Print the configuration found; return the exit code."""
-    wanted = target_pose(target, "--to-pose")
+    wanted = (target_rotation if free == "position" else target_pose)(target, "--to-pose")
+    if wanted.ndim == 1:
+        free = "rotation"
     with open_backend(**robot) as engine:
         model = engine.model
         name = chosen_frame(model, frame)
         start = None if q is None else configuration(model, q)
-        found = engine.inverse_kinematics(wanted, name, start)
+        found = engine.inverse_kinematics(wanted, name, start, free=free)
         result = {
             **document_head(engine),
             "frame": name,
             "target": wanted.tolist(),
+            "free": free,
             "success": bool(found.success),
             "q": found.q.tolist(),
-            "position_error": float(found.position_error),
-            "rotation_error": None if wanted.ndim == 1 else float(found.rotation_error),
+            "position_error": None if free == "position" else float(found.position_error),
+            "rotation_error": None if free == "rotation" else float(found.rotation_error),
             "iterations": int(found.iterations),
             "restarts": int(found.restarts),
         }
@@ -56,9 +62,8 @@ def ik(target: Numbers, frame: str | None, q: Numbers, json_path: str | None, **
 
 def _outcome(result: dict[str, Any]) -> str:
     """State whether the target was reached, the errors, and the number of iterations and restarts."""
-    error = f"{result['position_error']:.3g} m"
-    if result["rotation_error"] is not None:
-        error += f" and {result['rotation_error']:.3g} rad"
+    errors = ((result["position_error"], "m"), (result["rotation_error"], "rad"))
+    error = " and ".join(f"{value:.3g} {unit}" for value, unit in errors if value is not None)
     iterations, restarts = counted(result["iterations"], "iteration"), counted(result["restarts"], "restart")
     if result["success"]:
         return f"target reached: error {error}, after {iterations} and {restarts}"

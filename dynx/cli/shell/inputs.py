@@ -78,19 +78,39 @@ def target_pose(given: Numbers, option: str) -> Floats:
     numbers = np.array(given)
     if len(numbers) == 3:
         return numbers
-    if len(numbers) == 6:
-        return homogeneous(rotation_from_rpy(numbers[3:]), numbers[:3])
-    if len(numbers) == 7:
-        norm = float(np.linalg.norm(numbers[3:]))
-        if abs(norm - 1.0) > 1e-3:
-            raise ArgumentError(f"{option}: the quaternion has norm {norm:.6g}; wanted 1")
-        return homogeneous(rotation_from_quat(numbers[3:] / norm), numbers[:3])
+    if len(numbers) in (6, 7):
+        return homogeneous(_rotation(numbers[3:], option), numbers[:3])
     if len(numbers) == 16:
         return numbers.reshape(4, 4)
     raise ArgumentError(
         f"{option}: wanted 3 numbers (position), 6 (with roll, pitch, yaw), "
         f"7 (with a quaternion qx,qy,qz,qw) or 16 (a matrix); got {len(numbers)}"
     )
+
+
+def target_rotation(given: Numbers, option: str) -> Floats:
+    """Return a rotation (3, 3), or the pose (4, 4) that has it, from the numbers of `option`."""
+    numbers = np.array(given) if isinstance(given, list) else None
+    if numbers is None or len(numbers) in (6, 7, 16):
+        return target_pose(given, option)
+    if len(numbers) in (3, 4):
+        return _rotation(numbers, option)
+    if len(numbers) == 9:
+        return numbers.reshape(3, 3)
+    raise ArgumentError(
+        f"{option}: wanted a rotation of 3 numbers (roll, pitch, yaw), 4 (a quaternion qx,qy,qz,qw) or 9 "
+        f"(a matrix), or a pose of 6, 7 or 16; got {len(numbers)}"
+    )
+
+
+def _rotation(numbers: Floats, option: str) -> Floats:
+    """Return the rotation (3, 3) of roll, pitch, yaw [rad] or of a quaternion (x, y, z, w)."""
+    if len(numbers) == 3:
+        return rotation_from_rpy(numbers)
+    norm = float(np.linalg.norm(numbers))
+    if abs(norm - 1.0) > 1e-3:
+        raise ArgumentError(f"{option}: the quaternion has norm {norm:.6g}; wanted 1")
+    return rotation_from_quat(numbers / norm)
 
 
 def pose_of(numbers: Sequence[float], option: str) -> Pose:

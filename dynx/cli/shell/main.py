@@ -98,7 +98,7 @@ def _show_traceback(ctx: click.Context, option: click.Parameter, wanted: bool) -
     \b
     Examples:
       dynx agree ur5               compare the engines on the UR5
-      dynx agree all --json a.json compare them on every robot of example-robot-data
+      dynx agree all               compare them on all of example-robot-data
       dynx doctor my.urdf          find out why engines differ on a file
       dynx sim --tutorial          compare the tracking errors of all controllers
       dynx bench panda             time the engines on this machine
@@ -108,7 +108,8 @@ def _show_traceback(ctx: click.Context, option: click.Parameter, wanted: bool) -
 
     \b
     Exit codes: 0 success; 1 negative result (engines differ, target not reached,
-    simulation diverged); 2 unusable input; 70 defect of dynx; 74 output not writable.
+    simulation diverged); 2 unusable input; 70 defect of dynx; 74 output not
+    writable.
     """,
 )
 @click.version_option(__version__, prog_name="dynx", message="%(prog)s %(version)s")

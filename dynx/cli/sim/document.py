@@ -87,7 +87,7 @@ def _joints(model: Model, rollout: Rollout) -> list[Entry]:
     in_effect = rollout.settings.get("effort_limits")
     limit: Floats = model.effort_limit if in_effect is None else np.array(in_effect)
     entries = []
-    for k, (name, unit) in enumerate(zip(_names(model), _units(model), strict=True)):
+    for k, (name, unit) in enumerate(zip(_names(model), summary.units, strict=True)):
         known = rollout.reference is not None
         entries.append(
             {
@@ -109,13 +109,6 @@ def _names(model: Model) -> list[str]:
     """Return the names of the coordinates of v; those of a floating base are in its own axes."""
     base = ["base x", "base y", "base z", "base rx", "base ry", "base rz"] if model.floating else []
     return [*base, *model.joint_names]
-
-
-def _units(model: Model) -> list[str]:
-    """Return ``rad`` or ``m`` for each coordinate of v."""
-    kinds = {joint.name: joint.type for joint in model.joints}
-    base = ["m"] * 3 + ["rad"] * 3 if model.floating else []
-    return [*base, *("m" if kinds[name] == "prismatic" else "rad" for name in model.joint_names)]
 
 
 def _settings(request: SimulationRequest, rollout: Rollout) -> Entry:

@@ -159,6 +159,6 @@ def limit_message(error: LimitError, robot: str, *, ignorable: bool) -> str:
 
 def _violation(broken: LimitViolation) -> str:
     return (
-        f"{broken.quantity} of {shown(broken.joint)} is {broken.value:.6g} at {broken.time:.6g} s, "
-        f"limit {broken.limit:.6g}"
+        f"{broken.quantity} of {shown(broken.joint)} is {broken.value:.6g} {broken.unit} at "
+        f"{broken.time:.6g} s, limit {broken.limit:.6g} {broken.unit}"
     )

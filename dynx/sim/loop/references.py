@@ -67,10 +67,12 @@ def _held(model: Model, q: Any, within_limits: bool) -> SetpointOf:
         raise ArgumentError(f"reference has shape {held.shape}; wanted a trajectory or ({model.nq},)")
     if within_limits:
         joints = slice(7 if model.floating else 0, None)
-        rows = zip(model.joint_names, held[joints], model.lower[joints], model.upper[joints], strict=True)
+        rows = zip(
+            model.coordinate_joints, held[joints], model.lower[joints], model.upper[joints], strict=True
+        )
         found = [
-            LimitViolation(name, "position", 0.0, float(x), float(low if x < low else high))
-            for name, x, low, high in rows
+            LimitViolation(joint.name, "position", 0.0, float(x), float(low if x < low else high), joint.unit)
+            for joint, x, low, high in rows
             if not low <= x <= high
         ]
         if found:

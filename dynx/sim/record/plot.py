@@ -74,7 +74,7 @@ def _columns(model: Model) -> list[Column]:
     shares = -(-len(joints) // PER_COLUMN) or (0 if columns else 1)
     ends = np.linspace(0, len(joints), shares + 1).round().astype(int).tolist()
     for begin, end in pairwise(ends):
-        sliding = [joint.type == "prismatic" for joint in joints[begin:end]]
+        sliding = [joint.unit == "m" for joint in joints[begin:end]]
         units = ("m", "N") if sliding and all(sliding) else ("rad", "N m")
         labels = [joint.name for joint in joints[begin:end]]
         if any(sliding) and not all(sliding):

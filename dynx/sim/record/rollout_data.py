@@ -17,6 +17,7 @@ from dynx.sim.record.settings import settings_of
 from dynx.sim.scenario.scenario import Scenario
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint
+from dynx.trajectory.limit_check import UNITS
 
 Self = TypeVar("Self", bound="RolloutData")
 
@@ -48,8 +49,7 @@ class Summary(NamedTuple):
         elif self.max_error.size:
             sentences.append(f"largest error {self._largest(self.max_error)}")
         if self.max_torque.any():
-            efforts = {"rad": "N m", "m": "N"}
-            sentences.append(f"largest torque {self._largest(self.max_torque, efforts)}")
+            sentences.append(f"largest torque {self._largest(self.max_torque, UNITS['effort'])}")
             sentences.append(f"saturated in {100 * self.saturated:.3g} % of the steps")
         else:
             # Where motors do work, the energy changes by that and does not drift.
@@ -140,7 +140,7 @@ class RolloutData:
 
     @property
     def _units(self) -> tuple[str, ...]:
-        joints = ("m" if joint.type == "prismatic" else "rad" for joint in self.model.coordinate_joints)
+        joints = (joint.unit for joint in self.model.coordinate_joints)
         return (*(("m",) * 3 + ("rad",) * 3 if self.model.floating else ()), *joints)
 
     @cached_property

@@ -14,11 +14,12 @@ from hypothesis import strategies as st
 
 from dynx.backends import backend
 from dynx.cli.shell.inputs import default_frame
-from dynx.cli.shell.main import cli
+from dynx.cli.shell.main import COMMANDS, cli
 from dynx.cli.shell.options import number_list
 from dynx.cli.shell.terminal import counted
 from dynx.model.configuration import MAX_MAGNITUDE
 from dynx.model.loading import load
+from dynx.spatial.so3 import quat_from_rotation, rpy_from_rotation
 
 Q = [0.1, -1.5, 1.4, 0.2, 0.3, -0.4]
 Q_TEXT = ",".join(map(repr, Q))
@@ -101,6 +102,41 @@ def test_fk_jacobian_and_mass_are_the_backends() -> None:
     assert document("fk", *options)["T_world_frame"] == engine.forward_kinematics(Q, frame).tolist()
     assert document("jacobian", *options)["jacobian"] == engine.jacobian(Q, frame).tolist()
     assert document("mass", *options)["mass_matrix"] == engine.mass_matrix(Q).tolist()
+
+
+def test_ik_of_a_rotation_or_a_position_alone() -> None:
+    engine = backend("reference", load("ur5"))
+    options = ["--frame", "tool0", "--backend", "reference"]
+    T = engine.forward_kinematics(Q, "tool0")
+    quat, rpy = quat_from_rotation(T[:3, :3]).tolist(), rpy_from_rotation(T[:3, :3]).tolist()
+    for target in (T[:3, :3].ravel().tolist(), quat, rpy, [9.0, 9.0, 9.0, *rpy]):
+        numbers = ",".join(map(repr, target))
+        found = document("ik", "ur5", "--to-pose", numbers, "--free", "position", *options)
+        reached = engine.forward_kinematics(found["q"], "tool0")
+        assert np.abs(reached[:3, :3] - T[:3, :3]).max() < 2e-6
+        assert (found["free"], found["position_error"]) == ("position", None)
+        assert found["rotation_error"] < 1e-6
+    numbers = ",".join(map(repr, T.ravel().tolist()))
+    found = document("ik", "ur5", "--to-pose", numbers, "--free", "rotation", *options)
+    assert np.abs(engine.forward_kinematics(found["q"], "tool0")[:3, 3] - T[:3, 3]).max() < 1e-6
+    assert (found["free"], found["rotation_error"]) == ("rotation", None)
+    shown = CliRunner().invoke(cli, ["ik", "ur5", "--to-pose", "0,0,0", "--free", "position", *options])
+    assert " rad, after " in shown.stdout
+    assert " m " not in shown.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["0,0,0,2", "--free", "position"], "the quaternion has norm 2; wanted 1"),
+        (["0,0", "--free", "position"], "wanted a rotation of 3 numbers (roll, pitch, yaw), 4 (a"),
+        (["0,0,0", "--free", "positon"], "did you mean 'position'?"),
+    ],
+)
+def test_ik_refuses_a_target_that_is_no_rotation(arguments: list[str], message: str) -> None:
+    result = CliRunner().invoke(cli, ["ik", "ur5", "--backend", "reference", "--to-pose", *arguments])
+    assert result.exit_code == 2
+    assert message in result.stderr
 
 
 def test_joints_by_name() -> None:
@@ -305,9 +341,10 @@ def test_a_target_pose_has_one_name_in_ik_and_sim(option: str) -> None:
     assert "--to-pose: wanted 3 numbers" in simulated.stderr
 
 
-@pytest.mark.parametrize("command", ["sim", "ik", "agree", "bench", "jacobian"])
-def test_help_fits_80_columns(command: str) -> None:
-    lines = CliRunner().invoke(cli, [command, "--help"], terminal_width=80).stdout.splitlines()
+@pytest.mark.parametrize("command", [None, *COMMANDS])
+def test_help_fits_80_columns(command: str | None) -> None:
+    arguments = ["--help"] if command is None else [command, "--help"]
+    lines = CliRunner().invoke(cli, arguments, terminal_width=80).stdout.splitlines()
     assert max(map(len, lines)) <= 80
 
 

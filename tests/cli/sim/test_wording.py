@@ -100,8 +100,8 @@ def test_every_violated_limit_is_listed() -> None:
     assert result.exit_code == 2
     assert result.stderr == (
         "dynx: error: the motion violates 2 limits of ur5: "
-        "velocity of 'elbow_joint' is 60 at 0.05 s, limit 3.15; "
-        "velocity of 'wrist_1_joint' is 60 at 0.05 s, limit 3.2 "
+        "velocity of 'elbow_joint' is 60 rad/s at 0.05 s, limit 3.15 rad/s; "
+        "velocity of 'wrist_1_joint' is 60 rad/s at 0.05 s, limit 3.2 rad/s "
         "(a longer --duration lowers velocities; --ignore-limits simulates it nevertheless)\n"
     )
     tutorial = sim("--tutorial", "--duration", "0.2").stderr
