@@ -1,0 +1,73 @@
+"""Contacts, nearest points and ray hits, by the names of bodies and links, in world axes.
+
+A name is that of a body of the scene, or ``robot/link`` for a link of a robot.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from dynx.spatial.scalar import Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """A point at which two bodies touch, with the force of the last step there.
+
+    The force on `a` is ``normal_force * normal + friction_force``; that on `b` is its opposite.
+    """
+
+    a: str
+    b: str
+    point_a: Floats
+    """Point (3,) on the surface of `a` [m]."""
+    point_b: Floats
+    """Point (3,) on the surface of `b` [m]."""
+    normal: Floats
+    """Unit vector (3,) from `b` to `a`."""
+    distance: float
+    """Distance [m] of the surfaces along the normal; negative where they penetrate."""
+    normal_force: float
+    """Force along the normal, on `a` [N]; at least 0."""
+    friction_force: Floats
+    """Force (3,) on `a` perpendicular to the normal [N]."""
+
+    @property
+    def point(self) -> Floats:
+        """Middle (3,) of the two points [m]."""
+        return 0.5 * (self.point_a + self.point_b)
+
+    @property
+    def force(self) -> Floats:
+        """Force (3,) on `a` [N]."""
+        return self.normal_force * self.normal + self.friction_force
+
+
+@dataclass(frozen=True, eq=False)
+class ClosestPoints:
+    """The nearest points of two bodies or links."""
+
+    a: str
+    b: str
+    point_a: Floats
+    """Point (3,) on the surface of `a` [m]."""
+    point_b: Floats
+    """Point (3,) on the surface of `b` [m]."""
+    normal: Floats
+    """Unit vector (3,) from `b` to `a`."""
+    distance: float
+    """Distance [m] of the surfaces; negative where they penetrate."""
+
+
+class RayHits(NamedTuple):
+    """First hit of each of n rays."""
+
+    names: tuple[str | None, ...]
+    """What each ray hits first; None where it hits nothing."""
+    distance: Floats
+    """Distance (n,) from the origin of the ray [m]; infinity without a hit."""
+    points: Floats
+    """Point hit (n, 3) [m]; NaN without a hit."""
+    normals: Floats
+    """Unit normal (n, 3) of the surface, outward; NaN without a hit."""

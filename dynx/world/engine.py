@@ -1,0 +1,143 @@
+"""The interface that an engine implements to run a world.
+
+An implementation is given checked numbers only (`dynx.world.layout`): finite, in SI units and world axes, and
+robots in the coordinates of their models (`dynx.Model`), mimic joints and floating bases included. Names,
+frames, motors, the time and the check of every argument are those of `dynx.world.World`.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, NamedTuple
+
+from dynx.spatial.scalar import Floats
+from dynx.world.layout import Layout
+from dynx.world.settings import Setting
+from dynx.world.state import BodyState, RobotState
+
+
+class TouchingPoint(NamedTuple):
+    """A contact between two colliders, by their numbers, as `dynx.world.Contact` describes it."""
+
+    a: int
+    b: int
+    point_a: Floats
+    point_b: Floats
+    normal: Floats
+    """Unit vector (3,) from b to a."""
+    distance: float
+    normal_force: float = 0.0
+    friction_force: Floats | None = None
+    """Force (3,) on a [N]; None in a query of distances."""
+
+
+class RayHit(NamedTuple):
+    """First hit of a ray: the collider (None for no hit), the distance [m], the outward normal (3,)."""
+
+    collider: int | None
+    distance: float
+    normal: Floats
+
+
+class WorldEngine(ABC):
+    """A scene inside an engine, which advances in steps of `dt` [s].
+
+    A subclass has this constructor. A package offers it by an entry point in the group ``dynx.worlds``.
+    Where a method fails it raises `EngineError`; the engine's own exceptions do not reach the caller.
+    """
+
+    name: ClassVar[str]
+    """Name by which users choose the engine."""
+
+    settings: ClassVar[Mapping[str, Setting]] = {}
+    """Settings of the engine's solver and contacts that users may change, with their defaults."""
+
+    def __init__(self, layout: Layout, dt: float, settings: Mapping[str, Any]) -> None:
+        """Build the world at the start that `layout` describes; `settings` has a value for every name in
+        `settings`."""
+        self.layout = layout
+        self.dt = dt
+
+    # -- motion -------------------------------------------------------------------------------
+
+    @abstractmethod
+    def set_torques(self, robot: int, tau: Floats) -> None:
+        """Apply the generalised force `tau` (nv,) in all later steps, until the next call.
+
+        The first six entries of a floating base are force and moment at the base frame, in its axes. The
+        caller repeats the call before every step in which they are not zero, so that they may be converted
+        to axes of the world once.
+        """
+
+    @abstractmethod
+    def set_wrenches(self, wrenches: Floats) -> None:
+        """Apply a force and a moment about the centre of mass (n_bodies, 6), in world axes, to every body of
+        the scene in all later steps, until the next call."""
+
+    @abstractmethod
+    def step(self, n: int) -> None:
+        """Take `n` steps of `dt`."""
+
+    # -- state --------------------------------------------------------------------------------
+
+    @abstractmethod
+    def robot_state(self, robot: int) -> RobotState:
+        """Return new arrays q (nq,), v (nv,); NaN or infinity where the engine has diverged."""
+
+    @abstractmethod
+    def body_state(self, body: int) -> BodyState:
+        """Return new arrays, as `robot_state` does."""
+
+    @abstractmethod
+    def set_robot_state(self, robot: int, q: Floats, v: Floats) -> None:
+        """Set the state of a robot; contacts and forces of the last step are those of no step."""
+
+    @abstractmethod
+    def set_body_state(self, body: int, T: Floats, twist: Floats) -> None:
+        """Set the pose (4, 4) and twist (6,) of a body; one that is fixed may be moved."""
+
+    @abstractmethod
+    def dump(self) -> bytes:
+        """Return everything that determines the later steps, torques and wrenches excepted.
+
+        A world that continues and one that was restored take the same steps, bit for bit, also in another
+        process.
+        """
+
+    @abstractmethod
+    def load(self, data: bytes) -> None:
+        """Continue from what `dump` returned for the same layout, `dt` and settings in this version of the
+        engine. The caller has checked that the bytes are those."""
+
+    # -- queries ------------------------------------------------------------------------------
+
+    @abstractmethod
+    def contacts(self) -> Sequence[TouchingPoint]:
+        """Return the contacts of the last step with their forces; after a change of the state, those of the
+        new state without forces. Pairs that do not collide are left out."""
+
+    @abstractmethod
+    def closest(self, a: int, b: int, within: float) -> TouchingPoint | None:
+        """Return the nearest points of two colliders, whether or not they may touch; None if they are
+        farther apart than `within` [m]."""
+
+    @abstractmethod
+    def aabb(self, collider: int) -> tuple[Floats, Floats]:
+        """Return the lower and the upper corner (3,) of the box around a collider in world axes; infinite
+        where the collider is."""
+
+    @abstractmethod
+    def cast_rays(self, origins: Floats, directions: Floats, length: float) -> Sequence[RayHit]:
+        """Return the first hit of every ray, from origins (n, 3) along unit directions (n, 3)."""
+
+    # -- end ----------------------------------------------------------------------------------
+
+    @property
+    @abstractmethod
+    def version(self) -> str:
+        """Version of the engine, which a saved state records."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Release what the engine holds; closing twice is harmless."""

@@ -1,0 +1,131 @@
+"""A scene prepared for an engine: numbers in place of names, every mesh read, every filter evaluated.
+
+`dynx.world.World` builds it from a scene and passes it to the engine, so that no engine resolves a name,
+reads a file, or sees a value that was not checked.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dynx.model import Model
+from dynx.spatial.scalar import Floats
+
+Shape = Any  # a class of dynx.model.geometry
+Material = Any  # dynx.world.scene.Material
+
+WORLD = -1
+"""Number of the body that is the world itself."""
+
+
+class Owner(NamedTuple):
+    """The rigid body to which a collider or an end of a constraint belongs."""
+
+    robot: int | None
+    """Number of the robot; None for a body of the scene or the world."""
+    body: int
+    """Number of the moving body in the robot's mechanism (ROOT = -1: its base); without a robot, number of
+    the body of the scene, or WORLD."""
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedShape:
+    """A shape and its pose in the frame of its owner (4, 4).
+
+    The frame is that of the mechanism's body, for the base of a robot its base frame, and for a fixed base
+    the world. The hull of a mesh has been computed: `shape.hull` reads no file.
+    """
+
+    shape: Shape
+    T: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Collider:
+    """The collision shapes of one link of a robot, or of one body of the scene."""
+
+    name: str
+    """Name in contacts: ``robot/link``, or that of the body."""
+    owner: Owner
+    shapes: tuple[PlacedShape, ...]
+    material: Material
+
+
+@dataclass(frozen=True, eq=False)
+class RobotLayout:
+    """A robot at its start; arrays over joints have an entry for each body of `model.mechanism`."""
+
+    name: str
+    model: Model
+    q: Floats
+    v: Floats
+    lower: Floats
+    """Lower limits (n,) of the joints [rad or m]; minus infinity where there is none."""
+    upper: Floats
+    damping: Floats
+    """Viscous damping (n,) of the joints [N m s/rad or N s/m]."""
+    friction: Floats
+    """Coulomb friction (n,) of the joints [N m or N]."""
+
+
+@dataclass(frozen=True, eq=False)
+class BodyLayout:
+    """A body of the scene at its start; one without mass is fixed in the world."""
+
+    name: str
+    mass: float
+    center: Floats
+    """Centre of mass (3,) in the body frame [m]."""
+    inertia: Floats
+    """Inertia (3, 3) about the centre of mass, in the axes of the body frame [kg m^2]."""
+    T: Floats
+    """Pose of the body frame in the world (4, 4)."""
+    twist: Floats
+    """Linear velocity of the origin of the body frame, then angular velocity (6,), in world axes."""
+
+    @property
+    def fixed(self) -> bool:
+        """Whether the body is fixed in the world."""
+        return self.mass == 0.0
+
+
+class Anchor(NamedTuple):
+    """One end of a constraint: a frame in the frame of its owner (4, 4)."""
+
+    owner: Owner
+    T: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class ConstraintLayout:
+    """A weld makes the frames of both anchors coincide, a ``point`` their origins only."""
+
+    kind: Literal["weld", "point"]
+    a: Anchor
+    b: Anchor
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """A scene in numbers; robots, bodies and colliders are in the order of the scene."""
+
+    name: str
+    gravity: Floats
+    robots: tuple[RobotLayout, ...]
+    bodies: tuple[BodyLayout, ...]
+    colliders: tuple[Collider, ...]
+    """Links and bodies that have shapes; empty if the world has no collisions."""
+    collides: NDArray[np.bool_]
+    """Whether the colliders of each pair (n, n) may touch: symmetric, False on the diagonal, between
+    colliders of one owner, between fixed ones, and where the scene ignores the pair."""
+    constraints: tuple[ConstraintLayout, ...]
+
+    def is_fixed(self, owner: Owner) -> bool:
+        """Check whether a body cannot move: the world, a fixed base, or a body without mass."""
+        if owner.robot is not None:
+            return owner.body == WORLD and not self.robots[owner.robot].model.floating
+        return owner.body == WORLD or self.bodies[owner.body].fixed

@@ -1,0 +1,77 @@
+"""Settings of an engine's solver and contacts, by name, with their defaults and valid values."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
+from dynx.model.configuration import checked_array, is_real
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One setting: a number in a range, a whole number, a truth value, a choice or a list of numbers.
+
+    The type of `default` decides: float, int, bool, str (one of `choices`) or a tuple of floats.
+    """
+
+    default: Any
+    meaning: str
+    """Noun phrase for the documentation."""
+    least: float = 0.0
+    most: float = np.inf
+    choices: tuple[str, ...] = ()
+
+    def checked(self, name: str, value: object) -> Any:
+        """Return the value in the type of the default. Raises ArgumentError for any other."""
+        if isinstance(self.default, bool):
+            if isinstance(value, bool | np.bool_):
+                return bool(value)
+            raise ArgumentError(f"setting {name} is {shown(value)}; wanted True or False")
+        if isinstance(self.default, str):
+            if isinstance(value, str) and value in self.choices:
+                return value
+            raise ArgumentError(f"setting {name} is {shown(value)}; wanted one of {', '.join(self.choices)}")
+        if isinstance(self.default, tuple):
+            numbers = checked_array(f"setting {name}", cast(ArrayLike, value), len(self.default))
+            if numbers.ndim != 1:
+                raise ArgumentError(f"setting {name} is {shown(value)}; wanted {len(self.default)} numbers")
+            for number in numbers.tolist():
+                self._bounded(name, number)
+            return tuple(numbers.tolist())
+        if isinstance(self.default, int):
+            if isinstance(value, bool) or not isinstance(value, int | np.integer):
+                raise ArgumentError(f"setting {name} is {shown(value)}; wanted a whole number")
+            return int(self._bounded(name, int(value)))
+        if not is_real(value):
+            raise ArgumentError(f"setting {name} is {shown(value)}; wanted a number")
+        return float(self._bounded(name, float(value)))
+
+    def _bounded(self, name: str, number: float) -> float:
+        if not (self.least <= number <= self.most and np.isfinite(number)):
+            ends = f"at least {self.least:g}" if self.most == np.inf else f"{self.least:g} to {self.most:g}"
+            raise ArgumentError(f"setting {name} is {number:g}; wanted {ends}")
+        return number
+
+
+def checked_settings(
+    engine: str, known: Mapping[str, Setting], given: Mapping[str, object]
+) -> dict[str, Any]:
+    """Return a value for every setting of an engine: the given one, or the default.
+
+    Raises UnknownNameError for a setting that the engine does not have, ArgumentError for an invalid value.
+    """
+    for name in given:
+        if name not in known:
+            raise UnknownNameError(
+                f"the engine {shown(engine)} has no setting {shown(name)}{nearest(name, known)}"
+            )
+    return {
+        name: setting.checked(name, given[name]) if name in given else setting.default
+        for name, setting in known.items()
+    }
