@@ -126,10 +126,13 @@ def test_a_follower_leaves_its_limits(scale: float, offset: float, margin: float
     assert found("DX512", case) == ["wrist"] * (margin < 0.0)
 
 
-@given(st.floats(-100.0, 100.0))
-def test_an_orientation_beyond_two_turns_is_in_degrees(angle: float) -> None:
+@given(st.floats(-100.0, 100.0) | st.sampled_from([6.28, -6.2832, 10.0, -7.5]))
+def test_an_orientation_beyond_a_full_turn_is_in_degrees(angle: float) -> None:
     case = arm(f'<origin rpy="0 {angle!r} 0"/>')
-    assert found("DX513", case) == ["elbow"] * (abs(angle) > 4.0 * math.pi)
+    # A full turn rounded to two decimals or more is in radians.
+    beyond = abs(angle) > 6.29
+    assert found("DX513", case) == ["elbow"] * beyond
+    assert any("radians" in note.message for note in case.model.notes) == beyond
 
 
 def test_an_orientation_in_a_link_names_the_link() -> None:

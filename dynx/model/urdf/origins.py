@@ -19,6 +19,9 @@ from dynx.spatial.so3 import rotation_from_quat, rpy_from_rotation
 QUATERNION = "quat_xyzw"
 """Attribute of ``<origin>`` that holds a quaternion (x, y, z, w)."""
 
+FULL_TURN = 6.29
+"""Largest angle of an orientation that is written in radians: 2 pi, rounded up."""
+
 _FIRST_VERSION = (1, 1)
 
 
@@ -51,6 +54,13 @@ def read_origin(parent: Element, what: str, reading: Reading) -> Pose:
         if text is not None and not text.strip():
             reading.note(element, f"{attribute} in <origin> of {what} is empty; it is read as zero")
         parts[attribute] = ZERO if not (text and text.strip()) else reading.vector(element, attribute, what)
+    largest = max(parts["rpy"], key=abs)
+    if abs(largest) > FULL_TURN:
+        reading.note(
+            element,
+            f"rpy in <origin> of {what} holds {largest:g}, more than a full turn; URDF reads radians, in "
+            f"degrees it would be {math.radians(largest):.6g}",
+        )
     if QUATERNION in element.attributes:
         if reading.quaternions:
             parts["rpy"] = _read_quaternion(element, what, reading)

@@ -1,7 +1,7 @@
 """DX513 angle-in-degrees: An angle seems to be written in degrees, where URDF reads radians.
 
-Two patterns are reported. An ``rpy`` angle beyond two turns, 12.57 rad: no orientation is written so, while
-45, 90 and 180 are usual in degrees. And the limits of a revolute joint that are both whole multiples of 5
+Two patterns are reported. An ``rpy`` angle beyond a full turn, 6.28 rad: no orientation is written so, while
+10, 45, 90 and 180 are usual in degrees. And the limits of a revolute joint that are both whole multiples of 5
 between -360 and 360, at least one of them 30 or more: 30 rad are five turns, and 30 degrees is a usual range.
 Limits of -100 and 100 are not reported, because they often stand for "unlimited".
 
@@ -15,11 +15,11 @@ import math
 from collections.abc import Iterable, Iterator
 
 from dynx.errors import DescriptionError
+from dynx.model.urdf.origins import FULL_TURN
 from dynx.model.xml.source import SourceElement
 from dynx.rules import Case, Detection, Rule, found_at
 from dynx.rules.text.attributes import origin_of
 
-_TWO_TURNS = 4.0 * math.pi
 _STEP, _SMALLEST, _LARGEST = 5.0, 30.0, 360.0
 _UNLIMITED = (-100.0, 100.0)
 
@@ -40,7 +40,7 @@ def _origins(case: Case) -> Iterator[Detection]:
         for element in part.walk():
             if element.tag != "origin" or element.parent is None:
                 continue
-            large = [angle for angle in _angles(element.parent) if abs(angle) > _TWO_TURNS]
+            large = [angle for angle in _angles(element.parent) if abs(angle) > FULL_TURN]
             if large:
                 message = f"rpy holds {large[0]:g}, read as radians; in degrees it is {_radians(large[0])}"
                 yield found_at(element, message)

@@ -191,6 +191,14 @@ NOTED = {
     "negative moment": (link(INERTIAL.replace("0.05", "-0.05")), "principal moment -0.05"),
     "triangle": (link(INERTIAL.replace("0.05", "0.08")), "exceeds the sum of the others"),
     "inertia without mass": (link(INERTIAL.replace("2.5", "0")), "is not zero although its mass is"),
+    "angle in degrees": (
+        joint('<origin rpy="0 -90 10"/>'),
+        "rpy in <origin> of joint 'j' holds -90, more than a",
+    ),
+    "inertial in degrees": (
+        link(INERTIAL.replace("0.4 0.5 0.6", "0 0 45")),
+        "in degrees it would be 0.785398",
+    ),
     "mimic of nobody": (joint('<mimic joint="k"/>'), "mimics 'k', which does not exist"),
 }
 
