@@ -15,6 +15,7 @@ from dynx.model.elements import IDENTITY, Pose
 from dynx.model.library import find, robots
 from dynx.model.model import STANDARD_GRAVITY, Base, Model
 from dynx.model.package_paths import StrPath
+from dynx.model.urdf.geometry import urdf_geometry
 from dynx.model.urdf.reader import read_urdf
 from dynx.model.xacro_reading import expand_xacro
 
@@ -45,7 +46,8 @@ def load(
     `base` is ``"fixed"`` (default) or ``"floating"``. `lock` fixes joints, by name, at positions [rad or m];
     they are removed from q. `gravity` is (3,) [m/s^2] in world axes, by default (0, 0, -9.81). `base_pose`
     is the pose of the root link of a fixed base in the world, a `Pose` or a matrix (4, 4), by default the
-    identity. `package_dirs` are the folders in which xacro looks for packages.
+    identity. `package_dirs` are the folders in which packages and meshes are searched, besides those around
+    the file.
 
     Raises RobotNotFoundError if no robot or file is found, DescriptionError if the description is malformed
     (with file and line), UnsupportedFeatureError if it uses a feature that dynx does not support,
@@ -57,8 +59,18 @@ def load(
         )
     if isinstance(x, Model):
         return _with_options(x, base, lock, gravity, base_pose)
-    data, source, name = read_description(x, package_dirs)
-    return read_model(data, source, name, base=base, lock=lock, gravity=gravity, base_pose=base_pose)
+    folders = [package_dirs] if isinstance(package_dirs, str | os.PathLike) else list(package_dirs)
+    data, source, name = read_description(x, folders)
+    return read_model(
+        data,
+        source,
+        name,
+        base=base,
+        lock=lock,
+        gravity=gravity,
+        base_pose=base_pose,
+        package_dirs=folders,
+    )
 
 
 def read_description(
@@ -69,8 +81,6 @@ def read_description(
     The text is bytes or characters; the name is None for text that is not from a file. A .xacro file is
     expanded. Raises the errors of `load`.
     """
-    if isinstance(package_dirs, str | os.PathLike):
-        package_dirs = [package_dirs]
     if isinstance(x, bytes | bytearray | memoryview):
         return bytes(x), "<string>", None
     if isinstance(x, str) and x.lstrip("\ufeff \t\r\n").startswith("<"):
@@ -121,6 +131,7 @@ def read_model(
     lock: Mapping[str, float] | None = None,
     gravity: ArrayLike | None = None,
     base_pose: Pose | ArrayLike | None = None,
+    package_dirs: Iterable[StrPath] = (),
 ) -> Model:
     """Create the model of URDF text; `source` names it in errors.
 
@@ -138,6 +149,7 @@ def read_model(
             lock=lock,
             notes=content.notes,
             source=source,
+            geometry=urdf_geometry(data, source, package_dirs),
         )
     except DescriptionError as error:
         if content.unread is None:

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
 from dynx.model import configuration, locking, topology
 from dynx.model.elements import IDENTITY, Frame, Inertial, Joint, Link, Note, Pose, Vector
+from dynx.model.geometry import Geometry
 from dynx.model.mechanism import Mechanism, build_mechanism
 from dynx.model.number_bounds import refuse_unbounded_numbers
 from dynx.model.urdf.writer import write_urdf
@@ -21,6 +22,7 @@ from dynx.spatial.scalar import Floats
 Base = Literal["fixed", "floating"]
 Part = TypeVar("Part")
 STANDARD_GRAVITY: Vector = (0.0, 0.0, -9.81)
+NO_GEOMETRY = Geometry({})
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +34,9 @@ class Model:
     ``q[:3]`` is the position of the base frame in the world [m], ``q[3:7]`` its unit quaternion (x, y, z, w),
     and ``v[:3]``, ``v[3:6]`` its linear [m/s] and angular [rad/s] velocity, both expressed in the base frame.
     A fixed base has the pose `base_pose` in the world.
+
+    `geometry` holds the visual and collision shapes of the links. It affects no dynamics without contacts, so
+    models that differ in it alone are equal.
 
     Models are immutable; they compare by content (`==`), hash and pickle.
     """
@@ -45,6 +50,7 @@ class Model:
     base_pose: Pose = IDENTITY
     notes: tuple[Note, ...] = field(default=(), compare=False)
     source: str = field(default="<memory>", compare=False)
+    geometry: Geometry = field(default=NO_GEOMETRY, compare=False)
 
     def __post_init__(self) -> None:
         if self.floating and self.base_pose != IDENTITY:
@@ -66,6 +72,7 @@ class Model:
         lock: Mapping[str, float] | None = None,
         notes: Iterable[Note] = (),
         source: str = "<memory>",
+        geometry: Geometry = NO_GEOMETRY,
     ) -> Model:
         """Check that links and joints form one tree, order them, lock joints, and create the model.
 
@@ -87,6 +94,7 @@ class Model:
             base_pose=configuration.checked_pose("base_pose", base_pose),
             notes=tuple(notes),
             source=source,
+            geometry=geometry.for_links(link.name for link in ordered_links),
         )
 
     # -- names and sizes ---------------------------------------------------------------------

@@ -1,7 +1,7 @@
 """Extents of the shapes of links, with which rules compare masses and inertias."""
 
+from dynx.model.geometry.mesh_files import MeshNotFoundError, find_mesh
 from dynx.rules.geometry.extent import Extent
-from dynx.rules.geometry.mesh_files import MeshNotFoundError, find_mesh
 from dynx.rules.geometry.rigid_shapes import body_extents, group_extents
 from dynx.rules.geometry.unread_meshes import is_found, named_meshes, parts_with_meshes, reason_unread
 

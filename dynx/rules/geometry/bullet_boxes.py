@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from dynx.model.geometry.mesh_files import MeshNotFoundError, find_mesh
 from dynx.model.xml.source import SourceElement
-from dynx.rules.geometry.mesh_files import MeshNotFoundError, find_mesh
 from dynx.rules.geometry.meshes import Box, mesh_box
 
 MESH_TAGS = frozenset({"mesh", "sdf_mesh", "convex"})

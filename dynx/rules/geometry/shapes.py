@@ -9,9 +9,9 @@ from itertools import product
 import numpy as np
 
 from dynx.errors import DescriptionError
+from dynx.model.geometry.mesh_files import MeshNotFoundError, find_mesh
 from dynx.model.xml.source import SourceElement
 from dynx.rules.geometry.extent import Extent
-from dynx.rules.geometry.mesh_files import MeshNotFoundError, find_mesh
 from dynx.rules.geometry.meshes import mesh_box
 from dynx.rules.text.attributes import number_of, origin_of, vector_of
 from dynx.spatial.scalar import Floats

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from dynx.model.geometry.mesh_files import MeshNotFoundError, find_mesh, reason_unknown
 from dynx.model.xml.source import SourceElement, XmlSource
-from dynx.rules.geometry.mesh_files import MeshNotFoundError, find_mesh, reason_unknown
 from dynx.rules.geometry.meshes import is_mesh_format, mesh_box
 from dynx.rules.geometry.shapes import geometry_elements
 

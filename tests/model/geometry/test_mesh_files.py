@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from dynx.rules.geometry import MeshNotFoundError, find_mesh, mesh_files
+from dynx.model.geometry import mesh_files
+from dynx.model.geometry.mesh_files import MeshNotFoundError, find_mesh
 from dynx.rules.geometry.meshes import mesh_box
 
 

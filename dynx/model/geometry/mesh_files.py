@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable
 from functools import lru_cache
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 from dynx.errors import DescriptionError, nearest, shown
-from dynx.model.package_paths import find_package
+from dynx.model.package_paths import StrPath, find_package, resolve_package
 
 _SEARCH_PATHS = (("ROS_PACKAGE_PATH", ""), ("AMENT_PREFIX_PATH", "share"))
 """Environment variables that list folders, and where packages lie in each of these."""
@@ -28,7 +29,7 @@ class MeshNotFoundError(Exception):
     """The folder of a mesh is known, and the mesh is not in it."""
 
 
-def find_mesh(filename: str, source: str) -> Path | None:
+def find_mesh(filename: str, source: str, package_dirs: Iterable[StrPath] = ()) -> Path | None:
     """Find the file of a mesh named in the description `source` (a path); None where its folder is unknown.
 
     ``package://NAME/FILE`` is searched in the folders above the description and in ROS_PACKAGE_PATH and
@@ -37,8 +38,13 @@ def find_mesh(filename: str, source: str) -> Path | None:
     file is not in it.
 
     A description may come from anyone, so nothing is searched or listed outside the folder of its files (see
-    `_enclosing`) and the packages: a path that leads elsewhere, also by a symbolic link, gives None.
+    `_enclosing`) and the packages: a path that leads elsewhere, also by a symbolic link, gives None. Folders
+    in `package_dirs`, which the user names, are searched first: for packages, and for full paths in them.
     """
+    for folder in package_dirs:
+        found = _in_user_folder(filename, Path(folder))
+        if found is not None:
+            return found
     if not os.path.isfile(source):
         return None
     try:
@@ -73,6 +79,19 @@ def reason_unknown(filename: str, source: str) -> str:
     if "://" in filename and not filename.startswith("file://"):
         return f"dynx reads no {shown(filename.partition('://')[0] + '://')}"
     return f"{shown(filename, 200)} is outside the folder of the description"
+
+
+def _in_user_folder(filename: str, root: Path) -> Path | None:
+    """Return the file of a mesh in a folder that the user named, or None."""
+    try:
+        if filename.startswith("package://"):
+            return resolve_package(filename, [root])
+        full = filename.removeprefix("file://")
+        found = Path(os.path.realpath(full)) if os.path.isabs(full) else None
+        inside = found is not None and found.is_relative_to(os.path.realpath(root)) and found.is_file()
+        return found if inside else None
+    except (DescriptionError, OSError, ValueError, RuntimeError):
+        return None
 
 
 def _existing(path: Path, root: Path, described: str) -> Path | None:

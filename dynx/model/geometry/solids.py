@@ -1,0 +1,92 @@
+"""Volume, centre of mass and moments of inertia of shapes of uniform density."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from dynx.errors import ArgumentError
+from dynx.model.geometry.mesh import Mesh
+from dynx.model.geometry.shapes import Box, Capsule, Cylinder, HeightField, Plane, Sphere
+from dynx.spatial.scalar import Floats
+
+Shape = Box | Sphere | Cylinder | Capsule | Mesh | Plane | HeightField
+
+
+@dataclass(frozen=True, eq=False)
+class SolidProperties:
+    """Volume [m^3], its centre (3,) [m], and its second moments about the centre for density 1 [m^5]."""
+
+    volume: float
+    center: Floats
+    inertia: Floats
+
+    def transform(self, T: Floats) -> SolidProperties:
+        """Return the properties in frame A, where T (4, 4) is the pose of this frame in A."""
+        R = T[:3, :3]
+        return SolidProperties(self.volume, R @ self.center + T[:3, 3], R @ self.inertia @ R.T)
+
+    def __add__(self, other: SolidProperties) -> SolidProperties:
+        volume = self.volume + other.volume
+        center = (self.volume * self.center + other.volume * other.center) / volume
+        inertia = sum(
+            part.inertia + part.volume * _point_inertia(part.center - center) for part in (self, other)
+        )
+        return SolidProperties(volume, center, np.asarray(inertia))
+
+
+def solid_properties(shape: Shape) -> SolidProperties:
+    """Return volume, centre and second moments of a shape; those of a mesh are the ones of its convex hull.
+
+    Raises ArgumentError for a plane or height field, and the errors of `Mesh.hull`.
+    """
+    center = np.zeros(3)
+    if isinstance(shape, Box):
+        x, y, z = shape.size
+        return SolidProperties(x * y * z, center, x * y * z * _diagonal(x**2 / 12, y**2 / 12, z**2 / 12))
+    if isinstance(shape, Sphere):
+        volume = 4.0 / 3.0 * math.pi * shape.radius**3
+        square = shape.radius**2 / 5
+        return SolidProperties(volume, center, volume * _diagonal(square, square, square))
+    if isinstance(shape, Cylinder):
+        volume = math.pi * shape.radius**2 * shape.length
+        square = shape.radius**2 / 4
+        return SolidProperties(volume, center, volume * _diagonal(square, square, shape.length**2 / 12))
+    if isinstance(shape, Capsule):
+        return _capsule(shape.radius, shape.length)
+    if isinstance(shape, Mesh):
+        return _polyhedron(*shape.hull)
+    raise ArgumentError(f"a {type(shape).__name__} has no volume, so it cannot have a mass")
+
+
+def _diagonal(xx: float, yy: float, zz: float) -> Floats:
+    """Return the inertia of unit mass with these mean squares of x, y and z."""
+    return np.diag([yy + zz, xx + zz, xx + yy])
+
+
+def _point_inertia(p: Floats) -> Floats:
+    return np.asarray(p @ p * np.eye(3) - np.outer(p, p))
+
+
+def _capsule(radius: float, length: float) -> SolidProperties:
+    """Add a cylinder and two half balls, whose centres are 3/8 of the radius from their flat faces."""
+    tube, ball = math.pi * radius**2 * length, 4.0 / 3.0 * math.pi * radius**3
+    xx = (tube / 4 + ball / 5) * radius**2
+    zz = tube * length**2 / 12 + ball * (radius**2 / 5 + length**2 / 4 + 3 * length * radius / 8)
+    return SolidProperties(tube + ball, np.zeros(3), _diagonal(xx, xx, zz))
+
+
+def _polyhedron(vertices: Floats, faces: np.ndarray[tuple[int, int], np.dtype[np.intp]]) -> SolidProperties:
+    """Add the tetrahedra between an inner point and each triangle."""
+    middle = vertices.mean(axis=0)
+    corners = (vertices - middle)[faces]
+    volumes = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6.0
+    volume = float(volumes.sum())
+    sums = corners.sum(axis=1)
+    center = volumes @ sums / (4.0 * volume)
+    squares = np.einsum("i,ija,ijb->ab", volumes, corners, corners)
+    squares = (squares + np.einsum("i,ia,ib->ab", volumes, sums, sums)) / 20.0
+    squares -= volume * np.outer(center, center)
+    return SolidProperties(volume, center + middle, np.trace(squares) * np.eye(3) - squares)

@@ -1,0 +1,9 @@
+"""`Scene`: a frozen description of a world, and its parts."""
+
+from dynx.world.scene.bodies import SceneBody, box, ground, sphere
+from dynx.world.scene.constraints import PointToPoint, Weld
+from dynx.world.scene.material import Material
+from dynx.world.scene.robots import SceneRobot
+from dynx.world.scene.scene import Scene
+
+__all__ = ["Material", "PointToPoint", "Scene", "SceneBody", "SceneRobot", "Weld", "box", "ground", "sphere"]

@@ -1,0 +1,135 @@
+"""Bodies of a scene: rigid shapes that move freely or are fixed in the world."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dynx.errors import ArgumentError, ShapeError, shown
+from dynx.model import Inertial, Pose
+from dynx.model.configuration import checked_array, checked_pose
+from dynx.model.elements import IDENTITY, Vector
+from dynx.model.geometry import Box, Collision, HeightField, Plane, Sphere, solid_properties
+from dynx.model.geometry.sizes import finite_numbers, finite_vector, positive_number
+from dynx.model.urdf.links import inertia_fault
+from dynx.spatial.scalar import Floats
+from dynx.world.scene.material import DEFAULT_MATERIAL, Material, checked_material
+from dynx.world.scene.names import checked_name
+
+Tensor = tuple[Vector, Vector, Vector]
+
+
+@dataclass(frozen=True)
+class SceneBody:
+    """A rigid body of one shape, or of several placed ones (`Collision`), at `pose` in the world.
+
+    Without `mass` it is fixed in the world. `center_of_mass` (3,) [m] is in the body frame, and `inertia`
+    (3, 3) [kg m^2] about it in the axes of the body; each is that of shapes of one density where it is None
+    (overlaps count twice; a mesh counts as its convex hull). `twist` (6,) is the velocity at the start:
+    linear [m/s] of the origin of the body frame, angular [rad/s], in world axes.
+    """
+
+    name: str
+    shapes: tuple[Collision, ...]
+    pose: Pose = IDENTITY
+    mass: float | None = None
+    inertia: Tensor | None = None
+    center_of_mass: Vector | None = None
+    twist: tuple[float, ...] = (0.0,) * 6
+    material: Material = DEFAULT_MATERIAL
+
+    def __post_init__(self) -> None:
+        checked_name("body", self.name)
+        what = f"body {shown(self.name)}"
+        put = object.__setattr__
+        put(self, "shapes", _placed_shapes(what, self.shapes))
+        put(self, "pose", checked_pose(f"pose of {what}", self.pose))
+        put(self, "twist", finite_numbers(f"twist of {what}", self.twist, 6))
+        checked_material(f"material of {what}", self.material)
+        if self.mass is None:
+            self._refuse_motion(what)
+            return
+        put(self, "mass", positive_number(f"mass of {what}", self.mass))
+        for placed in self.shapes:
+            if isinstance(placed.shape, Plane | HeightField):
+                kind = type(placed.shape).__name__
+                raise ArgumentError(f"{what} has a mass and a {kind}, which belongs to fixed bodies only")
+        if self.center_of_mass is not None:
+            put(self, "center_of_mass", finite_vector(f"center_of_mass of {what}", self.center_of_mass))
+        if self.inertia is not None:
+            put(self, "inertia", _checked_inertia(what, self.inertia))
+
+    def _refuse_motion(self, what: str) -> None:
+        for name in ("inertia", "center_of_mass"):
+            if getattr(self, name) is not None:
+                raise ArgumentError(f"{what} has {name} and no mass; a body without mass is fixed")
+        if any(self.twist):
+            raise ArgumentError(f"{what} has a twist and no mass; a body without mass is fixed")
+
+    @property
+    def fixed(self) -> bool:
+        """Whether the body is fixed in the world."""
+        return self.mass is None
+
+    @cached_property
+    def inertial(self) -> Inertial:
+        """Mass, centre of mass and moments about it, in the axes of the body; zero for a fixed body.
+
+        Raises DescriptionError for a mesh without a usable hull.
+        """
+        if self.mass is None:
+            return Inertial()
+        center, inertia = self.center_of_mass, self.inertia
+        if center is None or inertia is None:
+            parts = [solid_properties(each.shape).transform(each.origin.matrix) for each in self.shapes]
+            solid = sum(parts[1:], start=parts[0])
+            density = self.mass / solid.volume
+            center = tuple(solid.center.tolist()) if center is None else center
+            tensor = density * solid.inertia if inertia is None else np.array(inertia)
+        else:
+            tensor = np.array(inertia)
+        (xx, xy, xz), (_, yy, yz), (_, _, zz) = tensor.tolist()
+        return Inertial(self.mass, Pose(center), xx, xy, xz, yy, yz, zz)
+
+
+def ground(
+    name: str = "ground", *, pose: Pose | ArrayLike = IDENTITY, material: Material = DEFAULT_MATERIAL
+) -> SceneBody:
+    """Return a fixed plane, the half-space below z = 0 of `pose`."""
+    return SceneBody(name, Plane(), checked_pose("pose", pose), material=material)  # type: ignore[arg-type]
+
+
+def box(name: str, size: ArrayLike, **options: object) -> SceneBody:
+    """Return a body with the shape of a box of that size (3,) [m]; `options` are those of `SceneBody`."""
+    return SceneBody(name, Box(size), **options)  # type: ignore[arg-type]
+
+
+def sphere(name: str, radius: float, **options: object) -> SceneBody:
+    """Return a body with the shape of a ball; `options` are those of `SceneBody`."""
+    return SceneBody(name, Sphere(radius), **options)  # type: ignore[arg-type]
+
+
+def _placed_shapes(what: str, shapes: object) -> tuple[Collision, ...]:
+    listed: list[Any] = list(shapes) if isinstance(shapes, Sequence) else [shapes]
+    if not listed:
+        raise ArgumentError(f"{what} has no shape; wanted at least one")
+    return tuple(each if isinstance(each, Collision) else Collision(each) for each in listed)
+
+
+def _checked_inertia(what: str, inertia: object) -> Tensor:
+    array: Floats = checked_array(f"inertia of {what}", inertia, 3)  # type: ignore[arg-type]
+    if array.shape != (3, 3):
+        raise ShapeError(f"inertia of {what} has shape {array.shape}; wanted (3, 3)")
+    largest = float(np.max(np.abs(array)))
+    if np.max(np.abs(array - array.T)) > 1e-9 * largest:
+        raise ArgumentError(f"inertia of {what} is not symmetric")
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = array.tolist()
+    fault = inertia_fault(Inertial(1.0, Pose(), xx, xy, xz, yy, yz, zz))
+    if fault is not None or largest == 0.0:
+        raise ArgumentError(f"inertia of {what} {fault or 'is zero'}")
+    return ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))

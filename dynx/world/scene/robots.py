@@ -1,0 +1,60 @@
+"""Robots of a scene: a model, its state at the start, and its materials."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from numpy.typing import ArrayLike
+
+from dynx.errors import ArgumentError, ShapeError, shown
+from dynx.model import Model
+from dynx.model.configuration import checked_array, checked_q, neutral
+from dynx.model.model import refuse_other_than_model
+from dynx.world.scene.material import DEFAULT_MATERIAL, Material, checked_material
+from dynx.world.scene.names import checked_name
+
+
+@dataclass(frozen=True)
+class SceneRobot:
+    """A robot: its `model`, and its configuration `q` (nq,) and velocity `v` (nv,) at the start.
+
+    `q` is the neutral configuration and `v` zero where they are None. A fixed base is at `model.base_pose`, a
+    floating one where `q` places it. `materials` are those of single links, by name; the others have
+    `material`. Links of one robot collide with one another only with `self_collision`, and never where a
+    joint connects them.
+    """
+
+    name: str
+    model: Model
+    q: tuple[float, ...] | None = None
+    v: tuple[float, ...] | None = None
+    material: Material = DEFAULT_MATERIAL
+    materials: tuple[tuple[str, Material], ...] = ()
+    self_collision: bool = False
+
+    def __post_init__(self) -> None:
+        checked_name("robot", self.name)
+        refuse_other_than_model(self.model)
+        what = f"robot {shown(self.name)}"
+        q = checked_q(self.model, neutral(self.model) if self.q is None else self.q, f"q of {what}")
+        zero: ArrayLike = [0.0] * self.model.nv
+        v = checked_array(f"v of {what}", zero if self.v is None else self.v, self.model.nv)
+        if q.ndim != 1 or v.ndim != 1:
+            raise ShapeError(f"q and v of {what} have shapes {q.shape} and {v.shape}; wanted one state")
+        checked_material(f"material of {what}", self.material)
+        if not isinstance(self.self_collision, bool):
+            raise ArgumentError(f"self_collision of {what} is {shown(self.self_collision)}; wanted a bool")
+        pairs = self.materials.items() if isinstance(self.materials, Mapping) else self.materials
+        materials = dict(pairs)
+        for link, material in materials.items():
+            self.model.link(link)
+            checked_material(f"material of {shown(link)} of {what}", material)
+        object.__setattr__(self, "q", tuple(q.tolist()))
+        object.__setattr__(self, "v", tuple(v.tolist()))
+        object.__setattr__(self, "materials", tuple(sorted(materials.items())))
+
+    def material_of(self, link: str) -> Material:
+        """Return the material of a link; UnknownNameError for an unknown one."""
+        self.model.link(link)
+        return dict(self.materials).get(link, self.material)

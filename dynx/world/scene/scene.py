@@ -1,0 +1,187 @@
+"""`Scene`: robots, bodies, constraints and collision filters of a world."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
+from dynx.model.configuration import checked_gravity
+from dynx.model.elements import Vector
+from dynx.model.model import STANDARD_GRAVITY
+from dynx.world.scene.bodies import SceneBody
+from dynx.world.scene.constraints import Constraint, PointToPoint, Weld
+from dynx.world.scene.filters import CollisionFilter
+from dynx.world.scene.material import Material
+from dynx.world.scene.names import WORLD, checked_name, split_name
+from dynx.world.scene.robots import SceneRobot
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Everything that is in a world at the start, for every engine alike.
+
+    A part is named by its body, its robot, or ``robot/link``. `ignored` are pairs of names that do not
+    collide, where a robot stands for all its links and a name in `groups` for all its members; a pair of one
+    name twice makes the parts behind it ignore one another. Gravity (3,) [m/s^2] is that of the scene, not of
+    the models.
+    """
+
+    name: str = "scene"
+    robots: tuple[SceneRobot, ...] = ()
+    bodies: tuple[SceneBody, ...] = ()
+    constraints: tuple[Constraint, ...] = ()
+    ignored: tuple[tuple[str, str], ...] = ()
+    groups: tuple[tuple[str, tuple[str, ...]], ...] = ()
+    gravity: Vector = STANDARD_GRAVITY
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        checked_name("scene", self.name)
+        put(self, "robots", _instances("robots", self.robots, SceneRobot))
+        put(self, "bodies", _instances("bodies", self.bodies, SceneBody))
+        put(self, "constraints", _instances("constraints", self.constraints, Weld | PointToPoint))
+        put(self, "gravity", checked_gravity(self.gravity))
+        _refuse_repeated([*(r.name for r in self.robots), *(b.name for b in self.bodies)])
+        groups = self.groups.items() if isinstance(self.groups, Mapping) else self.groups
+        put(
+            self, "groups", tuple((name, _names(f"group {shown(name)}", members)) for name, members in groups)
+        )
+        self._check_groups()
+        put(self, "ignored", tuple(_pair(pair) for pair in self.ignored))
+        for name in (name for pair in self.ignored for name in pair):
+            if name not in self._groups:
+                self.require(name)
+        for constraint in self.constraints:
+            self._check_constraint(constraint)
+
+    @cached_property
+    def _robots(self) -> dict[str, SceneRobot]:
+        return {robot.name: robot for robot in self.robots}
+
+    @cached_property
+    def _bodies(self) -> dict[str, SceneBody]:
+        return {body.name: body for body in self.bodies}
+
+    @cached_property
+    def _groups(self) -> dict[str, tuple[str, ...]]:
+        return dict(self.groups)
+
+    def robot(self, name: str) -> SceneRobot:
+        """Return the robot of that name; UnknownNameError if there is none."""
+        if name not in self._robots:
+            raise UnknownNameError(f"no robot {shown(name)} in {self.name}{nearest(str(name), self._robots)}")
+        return self._robots[name]
+
+    def body(self, name: str) -> SceneBody:
+        """Return the body of that name; UnknownNameError if there is none."""
+        if name not in self._bodies:
+            raise UnknownNameError(f"no body {shown(name)} in {self.name}{nearest(str(name), self._bodies)}")
+        return self._bodies[name]
+
+    def material(self, name: str) -> Material:
+        """Return the material of a body or of ``robot/link``; UnknownNameError for another name."""
+        self.require(name)
+        owner, link = split_name(name)
+        if owner in self._bodies:
+            return self._bodies[owner].material
+        if link is None:
+            raise UnknownNameError(f"{shown(name)} is a robot, whose links have materials; wanted robot/link")
+        return self._robots[owner].material_of(link)
+
+    def may_collide(self, a: str, b: str) -> bool:
+        """Check whether two parts, each a body or ``robot/link``, collide where they touch.
+
+        Parts that are fixed in the world, links of one robot without `self_collision`, links that a joint
+        connects and the pairs in `ignored` do not.
+        """
+        for name in (a, b):
+            self.material(name)
+        return self._filter.may_collide(a, b)
+
+    @cached_property
+    def parts(self) -> tuple[str, ...]:
+        """Every body, and every link as ``robot/link``, robots first."""
+        links = (f"{robot.name}/{link.name}" for robot in self.robots for link in robot.model.links)
+        return (*links, *self._bodies)
+
+    @cached_property
+    def _filter(self) -> CollisionFilter:
+        return CollisionFilter(self.robots, self.bodies, [tuple(map(self._members, p)) for p in self.ignored])
+
+    def _members(self, name: str) -> frozenset[str]:
+        """Return the parts behind a name."""
+        if name in self._groups:
+            return frozenset[str]().union(*map(self._members, self._groups[name]))
+        if name in self._robots:
+            return frozenset(f"{name}/{link.name}" for link in self._robots[name].model.links)
+        return frozenset([name])
+
+    def require(self, name: str) -> None:
+        """Raise UnknownNameError unless `name` is a body, a robot or ``robot/link``."""
+        if not isinstance(name, str):
+            raise ArgumentError(f"a name is {shown(name)}; wanted a body, a robot or robot/link")
+        owner, link = split_name(name)
+        if owner in self._robots and link is not None:
+            self._robots[owner].model.link(link)
+        elif owner not in self._robots and (owner not in self._bodies or link is not None):
+            known = [*self._robots, *self._bodies]
+            raise UnknownNameError(f"no part {shown(name)} in {self.name}{nearest(owner, known)}")
+
+    def _check_groups(self) -> None:
+        _refuse_repeated([*self._robots, *self._bodies, *(name for name, _ in self.groups)])
+        for name, members in self.groups:
+            checked_name("group", name)
+            for member in members:
+                self.require(member)
+
+    def _check_constraint(self, constraint: Constraint) -> None:
+        ends = (constraint.a, constraint.b)
+        for end in ends:
+            if end == WORLD:
+                continue
+            self.require(end)
+            if end in self._robots:
+                raise UnknownNameError(
+                    f"a {type(constraint).__name__} ends on the robot {shown(end)}; wanted robot/link"
+                )
+        if all(end == WORLD or self._filter.is_fixed(end) for end in ends):
+            raise ArgumentError(
+                f"a {type(constraint).__name__} connects {ends[0]!r} and {ends[1]!r}, both fixed"
+            )
+
+
+def _instances(name: str, parts: object, kinds: type | object) -> tuple[object, ...]:
+    if isinstance(parts, str) or not isinstance(parts, Iterable):
+        raise ArgumentError(f"{name} of a scene is {shown(parts)}; wanted a sequence")
+    found = tuple(parts)
+    for each in found:
+        if not isinstance(each, kinds):  # type: ignore[arg-type]
+            raise ArgumentError(f"{name} of a scene holds {shown(each)}; wanted {_spelled(kinds)}")
+    return found
+
+
+def _spelled(kinds: object) -> str:
+    return (
+        kinds.__name__ if isinstance(kinds, type) else str(kinds).replace("dynx.world.scene.constraints.", "")
+    )
+
+
+def _names(what: str, names: object) -> tuple[str, ...]:
+    if isinstance(names, str) or not isinstance(names, Iterable):
+        raise ArgumentError(f"{what} is {shown(names)}; wanted a sequence of names")
+    return tuple(names)
+
+
+def _pair(pair: object) -> tuple[str, str]:
+    names = _names("a pair of ignored parts", pair)
+    if len(names) != 2:
+        raise ArgumentError(f"a pair of ignored parts is {shown(names)}; wanted two names")
+    return names[0], names[1]
+
+
+def _refuse_repeated(names: list[str]) -> None:
+    for index, name in enumerate(names):
+        if name in names[:index]:
+            raise ArgumentError(f"two parts of the scene are called {shown(name)}; wanted different names")
