@@ -11,6 +11,8 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, NamedTuple
 
+from dynx.control.engine_motors import MotorCommand
+from dynx.errors import UnsupportedFeatureError
 from dynx.spatial.scalar import Floats
 from dynx.world.layout import Layout
 from dynx.world.settings import Setting
@@ -65,15 +67,23 @@ class WorldEngine(ABC):
     def set_torques(self, robot: int, tau: Floats) -> None:
         """Apply the generalised force `tau` (nv,) in all later steps, until the next call.
 
-        The first six entries of a floating base are force and moment at the base frame, in its axes. The
-        caller repeats the call before every step in which they are not zero, so that they may be converted
-        to axes of the world once.
+        The array may change after the call. The first six entries of a floating base are force and moment
+        at the base frame, in its axes. The caller repeats the call before every step in which they are not
+        zero, so that they may be converted to axes of the world once.
         """
 
     @abstractmethod
     def set_wrenches(self, wrenches: Floats) -> None:
         """Apply a force and a moment about the centre of mass (n_bodies, 6), in world axes, to every body of
         the scene in all later steps, until the next call."""
+
+    def command_motors(self, robot: int, command: MotorCommand | None) -> None:
+        """Set the engine's own motors of a robot, one per joint of the model, in all later steps; None
+        releases them."""
+        if command is not None:
+            raise UnsupportedFeatureError(
+                f"the engine {self.name!r} has no motors of its own; use those of dynx.world"
+            )
 
     @abstractmethod
     def step(self, n: int) -> None:
@@ -95,7 +105,7 @@ class WorldEngine(ABC):
 
     @abstractmethod
     def set_body_state(self, body: int, T: Floats, twist: Floats) -> None:
-        """Set the pose (4, 4) and twist (6,) of a body; one that is fixed may be moved."""
+        """Set the pose (4, 4) and twist (6,) of a body that moves."""
 
     @abstractmethod
     def dump(self) -> bytes:
@@ -121,11 +131,6 @@ class WorldEngine(ABC):
     def closest(self, a: int, b: int, within: float) -> TouchingPoint | None:
         """Return the nearest points of two colliders, whether or not they may touch; None if they are
         farther apart than `within` [m]."""
-
-    @abstractmethod
-    def aabb(self, collider: int) -> tuple[Floats, Floats]:
-        """Return the lower and the upper corner (3,) of the box around a collider in world axes; infinite
-        where the collider is."""
 
     @abstractmethod
     def cast_rays(self, origins: Floats, directions: Floats, length: float) -> Sequence[RayHit]:

@@ -7,16 +7,15 @@ reads a file, or sees a value that was not checked.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dynx.model import Model
+from dynx.model.geometry import Shape
 from dynx.spatial.scalar import Floats
-
-Shape = Any  # a class of dynx.model.geometry
-Material = Any  # dynx.world.scene.Material
+from dynx.world.scene import Material
 
 WORLD = -1
 """Number of the body that is the world itself."""

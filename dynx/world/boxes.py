@@ -1,0 +1,62 @@
+"""Boxes along the axes of the world around shapes, computed from the shapes, the same for every engine."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dynx.model.geometry import Box, Capsule, Cylinder, HeightField, Mesh, Plane, Shape, Sphere
+from dynx.rbd.kinematics import body_poses
+from dynx.spatial.scalar import Floats
+from dynx.spatial.se3 import homogeneous
+from dynx.world.layout import WORLD, Collider, Layout
+from dynx.world.state import WorldState
+
+Corners = tuple[Floats, Floats]
+
+
+def collider_box(layout: Layout, collider: Collider, state: WorldState) -> Corners:
+    """Return the lower and the upper corner (3,) of the box around the shapes of a collider."""
+    T_world_owner = owner_pose(layout, collider, state)
+    corners = [shape_box(each.shape, T_world_owner @ each.T) for each in collider.shapes]
+    return np.min([c[0] for c in corners], axis=0), np.max([c[1] for c in corners], axis=0)
+
+
+def owner_pose(layout: Layout, collider: Collider, state: WorldState) -> Floats:
+    """Return the pose (4, 4) in the world of the rigid body to which a collider belongs."""
+    robot, body = collider.owner
+    if robot is None:
+        return np.eye(4) if body == WORLD else state.bodies[layout.bodies[body].name].T_world_body
+    model = layout.robots[robot].model
+    q, mechanism = state.robots[layout.robots[robot].name].q, model.mechanism
+    poses = body_poses(mechanism, q if mechanism.coupling is None else mechanism.coupling.expand_q(q))
+    return np.asarray(homogeneous(*poses[body]), dtype=np.float64)
+
+
+def shape_box(shape: Shape, T: Floats) -> Corners:
+    """Return the lower and the upper corner (3,) of the box around a shape at the pose T (4, 4)."""
+    R, p = T[:3, :3], T[:3, 3]
+    if isinstance(shape, Plane):
+        return _half_space(R[:, 2], p)
+    if isinstance(shape, Mesh | HeightField):
+        points = (shape.hull if isinstance(shape, Mesh) else shape.triangles())[0] @ R.T + p
+        return points.min(axis=0), points.max(axis=0)
+    if isinstance(shape, Box):
+        reach = np.abs(R) @ np.array(shape.size) / 2
+    elif isinstance(shape, Sphere):
+        reach = np.full(3, shape.radius)
+    elif isinstance(shape, Capsule):
+        reach = shape.radius + np.abs(R[:, 2]) * shape.length / 2
+    else:
+        assert isinstance(shape, Cylinder)
+        across = np.sqrt(np.maximum(0.0, 1.0 - R[:, 2] ** 2))
+        reach = np.abs(R[:, 2]) * shape.length / 2 + shape.radius * across
+    return p - reach, p + reach
+
+
+def _half_space(normal: Floats, p: Floats) -> Corners:
+    """Return the box around the points below a plane: it ends only along a normal that is an axis."""
+    lower, upper = np.full(3, -np.inf), np.full(3, np.inf)
+    axis = int(np.argmax(np.abs(normal)))
+    if np.count_nonzero(np.abs(normal) > 1e-12) == 1:
+        (upper if normal[axis] > 0.0 else lower)[axis] = p[axis]
+    return lower, upper

@@ -1,0 +1,201 @@
+"""What acts during the steps of one call: held torques, or loads that are evaluated before every step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dynx.control.engine_motors import MotorCommand
+from dynx.errors import ArgumentError, ShapeError, UnknownNameError, nearest, shown
+from dynx.model import Model
+from dynx.model.configuration import checked_array
+from dynx.world.engine import WorldEngine
+from dynx.world.layout import Layout, RobotLayout
+from dynx.world.loads import RobotLoads, Wrench, checked_torques, robot_number
+from dynx.world.motors import Motor
+from dynx.world.snapshot import Memory
+
+MotorsOf = Mapping[str, "Motor | MotorCommand | Sequence[Motor]"]
+
+Act = Callable[[WorldEngine], bool]
+"""Apply the loads of the next step to the engine; False if one of them is not finite."""
+
+
+class Commands:
+    """Loads on the robots and bodies of one world, and what the engine still holds of earlier ones."""
+
+    def __init__(
+        self, layout: Layout, robots: Mapping[str, int], bodies: Mapping[str, int], h: float
+    ) -> None:
+        self._layout = layout
+        self._robots = robots
+        self._bodies = bodies
+        self._loads = [RobotLoads(robot, h) for robot in layout.robots]
+        self._zeros = [np.zeros(robot.model.nv) for robot in layout.robots]
+        self._floating = [robot.model.floating for robot in layout.robots]
+        self._no_wrench = np.zeros((len(layout.bodies), 6))
+        self.forget()
+
+    def forget(self) -> None:
+        """Forget all earlier steps: the engine is new, or its state was set."""
+        # Everything is sent once more before the next step.
+        self._loaded = set(range(len(self._loads)))
+        self._pushed = True
+        self._commanded: set[int] = set()
+        self._forget_steps(frozenset())
+
+    def memory(self) -> Memory:
+        """Return what the motors keep from one step to the next."""
+        kept = (loads.memory for loads in self._loads)
+        return tuple(None if m is None else (tuple(m[0].tolist()), tuple(m[1].tolist())) for m in kept)
+
+    def remember(self, memory: Memory) -> None:
+        """Restore what `memory` returned."""
+        for loads, m in zip(self._loads, memory, strict=True):
+            loads.memory = None if m is None else (np.array(m[0]), np.array(m[1]))
+        self._remembering = True
+
+    def hold(self, engine: WorldEngine, torques: Mapping[str, ArrayLike] | None, count: int) -> bool:
+        """Make the engine apply these torques alone in the next `count` steps.
+
+        Returns False, and does nothing, where they must be sent again before each of them.
+        """
+        checked = checked_torques(torques, self._robots, self._layout.robots) if torques else {}
+        if count > 1 and any(self._floating[k] and tau[:6].any() for k, tau in checked.items()):
+            return False
+        if self._pushed:
+            engine.set_wrenches(self._no_wrench)
+            self._pushed = False
+        if self._remembering:
+            self._forget_steps(frozenset())
+        if self._commanded:
+            self._command(engine, {})
+        if self._loaded or checked:
+            for k in self._loaded - checked.keys():
+                engine.set_torques(k, self._zeros[k])
+            for k, tau in checked.items():
+                engine.set_torques(k, tau)
+            self._loaded = set(checked)
+        return True
+
+    def plan(
+        self,
+        torques: Mapping[str, ArrayLike] | None,
+        motors: MotorsOf | None,
+        wrenches: Sequence[Wrench],
+    ) -> Act:
+        """Check what acts in the next steps, and return the function that applies it before each of them."""
+        held = checked_torques(torques, self._robots, self._layout.robots)
+        commands = self._set_motors(motors or {})
+        frames, pushes = self._sort_wrenches(wrenches)
+        motored = frozenset(k for k, loads in enumerate(self._loads) if loads.has_motors)
+        repeated = motored | frames.keys() | {k for k in held if self._floating[k]}
+        self._forget_steps(motored)
+        begun = False
+
+        def act(engine: WorldEngine) -> bool:
+            nonlocal begun
+            if not begun:
+                begun = True
+                self._command(engine, commands)
+                for k in (self._loaded | held.keys()) - repeated:
+                    engine.set_torques(k, held.get(k, self._zeros[k]))
+                self._loaded = set(repeated | held.keys())
+            for k in repeated:
+                q, v = engine.robot_state(k)
+                tau = self._loads[k].torque(q, v, held.get(k), frames.get(k, ()))
+                if not np.isfinite(tau).all():
+                    return False
+                engine.set_torques(k, tau)
+            if pushes or self._pushed:
+                self._push(engine, pushes)
+            return True
+
+        return act
+
+    def _set_motors(self, motors: MotorsOf) -> dict[int, MotorCommand]:
+        """Give the motors to their robots; return the commands to the engine's own motors."""
+        if not isinstance(motors, Mapping):
+            raise ArgumentError(f"motors is of type {type(motors).__name__}; wanted a dict by robot")
+        commands: dict[int, MotorCommand] = {}
+        given: dict[int, list[Motor]] = {}
+        for name, listed in motors.items():
+            k = robot_number(name, self._robots)
+            if isinstance(listed, MotorCommand):
+                commands[k] = checked_command(listed, self._layout.robots[k].model)
+                continue
+            given[k] = [listed] if isinstance(listed, Motor) else list(listed)
+            for each in given[k]:
+                if not isinstance(each, Motor):
+                    raise ArgumentError(f"a motor of {name} is {shown(each)}; wanted a Motor or MotorCommand")
+        for k, loads in enumerate(self._loads):
+            loads.set_motors(given.get(k, ()))
+        return commands
+
+    def _sort_wrenches(
+        self, wrenches: Sequence[Wrench]
+    ) -> tuple[dict[int, list[tuple[str, Wrench]]], dict[int, list[Wrench]]]:
+        """Return the wrenches on the frames of each robot, and on each body, by number."""
+        frames: dict[int, list[tuple[str, Wrench]]] = {}
+        pushes: dict[int, list[Wrench]] = {}
+        for wrench in wrenches:
+            if not isinstance(wrench, Wrench):
+                raise ArgumentError(f"a wrench is {shown(wrench)}; wanted a Wrench")
+            owner, slash, frame = wrench.on.partition("/")
+            if owner in self._robots and slash:
+                k = self._robots[owner]
+                self._layout.robots[k].model.frame_index(frame)
+                frames.setdefault(k, []).append((frame, wrench))
+            elif owner in self._bodies and not slash:
+                k = self._bodies[owner]
+                if self._layout.bodies[k].fixed:
+                    raise ArgumentError(f"a wrench acts on {shown(owner)}, which is fixed in the world")
+                pushes.setdefault(k, []).append(wrench)
+            else:
+                known = [*self._bodies, *(f"{name}/{r.model.root}" for name, r in self._named_robots())]
+                raise UnknownNameError(
+                    f"a wrench acts on {shown(wrench.on)}; wanted a body or robot/link"
+                    f"{nearest(wrench.on, known)}"
+                )
+        return frames, pushes
+
+    def _named_robots(self) -> list[tuple[str, RobotLayout]]:
+        return [(name, self._layout.robots[k]) for name, k in self._robots.items()]
+
+    def _push(self, engine: WorldEngine, pushes: Mapping[int, Sequence[Wrench]]) -> None:
+        total = self._no_wrench.copy()
+        for k, wrenches in pushes.items():
+            T, center = engine.body_state(k).T_world_body, self._layout.bodies[k].center
+            total[k] = np.sum([wrench.at(T, center) for wrench in wrenches], axis=0)
+        engine.set_wrenches(total)
+        self._pushed = bool(pushes)
+
+    def _command(self, engine: WorldEngine, commands: Mapping[int, MotorCommand]) -> None:
+        for k in self._commanded - commands.keys():
+            engine.command_motors(k, None)
+        for k, command in commands.items():
+            engine.command_motors(k, command)
+        self._commanded = set(commands)
+
+    def _forget_steps(self, motored: frozenset[int]) -> None:
+        """Forget the step before, of robots without motors in the next one."""
+        for k, loads in enumerate(self._loads):
+            if k not in motored:
+                loads.memory = None
+        self._remembering = bool(motored)
+
+
+def checked_command(command: MotorCommand, model: Model) -> MotorCommand:
+    """Return a command with one finite float per joint in each of its lists."""
+    n = len(model.joint_names)
+    checked = {}
+    for name, numbers in command._asdict().items():
+        if name != "mode" and numbers is not None:
+            numbers = checked_array(f"{name} of a motor command", numbers, n)
+            if numbers.ndim != 1:
+                raise ShapeError(f"{name} of a motor command has shape {numbers.shape}; wanted ({n},)")
+            numbers = numbers.tolist()
+        checked[name] = numbers
+    return MotorCommand(**checked)

@@ -1,0 +1,187 @@
+"""Torques, wrenches and motors of one call of `World.step`, as forces that an engine applies."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dynx.backends import Backend, backend
+from dynx.errors import ArgumentError, ShapeError, UnknownNameError, nearest, shown
+from dynx.model.configuration import checked_array, checked_entries, real_array
+from dynx.registry import DEFAULT_ENGINE
+from dynx.spatial.scalar import Floats
+from dynx.spatial.so3 import cross
+from dynx.world.layout import BodyLayout, RobotLayout
+from dynx.world.motors import Motor, combine
+from dynx.world.state import BodyState
+
+AXES = ("world", "local")
+
+
+@dataclass(frozen=True, eq=False)
+class Wrench:
+    """A force [N] and a moment [N m] on a body, ``robot/link`` or ``robot/frame``, during a step.
+
+    The force acts at `point` (3,) [m] of the frame of the part, which moves with it; at its origin by
+    default. `axes` are those of force and moment: ``world``, or ``local`` for the frame of the part.
+    """
+
+    on: str
+    force: ArrayLike = (0.0, 0.0, 0.0)
+    moment: ArrayLike = (0.0, 0.0, 0.0)
+    point: ArrayLike = (0.0, 0.0, 0.0)
+    axes: str = "world"
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.on, str):
+            raise ArgumentError(
+                f"a wrench acts on {shown(self.on)}; wanted a body, robot/link or robot/frame"
+            )
+        for name in ("force", "moment", "point"):
+            what = f"{name} of a wrench on {shown(self.on)}"
+            vector = checked_array(what, getattr(self, name), 3)
+            if vector.ndim != 1:
+                raise ShapeError(f"{what} has shape {vector.shape}; wanted (3,)")
+            object.__setattr__(self, name, vector)
+        if self.axes not in AXES:
+            raise ArgumentError(
+                f"axes of a wrench on {shown(self.on)} is {shown(self.axes)}; wanted {' or '.join(AXES)}"
+            )
+
+    def at(self, T: Floats, center: Floats) -> Floats:
+        """Return the force and the moment about the point `center` (3,) of the part's frame (6,), in world
+        axes, where the frame has the pose `T` (4, 4)."""
+        R = T[:3, :3]
+        force, moment = np.asarray(self.force), np.asarray(self.moment)
+        if self.axes == "local":
+            force, moment = R @ force, R @ moment
+        lever = R @ (np.asarray(self.point) - center)
+        return np.concatenate([force, moment + cross(lever, force)])
+
+
+class RobotLoads:
+    """The generalised force on one robot: torques of the caller, wrenches on its links, and its motors."""
+
+    def __init__(self, robot: RobotLayout, h: float) -> None:
+        """`h` is the step of the engine [s]."""
+        self.name = robot.name
+        self.model = robot.model
+        self._base = 6 if robot.model.floating else 0
+        self._h = h
+        self._nothing = np.zeros(robot.model.nv)
+        self._zero_center = np.zeros(3)
+        self._motors: tuple[Motor, ...] = ()
+        self.memory: tuple[Floats, Floats] | None = None
+        """Velocity and generalised force (nv,) of the step before, on which motors at the end of a step
+        depend; None if there was no such step."""
+
+    @cached_property
+    def dynamics(self) -> Backend:
+        """The backend that computes mass matrices and Jacobians."""
+        return backend(DEFAULT_ENGINE, self.model, validate=False)
+
+    @property
+    def has_motors(self) -> bool:
+        """Whether the robot has a motor in this call."""
+        return bool(self._motors)
+
+    def set_motors(self, motors: Sequence[Motor]) -> None:
+        """Use these motors in the next calls of `torque`."""
+        if [*map(id, motors)] != [*map(id, self._motors)]:
+            self._law, implicit = combine(self.model, motors)
+            law = self._law
+            self._motors = tuple(motors)
+            # At the end of the step: q + h v+ in place of q, v+ = v + h a in place of v.
+            self._ahead = implicit * self._h * law.kp
+            self._inertia = implicit * self._h * (law.kd + self._h * law.kp)
+            self._saturates = bool(np.isfinite(law.max_force).any())
+
+    def torque(
+        self, q: Floats, v: Floats, tau: Floats | None, wrenches: Sequence[tuple[str, Wrench]]
+    ) -> Floats:
+        """Return the generalised force (nv,) in a step from q, v: `tau`, wrenches by frame, motors."""
+        total = self._nothing if tau is None else tau
+        for frame, wrench in wrenches:
+            T = self.dynamics.forward_kinematics(q, frame)
+            J = self.dynamics.jacobian(q, frame, reference="local_world_aligned")
+            total = total + J.T @ wrench.at(T, self._zero_center)
+        if not self._motors:
+            return total
+        return self._with_motors(q, v, total)
+
+    def _with_motors(self, q: Floats, v: Floats, tau: Floats) -> Floats:
+        law, base = self._law, self._base
+        rates = v[base:]
+        positions = q[7:] if base else q
+        motor = law.torque + law.kp * (law.target - positions) + law.kd * (law.velocity - rates)
+        if law.implicit:
+            motor = self._implicit(q, v, tau, motor - self._ahead * rates)
+        if self._saturates:
+            motor = np.clip(motor, -law.max_force, law.max_force)
+        total: Floats = tau.copy()
+        total[base:] += motor
+        if law.implicit:
+            self.memory = (v, total)
+        return total
+
+    def _implicit(self, q: Floats, v: Floats, tau: Floats, motor: Floats) -> Floats:
+        """Return the torque of motors whose law holds at the end of the step.
+
+        With the torque `motor` for the acceleration 0, that for the acceleration a is motor - K a, where
+        (M + K) a = motor + all other forces. Those but `tau` are the ones of the step before.
+        """
+        M = self.dynamics.mass_matrix(q)
+        if self.memory is None:
+            others = -self.dynamics.bias_torque(q, v)
+        else:
+            v_before, tau_before = self.memory
+            others = M @ ((v - v_before) / self._h) - tau_before
+        others += tau
+        others[self._base :] += motor
+        diagonal = np.arange(self._base, len(v))
+        M[diagonal, diagonal] += self._inertia
+        a = np.linalg.solve(M, others)
+        return np.asarray(motor - self._inertia * a[self._base :])
+
+
+def checked_torques(
+    torques: Mapping[str, ArrayLike] | None, robots: Mapping[str, int], layouts: Sequence[RobotLayout]
+) -> dict[int, Floats]:
+    """Return the torque (nv,) of each robot named.
+
+    Raises UnknownNameError, ShapeError, DTypeError or NotFiniteError, naming the robot.
+    """
+    if torques is None:
+        return {}
+    if not isinstance(torques, Mapping):
+        raise ArgumentError(f"torques is of type {type(torques).__name__}; wanted a dict by robot")
+    checked = {}
+    for name, tau in torques.items():
+        number = robot_number(name, robots)
+        nv = layouts[number].model.nv
+        if type(tau) is not np.ndarray or tau.dtype != np.float64 or tau.shape != (nv,):
+            tau = real_array(f"torque of {name}", tau)
+            if tau.shape != (nv,):
+                raise ShapeError(f"torque of {name} has shape {tau.shape}; wanted ({nv},)")
+        # A finite sum of squares has finite entries below the bound.
+        if not tau.dot(tau) < 1e100:
+            checked_entries(f"torque of {name}", tau)
+        checked[number] = tau
+    return checked
+
+
+def robot_number(name: str, robots: Mapping[str, int]) -> int:
+    """Return the number of a robot; UnknownNameError for another name."""
+    try:
+        return robots[name]
+    except (KeyError, TypeError):
+        raise UnknownNameError(f"no robot {shown(name)}{nearest(str(name), robots)}") from None
+
+
+def body_wrench(wrench: Wrench, body: BodyLayout, state: BodyState) -> Floats:
+    """Return force and moment about the centre of mass (6,) in world axes."""
+    return wrench.at(state.T_world_body, body.center)

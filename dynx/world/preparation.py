@@ -1,0 +1,200 @@
+"""Preparation of a scene for an engine: shapes by owner, limits and damping by joint, anchors, filters."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+
+from dynx.backends.joint_dynamics import JointDynamicsTerms
+from dynx.errors import EngineLimitError
+from dynx.model import Model
+from dynx.model.elements import Pose
+from dynx.model.geometry import Collision, Mesh
+from dynx.rbd.kinematics import body_poses
+from dynx.spatial.scalar import Floats
+from dynx.spatial.se3 import homogeneous
+from dynx.world.layout import (
+    WORLD,
+    Anchor,
+    BodyLayout,
+    Collider,
+    ConstraintLayout,
+    Layout,
+    Owner,
+    PlacedShape,
+    RobotLayout,
+)
+from dynx.world.scene import Material, PointToPoint, Scene, SceneBody, SceneRobot, Weld
+
+MAX_COLLIDERS = 10_000
+"""Largest number of links and bodies with shapes; the filter has an entry for each pair."""
+
+_IDENTITY = np.eye(4)
+
+
+def prepare(
+    scene: Scene, *, collisions: bool, joint_limits: bool, joint_damping: bool, joint_friction: bool
+) -> Layout:
+    """Return the layout of a scene.
+
+    Raises DescriptionError for a fault in a collision shape or its mesh, EngineLimitError for more than
+    `MAX_COLLIDERS` colliders.
+    """
+    robots = tuple(
+        _robot(robot, scene.gravity, joint_limits, joint_damping, joint_friction) for robot in scene.robots
+    )
+    parts = _Parts(scene, robots)
+    colliders = parts.colliders() if collisions else ()
+    return Layout(
+        name=scene.name,
+        gravity=np.array(scene.gravity),
+        robots=robots,
+        bodies=tuple(map(_body, scene.bodies)),
+        colliders=colliders,
+        collides=_pairs(scene, colliders),
+        constraints=tuple(map(parts.constraint, scene.constraints)),
+    )
+
+
+def _robot(
+    robot: SceneRobot, gravity: tuple[float, float, float], limits: bool, damping: bool, friction: bool
+) -> RobotLayout:
+    model = robot.model if robot.model.gravity == gravity else replace(robot.model, gravity=gravity)
+    moving = [joint for joint in model.joints if joint.moves]
+    terms, base = JointDynamicsTerms(model), 6 if model.floating else 0
+    n = len(moving)
+    lower, upper = np.full(n, -np.inf), np.full(n, np.inf)
+    if limits:
+        for k, joint in enumerate(moving):
+            lower[k], upper[k] = sorted((joint.limits.lower, joint.limits.upper))
+    return RobotLayout(
+        robot.name,
+        model,
+        np.array(robot.q),
+        np.array(robot.v),
+        lower,
+        upper,
+        terms.damping[base:] if damping else np.zeros(n),
+        terms.friction[base:] if friction else np.zeros(n),
+    )
+
+
+def _body(body: SceneBody) -> BodyLayout:
+    inertial = body.inertial
+    return BodyLayout(
+        body.name,
+        inertial.mass,
+        np.array(inertial.origin.xyz),
+        inertial.tensor,
+        body.pose.matrix.copy(),
+        np.array(body.twist),
+    )
+
+
+class LinkFrames:
+    """The frames of a robot's links: the body of the mechanism that each is fixed to, and its pose there."""
+
+    def __init__(self, model: Model) -> None:
+        self._mechanism = model.mechanism
+        frames = model.mechanism.frames
+        self._at = {frame.name: (frame.body, homogeneous(frame.R, frame.p)) for frame in frames}
+
+    def __getitem__(self, link: str) -> tuple[int, Floats]:
+        body, T = self._at[link]
+        return body, np.asarray(T, dtype=np.float64)
+
+    def pose(self, q: Floats, link: str) -> Floats:
+        """Return T_world_link (4, 4) at the configuration `q` (nq,) of the model."""
+        coupling = self._mechanism.coupling
+        poses = body_poses(self._mechanism, q if coupling is None else coupling.expand_q(q))
+        body, T = self[link]
+        return np.asarray(homogeneous(*poses[body]) @ T)
+
+
+class _Parts:
+    """Colliders and anchors of a scene, from the names of its parts."""
+
+    def __init__(self, scene: Scene, robots: tuple[RobotLayout, ...]) -> None:
+        self._scene = scene
+        self._robots = robots
+        self._number = {robot.name: k for k, robot in enumerate(robots)}
+        self._body_number = {body.name: k for k, body in enumerate(scene.bodies)}
+
+    @cached_property
+    def _frames(self) -> list[LinkFrames]:
+        return [LinkFrames(robot.model) for robot in self._robots]
+
+    def colliders(self) -> tuple[Collider, ...]:
+        """Return every link and body with collision shapes, in the order of the scene."""
+        found = []
+        for k, (robot, frames) in enumerate(zip(self._scene.robots, self._frames, strict=True)):
+            for link in robot.model.links:
+                shapes = robot.model.geometry.collisions(link.name)
+                if shapes:
+                    body, T = frames[link.name]
+                    material = robot.material_of(link.name)
+                    found.append(_collider(f"{robot.name}/{link.name}", Owner(k, body), T, shapes, material))
+        for k, each in enumerate(self._scene.bodies):
+            found.append(_collider(each.name, Owner(None, k), _IDENTITY, each.shapes, each.material))
+        if len(found) > MAX_COLLIDERS:
+            raise EngineLimitError(
+                f"{self._scene.name} has {len(found)} links and bodies with shapes; "
+                f"at most {MAX_COLLIDERS} are supported"
+            )
+        return tuple(found)
+
+    def constraint(self, constraint: Weld | PointToPoint) -> ConstraintLayout:
+        """Return a constraint with its ends as frames in their owners."""
+        (owner_a, T_a), (owner_b, T_b) = self._part(constraint.a), self._part(constraint.b)
+        if isinstance(constraint, PointToPoint):
+            at_a, at_b = Pose(constraint.point_a).matrix, Pose(constraint.point_b).matrix
+            return ConstraintLayout("point", Anchor(owner_a, T_a @ at_a), Anchor(owner_b, T_b @ at_b))
+        if constraint.T_a_b is not None:
+            T_a_b = constraint.T_a_b.matrix
+        else:
+            T_a_b = np.linalg.inv(self._start(constraint.a)) @ self._start(constraint.b)
+        return ConstraintLayout("weld", Anchor(owner_a, T_a @ T_a_b), Anchor(owner_b, T_b))
+
+    def _part(self, name: str) -> tuple[Owner, Floats]:
+        """Return the owner of a part, and the pose of the part's frame in it."""
+        owner, _, link = name.partition("/")
+        if owner in self._number:
+            robot = self._number[owner]
+            body, T = self._frames[robot][link]
+            return Owner(robot, body), T
+        return Owner(None, self._body_number.get(owner, WORLD)), _IDENTITY
+
+    def _start(self, name: str) -> Floats:
+        """Return the pose of a part in the world at the start."""
+        owner, _, link = name.partition("/")
+        if owner in self._number:
+            robot = self._number[owner]
+            return self._frames[robot].pose(self._robots[robot].q, link)
+        if owner in self._body_number:
+            return self._scene.bodies[self._body_number[owner]].pose.matrix
+        return _IDENTITY
+
+
+def _collider(
+    name: str, owner: Owner, T: Floats, shapes: tuple[Collision, ...], material: Material
+) -> Collider:
+    placed = []
+    for each in shapes:
+        if isinstance(each.shape, Mesh):
+            # Read here, so that a fault is raised before any engine is started.
+            _ = each.shape.hull
+        placed.append(PlacedShape(each.shape, T @ each.origin.matrix))
+    return Collider(name, owner, tuple(placed), material)
+
+
+def _pairs(scene: Scene, colliders: tuple[Collider, ...]) -> np.ndarray[tuple[int, int], np.dtype[np.bool_]]:
+    n = len(colliders)
+    pairs = np.zeros((n, n), dtype=bool)
+    for i, a in enumerate(colliders):
+        for j in range(i):
+            b = colliders[j]
+            if a.owner != b.owner and scene.may_collide(a.name, b.name):
+                pairs[i, j] = pairs[j, i] = True
+    return pairs

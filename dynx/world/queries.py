@@ -1,0 +1,143 @@
+"""Contacts, distances, boxes and rays of a world by name, from an engine that knows numbers."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dynx.errors import ArgumentError, ShapeError, UnknownNameError, shown
+from dynx.model.configuration import MAX_MAGNITUDE, checked_array, checked_vector, is_real
+from dynx.spatial.scalar import Floats
+from dynx.world.boxes import collider_box
+from dynx.world.contacts import ClosestPoints, Contact, RayHits
+from dynx.world.engine import TouchingPoint, WorldEngine
+from dynx.world.layout import Layout
+from dynx.world.scene import Scene
+from dynx.world.state import WorldState
+
+MAX_RAY_LENGTH = 1e4
+"""Length of rays without a given one [m]."""
+
+_NO_FORCE = np.zeros(3)
+
+
+class Queries:
+    """The queries of one world. `engine` is passed to each, because a world may replace it."""
+
+    def __init__(self, scene: Scene, layout: Layout) -> None:
+        self._scene = scene
+        self._layout = layout
+        self._names = tuple(collider.name for collider in layout.colliders)
+        self._number = {name: k for k, name in enumerate(self._names)}
+
+    def contacts(self, engine: WorldEngine) -> tuple[Contact, ...]:
+        """Return the contacts of the last step, ordered by the parts of the scene."""
+        points = sorted(map(_ordered, engine.contacts()), key=lambda point: (point.a, point.b))
+        names = self._names
+        return tuple(
+            Contact(
+                names[p.a],
+                names[p.b],
+                p.point_a,
+                p.point_b,
+                p.normal,
+                p.distance,
+                p.normal_force,
+                _NO_FORCE.copy() if p.friction_force is None else p.friction_force,
+            )
+            for p in points
+        )
+
+    def closest_points(self, engine: WorldEngine, a: str, b: str, within: float) -> tuple[ClosestPoints, ...]:
+        """Return the nearest points of each pair of parts, nearest pair first."""
+        if not is_real(within) or not 0.0 <= within < MAX_MAGNITUDE:
+            raise ArgumentError(f"within is {shown(within)}; wanted a number of at least 0 [m]")
+        first, second = self._colliders(a), self._colliders(b)
+        found = []
+        for i in first:
+            for j in second:
+                point = None if i == j else engine.closest(i, j, float(within))
+                if point is not None:
+                    names = self._names[i], self._names[j]
+                    found.append(
+                        ClosestPoints(*names, point.point_a, point.point_b, point.normal, point.distance)
+                    )
+        return tuple(sorted(found, key=lambda points: points.distance))
+
+    def aabb(self, state: WorldState, name: str) -> tuple[Floats, Floats]:
+        """Return the corners of the smallest box that holds the boxes of all links of a part."""
+        boxes = [self._box(state, k) for k in self._colliders(name)]
+        return np.min([box[0] for box in boxes], axis=0), np.max([box[1] for box in boxes], axis=0)
+
+    def overlapping(self, state: WorldState, lower: ArrayLike, upper: ArrayLike) -> tuple[str, ...]:
+        """Return the names of the links and bodies whose box overlaps that from `lower` to `upper`."""
+        low, high = checked_vector("lower", lower), checked_vector("upper", upper)
+        if (low > high).any():
+            raise ArgumentError(f"lower is {low.tolist()}, above upper, {high.tolist()}")
+        found = []
+        for k, name in enumerate(self._names):
+            least, most = self._box(state, k)
+            if (least <= high).all() and (low <= most).all():
+                found.append(name)
+        return tuple(found)
+
+    def _box(self, state: WorldState, number: int) -> tuple[Floats, Floats]:
+        return collider_box(self._layout, self._layout.colliders[number], state)
+
+    def cast_rays(
+        self, engine: WorldEngine, origins: ArrayLike, directions: ArrayLike, length: float
+    ) -> RayHits:
+        """Return the first hit of each ray."""
+        starts, along = checked_array("origins", origins, 3), checked_array("directions", directions, 3)
+        if starts.ndim > 2 or along.ndim > 2:
+            raise ShapeError(
+                f"origins and directions have shapes {starts.shape}, {along.shape}; wanted (n, 3)"
+            )
+        try:
+            starts, along = np.broadcast_arrays(np.atleast_2d(starts), np.atleast_2d(along))
+        except ValueError:
+            raise ShapeError(
+                f"origins and directions have shapes {starts.shape}, {along.shape}; wanted the same number"
+            ) from None
+        if not is_real(length) or not 0.0 < length <= MAX_MAGNITUDE:
+            raise ArgumentError(f"length is {shown(length)}; wanted a positive number [m]")
+        norms = np.linalg.norm(along, axis=-1, keepdims=True)
+        if (norms == 0.0).any():
+            raise ArgumentError(f"directions[{int(np.argmin(norms))}] is zero; wanted a direction")
+        hits = engine.cast_rays(np.array(starts), along / norms, float(length))
+        unit = along / norms
+        distances = np.array([np.inf if hit.collider is None else hit.distance for hit in hits])
+        missed = np.array([hit.collider is None for hit in hits], dtype=bool)[:, None]
+        reach = np.where(np.isfinite(distances), distances, 0.0)[:, None]
+        return RayHits(
+            tuple(None if hit.collider is None else self._names[hit.collider] for hit in hits),
+            distances,
+            np.where(missed, np.nan, starts + reach * unit),
+            np.where(missed, np.nan, np.array([hit.normal for hit in hits]).reshape(-1, 3)),
+        )
+
+    def _colliders(self, name: str) -> list[int]:
+        """Return the numbers of the colliders of a body, a link, or all links of a robot."""
+        self._scene.require(name)
+        found = [self._number[name]] if name in self._number else []
+        found = found or [k for each, k in self._number.items() if each.startswith(f"{name}/")]
+        if not found:
+            raise UnknownNameError(f"{shown(name)} has no collision shape in this world")
+        return found
+
+
+def _ordered(point: TouchingPoint) -> TouchingPoint:
+    """Return a contact whose first collider is the earlier one of the scene."""
+    if point.a < point.b:
+        return point
+    friction = None if point.friction_force is None else -point.friction_force
+    return TouchingPoint(
+        point.b,
+        point.a,
+        point.point_b,
+        point.point_a,
+        -point.normal,
+        point.distance,
+        point.normal_force,
+        friction,
+    )

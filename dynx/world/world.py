@@ -1,0 +1,354 @@
+"""`World`: a scene that moves, on any engine."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NoReturn
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dynx.errors import ArgumentError, ClosedError, DivergedError, EngineError, shown
+from dynx.model.configuration import positive_seconds, whole_number
+from dynx.spatial.scalar import Floats
+from dynx.world.commands import Act, Commands, MotorsOf
+from dynx.world.contacts import ClosestPoints, Contact, RayHits
+from dynx.world.engine import WorldEngine
+from dynx.world.identity import identity
+from dynx.world.loads import Wrench
+from dynx.world.preparation import prepare
+from dynx.world.queries import MAX_RAY_LENGTH, Queries
+from dynx.world.registry import world_class
+from dynx.world.scene import Scene
+from dynx.world.settings import checked_settings
+from dynx.world.snapshot import Snapshot
+from dynx.world.state import BodyState, RobotState, WorldState
+from dynx.world.state_checks import apply_state, checked_state
+
+STEPS_BETWEEN_CHECKS = 100
+"""Number of steps of the engine after which the state is checked for divergence, unless it was read."""
+
+TIME_ROUNDING = 1e-9
+"""Tolerance within which the ratio of two times counts as a whole number."""
+
+TorquesOf = Mapping[str, ArrayLike]
+LoadsOf = Callable[["World"], Mapping[str, Any]]
+
+
+class World:
+    """The robots and bodies of a scene in motion, with contacts, in steps of `dt` [s].
+
+    Each step consists of `substeps` steps of the engine. `joint_limits`, `joint_damping` and
+    `joint_friction` are those of the robots' descriptions; without `collisions` nothing touches. `settings`
+    are those of the engine (`World.settings`); docs/world.md lists them.
+
+    A world is closed by `close` or at the end of a ``with`` block. Arguments are checked before the engine
+    gets them, and a call that raises an error leaves the state as it was.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        engine: str = "pybullet",
+        dt: float = 1e-3,
+        *,
+        substeps: int = 1,
+        collisions: bool = True,
+        joint_limits: bool = True,
+        joint_damping: bool = True,
+        joint_friction: bool = False,
+        **settings: object,
+    ) -> None:
+        """Raises UnknownBackendError and NotInstalledError for an engine, UnknownNameError and ArgumentError
+        for settings, DescriptionError for collision shapes, EngineLimitError for what the engine cannot
+        represent."""
+        self._engine: WorldEngine | None = None
+        if not isinstance(scene, Scene):
+            raise ArgumentError(f"scene is of type {type(scene).__name__}; wanted a Scene")
+        self._kind = world_class(engine)
+        self.scene = scene
+        self.engine = engine
+        """Name of the engine."""
+        self.dt = positive_seconds("dt", dt)
+        self.substeps = whole_number("substeps", substeps, 1)
+        switches = {
+            "collisions": collisions,
+            "joint_limits": joint_limits,
+            "joint_damping": joint_damping,
+            "joint_friction": joint_friction,
+        }
+        for name, value in switches.items():
+            if not isinstance(value, bool):
+                raise ArgumentError(f"{name} is {shown(value)}; wanted True or False")
+        self.settings: Mapping[str, Any] = checked_settings(engine, self._kind.settings, settings)
+        """The engine's settings in use, by name."""
+        self.options: Mapping[str, Any] = {"dt": self.dt, "substeps": self.substeps, **switches}
+        """Options of the world other than the engine's settings."""
+        self._layout = prepare(scene, **switches)
+        self._robots = {robot.name: k for k, robot in enumerate(self._layout.robots)}
+        self._bodies = {body.name: k for k, body in enumerate(self._layout.bodies)}
+        self._h = self.dt / self.substeps
+        self._commands = Commands(self._layout, self._robots, self._bodies, self._h)
+        self._queries = Queries(scene, self._layout)
+        self._identity: str | None = None
+        self._engine = self._build()
+        self._steps, self._start = 0, 0.0
+        self._unchecked = 0
+        self._state: WorldState | None = None
+        self._good: tuple[WorldState, int, float]
+        self._note()
+
+    # -- motion -------------------------------------------------------------------------------
+
+    @property
+    def time(self) -> float:
+        """Time [s]."""
+        return self._start + self._steps * self.dt
+
+    def step(
+        self,
+        n: int = 1,
+        torques: TorquesOf | None = None,
+        motors: MotorsOf | None = None,
+        wrenches: Sequence[Wrench] = (),
+    ) -> None:
+        """Take `n` steps of `dt`, during which torques, motors and wrenches act.
+
+        `torques` maps robots to generalised forces (nv,); `motors` maps robots to a motor or a list of them,
+        whose law is evaluated in every step of the engine. What is not given does not act.
+
+        Raises ArgumentError (and its kinds) for arguments, DivergedError where the state stops being finite:
+        the world is then at the last state that was read or checked.
+        """
+        engine = self._require()
+        if type(n) is not int or n < 1:
+            n = whole_number("n", n, 1)
+        count = n * self.substeps
+        held = not motors and not len(wrenches) and self._commands.hold(engine, torques, count)
+        act = None if held else self._commands.plan(torques, motors, wrenches)
+        try:
+            if act is None:
+                engine.step(count)
+            else:
+                self._step_one_by_one(engine, count, act)
+        except EngineError:
+            self._return_to_good()
+            raise
+        self._steps += n
+        self._state = None
+        self._unchecked += count
+        if self._unchecked >= STEPS_BETWEEN_CHECKS:
+            self._note()
+
+    def run(
+        self,
+        duration: float,
+        *,
+        torques: TorquesOf | None = None,
+        motors: MotorsOf | None = None,
+        wrenches: Sequence[Wrench] = (),
+        loads: LoadsOf | None = None,
+        real_time: bool = False,
+    ) -> None:
+        """Take steps for `duration` [s], rounded up to a multiple of `dt`.
+
+        `loads(world)` is called before each step and returns a dict with the arguments of `step` that act
+        during it (``torques``, ``motors``, ``wrenches``); those given here act otherwise. With `real_time` no
+        step is taken before its time has come on the clock of the machine.
+        """
+        self._require()
+        n = math.ceil(positive_seconds("duration", duration) / self.dt - TIME_ROUNDING)
+        fixed = {"torques": torques, "motors": motors, "wrenches": wrenches}
+        if loads is None and not real_time:
+            self.step(max(1, n), torques, motors, wrenches)
+            return
+        if loads is not None and not callable(loads):
+            raise ArgumentError(f"loads is of type {type(loads).__name__}; wanted a function of the world")
+        began = time.perf_counter()
+        for k in range(max(1, n)):
+            self.step(1, **(fixed if loads is None else fixed | dict(loads(self))))
+            if real_time:
+                time.sleep(max(0.0, began + (k + 1) * self.dt - time.perf_counter()))
+
+    def _step_one_by_one(self, engine: WorldEngine, count: int, act: Act) -> None:
+        for taken in range(count):
+            if not act(engine):
+                self._diverge(f"a load is not finite after {taken} of {count} steps of the engine")
+            engine.step(1)
+
+    # -- state --------------------------------------------------------------------------------
+
+    @property
+    def state(self) -> WorldState:
+        """Time, q and v of each robot, pose and twist of each body.
+
+        Raises DivergedError where they are not finite: the world is then at the last state that was.
+        """
+        self._require()
+        if self._state is None:
+            self._note()
+        assert self._state is not None
+        return self._state
+
+    def set_state(
+        self,
+        state: WorldState | None = None,
+        *,
+        robots: Mapping[str, RobotState | tuple[ArrayLike, ArrayLike]] | None = None,
+        bodies: Mapping[str, BodyState | tuple[ArrayLike, ArrayLike]] | None = None,
+    ) -> None:
+        """Set the state of the world, or of the robots (q, v) and bodies (pose, twist) named.
+
+        The time is that of `state`. Everything is checked before anything is set.
+        """
+        engine = self._require()
+        checked = checked_state(self._layout, state, robots or {}, bodies or {})
+        apply_state(engine, checked)
+        if state is not None:
+            self._start, self._steps = checked.time, 0
+        self._commands.forget()
+        self._state = None
+        self._note()
+
+    def reset(self) -> None:
+        """Return to the start of the scene, at time 0, as a new world is."""
+        self._require().close()
+        self._engine = self._build()
+        self._start, self._steps = 0.0, 0
+        self._commands.forget()
+        self._state = None
+        self._note()
+
+    def save(self) -> Snapshot:
+        """Return everything that determines the later steps, which `restore` continues bit for bit."""
+        engine = self._require()
+        return Snapshot(
+            self.engine,
+            engine.version,
+            self.identity,
+            self._steps,
+            self._start,
+            self._commands.memory(),
+            engine.dump(),
+        )
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Continue from a snapshot of this world, or of one with the same scene, engine and options.
+
+        Raises ArgumentError for any other.
+        """
+        engine = self._require()
+        if not isinstance(snapshot, Snapshot):
+            raise ArgumentError(f"snapshot is of type {type(snapshot).__name__}; wanted one of World.save")
+        snapshot.require(self.engine, engine.version, self.identity)
+        self._commands.forget()
+        engine.load(snapshot.data)
+        self._commands.remember(snapshot.memory)
+        self._start, self._steps = snapshot.time, snapshot.steps
+        self._state = None
+        self._note()
+
+    @property
+    def identity(self) -> str:
+        """Hash of the scene, the options and the settings: worlds of one engine with the same identity take
+        the same steps."""
+        if self._identity is None:
+            self._identity = identity(self._layout, {**self.options, **self.settings})
+        return self._identity
+
+    # -- queries ------------------------------------------------------------------------------
+
+    def contacts(self) -> tuple[Contact, ...]:
+        """Return the contacts of the last step of the engine, with their forces.
+
+        After the state was set, they are those of the new state, without forces.
+        """
+        return self._queries.contacts(self._require())
+
+    def closest_points(self, a: str, b: str, within: float = 1.0) -> tuple[ClosestPoints, ...]:
+        """Return the nearest points of two parts, nearest first: one entry for each pair of their links that
+        are at most `within` [m] apart.
+
+        A part is a body, ``robot/link``, or a robot for all its links.
+        """
+        return self._queries.closest_points(self._require(), a, b, within)
+
+    def aabb(self, name: str) -> tuple[Floats, Floats]:
+        """Return the lower and upper corner (3,) of the box around a part, along the axes of the world."""
+        return self._queries.aabb(self.state, name)
+
+    def overlapping(self, lower: ArrayLike, upper: ArrayLike) -> tuple[str, ...]:
+        """Return the names of the links and bodies whose `aabb` overlaps the box between two corners."""
+        return self._queries.overlapping(self.state, lower, upper)
+
+    def cast_rays(self, origins: ArrayLike, directions: ArrayLike, length: float = MAX_RAY_LENGTH) -> RayHits:
+        """Return what rays from `origins` (n, 3) along `directions` (n, 3) hit first within `length` [m]."""
+        return self._queries.cast_rays(self._require(), origins, directions, length)
+
+    # -- end ----------------------------------------------------------------------------------
+
+    def close(self) -> None:
+        """Release the engine; further calls raise ClosedError. Closing twice is harmless."""
+        if self._engine is not None:
+            self._engine.close()
+            self._engine = None
+
+    def __enter__(self) -> World:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        return f"<World {self.scene.name} in {self.engine} at {self.time:.6g} s>"
+
+    # -- internals ----------------------------------------------------------------------------
+
+    def _require(self) -> WorldEngine:
+        if self._engine is None:
+            raise ClosedError(f"the world of {self.scene.name} is closed")
+        return self._engine
+
+    def _build(self) -> WorldEngine:
+        return self._kind(self._layout, self._h, self.settings)
+
+    def _note(self) -> None:
+        """Read the state; keep it if it is finite, otherwise go back to the one kept before."""
+        engine = self._require()
+        robots = {name: engine.robot_state(k) for name, k in self._robots.items()}
+        bodies = {name: engine.body_state(k) for name, k in self._bodies.items()}
+        total = sum(float(np.sum(part)) for state in (*robots.values(), *bodies.values()) for part in state)
+        if not math.isfinite(total):
+            bad = [name for name, parts in {**robots, **bodies}.items() if not _finite(parts)]
+            self._diverge(f"the state of {' and '.join(bad[:3])} is not finite")
+        self._state = WorldState(self.time, robots, bodies)
+        self._good = self._state, self._steps, self._start
+        self._unchecked = 0
+
+    def _diverge(self, reason: str) -> NoReturn:
+        """Return to the last state that was finite, and raise DivergedError."""
+        failed_at, step = self.time, self._steps
+        self._return_to_good()
+        robots = self._good[0].robots
+        raise DivergedError(
+            f"the world of {self.scene.name} diverged in {self.engine} at {failed_at:.6g} s: {reason}; "
+            f"it is at {self.time:.6g} s again",
+            time=failed_at,
+            step=step,
+            state=tuple(next(iter(robots.values()), (None, None))),  # type: ignore[arg-type]
+        )
+
+    def _return_to_good(self) -> None:
+        """Rebuild the engine at the last state that was finite."""
+        state, self._steps, self._start = self._good
+        self._require().close()
+        self._engine = self._build()
+        apply_state(self._engine, state)
+        self._commands.forget()
+        self._state, self._unchecked = state, 0
+
+
+def _finite(parts: Sequence[Floats]) -> bool:
+    return all(np.isfinite(part).all() for part in parts)
