@@ -8,6 +8,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+from dynx.backends import installed_backends
+
 ROOT = Path(__file__).resolve().parent.parent
 
 
@@ -41,6 +43,15 @@ def test_integrators_are_of_their_order() -> None:
     assert finished.stdout.count("fitted order") == 3
     # The drift from one start says little about that from another.
     assert "20 random starts" in finished.stdout
+
+
+def test_calls_of_bindings_have_the_results_of_dynx() -> None:
+    finished = run("benchmarks.call_overhead", "--repetitions", "1")
+    # A time measured once on a busy machine may be beyond the bound.
+    assert finished.returncode in (0, 1), finished.stdout + finished.stderr
+    rows = finished.stdout.splitlines()[1:]
+    engines = [name for name in ("pinocchio", "pybullet", "mujoco", "drake") if name in installed_backends()]
+    assert all(sum(row.startswith(name) for row in rows) >= 9 for name in engines), finished.stdout
 
 
 def test_the_table_of_every_quantity_compares_the_engines() -> None:

@@ -41,37 +41,43 @@ def sample_check(model: Model, arguments: int, *, validate: bool) -> SampleCheck
     if not validate:
         return _have_one_axis
     entries_of_all = model.nq + (arguments - 1) * model.nv
-    if model.nq > MAX_LISTED or entries_of_all > MAX_LISTED_OF_ALL:
+    # An empty array may have two axes and no entry that shows it.
+    if not model.nv or model.nq > MAX_LISTED or entries_of_all > MAX_LISTED_OF_ALL:
         return _check_of_long_arrays(model)
-    q_shape, v_shape, fixed = (model.nq,), (model.nv,), not model.floating
+    nq, nv, fixed = model.nq, model.nv, not model.floating
+
+    # The entries of an array with two axes are lists, and those of one with none are no list: `hypot` and the
+    # stars raise TypeError for them. Comparing lengths takes half of the time of comparing shapes.
 
     def one(q: Any) -> bool:
-        if type(q) is ndarray and q.dtype is _FLOAT64 and q.shape == q_shape:
-            entries = q.tolist()
-            return hypot(*entries) < MAX_MAGNITUDE and (fixed or _is_unit(entries))
+        if type(q) is ndarray and q.dtype is _FLOAT64:
+            try:
+                entries = q.tolist()
+                return len(q) == nq and hypot(*entries) < MAX_MAGNITUDE and (fixed or _is_unit(entries))
+            except TypeError:
+                pass
         return False
 
     def two(q: Any, v: Any) -> bool:
-        if (
-            type(q) is type(v) is ndarray
-            and q.dtype is v.dtype is _FLOAT64
-            and q.shape == q_shape
-            and v.shape == v_shape
-        ):
-            entries = q.tolist()
-            return hypot(*entries, *v.tolist()) < MAX_MAGNITUDE and (fixed or _is_unit(entries))
+        if type(q) is type(v) is ndarray and q.dtype is v.dtype is _FLOAT64:
+            try:
+                if len(q) == nq and len(v) == nv:
+                    entries = q.tolist()
+                    size = hypot(*entries, *v.tolist())
+                    return size < MAX_MAGNITUDE and (fixed or _is_unit(entries))
+            except TypeError:
+                pass
         return False
 
     def three(q: Any, v: Any, a: Any) -> bool:
-        if (
-            type(q) is type(v) is type(a) is ndarray
-            and q.dtype is v.dtype is a.dtype is _FLOAT64
-            and q.shape == q_shape
-            and v.shape == a.shape == v_shape
-        ):
-            entries = q.tolist()
-            size = hypot(*entries, *v.tolist(), *a.tolist())
-            return size < MAX_MAGNITUDE and (fixed or _is_unit(entries))
+        if type(q) is type(v) is type(a) is ndarray and q.dtype is v.dtype is a.dtype is _FLOAT64:
+            try:
+                if len(q) == nq and len(v) == nv == len(a):
+                    entries = q.tolist()
+                    size = hypot(*entries, *v.tolist(), *a.tolist())
+                    return size < MAX_MAGNITUDE and (fixed or _is_unit(entries))
+            except TypeError:
+                pass
         return False
 
     checks: tuple[SampleCheck, ...] = one, two, three

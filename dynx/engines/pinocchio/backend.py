@@ -37,14 +37,22 @@ _FUNCTIONS: dict[str, Callable[..., Floats]] = {
 """Functions of the binding that take arrays and return one array, by quantity."""
 
 
+_AXES: dict[str, Any] = {
+    "local_world_aligned": pin.LOCAL_WORLD_ALIGNED,
+    "local": pin.LOCAL,
+    "world": pin.WORLD,
+}
+"""The binding's name of each reference."""
+
+
 # d(J v)/dt is the classical acceleration if the origin moves with the frame and the axes do not rotate, and
 # the spatial acceleration in the other two references.
-_ACCELERATION: dict[str, Callable[..., Any]] = {
-    "local_world_aligned": pin.getFrameClassicalAcceleration,
-    "local": pin.getFrameAcceleration,
-    "world": pin.getFrameAcceleration,
+_ACCELERATION: dict[str, tuple[Callable[..., Any], Any]] = {
+    "local_world_aligned": (pin.getFrameClassicalAcceleration, pin.LOCAL_WORLD_ALIGNED),
+    "local": (pin.getFrameAcceleration, pin.LOCAL),
+    "world": (pin.getFrameAcceleration, pin.WORLD),
 }
-"""Function of the binding that returns the acceleration of a frame, by reference."""
+"""Function of the binding that returns the acceleration of a frame, and its axes, by reference."""
 
 
 class _Workspace(local):
@@ -70,11 +78,6 @@ class PinocchioBackend(Backend):
         super().__init__(model, validate=validate)
         self._engine, self._frame_ids = engine_model(model)
         self._workspace = _Workspace(self._engine)
-        self._axes = {
-            "local_world_aligned": pin.LOCAL_WORLD_ALIGNED,
-            "local": pin.LOCAL,
-            "world": pin.WORLD,
-        }
         # With one degree of freedom the binding returns Jacobians as vectors; with none, its derivative of a
         # Jacobian ends the process.
         self._nv = self._mechanism.nv
@@ -121,7 +124,7 @@ class PinocchioBackend(Backend):
 
     def _jacobian(self, q: Floats, frame: int, reference: Reference) -> Floats:
         J: Floats = pin.computeFrameJacobian(
-            self._engine, self._workspace.data, q, self._frame_ids[frame], self._axes[reference]
+            self._engine, self._workspace.data, q, self._frame_ids[frame], _AXES[reference]
         )
         return J if self._nv > 1 else J.reshape(6, self._nv)
 
@@ -129,7 +132,7 @@ class PinocchioBackend(Backend):
         if not self._nv:
             return np.zeros((6, 0))
         dJ: Floats = pin.frameJacobianTimeVariation(
-            self._engine, self._workspace.data, q, v, self._frame_ids[frame], self._axes[reference]
+            self._engine, self._workspace.data, q, v, self._frame_ids[frame], _AXES[reference]
         )
         return dJ if self._nv > 1 else dJ.reshape(6, self._nv)
 
@@ -137,7 +140,7 @@ class PinocchioBackend(Backend):
         engine, data, frame = self._engine, self._workspace.data, self._frame_ids[frame]
         pin.forwardKinematics(engine, data, q, v)
         pin.updateFramePlacement(engine, data, frame)
-        velocity: Floats = pin.getFrameVelocity(engine, data, frame, self._axes[reference]).vector
+        velocity: Floats = pin.getFrameVelocity(engine, data, frame, _AXES[reference]).vector
         return velocity
 
     def _frame_acceleration(
@@ -146,7 +149,8 @@ class PinocchioBackend(Backend):
         engine, data, frame = self._engine, self._workspace.data, self._frame_ids[frame]
         pin.forwardKinematics(engine, data, q, v, a)
         pin.updateFramePlacement(engine, data, frame)
-        acceleration: Floats = _ACCELERATION[reference](engine, data, frame, self._axes[reference]).vector
+        function, axes = _ACCELERATION[reference]
+        acceleration: Floats = function(engine, data, frame, axes).vector
         return acceleration
 
     # -- dynamics -----------------------------------------------------------------------------
@@ -186,8 +190,9 @@ class PinocchioBackend(Backend):
     def _inertial_regressor(self, q: Floats, v: Floats, a: Floats) -> Floats:
         if not self._nv:
             return np.zeros((0, 10 * len(self.model.links)))
-        Y = pin.computeJointTorqueRegressor(self._engine, self._workspace.data, q, v, a)
-        return self._link_regressor(Y if self._nv > 1 else Y.reshape(1, -1))
+        return self._link_regressor(
+            pin.computeJointTorqueRegressor(self._engine, self._workspace.data, q, v, a)
+        )
 
     # -- the whole body -----------------------------------------------------------------------
 

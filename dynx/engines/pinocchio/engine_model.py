@@ -89,54 +89,61 @@ class LinkRegressor:
     """The map from the engine's regressor of joints to that of links.
 
     The engine merges the inertia of a link into the joint that moves it. Columns of links whose frame is the
-    joint's own only change their order; those of other links on a joint are products with one matrix, and
-    those of links that no joint moves are zero.
+    joint's own only change their order, those of links that no joint moves are zero, and those of other links
+    are products of the joint's columns with a matrix.
     """
 
     def __init__(self, engine: Any, links: Sequence[int]) -> None:
         """`links` are the engine's numbers of the links' frames."""
-        self._size = 10 * (engine.njoints - 1)
         unchanged = np.eye(10)[_ENGINE_ORDER]
-        matrices: dict[int, list[Floats]] = {}
-        # For each link its joint, not counting the universe, and its number among the matrices of the joint;
-        # None for a link that has no matrix.
-        places: list[tuple[int, int | None]] = []
-        for link in links:
-            frame = engine.frames[link]
-            joint = int(frame.parentJoint) - 1
+        of_joints, of_links = 10 * (engine.njoints - 1), 10 * len(links)
+        self._shape = engine.nv, of_joints
+        # For each entry of the result, the entry of the engine's array that has it, or one that is zero.
+        source = np.empty((engine.nv, of_links), dtype=np.intp)
+        source[...] = np.arange(engine.nv)[:, None] * of_joints
+        zero = self._zero_entry(engine)
+        self._fixed: list[slice] = []
+        products: list[tuple[slice, slice, Floats]] = []
+        for number, link in enumerate(links):
+            frame, columns = engine.frames[link], slice(10 * number, 10 * number + 10)
+            begin = 10 * (int(frame.parentJoint) - 1)
+            if frame.parentJoint == WORLD:
+                if zero is None:
+                    self._fixed.append(columns)
+                else:
+                    source[:, columns] = zero
+                continue
+            source[:, columns] += begin + np.array(_ENGINE_ORDER)
             matrix = _parameters_on_joint(frame.placement)
-            if frame.parentJoint == WORLD or np.array_equal(matrix, unchanged):
-                places.append((joint, None))
-            else:
-                of_joint = matrices.setdefault(joint, [])
-                places.append((joint, len(of_joint)))
-                of_joint.append(matrix.T)
-        self._products: list[tuple[slice, slice, Floats]] = []
-        end, first = self._size + 10, {}
-        for joint, of_joint in matrices.items():
-            first[joint], begin, end = end, end, end + 10 * len(of_joint)
-            columns = slice(10 * joint, 10 * joint + 10)
-            self._products.append((columns, slice(begin, end), np.concatenate(of_joint)))
-        self._rows = end
-        order: list[int] = []
-        for joint, number in places:
-            if number is not None:
-                order += range(first[joint] + 10 * number, first[joint] + 10 * number + 10)
-            elif joint < 0:
-                order += range(self._size, self._size + 10)
-            else:
-                order += [10 * joint + k for k in _ENGINE_ORDER]
-        self._order = np.array(order, dtype=np.intp)
+            if np.array_equal(matrix, unchanged):
+                continue
+            joint = slice(begin, begin + 10)
+            if products and products[-1][0] == joint and products[-1][1].stop == columns.start:
+                # Links in a row on one joint share a product.
+                _, before, matrices = products.pop()
+                columns, matrix = slice(before.start, columns.stop), np.hstack([matrices, matrix])
+            products.append((joint, columns, matrix))
+        self._source = source
+        self._products = products
+
+    @staticmethod
+    def _zero_entry(engine: Any) -> int | None:
+        """Return the number of an entry of the engine's regressor that is zero at every state: the torque of
+        a joint that does not move the body of the first joint."""
+        row = int(engine.joints[1].nv)
+        return 10 * (engine.njoints - 1) * row if engine.nv > row else None
 
     def __call__(self, of_joints: Floats) -> Floats:
         """Return the regressor of the links (nv, 10 n_links) for that of the joints (nv, 10 n_joints)."""
-        # Columns as rows, because the engine stores its array by columns: those of joints, zeros, products.
-        columns = np.empty((self._rows, len(of_joints)))
-        columns[: self._size] = of_joints.T
-        columns[self._size : self._size + 10].fill(0.0)
-        for source, target, matrices in self._products:
-            np.dot(matrices, columns[source], out=columns[target])
-        return np.asarray(columns.take(self._order, axis=0).T)
+        # With one degree of freedom the binding returns a vector.
+        result: Floats = of_joints.take(self._source, None, None, "clip")
+        if self._products:
+            of_joints = of_joints.reshape(self._shape)
+            for joint, columns, matrices in self._products:
+                result[:, columns] = of_joints[:, joint].dot(matrices)
+        for columns in self._fixed:
+            result[:, columns] = 0.0
+        return result
 
 
 _ENGINE_ORDER = [0, 1, 2, 3, 4, 5, 7, 6, 8, 9]

@@ -1,75 +1,34 @@
-"""Calls of an engine's own binding, each with the work and the outputs of one method of a backend.
-
-They are what a user of the engine would write for a loop: the engine's model is at hand, its state is set
-where the engine has one, and the result is an array that the caller owns.
-"""
+"""Calls of Pinocchio's own binding, each with the work and the outputs of one method of a backend."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
-from dynx.backends import Backend
+from benchmarks.bindings.sample import FRAME, Call, Sample
 from dynx.model import Model
 from dynx.rbd.regressor import inertia_from_parameters, parameters_from_inertia
 from dynx.spatial.scalar import Floats
 
-Call = Callable[[], Floats]
-FRAME = "tool0"
 
-
-class Sample:
-    """One state of a robot."""
-
-    def __init__(self, model: Model) -> None:
-        rng = np.random.default_rng(0)
-        self.q = model.random(rng)
-        self.v, self.a, self.tau = (rng.standard_normal(model.nv) for _ in range(3))
-
-
-def through_dynx(backend: Backend, sample: Sample) -> dict[str, Call]:
-    """Return the calls of a backend's methods, by name."""
-    q, v, a, tau = sample.q, sample.v, sample.a, sample.tau
-    return {
-        "forward_kinematics": lambda: backend.forward_kinematics(q, FRAME),
-        "all frames": lambda: backend.forward_kinematics(q),
-        "jacobian": lambda: backend.jacobian(q, FRAME),
-        "jacobian_derivative": lambda: backend.jacobian_derivative(q, v, FRAME),
-        "frame_velocity": lambda: backend.frame_velocity(q, v, FRAME),
-        "frame_acceleration": lambda: backend.frame_acceleration(q, v, a, FRAME),
-        "inverse_dynamics": lambda: backend.inverse_dynamics(q, v, a),
-        "forward_dynamics": lambda: backend.forward_dynamics(q, v, tau),
-        "mass_matrix": lambda: backend.mass_matrix(q),
-        "bias_torque": lambda: backend.bias_torque(q, v),
-        "gravity_torque": lambda: backend.gravity_torque(q),
-        "coriolis_matrix": lambda: backend.coriolis_matrix(q, v),
-        "inertial_regressor": lambda: backend.inertial_regressor(q, v, a),
-        "center_of_mass": lambda: backend.center_of_mass(q),
-        "center_of_mass_jacobian": lambda: backend.center_of_mass_jacobian(q),
-        "centroidal_momentum": lambda: backend.centroidal_momentum(q, v),
-        "kinetic_energy": lambda: backend.kinetic_energy(q, v),
-        "potential_energy": lambda: backend.potential_energy(q),
-    }
-
-
-def of_pinocchio(engine: Any, frames: list[str], links: list[str], sample: Sample) -> dict[str, Call]:
-    """Return the calls of Pinocchio's binding on its own model, by the names that `through_dynx` has.
+def binding_calls(model: Model, sample: Sample) -> dict[str, Call]:
+    """Return the calls of Pinocchio's binding on a model that its own parser reads.
 
     The binding leaves links that no joint moves out of the centre of mass, and gives a regressor for each
     joint instead of each link; the few lines of NumPy with which its user gets the outputs of dynx belong to
     the call.
     """
+    engine = pin.buildModelFromUrdf(model.source)
     data, (q, v, a, tau) = engine.createData(), (sample.q, sample.v, sample.a, sample.tau)
     axes = pin.LOCAL_WORLD_ALIGNED
-    numbers, tool = [engine.getFrameId(name) for name in frames], engine.getFrameId(FRAME)
+    numbers, tool = [engine.getFrameId(name) for name in model.frame_names], engine.getFrameId(FRAME)
     masses = [float(inertia.mass) for inertia in engine.inertias]
     share, rest_share = sum(masses[1:]) / sum(masses), masses[0] / sum(masses)
     at_rest = rest_share * np.array(engine.inertias[0].lever)
     rest_energy = -sum(masses) * float(engine.gravity.linear @ at_rest)
-    to_links = link_matrix(engine, links)
+    to_links = link_matrix(engine, [link.name for link in model.links])
 
     def forward_kinematics() -> Floats:
         pin.forwardKinematics(engine, data, q)
