@@ -7,7 +7,6 @@ inertias, ballast), `canonical_urdf` (the file that Bullet loads), `client` (loa
 
 from __future__ import annotations
 
-from importlib.metadata import PackageNotFoundError, version
 from threading import RLock
 from typing import ClassVar
 
@@ -16,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from dynx.backends.base import Backend
 from dynx.engines.pybullet.inertia import Ballast, ballast_for
-from dynx.engines.pybullet.library import bullet
+from dynx.engines.pybullet.library import bullet, bullet_version
 from dynx.engines.pybullet.robot import BulletRobot
 from dynx.errors import ArgumentError, ClosedError, EngineError
 from dynx.model import Model
@@ -78,10 +77,7 @@ class PyBulletBackend(Backend):
     @property
     def engine_version(self) -> str:
         """``pybullet`` and the version of its distribution."""
-        try:
-            return f"pybullet {version('pybullet')}"
-        except PackageNotFoundError:
-            return "pybullet"
+        return f"pybullet {bullet_version()}".strip()
 
     @property
     def ballast(self) -> bool:

@@ -11,7 +11,8 @@ the frame is the base frame.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from decimal import Decimal
 
 import numpy as np
@@ -53,8 +54,13 @@ class BulletTree:
     unit: float
 
 
-def bullet_tree(mechanism: Mechanism, ballast: tuple[Ballast, ...], times: int) -> BulletTree:
-    """Return the tree that Bullet loads for a long-double `mechanism`, with `times` copies of the ballast."""
+def bullet_tree(
+    mechanism: Mechanism, ballast: tuple[Ballast, ...], times: int, *, unit: float | None = None
+) -> BulletTree:
+    """Return the tree that Bullet loads for a long-double `mechanism`, with `times` copies of the ballast.
+
+    `unit` [kg] is computed if it is None. Objects that touch must have the same.
+    """
     root = principal_inertia(NOTHING)
     largest_moments = [0.0]
     if mechanism.floating:
@@ -64,7 +70,8 @@ def bullet_tree(mechanism: Mechanism, ballast: tuple[Ballast, ...], times: int) 
     bodies = list(zip(mechanism.bodies, ballast[1:], strict=True))
     inertias = [load.add_to(body.inertia, times) for body, load in bodies]
     largest_moments += [float(np.max(np.abs(inertia.rotational_inertia))) for inertia in inertias]
-    unit = 2.0 ** max(0, int(np.frexp(max(largest_moments))[1]))
+    if unit is None:
+        unit = 2.0 ** max(0, int(np.frexp(max(largest_moments))[1]))
     links = []
     for body, merged in zip(mechanism.bodies, inertias, strict=True):
         R, p = body.R, body.p
@@ -76,22 +83,57 @@ def bullet_tree(mechanism: Mechanism, ballast: tuple[Ballast, ...], times: int) 
     return BulletTree(mechanism.floating, _in_units(root, unit), tuple(links), unit)
 
 
-def write_bullet_urdf(tree: BulletTree) -> str:
+@dataclass(frozen=True)
+class Attachments:
+    """What a canonical URDF has besides the mechanism: shapes, and limits of joints."""
+
+    first: tuple[str, ...] = ()
+    """Elements that precede every link but the root."""
+    shapes: Mapping[int, Sequence[str]] = field(default_factory=dict)
+    """``<collision>`` elements of the moving bodies and of the root, in the frames of their links."""
+    limits: Mapping[int, tuple[float, float]] = field(default_factory=dict)
+    """Lower and upper limit of the joints that have them."""
+
+
+def write_bullet_urdf(tree: BulletTree, attachments: Attachments = Attachments()) -> str:
     """Return the tree as URDF text, in ASCII."""
-    lines = ['<robot name="r">', *_link("b", tree.root.mass, np.zeros(3), np.eye(3))]
+    shapes, limits = attachments.shapes, attachments.limits
+    lines = ['<robot name="r">', *_link("b", tree.root.mass, np.zeros(3), np.eye(3), shapes.get(ROOT, ()))]
+    lines += attachments.first
     for k, link in enumerate(tree.links):
-        lines += _link(f"l{k}", link.inertia.mass, link.inertia.center, link.inertia.axes)
+        inertia = link.inertia
+        lines += _link(f"l{k}", inertia.mass, inertia.center, inertia.axes, shapes.get(k, ()))
+        # Bullet requires limits of a prismatic joint; a lower limit above the upper one means unlimited.
+        lower, upper = limits.get(k, (1.0, -1.0))
+        kind = "prismatic" if not link.revolute else "revolute" if k in limits else "continuous"
         lines += [
-            f'<joint name="j{k}" type="{"continuous" if link.revolute else "prismatic"}">',
-            f'<parent link="{"b" if link.parent == ROOT else f"l{link.parent}"}"/>',
+            f'<joint name="j{k}" type="{kind}">',
+            f'<parent link="{body_name(link.parent)}"/>',
             f'<child link="l{k}"/>',
             _origin(link.p, link.R),
             f'<axis xyz="{_vector(link.axis)}"/>',
-            # Bullet requires limits of a prismatic joint; a lower limit above the upper one means unlimited.
-            '<limit lower="1" upper="-1" effort="0" velocity="0"/>',
+            f'<limit lower="{locale_free(lower)}" upper="{locale_free(upper)}" effort="0" velocity="0"/>',
             "</joint>",
         ]
     return "\n".join([*lines, "</robot>", ""])
+
+
+def body_name(body: int) -> str:
+    """Return the name of the link of a moving body, or of the root."""
+    return "b" if body == ROOT else f"l{body}"
+
+
+def fixed_link(name: str, parent: str, shapes: Sequence[str]) -> list[str]:
+    """Return a link without mass, fixed to the frame of the link `parent`, as URDF text."""
+    return [
+        *_link(name, 0.0, np.zeros(3), np.eye(3), shapes),
+        f'<joint name="f{name}" type="fixed"><parent link="{parent}"/><child link="{name}"/></joint>',
+    ]
+
+
+def pose_element(T: Array) -> str:
+    """Return the ``<origin>`` element of a pose (4, 4)."""
+    return _origin(T[:3, 3], T[:3, :3])
 
 
 def locale_free(number: float) -> str:
@@ -107,13 +149,15 @@ def _in_units(inertia: PrincipalInertia, unit: float) -> PrincipalInertia:
     return replace(inertia, mass=inertia.mass / unit, moments=inertia.moments / unit)
 
 
-def _link(name: str, mass: float, center: Array, axes: Array) -> list[str]:
+def _link(name: str, mass: float, center: Array, axes: Array, shapes: Sequence[str] = ()) -> list[str]:
     return [
         f'<link name="{name}"><inertial>',
         _origin(center, axes),
         f'<mass value="{locale_free(mass)}"/>',
         '<inertia ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"/>',
-        "</inertial></link>",
+        "</inertial>",
+        *shapes,
+        "</link>",
     ]
 
 

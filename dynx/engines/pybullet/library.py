@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from importlib import import_module
+from importlib.metadata import PackageNotFoundError, version
 from threading import Lock
 from types import ModuleType
 
@@ -11,6 +12,14 @@ from dynx.engines.silence import silence
 from dynx.errors import NotInstalledError
 
 _import_lock = Lock()
+
+
+def bullet_version() -> str:
+    """Return the version of the distribution; empty if it is unknown."""
+    try:
+        return version("pybullet")
+    except PackageNotFoundError:
+        return ""
 
 
 def bullet() -> ModuleType:

@@ -18,7 +18,8 @@ from dynx.engines.pybullet.backend import PyBulletBackend
 from dynx.engines.pybullet.canonical_urdf import bullet_tree
 from dynx.engines.pybullet.inertia import ballast_for
 from dynx.engines.pybullet.library import bullet
-from dynx.engines.pybullet.stepping import BaseState, SteppingClient
+from dynx.engines.pybullet.root_frame import BaseState, RootFrame
+from dynx.engines.pybullet.stepping import SteppingClient
 from dynx.errors import EngineLimitError, UnsupportedFeatureError
 from dynx.model import Model
 from dynx.model.mechanism import build_mechanism
@@ -27,7 +28,7 @@ from dynx.sim.plants.friction_solver import FrictionSolver
 from dynx.sim.plants.plant import Plant, StepResult
 from dynx.spatial.extended import longdouble
 from dynx.spatial.scalar import Floats
-from dynx.spatial.so3 import cross, quat_from_rotation, quat_product, rotate_back, rotation_from_quat
+from dynx.spatial.so3 import cross, rotate_back, rotation_from_quat
 
 Mask = NDArray[np.bool_]
 
@@ -61,10 +62,7 @@ class BulletPlant(Plant):
         self._owners = np.flatnonzero([joint.mimic is None for joint in model.joints if joint.moves])
         self._solves = self._coupling is not None or disturbances.has_armature
         self._sticks = disturbances.sticks
-        # The root's inertial frame in the base frame.
-        self._center: Floats = np.asarray(tree.root.center, dtype=np.float64)
-        self._axes: Floats = quat_from_rotation(np.asarray(tree.root.axes, dtype=np.float64))
-        self._axes_back: Floats = self._axes * np.array([-1.0, -1.0, -1.0, 1.0])
+        self._root = RootFrame(tree.root)
         self._client = SteppingClient(bullet(), tree, model.name, gravity=list(model.gravity), dt=self._h)
 
     @cached_property
@@ -179,7 +177,7 @@ class BulletPlant(Plant):
             joints, rates = self._joints(sticking)
             self._read(joints, rates, sticking)
             return (rates - v) / h
-        R, c, before = rotation_from_quat(self._q[3:7]), self._center, self._base
+        R, c, before = rotation_from_quat(self._q[3:7]), self._root.center, self._base
         force, moment = R @ tau[:3], R @ (tau[3:6] - cross(c, tau[:3]))
         self._client.push_base((force / self._unit).tolist(), (moment / self._unit).tolist(), before.position)
         self._client.advance()
@@ -206,14 +204,9 @@ class BulletPlant(Plant):
         return positions, rates
 
     def _base_coordinates(self, base: BaseState, joints: Floats, rates: Floats) -> tuple[Floats, Floats]:
-        quat = quat_product(np.array(base.quat_xyzw), self._axes_back)
         # Bullet may change the sign of the quaternion; the sign nearer to the previous one is kept.
-        quat /= np.copysign(np.sqrt(quat.dot(quat)), quat.dot(self._q[3:7]))
-        R = rotation_from_quat(quat)
-        w = rotate_back(R, np.array(base.angular))
-        linear = rotate_back(R, np.array(base.linear)) - cross(w, self._center)
-        position = np.array(base.position) - R @ self._center
-        return np.concatenate([position, quat, joints]), np.concatenate([linear, w, rates])
+        base_q, base_v = self._root.coordinates(base, self._q[3:7])
+        return np.concatenate([base_q, joints]), np.concatenate([base_v, rates])
 
     def _read(self, q: Floats, v: Floats, sticking: Mask | None = None) -> None:
         self._q, self._v = q, v
@@ -228,14 +221,7 @@ class BulletPlant(Plant):
             q, v = self._coupling.expand_q(q), self._S @ v
         base = None
         if self._floating:
-            R = rotation_from_quat(q[3:7])
-            w, c = v[3:6], self._center
-            base = self._base = BaseState(
-                (q[:3] + R @ c).tolist(),
-                quat_product(q[3:7], self._axes).tolist(),
-                (R @ (v[:3] + cross(w, c))).tolist(),
-                (R @ w).tolist(),
-            )
+            base = self._base = self._root.base_state(q, v)
         self._client.place(q[self._base_nq :].tolist(), v[self._base_nv :].tolist(), base)
 
     def _in_units(self, command: MotorCommand) -> MotorCommand:

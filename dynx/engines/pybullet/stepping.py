@@ -15,25 +15,16 @@ second), damps joints as in the URDF, and limits speeds to 100: dynx switches al
 from __future__ import annotations
 
 from types import ModuleType
-from typing import NamedTuple
 
 from dynx.control.engine_motors import MotorCommand
 from dynx.engines.pybullet.canonical_urdf import BulletTree
 from dynx.engines.pybullet.client import BulletClient
 from dynx.engines.pybullet.connection import Reals
+from dynx.engines.pybullet.root_frame import BaseState
 from dynx.errors import ArgumentError, shown
 
 MODES = ("POSITION_CONTROL", "VELOCITY_CONTROL", "TORQUE_CONTROL", "PD_CONTROL")
 """Control modes of the engine for a joint's motor."""
-
-
-class BaseState(NamedTuple):
-    """Pose of the root's inertial frame in the world, and its velocity along the world's axes."""
-
-    position: Reals
-    quat_xyzw: Reals
-    linear: Reals
-    angular: Reals
 
 
 class SteppingClient(BulletClient):

@@ -1,0 +1,81 @@
+"""Contacts, distances and rays of a Bullet world, by the numbers of colliders."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from dynx.engines.pybullet.world.client import WorldClient
+from dynx.engines.pybullet.world.filters import Place
+from dynx.spatial.scalar import Floats
+from dynx.world.engine import RayHit, TouchingPoint
+
+RAYS_PER_CALL = 4096
+"""Number of rays in one call; Bullet takes at most 16,384."""
+
+_NO_NORMAL = np.full(3, np.nan)
+
+
+class ContactReader:
+    """Translation of Bullet's reports, which name bodies and links by number."""
+
+    def __init__(self, client: WorldClient, places: Sequence[Sequence[Place]]) -> None:
+        """`places` are the bodies and links of each collider."""
+        self._client = client
+        self._places = places
+        self._collider = {place: k for k, found in enumerate(places) for place in found}
+        self.fresh = True
+        """Whether no step was taken since the state was set, so that there are no forces."""
+
+    def contacts(self) -> list[TouchingPoint]:
+        """Return the contacts that have a force, or overlap."""
+        points = self._client.call(self._client.engine.getContactPoints) or ()
+        found = []
+        for point in points:
+            a, b = self._collider.get((point[1], point[3])), self._collider.get((point[2], point[4]))
+            if a is None or b is None or not (point[8] <= 0.0 or point[9] > 0.0):
+                continue
+            force, friction = (0.0, np.zeros(3)) if self.fresh else (point[9], _friction(point))
+            found.append(_touching(a, b, point, force, friction))
+        return found
+
+    def closest(self, a: int, b: int, within: float) -> TouchingPoint | None:
+        """Return the nearest points of two colliders."""
+        found: list[TouchingPoint] = []
+        for body_a, link_a in self._places[a]:
+            for body_b, link_b in self._places[b]:
+                points = self._client.call(
+                    self._client.engine.getClosestPoints, body_a, body_b, within, link_a, link_b
+                )
+                found += [_touching(a, b, point, 0.0, None) for point in points or ()]
+        return min(found, key=lambda point: point.distance, default=None)
+
+    def cast_rays(self, origins: Floats, directions: Floats, length: float) -> list[RayHit]:
+        """Return the first hit of each ray."""
+        hits: list[RayHit] = []
+        ends = origins + length * directions
+        for start in range(0, len(origins), RAYS_PER_CALL):
+            part = slice(start, start + RAYS_PER_CALL)
+            reported = self._client.call(
+                self._client.engine.rayTestBatch, origins[part].tolist(), ends[part].tolist()
+            )
+            for body, link, fraction, _, normal in reported:
+                collider = self._collider.get((body, link))
+                if collider is None:
+                    hits.append(RayHit(None, np.inf, _NO_NORMAL))
+                else:
+                    hits.append(RayHit(collider, fraction * length, np.array(normal)))
+        return hits
+
+
+def _friction(point: Sequence[Any]) -> Floats:
+    """Return the friction on the first body: two forces along two directions of the tangent plane."""
+    return np.asarray(point[10] * np.array(point[11]) + point[12] * np.array(point[13]))
+
+
+def _touching(a: int, b: int, point: Sequence[Any], force: float, friction: Floats | None) -> TouchingPoint:
+    return TouchingPoint(
+        a, b, np.array(point[5]), np.array(point[6]), np.array(point[7]), point[8], force, friction
+    )

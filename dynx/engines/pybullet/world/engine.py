@@ -1,0 +1,189 @@
+"""`BulletWorld`: a scene in PyBullet.
+
+Robots are dynx's canonical mechanisms, stepped as `dynx.simulate(plant="pybullet")` steps them, without
+motors, damping or limits that the scene does not have. Every link with shapes has a Bullet link of its own,
+so that contacts are named by the links of the description.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, ClassVar
+
+import numpy as np
+
+from dynx.control.engine_motors import MotorCommand
+from dynx.engines.pybullet.library import bullet, bullet_version
+from dynx.engines.pybullet.world.bodies import BulletBody
+from dynx.engines.pybullet.world.client import WorldClient
+from dynx.engines.pybullet.world.constraints import add_constraint
+from dynx.engines.pybullet.world.contacts import ContactReader
+from dynx.engines.pybullet.world.filters import set_filters
+from dynx.engines.pybullet.world.objects import BulletObject
+from dynx.engines.pybullet.world.robot import BulletRobot
+from dynx.engines.pybullet.world.settings import SETTINGS
+from dynx.engines.pybullet.world.shapes import ShapeFiles, is_ground, load_ground
+from dynx.errors import EngineError
+from dynx.model.mechanism import ROOT
+from dynx.spatial.scalar import Floats
+from dynx.world.engine import RayHit, TouchingPoint, WorldEngine
+from dynx.world.layout import Collider, Layout
+from dynx.world.settings import Setting
+from dynx.world.state import BodyState, RobotState
+
+
+class BulletWorld(WorldEngine):
+    """A scene in a Bullet client of its own."""
+
+    name = "pybullet"
+    settings: ClassVar[Mapping[str, Setting]] = SETTINGS
+
+    def __init__(self, layout: Layout, dt: float, settings: Mapping[str, Any]) -> None:
+        super().__init__(layout, dt, settings)
+        engine = bullet()
+        self._client = client = WorldClient(engine, layout.name, dt, settings)
+        self._number = client.number
+        self._step_simulation = engine.stepSimulation
+        try:
+            with TemporaryDirectory(prefix="dynx-", ignore_cleanup_errors=True) as folder:
+                self._load(Path(folder), settings)
+        except OSError as error:
+            client.close()
+            raise EngineError(f"the files through which Bullet loads {layout.name}: {error}") from error
+        except BaseException:
+            client.close()
+            raise
+        self._loaded_robots: list[BulletRobot] = []
+        self._pushed: list[BulletBody] = []
+        self._coupled = [robot for robot in self._robots if robot.coupled]
+        self._touch()
+
+    def _load(self, folder: Path, settings: Mapping[str, Any]) -> None:
+        layout, client = self.layout, self._client
+        client.call(client.engine.setGravity, *layout.gravity.tolist())
+        files = ShapeFiles(folder)
+        owned: dict[tuple[int | None, int], dict[int, Collider]] = {}
+        for number, collider in enumerate(layout.colliders):
+            robot, body = collider.owner
+            owned.setdefault((robot, body if robot is None else ROOT), {})[number] = collider
+        self._robots = [
+            BulletRobot(client, robot, owned.get((k, ROOT), {}), files, folder, self.dt)
+            for k, robot in enumerate(layout.robots)
+        ]
+        self._bodies = [
+            BulletBody(client, body, owned.get((None, k), {}), files, folder)
+            for k, body in enumerate(layout.bodies)
+        ]
+        places: list[list[tuple[int, int]]] = [[] for _ in layout.colliders]
+        objects: list[BulletObject] = [robot.object for robot in self._robots]
+        objects += [body.object for body in self._bodies]
+        for each in objects:
+            for number, link in each.link_of.items():
+                places[number].append((each.body, link))
+        for number, collider in enumerate(layout.colliders):
+            for shape in filter(is_ground, collider.shapes):
+                T = np.eye(4) if collider.owner.robot is not None else layout.bodies[collider.owner.body].T
+                places[number].append((load_ground(client, shape, T), ROOT))
+        set_filters(client, layout, places, settings)
+        self._contacts = ContactReader(client, places)
+        for constraint in layout.constraints:
+            add_constraint(client, constraint, self._robots, self._bodies, settings["constraint_force"])
+
+    # -- motion -------------------------------------------------------------------------------
+
+    def set_torques(self, robot: int, tau: Floats) -> None:
+        found = self._robots[robot]
+        acts = found.set_torques(tau)
+        if acts != (found in self._loaded_robots):
+            (self._loaded_robots.append if acts else self._loaded_robots.remove)(found)
+
+    def set_wrenches(self, wrenches: Floats) -> None:
+        self._pushed = []
+        for body, wrench in zip(self._bodies, wrenches, strict=True):
+            body.wrench = wrench.tolist()
+            if wrench.any():
+                self._pushed.append(body)
+
+    def command_motors(self, robot: int, command: MotorCommand | None) -> None:
+        self._robots[robot].command(command)
+
+    def step(self, n: int) -> None:
+        self._contacts.fresh = False
+        step, number = self._step_simulation, self._number
+        try:
+            for _ in range(n):
+                for robot in self._loaded_robots:
+                    robot.apply()
+                for body in self._pushed:
+                    body.push()
+                for robot in self._coupled:
+                    robot.before_step()
+                step(physicsClientId=number)
+                for robot in self._coupled:
+                    robot.after_step()
+        except self._client.errors as error:
+            raise self._client.failure("stepSimulation", error) from error
+
+    # -- state --------------------------------------------------------------------------------
+
+    def robot_state(self, robot: int) -> RobotState:
+        return self._robots[robot].state()
+
+    def body_state(self, body: int) -> BodyState:
+        return self._bodies[body].state()
+
+    def set_robot_state(self, robot: int, q: Floats, v: Floats) -> None:
+        self._robots[robot].set_state(q, v)
+        self._touch()
+
+    def set_body_state(self, body: int, T: Floats, twist: Floats) -> None:
+        self._bodies[body].set_state(T, twist)
+        self._touch()
+
+    def _touch(self) -> None:
+        """Find the contacts of a state that was set."""
+        self._client.call(self._client.engine.performCollisionDetection)
+        self._contacts.fresh = True
+
+    def dump(self) -> bytes:
+        near = np.array([robot.near for robot in self._robots]).tobytes()
+        with TemporaryDirectory(prefix="dynx-", ignore_cleanup_errors=True) as folder:
+            path = Path(folder) / "world.bullet"
+            self._client.call(self._client.engine.saveBullet, str(path))
+            return struct.pack("<?", self._contacts.fresh) + near + path.read_bytes()
+
+    def load(self, data: bytes) -> None:
+        size = 32 * len(self._robots)
+        near = np.frombuffer(data[1 : 1 + size]).reshape(-1, 4)
+        with TemporaryDirectory(prefix="dynx-", ignore_cleanup_errors=True) as folder:
+            path = Path(folder) / "world.bullet"
+            path.write_bytes(data[1 + size :])
+            self._client.call(self._client.engine.restoreState, fileName=str(path))
+        for robot, quat in zip(self._robots, near, strict=True):
+            robot.near = quat.copy()
+        (self._contacts.fresh,) = struct.unpack("<?", data[:1])
+
+    # -- queries ------------------------------------------------------------------------------
+
+    def contacts(self) -> Sequence[TouchingPoint]:
+        return [point for point in self._contacts.contacts() if self.layout.collides[point.a, point.b]]
+
+    def closest(self, a: int, b: int, within: float) -> TouchingPoint | None:
+        return self._contacts.closest(a, b, within)
+
+    def cast_rays(self, origins: Floats, directions: Floats, length: float) -> Sequence[RayHit]:
+        return self._contacts.cast_rays(origins, directions, length)
+
+    # -- end ----------------------------------------------------------------------------------
+
+    @property
+    def version(self) -> str:
+        return bullet_version()
+
+    def close(self) -> None:
+        for robot in self._robots:
+            robot.close()
+        self._client.close()

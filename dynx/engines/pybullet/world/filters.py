@@ -1,0 +1,49 @@
+"""Materials and collision filters of a scene in Bullet."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import sqrt
+from typing import Any
+
+from dynx.engines.pybullet.world.client import WorldClient
+from dynx.model.geometry import Mesh
+from dynx.world.layout import Layout
+
+Place = tuple[int, int]
+"""Bullet's numbers of a body and of its link."""
+
+
+def set_filters(
+    client: WorldClient, layout: Layout, places: Sequence[Sequence[Place]], settings: Mapping[str, Any]
+) -> None:
+    """Set the materials of all colliders, and which pairs of them may touch.
+
+    Bullet multiplies friction and restitution of two surfaces; given the square roots it uses their geometric
+    mean, so that two surfaces of one material have the coefficients of that material.
+    """
+    engine = client.engine
+    for collider, found in zip(layout.colliders, places, strict=True):
+        material = collider.material
+        options = {
+            "lateralFriction": sqrt(material.friction),
+            "spinningFriction": material.torsional_friction,
+            "rollingFriction": material.rolling_friction,
+            "restitution": sqrt(material.restitution),
+        }
+        if any(isinstance(each.shape, Mesh) for each in collider.shapes):
+            options["collisionMargin"] = settings["mesh_margin"]
+        for body, link in found:
+            client.call(engine.changeDynamics, body, link, **options)
+    for i, first in enumerate(places):
+        for j in range(i):
+            for body_a, link_a in first:
+                for body_b, link_b in places[j]:
+                    client.call(
+                        engine.setCollisionFilterPair,
+                        body_a,
+                        body_b,
+                        link_a,
+                        link_b,
+                        int(layout.collides[i, j]),
+                    )

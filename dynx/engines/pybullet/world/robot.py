@@ -1,0 +1,232 @@
+"""A robot of a scene in Bullet, in the coordinates of its model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from dynx.control.engine_motors import MotorCommand
+from dynx.engines.pybullet.backend import PyBulletBackend
+from dynx.engines.pybullet.world.client import WorldClient
+from dynx.engines.pybullet.world.objects import UNLIMITED, BulletObject
+from dynx.engines.pybullet.world.shapes import ShapeFiles
+from dynx.errors import ArgumentError, UnsupportedFeatureError, shown
+from dynx.model.mechanism import build_mechanism
+from dynx.spatial.branchless import quat_exp
+from dynx.spatial.extended import longdouble
+from dynx.spatial.scalar import Floats
+from dynx.spatial.so3 import cross, quat_product, rotation_from_quat
+from dynx.world.layout import Collider, RobotLayout
+from dynx.world.state import RobotState
+
+MODES = ("POSITION_CONTROL", "VELOCITY_CONTROL", "TORQUE_CONTROL", "PD_CONTROL")
+"""Control modes of Bullet for a joint's motor."""
+
+
+class BulletRobot:
+    """A robot with the shapes of its links, its joint limits, damping and friction.
+
+    Bullet's stepper has no mimic joints. Their robot moves with all joints free during a step; the velocity
+    at its end is then projected, in the metric of the mass matrix, on those that the coupling allows. That is
+    Gauss' principle, so torques, contacts and limits act on followers and drivers as they should.
+    """
+
+    def __init__(
+        self,
+        client: WorldClient,
+        layout: RobotLayout,
+        colliders: Mapping[int, Collider],
+        files: ShapeFiles,
+        folder: Path,
+        h: float,
+    ) -> None:
+        model = layout.model
+        self.model = model
+        self._h = h
+        self._base = 6 if model.floating else 0
+        limited = np.flatnonzero(np.isfinite(layout.lower) | np.isfinite(layout.upper)).tolist()
+        limits = {
+            k: (max(float(layout.lower[k]), -UNLIMITED), min(float(layout.upper[k]), UNLIMITED))
+            for k in limited
+        }
+        mechanism = build_mechanism(model, longdouble)
+        self.object = BulletObject(client, mechanism, colliders, files, folder, limits)
+        self._client = client
+        self._coupling = model.mechanism.coupling
+        self._S = np.eye(model.nv) if self._coupling is None else self._coupling.matrix()
+        self._owners = np.flatnonzero([joint.mimic is None for joint in model.joints if joint.moves])
+        self._friction = layout.friction
+        self._near = np.array([0.0, 0.0, 0.0, 1.0])
+        self._tau: Floats = np.zeros(model.nv)
+        self._forces: list[float] | None = None
+        self.motor: MotorCommand | None = None
+        for k, damping in zip(self.object.links, layout.damping.tolist(), strict=True):
+            if damping:
+                client.call(client.engine.changeDynamics, self.object.body, k, jointDamping=damping)
+        self.release_motors()
+        self.set_state(layout.q, layout.v)
+
+    @property
+    def coupled(self) -> bool:
+        """Whether the robot has mimic joints, so that `before_step` and `after_step` must be called."""
+        return self._coupling is not None
+
+    # -- state --------------------------------------------------------------------------------
+
+    @property
+    def near(self) -> Floats:
+        """Quaternion (4,) of the last state read, whose sign the next one has."""
+        return self._near
+
+    @near.setter
+    def near(self, quat_xyzw: Floats) -> None:
+        self._near = quat_xyzw
+
+    def set_state(self, q: Floats, v: Floats) -> None:
+        """Set the configuration and velocity of the model."""
+        tree_q = q if self._coupling is None else self._coupling.expand_q(q)
+        tree_v = self._S @ v
+        if self._base:
+            self._near = q[3:7].copy()
+            self.object.place_base(self.object.root.base_state(q, v))
+            tree_q = tree_q[7:]
+        self.object.place_joints(tree_q.tolist(), tree_v[self._base :].tolist())
+
+    def state(self) -> RobotState:
+        """Return the configuration and velocity of the model."""
+        positions, rates = (np.array(numbers) for numbers in self.object.joint_states())
+        if self._coupling is not None:
+            positions, rates = positions[self._owners], rates[self._owners]
+        if not self._base:
+            return RobotState(positions, rates)
+        q, v = self.object.root.coordinates(self.object.base_state(), self._near)
+        self._near = q[3:7]
+        return RobotState(np.concatenate([q, positions]), np.concatenate([v, rates]))
+
+    # -- forces -------------------------------------------------------------------------------
+
+    def set_torques(self, tau: Floats) -> bool:
+        """Keep the generalised force for `apply`; return whether it has an effect."""
+        self._tau = np.array(tau)
+        joints = tau[self._base :]
+        if self._coupling is not None:
+            # On the driver alone: the torque on its followers that has the same power.
+            tree = np.zeros(len(self.object.links))
+            tree[self._owners] = joints
+            joints = tree
+        self._forces = joints.tolist() if joints.any() else None
+        return self._forces is not None or bool(tau[: self._base].any())
+
+    def apply(self) -> None:
+        """Apply the generalised force during the next step."""
+        engine = self._client.engine
+        if self._forces is not None:
+            self._client.call(
+                engine.setJointMotorControlArray,
+                self.object.body,
+                self.object.links,
+                engine.TORQUE_CONTROL,
+                forces=self._forces,
+            )
+        if self._base and self._tau[:6].any():
+            R = rotation_from_quat(self.object.root.coordinates(self.object.base_state(), self._near)[0][3:7])
+            force = self._tau[:3]
+            moment = self._tau[3:6] - cross(self.object.root.center, force)
+            self.object.push_base((R @ force).tolist(), (R @ moment).tolist())
+
+    def command(self, command: MotorCommand | None) -> None:
+        """Set Bullet's motors of all joints; None releases them."""
+        self.release_motors()
+        self.motor = command
+        if command is None:
+            return
+        if command.mode not in MODES:
+            raise ArgumentError(f"mode is {shown(command.mode)}; wanted one of {', '.join(MODES)}")
+        if self._coupling is not None:
+            raise UnsupportedFeatureError(
+                f"PyBullet's motors do not support the mimic joints of {self.model.name}; use those of dynx"
+            )
+        given = {
+            "targetPositions": command.positions,
+            "targetVelocities": command.velocities,
+            "forces": command.forces,
+            "positionGains": command.position_gains,
+            "velocityGains": command.velocity_gains,
+        }
+        self._motor_options = {name: numbers for name, numbers in given.items() if numbers is not None}
+        self.apply_motor()
+
+    def apply_motor(self) -> None:
+        """Send the command of Bullet's motors, which forgets torques after each step."""
+        if self.motor is not None and self.object.links:
+            mode = getattr(self._client.engine, self.motor.mode)
+            self._client.call(
+                self._client.engine.setJointMotorControlArray,
+                self.object.body,
+                self.object.links,
+                mode,
+                **self._motor_options,
+            )
+
+    def release_motors(self) -> None:
+        """Let Bullet's motors, which hold every joint of a loaded robot, give only its Coulomb friction."""
+        if self.object.links:
+            engine = self._client.engine
+            self._client.call(
+                engine.setJointMotorControlArray,
+                self.object.body,
+                self.object.links,
+                engine.VELOCITY_CONTROL,
+                forces=self._friction.tolist(),
+            )
+
+    # -- mimic joints -------------------------------------------------------------------------
+
+    @cached_property
+    def _tree_dynamics(self) -> PyBulletBackend:
+        """The robot with its mimic joints free."""
+        joints = tuple(replace(joint, mimic=None) for joint in self.model.joints)
+        return PyBulletBackend(replace(self.model, joints=joints), validate=False)
+
+    def before_step(self) -> None:
+        """Note the state at the beginning of a step of a robot with mimic joints."""
+        self._begun = self.state()
+
+    def after_step(self) -> None:
+        """Project the velocity at the end of a step, and step to it from the noted state."""
+        assert self._coupling is not None
+        q, h, base = self._begun.q, self._h, self._base
+        tree_q = self._coupling.expand_q(q)
+        M, rates = self._tree_dynamics.mass_matrix(tree_q), np.array(self.object.joint_states()[1])
+        if not base:
+            v = self._project(M, rates)
+            self.set_state(q + h * v, v)
+            return
+        R, c = rotation_from_quat(q[3:7]), self.object.root.center
+        after = self.object.base_state()
+        # The velocity of the base frame as it was placed when the step began.
+        w = R.T @ np.array(after.angular)
+        linear = R.T @ np.array(after.linear) - cross(w, c)
+        v = self._project(M, np.concatenate([linear, w, rates]))
+        angular, linear = R @ v[3:6], R @ (v[:3] + cross(v[3:6], c))
+        quat = quat_product(quat_exp(h * angular), q[3:7])
+        quat = quat / np.sqrt(quat.dot(quat))
+        R_next = rotation_from_quat(quat)
+        position = q[:3] + R @ c + h * linear - R_next @ c
+        w = R_next.T @ angular
+        v = np.concatenate([R_next.T @ linear - cross(w, c), w, v[6:]])
+        self.set_state(np.concatenate([position, quat, q[7:] + h * v[6:]]), v)
+
+    def _project(self, M: Floats, v: Floats) -> Floats:
+        """Return the velocity of the model nearest to that of the tree, in the metric M."""
+        S = self._S
+        return np.asarray(np.linalg.solve(S.T @ M @ S, S.T @ (M @ v)))
+
+    def close(self) -> None:
+        """Close the clients of its own."""
+        if "_tree_dynamics" in self.__dict__:
+            self._tree_dynamics.close()

@@ -1,0 +1,89 @@
+"""Collision shapes as Bullet loads them: URDF elements, files of hulls, and grounds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from dynx.engines.pybullet.canonical_urdf import locale_free, pose_element
+from dynx.engines.pybullet.world.client import WorldClient
+from dynx.errors import EngineLimitError
+from dynx.model.geometry import Box, Capsule, Cylinder, HeightField, Mesh, Plane, Sphere
+from dynx.spatial.scalar import Floats
+from dynx.spatial.so3 import quat_from_rotation
+from dynx.world.layout import PlacedShape
+
+MAX_VERTICES = 100_000
+"""Largest number of points of a height field; Bullet takes 131,072 in one call."""
+
+
+class ShapeFiles:
+    """URDF elements of shapes, with the hulls of meshes as files in one folder."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._files: dict[Mesh, Path] = {}
+
+    def elements(self, shapes: tuple[PlacedShape, ...], T: Floats) -> list[str]:
+        """Return the ``<collision>`` elements of shapes whose owner has the pose T (4, 4) in its link."""
+        return [self._element(each, T @ each.T) for each in shapes if not is_ground(each)]
+
+    def _element(self, placed: PlacedShape, T: Floats) -> str:
+        return f"<collision>\n{pose_element(T)}\n<geometry>{self._geometry(placed)}</geometry></collision>"
+
+    def _geometry(self, placed: PlacedShape) -> str:
+        shape = placed.shape
+        if isinstance(shape, Box):
+            return f'<box size="{" ".join(map(locale_free, shape.size))}"/>'
+        if isinstance(shape, Sphere):
+            return f'<sphere radius="{locale_free(shape.radius)}"/>'
+        if isinstance(shape, Cylinder | Capsule):
+            kind = type(shape).__name__.lower()
+            return f'<{kind} radius="{locale_free(shape.radius)}" length="{locale_free(shape.length)}"/>'
+        assert isinstance(shape, Mesh)
+        return f'<mesh filename="{self._hull_file(shape)}"/>'
+
+    def _hull_file(self, mesh: Mesh) -> str:
+        if mesh not in self._files:
+            path = self._folder / f"hull{len(self._files)}.obj"
+            vertices, faces = mesh.hull
+            lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in vertices.tolist()]
+            lines += [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in faces.tolist()]
+            path.write_text("\n".join([*lines, ""]), encoding="ascii")
+            self._files[mesh] = path
+        return str(self._files[mesh])
+
+
+def is_ground(placed: PlacedShape) -> bool:
+    """Check whether a shape belongs to fixed bodies only, and URDF has none of the kind."""
+    return isinstance(placed.shape, Plane | HeightField)
+
+
+def load_ground(client: WorldClient, placed: PlacedShape, T: Floats) -> int:
+    """Load a plane or height field whose owner has the pose T (4, 4); return Bullet's number of the body."""
+    engine, shape, at = client.engine, placed.shape, T @ placed.T
+    if isinstance(shape, Plane):
+        number = client.call(engine.createCollisionShape, engine.GEOM_PLANE, planeNormal=[0.0, 0.0, 1.0])
+    else:
+        assert isinstance(shape, HeightField)
+        vertices, faces = shape.triangles()
+        if len(vertices) > MAX_VERTICES:
+            raise EngineLimitError(
+                f"a height field has {len(vertices)} points; Bullet supports at most {MAX_VERTICES}"
+            )
+        number = client.call(
+            engine.createCollisionShape,
+            engine.GEOM_MESH,
+            vertices=vertices.tolist(),
+            indices=np.asarray(faces).ravel().tolist(),
+        )
+    return int(
+        client.call(
+            engine.createMultiBody,
+            baseMass=0.0,
+            baseCollisionShapeIndex=number,
+            basePosition=at[:3, 3].tolist(),
+            baseOrientation=quat_from_rotation(at[:3, :3]).tolist(),
+        )
+    )
