@@ -118,6 +118,10 @@ class EngineHooks(ABC):
         M = np.stack(columns, axis=-1)
         return np.asarray(0.5 * (M + np.swapaxes(M, -1, -2)))
 
+    def _mass_matrix_and_bias(self, q: Floats, v: Floats) -> tuple[Floats, Floats]:
+        """Return the mass matrix and the bias torque of one sample, for plants with joint friction."""
+        return self._mass_matrix(q), self._bias_torque(q, v)
+
     def _forward_dynamics(self, q: Floats, v: Floats, tau: Floats) -> Floats:
         """Return the acceleration a (..., nv) with M a + bias = tau."""
         return solve_mass_matrix(self._mass_matrix(q), tau - self._bias_torque(q, v))

@@ -9,12 +9,13 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 from dynx.backends import Backend
 from dynx.backends.hooks import untranslated
 from dynx.model import Model
+from dynx.spatial.scalar import Floats
 
 Evaluation = Callable[..., Any]
 """Function of arrays that returns one array; quantities of a frame take its name after the arrays."""
@@ -80,6 +81,18 @@ class EngineDynamics(Dynamics):
         usual: Evaluation = getattr(self, quantity)
         return quick or usual
 
+    @cached_property
+    def mass_matrix_and_bias(self) -> Callable[[Floats, Floats], tuple[Floats, Floats]]:
+        """M (nv, nv) and C v + g (nv,) of q, v: by the engine's hook for both, if its class has one that is
+        not older than its hooks for either."""
+        backend, parts = self.backend, ("mass_matrix", "bias_torque")
+        if all(map(self._calls_hook, parts)) and _defines_first(
+            type(backend), "_mass_matrix_and_bias", ("_inverse_dynamics", *(f"_{part}" for part in parts))
+        ):
+            return partial(untranslated(type(backend)._mass_matrix_and_bias), backend)
+        M, bias = self.mass_matrix, self.bias_torque
+        return lambda q, v: (M(q), bias(q, v))
+
     def content_key(self) -> tuple[Any, ...]:
         """Return the key that is equal for equal models in engines of one kind."""
         return type(self.backend), self.backend.name, self.model
@@ -98,3 +111,11 @@ class EngineDynamics(Dynamics):
 def _function(backend: Backend, name: str) -> object:
     """Return the function of a method; None if an attribute of the object itself replaces it."""
     return getattr(getattr(backend, name), "__func__", None)
+
+
+def _defines_first(kind: type, name: str, others: tuple[str, ...]) -> bool:
+    """Check whether no class defines one of the `others` that overrides the class which defines `name`."""
+    order = [vars(each) for each in kind.__mro__]
+    return next(k for k, own in enumerate(order) if name in own) <= min(
+        next(k for k, own in enumerate(order) if other in own) for other in others
+    )

@@ -17,6 +17,7 @@ from threading import local
 from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dynx.backends.base import Backend
 from dynx.backends.engine_errors import engine_errors
@@ -27,7 +28,7 @@ from dynx.errors import DynxError, EngineError, nonblank_lines
 from dynx.model import Model
 from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED, Reference
 from dynx.spatial.scalar import Floats
-from dynx.spatial.so3 import skew
+from dynx.spatial.so3 import cross, skew
 
 ORIGIN = np.zeros(3)
 ALMOST_SINGULAR = int(mujoco.mjtWarning.mjWARN_INERTIA)
@@ -45,6 +46,14 @@ class _Workspace(local):
         self.q, self.v, self.a = data.qpos, data.qvel, data.qacc
         self.tau = data.qfrc_applied
         self.p, self.R = data.xpos, data.xmat.reshape(-1, 3, 3)
+        self.M = data.M
+
+
+def _places_of_triangle(engine: Any) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return the places of the entries of MuJoCo's sparse mass matrix, which is its lower triangle, in a
+    matrix (nv, nv) by rows, and in its transpose."""
+    rows, columns = np.repeat(np.arange(engine.nv), engine.M_rownnz), engine.M_colind
+    return rows * engine.nv + columns, columns * engine.nv + rows
 
 
 @engine_errors(_message)
@@ -75,6 +84,7 @@ class MujocoBackend(Backend):
         self._dynamics = ProjectedDynamics(self._engine, floating=model.floating)
         self._masses_add = tree.masses_add
         self._total_mass = float(self._engine.body_subtreemass[ROOT])
+        self._lower, self._upper = _places_of_triangle(self._engine)
 
     @property
     def engine_version(self) -> str:
@@ -164,6 +174,27 @@ class MujocoBackend(Backend):
     def _mass_matrix(self, q: Floats) -> Floats:
         work = self._set_positions(q)
         return self._dynamics.mass_matrix(work.data, work.R[ROOT], work.p[ROOT])
+
+    def _mass_matrix_and_bias(self, q: Floats, v: Floats) -> tuple[Floats, Floats]:
+        """Return M (nv, nv) and C v + g (nv,) as MuJoCo's own forward dynamics has them."""
+        work, engine, n = self._set_state(q, v), self._engine, self._nv
+        warned = work.data.warning[ALMOST_SINGULAR]
+        before = warned.number
+        mujoco.mj_makeM(engine, work.data)
+        mujoco.mj_factorM(engine, work.data)
+        if warned.number != before:
+            return super()._mass_matrix_and_bias(q, v)
+        bias, entries = np.empty(n), np.zeros(n * n)
+        mujoco.mj_rne(engine, work.data, 0, bias)
+        entries[self._lower] = entries[self._upper] = work.M
+        M = entries.reshape(n, n)
+        if self._floating:
+            R = work.R[ROOT]
+            bias += M[:, :3] @ (R @ cross(v[3:6], v[:3]))
+            bias[:3] = bias[:3] @ R
+            M[:3] = R.T @ M[:3]
+            M[:, :3] = M[:, :3] @ R
+        return M, bias
 
     # -- the whole body -----------------------------------------------------------------------
 

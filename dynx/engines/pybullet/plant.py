@@ -13,6 +13,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from dynx.backends import backend
+from dynx.control.dynamics import EngineDynamics
 from dynx.control.engine_motors import EngineMotor, MotorCommand
 from dynx.engines.pybullet.backend import PyBulletBackend
 from dynx.engines.pybullet.canonical_urdf import bullet_tree
@@ -37,8 +39,8 @@ class BulletPlant(Plant):
     """One robot in its own Bullet world, stepped by Bullet.
 
     Bullet's stepper has no mimic joints, no armature, and no joint friction that is exact in each step. With
-    them the acceleration is solved from Bullet's mass matrix and bias, and the stepper applies the torque
-    that causes it.
+    them the acceleration is solved from mass matrix and bias, and the stepper applies the torque that causes
+    it: a torque of friction from dynx's own matrices, all else from Bullet's.
     """
 
     motor_commands: ClassVar[tuple[type, ...]] = (MotorCommand,)
@@ -81,8 +83,9 @@ class BulletPlant(Plant):
         return self.disturbances.friction_solver(self._h)
 
     @cached_property
-    def _damping(self) -> Floats:
-        return np.diag(self._h * self.disturbances.friction.viscous)
+    def _dynamics(self) -> EngineDynamics:
+        """Mass matrix and bias by dynx, because Bullet takes longer for its mass matrix than for a step."""
+        return EngineDynamics(backend("compiled", self.model, validate=False))
 
     @cached_property
     def _accelerate(self) -> DisturbedAcceleration:
@@ -129,16 +132,20 @@ class BulletPlant(Plant):
         for made in ("_engine", "_tree"):
             if made in self.__dict__:
                 self.__dict__[made].close()
+        if "_dynamics" in self.__dict__:
+            self._dynamics.backend.close()
 
     # -- one step -----------------------------------------------------------------------------
 
     def _substep(self, t: float, tau: Floats) -> Floats:
         q, v, moves = self._q, self._v, None
         if self._sticks:
-            M, torque, bias = self._accelerate.equation(q, v, tau, t)
-            a, moves = self._friction.step(M + self._damping, torque - bias, v)
+            if self.disturbances.has_torque:
+                tau = tau + self.disturbances.torque(self._engine, t, q, v)
+            a, moves = self._friction.step(*self._dynamics.mass_matrix_and_bias(q, v), tau, v)
             # The torque that Bullet's own dynamics need for this acceleration.
-            tau = self._tree_torque(q, v, a) if self._solves else M @ a + bias
+            solved = self._coupling is not None
+            tau = self._tree_torque(q, v, a) if solved else self._friction.net_torque
         elif self._solves:
             tau = self._tree_torque(q, v, self._accelerate(q, v, tau, t))
         elif self.disturbances.has_torque:

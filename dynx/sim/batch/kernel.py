@@ -27,6 +27,7 @@ from dynx.sim.loop.controller_checks import ControllerWatch, defect_of_outcome, 
 from dynx.sim.loop.own_controllers import refuse_irreproducible, traced_torque
 from dynx.sim.loop.plain import DIVERGENCE_SPEED
 from dynx.sim.plants.friction_law import FrictionLaw, FrictionStep
+from dynx.sim.plants.friction_solver import CORRECTIONS, MAX_CORRECTED_OPERATIONS
 from dynx.sim.plants.integrators import SemiImplicitEuler
 from dynx.simd.cache import load_kernel, program_recipe
 from dynx.simd.kernel import Kernel
@@ -35,13 +36,6 @@ from dynx.simd.user_code.numbers import as_symbol, as_traced, select
 from dynx.spatial.branchless import difference, integrate
 from dynx.spatial.scalar import Array, Floats, clamp, sign, tanh
 from dynx.trajectory.base import Setpoint
-
-CORRECTIONS = 1
-"""Number of corrections of the modes of dry friction in one call of a kernel; few steps need more."""
-
-MAX_CORRECTED_OPERATIONS = 1500
-"""Number of products in one solution of the law of friction above which a kernel has one solution only,
-because a second one takes longer to compile than it saves."""
 
 MAX_CACHED_KERNELS = 32
 """Number of kernels that this process keeps for later batches."""

@@ -123,10 +123,17 @@ class Disturbances:
         """Whether pushes or friction with a slip speed add a torque, a function of time and state."""
         return (self.friction.present and not self.sticks) or bool(self.pushes)
 
-    def friction_solver(self, h: float) -> FrictionSolver:
-        """Return the solver of dry friction for steps of `h` [s]."""
+    def friction_solver(self, h: float, *, damped: bool = True, armature: bool = True) -> FrictionSolver:
+        """Return the solver of joint friction for steps of `h` [s], with damping and armature or without."""
         dry = self.friction.dry
-        return FrictionSolver(FrictionLaw.of(self.model, dry), dry, h)
+        return FrictionSolver(
+            FrictionLaw.of(self.model, dry),
+            dry,
+            h,
+            damping=self.friction.viscous if damped else None,
+            # Each joint depends on at most one coordinate, so the armature matrix is diagonal.
+            armature=self.armature.diagonal() if armature else None,
+        )
 
     def slowed(self, M: Floats, v: Floats, h: float) -> Floats:
         """Return the velocity (nv,) that joint friction leaves of `v` in a step of `h` [s].
@@ -136,9 +143,11 @@ class Disturbances:
         """
         if not self.sticks:
             return np.asarray(v - h * np.linalg.solve(M, self.friction(v)))
-        solver = self._solvers.get(h) or self._solvers.setdefault(h, self.friction_solver(h))
-        damping = self.friction.viscous
-        a, moves = solver.step(M + np.diag(h * damping), -damping * v, v)
+        solver = self._solvers.get(h)
+        if solver is None:
+            solver = self._solvers[h] = self.friction_solver(h, armature=False)
+        nothing = np.zeros(len(v))
+        a, moves = solver.step(M, nothing, nothing, v)
         return np.asarray((v + h * a) * moves)
 
     @cached_property
@@ -174,7 +183,6 @@ class DisturbedAcceleration:
         self.dynamics = EngineDynamics(engine)
         self._engine = engine
         self._disturbances = disturbances
-        self._viscous = disturbances.friction.viscous
 
     @property
     def is_undisturbed(self) -> bool:
@@ -184,26 +192,25 @@ class DisturbedAcceleration:
     def __call__(self, q: Floats, v: Floats, tau: Floats, t: float = 0.0) -> Floats:
         """Return the acceleration (nv,) at state q, v under `tau`, in a step that began at `t`, without
         friction that sticks."""
-        if not self._disturbances.has_armature:
-            if self._disturbances.has_torque:
-                tau = tau + self._disturbances.torque(self._engine, t, q, v)
-            a: Floats = self.dynamics.forward_dynamics(q, v, tau)
-            return a
-        M, torque, bias = self.equation(q, v, tau, t)
-        return solve_mass_matrix(M, torque - bias)
-
-    def equation(self, q: Floats, v: Floats, tau: Floats, t: float) -> tuple[Floats, Floats, Floats]:
-        """Return M (nv, nv), the torque (nv,) and the bias (nv,) of M a = torque - bias, in a step that began
-        at `t`. The torque includes damping, but not dry friction that sticks."""
         disturbances, dynamics = self._disturbances, self.dynamics
-        if disturbances.has_torque:
-            tau = tau + disturbances.torque(self._engine, t, q, v)
-        if disturbances.sticks:
-            tau = tau - self._viscous * v
-        M: Floats = dynamics.mass_matrix(q)
-        if disturbances.has_armature:
-            M = M + disturbances.armature
-        return M, tau, dynamics.bias_torque(q, v)
+        tau = self.pushed(q, v, tau, t)
+        if not disturbances.has_armature:
+            a: Floats = dynamics.forward_dynamics(q, v, tau)
+            return a
+        M, bias = dynamics.mass_matrix_and_bias(q, v)
+        return solve_mass_matrix(M + disturbances.armature, tau - bias)
+
+    def with_friction(self, solver: FrictionSolver, q: Floats, v: Floats, tau: Floats, t: float) -> Floats:
+        """Return the acceleration under joint friction that sticks, and 1 for coordinates that move and 0 for
+        those that stick, (2, nv)."""
+        tau = self.pushed(q, v, tau, t)
+        return solver.step(*self.dynamics.mass_matrix_and_bias(q, v), tau, v)
+
+    def pushed(self, q: Floats, v: Floats, tau: Floats, t: float) -> Floats:
+        """Return `tau` plus the torque of pushes, minus that of friction with a slip speed (nv,)."""
+        if not self._disturbances.has_torque:
+            return tau
+        return tau + self._disturbances.torque(self._engine, t, q, v)
 
 
 def _armature_matrix(model: Model, armature: Coefficients) -> Floats:

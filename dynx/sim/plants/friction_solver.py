@@ -14,10 +14,17 @@ from dynx.simd.kernel import Kernel
 from dynx.simd.simplify import STRICT
 from dynx.simd.target import host
 from dynx.simd.trace import trace
-from dynx.spatial.scalar import Array, Floats
+from dynx.spatial.scalar import Array, Floats, sign
 
 MAX_COMPILED_OPERATIONS = 8000
 """Number of products in one solution above which NumPy takes less time than compilation is worth."""
+
+CORRECTIONS = 1
+"""Number of corrections of the modes in one call of a kernel; few steps need more."""
+
+MAX_CORRECTED_OPERATIONS = 1500
+"""Number of products in one solution above which a kernel has one solution only, because a second one takes
+longer to compile than it saves."""
 
 BLOCK_CORRECTIONS = 8
 """Number of solutions after which modes are corrected one at a time."""
@@ -27,112 +34,172 @@ MAX_SOLUTIONS = 256
 
 
 class FrictionSolver:
-    """Velocities at the end of a step under dry friction, by solutions of the law in a compiled kernel.
+    """Velocities at the end of a step under joint friction, by solutions of the law in a compiled kernel.
 
-    Results depend on the arguments alone. Not safe for several threads at a time.
+    The equation of motion is (M + armature) a = tau - bias - damping w - f, where w = v + h a is the velocity
+    at the end of the step and f the torque of dry friction. Results depend on the arguments alone. Not safe
+    for several threads at a time.
     """
 
-    def __init__(self, law: FrictionLaw, friction: Floats, h: float) -> None:
-        """`friction` (nv,) [N m or N] of the coordinates, `h` [s] the length of a step."""
+    def __init__(
+        self,
+        law: FrictionLaw,
+        friction: Floats,
+        h: float,
+        *,
+        damping: Floats | None = None,
+        armature: Floats | None = None,
+    ) -> None:
+        """`friction` [N m or N], `damping` [N m s/rad or N s/m] and `armature` [kg m^2 or kg] (nv,) of the
+        coordinates, `h` [s] the length of a step."""
         self.law = law
         self._joints = list(law.joints)
-        n, nv = len(law.joints), len(law.below)
+        nv = len(law.below)
         self._friction: Floats = friction[self._joints]
         self._h = h
         self._inertia = np.array(law.inertia)
-        self._all_move = np.ones(nv)
+        self._damping: Floats = np.zeros(nv) if damping is None else damping
+        self._armature: Floats = np.zeros(nv) if armature is None else armature
+        self.torque: Floats = np.zeros(len(law.joints))
+        """Torque (n,) of dry friction on the joints of the law in the last step."""
+        self.net_torque: Floats = np.zeros(nv)
+        """Torque (nv,) that the robot without armature needed for the acceleration of the last step."""
         self._kernel = None
         if law.operations <= MAX_COMPILED_OPERATIONS:
-            space = self._kernel = _kernel(law.joints, law.below).workspace()
-            self._A, self._r, self._v, _, _, self._modes, self._single = space.input_slices[:7]
-            self._numbers: Any = space.inputs
-            for port, value in ((3, self._friction), (4, self._inertia), (7, h)):
-                space.input_rows[port][:] = value
-            found = space.results
-            self._a, self._moves, self._torque, self._corrected = found[:4]
-            self._changes: Any = space.output_rows[4][:1, 0].data
-        self.torque: Floats = np.zeros(n)
-        """Torque (n,) of dry friction on the joints of the law in the last step."""
+            # The workspace is kept because its calls do not keep it.
+            space = self._workspace = _kernel(law.joints, law.below).workspace()
+            self._kernel = space.run
+            slices = space.input_slices
+            self._M, self._bias, self._tau, self._v, self._shift, self._single = slices[:6]
+            self._inputs: Any = space.inputs
+            constants = (self._friction, self._inertia, self._damping, self._armature, np.array([h]))
+            for rows, value in zip(space.input_rows[6:], constants, strict=True):
+                rows[:] = value
+            self._motion: Floats = space.results[0]
+            self.torque, self.net_torque, self._next_shift = space.results[1:4]
+            self._first_a: Floats = space.results[4]
+            self._unsettled: Any = space.output_rows[5][:1, 0].data
+            self._no_shift = np.zeros(len(law.joints))
 
-    def step(self, A: Floats, r: Floats, v: Floats) -> tuple[Floats, Floats]:
-        """Return the acceleration (nv,) from velocity `v`, and 1 for coordinates that move, 0 for those that
-        stick, (nv,).
+    def step(self, M: Floats, bias: Floats, tau: Floats, v: Floats) -> Floats:
+        """Return the acceleration from velocity `v`, and 1 for coordinates that move, 0 for those that stick,
+        (2, nv).
 
-        `A` (nv, nv) is the mass matrix plus h times the damping; `r` (nv,) the torque without dry friction.
+        `M` (nv, nv) is the symmetric mass matrix, `bias` (nv,) the torque without acceleration, `tau` (nv,)
+        that of everything but joint friction.
         """
-        modes = np.sign(v[self._joints])
-        for count in range(MAX_SOLUTIONS):
-            corrected = self._solve(A, r, v, modes, 0.0 if count < BLOCK_CORRECTIONS else 1.0)
-            if corrected is None:
-                break
-            modes = corrected
-        a, moves = self._a.copy(), self._moves.copy()
-        return a, moves
+        if self._kernel is None:
+            return self._step_densely(M, bias, tau, v)
+        self._write(M, bias, tau, v)
+        self._kernel()
+        if self._unsettled[0] > 0.0:  # not where it is NaN, because the simulation diverged
+            self._settle()
+        return np.array(self._motion)
 
-    def with_modes(self, A: Floats, r: Floats, v: Floats, modes: Floats) -> Floats:
+    def _write(self, M: Floats, bias: Floats, tau: Floats, v: Floats) -> None:
+        """Write the arguments of a step into the inputs of the kernel."""
+        inputs = self._inputs
+        inputs[self._M] = M.ravel("K")
+        inputs[self._bias], inputs[self._tau], inputs[self._v] = bias, tau, v
+
+    def _settle(self) -> None:
+        """Repeat the last solution with corrected modes until they are right."""
+        assert self._kernel is not None
+        inputs = self._inputs
+        for count in range(1, MAX_SOLUTIONS):
+            inputs[self._shift] = self._next_shift.copy()
+            inputs[self._single.start] = float(count >= BLOCK_CORRECTIONS)
+            self._kernel()
+            if not self._unsettled[0] > 0.0:
+                break
+        inputs[self._shift], inputs[self._single.start] = self._no_shift, 0.0
+
+    def with_modes(self, M: Floats, bias: Floats, tau: Floats, v: Floats, modes: Floats) -> Floats:
         """Return the acceleration (nv,) with modes (n,) that are not corrected; joints that stick reach
         velocity 0 from `v` after h."""
-        self._solve(A, r, v, modes, 0.0)
-        a: Floats = self._a.copy()
-        return a
-
-    def _solve(self, A: Floats, r: Floats, v: Floats, modes: Floats, single: float) -> Floats | None:
-        """Solve the law for given modes; return corrected modes, or None if they are right."""
         if self._kernel is None:
-            return self._solve_densely(A, r, v, modes, single)
-        numbers = self._numbers
-        numbers[self._A] = A.reshape(-1)
-        numbers[self._r], numbers[self._v], numbers[self._modes] = r, v, modes
-        numbers[self._single.start] = single
-        self._kernel.run()
-        self.torque = self._torque
-        # NaN counts as right: the simulation diverged.
-        return self._corrected.copy() if self._changes[0] > 0.0 else None
+            return self._solution(M, bias, tau, v, modes)[0]
+        self._write(M, bias, tau, v)
+        self._inputs[self._shift] = modes - np.sign(v[self._joints])
+        self._kernel()
+        self._inputs[self._shift] = self._no_shift
+        return np.array(self._first_a)
 
-    def _solve_densely(self, A: Floats, r: Floats, v: Floats, modes: Floats, single: float) -> Floats | None:
-        joints, h, friction = self._joints, self._h, self._friction
-        moves, sliding = self._all_move.copy(), np.zeros(len(v))
-        moves[joints], sliding[joints] = np.abs(modes), modes * friction
-        stuck, free = moves == 0.0, moves != 0.0
+    def _solution(
+        self, M: Floats, bias: Floats, tau: Floats, v: Floats, modes: Floats
+    ) -> tuple[Floats, Floats]:
+        """Return the acceleration (nv,) for given modes (n,), and what is left of the torque (nv,)."""
+        joints, h = self._joints, self._h
+        A = M + np.diag(self._armature + h * self._damping)
+        rest = tau - bias - self._damping * v
+        rest[joints] -= modes * self._friction
+        stuck = np.zeros(len(v), dtype=bool)
+        stuck[joints] = modes == 0.0
+        free = ~stuck
         a = np.where(stuck, -v / h, 0.0)
-        rest = r - sliding - A @ a
+        rest -= A @ a
         a[free] = np.linalg.solve(A[np.ix_(free, free)], rest[free])
-        left = (r - A @ a)[joints]
-        self._a, self._moves = a, moves
-        self.torque = np.where(moves[joints] == 0.0, left, modes * friction)
-        speed = moves[joints] * (v + h * a)[joints]
-        wanted = self.torque + speed * self._inertia / h
-        bound = friction * (1.0 + TOLERANCE)
-        change = np.sign(wanted - np.clip(wanted, -bound, bound)) - modes
-        wrong = np.flatnonzero(change)
-        if not wrong.size or not np.isfinite(a).all():
-            return None
-        corrected = modes + np.clip(change, single - 2.0, 2.0 - single)
-        if single:
-            corrected[wrong[:-1]] = modes[wrong[:-1]]
-        return np.asarray(corrected)
+        rest[stuck] -= A[np.ix_(stuck, free)] @ a[free]
+        return a, rest
+
+    def _step_densely(self, M: Floats, bias: Floats, tau: Floats, v: Floats) -> Floats:
+        """Take a step by NumPy."""
+        joints, h, friction = self._joints, self._h, self._friction
+        modes = np.sign(v[joints])
+        for count in range(MAX_SOLUTIONS):
+            a, left = self._solution(M, bias, tau, v, modes)
+            moves = np.ones(len(v))
+            moves[joints] = np.abs(modes)
+            self.torque = np.where(modes == 0.0, left[joints], modes * friction)
+            speed = moves[joints] * (v + h * a)[joints]
+            wanted = self.torque + speed * self._inertia / h
+            bound = friction * (1.0 + TOLERANCE)
+            change = np.sign(wanted - np.clip(wanted, -bound, bound)) - modes
+            wrong = np.flatnonzero(change)
+            if not wrong.size or not np.isfinite(a).all():
+                break
+            single = float(count >= BLOCK_CORRECTIONS)
+            corrected = modes + np.clip(change, single - 2.0, 2.0 - single)
+            if single:
+                corrected[wrong[:-1]] = modes[wrong[:-1]]
+            modes = corrected
+        self.net_torque = tau - self._damping * (v + h * a) - self._armature * a
+        self.net_torque[joints] -= self.torque
+        return np.array([a, moves])
 
 
 @cache
 def _kernel(joints: tuple[int, ...], below: tuple[tuple[int, ...], ...]) -> Kernel:
-    """Compile one solution of the law; coefficients, step and estimated inertias are inputs."""
-    n, nv = len(joints), len(below)
+    """Compile a step of the law, with `CORRECTIONS` corrections of the modes or none for a large robot;
+    coefficients, step and estimated inertias are inputs.
+
+    The first modes are the signs of the velocities plus ``shift``.
+    """
+    n, nv, rows = len(joints), len(below), list(joints)
     law = FrictionLaw(joints, below, (0.0,) * n)
 
-    def solution(**given: Array) -> dict[str, Array]:
-        found = law.solve(
-            given["A"],
-            given["r"],
-            given["v"],
-            given["friction"],
-            given["h"][0],
-            given["modes"],
-            given["one_by_one"][0],
-            given["inertia"],
-        )
-        return {**found._asdict(), "changes": np.array([found.changes], dtype=object)}
+    def step(**given: Array) -> dict[str, Array]:
+        v, h, friction, single = given["v"], given["h"][0], given["friction"], given["one_by_one"][0]
+        damping, armature = given["damping"], given["armature"]
+        A = given["M"] + np.diag(armature + h * damping)
+        r = given["tau"] - given["bias"] - damping * v
+        start = sign(v[rows])
+        found = first = law.solve(A, r, v, friction, h, start + given["shift"], single, given["inertia"])
+        for _ in range(CORRECTIONS if law.operations <= MAX_CORRECTED_OPERATIONS else 0):
+            found = law.solve(A, r, v, friction, h, found.modes, single, given["inertia"])
+        net = given["tau"] - damping * (v + h * found.a) - armature * found.a
+        net[rows] = net[rows] - found.torque
+        return {
+            "motion": np.array([found.a, found.moves]),
+            "torque": found.torque,
+            "net_torque": net,
+            "next_shift": found.modes - start,
+            "first_a": first.a,
+            "unsettled": np.array([found.changes], dtype=object),
+        }
 
-    sizes: dict[str, tuple[int, ...]] = {"A": (nv, nv), "r": (nv,), "v": (nv,)}
-    sizes |= {"friction": (n,), "inertia": (n,), "modes": (n,), "one_by_one": (1,), "h": (1,)}
-    program = trace(solution, sizes, simplify=STRICT)
+    sizes: dict[str, tuple[int, ...]] = {"M": (nv, nv), "bias": (nv,), "tau": (nv,), "v": (nv,)}
+    sizes |= {"shift": (n,), "one_by_one": (1,), "friction": (n,), "inertia": (n,)}
+    sizes |= {"damping": (nv,), "armature": (nv,), "h": (1,)}
+    program = trace(step, sizes, simplify=STRICT)
     return load_kernel(program_recipe(program), lambda: program, settings=Settings(host().lanes, fast=False))

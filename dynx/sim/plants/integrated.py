@@ -57,10 +57,9 @@ class IntegratedPlant(Plant):
         self._forward = self.dynamics.forward_dynamics
         self._undisturbed = self._accelerate.is_undisturbed and not disturbances.sticks
         if disturbances.sticks:
-            self._friction = disturbances.friction_solver(self._h)
+            damped = isinstance(self._scheme, SemiImplicitEuler)
+            self._friction = disturbances.friction_solver(self._h, damped=damped)
             self._dry = list(self._friction.law.joints)
-            implicit = isinstance(self._scheme, SemiImplicitEuler)
-            self._damping = np.diag(self._h * disturbances.friction.viscous) if implicit else 0.0
         self._singular = not disturbances.has_armature and _is_singular(engine.model)
 
     def reset(self, q: Floats, v: Floats) -> None:
@@ -125,22 +124,24 @@ class IntegratedPlant(Plant):
     def _slowed(self, q: Floats, v: Floats, tau: Floats, t: float = 0.0) -> Floats:
         """Return the acceleration under joint friction, and 1 for coordinates that move and 0 for those that
         stick, (2, nv)."""
-        M, torque, bias = self._accelerate.equation(q, v, tau, t)
-        return np.array(self._friction.step(M + self._damping, torque - bias, v))
+        return self._accelerate.with_friction(self._friction, q, v, tau, t)
 
     def _advance_in_modes(self, scheme: RungeKutta4 | Adaptive, t: float, tau: Floats) -> State:
         """Take one step in which each joint sticks or slides as the law of friction has it for Euler's step.
 
         A joint whose velocity would have changed its sign at the end of the step stops there instead.
         """
-        start, dry, equation = self._v, self._dry, self._accelerate.equation
-        M, torque, bias = equation(self._q, start, tau, t)
-        a, moves = self._friction.step(M, torque - bias, start)
+        start, dry, pushed = self._v, self._dry, self._accelerate.pushed
+        damping, friction = self.disturbances.friction.viscous, self._friction
+        mass_matrix_and_bias = self.dynamics.mass_matrix_and_bias
+        torque = pushed(self._q, start, tau, t) - damping * start
+        M, bias = mass_matrix_and_bias(self._q, start)
+        a, moves = friction.step(M, bias, torque, start)
         modes = np.sign(start + self._h * a)[dry] * moves[dry]
 
         def accelerate(q: Floats, v: Floats, tau: Floats) -> Floats:
-            M, torque, bias = equation(q, v, tau, t)
-            return self._friction.with_modes(M, torque - bias, start, modes)
+            torque = pushed(q, v, tau, t) - damping * v
+            return friction.with_modes(*mass_matrix_and_bias(q, v), torque, start, modes)
 
         while True:
             q, v, a = scheme(accelerate, self._q, start, tau)

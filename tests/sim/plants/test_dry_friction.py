@@ -117,7 +117,7 @@ def test_a_step_obeys_the_law(robot: Model, data: st.DataObject) -> None:
 
 
 def assert_law(solver: FrictionSolver, M: Floats, r: Floats, v: Floats, friction: Floats, h: float) -> None:
-    a, moves = solver.step(M, r, v)
+    a, moves = solver.step(M, np.zeros(len(v)), r, v)
     after = moves * (v + h * a)
     force = r - M @ a
     size = np.abs(r) + np.abs(M) @ np.abs(a)
@@ -142,10 +142,12 @@ def test_solutions_without_a_kernel_are_the_same(base: str, monkeypatch: pytest.
         for _ in range(50):
             M, r = engine.mass_matrix(robot.random(rng)), rng.normal(size=robot.nv)
             v = rng.normal(size=robot.nv) * (rng.random(robot.nv) < 0.5)
-            found, other = compiled.step(M, r, v), dense.step(M, r, v)
+            bias = rng.normal(size=robot.nv)
+            found, other = compiled.step(M, bias, r, v), dense.step(M, bias, r, v)
             np.testing.assert_array_equal(found[1], other[1])
             np.testing.assert_allclose(found[0], other[0], rtol=1e-9, atol=1e-6)
             np.testing.assert_allclose(compiled.torque, dense.torque, rtol=1e-7, atol=1e-9)
+            np.testing.assert_allclose(compiled.net_torque, dense.net_torque, rtol=1e-7, atol=1e-9)
 
 
 def test_modes_that_cycle_are_corrected_one_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -161,11 +163,12 @@ def test_modes_that_cycle_are_corrected_one_at_a_time(monkeypatch: pytest.Monkey
         friction, r, v = 10.0 ** rng.uniform(-2.0, 1.0, n), 10.0 * rng.normal(size=n), rng.normal(size=n)
         solver = FrictionSolver(bold, friction, 1e-2)
         assert_law(solver, M, r, v, friction, 1e-2)
-        right = FrictionSolver(law, friction, 1e-2).step(M, r, v)
-        np.testing.assert_array_equal(solver.step(M, r, v), right)
+        bias = np.zeros(n)
+        right = FrictionSolver(law, friction, 1e-2).step(M, bias, r, v)
+        np.testing.assert_array_equal(solver.step(M, bias, r, v), right)
         with monkeypatch.context() as patch:
             patch.setattr("dynx.sim.plants.friction_solver.MAX_SOLUTIONS", BLOCK_CORRECTIONS)
-            cycled += not np.array_equal(solver.step(M, r, v), right)
+            cycled += not np.array_equal(solver.step(M, bias, r, v), right)
     assert cycled
 
 
