@@ -62,6 +62,17 @@ def test_the_table_of_every_quantity_compares_the_engines() -> None:
     assert len([line for line in finished.stdout.splitlines() if line.startswith("ur5")]) == 2
 
 
+def test_compile_times_are_measured_with_an_empty_cache() -> None:
+    finished = run(
+        "benchmarks.compile_times", "--robots", "pendulum", "--bases", "fixed", "--kinds", "mass_matrix"
+    )
+    assert finished.returncode == 0, finished.stdout + finished.stderr
+    heading, *rows = finished.stdout.splitlines()
+    assert heading.split() == ["seconds", "MiB", "robot", "kind"]
+    assert {row.split("fixed")[1].strip() for row in rows} == {"mass_matrix", "parametric mass_matrix"}
+    assert all(float(row.split()[0]) > 0.0 for row in rows)
+
+
 def run(*command: str) -> subprocess.CompletedProcess[str]:
     """Run `python -m` with these arguments in the root of the repository."""
     # Options meant for this run, such as its number of processes, are not meant for that one.

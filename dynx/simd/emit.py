@@ -12,7 +12,7 @@ linearly with the length of straight-line code. Values that a later segment need
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 from dynx.simd.elementary import elementary
@@ -40,6 +40,15 @@ PREFETCH_GROUPS = 8
 CACHE_LINE = 64
 """Size of a cache line [bytes]."""
 
+MAX_OPTIMISED_LENGTH = 20_000
+"""Length of a program above which LLVM does not optimise it. Optimising takes some 0.2 ms for each operation,
+which is five times as long, and makes long programs a tenth to a fifth faster: they are limited by reading
+their code from memory."""
+
+QUICK_SEGMENT = 400
+"""Length of the segments that are not optimised. In shorter ones fewer values leave the registers, but more
+are spilled between them."""
+
 
 @dataclass(frozen=True)
 class Settings:
@@ -48,12 +57,19 @@ class Settings:
     `lanes` samples are evaluated at once. `fast` lets LLVM contract a product and a sum into one operation
     with one rounding and ignore the sign of zeros (its flags ``contract nsz``); otherwise every operation
     follows IEEE 754. NaN and infinity propagate in both cases. `segment` is the largest number of
-    operations in one function.
+    operations in one function. With `quick`, LLVM optimises nothing.
     """
 
     lanes: int
     fast: bool = True
     segment: int = 2500
+    quick: bool = False
+
+    def for_length(self, length: int) -> Settings:
+        """Return the settings for a program of this length (`dynx.simd.schedule.program_length`)."""
+        if length <= MAX_OPTIMISED_LENGTH:
+            return self
+        return replace(self, segment=min(self.segment, QUICK_SEGMENT), quick=True)
 
     @property
     def flags(self) -> str:

@@ -17,6 +17,7 @@ from dynx.errors import CompileError
 from dynx.simd.emit import ENTRY, Settings, emit_modules
 from dynx.simd.program import Port, Program
 from dynx.simd.routines import RoutineSet, emit_routines
+from dynx.simd.schedule import program_length
 from dynx.simd.target import Target, host
 
 COMPILE_LOCK = threading.RLock()
@@ -56,9 +57,10 @@ def compile_image(program: Program, target: Target | None = None, settings: Sett
     Raises CompileError if LLVM rejects the emitted code, which would be a defect of dynx.
     """
     target = host() if target is None else target
-    settings = Settings(target.lanes) if settings is None else settings
+    settings = (Settings(target.lanes) if settings is None else settings).for_length(program_length(program))
     # Python handles Ctrl-C between two modules.
-    objects = tuple(compile_text(text, target) for text in emit_modules(program, target, settings))
+    texts = emit_modules(program, target, settings)
+    objects = tuple(compile_text(text, target, quick=settings.quick) for text in texts)
     return Image(program.inputs, program.outputs, settings.lanes, target, objects)
 
 
@@ -68,11 +70,14 @@ def compile_routines(routines: RoutineSet, target: Target, settings: Settings) -
     return Image((), (), settings.lanes, target, (code,))
 
 
-def compile_text(text: str, target: Target) -> bytes:
-    """Compile the text of an LLVM module to an object file. Raises CompileError if LLVM rejects it."""
+def compile_text(text: str, target: Target, *, quick: bool = False) -> bytes:
+    """Compile the text of an LLVM module to an object file, without optimisation if `quick`.
+
+    Raises CompileError if LLVM rejects it.
+    """
     with COMPILE_LOCK:
         try:
-            return bytes(target.machine().emit_object(binding.parse_assembly(text)))
+            return bytes(target.machine(quick=quick).emit_object(binding.parse_assembly(text)))
         except RuntimeError as error:
             raise CompileError(f"LLVM rejects the code of a kernel: {error}") from error
 

@@ -97,6 +97,16 @@ def _divide_stores(segment: Segment) -> Iterator[Segment]:
         yield Segment([], segment.stores[first : first + MAX_STORES])
 
 
+def program_length(program: Program) -> int:
+    """Return the approximate number of operations of a program, of which every result takes two."""
+    operations = sum(
+        25 if node.op in TRIG else _operation_count(program, index)
+        for index, node in enumerate(program.nodes)
+        if node.op not in LEAVES
+    )
+    return operations + 2 * len(program.results)
+
+
 def spill_slots(program: Program, segments: Sequence[Segment]) -> dict[int, int]:
     """Assign a memory slot to every spilled value, reusing the slots of values no longer needed."""
     last = {

@@ -39,13 +39,18 @@ class Target:
         """
         return self.triple.startswith("x86_64") and "windows" not in self.triple
 
-    def machine(self) -> binding.TargetMachine:
-        """Return LLVM's code generator for the processor."""
+    def machine(self, *, quick: bool = False) -> binding.TargetMachine:
+        """Return LLVM's code generator for the processor; a `quick` one optimises nothing."""
         _initialise()
         target = binding.Target.from_triple(self.triple)
         model = "small" if self.short_addresses else "jitdefault"
         return target.create_target_machine(
-            cpu=self.cpu, features=self.features, opt=2, reloc="pic", codemodel=model, jit=True
+            cpu=self.cpu,
+            features=self.features,
+            opt=0 if quick else 2,
+            reloc="pic",
+            codemodel=model,
+            jit=True,
         )
 
 

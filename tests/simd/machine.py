@@ -32,7 +32,8 @@ class Machine:
         module = binding.parse_assembly(emit(program, target, settings))
         module.verify()
         self._jit = binding.create_lljit_compiler()
-        builder = binding.JITLibraryBuilder().add_object_img(target.machine().emit_object(module))
+        code = target.machine(quick=settings.quick).emit_object(module)
+        builder = binding.JITLibraryBuilder().add_object_img(code)
         self._library = builder.add_current_process().export_symbol(ENTRY).link(self._jit, ENTRY)
         self._entry = ctypes.CFUNCTYPE(None, ctypes.c_void_p)(self._library[ENTRY])
 

@@ -33,6 +33,7 @@ from tests.simd.rounding import agree, bounds
 FUNCTIONS: tuple[Op, ...] = ("sin", "cos", "exp", "tanh", "arctan")
 TARGET = st.sampled_from(TARGETS)
 LANE = st.sampled_from(LANES)
+SEGMENT = st.sampled_from((5, 2500))
 BATCH = st.integers(0, 17)
 """Number of samples beyond the least, up to two groups and one sample."""
 LAYOUTS = ("rows", "padded", "every second", "backwards", "one row")
@@ -79,14 +80,20 @@ def draw_inputs(program: Program, rng: np.random.Generator, n: int, *, special: 
     return [with_layout(numbers(rng, (n, port.size)), str(rng.choice(LAYOUTS))) for port in program.inputs]
 
 
-@given(programs(), TARGET, LANE, BATCH, st.sampled_from((5, 2500)), RANDOM)
+@given(programs(), TARGET, LANE, BATCH, SEGMENT, st.booleans(), RANDOM)
 def test_strict_code_is_the_interpreter_bit_for_bit(
-    program: Program, target: Target, lanes: int, more: int, segment: int, rng: np.random.Generator
+    program: Program,
+    target: Target,
+    lanes: int,
+    more: int,
+    segment: int,
+    quick: bool,
+    rng: np.random.Generator,
 ) -> None:
     n = lanes + min(more, 2 * lanes + 1)
     inputs = draw_inputs(program, rng, n, special=True)
     wanted = interpret(program, inputs, kernel_functions(target))
-    got = Machine(program, target, Settings(lanes, fast=False, segment=segment))(inputs)
+    got = Machine(program, target, Settings(lanes, fast=False, segment=segment, quick=quick))(inputs)
     for port, a, b in zip(program.outputs, got, wanted, strict=True):
         assert same_bits(a, b), port
 
@@ -97,7 +104,8 @@ def test_strict_code_is_the_interpreter_bit_for_bit(
     TARGET,
     LANE,
     BATCH,
-    st.sampled_from((5, 2500)),
+    SEGMENT,
+    st.booleans(),
     RANDOM,
 )
 def test_fast_code_is_the_interpreter_to_rounding(
@@ -107,13 +115,14 @@ def test_fast_code_is_the_interpreter_to_rounding(
     lanes: int,
     more: int,
     segment: int,
+    quick: bool,
     rng: np.random.Generator,
 ) -> None:
     n = lanes + min(more, 2 * lanes + 1)
     inputs = draw_inputs(program, rng, n, special=False)
     wanted = interpret(program, inputs)
     short = simplified(program, simplify)
-    got = Machine(short, target, Settings(lanes, segment=segment))(inputs)
+    got = Machine(short, target, Settings(lanes, segment=segment, quick=quick))(inputs)
     for port, a, b, one, other in zip(
         program.outputs, got, wanted, bounds(program, inputs), bounds(short, inputs), strict=True
     ):

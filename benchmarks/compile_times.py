@@ -1,0 +1,260 @@
+"""Times to compile every kind of kernel for robots of the library: ``python -m benchmarks.compile_times``.
+
+Every kind is compiled in a process of its own with an empty cache, by the public function that needs it, and
+on small data. A time is that of the processors, of all threads together, so that other load on the machine
+changes it little; it includes tracing and one evaluation. The largest are printed first. A time above
+`MAX_SECONDS` ends the command with 1.
+"""
+
+from __future__ import annotations
+
+import argparse
+import multiprocessing
+import os
+import resource
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from tempfile import TemporaryDirectory
+from time import process_time
+from typing import Any
+
+import numpy as np
+
+from benchmarks.every_quantity import serial_arm, tree
+from benchmarks.progress import tell
+from dynx import control
+from dynx.backends import backend
+from dynx.backends.quantities import QUANTITIES
+from dynx.compiled.derivatives import Derivatives
+from dynx.compiled.parametric import ParametricDynamics, parametric
+from dynx.model import Model
+from dynx.model.library import robots
+from dynx.model.loading import load
+from dynx.model.model import Base
+from dynx.sim import Noise, Push, simulate, simulate_batch
+
+MAX_SECONDS = 10.0
+"""Longest time that a compilation may take [s]."""
+
+LARGEST_ROBOTS = (
+    "tiago_dual",
+    "tiago",
+    "g1_with_hands",
+    "alex_psyonic_hands",
+    "centauro",
+    "human",
+    "romeo",
+    "talos_full",
+    "talos",
+    "icub",
+    "g1",
+    "pr2",
+    "allegro_left_hand",
+)
+"""Robots that are compiled by default, those with most joints of the library and a hand."""
+
+BASES: tuple[Base, ...] = ("fixed", "floating")
+
+DT = 1e-3
+"""Step of the simulations [s]."""
+
+ROLLOUTS = 16
+"""Rollouts of a batch, which suffice for every number of lanes."""
+
+LONG_ENOUGH = 257
+"""Steps of one simulation, from which on its step is compiled."""
+
+Kind = Callable[[Model], object]
+
+
+@dataclass(frozen=True)
+class Compilation:
+    """A kind of kernel, a robot, and what its compilation took; seconds are None if it was ended."""
+
+    robot: str
+    kind: str
+    seconds: float | None
+    mebibytes: float
+    problem: str = ""
+
+
+def _state(model: Model) -> dict[str, Any]:
+    rng = np.random.default_rng(0)
+    v, a, tau = rng.uniform(-0.5, 0.5, (3, model.nv))
+    return {"q": model.random(rng), "v": v, "a": a, "tau": tau}
+
+
+def _quantity(model: Model, quantity: str) -> object:
+    state, described = _state(model), QUANTITIES[quantity]
+    frame = (model.frame_names[-1],) if described.of_frame else ()
+    method = getattr(backend("compiled", model, threads=1), quantity)
+    return method(*(state[argument] for argument in described.arguments), *frame)
+
+
+def _derivatives(model: Model, what: str) -> object:
+    state, derivatives = _state(model), Derivatives(model, threads=1)
+    if what == "inverse dynamics":
+        return derivatives.inverse_dynamics_derivatives(state["q"], state["v"], state["a"])
+    if what == "forward dynamics":
+        return derivatives.forward_dynamics_derivatives(state["q"], state["v"], state["tau"])
+    return derivatives.forward_kinematics_derivative(state["q"], model.frame_names[-1])
+
+
+def _everything_a_parameter(model: Model) -> ParametricDynamics:
+    links = [link.name for link in model.links]
+    tip = model.frame_names[-1]
+    return parametric(model, links=links, payload=tip, point_payload=tip, joint_dynamics=True, threads=1)
+
+
+def _parametric(model: Model, quantity: str) -> object:
+    state = _state(model)
+    method = getattr(_everything_a_parameter(model), quantity)
+    return method(*(state[argument] for argument in QUANTITIES[quantity].arguments))
+
+
+def _batch(model: Model, controller: control.Controller[Any], **options: Any) -> object:
+    q = np.tile(model.neutral(), (ROLLOUTS, 1))
+    return simulate_batch(
+        model,
+        controller,
+        model.neutral(),
+        q0=q,
+        duration=2 * DT,
+        dt=DT,
+        threads=1,
+        check_reference=False,
+        **options,
+    )
+
+
+def _controller(model: Model) -> control.Controller[Any]:
+    """Return computed torque, or a controller of the joints alone for a floating base."""
+    if model.floating:
+        return control.PD(model, kp=100.0, kd=10.0)
+    return control.ComputedTorque(model, kp=400.0, kd=40.0, backend="reference")
+
+
+def _batch_with(model: Model, **options: Any) -> object:
+    return _batch(model, _controller(model), **options)
+
+
+def _batch_with_everything(model: Model) -> object:
+    push = Push(model.frame_names[-1], (1.0, 0.0, 0.0, 0.0, 0.1, 0.0), duration=DT)
+    noise = Noise(q=1e-4, v=1e-3, seed=0)
+    options: dict[str, Any] = {"parametric": _everything_a_parameter(model), "pushes": push, "noise": noise}
+    options["effort_limits"] = 100.0
+    return _batch_with(model, delay=2 * DT, position_limits=True, **options)
+
+
+def _batch_in_operational_space(model: Model) -> object:
+    if model.floating:
+        return None
+    tip = model.frame_names[-1]
+    return _batch(model, control.OperationalSpace(model, tip, kp=400.0, kd=40.0, backend="reference"))
+
+
+def _simulation(model: Model, **options: Any) -> object:
+    return simulate(
+        model,
+        _controller(model),
+        model.neutral(),
+        plant="compiled",
+        duration=LONG_ENOUGH * DT,
+        dt=DT,
+        check_reference=False,
+        **options,
+    )
+
+
+KINDS: dict[str, Kind] = {
+    **{name: partial(_quantity, quantity=name) for name in QUANTITIES},
+    **{
+        f"derivatives of {what}": partial(_derivatives, what=what)
+        for what in ("inverse dynamics", "forward dynamics", "a pose")
+    },
+    **{
+        f"parametric {name}": partial(_parametric, quantity=name)
+        for name in ("inverse_dynamics", "forward_dynamics", "mass_matrix")
+    },
+    "batch, plain": _batch_with,
+    "batch, dry friction": partial(_batch_with, friction=0.1, damping=0.1, armature=0.01),
+    "batch, smooth friction": partial(_batch_with, friction=0.1, damping=0.1, friction_slip=0.1),
+    "batch, position limits": partial(_batch_with, position_limits=True),
+    "batch, all parameters, noise, limits, pushes": _batch_with_everything,
+    "batch, operational space": _batch_in_operational_space,
+    "simulation, plain": _simulation,
+    "simulation, dry friction": partial(_simulation, friction=0.1, damping=0.1, armature=0.01),
+}
+"""Functions that compile each kind of kernel for a robot."""
+
+
+def measure(robot: str, model: Model, kind: str, limit: float) -> Compilation:
+    """Compile a kind of kernel in a new process, which is ended after `limit` seconds."""
+    receiving, sending = multiprocessing.Pipe(duplex=False)
+    process = multiprocessing.Process(target=_compile, args=(model, kind, sending))
+    process.start()
+    sending.close()
+    try:
+        seconds, mebibytes, problem = receiving.recv() if receiving.poll(limit) else (None, 0.0, "ended")
+    except EOFError:
+        seconds, mebibytes, problem = None, 0.0, "the process ended without a result"
+    finally:
+        process.kill()
+        process.join()
+    return Compilation(robot, kind, seconds, mebibytes, problem)
+
+
+def _compile(model: Model, kind: str, results: Any) -> None:
+    with TemporaryDirectory() as folder:
+        os.environ["DYNX_CACHE_DIR"] = folder
+        start, problem = process_time(), ""
+        try:
+            KINDS[kind](model)
+        except Exception as error:
+            problem = f"{type(error).__name__}: {error}"
+        seconds = process_time() - start
+    results.send((seconds, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024, problem))
+
+
+def chosen_robots(names: Sequence[str], bases: Sequence[Base]) -> Iterator[tuple[str, Model]]:
+    """Yield robots of the library with each base; ``tree:101`` and ``serial:64`` are trees and arms of so
+    many joints."""
+    for name in names:
+        kind, _, count = name.partition(":")
+        if count:
+            yield name, (tree if kind == "tree" else serial_arm)(int(count))
+            continue
+        for base in bases:
+            yield f"{name}, {base}", load(name, base=base)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Print the table, the longest compilations first; return 1 if one takes longer than `MAX_SECONDS`."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.compile_times", description=__doc__)
+    parser.add_argument(
+        "--robots", nargs="+", default=LARGEST_ROBOTS, metavar="ROBOT", help="names, tree:N, serial:N, or all"
+    )
+    parser.add_argument("--bases", nargs="+", default=BASES, choices=BASES)
+    parser.add_argument("--kinds", nargs="+", metavar="TEXT", help="kinds whose names contain one of these")
+    parser.add_argument("--limit", type=float, default=120.0, help="time after which one is ended [s]")
+    chosen = parser.parse_args(arguments)
+    kinds = [kind for kind in KINDS if not chosen.kinds or any(text in kind for text in chosen.kinds)]
+    names = [robot.name for robot in robots()] if chosen.robots == ["all"] else chosen.robots
+    done: list[Compilation] = []
+    for name, model in chosen_robots(names, chosen.bases):
+        for kind in kinds:
+            tell(f"{name}: {kind}")
+            done.append(measure(name, model, kind, chosen.limit))
+    tell("")
+    done.sort(key=lambda each: (each.seconds is None, each.seconds), reverse=True)
+    print(f"{'seconds':>8} {'MiB':>6}  {'robot':30}{'kind'}")
+    for each in done:
+        taken = f">{chosen.limit:.0f}" if each.seconds is None else f"{each.seconds:.2f}"
+        print(f"{taken:>8} {each.mebibytes:6.0f}  {each.robot:30}{each.kind}  {each.problem}".rstrip())
+    return 1 if any(each.seconds is None or each.seconds > MAX_SECONDS for each in done) else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
