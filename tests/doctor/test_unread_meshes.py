@@ -17,7 +17,7 @@ from dynx.doctor.report import DoctorReport
 from dynx.engines.silence import silence
 from dynx.errors import EngineError
 from dynx.loaded import ENGINES, installed_engines, loader_class
-from dynx.rules.geometry.meshes import STL_FACET
+from dynx.model.geometry.formats.stl import STL_FACET
 from tests.doctor.formats.test_sarif import require_valid
 
 ARM = """<robot name="arm">

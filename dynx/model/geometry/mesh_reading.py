@@ -1,18 +1,20 @@
-"""Triangles of mesh files, read by trimesh and checked before any engine sees them."""
+"""Triangles of mesh files, checked before any engine sees them."""
 
 from __future__ import annotations
 
-import io
 import os
-from functools import lru_cache
-from typing import Any
+from functools import lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dynx.errors import DescriptionError, NotInstalledError, shown
+from dynx.errors import DescriptionError, DynxError, shown
 from dynx.files.reading import printable, read_file
 from dynx.model.configuration import MAX_MAGNITUDE
+from dynx.model.geometry.formats.collada import collada_triangles
+from dynx.model.geometry.formats.gltf import gltf_triangles
+from dynx.model.geometry.formats.obj import obj_triangles
+from dynx.model.geometry.formats.stl import stl_triangles
 from dynx.spatial.scalar import Floats
 
 Triangles = tuple[Floats, NDArray[np.intp]]
@@ -28,8 +30,8 @@ def read_triangles(path: str) -> Triangles:
     """Return the vertices (n, 3) [m] and triangles (m, 3) of a mesh file, unscaled.
 
     The result is shared between calls until the file changes. Raises RobotNotFoundError for a missing file,
-    DescriptionError for one that is too large, damaged, empty or of another format, NotInstalledError without
-    trimesh.
+    DescriptionError for one that is too large, damaged, empty or of another format, NotInstalledError for
+    glTF without trimesh.
     """
     try:
         status = os.stat(path)
@@ -39,7 +41,7 @@ def read_triangles(path: str) -> Triangles:
 
 
 # A robot names its meshes twice, and is often loaded into several engines.
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=64)
 def _cached(path: str, changed: int, size: int) -> Triangles:
     return _checked(path)
 
@@ -63,22 +65,29 @@ def _checked(path: str) -> Triangles:
 
 
 def _parsed(path: str, data: bytes, suffix: str) -> Triangles:
-    library = _trimesh()
     try:
-        scene: Any = library.load_scene(io.BytesIO(data), file_type=suffix[1:], process=False)
-        mesh: Any = scene.to_mesh()
-    # The parsers of trimesh raise whatever exception damaged data lead to.
+        if suffix == ".stl":
+            return stl_triangles(data)
+        if suffix == ".obj":
+            return obj_triangles(data)
+        if suffix == ".dae":
+            return collada_triangles(data)
+        return gltf_triangles(data, partial(_read_beside, path))
+    except DynxError:
+        raise
+    # trimesh raises whatever exception damaged data lead to, as do lookups in the tree of such a file.
     except Exception as error:
-        raise _fault(path, f"cannot be read as {suffix}: {type(error).__name__}: {error}") from error
-    return np.array(mesh.vertices, np.float64), np.array(mesh.faces, np.intp)
+        reason = str(error) if type(error) is ValueError else f"{type(error).__name__}: {error}"
+        raise _fault(path, f"cannot be read as {suffix}: {reason}") from error
 
 
-def _trimesh() -> Any:
-    try:
-        import trimesh
-    except ImportError as error:
-        raise NotInstalledError("meshes are read by trimesh: pip install 'dynx[world]'") from error
-    return trimesh
+def _read_beside(path: str, name: str) -> bytes:
+    """Return the bytes of a file in the folder of a mesh; ValueError for one outside."""
+    folder = os.path.realpath(os.path.dirname(path))
+    found = os.path.realpath(os.path.join(folder, name))
+    if not found.startswith(os.path.join(folder, "")):
+        raise ValueError(f"{shown(name, 200)} is outside the folder of the mesh")
+    return read_file(found)
 
 
 def _fault(path: str, message: str) -> DescriptionError:

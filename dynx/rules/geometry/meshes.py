@@ -10,19 +10,14 @@ import numpy as np
 
 from dynx.errors import DynxError
 from dynx.files.reading import read_file
-from dynx.rules.geometry.collada import collada_points
+from dynx.model.geometry.formats.collada import collada_points
+from dynx.model.geometry.formats.stl import STL_FACET, STL_HEAD, STL_VERTEX
 from dynx.spatial.scalar import Floats
 
 Box = tuple[tuple[float, float, float], tuple[float, float, float]]
 
-STL_FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
-"""A facet of a binary STL file."""
-
-_STL_HEAD = 84
-
 # Each line is matched in time proportional to its length: a pattern must not run across lines, nor start
 # again within a run of blanks.
-_STL_VERTEX = re.compile(rb"^[ \t]*vertex[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)", re.MULTILINE | re.IGNORECASE)
 _OBJ_VERTEX = re.compile(rb"^[ \t]*v[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)", re.MULTILINE)
 
 
@@ -66,13 +61,13 @@ def _box(path: Path, by_bullet: bool, changed: int, size: int) -> Box | None:
 def _stl_points(data: bytes, by_bullet: bool) -> Floats | None:
     """Return the corners of the facets. A binary file is known by its length, since some begin with "solid"
     too."""
-    if len(data) >= _STL_HEAD:
+    if len(data) >= STL_HEAD:
         count = int.from_bytes(data[80:84], "little")
-        if len(data) == _STL_HEAD + STL_FACET.itemsize * count:
-            corners = np.frombuffer(data, STL_FACET, count, _STL_HEAD)["corners"]
+        if len(data) == STL_HEAD + STL_FACET.itemsize * count:
+            corners = np.frombuffer(data, STL_FACET, count, STL_HEAD)["corners"]
             return corners.reshape(-1, 3).astype(np.float64)
     is_text = data.lstrip()[:5].lower() == b"solid" and not by_bullet
-    return _vertices(_STL_VERTEX, data) if is_text else None
+    return _vertices(STL_VERTEX, data) if is_text else None
 
 
 def _obj_points(data: bytes, by_bullet: bool) -> Floats | None:

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dynx.rules.geometry import collada
+from dynx.model.geometry.formats import collada
 from dynx.rules.geometry.meshes import mesh_box
 from tests.rules.geometry.test_meshes import FACET, ascii_stl, binary_stl, box_of, dae, obj
 

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dynx.rules.geometry.collada import collada_points
+from dynx.model.geometry.formats.collada import collada_points
 from dynx.rules.geometry.meshes import Box, mesh_box
 from dynx.spatial.scalar import Floats
 
