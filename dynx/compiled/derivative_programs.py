@@ -1,14 +1,21 @@
-"""Programs of derivatives for one mechanism: differentiated graphs of the algorithms of `dynx.rbd`."""
+"""Programs of derivatives for one mechanism.
+
+They are differentiated graphs of the algorithms of `dynx.rbd`, or its closed form where that is shorter.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
-from dynx.compiled.kernels import evaluate_quantity
 from dynx.compiled.mass_factors import factorize_mass_matrix, solve_with_factors
-from dynx.compiled.model_coordinates import argument_shapes, reduce_columns, tree_coordinates
+from dynx.compiled.model_coordinates import (
+    argument_shapes,
+    reduce_columns,
+    reduce_rows,
+    tree_coordinates,
+)
 from dynx.model import Mechanism
-from dynx.rbd import kinematics, rnea
+from dynx.rbd import derivatives, kinematics, rnea
 from dynx.rbd.base_parameters import regroup_inertias
 from dynx.rbd.elimination import filled_entries
 from dynx.simd.differentiate import differentiate
@@ -19,11 +26,24 @@ from dynx.spatial.branchless import displace
 from dynx.spatial.scalar import Array
 from dynx.spatial.se3 import homogeneous
 
+MAX_DIFFERENTIATED_PAIRS = 40
+"""Number of pairs of a joint and an ancestor up to which differentiating the algorithm gives shorter code for
+a robot with a fixed base, because the poses of its few joints have many zeros."""
+
 
 def inverse_dynamics_derivatives(mechanism: Mechanism) -> Program:
     """Return the program of q, v and a, with the outputs dtau_dq, dtau_dv and dtau_da, each (nv, nv)."""
-    program = _differentiated_torque(mechanism)
-    return trace(lambda q, v, a: _torque_derivatives(program, q, v, a), argument_shapes(mechanism, "qva"))
+    shapes = argument_shapes(mechanism, "qva")
+    if not mechanism.floating and pair_count(mechanism) <= MAX_DIFFERENTIATED_PAIRS:
+        program = _differentiated_torque(mechanism)
+        return trace(lambda q, v, a: _torque_derivatives(program, q, v, a), shapes)
+    return trace(lambda q, v, a: _closed_form(mechanism, q, v, a), shapes)
+
+
+def pair_count(mechanism: Mechanism) -> int:
+    """Return the number of pairs of a joint and an ancestor, itself and coordinates of the base included."""
+    base = mechanism.nv - len(mechanism.bodies)
+    return sum(len(kinematics.ancestry(mechanism, body)) + base for body in range(len(mechanism.bodies)))
 
 
 def forward_dynamics_derivatives(mechanism: Mechanism) -> Program:
@@ -66,15 +86,6 @@ def solution_by_factors(mechanism: Mechanism) -> Program:
     return trace(solution, {"factors": (len(filled) + nv,), "b": (nv,)})
 
 
-def acceleration(mechanism: Mechanism) -> Program:
-    """Return the program of q, v and tau, with the output a (nv,)."""
-
-    def solve(q: Array, v: Array, tau: Array) -> Array:
-        return evaluate_quantity(mechanism, "forward_dynamics", (), q, v, tau)
-
-    return trace(solve, argument_shapes(mechanism, ("q", "v", "tau")))
-
-
 def pose_derivative(mechanism: Mechanism, frame: int) -> Program:
     """Return the program of q, with the output dT_dq (4, 4, nv) for frame number `frame`."""
     shapes = argument_shapes(mechanism, "qv")
@@ -87,6 +98,13 @@ def pose_derivative(mechanism: Mechanism, frame: int) -> Program:
     program = differentiate(trace(pose, {"q": shapes["q"], "d": shapes["v"]}), [("T", "d")], order="forward")
     still = np.zeros(shapes["v"])
     return trace(lambda q: {"dT_dq": inline(program, {"q": q, "d": still})["dT_dd"]}, {"q": shapes["q"]})
+
+
+def _closed_form(mechanism: Mechanism, q: Array, v: Array, a: Array) -> dict[str, Array]:
+    found = derivatives.inverse_dynamics_derivatives(mechanism, *tree_coordinates(mechanism, q, v, a))
+    reduced = (reduce_rows(mechanism, reduce_columns(mechanism, matrix)) for matrix in found)
+    dtau_dq, dtau_dv, M = reduced
+    return {"dtau_dq": dtau_dq, "dtau_dv": dtau_dv, "dtau_da": _symmetric(M)}
 
 
 def _torque(mechanism: Mechanism, q: Array, v: Array, a: Array) -> Array:
@@ -111,7 +129,13 @@ def _differentiated_torque(mechanism: Mechanism) -> Program:
 def _torque_derivatives(program: Program, q: Array, v: Array, a: Array) -> dict[str, Array]:
     """Return the outputs of `_differentiated_torque` at d = 0; only one triangle of M is computed."""
     found = inline(program, {"q": q, "d": np.zeros(len(v)), "v": v, "a": a})
-    M = np.array(found["dtau_da"])
+    M = _symmetric(found["dtau_da"])
+    return {"dtau_dq": found["dtau_dd"], "dtau_dv": found["dtau_dv"], "dtau_da": M}
+
+
+def _symmetric(M: Array) -> Array:
+    """Return the symmetric matrix with the lower triangle of `M`, whose upper one is then never computed."""
+    M = np.array(M)
     for i, j in zip(*np.triu_indices(len(M), 1), strict=True):
         M[i, j] = M[j, i]
-    return {"dtau_dq": found["dtau_dd"], "dtau_dv": found["dtau_dv"], "dtau_da": M}
+    return M

@@ -1,8 +1,9 @@
 """Exact derivatives of the dynamics and of poses, compiled for one robot.
 
-The graph of the algorithm itself is differentiated (`dynx.simd.differentiate`), so there is no step size, and
-no second implementation that could differ from the first. With mimic joints, derivatives are by the
-coordinates of the model.
+There is no step size. For small robots the graph of the algorithm itself is differentiated
+(`dynx.simd.differentiate`); for others a closed form (`dynx.rbd.derivatives`) gives shorter code. For large
+ones that is evaluated by routines, which are compiled once for all robots (`dynx.compiled.looped`). With
+mimic joints, derivatives are by the coordinates of the model.
 
 Forward dynamics is differentiated by the implicit function theorem: at a = FD(q, v, tau) the torque
 ID(q, v, a) stays tau, so
@@ -15,7 +16,8 @@ That is as exact as differentiating the articulated-body algorithm, but takes se
 
 from __future__ import annotations
 
-from functools import partial
+from dataclasses import replace
+from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -24,15 +26,25 @@ from numpy.typing import ArrayLike
 from dynx.backends.arguments import Arguments
 from dynx.backends.solvability import Solvability
 from dynx.compiled import derivative_programs as programs
+from dynx.compiled.backend import CompiledBackend
+from dynx.compiled.looped.kernels import looped_derivatives
+from dynx.compiled.model_coordinates import reduce_columns, reduce_rows, tree_coordinates
 from dynx.compiled.robot_kernel import Making, RobotKernels
+from dynx.compiled.simplification import simplify_mechanism
 from dynx.model import Model
 from dynx.model.model import refuse_other_than_model
+from dynx.simd.call_table import TableKernel
 from dynx.spatial.scalar import Floats
 
 MAX_NV_OF_ONE_KERNEL = 12
 """Largest number of degrees of freedom for which one kernel computes all derivatives of forward dynamics;
 its code grows with the cube of that number. For larger robots, the equations are solved one right-hand
 side at a time."""
+
+MAX_COMPILED_PAIRS = 250
+"""Largest number of pairs of a joint and an ancestor, coordinates of a floating base included, for which the
+derivatives of inverse dynamics are compiled for one robot. Routines are faster for larger robots: reading
+long code from memory takes longer than computing."""
 
 MIN_SAMPLES_BY_COLUMN = 64
 """Smallest number of samples at which systems of equations are solved column by column for all samples at
@@ -78,12 +90,15 @@ class Derivatives:
         self._kernels = RobotKernels(model, threads)
         self._arguments = Arguments(model)
         self._solvability = Solvability(model)
+        self._engine = CompiledBackend(model, threads=threads)
 
     def inverse_dynamics_derivatives(
         self, q: ArrayLike, v: ArrayLike, a: ArrayLike
     ) -> InverseDynamicsDerivatives:
         """Return the derivatives of tau = M a + bias by q, v and a; the last is the mass matrix."""
         arrays = self._checked(q, v, a, "a")
+        if programs.pair_count(self.model.mechanism) > MAX_COMPILED_PAIRS:
+            return self._by_routines(arrays)
         found = self._evaluate("inverse_dynamics", programs.inverse_dynamics_derivatives, arrays)
         return InverseDynamicsDerivatives(*found)
 
@@ -100,8 +115,7 @@ class Derivatives:
         if self.model.nv <= MAX_NV_OF_ONE_KERNEL:
             found = self._evaluate("forward_dynamics", programs.forward_dynamics_derivatives, arrays)
             return ForwardDynamicsDerivatives(*map(self._arguments.finite_acceleration, found))
-        (a,) = self._evaluate("acceleration", programs.acceleration, arrays)
-        self._arguments.finite_acceleration(a)
+        a = self._engine.forward_dynamics(*arrays)
         dtau_dq, dtau_dv, M = self.inverse_dynamics_derivatives(arrays[0], arrays[1], a)
         nv = self.model.nv
         entries = M.reshape(*a.shape[:-1], nv * nv)
@@ -118,6 +132,19 @@ class Derivatives:
         program = partial(programs.pose_derivative, frame=index)
         (derivative,) = self._evaluate(("pose", index), program, [self._arguments.q(q)])
         return derivative
+
+    def _by_routines(self, arrays: list[Floats]) -> InverseDynamicsDerivatives:
+        mechanism = self.model.mechanism
+        found = self._kernels.run(self._routines, list(tree_coordinates(mechanism, *arrays)))
+        if mechanism.coupling is None:
+            return InverseDynamicsDerivatives(*found)
+        by_q, by_v, M = (reduce_rows(mechanism, reduce_columns(mechanism, matrix)) for matrix in found)
+        # Products of matrices are symmetric to rounding only.
+        return InverseDynamicsDerivatives(by_q, by_v, (M + np.swapaxes(M, -1, -2)) / 2)
+
+    @cached_property
+    def _routines(self) -> TableKernel:
+        return looped_derivatives(replace(simplify_mechanism(self.model.mechanism), coupling=None))
 
     def _solve(self, factors: Floats, b: Floats) -> Floats:
         """Solve M x = b for matrices b (..., nv, nv), from the factors of M."""

@@ -48,7 +48,10 @@ class RobotKernels:
 
     def evaluate(self, purpose: object, program: Making, arrays: Sequence[Floats]) -> list[Floats]:
         """Evaluate `program` on inputs (..., size) that broadcast; return its outputs (..., *shape)."""
-        kernel = self.kernel(purpose, program)
+        return self.run(self.kernel(purpose, program), arrays)
+
+    def run(self, kernel: Kernel, arrays: Sequence[Floats]) -> list[Floats]:
+        """Evaluate a kernel on inputs (..., size) that broadcast; return its outputs (..., *shape)."""
         batch = common_batch(*arrays)
         n = prod(batch)
         rows = [batch_rows(array, batch) for array in arrays]

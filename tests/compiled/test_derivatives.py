@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import pickle
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
@@ -10,15 +12,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import dynx
+from benchmarks.every_quantity import tree
 from dynx.agreement.magnitudes import Magnitudes
 from dynx.compiled.derivative_programs import (
-    acceleration,
     factors_of_mass,
     forward_dynamics_derivatives,
     inverse_dynamics_derivatives,
+    pair_count,
     solution_by_factors,
 )
-from dynx.compiled.derivatives import MAX_NV_OF_ONE_KERNEL, Derivatives
+from dynx.compiled.derivatives import MAX_COMPILED_PAIRS, MAX_NV_OF_ONE_KERNEL, Derivatives
+from dynx.compiled.kernels import evaluate_quantity
+from dynx.compiled.model_coordinates import argument_shapes
 from dynx.engines.pinocchio.backend import PinocchioBackend
 from dynx.engines.pinocchio.library import pin
 from dynx.errors import (
@@ -31,9 +36,11 @@ from dynx.errors import (
 from dynx.model import Link, Model
 from dynx.model.model import Base
 from dynx.rbd import rnea
+from dynx.rbd.derivatives import inverse_dynamics_derivatives as closed_form
 from dynx.reference.backend import ReferenceBackend
 from dynx.simd.differentiate import differentiate
 from dynx.simd.expr import Node
+from dynx.simd.trace import trace
 from dynx.spatial.scalar import Floats
 from dynx.testing.strategies import models, samples
 from tests.backends.robots import BASES, assert_close, chain, mixed_robot, motion
@@ -42,6 +49,20 @@ from tests.rbd.exact import exact_mechanism, exactly, fifty_digits, rate, tree_q
 
 MODELS = [mixed_robot(base, mimic=mimic) for base in BASES for mimic in (False, True)]
 each_model = pytest.mark.parametrize("model", MODELS, ids=["fixed", "mimic", "floating", "floating-mimic"])
+
+
+FORMS = ("differentiated", "closed", "routines")
+
+
+@contextmanager
+def form(name: str) -> Iterator[None]:
+    """Compute derivatives of inverse dynamics in one form only; a floating base is never differentiated."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("dynx.compiled.derivatives.MAX_COMPILED_PAIRS", -1 if name == "routines" else 10**6)
+        limit = 10**6 if name == "differentiated" else -1
+        patch.setattr("dynx.compiled.derivative_programs.MAX_DIFFERENTIATED_PAIRS", limit)
+        patch.setenv("DYNX_CACHE", "0")
+        yield
 
 
 class PinocchioDerivatives:
@@ -107,7 +128,8 @@ def test_real_robots_against_pinocchio(name: str, base: Base) -> None:
 def test_random_robots_in_50_digits(data: st.DataObject) -> None:
     model = data.draw(models(max_links=4, base="either"))
     q, v, a = data.draw(samples(model))
-    found = Derivatives(model, threads=1).inverse_dynamics_derivatives(q, v, a)
+    with form(data.draw(st.sampled_from(FORMS))):
+        found = Derivatives(model, threads=1).inverse_dynamics_derivatives(q, v, a)
     sizes = Magnitudes(samples_at(model, q, v, a))
     # A torque, per radian and per metre; each velocity product, per velocity.
     size = float(np.max(sizes.torque, initial=0.0))
@@ -128,6 +150,45 @@ def test_random_robots_in_50_digits(data: st.DataObject) -> None:
             for name, derivative in by.items():
                 got = getattr(found, name)[:, j]
                 assert_close(got, np.asarray(S.T @ derivative, dtype=float), max(size, 1e-12), name)
+
+
+@each_model
+def test_all_forms_agree(model: Model) -> None:
+    """In batches that fill the lanes, in parts of them, and in the array code that both are traced from."""
+    q, v, a = motion(model, size=(9,))
+    mechanism = model.mechanism
+    S = np.eye(mechanism.nv) if mechanism.coupling is None else mechanism.coupling.matrix()
+    q_tree = q if mechanism.coupling is None else mechanism.coupling.expand_q(q)
+    plain = closed_form(mechanism, q_tree, v @ S.T, a @ S.T)
+    wanted = [S.T @ matrix @ S for matrix in plain]
+    for name in FORMS:
+        with form(name):
+            compiled = Derivatives(model, threads=2)
+            found = compiled.inverse_dynamics_derivatives(q, v, a)
+            one = compiled.inverse_dynamics_derivatives(q[2], v[2], a[2])
+        for field, got, single, expected in zip(found._fields, found, one, wanted, strict=True):
+            assert_close(got, expected, what=f"{name} {field}")
+            assert_close(single, expected[2], what=f"{name} {field}")
+        np.testing.assert_array_equal(found.dtau_da, np.swapaxes(found.dtau_da, -1, -2))
+
+
+def test_nothing_is_compiled_for_the_derivatives_of_a_large_robot(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Those of inverse dynamics; they had compiled for minutes."""
+    small, large = tree(8), tree(101)
+    assert pair_count(large.mechanism) > MAX_COMPILED_PAIRS
+    with form("routines"):
+        Derivatives(small).inverse_dynamics_derivatives(*motion(small))
+    monkeypatch.setattr("dynx.simd.cache.compile_image", _refuse)
+    monkeypatch.setattr("dynx.simd.cache.compile_routines", _refuse)
+    q, v, a = motion(large)
+    found = Derivatives(large).inverse_dynamics_derivatives(q, v, a)
+    plain = closed_form(large.mechanism, q, v, a)
+    for got, wanted in zip(found, plain, strict=True):
+        assert_close(got, wanted)
+
+
+def _refuse(*_: object) -> None:
+    raise AssertionError("nothing is to be compiled")
 
 
 @each_model
@@ -198,7 +259,10 @@ def test_batches_broadcast_and_threads_change_nothing(model: Model) -> None:
 def test_implicit_differentiation_is_smaller_than_that_of_the_algorithm() -> None:
     mechanism = dynx.load("ur5").mechanism
     assert mechanism.nv <= MAX_NV_OF_ONE_KERNEL
-    program = acceleration(mechanism)
+    program = trace(
+        lambda q, v, tau: evaluate_quantity(mechanism, "forward_dynamics", (), q, v, tau),
+        argument_shapes(mechanism, ("q", "v", "tau")),
+    )
     direct = differentiate(program, [("result", name) for name in ("q", "v", "tau")], order="reverse")
     assert 2 * len(forward_dynamics_derivatives(mechanism).nodes) < len(direct.nodes)
 

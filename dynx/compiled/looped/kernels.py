@@ -25,6 +25,7 @@ from dynx.compiled.looped import (
     forward_dynamics,
     inertial_regressor,
     inverse_dynamics,
+    inverse_dynamics_derivatives,
     mass_matrix,
 )
 from dynx.compiled.model_coordinates import argument_shapes
@@ -56,6 +57,12 @@ _LOOPED = {
 LOOPED = frozenset(_LOOPED)
 """Quantities that are available as calls of routines."""
 
+_DERIVATIVES = "derivatives of inverse dynamics"
+_ALL = {
+    **_LOOPED,
+    _DERIVATIVES: _Looped(inverse_dynamics_derivatives.routines, inverse_dynamics_derivatives.call_table),
+}
+
 
 def looped_kernel(mechanism: Mechanism, name: str, details: tuple[Any, ...]) -> TableKernel:
     """Return the kernel of a quantity in tree coordinates; the outputs are the result and the defect."""
@@ -68,10 +75,19 @@ def looped_kernel(mechanism: Mechanism, name: str, details: tuple[Any, ...]) -> 
     return TableKernel(table, inputs, [Port("result", shape), Port("defect", (1,))], code)
 
 
+def looped_derivatives(mechanism: Mechanism) -> TableKernel:
+    """Return the kernel of q, v and a with the outputs dtau_dq, dtau_dv and dtau_da, in tree coordinates."""
+    routines, code = _code(_DERIVATIVES)
+    table = inverse_dynamics_derivatives.call_table(mechanism, routines)
+    inputs = [Port(*port) for port in argument_shapes(mechanism, "qva").items()]
+    shape = (mechanism.nv, mechanism.nv)
+    return TableKernel(table, inputs, [Port(name, shape) for name in ("dtau_dq", "dtau_dv", "dtau_da")], code)
+
+
 @cache
 def _code(name: str) -> tuple[RoutineSet, RoutineCode]:
     """Return the routines of a quantity and their machine code, which all robots of the process share."""
-    routines = _LOOPED[name].routines()
+    routines = _ALL[name].routines()
     return routines, load_routines(f"{name} {_algorithms()}".encode(), routines)
 
 

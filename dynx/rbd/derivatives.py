@@ -1,0 +1,276 @@
+"""Partial derivatives of inverse dynamics in closed form.
+
+Each pair of a joint and one of its ancestors takes some forty products, as in Singh, Russell and Wensing,
+Efficient Analytical Derivatives of Rigid-Body Dynamics Using Spatial Vector Algebra, 2022. With S the motion
+subspace of a joint, v and a the velocity and acceleration of its parent (gravity subtracted),
+
+    S' = v x S,   S'' = a x S + v x S',
+
+and with I, B and F the inertia, Coriolis terms and wrench of the subtree of joint i, for an ancestor j
+
+    dtau_j/dq_i = S_j . (2 B S'_i + I S''_i + S_i x* F),    dtau_i/dq_j = S_i . (2 B S'_j + I S''_j),
+    dtau_j/dv_i = S_j . (2 B S_i + 2 I S'_i),               dtau_i/dv_j = S_i . (2 B S_j + 2 I S'_j).
+
+B = (v x* I - I v x + (I v) x~*) / 2 summed over the subtree maps the twist l + e x r to the force e x f and
+the moment E e, where f is the momentum of the subtree and E = integral of -[r] [dr/dt] (`dynx.rbd.coriolis`).
+
+All vectors are in the axes of the root body and about its origin, and velocities are relative to that of the
+origin, so neither the position nor the velocity of the robot as a whole causes rounding errors. The base then
+enters by its angular velocity and acceleration and the proper acceleration of its origin alone: derivatives
+by its coordinates follow from these by the chain rule.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from dynx.model.mechanism import ROOT, Body, Mechanism
+from dynx.rbd.kinematics import joint_value
+from dynx.rbd.placement import Placement, SpatialVector
+from dynx.rbd.rnea import add_spatial
+from dynx.spatial.inertia import RigidInertia
+from dynx.spatial.scalar import Array, append_axis
+from dynx.spatial.so3 import cross, rotate, rotate_back, rotation_from_quat, skew
+
+
+@dataclass(frozen=True)
+class BodyMotion:
+    """Pose (R, p) of a body in the root; its velocity and its acceleration minus gravity, spatial vectors."""
+
+    R: Array
+    p: Array
+    velocity: SpatialVector
+    acceleration: SpatialVector
+
+
+class Base(NamedTuple):
+    """Linear and angular velocity of a floating base, and gravity, in its axes."""
+
+    linear: Array
+    omega: Array
+    gravity: Array
+
+    @classmethod
+    def of(cls, q: Array, v: Array, gravity: Array) -> Base:
+        """Make the base from q (..., 7 or more), v (..., 6 or more) and gravity (3,) in the world."""
+        return cls(v[..., :3], v[..., 3:6], rotate_back(rotation_from_quat(q[..., 3:7]), gravity))
+
+    def motion(self, a: Array) -> BodyMotion:
+        """Return the motion of the root at acceleration a, relative to that of its origin."""
+        proper = a[..., :3] + cross(self.omega, self.linear) - self.gravity
+        identity, zero = np.eye(3, dtype=int), 0 * self.omega
+        return BodyMotion(identity, zero, (zero, self.omega), (proper, a[..., 3:6]))
+
+
+class JointMotion(NamedTuple):
+    """Motion subspace S of a joint, S' and S'' (see the module)."""
+
+    S: SpatialVector
+    first: SpatialVector
+    second: SpatialVector
+
+
+@dataclass(frozen=True)
+class Subtree:
+    """A body with all bodies outboard of it: inertia, momentum f, E and the wrench that moves it."""
+
+    inertia: RigidInertia
+    momentum: Array
+    E: Array
+    wrench: SpatialVector
+
+    @classmethod
+    def of_body(cls, inertia: RigidInertia, motion: BodyMotion) -> Subtree:
+        """Return the subtree of one body, whose inertia is given in its own frame."""
+        own = inertia.transform(motion.R, motion.p)
+        linear, omega = motion.velocity
+        momentum, angular_momentum = own.momentum(linear, omega)
+        E = -skew(own.first_moment) @ skew(linear) - skew(omega) @ own.second_moment_matrix
+        force, moment = own.momentum(*motion.acceleration)
+        moment = moment + cross(omega, angular_momentum) + cross(linear, momentum)
+        return cls(own, momentum, np.asarray(E), (force + cross(omega, momentum), moment))
+
+    def __add__(self, other: Subtree) -> Subtree:
+        return Subtree(
+            self.inertia + other.inertia,
+            self.momentum + other.momentum,
+            self.E + other.E,
+            add_spatial(self.wrench, other.wrench),
+        )
+
+
+class Response(NamedTuple):
+    """Spatial vectors of a joint whose products with the motions of its ancestors are derivatives."""
+
+    IS: SpatialVector
+    BS: Array
+    """Angular part of B' S; the linear part is zero."""
+    by_q: SpatialVector
+    by_v: SpatialVector
+
+
+class Entries(NamedTuple):
+    """Derivatives of the torque of one joint by the coordinates of another (...,) or of the base (..., 6)."""
+
+    by_q: Array
+    by_v: Array
+    by_a: Array
+
+
+def inverse_dynamics_derivatives(
+    mechanism: Mechanism, q: Array, v: Array, a: Array
+) -> tuple[Array, Array, Array]:
+    """Return dtau/dq, dtau/dv and dtau/da (..., nv, nv) in tree coordinates, at q (..., nq), v, a (..., nv).
+
+    With a floating base the derivative by q is the one by a displacement in the axes of the base.
+    """
+    bodies, first = mechanism.bodies, mechanism.nv - len(mechanism.bodies)
+    base = Base.of(q, v, mechanism.gravity) if mechanism.floating else None
+    motions = [fixed_root(mechanism.gravity) if base is None else base.motion(a)]
+    joints: list[JointMotion] = []
+    for index, body in enumerate(bodies):
+        placement = Placement.of(body, joint_value(mechanism, q, index))
+        speeds = (joint_value(mechanism, x, index) for x in (v, a))
+        motion, joint = move_child(body, placement, motions[body.parent + 1], *speeds)
+        motions.append(motion)
+        joints.append(joint)
+    inertias = (mechanism.root, *(body.inertia for body in bodies))
+    subtrees = [Subtree.of_body(x, motion) for x, motion in zip(inertias, motions, strict=True)]
+    for index in reversed(range(len(bodies))):
+        parent = bodies[index].parent + 1
+        subtrees[parent] = subtrees[parent] + subtrees[index + 1]
+
+    zero = 0 * np.sum(v, axis=-1)
+    tables = [[[zero] * mechanism.nv for _ in range(mechanism.nv)] for _ in range(3)]
+
+    def put(row: int, column: int, entries: tuple[Array, ...]) -> None:
+        for table, entry in zip(tables, entries, strict=True):
+            table[row][column] = entry + zero
+
+    for index in range(len(bodies)):
+        own, response = first + index, respond(subtrees[index + 1], joints[index])
+        row = index
+        while row != ROOT:
+            put(own, first + row, by_ancestor(response, joints[row]))
+            if row != index:
+                put(first + row, own, of_ancestor(response, joints[row]))
+            row = bodies[row].parent
+        if base is not None:
+            columns, rows = by_base(response.IS, response.BS, base), base_wrenches(response)
+            for k in range(6):
+                put(own, k, tuple(entry[..., k] for entry in columns))
+                put(k, own, tuple(entry[..., k] for entry in rows))
+    if base is not None:
+        for row, columns in enumerate(base_block(subtrees[0], base)):
+            for k in range(6):
+                put(row, k, tuple(entry[..., k] for entry in columns))
+    if not mechanism.nv:
+        empty = np.zeros((*q.shape[:-1], 0, 0))
+        return empty, empty, empty
+    by_q, by_v, M = (np.stack([np.stack(row, axis=-1) for row in table], axis=-2) for table in tables)
+    return by_q, by_v, M
+
+
+def fixed_root(gravity: Array) -> BodyMotion:
+    """Return the motion of a fixed root, which gravity (3,) accelerates upwards."""
+    zero = 0 * gravity
+    return BodyMotion(np.eye(3, dtype=int), zero, (zero, zero), (-gravity, zero))
+
+
+def move_child(
+    body: Body, placement: Placement, parent: BodyMotion, speed: Array, acceleration: Array
+) -> tuple[BodyMotion, JointMotion]:
+    """Return the motion of a body and of its joint, from those of its parent and the joint's rates (...,)."""
+    R, p = parent.R @ placement.R, parent.p + rotate(parent.R, placement.p)
+    axis = rotate(R, body.axis)
+    S = (cross(p, axis), axis) if body.revolute else (axis, 0 * axis)
+    first = _cross_motion(parent.velocity, S)
+    second = add_spatial(_cross_motion(parent.acceleration, S), _cross_motion(parent.velocity, first))
+    velocity = add_spatial(parent.velocity, _scaled(S, speed))
+    total = add_spatial(parent.acceleration, add_spatial(_scaled(S, acceleration), _scaled(first, speed)))
+    return BodyMotion(np.asarray(R), p, velocity, total), JointMotion(S, first, second)
+
+
+def respond(subtree: Subtree, joint: JointMotion) -> Response:
+    """Return the response of the subtree of a joint."""
+    inertia, f, E = subtree.inertia, subtree.momentum, subtree.E
+    (linear, angular), first, second = joint
+
+    def coriolis(e: Array) -> SpatialVector:
+        return cross(e, f), rotate(E, e)
+
+    force, moment = subtree.wrench
+    turned = cross(angular, force), cross(angular, moment) + cross(linear, force)
+    by_q = add_spatial(_twice(coriolis(first[1])), add_spatial(inertia.momentum(*second), turned))
+    by_v = _twice(add_spatial(coriolis(angular), inertia.momentum(*first)))
+    return Response(inertia.momentum(linear, angular), cross(f, linear) + rotate_back(E, angular), by_q, by_v)
+
+
+def by_ancestor(response: Response, joint: JointMotion) -> Entries:
+    """Return the derivatives of the torque of the responding joint by the coordinate of an ancestor."""
+    IS, BS = response.IS, response.BS
+    return Entries(
+        2 * _dot3(BS, joint.first[1]) + _dot(IS, joint.second),
+        2 * (_dot3(BS, joint.S[1]) + _dot(IS, joint.first)),
+        _dot(IS, joint.S),
+    )
+
+
+def of_ancestor(response: Response, joint: JointMotion) -> Entries:
+    """Return the derivatives of the torque of an ancestor by the coordinate of the responding joint."""
+    return Entries(*(_dot(joint.S, x) for x in (response.by_q, response.by_v, response.IS)))
+
+
+def base_wrenches(response: Response) -> Entries:
+    """Return the derivatives (..., 6) of the wrench of a floating base by the coordinate of the joint."""
+    return Entries(*(np.concatenate(x, axis=-1) for x in (response.by_q, response.by_v, response.IS)))
+
+
+def by_base(IS: SpatialVector, BS: Array, base: Base) -> Entries:
+    """Return the derivatives (..., 6) of a torque by the coordinates of a floating base.
+
+    `IS` and `BS` are those of the joint (`Response`).
+    """
+    force, moment = IS
+    by_rotation = cross(base.gravity, force)
+    by_omega = 2 * BS + cross(moment, base.omega) + cross(base.linear, force)
+    return Entries(
+        np.concatenate([0 * by_rotation, by_rotation], axis=-1),
+        np.concatenate([cross(force, base.omega), by_omega], axis=-1),
+        np.concatenate([force, moment], axis=-1),
+    )
+
+
+def base_block(subtree: Subtree, base: Base) -> list[Entries]:
+    """Return the derivatives of the wrench of a floating base by its own coordinates, row by row."""
+    axes, zero = np.eye(3, dtype=int) + 0 * subtree.E, 0 * subtree.momentum
+    unit = [*((axes[..., k, :], zero) for k in range(3)), *((zero, axes[..., k, :]) for k in range(3))]
+    rows = []
+    for linear, angular in unit:
+        BS = cross(subtree.momentum, linear) + rotate_back(subtree.E, angular)
+        rows.append(by_base(subtree.inertia.momentum(linear, angular), BS, base))
+    return rows
+
+
+def _cross_motion(a: SpatialVector, b: SpatialVector) -> SpatialVector:
+    """Return a x b for motions."""
+    return cross(a[1], b[0]) + cross(a[0], b[1]), cross(a[1], b[1])
+
+
+def _twice(a: SpatialVector) -> SpatialVector:
+    return 2 * a[0], 2 * a[1]
+
+
+def _scaled(a: SpatialVector, factor: Array) -> SpatialVector:
+    return a[0] * append_axis(factor), a[1] * append_axis(factor)
+
+
+def _dot3(a: Array, b: Array) -> Array:
+    return np.asarray(np.sum(a * b, axis=-1))
+
+
+def _dot(a: SpatialVector, b: SpatialVector) -> Array:
+    return _dot3(a[0], b[0]) + _dot3(a[1], b[1])
