@@ -128,7 +128,7 @@ ENGINES_FAULTS = (
     Fault(
         "mujoco_spatial_for_classical_acceleration",
         "dynx.engines.mujoco.backend",
-        right="work.a[:3] = work.R[ROOT] @ (a[:3] + np.cross(v[3:6], v[:3]))",
+        right="work.a[:3] = work.R[ROOT] @ (a[:3] + cross(v[3:6], v[:3]))",
         wrong="work.a[:3] = work.R[ROOT] @ a[:3]",
         test_file="tests/oracles/test_closed_forms.py",
         test="test_backend_matches_closed_form[free_body-mujoco]",

@@ -31,6 +31,7 @@ from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import cross, skew
 
 ORIGIN = np.zeros(3)
+XBODY = mujoco.mjtObj.mjOBJ_XBODY
 ALMOST_SINGULAR = int(mujoco.mjtWarning.mjWARN_INERTIA)
 
 
@@ -46,6 +47,7 @@ class _Workspace(local):
         self.q, self.v, self.a = data.qpos, data.qvel, data.qacc
         self.tau = data.qfrc_applied
         self.p, self.R = data.xpos, data.xmat.reshape(-1, 3, 3)
+        self.almost_singular = data.warning[ALMOST_SINGULAR]
         self.M = data.M
 
 
@@ -82,6 +84,7 @@ class MujocoBackend(Backend):
         self._nv = self._mechanism.nv
         self._floating = model.floating
         self._dynamics = ProjectedDynamics(self._engine, floating=model.floating)
+        self._gravity: Floats = np.array(model.gravity)
         self._masses_add = tree.masses_add
         self._total_mass = float(self._engine.body_subtreemass[ROOT])
         self._lower, self._upper = _places_of_triangle(self._engine)
@@ -121,13 +124,13 @@ class MujocoBackend(Backend):
     def _jacobian_derivative(self, q: Floats, v: Floats, frame: int, reference: Reference) -> Floats:
         work, body = self._set_state(q, v), self._bodies[frame]
         p, R = work.p[body], work.R[body]
-        J = self._columns(work, mujoco.mj_jac, p, body)
         dJ = self._columns(work, mujoco.mj_jacDot, p, body)
         if self._floating:
             # The base's linear columns are its axes, which rotate with it.
             dJ[:3, :3] = work.R[ROOT] @ skew(v[3:6])
         if reference == LOCAL_WORLD_ALIGNED:
             return dJ
+        J = self._columns(work, mujoco.mj_jac, p, body)
         velocity, omega = J[:3] @ v, J[3:] @ v
         if reference == "local":
             spin = skew(omega)
@@ -136,39 +139,50 @@ class MujocoBackend(Backend):
 
     def _frame_velocity(self, q: Floats, v: Floats, frame: int, reference: Reference) -> Floats:
         work, body = self._set_state(q, v), self._bodies[frame]
-        twist = np.zeros(6)
-        kind = mujoco.mjtObj.mjOBJ_XBODY
-        mujoco.mj_objectVelocity(self._engine, work.data, kind, body, twist, reference == "local")
-        angular, linear = twist[:3], twist[3:]
-        if reference == "world":
-            linear = linear + np.cross(work.p[body], angular)
-        return np.concatenate([linear, angular])
+        twist = np.empty(6)
+        mujoco.mj_objectVelocity(self._engine, work.data, XBODY, body, twist, reference == "local")
+        return _linear_first(twist, work.p[body] if reference == "world" else None)
+
+    def _frame_acceleration(
+        self, q: Floats, v: Floats, a: Floats, frame: int, reference: Reference
+    ) -> Floats:
+        work, body = self._set_state(q, v), self._bodies[frame]
+        self._set_acceleration(work, v, a)
+        found = np.empty(6)
+        # The classical acceleration of the origin, minus gravity.
+        mujoco.mj_objectAcceleration(self._engine, work.data, XBODY, body, found, reference == "local")
+        if reference == LOCAL_WORLD_ALIGNED:
+            return np.concatenate((found[3:] + self._gravity, found[:3]))
+        found[3:] += self._gravity if reference == "world" else self._gravity @ work.R[body]
+        twist = np.empty(6)
+        mujoco.mj_objectVelocity(self._engine, work.data, XBODY, body, twist, reference == "local")
+        found[3:] -= cross(twist[:3], twist[3:])
+        return _linear_first(found, work.p[body] if reference == "world" else None)
 
     # -- dynamics -----------------------------------------------------------------------------
 
     def _inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
         work = self._set_state(q, v)
-        work.a[:] = a
-        if self._floating:
-            work.a[:3] = work.R[ROOT] @ (a[:3] + np.cross(v[3:6], v[:3]))
-        mujoco.mj_rnePostConstraint(self._engine, work.data)
+        self._set_acceleration(work, v, a)
         return self._dynamics.torque(work.data, work.R[ROOT], work.p[ROOT])
 
     def _forward_dynamics(self, q: Floats, v: Floats, tau: Floats) -> Floats:
-        work = self._set_state(q, v)
-        work.tau[:] = tau
+        work = self._workspace
         if self._floating:
-            work.tau[:3] = work.R[ROOT] @ tau[:3]
-        warned = work.data.warning[ALMOST_SINGULAR]
-        before = warned.number
+            self._set_positions(q)
+            work.v[:], work.tau[:] = v, tau
+            work.v[:3], work.tau[:3] = work.R[ROOT] @ v[:3], work.R[ROOT] @ tau[:3]
+        else:
+            work.q[:], work.v[:], work.tau[:] = q, v, tau
+        before = work.almost_singular.number
         mujoco.mj_forward(self._engine, work.data)
-        if warned.number != before:
+        if work.almost_singular.number != before:
             # A pivot below 1e-15 was replaced by it, because of small units or a mass matrix that is not
             # positive definite.
             return super()._forward_dynamics(q, v, tau)
-        a = np.array(work.a)
+        a: Floats = work.a.copy()
         if self._floating:
-            a[:3] = work.R[ROOT].T @ a[:3] - np.cross(v[3:6], v[:3])
+            a[:3] = work.R[ROOT].T @ a[:3] - cross(v[3:6], v[:3])
         return a
 
     def _mass_matrix(self, q: Floats) -> Floats:
@@ -250,6 +264,13 @@ class MujocoBackend(Backend):
         mujoco.mj_comVel(self._engine, work.data)
         return work
 
+    def _set_acceleration(self, work: _Workspace, v: Floats, a: Floats) -> None:
+        """Compute the accelerations of all bodies, after `_set_state`."""
+        work.a[:] = a
+        if self._floating:
+            work.a[:3] = work.R[ROOT] @ (a[:3] + cross(v[3:6], v[:3]))
+        mujoco.mj_rnePostConstraint(self._engine, work.data)
+
     def _columns(self, work: _Workspace, function: Callable[..., None], point: Floats, body: int) -> Floats:
         """Return a Jacobian (6, nv) by MuJoCo, with the base's velocity in base axes."""
         J = np.zeros((6, self._nv))
@@ -257,3 +278,9 @@ class MujocoBackend(Backend):
         if self._floating:
             J[:3, :3] = J[:3, :3] @ work.R[ROOT]
         return J
+
+
+def _linear_first(spatial: Floats, p: Floats | None = None) -> Floats:
+    """Reorder an (angular, linear) vector (6,) of MuJoCo; with `p`, from there to the world's origin."""
+    angular, linear = spatial[:3], spatial[3:]
+    return np.concatenate([linear if p is None else linear + cross(p, angular), angular])

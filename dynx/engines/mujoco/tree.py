@@ -84,6 +84,8 @@ def build_tree(model: Model) -> MujocoTree:
     joints = [tree[model.frame_index(joint.child)] for joint in model.joints if joint.moves]
     if list(compiled.jnt_bodyid[model.floating :]) != joints or compiled.nv != mechanism.nv:
         raise EngineError(f"mujoco ordered the joints of {model.name} in an unexpected way")
+    # There is nothing to collide or to constrain; the engine does not need to look for it.
+    compiled.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
     masses = _write_inertias(model, compiled, tree)
     return MujocoTree(compiled, tree, masses_add=bool(masses.min() >= 0.0 and masses.sum() > mujoco.mjMINVAL))
 
