@@ -15,10 +15,12 @@ from typing import Any
 from dynx.agreement.report import AgreementDocument
 from dynx.bench.document import BenchDocument
 from dynx.cli.sim.document_types import SimDocument, TutorialDocument
+from dynx.cli.world.document import WorldDocument
 from dynx.doctor.formats.baseline import BaselineDocument
 from dynx.doctor.report_document import DoctorDocument
 from dynx.files.documents import json_schema
 from dynx.sim.scenario.document_type import ScenarioDocument
+from dynx.world.scene.document_types import SceneDocument
 
 FOLDER = Path(__file__).with_name("schemas")
 
@@ -31,7 +33,9 @@ def schemas() -> dict[str, dict[str, Any]]:
         "bench": json_schema(BenchDocument, "dynx bench --json"),
         "doctor": json_schema(DoctorDocument, "dynx doctor --json"),
         "scenario": json_schema(ScenarioDocument, "dynx.Scenario.to_json"),
+        "scene": json_schema(SceneDocument, "dynx.world.write_scene", omits_defaults=True),
         "sim": json_schema(SimDocument, "dynx sim --json"),
+        "world": json_schema(WorldDocument, "dynx world --json"),
         "tutorial": json_schema(TutorialDocument, "dynx sim --tutorial --json"),
     }
 

@@ -24,6 +24,8 @@ from dynx.files.documents import json_text
 from dynx.sim import Noise, Payload, Push
 from dynx.sim.scenario.scenario import Scenario
 from dynx.trajectory import cycloidal
+from dynx.world import read_scene
+from dynx.world.scene.writing import scene_document
 from tests.doctor.formats.reports import alike, differing, hostile, refused
 
 DOCS = Path(__file__).parents[1] / "docs"
@@ -141,3 +143,12 @@ def test_a_key_too_few_or_too_many_is_an_error_wherever_it_is() -> None:
         other[f"{key}_"] = None
         assert errors("doctor", fewer)
         assert errors("doctor", more)
+
+
+def test_documents_of_scenes_and_worlds_keep_their_schema() -> None:
+    pytest.importorskip("pybullet")
+    assert not errors("scene", scene_document(read_scene("stack")))
+    arguments = ["world", "stack", "--engine", "pybullet", "--duration", "0.01", "--json", "-"]
+    result = CliRunner().invoke(cli, arguments)
+    assert result.exit_code == 0, result.output
+    assert not errors("world", json.loads(result.stdout))

@@ -8,6 +8,7 @@ from dynx.sim.plants.disturbances import Push
 from dynx.sim.plants.model_error import Payload, plant_model
 from dynx.sim.plants.plant import Plant, StepResult
 from dynx.sim.plants.registry import register as register_plant
+from dynx.sim.plants.scene_plant import ScenePlant
 from dynx.sim.record.rollout import Rollout
 from dynx.sim.record.rollout_data import Summary
 from dynx.sim.scenario.scenario import Scenario
@@ -23,6 +24,7 @@ __all__ = [
     "Rollout",
     "RolloutInterrupted",
     "Scenario",
+    "ScenePlant",
     "Simulation",
     "Snapshot",
     "State",

@@ -16,6 +16,7 @@ from dynx.registry import DEFAULT_ENGINE
 from dynx.sim.loop.noise import Noise
 from dynx.sim.plants.disturbances import Push
 from dynx.sim.plants.model_error import MassScale, Payload
+from dynx.sim.plants.scene_plant import ScenePlant
 from dynx.sim.record.rollout import Rollout
 from dynx.sim.scenario.keywords import scenario_of
 from dynx.sim.scenario.scenario import Scenario
@@ -37,7 +38,7 @@ def simulate(
     controller: Controller[Any] | None = None,
     reference: Trajectory | ArrayLike | None = None,
     *,
-    plant: str = DEFAULT_ENGINE,
+    plant: str | ScenePlant = DEFAULT_ENGINE,
     integrator: str | None = None,
     controller_backend: str | None = None,
     dt: float = 1e-3,
@@ -77,8 +78,9 @@ def simulate(
     dynamics an `integrator` of dynx integrates: ``semi_implicit`` (the default: v then q, the scheme of
     Bullet), ``rk4``, or ``adaptive`` (SciPy's `method` with `rtol`, `atol`). ``plant="pybullet",
     integrator="rk4"`` is PyBullet's forward dynamics under RK4. Without a controller (None) the robot has no
-    motors. `reference` is a trajectory, one configuration (nq,) to hold, or None. The initial state is `q0`,
-    `v0`; by default the start of the reference, or the neutral configuration.
+    motors. A `ScenePlant` is the robot in a scene, with contacts; the rollout then has `surroundings`.
+    `reference` is a trajectory, one configuration (nq,) to hold, or None. The initial state is `q0`,
+    `v0`; by default that of the scene, the start of the reference, or the neutral configuration.
 
     **Time** [s]. `dt` is the step of the record; the plant takes `substeps` steps in each. The controller
     runs every `control_dt` (by default `dt`), and its torque is held in between. It measures the state as it

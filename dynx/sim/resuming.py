@@ -7,6 +7,7 @@ from typing import Any
 
 from dynx.errors import ArgumentError, shown
 from dynx.model import Model
+from dynx.sim.plants.scene_plant import ScenePlant
 from dynx.sim.record.rollout import Rollout
 from dynx.sim.scenario.documents import in_words
 from dynx.sim.scenario.scenario import Scenario
@@ -23,6 +24,11 @@ def require_rollout(rollout: object) -> None:
 
 def refuse_other_scenario(rollout: Rollout, scenario: Scenario) -> None:
     """Raise ArgumentError if the scenario of `rollout` differs from `scenario` in more than the duration."""
+    if isinstance(scenario.plant, ScenePlant):
+        raise ArgumentError(
+            "a rollout in a scene cannot be resumed, because its record does not have the engine's contact "
+            "forces: Simulation.save and restore continue exactly"
+        )
     then = rollout.scenario
     if then is None:
         raise ArgumentError("the rollout to resume has no scenario, so it cannot be compared")

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from dynx.control.base import Controller
 from dynx.control.engine_motors import EngineMotor
@@ -20,6 +19,7 @@ from dynx.sim.loop.references import SetpointOf, checked_reference
 from dynx.sim.plants.disturbances import Disturbances
 from dynx.sim.plants.model_error import plant_model
 from dynx.sim.plants.registry import default_integrator
+from dynx.sim.plants.scene_plant import ScenePlant
 from dynx.sim.scenario.documents import Unknown
 from dynx.sim.scenario.scenario import Scenario
 from dynx.simd.machine import require_memory
@@ -58,7 +58,7 @@ class Setup:
         )
         disturbances = disturbances_of(scenario, moved)
         limit = effort_limits_of(scenario)
-        start = _start(moved, setpoint_of, scenario.q0, scenario.v0)
+        start = _start(moved, setpoint_of, scenario)
         return cls(scenario, controller, clock, moved, setpoint_of, disturbances, limit, start)
 
     @property
@@ -128,11 +128,12 @@ def effort_limits_of(scenario: Scenario) -> Floats | None:
     return checked_limit(scenario.model, None if scenario.effort_limits is True else scenario.effort_limits)
 
 
-def _start(
-    model: Model, setpoint_of: SetpointOf | None, q0: ArrayLike | None, v0: ArrayLike | None
-) -> tuple[Floats, Floats]:
+def _start(model: Model, setpoint_of: SetpointOf | None, scenario: Scenario) -> tuple[Floats, Floats]:
+    q0, v0, plant = scenario.q0, scenario.v0, scenario.plant
     q, v = model.neutral(), np.zeros(model.nv)
-    if setpoint_of is not None:
+    if isinstance(plant, ScenePlant):
+        q, v = np.array(plant.scene_robot.q), np.array(plant.scene_robot.v)
+    elif setpoint_of is not None:
         first = setpoint_of(np.zeros(1))
         q, v = first.q[0], first.v[0]
     if q0 is not None:

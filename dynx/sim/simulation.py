@@ -6,7 +6,7 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -56,6 +56,8 @@ class Snapshot:
     loop_state: LoopState
     executor: tuple[str, ...]
     departures: tuple[str, ...]
+    plant_memory: Any = None
+    """What the plant needs besides the state, such as the world around the robot."""
 
     @property
     def time(self) -> float:
@@ -207,7 +209,7 @@ class Simulation:
             if loop_state is None:
                 loop_state = self._loop_state = self._loop.start(record)
             elif self._plant_needs_reset:
-                self._loop.place(loop_state.q, loop_state.v)
+                self._loop.recover(loop_state)
             self._plant_needs_reset = False
             if end == record.steps + 1 and not compiled:
                 self._loop.advance(record, loop_state, end, given)
@@ -294,6 +296,7 @@ class Simulation:
             self.scenario,
             "; ".join(self._executor),
             departures,
+            self._plant.surroundings(n),
         )
 
     def reset(self) -> State:
@@ -312,7 +315,8 @@ class Simulation:
         self._refuse_changed_controller()
         self._loop_state = self._loop_state or self._loop.start(self._record)
         record, state = self._record.copy(), replace(self._loop_state)
-        return Snapshot(self.scenario, record, state, self._executor, self._departures)
+        memory = self._plant.save()
+        return Snapshot(self.scenario, record, state, self._executor, self._departures, memory)
 
     def restore(self, snapshot: Snapshot) -> State:
         """Continue from a snapshot of this simulation or of another of the same robot and `dt`.
@@ -341,6 +345,8 @@ class Simulation:
         self._executor, self._departures = snapshot.executor, snapshot.departures
         loop_state = replace(snapshot.loop_state)
         self._loop.place(loop_state.q, loop_state.v)
+        if snapshot.plant_memory is not None:
+            self._plant.restore(snapshot.plant_memory)
         if "controller" in changed:
             controller = self._setup.controller
             loop_state.controller_state = None if controller is None else controller.initial_state()

@@ -1,20 +1,36 @@
 """Scenes of robots and bodies, and worlds in which they move and touch, on every engine alike."""
 
+from dynx.world.comparison import WorldComparison, compare_worlds
 from dynx.world.contacts import ClosestPoints, Contact, RayHits
 from dynx.world.loads import Wrench
 from dynx.world.motors import Motor, PDMotor, PositionMotor, TorqueMotor, VelocityMotor
 from dynx.world.registry import register as register_world
 from dynx.world.registry import unregister as unregister_world
 from dynx.world.registry import world_names
-from dynx.world.scene import Material, PointToPoint, Scene, SceneBody, SceneRobot, Weld, box, ground, sphere
+from dynx.world.scene import (
+    Material,
+    PointToPoint,
+    Scene,
+    SceneBody,
+    SceneRobot,
+    Weld,
+    box,
+    ground,
+    read_scene,
+    scene_names,
+    sphere,
+    write_scene,
+)
 from dynx.world.snapshot import Snapshot
 from dynx.world.state import BodyState, RobotState, WorldState
+from dynx.world.surroundings import ContactTable, Surroundings
 from dynx.world.world import World
 
 __all__ = [
     "BodyState",
     "ClosestPoints",
     "Contact",
+    "ContactTable",
     "Material",
     "Motor",
     "PDMotor",
@@ -26,16 +42,22 @@ __all__ = [
     "SceneBody",
     "SceneRobot",
     "Snapshot",
+    "Surroundings",
     "TorqueMotor",
     "VelocityMotor",
     "Weld",
     "World",
+    "WorldComparison",
     "WorldState",
     "Wrench",
     "box",
+    "compare_worlds",
     "ground",
+    "read_scene",
     "register_world",
+    "scene_names",
     "sphere",
     "unregister_world",
     "world_names",
+    "write_scene",
 ]

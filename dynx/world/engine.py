@@ -61,6 +61,11 @@ class WorldEngine(ABC):
         self.layout = layout
         self.dt = dt
 
+    @classmethod
+    def require_engine(cls) -> None:
+        """Raise NotInstalledError where the engine is not installed."""
+        return
+
     # -- motion -------------------------------------------------------------------------------
 
     @abstractmethod

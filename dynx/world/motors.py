@@ -42,9 +42,16 @@ LAW = ("target", "velocity", "kp", "kd", "torque", "max_force")
 """Numbers of a law."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Motor(ABC):
     """A motor on the joints named in `joints`, or on every joint of the robot."""
+
+    def __post_init__(self) -> None:
+        # Tuples compare and hash, as the scenes that have motors do; what is invalid is refused by `law`.
+        for each in fields(self):
+            value = getattr(self, each.name)
+            value = value.tolist() if isinstance(value, np.ndarray) else value
+            object.__setattr__(self, each.name, tuple(value) if isinstance(value, list) else value)
 
     @abstractmethod
     def law(self, model: Model) -> tuple[tuple[int, ...], JointLaw]:
@@ -68,7 +75,7 @@ class Motor(ABC):
         return joints, JointLaw(**{**absent, **numbers}, implicit=implicit)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class TorqueMotor(Motor):
     """A motor with a given `torque` [N m or N], one number or one per joint."""
 
@@ -80,7 +87,7 @@ class TorqueMotor(Motor):
         return self._law(model, implicit=False)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class PDMotor(Motor):
     """A motor with the torque kp (target - q) + kd (velocity - v) at the beginning of each step.
 
@@ -99,7 +106,7 @@ class PDMotor(Motor):
         return self._law(model, implicit=False)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class PositionMotor(Motor):
     """A motor with the torque kp (target - q) + kd (velocity - v) at the end of each step, stable at any
     gain; arguments as for `PDMotor`."""
@@ -115,7 +122,7 @@ class PositionMotor(Motor):
         return self._law(model, implicit=True)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class VelocityMotor(Motor):
     """A motor with the torque kd (velocity - v) at the end of each step, stable at any gain."""
 

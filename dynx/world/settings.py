@@ -75,3 +75,11 @@ def checked_settings(
         name: setting.checked(name, given[name]) if name in given else setting.default
         for name, setting in known.items()
     }
+
+
+def checked_switches(**switches: object) -> dict[str, bool]:
+    """Return switches of a world by name; ArgumentError for one that is neither True nor False."""
+    for name, value in switches.items():
+        if not isinstance(value, bool):
+            raise ArgumentError(f"{name} is {shown(value)}; wanted True or False")
+    return dict(switches)  # type: ignore[arg-type]

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from dynx.errors import ArgumentError, shown
+from dynx.files.reading import checked_path, open_regular, printable
 from dynx.files.writing import write_bytes
 
 MAGIC = b"dynx world 1\n"
@@ -79,31 +80,51 @@ def write_snapshot(path: str | os.PathLike[str], snapshot: Snapshot, world: dict
     write_bytes(path, MAGIC + hashlib.sha256(content).digest() + content)
 
 
-def read_snapshot(path: str | os.PathLike[str], data: bytes) -> tuple[Snapshot, dict[str, Any]]:
-    """Return the snapshot in the content of a file, and the document of its world.
+def read_snapshot(path: str | os.PathLike[str]) -> tuple[Snapshot, dict[str, Any]]:
+    """Return the snapshot of a file, and the document of its world.
 
-    Raises ArgumentError for a file that is not one, or that was damaged or cut.
+    Raises ArgumentError for a file that cannot be read, is not one of `write_snapshot`, or was damaged.
     """
-    name = shown(os.fspath(path), 300)
-    start = len(MAGIC) + 32
+    name = printable(checked_path(path))
+    try:
+        with open_regular(path) as file:
+            data = file.read(MAX_BYTES + 1)
+    except OSError as error:
+        raise ArgumentError(f"{name} cannot be read: {error.strerror or error}") from None
+    start = len(MAGIC) + hashlib.sha256().digest_size
     if not data.startswith(MAGIC):
         raise ArgumentError(f"{name} is no file that World.write wrote, or is of another version of it")
     content = data[start:]
-    if hashlib.sha256(content).digest() != data[len(MAGIC) : start]:
+    if len(data) > MAX_BYTES or hashlib.sha256(content).digest() != data[len(MAGIC) : start]:
         raise ArgumentError(f"{name} is damaged: its content does not match its checksum")
     length = int.from_bytes(content[:8], "little")
-    header = json.loads(content[8 : 8 + length])
+    try:
+        header = json.loads(content[8 : 8 + length])
+        return _snapshot(header, content[8 + length :]), _world(header["world"])
+    # The header of a file that was not written by dynx may have any form.
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        raise ArgumentError(f"{name} cannot be read as a world: {error}") from error
+
+
+def _snapshot(header: dict[str, Any], data: bytes) -> Snapshot:
     memory = tuple(
-        None if pair is None else tuple(tuple(map(float.fromhex, numbers)) for numbers in pair)
-        for pair in header["memory"]
+        None if pair is None else (_numbers(pair[0]), _numbers(pair[1])) for pair in header["memory"]
     )
-    snapshot = Snapshot(
-        header["engine"],
-        header["version"],
-        header["identity"],
-        header["steps"],
-        float.fromhex(header["time"]),
-        memory,  # type: ignore[arg-type]
-        content[8 + length :],
-    )
-    return snapshot, header["world"]
+    engine, version, identity = (str(header[name]) for name in ("engine", "version", "identity"))
+    time = float.fromhex(header["time"])
+    return Snapshot(engine, version, identity, int(header["steps"]), time, memory, data)
+
+
+def _world(given: dict[str, Any]) -> dict[str, Any]:
+    """Check the form of the document of a world."""
+    forms = {"scene": dict, "engine": str, "options": dict, "settings": dict}
+    for name, form in forms.items():
+        if not isinstance(given[name], form):
+            raise TypeError(f"{name} is {shown(given[name])}")
+    if given["options"].keys() & given["settings"].keys():
+        raise ValueError("options and settings have the same names")
+    return given
+
+
+def _numbers(texts: list[str]) -> tuple[float, ...]:
+    return tuple(map(float.fromhex, texts))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NoReturn
@@ -10,7 +11,7 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dynx.errors import ArgumentError, ClosedError, DivergedError, EngineError, shown
+from dynx.errors import ArgumentError, ClosedError, DivergedError, EngineError
 from dynx.model.configuration import positive_seconds, whole_number
 from dynx.spatial.scalar import Floats
 from dynx.world.commands import Act, Commands, MotorsOf
@@ -22,8 +23,10 @@ from dynx.world.preparation import prepare
 from dynx.world.queries import MAX_RAY_LENGTH, Queries
 from dynx.world.registry import world_class
 from dynx.world.scene import Scene
-from dynx.world.settings import checked_settings
-from dynx.world.snapshot import Snapshot
+from dynx.world.scene.reading import scene_from_document
+from dynx.world.scene.writing import scene_document
+from dynx.world.settings import checked_settings, checked_switches
+from dynx.world.snapshot import Snapshot, read_snapshot, write_snapshot
 from dynx.world.state import BodyState, RobotState, WorldState
 from dynx.world.state_checks import apply_state, checked_state
 
@@ -73,20 +76,18 @@ class World:
         """Name of the engine."""
         self.dt = positive_seconds("dt", dt)
         self.substeps = whole_number("substeps", substeps, 1)
-        switches = {
-            "collisions": collisions,
-            "joint_limits": joint_limits,
-            "joint_damping": joint_damping,
-            "joint_friction": joint_friction,
-        }
-        for name, value in switches.items():
-            if not isinstance(value, bool):
-                raise ArgumentError(f"{name} is {shown(value)}; wanted True or False")
+        switches = checked_switches(
+            collisions=collisions,
+            joint_limits=joint_limits,
+            joint_damping=joint_damping,
+            joint_friction=joint_friction,
+        )
         self.settings: Mapping[str, Any] = checked_settings(engine, self._kind.settings, settings)
         """The engine's settings in use, by name."""
         self.options: Mapping[str, Any] = {"dt": self.dt, "substeps": self.substeps, **switches}
         """Options of the world other than the engine's settings."""
         self._layout = prepare(scene, **switches)
+        self._scene_motors = {robot.name: robot.motors for robot in scene.robots if robot.motors}
         self._robots = {robot.name: k for k, robot in enumerate(self._layout.robots)}
         self._bodies = {body.name: k for k, body in enumerate(self._layout.bodies)}
         self._h = self.dt / self.substeps
@@ -99,6 +100,11 @@ class World:
         self._state: WorldState | None = None
         self._good: tuple[WorldState, int, float]
         self._note()
+
+    @property
+    def version(self) -> str:
+        """Version of the engine."""
+        return self._require().version
 
     # -- motion -------------------------------------------------------------------------------
 
@@ -117,7 +123,8 @@ class World:
         """Take `n` steps of `dt`, during which torques, motors and wrenches act.
 
         `torques` maps robots to generalised forces (nv,); `motors` maps robots to a motor or a list of them,
-        whose law is evaluated in every step of the engine. What is not given does not act.
+        whose law is evaluated in every step of the engine. The motors of the scene act on robots that
+        neither names; otherwise, what is not given does not act.
 
         Raises ArgumentError (and its kinds) for arguments, DivergedError where the state stops being finite:
         the world is then at the last state that was read or checked.
@@ -126,6 +133,8 @@ class World:
         if type(n) is not int or n < 1:
             n = whole_number("n", n, 1)
         count = n * self.substeps
+        if self._scene_motors:
+            motors = self._with_scene_motors(torques or {}, motors or {})
         held = not motors and not len(wrenches) and self._commands.hold(engine, torques, count)
         act = None if held else self._commands.plan(torques, motors, wrenches)
         try:
@@ -171,6 +180,11 @@ class World:
             self.step(1, **(fixed if loads is None else fixed | dict(loads(self))))
             if real_time:
                 time.sleep(max(0.0, began + (k + 1) * self.dt - time.perf_counter()))
+
+    def _with_scene_motors(self, torques: TorquesOf, motors: MotorsOf) -> MotorsOf:
+        """Add the motors of the scene on robots without torques and motors."""
+        given = {*torques, *motors}
+        return {**{name: each for name, each in self._scene_motors.items() if name not in given}, **motors}
 
     def _step_one_by_one(self, engine: WorldEngine, count: int, act: Act) -> None:
         for taken in range(count):
@@ -249,6 +263,38 @@ class World:
         self._start, self._steps = snapshot.time, snapshot.steps
         self._state = None
         self._note()
+
+    def write(self, path: str | os.PathLike[str]) -> None:
+        """Write the world and its state to a file, from which `read` continues bit for bit.
+
+        Raises DescriptionError for a collision shape that a file cannot have, and ArgumentError for a file
+        that cannot be written.
+        """
+        world = {
+            "scene": scene_document(self.scene),
+            "engine": self.engine,
+            "options": dict(self.options),
+            "settings": dict(self.settings),
+        }
+        write_snapshot(path, self.save(), world)
+
+    @classmethod
+    def read(cls, path: str | os.PathLike[str]) -> World:
+        """Return the world of a file that `write` wrote, in its state; meshes are read from their files.
+
+        Read files that you trust only: a changed state can end the process inside an engine. Raises
+        ArgumentError for a file that is damaged, of another version of the engine, or whose meshes changed.
+        """
+        snapshot, given = read_snapshot(path)
+        world = cls(
+            scene_from_document(given["scene"]), given["engine"], **given["options"], **given["settings"]
+        )
+        try:
+            world.restore(snapshot)
+        except BaseException:
+            world.close()
+            raise
+        return world
 
     @property
     def identity(self) -> str:

@@ -21,6 +21,9 @@ COMMANDS = {
         "dynx.cli.doctor.command:doctor", "Find, prove and mend the causes of differences between engines."
     ),
     "sim": LazyCommand("dynx.cli.sim.command:sim", "Simulate a robot under a controller."),
+    "world": LazyCommand(
+        "dynx.cli.world.command:world", "Run a scene with contacts on several engines, and compare them."
+    ),
     "bench": LazyCommand("dynx.cli.bench.command:bench", "Time the engines on a robot and this machine."),
     "explain": LazyCommand(
         "dynx.cli.queries.commands:explain", "Explain a rule of the doctor, such as DX101."

@@ -10,27 +10,32 @@ from xml.sax.saxutils import quoteattr
 from dynx.errors import DescriptionError
 from dynx.model.elements import Inertial, Joint, JointDynamics, Pose, Vector
 from dynx.model.urdf.joints import FRAME_TAG, LOCKED_TAG
+from dynx.model.urdf.shapes import write_shapes
 from dynx.model.urdf.values import name_fault
 
 if TYPE_CHECKING:
     from dynx.model.model import Model
 
 
-def write_urdf(model: Model) -> str:
+def write_urdf(model: Model, *, geometry: bool = False) -> str:
     """Return `model` as URDF text in canonical form; `dynx.load` of it returns an equal model.
 
     URDF cannot express the base, its pose and gravity, so the same must be given to ``load`` again. A locked
     joint is written as fixed, with its position in the extension ``<dynx_locked>``; an added frame as a
     massless link on a fixed joint, marked by ``<dynx_frame>``; other readers ignore both marks. An infinite
     limit is written as the largest double, which every engine can read; limits of `MAX_MAGNITUDE` or more are
-    read back as infinite. Raises DescriptionError for a name that URDF cannot express.
+    read back as infinite. With `geometry` the visual and collision shapes are written too. Raises
+    DescriptionError for a name that URDF cannot express, and with `geometry` as `write_shapes` does.
     """
     lines = ['<?xml version="1.0"?>', f"<robot name={_name(model.name)}>"]
     for link in model.links:
-        if link.inertial is None:
-            lines.append(f"  <link name={_name(link.name)}/>")
+        content = [] if link.inertial is None else [*_inertial(link.inertial)]
+        if geometry:
+            content += write_shapes(model.geometry, link.name, _origin)
+        if content:
+            lines += [f"  <link name={_name(link.name)}>", *content, "  </link>"]
         else:
-            lines += [f"  <link name={_name(link.name)}>", *_inertial(link.inertial), "  </link>"]
+            lines.append(f"  <link name={_name(link.name)}/>")
     for joint in model.joints:
         lines += _joint(joint)
     taken = {joint.name for joint in model.joints}

@@ -91,6 +91,11 @@ class Loop:
         with plant_errors(type(self.plant), "cannot be reset"):
             self.plant.reset(q, v)
 
+    def recover(self, loop_state: LoopState) -> None:
+        """Return the plant to the state of the last complete step. Raises EngineError where that fails."""
+        with plant_errors(type(self.plant), "cannot be reset"):
+            self.plant.recover(loop_state.q, loop_state.v)
+
     def advance(self, record: Record, loop_state: LoopState, end: int, given: Floats | None = None) -> None:
         """Step from the last state of `record`, which the plant must be in, to step `end`.
 

@@ -12,6 +12,7 @@ from dynx.errors import DynxError, EngineError, UnsupportedFeatureError
 from dynx.model import Model
 from dynx.sim.plants.disturbances import Disturbances
 from dynx.spatial.scalar import Floats
+from dynx.world.surroundings import Surroundings
 
 
 class StepResult(NamedTuple):
@@ -26,11 +27,12 @@ class StepResult(NamedTuple):
     tau: Floats
     """Torque (nv,) of the motors at the beginning of the step [N m or N]."""
     contacts: tuple[Any, ...] = ()
-    """Contacts during the step; no plant of dynx has contacts yet."""
+    """Contacts (`dynx.world.Contact`) during the step, of a plant in a scene."""
 
 
 class Plant(ABC):
-    """A robot in motion. A step depends on the state and on its arguments only, not on earlier steps.
+    """A robot in motion. A step depends on the state and on its arguments only, not on earlier steps; a
+    plant for which this does not hold has a memory, which `save` returns.
 
     A plant of your own is a subclass with this constructor. `dynx.sim.register_plant` adds it under a
     name, and a package offers it by an entry point in the group ``dynx.plants``.
@@ -67,6 +69,22 @@ class Plant(ABC):
                 f"{controller.name} is a motor inside PyBullet, so it runs with plant='pybullet' and "
                 "its own stepper only"
             )
+
+    def recover(self, q: Floats, v: Floats) -> None:
+        """Return to the state q, v of the last complete step, after a step that failed or was interrupted."""
+        self.reset(q, v)
+
+    def save(self) -> Any:
+        """Return what determines later steps besides q and v; None for nothing."""
+        return None
+
+    def restore(self, memory: Any) -> None:
+        """Return to what `save` returned; q and v were set before. Nothing is to be done without a memory."""
+        return
+
+    def surroundings(self, n: int) -> Surroundings | None:
+        """Return the record of what surrounds the robot, over the `n` steps taken; None for nothing."""
+        return None
 
     @abstractmethod
     def close(self) -> None:

@@ -19,6 +19,8 @@ from dynx.registry import ClassRegistry
 from dynx.sim.plants.disturbances import Disturbances
 from dynx.sim.plants.integrated import SCHEMES, IntegratedPlant
 from dynx.sim.plants.plant import Plant, plant_errors
+from dynx.sim.plants.scene_plant import ScenePlant
+from dynx.sim.plants.world_plant import WorldPlant
 
 GROUP = "dynx.plants"
 """The entry-point group: ``name = "package.module:PlantClass"``."""
@@ -66,14 +68,16 @@ def register(name: str, loader: Callable[[], type[Plant]]) -> None:
     _steppers.register(name, loader)
 
 
-def default_integrator(name: str) -> str:
+def default_integrator(name: str | ScenePlant) -> str:
     """Return ``engine`` for a plant with a stepper of its own, otherwise ``semi_implicit``."""
+    if isinstance(name, ScenePlant):
+        return ENGINE
     has_stepper = name in BUILT_IN if name in BACKENDS else name in plant_names()
     return ENGINE if has_stepper else "semi_implicit"
 
 
 def make_plant(
-    name: str,
+    name: str | ScenePlant,
     model: Model,
     disturbances: Disturbances,
     dt: float,
@@ -82,7 +86,9 @@ def make_plant(
     substeps: int,
     options: Mapping[str, Any],
 ) -> Plant:
-    """Make the plant `name` with `integrator`; `options` are those of the adaptive integrator.
+    """Make the plant `name`, or that of a robot in a scene, with `integrator`.
+
+    `options` are those of the adaptive integrator.
 
     Raises ArgumentError for an integrator that the plant does not have, UnknownBackendError for an unknown
     name, NotInstalledError where its engine is missing, EngineError where its constructor fails.
@@ -90,6 +96,13 @@ def make_plant(
     whole_number("substeps", substeps, 1)
     if integrator not in INTEGRATORS:
         raise ArgumentError(f"integrator is {shown(integrator)}; wanted one of {', '.join(INTEGRATORS)}")
+    if isinstance(name, ScenePlant):
+        if integrator != ENGINE:
+            raise ArgumentError(
+                f"integrator is {shown(integrator)}; a plant in a scene has the engine's own stepper, which "
+                f"is integrator={ENGINE!r}"
+            )
+        return WorldPlant(name, model, disturbances, dt, substeps=substeps)
     if integrator == ENGINE:
         try:
             kind = plant_class(name)

@@ -10,6 +10,7 @@ The first line names the columns, in this order; ``c`` stands for each coordinat
 | `energy` | kinetic and potential | J |
 | `a:c`, `tau:c` | acceleration and torque in the step that starts at this time | per second squared; N m, N |
 | `saturated:c` | 1 if the motor was at its limit in that step, otherwise 0 | |
+| `contact:name:x`, `:y`, `:z` | sum of the contact forces on a body or link in that step, world axes | N |
 
 Coordinates have the names of their joints. A floating base comes first: `x y z qx qy qz qw` in positions (of
 the base frame in the world, quaternion xyzw) and `vx vy vz wx wy wz` in rates (in the base frame). No step
@@ -41,13 +42,20 @@ def write_csv(rollout: RolloutData, file: BinaryIO) -> None:
     blocks.append(rollout.energy[:, None])
     states = np.concatenate(blocks, axis=1)
     acting = np.concatenate([rollout.a, rollout.tau], axis=1)
-    nothing = [""] * 3 * model.nv
+    forces = np.zeros((len(rollout), 0))
+    if rollout.surroundings is not None:
+        contacts = rollout.surroundings.contacts
+        columns += [f"contact:{name}:{axis}" for name in contacts.names for axis in "xyz"]
+        each = [contacts.force_on(name, len(rollout)) for name in contacts.names]
+        forces = np.concatenate([forces, *each], axis=1)
+    nothing = [""] * (3 * model.nv + forces.shape[1])
     file.write((",".join(_quoted(column) for column in columns) + "\n").encode())
     for k, state in enumerate(states):
         cells = [repr(x) for x in state.tolist()]
         if k < len(acting):
             cells += [repr(x) for x in acting[k].tolist()]
             cells += ["1" if flag else "0" for flag in rollout.saturated[k].tolist()]
+            cells += [repr(x) for x in forces[k].tolist()]
         else:
             cells += nothing
         file.write((",".join(cells) + "\n").encode())

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
 
 from dynx.errors import ArgumentError, shown
-from dynx.files.arrays import read_arrays
+from dynx.files.arrays import ArrayFile, read_arrays
 from dynx.files.reading import checked_path
 from dynx.files.writing import atomic_file
 from dynx.model.documents import robot_document, robot_from_document
@@ -20,6 +21,7 @@ from dynx.sim.record.mcap_file import write_mcap
 from dynx.sim.record.rollout_data import RolloutData
 from dynx.sim.scenario.scenario import Scenario
 from dynx.trajectory.base import Setpoint
+from dynx.world.surroundings import from_document, to_document
 
 SCHEMA = "dynx.rollout/2"
 """Name and version of the layout of the file."""
@@ -54,17 +56,19 @@ def load(path: str | os.PathLike[str]) -> dict[str, Any]:
     The model is read from the URDF text in the file; no array is unpickled.
     """
     file = read_arrays(path, "a rollout", SCHEMA)
-    try:
+    with _reading("the robot", file):
         robot: dict[str, Any] = json.loads(file.text("robot"))
         model = robot_from_document(robot)
         scenario = None if robot["scenario"] is None else Scenario.from_dict(robot["scenario"])
         executor, departures = str(robot["executor"]), tuple(map(str, robot["departures"]))
-    # The errors of dynx are among them; the others are those of JSON in another form.
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
-        raise ArgumentError(f"the robot in {file.path} cannot be read: {error}") from error
     nq, nv = model.nq, model.nv
+    around = robot.get("surroundings")
     tau = file.array("tau", (None, nv))
     n = len(tau)
+    surroundings = None
+    if around is not None:
+        with _reading("the record of the scene", file):
+            surroundings = from_document(around, file, n)
     reference = None
     if all(entry in file.arrays for entry in REFERENCE):
         q, v, a = REFERENCE
@@ -82,7 +86,18 @@ def load(path: str | os.PathLike[str]) -> dict[str, Any]:
         "scenario": scenario,
         "executor": executor,
         "departures": departures,
+        "surroundings": surroundings,
     }
+
+
+@contextmanager
+def _reading(part: str, file: ArrayFile) -> Iterator[None]:
+    """Turn the errors of a part of the file into ArgumentError."""
+    try:
+        yield
+    # The errors of dynx are among them; the others are those of JSON in another form.
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        raise ArgumentError(f"{part} in {file.path} cannot be read: {error}") from error
 
 
 def _write_npz(rollout: RolloutData, file: BinaryIO) -> None:
@@ -94,6 +109,9 @@ def _write_npz(rollout: RolloutData, file: BinaryIO) -> None:
         "departures": list(rollout.departures),
     }
     arrays: dict[str, Any] = {name: getattr(rollout, name) for name in ARRAYS}
+    if rollout.surroundings is not None:
+        robot["surroundings"], of_scene = to_document(rollout.surroundings)
+        arrays |= of_scene
     if rollout.reference is not None:
         arrays.update(zip(REFERENCE, rollout.reference, strict=True))
     # The energy is for programs without dynx; `load` computes it again.

@@ -26,6 +26,9 @@ STYLES = ("-", "--", "-.", ":")
 PER_COLUMN = 12
 """Largest number of curves in one panel."""
 
+MAX_CONTACT_CURVES = 8
+"""Largest number of bodies and links whose contact forces are drawn: those with the largest."""
+
 NEAR = 0.5
 """Share of an effort limit that a torque must reach for the limit to be drawn; one far above the curves
 would flatten them."""
@@ -53,16 +56,47 @@ def plot(rollout: RolloutData, path: str | os.PathLike[str] | None = None) -> An
     axes of the base. The figure belongs to no window. Raises NotInstalledError without matplotlib
     (``pip install 'dynx[plot]'``), ArgumentError for a file that cannot be written.
     """
-    columns = _columns(rollout.model)
-    figure = new_figure(7.0 if len(columns) == 1 else 3.8 * len(columns), 8.0)
-    panels = figure.subplots(3, len(columns), sharex=True, squeeze=False)
+    columns, forces = _columns(rollout.model), _contact_forces(rollout)
+    rows = 4 if forces else 3
+    figure = new_figure(7.0 if len(columns) == 1 else 3.8 * len(columns), 8.0 if rows == 3 else 10.5)
+    panels = figure.subplots(rows, len(columns), sharex=True, squeeze=False)
     frame = _controlled_frame(rollout)
-    for column, axes in zip(columns, panels.T, strict=True):
+    for column, axes in zip(columns, panels[-3:].T, strict=True):
         _draw(rollout, column, axes, frame if column is columns[0] else None)
+    if forces:
+        _draw_contacts(rollout.t[:-1], forces, panels[0])
     figure.suptitle(_plain(_title(rollout)), fontsize=11)
     if path is not None:
         save_figure(figure, path)
     return figure
+
+
+def _contact_forces(rollout: RolloutData) -> dict[str, Floats]:
+    """Return the magnitudes (n,) of the contact forces [N], of the bodies and links with the largest."""
+    if rollout.surroundings is None:
+        return {}
+    contacts = rollout.surroundings.contacts
+    # The ground's force is the sum of the others.
+    moving = {name for name in contacts.names if "/" in name or name in rollout.surroundings.bodies}
+    found = {
+        name: np.linalg.norm(contacts.force_on(name, len(rollout)), axis=1)
+        for name in contacts.names
+        if name in moving
+    }
+    largest = sorted(found, key=lambda name: -float(np.max(found[name])))[:MAX_CONTACT_CURVES]
+    return {name: found[name] for name in sorted(largest)}
+
+
+def _draw_contacts(t: Floats, forces: dict[str, Floats], panels: Any) -> None:
+    """Draw the contact forces in the first panel of a row, and hide the others."""
+    for k, (name, force) in enumerate(forces.items()):
+        style = {"color": f"C{k % 10}", "linestyle": STYLES[k // 10 % len(STYLES)], "lw": 1.1}
+        panels[0].step(t, force, where="post", label=_plain(name), **style)
+    panels[0].set_ylabel("contact force [N]")
+    panels[0].grid(visible=True, color="0.9")
+    panels[0].legend(fontsize=7, ncols=2)
+    for panel in panels[1:]:
+        panel.set_visible(False)
 
 
 def _columns(model: Model) -> list[Column]:
@@ -152,7 +186,7 @@ def _draw(rollout: RolloutData, column: Column, axes: Any, frame: str | None) ->
             list(curves),
             loc="upper center",
             bbox_to_anchor=(0.5, -0.2),
-            ncols=min(4 if len(axes[0].figure.axes) == 3 else 2, len(curves)),
+            ncols=min(4 if len(axes[0].figure.axes) <= 4 else 2, len(curves)),
             fontsize=8,
         )
 

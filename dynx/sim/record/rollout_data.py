@@ -18,6 +18,7 @@ from dynx.sim.scenario.scenario import Scenario
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint
 from dynx.trajectory.limit_check import UNITS
+from dynx.world.surroundings import Surroundings
 
 Self = TypeVar("Self", bound="RolloutData")
 
@@ -96,6 +97,8 @@ class RolloutData:
     """Executor of the steps: ``staged``, or ``plain`` with the reason; semicolons separate several."""
     departures: tuple[str, ...] = ()
     """Interventions that make the record differ from its scenario, such as torques given by the caller."""
+    surroundings: Surroundings | None = None
+    """Contacts, bodies and other robots, of a rollout in a scene (`ScenePlant`)."""
 
     def __len__(self) -> int:
         """Return the number of steps."""
@@ -155,7 +158,8 @@ class RolloutData:
         reference = None if self.reference is None else Setpoint(*(x[: n + 1] for x in self.reference))
         states = {name: getattr(self, name)[: n + 1] for name in ("t", "q", "v")}
         steps = {name: getattr(self, name)[:n] for name in ("a", "tau", "saturated")}
-        return replace(self, **states, **steps, reference=reference)
+        around = None if self.surroundings is None else self.surroundings.first(n)
+        return replace(self, **states, **steps, reference=reference, surroundings=around)
 
     def __repr__(self) -> str:
         return f"<Rollout of {self.model.name}: {len(self)} steps to {self.t[-1]:.6g} s>"

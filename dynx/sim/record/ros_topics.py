@@ -24,6 +24,13 @@ A floating base adds these topics. Its pose is in the frame ``world`` (``map`` i
 | `/base/reference_acceleration` | geometry_msgs/AccelStamped | likewise |
 | `/base/error` | geometry_msgs/TwistStamped | the displacement [m, rad] from the base to the reference |
 
+A rollout in a scene adds a topic for each body and link that touches something; characters that ROS does not
+allow in names become ``_``:
+
+| topic | type | content |
+|---|---|---|
+| `/contacts/NAME` | geometry_msgs/WrenchStamped | sum of the contact forces on it, in world axes |
+
 Every number is the float64 of the record. The torque of a step is stamped with the time at which the step
 begins, so the last state has no effort. Mimic joints are not listed, because the description defines how they
 follow others.
@@ -31,7 +38,9 @@ follow others.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import re
+from collections.abc import Callable, Iterator, Sequence
+from itertools import count
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -70,7 +79,8 @@ class Topic(NamedTuple):
 
 def topics_of(rollout: RolloutData) -> list[Topic]:
     """Return all topics of `rollout`; one whose layout differs at the last state appears twice."""
-    return [*_joint_topics(rollout), *(_base_topics(rollout) if rollout.model.floating else [])]
+    base = _base_topics(rollout) if rollout.model.floating else []
+    return [*_joint_topics(rollout), *base, *_contact_topics(rollout)]
 
 
 def _joint_topics(rollout: RolloutData) -> list[Topic]:
@@ -129,6 +139,27 @@ def _base_topics(rollout: RolloutData) -> list[Topic]:
             topic("/base/error", "geometry_msgs/TwistStamped", _stamped(base, rollout.error[:, :6])),
         ]
     return topics
+
+
+def _contact_topics(rollout: RolloutData) -> list[Topic]:
+    if rollout.surroundings is None:
+        return []
+    contacts, n = rollout.surroundings.contacts, len(rollout)
+    world = "world" if rollout.model.root != "world" else "map"
+    topics, taken = [], set()
+    for name in contacts.names:
+        allowed = re.sub(r"[^A-Za-z0-9_/]", "_", name)
+        # Names that differ in other characters only get a number.
+        topic = next(each for each in _numbered(f"/contacts/{allowed}") if each not in taken)
+        taken.add(topic)
+        force = np.concatenate([contacts.force_on(name, n), np.zeros((n, 3))], axis=1)
+        topics.append(Topic(topic, "geometry_msgs/WrenchStamped", 0, n, _stamped(world, force)))
+    return topics
+
+
+def _numbered(name: str) -> Iterator[str]:
+    yield name
+    yield from (f"{name}_{k}" for k in count(2))
 
 
 def _joint_states(

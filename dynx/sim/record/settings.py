@@ -19,7 +19,7 @@ def settings_of(scenario: Scenario) -> dict[str, Any]:
     disturbances = disturbances_of(scenario, moved)
     friction = disturbances.friction
     return {
-        "plant": scenario.plant,
+        "plant": str(scenario.plant),
         "integrator": scenario.with_defaults().integrator,
         "controller": "none" if controller is None else controller.name,
         "law": _numbers(controller),

@@ -18,7 +18,7 @@ class ScenarioDocument(TypedDict):
     model: dict[str, Any]
     controller: dict[str, Any] | None
     reference: list[Any] | dict[str, Any] | None
-    plant: str
+    plant: str | dict[str, Any]
     integrator: str | None
     substeps: int
     method: str

@@ -31,6 +31,9 @@ from dynx.model import Model
 from dynx.model.documents import robot_document, robot_from_document
 from dynx.sim.loop.controller_checks import controller_numbers
 from dynx.trajectory.base import Trajectory
+from dynx.world.scene import Scene
+from dynx.world.scene.reading import scene_from_document
+from dynx.world.scene.writing import scene_document
 
 MAX_WORDS_LENGTH = 80
 """Largest number of characters of a value in a message."""
@@ -42,6 +45,7 @@ Document = Any
 """Value that `json.dumps` accepts."""
 
 FINGERPRINT, CLASS, MODEL, ARRAY, CONTROLLER = "fingerprint", "class", "model", "array", "controller"
+SCENE = "scene"
 
 REGISTRATION = (
     "a controller of your own is rebuilt if its class is a frozen dataclass with a name, which an entry "
@@ -124,6 +128,8 @@ def encode(value: Any, model: Model | None = None) -> Document:
         return value.name
     if isinstance(value, Unknown):
         return json.loads(value.text)
+    if isinstance(value, Scene):
+        return {SCENE: scene_document(value)}
     if isinstance(value, Controller):
         document = _controller(value, model)
         if document is not None:
@@ -171,6 +177,8 @@ def in_words(document: Document) -> str:
             return f"{name}({', '.join(f'{key} {in_words(each)}' for key, each in given.items())})"
         if document == SAME_MODEL or MODEL in document:
             return "of the scenario's model" if document == SAME_MODEL else "of another model"
+        if SCENE in document:
+            return f"the scene {shown(document[SCENE].get('name', 'scene'))}"
         for kind in (ARRAY, "float", "mapping"):
             document = document.get(kind, document) if isinstance(document, dict) else document
     if isinstance(document, str):
@@ -203,6 +211,8 @@ def _decoded(document: Document, model: Model | None) -> Any:
             return Unknown(name, json.dumps(document))
     if document == SAME_MODEL and model is not None:
         return model
+    if SCENE in document:
+        return scene_from_document(document[SCENE])
     if MODEL in document:
         return robot_from_document(document[MODEL])
     if FINGERPRINT in document:

@@ -22,6 +22,7 @@ from dynx.sim.loop.noise import Noise
 from dynx.sim.plants.disturbances import Push
 from dynx.sim.plants.model_error import MassScale, Payload
 from dynx.sim.plants.registry import default_integrator
+from dynx.sim.plants.scene_plant import ScenePlant
 from dynx.sim.scenario.documents import (
     ARRAY,
     CLASS,
@@ -69,7 +70,7 @@ class Scenario:
     """None for a robot without motors; `Unknown` only in a scenario that was read from a file."""
     reference: Trajectory | ArrayLike | Unknown | None = None
     _: KW_ONLY
-    plant: str = DEFAULT_ENGINE
+    plant: str | ScenePlant = DEFAULT_ENGINE
     integrator: str | None = None
     substeps: int = 1
     method: str = "DOP853"
@@ -114,8 +115,17 @@ class Scenario:
                 raise ArgumentError(f"{name} is {shown(getattr(self, name))}; wanted True or False")
         if self.effort_limits is None:
             raise ArgumentError("effort_limits is None; wanted True (those of the model), False or numbers")
-        if not isinstance(self.plant, str):
-            raise ArgumentError(f"plant is of type {type(self.plant).__name__}; wanted the name of a plant")
+        if isinstance(self.plant, ScenePlant):
+            self.plant.require_model(self.model)
+            if self.position_limits:
+                raise ArgumentError(
+                    "position_limits are the stops of dynx; a plant in a scene has those of its engine, by "
+                    "ScenePlant(joint_limits=True)"
+                )
+        elif not isinstance(self.plant, str):
+            raise ArgumentError(
+                f"plant is of type {type(self.plant).__name__}; wanted the name of a plant or a ScenePlant"
+            )
         if not isinstance(self.noise, Noise | Unknown | None):
             raise ArgumentError(f"noise is {shown(self.noise)}; wanted a dynx.Noise, as in Noise(v=1e-3)")
         for name in NUMBERS:

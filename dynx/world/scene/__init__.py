@@ -2,8 +2,22 @@
 
 from dynx.world.scene.bodies import SceneBody, box, ground, sphere
 from dynx.world.scene.constraints import PointToPoint, Weld
+from dynx.world.scene.files import read_scene, scene_names, write_scene
 from dynx.world.scene.material import Material
 from dynx.world.scene.robots import SceneRobot
 from dynx.world.scene.scene import Scene
 
-__all__ = ["Material", "PointToPoint", "Scene", "SceneBody", "SceneRobot", "Weld", "box", "ground", "sphere"]
+__all__ = [
+    "Material",
+    "PointToPoint",
+    "Scene",
+    "SceneBody",
+    "SceneRobot",
+    "Weld",
+    "box",
+    "ground",
+    "read_scene",
+    "scene_names",
+    "sphere",
+    "write_scene",
+]

@@ -11,6 +11,7 @@ from dynx.errors import ArgumentError, ShapeError, shown
 from dynx.model import Model
 from dynx.model.configuration import checked_array, checked_q, neutral
 from dynx.model.model import refuse_other_than_model
+from dynx.world.motors import Motor, combine
 from dynx.world.scene.material import DEFAULT_MATERIAL, Material, checked_material
 from dynx.world.scene.names import checked_name
 
@@ -22,7 +23,7 @@ class SceneRobot:
     `q` is the neutral configuration and `v` zero where they are None. A fixed base is at `model.base_pose`, a
     floating one where `q` places it. `materials` are those of single links, by name; the others have
     `material`. Links of one robot collide with one another only with `self_collision`, and never where a
-    joint connects them.
+    joint connects them. `motors` act in every step of a world that is given none for this robot.
     """
 
     name: str
@@ -32,6 +33,7 @@ class SceneRobot:
     material: Material = DEFAULT_MATERIAL
     materials: tuple[tuple[str, Material], ...] = ()
     self_collision: bool = False
+    motors: tuple[Motor, ...] = ()
 
     def __post_init__(self) -> None:
         checked_name("robot", self.name)
@@ -45,6 +47,12 @@ class SceneRobot:
         checked_material(f"material of {what}", self.material)
         if not isinstance(self.self_collision, bool):
             raise ArgumentError(f"self_collision of {what} is {shown(self.self_collision)}; wanted a bool")
+        motors = (self.motors,) if isinstance(self.motors, Motor) else tuple(self.motors)
+        for motor in motors:
+            if not isinstance(motor, Motor):
+                raise ArgumentError(f"motors of {what} holds {shown(motor)}; wanted a Motor")
+        combine(self.model, motors)
+        object.__setattr__(self, "motors", motors)
         pairs = self.materials.items() if isinstance(self.materials, Mapping) else self.materials
         materials = dict(pairs)
         for link, material in materials.items():

@@ -41,6 +41,10 @@ class BulletWorld(WorldEngine):
     name = "pybullet"
     settings: ClassVar[Mapping[str, Setting]] = SETTINGS
 
+    @classmethod
+    def require_engine(cls) -> None:
+        bullet()
+
     def __init__(self, layout: Layout, dt: float, settings: Mapping[str, Any]) -> None:
         super().__init__(layout, dt, settings)
         engine = bullet()
@@ -58,7 +62,7 @@ class BulletWorld(WorldEngine):
             raise
         self._loaded_robots: list[BulletRobot] = []
         self._pushed: list[BulletBody] = []
-        self._corrected = [robot for robot in self._robots if robot.corrected]
+        self._coupled = [robot for robot in self._robots if robot.coupled]
         self._touch()
 
     def _load(self, folder: Path, settings: Mapping[str, Any]) -> None:
@@ -119,10 +123,10 @@ class BulletWorld(WorldEngine):
                     robot.apply()
                 for body in self._pushed:
                     body.push()
-                for robot in self._corrected:
+                for robot in self._coupled:
                     robot.before_step()
                 step(physicsClientId=number)
-                for robot in self._corrected:
+                for robot in self._coupled:
                     robot.after_step()
         except self._client.errors as error:
             raise self._client.failure("stepSimulation", error) from error

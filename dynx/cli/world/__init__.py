@@ -1,0 +1,1 @@
+"""``dynx world``: a scene run by one engine or several."""

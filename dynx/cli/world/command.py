@@ -1,0 +1,98 @@
+"""Declaration of ``dynx world``."""
+
+from __future__ import annotations
+
+import click
+
+from dynx.cli.shell.lazy import runs
+from dynx.cli.shell.options import GroupedCommand, group, json_option, name_list
+
+
+def setting(word: str) -> tuple[str, str]:
+    """Read ``name=value`` or ``engine.name=value``."""
+    name, equals, value = word.partition("=")
+    if not equals or not name.strip() or not value.strip():
+        raise click.BadParameter(f"{word!r} is not of the form name=value, such as solver_iterations=100")
+    return name.strip(), value.strip()
+
+
+@click.command(cls=GroupedCommand)
+@click.argument("scene", metavar="SCENE")
+@group(
+    "Run",
+    click.option(
+        "--engine",
+        "engines",
+        type=name_list,
+        metavar="A,B,C",
+        help="Engines that run the scene (default: all that are installed).",
+    ),
+    click.option(
+        "--duration",
+        type=click.FloatRange(min=0.0, min_open=True),
+        default=1.0,
+        show_default=True,
+        help="Time to simulate [s].",
+    ),
+    click.option(
+        "--dt",
+        type=click.FloatRange(min=0.0, min_open=True),
+        default=1e-3,
+        show_default=True,
+        help="Step of the world [s].",
+    ),
+    click.option(
+        "--substeps",
+        type=click.IntRange(min=1),
+        default=1,
+        show_default=True,
+        help="Number of steps of the engine in each step.",
+    ),
+    click.option(
+        "--set",
+        "settings",
+        type=setting,
+        multiple=True,
+        metavar="NAME=VALUE",
+        help="Setting of an engine (docs/world.md), as name=value for all engines that have it or "
+        "engine.name=value; may be given several times.",
+    ),
+    click.option(
+        "--within",
+        type=click.FloatRange(min=0.0),
+        metavar="METRES",
+        help="Largest distance between two engines' motions; beyond it the exit code is 1.",
+    ),
+)
+@group(
+    "Output",
+    json_option,
+    click.option("--plot", "plot_path", metavar="FILE", help="File for a plot of the distances over time."),
+    click.option(
+        "--save",
+        "save_path",
+        metavar="FILE",
+        help="File for the final state of the world, which dynx.world.World.read continues; with several "
+        "engines the name of each stands before the suffix.",
+    ),
+    click.option(
+        "--quiet", is_flag=True, help="No tables and no progress: only errors, files and the exit code."
+    ),
+)
+@runs("dynx.cli.world.run:world")
+def world() -> None:
+    """Run a scene of robots and bodies with contacts, and compare the engines.
+
+    SCENE is a scene file (TOML or JSON) or the name of a scene of dynx; --help of a wrong name lists them.
+    The final states are printed, the contacts of the last step, and for every two engines how far apart
+    their motions are over time.
+
+    Exit code 0; 1 if an engine ended early or the engines are farther apart than --within; 2 for a scene
+    that cannot be run. After Ctrl-C the exit code is 130.
+
+    \b
+    Examples:
+      dynx world stack
+      dynx world bowling --engine pybullet,mujoco --duration 3 --plot apart.png
+      dynx world my_scene.toml --engine mujoco --set impratio=100 --json
+    """

@@ -1,0 +1,171 @@
+"""Run of ``dynx world``: the scene in each engine, with progress, tables, files and exit code."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from dynx.cli.shell.exits import BAD_INPUT, DONE, NEGATIVE_RESULT, complain, failure_of
+from dynx.cli.shell.interruption import interruptible
+from dynx.cli.shell.output_file import check_json, check_writable
+from dynx.cli.shell.progress import progress_bar
+from dynx.cli.shell.terminal import present
+from dynx.cli.world.document import document
+from dynx.cli.world.plot import plot
+from dynx.cli.world.tables import show
+from dynx.errors import (
+    ArgumentError,
+    BackendError,
+    DynxError,
+    NotInstalledError,
+    UnknownNameError,
+    nearest,
+    shown,
+)
+from dynx.files.figures import picture_format
+from dynx.world import World, world_names
+from dynx.world.comparison import WorldComparison, compare_worlds
+from dynx.world.registry import world_class
+from dynx.world.scene import read_scene
+from dynx.world.settings import Setting
+
+WORDS = {"true": True, "yes": True, "on": True, "false": False, "no": False, "off": False}
+"""Words for truth values of settings."""
+
+
+def world(
+    scene: str,
+    engines: tuple[str, ...] | None,
+    duration: float,
+    dt: float,
+    substeps: int,
+    settings: Sequence[tuple[str, str]],
+    within: float | None,
+    json_path: str | None,
+    plot_path: str | None,
+    save_path: str | None,
+    quiet: bool,
+) -> int:
+    """Run the scene in each engine and compare; return the exit code."""
+    check_json(json_path)
+    for path in (plot_path, save_path):
+        if path is not None:
+            check_writable(path)
+    if plot_path is not None:
+        picture_format(plot_path)
+    chosen = engines or installed_engines()
+    described = read_scene(scene)
+    given = settings_by_engine(chosen, settings)
+    errors: list[DynxError] = []
+
+    def save(world: World) -> None:
+        if save_path is not None:
+            error = failure_of(world.write, _own_path(save_path, world.engine, len(chosen)))
+            errors.extend([error] if error is not None else [])
+
+    with interruptible() as interruption:
+        total = round(1e3 * duration) * len(chosen)
+        before: dict[str, float] = {}
+        with progress_bar(total, enabled=not quiet) as advance:
+
+            def progress(engine: str, time: float) -> None:
+                before[engine] = time
+                advance(round(1e3 * sum(before.values())), f"{engine}, simulated time [ms]")
+
+            comparison = compare_worlds(
+                described,
+                chosen,
+                duration,
+                dt,
+                substeps=substeps,
+                settings=given,
+                finish=save,
+                progress=progress,
+            )
+        interruption.finishing = True
+        if plot_path is not None:
+            error = failure_of(plot, comparison, plot_path)
+            errors.extend([error] if error is not None else [])
+        made = document(comparison)
+        error = present(made, _nothing if quiet else show, json_path)
+        errors.extend([error] if error is not None else [])
+    for each in errors:
+        complain(str(each))
+    if errors:
+        return BAD_INPUT
+    return NEGATIVE_RESULT if _is_negative(comparison, within) else DONE
+
+
+def installed_engines() -> tuple[str, ...]:
+    """Return the names of the engines that are installed. Raises NotInstalledError if none is."""
+    found = []
+    for name in world_names():
+        try:
+            world_class(name).require_engine()
+        except BackendError:
+            continue
+        found.append(name)
+    if not found:
+        raise NotInstalledError("no engine for worlds is installed: pip install 'dynx[mujoco]'")
+    return tuple(found)
+
+
+def settings_by_engine(engines: Sequence[str], given: Sequence[tuple[str, str]]) -> dict[str, dict[str, Any]]:
+    """Return the settings of each engine from ``name=value`` and ``engine.name=value``.
+
+    Raises UnknownNameError for a setting that no engine has, ArgumentError for a value of another type.
+    """
+    known: dict[str, Mapping[str, Setting]] = {name: world_class(name).settings for name in engines}
+    found: dict[str, dict[str, Any]] = {name: {} for name in engines}
+    for full, text in given:
+        engine, dot, name = full.rpartition(".")
+        if dot and engine not in known:
+            raise UnknownNameError(
+                f"--set {shown(full)}: {shown(engine)} does not run{nearest(engine, known)}"
+            )
+        having = [each for each in ([engine] if dot else engines) if name in known[each]]
+        if not having:
+            names = sorted({each for settings in known.values() for each in settings})
+            raise UnknownNameError(
+                f"--set {shown(full)}: {', '.join([engine] if dot else engines)} has no such setting"
+                f"{nearest(name, names)}"
+            )
+        for each in having:
+            found[each][name] = _value(known[each][name], full, text)
+    return found
+
+
+def _value(setting: Setting, name: str, text: str) -> Any:
+    """Return the text as a value of the type of the setting."""
+    if isinstance(setting.default, bool):
+        if text.lower() not in WORDS:
+            raise ArgumentError(f"--set {name}={text}: wanted true or false")
+        return WORDS[text.lower()]
+    if isinstance(setting.default, str):
+        return text
+    try:
+        if isinstance(setting.default, tuple):
+            return [float(word) for word in text.replace(",", " ").split()]
+        return int(text) if isinstance(setting.default, int) else float(text)
+    except ValueError:
+        kind = "a whole number" if isinstance(setting.default, int) else "a number"
+        raise ArgumentError(f"--set {name}={text}: wanted {kind}") from None
+
+
+def _own_path(path: str, engine: str, engines: int) -> str:
+    """Return the file of one engine: with several, its name stands before the suffix."""
+    if engines == 1:
+        return path
+    file = Path(path)
+    return str(file.with_name(f"{file.stem}.{engine}{file.suffix}"))
+
+
+def _is_negative(comparison: WorldComparison, within: float | None) -> bool:
+    if any(run.error is not None for run in comparison.runs):
+        return True
+    return within is not None and any(max(each.distance) > within for each in comparison.separations)
+
+
+def _nothing(*_: object) -> None:
+    """Show nothing."""

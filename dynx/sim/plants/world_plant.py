@@ -1,0 +1,146 @@
+"""A robot in a world of an engine as a plant: the world's steps, with contacts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from dynx.backends import Backend, backend
+from dynx.errors import EngineError, UnsupportedFeatureError
+from dynx.model import Model
+from dynx.model.elements import JointDynamics
+from dynx.model.geometry import Geometry
+from dynx.registry import DEFAULT_ENGINE
+from dynx.sim.plants.disturbances import Disturbances
+from dynx.sim.plants.plant import Plant, StepResult
+from dynx.sim.plants.scene_plant import ScenePlant
+from dynx.spatial.scalar import Floats
+from dynx.world import Contact, World
+from dynx.world.scene import Scene
+from dynx.world.snapshot import Snapshot
+from dynx.world.state import WorldState
+from dynx.world.surroundings import ContactTable, Surroundings
+
+
+class Memory(NamedTuple):
+    """What a world plant needs, beside q and v, to continue: the world, and the record so far."""
+
+    snapshot: Snapshot
+    contacts: tuple[tuple[Contact, ...], ...]
+    states: tuple[WorldState, ...]
+
+
+class WorldPlant(Plant):
+    """A robot of a scene in `dynx.world.World`.
+
+    Joint damping, and dry friction without a slip speed, are those of the engine; friction with a slip speed
+    and pushes are torques, as in the other plants. Contacts and the motion of the surroundings are recorded.
+    """
+
+    def __init__(
+        self, place: ScenePlant, model: Model, disturbances: Disturbances, dt: float, *, substeps: int = 1
+    ) -> None:
+        """Raises UnsupportedFeatureError for armature, otherwise as `World` does."""
+        super().__init__(model, disturbances, dt, substeps=substeps)
+        if disturbances.has_armature:
+            raise UnsupportedFeatureError(
+                "a world has no armature: simulate with another plant, or write the inertia into the links"
+            )
+        assert place.robot is not None
+        self._robot = place.robot
+        self._world = World(
+            _scene_of(place, model, disturbances),
+            place.engine,
+            dt,
+            substeps=substeps,
+            joint_limits=place.joint_limits,
+            joint_damping=disturbances.sticks,
+            joint_friction=disturbances.sticks,
+            **dict(place.settings),
+        )
+        self._others = tuple(robot.name for robot in place.scene.robots if robot.name != place.robot)
+        self._moving = tuple(body.name for body in place.scene.bodies if not body.fixed)
+        self._contacts: list[tuple[Contact, ...]] = []
+        self._states: list[WorldState] = []
+        self._lazy_engine: Backend | None = None
+
+    def reset(self, q: Floats, v: Floats) -> None:
+        """Put the scene at its start, and the robot at q, v."""
+        self._world.reset()
+        self._world.set_state(robots={self._robot: (q, v)})
+        self._contacts, self._states = [], [self._world.state]
+
+    def recover(self, q: Floats, v: Floats) -> None:
+        """Stay in the state q, v of the last complete step.
+
+        Raises EngineError if the world is in another state, because q and v do not determine the rest.
+        """
+        now = self._world.state.robots[self._robot]
+        if not (np.array_equal(now.q, q) and np.array_equal(now.v, v)):
+            raise EngineError(
+                "the world was interrupted in the middle of a step: Simulation.reset starts again, "
+                "Simulation.restore returns to what was saved"
+            )
+
+    def step(self, t: float, tau: Floats) -> StepResult:
+        acting = tau
+        if self.disturbances.has_torque:
+            now = self._states[-1].robots[self._robot]
+            acting = tau + self.disturbances.torque(self._engine, t, now.q, now.v)
+        world = self._world
+        before = self._states[-1].robots[self._robot].v
+        world.step(1, {self._robot: acting})
+        state, contacts = world.state, world.contacts()
+        self._states.append(state)
+        self._contacts.append(contacts)
+        q, v = state.robots[self._robot]
+        return StepResult(q, v, (v - before) / self.dt, tau, contacts)
+
+    def save(self) -> Memory:
+        return Memory(self._world.save(), tuple(self._contacts), tuple(self._states))
+
+    def restore(self, memory: Memory) -> None:
+        self._world.restore(memory.snapshot)
+        self._contacts, self._states = list(memory.contacts), list(memory.states)
+
+    def surroundings(self, n: int) -> Surroundings:
+        states = self._states[: n + 1]
+        return Surroundings(
+            ContactTable.of(self._contacts[:n]),
+            {name: np.array([each.bodies[name].T_world_body for each in states]) for name in self._moving},
+            {name: np.array([each.robots[name].q for each in states]) for name in self._others},
+        )
+
+    def close(self) -> None:
+        self._world.close()
+        if self._lazy_engine is not None:
+            self._lazy_engine.close()
+
+    @property
+    def _engine(self) -> Backend:
+        """The backend whose Jacobians turn pushes into torques."""
+        if self._lazy_engine is None:
+            self._lazy_engine = backend(DEFAULT_ENGINE, self.model, validate=False)
+        return self._lazy_engine
+
+
+def _scene_of(place: ScenePlant, model: Model, disturbances: Disturbances) -> Scene:
+    """Return the scene with the robot's masses and joint friction as the simulation has them."""
+    friction, base = disturbances.friction, 6 if model.floating else 0
+    own = place.scene_robot.model
+    joints = [joint for joint in model.joints if joint.moves]
+    # Coefficients of the description belong to all moving joints, given ones to those with a coordinate.
+    owners = joints if friction.to_tree is not None else list(model.coordinate_joints)
+    pairs = zip(friction.damping[base:].tolist(), friction.friction[base:].tolist(), strict=True)
+    laws = {
+        joint.name: JointDynamics(damping=damping, friction=dry)
+        for joint, (damping, dry) in zip(owners, pairs, strict=True)
+    }
+    moved = tuple(replace(joint, dynamics=laws.get(joint.name, JointDynamics())) for joint in model.joints)
+    # A payload is a link more, without shapes.
+    geometry = Geometry(own.geometry.links).for_links(link.name for link in model.links)
+    simulated = replace(place.scene_robot, model=replace(model, joints=moved, geometry=geometry))
+    robots = tuple(simulated if robot.name == place.robot else robot for robot in place.scene.robots)
+    return replace(place.scene, robots=robots)

@@ -1,0 +1,163 @@
+"""One scene run by several engines, and how far apart their motions are."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack, closing
+from dataclasses import dataclass, field
+from itertools import combinations, pairwise
+from typing import Any
+
+import numpy as np
+
+from dynx.errors import ArgumentError, DynxError
+from dynx.model.configuration import positive_seconds, whole_number
+from dynx.model.mechanism import ROOT
+from dynx.rbd.kinematics import body_poses
+from dynx.spatial.scalar import Floats
+from dynx.world.contacts import Contact
+from dynx.world.scene import Scene
+from dynx.world.state import WorldState
+from dynx.world.world import World
+
+PARTED = (1e-3, 1e-2, 1e-1)
+"""Distances [m] of which a comparison gives the first time."""
+
+SAMPLES = 200
+"""Number of times at which states are compared, unless there are fewer steps."""
+
+
+@dataclass(frozen=True, eq=False)
+class EngineRun:
+    """The run of a scene by one engine; it ends early where the engine fails."""
+
+    engine: str
+    version: str
+    times: Floats
+    """Times (k,) [s] of the states."""
+    states: tuple[WorldState, ...]
+    contacts: tuple[Contact, ...]
+    """Contacts of the last step."""
+    settings: Mapping[str, Any]
+    error: DynxError | None = None
+    """Why the engine ended early."""
+
+
+@dataclass(frozen=True, eq=False)
+class Separation:
+    """Distance between the motions of one scene in two engines."""
+
+    engines: tuple[str, str]
+    times: Floats
+    """Times (k,) [s]."""
+    distance: Floats
+    """Largest distance (k,) between the positions of a body, or of a moving link, in the two engines [m]."""
+    farthest: tuple[str, ...]
+    """Name of that body or ``robot/link`` at each time."""
+
+    def first_beyond(self, distance: float) -> float | None:
+        """Return the first of the times at which the distance is larger; None if it never is."""
+        beyond = np.flatnonzero(self.distance > distance)
+        return float(self.times[beyond[0]]) if beyond.size else None
+
+
+@dataclass(frozen=True, eq=False)
+class WorldComparison:
+    """Runs of one scene by several engines."""
+
+    scene: Scene
+    dt: float
+    substeps: int
+    duration: float
+    runs: tuple[EngineRun, ...]
+    separations: tuple[Separation, ...] = field(default=())
+
+    def __repr__(self) -> str:
+        engines = ", ".join(run.engine for run in self.runs)
+        return f"<WorldComparison of {self.scene.name} by {engines}, {self.duration:.6g} s>"
+
+
+def compare_worlds(
+    scene: Scene,
+    engines: Sequence[str],
+    duration: float,
+    dt: float = 1e-3,
+    *,
+    substeps: int = 1,
+    settings: Mapping[str, Mapping[str, Any]] | None = None,
+    samples: int = SAMPLES,
+    finish: Callable[[World], object] | None = None,
+    progress: Callable[[str, float], object] | None = None,
+) -> WorldComparison:
+    """Run a scene for `duration` [s] in each engine, and compare the states at `samples` times.
+
+    The engines step `dt` / `substeps`; `settings` are those of `World` by engine. `finish` is called with
+    each world at its end, and `progress` with the name of the engine and the time reached. An engine that
+    fails in a step ends its run there. Raises the errors of `World` for a scene that cannot be opened.
+    """
+    n_steps = max(1, round(positive_seconds("duration", duration) / positive_seconds("dt", dt)))
+    ends = np.unique(np.linspace(0, n_steps, whole_number("samples", samples, 1) + 1).round().astype(int))
+    unknown = set(settings or {}) - set(engines)
+    if unknown:
+        raise ArgumentError(f"settings are given for {', '.join(sorted(unknown))}, which does not run")
+    with ExitStack() as stack:
+        # All are opened first, so that a scene that one engine refuses costs no time in the others.
+        worlds = [
+            stack.enter_context(
+                closing(World(scene, name, dt, substeps=substeps, **dict((settings or {}).get(name, {}))))
+            )
+            for name in engines
+        ]
+        runs = tuple(_run(world, ends.tolist(), finish, progress) for world in worlds)
+    pairs = combinations(runs, 2)
+    return WorldComparison(
+        scene, dt, substeps, n_steps * dt, runs, tuple(_separation(scene, a, b) for a, b in pairs)
+    )
+
+
+def _run(
+    world: World,
+    ends: Sequence[int],
+    finish: Callable[[World], object] | None,
+    progress: Callable[[str, float], object] | None,
+) -> EngineRun:
+    states, error = [world.state], None
+    try:
+        for begin, end in pairwise(ends):
+            world.step(end - begin)
+            states.append(world.state)
+            if progress is not None:
+                progress(world.engine, world.time)
+    except DynxError as raised:
+        error = raised
+    contacts = world.contacts()
+    if finish is not None:
+        finish(world)
+    times = np.array([state.time for state in states])
+    return EngineRun(world.engine, world.version, times, tuple(states), contacts, world.settings, error)
+
+
+def _separation(scene: Scene, one: EngineRun, other: EngineRun) -> Separation:
+    k = min(len(one.states), len(other.states))
+    names, paths = zip(*(_positions(scene, run.states[:k]) for run in (one, other)), strict=True)
+    apart = np.linalg.norm(paths[0] - paths[1], axis=2)
+    worst = np.argmax(apart, axis=1)
+    farthest = tuple(names[0][index] if names[0] else "" for index in worst.tolist())
+    return Separation((one.engine, other.engine), one.times[:k], apart[np.arange(k), worst], farthest)
+
+
+def _positions(scene: Scene, states: Sequence[WorldState]) -> tuple[list[str], Floats]:
+    """Return the names of what moves, and its positions (states, names, 3)."""
+    paths: dict[str, Floats] = {}
+    for body in scene.bodies:
+        if not body.fixed:
+            paths[body.name] = np.array([state.bodies[body.name].T_world_body[:3, 3] for state in states])
+    for robot in scene.robots:
+        mechanism = robot.model.mechanism
+        q = np.array([state.robots[robot.name].q for state in states])
+        poses = body_poses(mechanism, q if mechanism.coupling is None else mechanism.coupling.expand_q(q))
+        if robot.model.floating:
+            paths[f"{robot.name}/{robot.model.root}"] = poses[ROOT][1]
+        moving = (joint.child for joint in robot.model.joints if joint.moves)
+        paths |= {f"{robot.name}/{link}": poses[k][1] for k, link in enumerate(moving)}
+    return [*paths], np.stack([*paths.values(), np.zeros((len(states), 3))][: len(paths) or 1], axis=1)

@@ -1,0 +1,98 @@
+"""Files of scenes: TOML, or JSON with the same keys."""
+
+from __future__ import annotations
+
+import json
+import os
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from dynx.errors import ArgumentError, NotInstalledError, RobotNotFoundError, nearest, shown
+from dynx.files.reading import checked_path, printable, read_file
+from dynx.files.writing import write_bytes
+from dynx.model.library import own_roots
+from dynx.world.scene.reading import scene_from_document
+from dynx.world.scene.scene import Scene
+from dynx.world.scene.writing import scene_document
+
+SUFFIXES = (".toml", ".json")
+
+SCENES = "scenes"
+"""Folder of the scenes among the models of dynx."""
+
+
+def read_scene(source: str | os.PathLike[str]) -> Scene:
+    """Read a scene from a ``.toml`` or ``.json`` file, or one of the scenes of dynx by its name.
+
+    docs/world.md describes the keys. Robots are names or files beside the scene, meshes files beside it.
+    Raises RobotNotFoundError where nothing is there, ArgumentError and its kinds for a file that is no scene,
+    with the place in it, and the errors of `dynx.load` for its robots.
+    """
+    path = Path(checked_path(source))
+    if path.suffix.lower() not in SUFFIXES:
+        path = _named(str(path))
+    name = printable(str(path))
+    text = _text(read_file(str(path)), name)
+    try:
+        document = _parsed(text, path.suffix.lower())
+    except (ValueError, RecursionError) as error:
+        raise ArgumentError(f"{name} cannot be read: {error}") from None
+    try:
+        return scene_from_document(document, str(path.parent))
+    except ArgumentError as error:
+        raise type(error)(f"{name}: {error}") from error
+
+
+def write_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
+    """Write a scene to a ``.toml`` or ``.json`` file, atomically; `read_scene` returns an equal one.
+
+    Robots are written as URDF text, and meshes by their full paths. Raises ArgumentError for another suffix
+    or a file that cannot be written, NotInstalledError for ``.toml`` without tomli-w (``pip install
+    'dynx[world]'``).
+    """
+    file = checked_path(path)
+    suffix = Path(file).suffix.lower()
+    if suffix not in SUFFIXES:
+        raise ArgumentError(f"a scene is written as .toml or .json, not as {shown(Path(file).name)}")
+    document = scene_document(scene)
+    if suffix == ".json":
+        write_bytes(file, json.dumps(document, indent=1, allow_nan=False).encode())
+        return
+    try:
+        import tomli_w
+    except ImportError as error:
+        raise NotInstalledError("a scene in TOML needs tomli-w: pip install 'dynx[world]'") from error
+    write_bytes(file, tomli_w.dumps(document, multiline_strings=True).encode())
+
+
+def scene_names() -> tuple[str, ...]:
+    """Return the names of the scenes that come with dynx."""
+    return tuple(sorted(path.stem for root in own_roots() for path in (root / SCENES).glob("*.toml")))
+
+
+def _named(name: str) -> Path:
+    for root in own_roots():
+        path = root / SCENES / f"{name}.toml"
+        if name in scene_names() and path.is_file():
+            return path
+    known = scene_names()
+    raise RobotNotFoundError(f"no scene {shown(name)}{nearest(name, known)}; a file ends in .toml or .json")
+
+
+def _text(data: bytes, name: str) -> str:
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise ArgumentError(f"{name} is not text in UTF-8: {error}") from None
+
+
+def _parsed(text: str, suffix: str) -> Any:
+    if suffix == ".json":
+        return json.loads(text)
+    # Part of Python from 3.11 on; before that, tomli is the same module.
+    for name in ("tomllib", "tomli"):
+        if find_spec(name) is not None:
+            return import_module(name).loads(text)
+    raise NotInstalledError("a scene in TOML needs tomli: pip install 'dynx[world]'")

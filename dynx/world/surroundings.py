@@ -1,0 +1,171 @@
+"""What a rollout in a scene records besides its robot: contacts, bodies, and the other robots."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dynx.errors import UnknownNameError, nearest, shown
+from dynx.files.arrays import ArrayFile
+from dynx.spatial.scalar import Floats
+from dynx.world.contacts import Contact
+
+Integers = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class ContactTable:
+    """All contacts of a rollout, a row each, in the order of the steps.
+
+    Row k is a contact between ``names[a[k]]`` and ``names[b[k]]`` during step ``step[k]``, which begins at
+    ``t[step[k]]``; all else is as in `dynx.world.Contact`, in world axes.
+    """
+
+    names: tuple[str, ...]
+    """Bodies and links (``robot/link``) that touch at some time."""
+    step: Integers
+    a: Integers
+    b: Integers
+    point_a: Floats
+    """Points (m, 3) on the surfaces of a [m]."""
+    point_b: Floats
+    normal: Floats
+    """Unit vectors (m, 3) from b to a."""
+    distance: Floats
+    """Distances (m,) [m]; negative for penetration."""
+    normal_force: Floats
+    """Forces (m,) along the normals, on a [N]."""
+    friction_force: Floats
+    """Forces (m, 3) on a, perpendicular to the normals [N]."""
+
+    @classmethod
+    def of(cls, steps: Sequence[Sequence[Contact]]) -> ContactTable:
+        """Return the table of the contacts of each step."""
+        listed = [(k, contact) for k, contacts in enumerate(steps) for contact in contacts]
+        names = tuple(sorted({name for _, contact in listed for name in (contact.a, contact.b)}))
+        number = {name: k for k, name in enumerate(names)}
+        vectors = {
+            name: np.array([getattr(contact, name) for _, contact in listed]).reshape(-1, 3)
+            for name in ("point_a", "point_b", "normal", "friction_force")
+        }
+        numbers = {
+            name: np.array([getattr(contact, name) for _, contact in listed], dtype=np.float64)
+            for name in ("distance", "normal_force")
+        }
+        return cls(
+            names=names,
+            step=np.array([k for k, _ in listed], dtype=np.int64),
+            a=np.array([number[contact.a] for _, contact in listed], dtype=np.int64),
+            b=np.array([number[contact.b] for _, contact in listed], dtype=np.int64),
+            **vectors,
+            **numbers,
+        )
+
+    def __len__(self) -> int:
+        """Return the number of rows."""
+        return len(self.step)
+
+    def __getitem__(self, step: int) -> tuple[Contact, ...]:
+        """Return the contacts of one step."""
+        return tuple(self._row(k) for k in np.flatnonzero(self.step == step).tolist())
+
+    def _row(self, k: int) -> Contact:
+        return Contact(
+            self.names[self.a[k]],
+            self.names[self.b[k]],
+            self.point_a[k],
+            self.point_b[k],
+            self.normal[k],
+            float(self.distance[k]),
+            float(self.normal_force[k]),
+            self.friction_force[k],
+        )
+
+    def force_on(self, name: str, n: int) -> Floats:
+        """Return the sum of the contact forces on a body or link in each of `n` steps (n, 3) [N].
+
+        Raises UnknownNameError for a name that is in no contact.
+        """
+        if name not in self.names:
+            raise UnknownNameError(f"no contact of {shown(name)}{nearest(name, self.names)}")
+        number, total = self.names.index(name), np.zeros((n, 3))
+        force = self.normal_force[:, None] * self.normal + self.friction_force
+        for side, sign in ((self.a, 1.0), (self.b, -1.0)):
+            rows = side == number
+            np.add.at(total, self.step[rows], sign * force[rows])
+        return total
+
+    def first(self, n: int) -> ContactTable:
+        """Return the contacts of the first `n` steps."""
+        end = int(np.searchsorted(self.step, n))
+        arrays = {each.name: getattr(self, each.name)[:end] for each in fields(self) if each.name != "names"}
+        return ContactTable(self.names, **arrays)
+
+
+@dataclass(frozen=True, eq=False)
+class Surroundings:
+    """Contacts of n steps, and at n + 1 times the poses of bodies and the configurations of other robots."""
+
+    contacts: ContactTable
+    bodies: Mapping[str, Floats]
+    """Pose (n + 1, 4, 4) of each body of the scene that moves."""
+    robots: Mapping[str, Floats]
+    """Configurations (n + 1, nq) of the other robots of the scene."""
+
+    def first(self, n: int) -> Surroundings:
+        """Return the record of the first `n` steps."""
+        bodies, robots = (
+            {name: rows[: n + 1] for name, rows in parts.items()} for parts in (self.bodies, self.robots)
+        )
+        return Surroundings(self.contacts.first(n), bodies, robots)
+
+    def __repr__(self) -> str:
+        counts = f"contacts: {len(self.contacts)}, moving bodies: {len(self.bodies)}"
+        return f"<Surroundings: {counts}, other robots: {len(self.robots)}>"
+
+
+def to_document(surroundings: Surroundings) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return the names as a document, and the arrays of a file by name; `from_document` is the inverse."""
+    table = surroundings.contacts
+    names: dict[str, Any] = {"contacts": list(table.names)}
+    names |= {kind: [*getattr(surroundings, kind)] for kind in _PARTS}
+    arrays = {f"contact_{name}": getattr(table, name) for name in _COLUMNS}
+    for kind in _PARTS:
+        arrays |= {f"{kind}_{k}": rows for k, rows in enumerate(getattr(surroundings, kind).values())}
+    return names, arrays
+
+
+def from_document(document: Mapping[str, Any], file: ArrayFile, n: int) -> Surroundings:
+    """Return the surroundings over `n` steps from what `to_document` returned, read from a file.
+
+    Raises ArgumentError for arrays of other shapes, and KeyError, TypeError or ValueError for a document of
+    another form.
+    """
+    names = tuple(map(str, document["contacts"]))
+    arrays = {name: file.array(f"contact_{name}", shape, kind) for name, (shape, kind) in _COLUMNS.items()}
+    m = len(arrays["step"])
+    lengths = {len(rows) for rows in arrays.values()}
+    numbers = np.concatenate([arrays["a"], arrays["b"]])
+    in_order = np.all(np.diff(arrays["step"]) >= 0) and np.all((arrays["step"] >= 0) & (arrays["step"] < n))
+    if lengths != {m} or not in_order or not np.all((numbers >= 0) & (numbers < len(names))):
+        raise ValueError("its contacts do not fit together")
+    parts = {
+        kind: {str(name): file.array(f"{kind}_{k}", (n + 1, *shape)) for k, name in enumerate(document[kind])}
+        for kind, shape in _PARTS.items()
+    }
+    return Surroundings(ContactTable(names, **arrays), parts["bodies"], parts["robots"])
+
+
+_COLUMNS: dict[str, tuple[tuple[int | None, ...], type]] = {
+    **dict.fromkeys(("step", "a", "b"), ((None,), np.int64)),
+    **dict.fromkeys(("point_a", "point_b", "normal", "friction_force"), ((None, 3), float)),
+    **dict.fromkeys(("distance", "normal_force"), ((None,), float)),
+}
+"""Shape and type of the columns of a table of contacts."""
+
+_PARTS: dict[str, tuple[int | None, ...]] = {"bodies": (4, 4), "robots": (None,)}
+"""Shape of a row for each kind of part."""

@@ -1,0 +1,103 @@
+"""`dynx world`: tables, document, files and exit codes."""
+
+from __future__ import annotations
+
+import json
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner, Result
+
+from dynx.cli.shell.main import cli
+from dynx.world import World, world_names
+from tests.world.engines import WORLDS
+
+ENGINES = [name for name in WORLDS if find_spec(name) is not None]
+
+pytestmark = pytest.mark.skipif(not ENGINES, reason="needs an engine for worlds")
+
+FALLING = """schema = "dynx.scene/1"
+name = "falling"
+[[bodies]]
+name = "ball"
+shape = { sphere = 0.1 }
+mass = 1.0
+pose = [0.0, 0.0, 5.0]
+"""
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> str:
+    path = tmp_path / "falling.toml"
+    path.write_text(FALLING)
+    return str(path)
+
+
+def run(*arguments: str) -> Result:
+    return CliRunner().invoke(cli, ["world", *arguments])
+
+
+def test_the_table_shows_what_falls(scene: str) -> None:
+    result = run(scene, "--engine", ENGINES[0], "--duration", "1")
+    assert result.exit_code == 0, result.output
+    assert "falling: 1 s, dt 0.001 s" in result.output
+    # z = 5 - g t^2 / 2, of semi-implicit Euler 5 mm lower.
+    assert "0.0901" in result.output
+    assert "no contacts at the end" in result.output
+
+
+@pytest.mark.skipif(len(ENGINES) < 2, reason="needs two engines")
+def test_engines_that_agree_are_never_apart(scene: str) -> None:
+    result = run(scene, "--engine", ",".join(ENGINES), "--duration", "0.5", "--within", "1e-9", "--json", "-")
+    assert result.exit_code == 0, result.output
+    document: dict[str, Any] = json.loads(result.stdout)
+    assert [each["engine"] for each in document["engines"]] == ENGINES
+    for each in document["separations"]:
+        assert max(each["distance"]) < 1e-9
+        assert each["parted"][0] == {"distance": 1e-3, "time": None}
+
+
+@pytest.mark.skipif(len(ENGINES) < 2, reason="needs two engines")
+def test_engines_that_part_give_exit_code_1() -> None:
+    stack = run("stack", "--engine", ",".join(ENGINES), "--duration", "0.2", "--within", "1e-12")
+    assert stack.exit_code == 1, stack.output
+    assert "distance between the motions" in stack.output
+
+
+def test_files_are_written(scene: str, tmp_path: Path) -> None:
+    saved, plotted, document = (tmp_path / name for name in ("end.world", "plot.png", "run.json"))
+    result = run(
+        *(scene, "--engine", ENGINES[0], "--duration", "0.1", "--quiet"),
+        *("--save", str(saved), "--plot", str(plotted), "--json", str(document)),
+    )
+    assert result.exit_code == 0, result.output
+    assert result.stdout == ""
+    with World.read(saved) as world:
+        assert world.time == pytest.approx(0.1)
+        assert world.state.bodies["ball"].T_world_body[2, 3] < 5.0
+    assert plotted.stat().st_size > 1000
+    assert json.loads(document.read_text())["scene"] == "falling"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["stak"], "did you mean 'stack'"),
+        (["stack", "--engine", "pybulet"], "no world engine 'pybulet'"),
+        (["stack", "--set", "solver_iteration=3"], "no such setting"),
+        (["stack", "--set", "solver_iterations"], "name=value"),
+        (["stack", "--duration", "-1"], "--duration"),
+        (["stack", "--json", "/no/such/folder/x.json"], "no directory"),
+    ],
+)
+def test_wrong_input_gives_one_line_and_exit_code_2(arguments: list[str], message: str) -> None:
+    result = run(*arguments, *([] if "--engine" in arguments else ["--engine", ENGINES[0]]))
+    assert result.exit_code == 2
+    assert message in result.output
+    assert "Traceback" not in result.output
+
+
+def test_every_engine_of_dynx_is_offered() -> None:
+    assert {"pybullet", "mujoco", "drake"} <= set(world_names())

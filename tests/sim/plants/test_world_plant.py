@@ -1,0 +1,192 @@
+"""A robot in a scene as the plant of `dynx.simulate`: motion, contacts, record and files."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import dynx
+from dynx import control
+from dynx.errors import ArgumentError, UnknownNameError, UnsupportedFeatureError
+from dynx.sim import Scenario, ScenePlant, Simulation
+from dynx.world import Material, Scene, SceneRobot, box, ground
+from tests.world.engines import WORLDS
+
+ENGINES = [
+    pytest.param(name, marks=pytest.mark.skipif(find_spec(name) is None, reason=f"needs {name}"))
+    for name in WORLDS
+    if name != "drake"
+]
+"""Engines of worlds that are plants of `dynx.simulate` too."""
+
+SLIDER = """<robot name="slider">
+  <link name="rail"/>
+  <link name="pusher">
+    <inertial><mass value="2"/><inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
+    <collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision>
+  </link>
+  <joint name="x" type="prismatic">
+    <parent link="rail"/><child link="pusher"/><origin xyz="0 0 0.1"/><axis xyz="1 0 0"/>
+    <limit lower="-2" upper="2" effort="100" velocity="10"/><dynamics damping="0.5" friction="0.3"/>
+  </joint>
+</robot>"""
+
+BRICK = """<robot name="brick">
+  <link name="body">
+    <inertial><mass value="3"/><inertia ixx="0.02" iyy="0.02" izz="0.02" ixy="0" ixz="0" iyz="0"/></inertial>
+    <collision><geometry><box size="0.2 0.2 0.2"/></geometry></collision>
+  </link>
+</robot>"""
+
+CUBE = box(
+    "cube", (0.2, 0.2, 0.2), mass=0.5, pose=dynx.Pose((0.3, 0.0, 0.1)), material=Material(friction=0.3)
+)
+
+
+def pushing(engine: str) -> Scenario:
+    """A motor pushes a slider against a cube on the ground."""
+    slider = dynx.load(SLIDER)
+    scene = Scene("pushing", robots=(SceneRobot("slider", slider),), bodies=(ground(), CUBE))
+    plant = ScenePlant(scene, engine=engine)
+    return Scenario(slider, control.PD(slider, kp=200.0, kd=40.0), [0.4], plant=plant, duration=0.5)
+
+
+def rollout_of(scenario: Scenario) -> dynx.Rollout:
+    return dynx.simulate(scenario)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_without_contacts_the_motion_is_that_of_the_same_engine(engine: str) -> None:
+    arm = dynx.load("ur5")
+    q0 = np.array([0.0, -1.2, 1.5, -0.3, 0.5, 0.0])
+    scene = Scene("alone", robots=(SceneRobot("arm", arm, q=tuple(q0)),))
+    law = control.ComputedTorque(arm, kp=100.0, kd=20.0)
+    goal = q0 + 0.4
+    inside = dynx.simulate(arm, law, goal, plant=ScenePlant(scene, engine=engine), duration=0.3)
+    alone = dynx.simulate(arm, law, goal, q0=q0, plant=engine, duration=0.3)
+    np.testing.assert_allclose(inside.q, alone.q, rtol=0, atol=1e-10)
+    np.testing.assert_allclose(inside.v, alone.v, rtol=0, atol=1e-10)
+    assert inside.surroundings is not None
+    assert len(inside.surroundings.contacts) == 0
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_contact_forces_account_for_the_motion_of_what_is_pushed(engine: str) -> None:
+    rollout = rollout_of(pushing(engine))
+    around = rollout.surroundings
+    assert around is not None
+    n, path = len(rollout), around.bodies["cube"][:, :3, 3]
+    assert path[-1, 0] > path[0, 0] + 0.05
+    force = around.contacts.force_on("cube", n)
+    # Newton's second law over the last 0.1 s: change of momentum = impulse of contacts and gravity.
+    window = slice(n - 100, n)
+    momentum = 0.5 * (path[n] - path[n - 1] - (path[n - 100] - path[n - 101])) / rollout.scenario.dt  # type: ignore[union-attr]
+    impulse = 1e-3 * (force[window] + [0.0, 0.0, -0.5 * 9.81]).sum(axis=0)
+    np.testing.assert_allclose(momentum, impulse, atol=0.03)
+    pusher = around.contacts.force_on("slider/pusher", n)
+    assert (pusher[:, 0] <= 1e-9).all()
+    assert pusher[:, 0].min() < -0.3 * 0.5 * 9.81
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_floating_robot_rests_with_its_payload_on_the_ground(engine: str) -> None:
+    brick = dynx.load(BRICK, base="floating")
+    start = (0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 1.0)
+    scene = Scene("resting", robots=(SceneRobot("brick", brick, q=start),), bodies=(ground(),))
+    rollout = dynx.simulate(
+        brick, plant=ScenePlant(scene, engine=engine), duration=1.0, payload=dynx.Payload("body", 2.0)
+    )
+    around = rollout.surroundings
+    assert around is not None
+    force = around.contacts.force_on("brick/body", len(rollout))
+    np.testing.assert_allclose(force[-200:].mean(axis=0), [0.0, 0.0, 5.0 * 9.81], atol=0.05)
+    assert around.contacts[999]
+    assert {around.contacts[999][0].a, around.contacts[999][0].b} == {"brick/body", "ground"}
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_joint_friction_and_pushes_act_as_in_other_plants(engine: str) -> None:
+    slider = dynx.load(SLIDER)
+    plant = ScenePlant(Scene("free", robots=(SceneRobot("slider", slider),)), engine=engine)
+    push = dynx.Push("pusher", [4.0, 0, 0, 0, 0, 0], duration=0.25)
+    given = {"duration": 0.5, "damping": True, "friction": True, "pushes": push}
+    inside, alone = (dynx.simulate(slider, plant=each, **given) for each in (plant, "reference"))  # type: ignore[arg-type]
+    np.testing.assert_allclose(inside.q, alone.q, atol=2e-3)
+    assert 0.0 < inside.v[-1, 0] < inside.v.max()
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_simulation_returns_to_what_it_saved(engine: str) -> None:
+    with Simulation(pushing(engine)) as simulation:
+        simulation.run(until=0.3)
+        saved = simulation.save()
+        first = simulation.run()
+        simulation.restore(saved)
+        again = simulation.run()
+        simulation.reset()
+        anew = simulation.run()
+    for other in (again, anew):
+        assert other.q.tobytes() == first.q.tobytes()
+        assert first.surroundings is not None
+        assert other.surroundings is not None
+        ours, theirs = (each.surroundings.contacts.normal_force for each in (first, other))  # type: ignore[union-attr]
+        assert ours.tobytes() == theirs.tobytes()
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_the_record_is_saved_with_its_contacts(engine: str, tmp_path: Path) -> None:
+    rollout = rollout_of(pushing(engine))
+    around = rollout.surroundings
+    assert around is not None
+    rollout.save(tmp_path / "run.npz")
+    found = dynx.Rollout.load(tmp_path / "run.npz")
+    assert found.surroundings is not None
+    assert found.surroundings.contacts.names == around.contacts.names
+    for name in ("step", "a", "b", "point_a", "normal", "normal_force", "friction_force"):
+        ours, theirs = getattr(around.contacts, name), getattr(found.surroundings.contacts, name)
+        assert ours.tobytes() == theirs.tobytes()
+    np.testing.assert_array_equal(found.surroundings.bodies["cube"], around.bodies["cube"])
+    assert found.scenario == rollout.scenario
+    assert rollout_of(found.scenario).q.tobytes() == rollout.q.tobytes()  # type: ignore[arg-type]
+    rollout.save(tmp_path / "run.csv")
+    head = (tmp_path / "run.csv").read_text().partition("\n")[0]
+    assert "contact:cube:x" in head
+    shorter = rollout.first(400).surroundings
+    assert shorter is not None
+    assert shorter.contacts.step.max() < 400
+    assert len(shorter.bodies["cube"]) == 401
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_the_plot_shows_the_contact_forces(engine: str) -> None:
+    pytest.importorskip("matplotlib")
+    figure = rollout_of(pushing(engine)).plot()
+    labels = [axis.get_ylabel() for axis in figure.axes]
+    assert labels[0] == "contact force [N]"
+    assert len(labels) == 4
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_scene_refuses_what_it_cannot_do(engine: str) -> None:
+    scenario = pushing(engine)
+    scene = scenario.plant.scene  # type: ignore[union-attr]
+    with pytest.raises(UnknownNameError, match="did you mean 'slider'"):
+        ScenePlant(scene, "slide", engine=engine)
+    with pytest.raises(UnknownNameError, match="no setting"):
+        ScenePlant(scene, engine=engine, settings={"no_such_setting": 1.0})
+    with pytest.raises(ArgumentError, match="wanted the name of the robot"):
+        ScenePlant(Scene("empty", bodies=(ground(),)), engine=engine)
+    with pytest.raises(ArgumentError, match="is not the model"):
+        replace(scenario, model=dynx.load(BRICK), controller=None, reference=None)
+    with pytest.raises(ArgumentError, match="joint_limits"):
+        replace(scenario, position_limits=True)
+    with pytest.raises(ArgumentError, match="own stepper"):
+        dynx.simulate(replace(scenario, integrator="rk4"))
+    with pytest.raises(UnsupportedFeatureError, match="armature"):
+        dynx.simulate(replace(scenario, armature=0.1))
+    with pytest.raises(ArgumentError, match="cannot be resumed"):
+        dynx.simulate(scenario, resume=dynx.simulate(scenario), step=10)

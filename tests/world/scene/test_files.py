@@ -1,0 +1,203 @@
+"""Files of scenes: round trips, the scenes of dynx, and faults named by their place."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import dynx
+from dynx.errors import ArgumentError, DynxError, NotFiniteError, RobotNotFoundError, UnknownNameError
+from dynx.model.geometry import Box, Capsule, Collision, Cylinder, HeightField, Sphere
+from dynx.world import (
+    Material,
+    PDMotor,
+    PointToPoint,
+    PositionMotor,
+    Scene,
+    SceneBody,
+    SceneRobot,
+    Weld,
+    ground,
+    read_scene,
+    scene_names,
+    write_scene,
+)
+from dynx.world.scene.reading import scene_from_document
+from dynx.world.scene.writing import scene_document
+
+numbers = st.floats(-10.0, 10.0, allow_nan=False)
+sizes = st.floats(0.01, 2.0)
+vectors = st.tuples(numbers, numbers, numbers)
+poses = st.builds(dynx.Pose, vectors, vectors)
+materials = st.builds(
+    Material, friction=sizes, restitution=st.floats(0.0, 1.0), rgba=st.tuples(*[st.floats(0.0, 1.0)] * 4)
+)
+solids = st.one_of(
+    st.builds(Box, st.tuples(sizes, sizes, sizes)),
+    st.builds(Sphere, sizes),
+    st.builds(Cylinder, sizes, sizes),
+    st.builds(Capsule, sizes, sizes),
+)
+shapes = st.lists(st.builds(Collision, solids, poses), min_size=1, max_size=3).map(tuple)
+names = st.text("abcdefgh_", min_size=1, max_size=6)
+
+
+@st.composite
+def scenes(draw: st.DrawFn) -> Scene:
+    """Return scenes of bodies of every kind, with a robot, constraints and filters."""
+    called = draw(st.lists(names, min_size=2, max_size=5, unique=True).filter(lambda x: "world" not in x))
+    bodies = [ground(called[0])]
+    for name in called[1:]:
+        moving = (
+            {"mass": draw(sizes), "twist": tuple(draw(st.tuples(*[numbers] * 6)))}
+            if draw(st.booleans())
+            else {}
+        )
+        bodies.append(SceneBody(name, draw(shapes), draw(poses), material=draw(materials), **moving))  # type: ignore[arg-type]
+    pendulum = dynx.load("pendulum")
+    motor = PositionMotor(draw(numbers), kp=draw(sizes), kd=draw(sizes), joints=pendulum.joint_names[:1])
+    robot = SceneRobot("the robot", pendulum, motors=(motor,) if draw(st.booleans()) else ())
+    link = f"the robot/{pendulum.links[-1].name}"
+    joined = [PointToPoint(link, "world", draw(vectors), draw(vectors))]
+    if not bodies[1].fixed:
+        joined.append(Weld(called[1], "world", draw(poses)))  # type: ignore[arg-type]
+    return Scene(
+        draw(names),
+        (robot,),
+        tuple(bodies),
+        tuple(joined),
+        ignored=((called[0], "all"),),
+        groups=(("all", tuple(called)),),
+        gravity=draw(vectors),
+    )
+
+
+def require_robots() -> None:
+    """Skip a test that needs a robot of example-robot-data."""
+    if "ur5" not in {entry.name for entry in dynx.robots()}:
+        pytest.skip("needs example-robot-data")
+
+
+@given(scenes())
+def test_a_document_gives_an_equal_scene(scene: Scene) -> None:
+    document = json.loads(json.dumps(scene_document(scene)))
+    assert scene_from_document(document) == scene
+
+
+@pytest.mark.parametrize("suffix", [".toml", ".json"])
+def test_a_file_gives_an_equal_scene(suffix: str, tmp_path: Path) -> None:
+    if suffix == ".toml":
+        pytest.importorskip("tomli_w")
+    heights = HeightField(((0.0, 0.1), (0.2, 0.3), (0.1, 0.0)), (2.0, 3.0))
+    scene = Scene("text \"with\" 'quotes' \\ and ünïcode", bodies=(SceneBody("hills", heights),))  # type: ignore[arg-type]
+    path = tmp_path / f"scene{suffix}"
+    write_scene(scene, path)
+    assert read_scene(path) == scene
+
+
+@pytest.mark.parametrize("name", scene_names())
+def test_the_scenes_of_dynx_are_read_and_written(name: str, tmp_path: Path) -> None:
+    if name in ("pushing", "standing"):
+        require_robots()
+    if name in ("duck", "rolling"):
+        pytest.importorskip("pybullet_data")
+    scene = read_scene(name)
+    assert scene.name == name
+    write_scene(scene, tmp_path / "copy.json")
+    again = read_scene(tmp_path / "copy.json")
+    assert again == scene
+    assert [robot.model.geometry for robot in again.robots] == [
+        robot.model.geometry for robot in scene.robots
+    ]
+
+
+def test_a_robot_of_a_file_has_its_state_by_names(tmp_path: Path) -> None:
+    require_robots()
+    path = tmp_path / "arm.toml"
+    path.write_text(
+        """schema = "dynx.scene/1"
+[[robots]]
+name = "arm"
+robot = "ur5"
+pose = [1.0, 0.0, 0.5, 0.0, 0.0, 1.5]
+q = { elbow_joint = 0.5 }
+v = { elbow_joint = -1.0 }
+motors = [{ kind = "pd", target = 0.0, kp = 10.0, kd = 1.0 }]
+[[robots]]
+name = "flying"
+robot = "ur5"
+base = "floating"
+pose = [0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 1.0]
+"""
+    )
+    scene = read_scene(path)
+    arm, flying = scene.robots
+    assert arm.model.base_pose == dynx.Pose((1.0, 0.0, 0.5), (0.0, 0.0, 1.5))
+    assert arm.q == (0.0, 0.0, 0.5, 0.0, 0.0, 0.0)
+    assert arm.v == (0.0, 0.0, -1.0, 0.0, 0.0, 0.0)
+    assert arm.motors == (PDMotor(0.0, 10.0, 1.0),)
+    np.testing.assert_array_equal(np.array(flying.q)[:7], [0, 0, 2, 0, 0, 0, 1])
+
+
+BODY: dict[str, Any] = {"name": "b", "shape": {"box": [1, 1, 1]}}
+
+FAULTS: list[tuple[dict[str, Any], type[DynxError], str]] = [
+    ({"schema": "dynx.scene/2"}, ArgumentError, "has schema 'dynx.scene/1'"),
+    ({"bodys": []}, ArgumentError, "no key 'bodys'; did you mean 'bodies'"),
+    (
+        {"bodies": [{**BODY, "masss": 1.0}]},
+        ArgumentError,
+        r"bodies\[0\] has no key 'masss'; did you",
+    ),
+    ({"bodies": [{**BODY, "mass": "1"}]}, ArgumentError, r"bodies\[0\].mass"),
+    ({"bodies": [{**BODY, "mass": -1.0}]}, ArgumentError, r"bodies\[0\], 'b': mass of body 'b' is '-1"),
+    ({"bodies": [{**BODY, "mass": float("nan")}]}, ArgumentError, "mass of body 'b' is 'nan"),
+    ({"bodies": [{**BODY, "pose": [1.0, float("nan"), 0.0]}]}, NotFiniteError, r"bodies\[0\], 'b': pose"),
+    ({"bodies": [{**BODY, "pose": [0, 0, 0, 0, 0, 0, 2]}]}, ArgumentError, "norm 1"),
+    ({"bodies": [{**BODY, "pose": [0, 0]}]}, ArgumentError, "pose has 2 numbers; wanted 3, 6 or 7"),
+    ({"bodies": [BODY, BODY]}, ArgumentError, "two parts of the scene are called 'b'"),
+    ({"bodies": [{"name": "b"}]}, ArgumentError, "wanted either shape or shapes"),
+    ({"bodies": [{"name": "b", "shape": {}}]}, ArgumentError, "it has none"),
+    ({"bodies": [{"name": "b", "shape": {"box": [1, 1, 1], "sphere": 1}}]}, ArgumentError, "box and sphere"),
+    ({"bodies": [{"name": "b", "shape": {"box": [1, 0, 1]}}]}, ArgumentError, r"size of a box\[1\] is 0"),
+    (
+        {"bodies": [{"name": "b", "shape": {"sphere": 1.0, "scale": [1]}}]},
+        ArgumentError,
+        "belongs to mesh",
+    ),
+    ({"bodies": [{"name": "b", "shape": {"cylinder": [1]}}]}, ArgumentError, "wanted radius and length"),
+    ({"bodies": [{**BODY, "material": {"friction": -1}}]}, ArgumentError, "friction is '-1"),
+    ({"robots": [{"name": "r"}]}, ArgumentError, "wanted either robot"),
+    ({"robots": [{"name": "r", "robot": "ur55"}]}, ArgumentError, "from elsewhere may not name; wanted urdf"),
+    ({"robots": [{"name": "r", "urdf": "<robot"}]}, DynxError, r"robots\[0\], 'r'"),
+    ({"constraints": [{"kind": "weld", "a": "world", "b": "c"}]}, UnknownNameError, "no part 'c'"),
+    ({"constraints": [{"kind": "hinge", "a": "b", "b": "c"}]}, ArgumentError, "hinge"),
+    ({"bodies": [BODY], "ignored": [["b", "c"]]}, UnknownNameError, "no part 'c'"),
+    ({"gravity": [0, 0]}, ArgumentError, "gravity"),
+]
+
+
+@pytest.mark.parametrize(("change", "kind", "message"), FAULTS)
+def test_a_fault_is_named_with_its_place(change: dict[str, Any], kind: type[DynxError], message: str) -> None:
+    with pytest.raises(kind, match=message):
+        scene_from_document({"schema": "dynx.scene/1", **change})
+
+
+def test_files_that_are_no_scene_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(RobotNotFoundError, match="did you mean 'stack'"):
+        read_scene("stak")
+    with pytest.raises(RobotNotFoundError, match="no such file"):
+        read_scene(tmp_path / "absent.toml")
+    for content in (b"a = [", b"\xff\xfe\x00", b"[" * 100_000, b"x = 1"):
+        path = tmp_path / "bad.toml"
+        path.write_bytes(content)
+        with pytest.raises(ArgumentError, match=r"bad\.toml"):
+            read_scene(path)
+    with pytest.raises(ArgumentError, match=r"\.toml or \.json"):
+        write_scene(Scene("empty"), tmp_path / "scene.yaml")
