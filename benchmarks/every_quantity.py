@@ -1,24 +1,32 @@
 """Every quantity of several robots, by each engine: ``python -m benchmarks.every_quantity``.
 
-Each engine is called through dynx, with checked arguments: one sample, and a batch. The result of `compiled`
-is compared with that of each engine first. The table gives nanoseconds per sample of `compiled`, the fastest
-other engine, and how many times its time that engine takes. A ratio below 1 ends the command with 1.
+Each engine that computes the quantity itself is called through dynx, with checked arguments: one sample, and
+a batch. The result of `compiled` is compared with that of each engine first. The table gives the least
+processor time per sample of `compiled` and of the fastest other engine in nanoseconds, and how many times the
+time of `compiled` that engine takes. A ratio below 1 ends the command with 1.
+
+``--record FILE`` adds each row to a file when it is measured. Rows that the file has are not measured again,
+so an interrupted run continues where it stopped. ``--markdown`` prints the table of docs/bench.md.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import sys
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from benchmarks.progress import tell
 from dynx.backends import Backend, backend, installed_backends
+from dynx.backends.derived import native_quantities
 from dynx.backends.quantities import QUANTITIES
-from dynx.bench.timing import interleaved
+from dynx.bench.timing import interleaved, once
 from dynx.errors import DynxError
 from dynx.model import Inertial, Joint, Link, Model, Pose
 from dynx.model.loading import load
@@ -32,6 +40,9 @@ MAX_RESULT_BYTES = 2**23
 
 MAX_SAMPLES_OF_A_LOOP = 64
 """Samples that an engine without batches of its own evaluates in one timing."""
+
+HOPELESS = 10.0
+"""Ratio to the fastest engine from which on another is not timed further."""
 
 MIN_AGREEMENT = 1e-6
 """Largest difference of two engines, relative to the largest entry."""
@@ -56,6 +67,13 @@ class Row:
     def ratio(self) -> float:
         """Time of the fastest other engine over that of `compiled`."""
         return self.others[self.best] / self.compiled
+
+    def __str__(self) -> str:
+        return (
+            f"{self.robot:10}{self.quantity:26}{self.samples:8}{1e9 * self.compiled:12,.0f}"
+            f"{1e9 * self.others[self.best]:12,.0f}  {self.best:10}{self.ratio:7.2f}"
+            f"{'  SLOWER' if self.ratio < 1.0 else ''}"
+        )
 
 
 def serial_arm(n: int) -> Model:
@@ -102,49 +120,95 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.every_quantity", description=__doc__)
     parser.add_argument("--robot", action="append", choices=list(robots()), help="default: all")
     parser.add_argument("--quantity", action="append", choices=list(QUANTITIES), help="default: all")
-    parser.add_argument("--batch", type=int, default=4096, help="samples in a batch (default 4096)")
+    parser.add_argument("--batch", type=int, default=1024, help="samples in a batch (default 1024)")
     parser.add_argument("--repetitions", type=int, default=7)
+    parser.add_argument("--record", type=Path, metavar="FILE", help="rows measured so far, one in a line")
+    parser.add_argument("--markdown", action="store_true", help="print the table as Markdown at the end")
     chosen = parser.parse_args(arguments)
-    slower = False
+    known = recorded(chosen.record)
+    rows: list[Row] = []
     print(f"{'robot':10}{'quantity':26}{'samples':>8}{'compiled':>12}{'best other':>12}  {'':10}{'ratio':>7}")
-    for name, model in robots().items():
-        if chosen.robot and name not in chosen.robot:
-            continue
-        for quantity in chosen.quantity or QUANTITIES:
-            for row in measure(name, model, quantity, chosen.batch, chosen.repetitions):
-                slower |= row.ratio < 1.0
-                print(
-                    f"{name:10}{quantity:26}{row.samples:8}{1e9 * row.compiled:12,.0f}"
-                    f"{1e9 * row.others[row.best]:12,.0f}  {row.best:10}{row.ratio:7.2f}"
-                    f"{'  SLOWER' if row.ratio < 1.0 else ''}",
-                    flush=True,
+    models = {name: model for name, model in robots().items() if name in (chosen.robot or robots())}
+    quantities = chosen.quantity or list(QUANTITIES)
+    for name, model in models.items():
+        for quantity in quantities:
+            for samples in (1, batch_size(model, quantity, chosen.batch)):
+                tell(
+                    f"{len(rows)} of {2 * len(models) * len(quantities)} rows; {name}, {quantity}, {samples}"
                 )
-    return 1 if slower else 0
+                row = known.get((name, quantity, samples))
+                if row is None:
+                    row = measure(name, model, quantity, samples, chosen.repetitions)
+                    if chosen.record is not None:
+                        with chosen.record.open("a", encoding="utf-8") as file:
+                            print(json.dumps(asdict(row)), file=file)
+                tell("")
+                print(row, flush=True)
+                rows.append(row)
+    if chosen.markdown:
+        print(markdown(rows))
+    return 1 if any(row.ratio < 1.0 for row in rows) else 0
 
 
-def measure(name: str, model: Model, quantity: str, batch: int, repetitions: int) -> Iterator[Row]:
-    """Yield the times of one sample and of a batch."""
+def recorded(path: Path | None) -> dict[tuple[str, str, int], Row]:
+    """Return the rows of a file, if there is one."""
+    if path is None or not path.exists():
+        return {}
+    rows = [Row(**json.loads(line)) for line in path.read_text(encoding="utf-8").splitlines()]
+    return {(row.robot, row.quantity, row.samples): row for row in rows}
+
+
+def batch_size(model: Model, quantity: str, wanted: int) -> int:
+    """Return the samples of a batch, whose result is at most `MAX_RESULT_BYTES` long."""
     result_bytes = 8 * int(np.prod(QUANTITIES[quantity].shape_of(model)))
-    for samples in (1, max(1, min(batch, MAX_RESULT_BYTES // result_bytes))):
-        tell(f"{name}, {quantity}, {samples} samples")
-        engines = {"compiled": _call(backend("compiled", model, threads=1), quantity, samples)}
-        counts = {"compiled": samples}
-        for engine in ENGINES:
-            if engine not in installed_backends():
+    return max(2, min(wanted, MAX_RESULT_BYTES // max(1, result_bytes)))
+
+
+def measure(name: str, model: Model, quantity: str, samples: int, repetitions: int) -> Row:
+    """Time one sample or a batch on `compiled` and on every engine that computes the quantity itself."""
+    calls = {"compiled": _call(backend("compiled", model, threads=1), quantity, samples)}
+    counts = {"compiled": samples}
+    expected = calls["compiled"]()
+    for engine in ENGINES:
+        if engine not in installed_backends():
+            continue
+        count = min(samples, MAX_SAMPLES_OF_A_LOOP)
+        try:
+            opened = backend(engine, model)
+            if quantity not in native_quantities(opened):
                 continue
-            counts[engine] = min(samples, MAX_SAMPLES_OF_A_LOOP)
-            try:
-                engines[engine] = _call(backend(engine, model), quantity, counts[engine])
-                check(engines["compiled"](), engines[engine](), f"{name}, {quantity}: {engine}")
-            except DynxError as error:
-                engines.pop(engine, None)
-                tell(f"{name}, {quantity}: {engine} is left out: {error}")
-        found = interleaved(list(engines.values()), repetitions)
-        seconds = {
-            engine: min(times.seconds) / counts[engine] for engine, times in zip(engines, found, strict=True)
-        }
-        tell("")
-        yield Row(name, quantity, samples, seconds.pop("compiled"), seconds)
+            call = _call(opened, quantity, count)
+            check(expected, call(), f"{name}, {quantity}: {engine}")
+        except DynxError as error:
+            tell("")
+            print(f"{name}, {quantity}: {engine} is left out: {error}", file=sys.stderr)
+            continue
+        calls[engine], counts[engine] = call, count
+    first = {
+        engine: min(once(call, time.process_time) for _ in range(3)) / counts[engine]
+        for engine, call in calls.items()
+    }
+    fastest = min(seconds for engine, seconds in first.items() if engine != "compiled")
+    timed = [engine for engine in calls if engine == "compiled" or first[engine] < HOPELESS * fastest]
+    found = interleaved([calls[engine] for engine in timed], repetitions, time.process_time)
+    seconds = {
+        engine: min(times.seconds) / counts[engine] for engine, times in zip(timed, found, strict=True)
+    }
+    return Row(name, quantity, samples, seconds.pop("compiled"), seconds)
+
+
+def markdown(rows: Sequence[Row]) -> str:
+    """Return a table with a line for each quantity and a column for each robot: nanoseconds of `compiled` and
+    the ratio, for one sample and in a batch."""
+    names = list(dict.fromkeys(row.robot for row in rows))
+    lines = ["| | " + " | ".join(names) + " |", "|---" * (len(names) + 1) + "|"]
+    for quantity in dict.fromkeys(row.quantity for row in rows):
+        cells = []
+        for name in names:
+            pair = [row for row in rows if (row.robot, row.quantity) == (name, quantity)]
+            cells.append(", ".join(f"{1e9 * row.compiled:,.0f} ({row.ratio:.3g}x)" for row in pair))
+        lines.append(f"| `{quantity}` | " + " | ".join(cells) + " |")
+    return "\n".join(lines)
 
 
 def check(own: Floats, other: Floats, what: str) -> None:

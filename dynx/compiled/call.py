@@ -7,7 +7,6 @@ is read in place.
 from __future__ import annotations
 
 from collections.abc import Callable
-from ctypes import addressof, c_char
 from math import prod
 from typing import Any
 
@@ -19,7 +18,8 @@ from dynx.compiled.kernels import evaluate_quantity, kernel_quantity
 from dynx.compiled.model_coordinates import reduce_columns, reduce_rows, tree_coordinates
 from dynx.errors import ArgumentError, DTypeError, ShapeError
 from dynx.model import Mechanism
-from dynx.simd.kernel import Kernel, Workspace, address_of
+from dynx.simd.arrays import ACCEPTED, DESCRIBED, REFUSED, address_of
+from dynx.simd.kernel import Kernel, Workspace
 from dynx.spatial.scalar import Floats
 
 Check = Callable[..., Floats]
@@ -31,6 +31,10 @@ MAX_COPIED_SAMPLES = 256
 MAX_COPIED_SIZE = 16384
 """Largest size of one array of such a batch."""
 
+MAX_LOCKED_WORK = 4e6
+"""Most work of a batch that is evaluated with Python's global lock held, in bytes of code times groups of
+samples: some 20 microseconds."""
+
 DEFECT_SCALE = 2.0**-300
 """Factor by which defects are scaled before they are added."""
 
@@ -40,7 +44,6 @@ SCALES = np.full(8192, DEFECT_SCALE)
 _FLOAT64 = np.dtype(np.float64)
 _ABSENT = object()
 _NDARRAY = np.ndarray
-_first_byte: Any = c_char.from_buffer
 
 _NOT_ONE_SAMPLE = (TypeError, ValueError, NotImplementedError, BufferError)
 """Exceptions that a memory view raises for anything but one sample of float64."""
@@ -63,6 +66,7 @@ class KernelCall:
         "_kernel",
         "_lanes",
         "_max_in_place",
+        "_max_locked",
         "_max_rows",
         "_place",
         "_result_word",
@@ -96,6 +100,7 @@ class KernelCall:
         self._result_word = 1 + 2 * len(kernel.inputs)
         self._max_in_place = kernel.max_samples_of_one_part(threads)
         self._max_rows = min(MAX_COPIED_SAMPLES, max(1, MAX_COPIED_SIZE // largest))
+        self._max_locked = max(1, int(MAX_LOCKED_WORK / kernel.image.size)) * self._lanes
         workspace = self._workspace()
         self._first, self._second, self._third = (*workspace.input_slices, slice(0), slice(0))[:3]
         self._defect = workspace.output_slices[1].start
@@ -113,6 +118,8 @@ class KernelCall:
             workspace = self._workspaces.pop()
         except IndexError:
             workspace = self._workspace()
+        if type(q) is _NDARRAY and q.ndim == 2:
+            return self._evaluate_rows(workspace, _given(q, v, a), out)
         numbers = workspace.inputs
         try:
             numbers[self._first] = q
@@ -142,60 +149,50 @@ class KernelCall:
         return self._batch(_given(q, v, a), out)
 
     def _evaluate_rows(self, workspace: Workspace, arguments: tuple[Any, ...], out: Floats | None) -> Floats:
-        """Evaluate a batch and return its results; contiguous rows and few rows take the fastest paths."""
-        found = self._evaluate_in_place(workspace, arguments, out)
-        if found is None:
-            n = len(arguments[0]) if _is_float64(arguments[0], self._sizes[0]) else 0
-            if 0 < n <= self._max_rows and all(
-                _is_float64(array, size) and array.shape == (n, size)
-                for array, size in zip(arguments, self._sizes, strict=True)
-            ):
-                found = self._evaluate_copies(workspace, n, arguments, out)
+        """Evaluate a batch and return its results; arrays (n, size) take the fastest paths."""
+        first = arguments[0]
+        n = len(first) if type(first) is _NDARRAY and first.ndim == 2 else 0
+        found = None
+        if self._lanes <= n <= self._max_in_place:
+            found = self._evaluate_in_place(workspace, n, arguments, out)
+        if found is None and 0 < n <= self._max_rows:
+            found = self._evaluate_copies(workspace, n, arguments, out)
         self._workspaces.append(workspace)
         return self._batch(arguments, out) if found is None else found
 
     def _evaluate_in_place(
-        self, workspace: Workspace, arguments: tuple[Any, ...], out: Floats | None
+        self, workspace: Workspace, n: int, arguments: tuple[Any, ...], out: Floats | None
     ) -> Floats | None:
         """Evaluate contiguous rows (n, size) where they are.
 
         Return None if the arguments are others, or one may be invalid.
         """
-        first = arguments[0]
-        if type(first) is not np.ndarray or first.ndim != 2:
-            return None
-        n = len(first)
-        if not self._lanes <= n <= self._max_in_place:
-            return None
-        words, word = workspace.batch_words, 1
-        words[0] = n
-        for array, size in zip(arguments, self._sizes, strict=True):
-            if type(array) is not np.ndarray or array.dtype is not _FLOAT64 or array.shape != (n, size):
+        for array in arguments:
+            # The buffer of a masked array has no mask.
+            if type(array) is not _NDARRAY:
                 return None
-            try:
-                # A buffer exists only of a contiguous, writeable array.
-                words[word] = addressof(_first_byte(array))
-            except (TypeError, ValueError):
-                if not (array.flags.c_contiguous and array.flags.aligned):
-                    return None
-                words[word] = array.ctypes.data
-            word += 2
-        if out is None:
-            result = np.empty((n, *self._shape))
-        else:
-            result = _checked_out(out, (n, *self._shape))
-            if any(np.may_share_memory(out, array) for array in arguments):
-                return None
-        defects = workspace.output_rows[1] if n <= self._max_rows else np.empty((n, 1))
-        word = self._result_word
-        words[word], words[word + 2] = address_of(result), address_of(defects)
-        workspace.run_batch()
-        return result if self._unchecked or self._are_valid(defects, n) else None
+        shape = (n, *self._shape)
+        result = np.empty(shape) if out is None else _checked_out(out, shape)
+        run = workspace.run_arrays or workspace.accept_arrays(self._sizes, self._max_locked, MAX_DEFECT)
+        outcome = run(*arguments, result)
+        if outcome == DESCRIBED:
+            defects = np.empty((n, 1))
+            words = workspace.batch_words
+            words[0], words[self._result_word + 2] = n, address_of(defects)
+            workspace.run_batch()
+            outcome = ACCEPTED if self._unchecked or self._are_valid(defects, n) else REFUSED
+        return result if outcome == ACCEPTED or (outcome == REFUSED and self._unchecked) else None
 
     def _evaluate_copies(
         self, workspace: Workspace, n: int, arguments: tuple[Floats, ...], out: Floats | None
     ) -> Floats | None:
-        """Evaluate rows (n, size) that are copied to the workspace; return None if one may be invalid."""
+        """Evaluate rows that are copied to the workspace.
+
+        Return None if they are not (n, size) float64, or one may be invalid.
+        """
+        for array, size in zip(arguments, self._sizes, strict=True):
+            if not _is_float64(array, size) or array.shape != (n, size):
+                return None
         for rows, array in zip(workspace.input_rows, arguments, strict=False):
             rows[:n] = array
         workspace.run_rows(n)

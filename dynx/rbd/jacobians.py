@@ -44,10 +44,10 @@ def frame_jacobian_derivative(
 
     linear, angular = _world_columns(mechanism, poses, body, p)
     d_linear, d_angular = [0 * column for column in linear], [0 * column for column in angular]
-    for column, z, o, owner in _moving_columns(mechanism, poses, body):
+    for column, z, o, owner in moving_columns(mechanism, poses, body):
         o_velocity, o_omega = twists[owner]
         dz = cross(o_omega, z)
-        if _is_rotation(mechanism, column, owner):
+        if is_rotation(mechanism, column, owner):
             d_linear[column] = cross(dz, p - o) + cross(z, velocity - o_velocity)
             d_angular[column] = dz + 0 * d_linear[column]
         else:
@@ -98,7 +98,7 @@ def shift_jacobian(
     return np.concatenate([moved, dJ[..., 3:, :]], axis=-2)
 
 
-def _moving_columns(mechanism: Mechanism, poses: Poses, body: int) -> list[tuple[int, Array, Array, int]]:
+def moving_columns(mechanism: Mechanism, poses: Poses, body: int) -> list[tuple[int, Array, Array, int]]:
     """List (column, axis z, origin o, body that the joint moves) of every coordinate that moves `body`."""
     base = 6 if mechanism.floating else 0
     columns = [(base + k, joint_axis(mechanism, poses, k), poses[k][1], k) for k in ancestry(mechanism, body)]
@@ -108,7 +108,7 @@ def _moving_columns(mechanism: Mechanism, poses: Poses, body: int) -> list[tuple
     return columns
 
 
-def _is_rotation(mechanism: Mechanism, column: int, owner: int) -> bool:
+def is_rotation(mechanism: Mechanism, column: int, owner: int) -> bool:
     """Return whether the coordinate is a rotation, not a translation."""
     return column >= 3 if owner == ROOT else mechanism.bodies[owner].revolute
 
@@ -119,8 +119,8 @@ def _world_columns(
     """Return the columns (linear, angular), in world axes, of the point p fixed to `body`."""
     zero = 0 * p
     linear, angular = [zero] * mechanism.nv, [zero] * mechanism.nv
-    for column, z, o, owner in _moving_columns(mechanism, poses, body):
-        if _is_rotation(mechanism, column, owner):
+    for column, z, o, owner in moving_columns(mechanism, poses, body):
+        if is_rotation(mechanism, column, owner):
             linear[column], angular[column] = cross(z, p - o), z + zero
         else:
             linear[column] = z + zero

@@ -86,7 +86,8 @@ class Code:
     """An image linked into this process. The code is freed when nothing refers to this object.
 
     `entry` takes the address of the arguments (`dynx.simd.emit`) and releases Python's global lock;
-    `locked_entry` holds it, which saves a good part of a call that takes less than a microsecond.
+    `locked_entry` holds it, which saves a good part of a call that takes less than a microsecond. `address`
+    is that of the machine code.
     """
 
     def __init__(self, image: Image) -> None:
@@ -101,6 +102,6 @@ class Code:
                 self._library = builder.link(self._jit, ENTRY)
             except RuntimeError as error:
                 raise CompileError(f"a kernel cannot be linked: {error}") from error
-        address = self._library[ENTRY]
-        self.entry = ctypes.CFUNCTYPE(None, ctypes.c_void_p)(address)
-        self.locked_entry = ctypes.PYFUNCTYPE(None, ctypes.c_void_p)(address)
+        self.address: int = self._library[ENTRY]
+        self.entry = ctypes.CFUNCTYPE(None, ctypes.c_void_p)(self.address)
+        self.locked_entry = ctypes.PYFUNCTYPE(None, ctypes.c_void_p)(self.address)

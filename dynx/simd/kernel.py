@@ -4,14 +4,21 @@ from __future__ import annotations
 
 from array import array as packed
 from collections.abc import Callable, Sequence
-from ctypes import addressof, c_char
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dynx.errors import ArgumentError, ClosedError, CompileError, DTypeError, ShapeError
+from dynx.errors import ArgumentError, ClosedError, CompileError
+from dynx.simd.arrays import (
+    address_of,
+    array_entry,
+    check_arrays,
+    extent_of,
+    is_disjoint,
+    make_plan,
+    usable_in_place,
+)
 from dynx.simd.emit import Settings
 from dynx.simd.image import Code, Image, compile_image
 from dynx.simd.program import Port, Program
@@ -30,8 +37,6 @@ PARTS_PER_THREAD = 4
 """Number of parts per thread; more than 1, so that a delayed thread does not delay the whole batch."""
 
 _FLOAT64_BYTES = 8
-_FLOAT64 = np.dtype(np.float64)
-_first_byte: Any = c_char.from_buffer
 
 
 class Kernel:
@@ -71,14 +76,14 @@ class Kernel:
         ArgumentError, DTypeError or ShapeError for arrays that do not fit, and writes nothing then.
         """
         code = self._open_code()
-        n = _check_arrays(self.inputs, self.outputs, inputs, outputs)
+        n = check_arrays(self.inputs, self.outputs, inputs, outputs)
         if n == 0 or not outputs:
             return
-        sources = [array if _usable_in_place(array) else np.ascontiguousarray(array) for array in inputs]
-        places = [_extent(array) for array in (*sources, *outputs)]
+        sources = [array if usable_in_place(array) else np.ascontiguousarray(array) for array in inputs]
+        places = [extent_of(array) for array in (*sources, *outputs)]
         targets = [
             out
-            if _usable_in_place(out) and _is_disjoint(places, len(sources) + k, out)
+            if usable_in_place(out) and is_disjoint(places, len(sources) + k, out)
             else np.empty(out.shape)
             for k, out in enumerate(outputs)
         ]
@@ -148,14 +153,14 @@ class Kernel:
     ) -> tuple[Callable[[int], None], NDArray[np.int64]]:
         """Return the code, and its arguments for these arrays, whose address it is called with."""
         code, arrays = self._open_code(), (*inputs, *outputs)
-        n = _check_arrays(self.inputs, self.outputs, inputs, outputs)
+        n = check_arrays(self.inputs, self.outputs, inputs, outputs)
         if n < self.image.lanes:
             raise ArgumentError(f"a bound call needs at least {self.image.lanes} samples, not {n}")
         for array in arrays:
-            if not _usable_in_place(array):
+            if not usable_in_place(array):
                 raise ArgumentError("a bound call needs arrays with contiguous rows")
-        places = [_extent(array) for array in arrays]
-        if not all(_is_disjoint(places, len(inputs) + k, out) for k, out in enumerate(outputs)):
+        places = [extent_of(array) for array in arrays]
+        if not all(is_disjoint(places, len(inputs) + k, out) for k, out in enumerate(outputs)):
             raise ArgumentError("an output of a bound call shares memory with another array")
         words = [n]
         for array in arrays:
@@ -204,14 +209,19 @@ class Workspace:
     least that of lanes, and their addresses into `batch_words`, and call `run_batch()`, which does not hold
     Python's global lock: the words are the number, then an address and the distance of rows for each array.
 
+    After `accept_arrays`, `run_arrays` takes NumPy arrays and writes the words itself.
+
     Not safe for several threads at a time. The other calls hold the lock: they are meant for evaluations
     that take microseconds.
     """
 
     __slots__ = (
         "_arguments",
+        "_batch",
+        "_code",
         "_kept",
         "_lanes",
+        "_plan",
         "_run_rows",
         "batch_words",
         "input_rows",
@@ -222,6 +232,7 @@ class Workspace:
         "output_values",
         "results",
         "run",
+        "run_arrays",
         "run_batch",
     )
 
@@ -262,11 +273,33 @@ class Workspace:
         else:
             one[0] = 1
         batch = several.copy()
-        self._kept = (code, one, kept)
+        self._code, self._batch, self._kept = code, batch, (one, kept)
         self._arguments, self.batch_words = several.data, batch.data
+        self.run_arrays: Callable[..., int] | None = None
         self.run: Callable[[], None] = partial((single or code).locked_entry, one.ctypes.data)
         self._run_rows: Callable[[], None] = partial(code.locked_entry, several.ctypes.data)
         self.run_batch: Callable[[], None] = partial(code.entry, batch.ctypes.data)
+
+    def accept_arrays(self, sizes: Sequence[int], max_samples: int, bound: float) -> Callable[..., int]:
+        """Return `run_arrays`, a function of the first inputs, arrays (n, size) of these `sizes`, and of the
+        first output, an array (n, ...), which returns an outcome (`dynx.simd.arrays`).
+
+        Up to `max_samples` are evaluated; the sum of the second output, a number for each sample, is compared
+        with `bound`. More than that are only described in `batch_words`.
+        """
+        addends = np.empty(max_samples)
+        plan = make_plan(
+            self._batch.ctypes.data,
+            self._code.address,
+            max_samples,
+            addends.ctypes.data,
+            1 + 2 * len(self.input_rows),
+            bound,
+            sizes,
+        )
+        self._plan = (plan, addends)
+        self.run_arrays = partial(array_entry(len(sizes)), plan.ctypes.data)
+        return self.run_arrays
 
     def repeat_input(self, number: int) -> None:
         """Let `run_batch` use the first row of an input of this workspace for all samples."""
@@ -311,65 +344,6 @@ def arguments_of_parts(words: Sequence[int], n: int, lanes: int, parts: int) -> 
     arguments[:, 0] = np.diff(first)
     arguments[:, 1::2] += first[:-1, None] * arguments[:, 2::2]
     return arguments
-
-
-def _check_arrays(
-    input_ports: Sequence[Port],
-    output_ports: Sequence[Port],
-    inputs: Sequence[Floats],
-    outputs: Sequence[Floats],
-) -> int:
-    """Check number, shapes and dtypes of all arrays; return the number of samples."""
-    ports, arrays = (*input_ports, *output_ports), (*inputs, *outputs)
-    if len(inputs) != len(input_ports) or len(outputs) != len(output_ports):
-        raise ArgumentError(
-            f"a kernel of {len(input_ports)} inputs and {len(output_ports)} outputs was given "
-            f"{len(inputs)} and {len(outputs)}"
-        )
-    n = len(arrays[-1]) if arrays and arrays[-1].ndim else 0
-    for port, array in zip(ports, arrays, strict=True):
-        if array.dtype is not _FLOAT64 and (array.dtype != _FLOAT64 or not array.dtype.isnative):
-            raise DTypeError(f"{port.name} has dtype {array.dtype}; wanted float64")
-        if array.shape != (n, port.size):
-            raise ShapeError(f"{port.name} has shape {array.shape}; wanted ({n}, {port.size})")
-    for port, array in zip(output_ports, outputs, strict=True):
-        if not array.flags.writeable:
-            raise ArgumentError(f"{port.name} is read-only; wanted a writeable array")
-    return n
-
-
-def _usable_in_place(array: Floats) -> bool:
-    """Return whether the code can use an array without copying: aligned numbers, contiguous rows."""
-    return array.flags.aligned and (array.shape[1] <= 1 or array.strides[1] == _FLOAT64_BYTES)
-
-
-def address_of(array: Floats) -> int:
-    """Return the address of the first number of an array."""
-    try:
-        # This takes a third of the time of `array.ctypes`, but needs a contiguous, writeable array.
-        return addressof(_first_byte(array))
-    except (TypeError, ValueError, BufferError):
-        return array.ctypes.data
-
-
-def _extent(array: Floats) -> tuple[int, int]:
-    """Return the first address of an array (n, size) and the first one after it."""
-    first = address_of(array)
-    rows, columns = array.shape
-    row_stride, column_stride = array.strides
-    height, width = (rows - 1) * row_stride, (columns - 1) * column_stride
-    return first + min(height, 0) + min(width, 0), first + max(height, 0) + max(width, 0) + _FLOAT64_BYTES
-
-
-def _is_disjoint(extents: Sequence[tuple[int, int]], own: int, out: Floats) -> bool:
-    """Return whether neither another array nor another row of its own shares memory with `out`.
-
-    `extents` are those of all arrays, of which number `own` is that of `out`.
-    """
-    if len(out) > 1 and abs(out.strides[0]) < _FLOAT64_BYTES * out.shape[1]:
-        return False
-    first, end = extents[own]
-    return all(k == own or low >= end or high <= first for k, (low, high) in enumerate(extents))
 
 
 def _unpickle(image: Image) -> Kernel:

@@ -117,15 +117,29 @@ def test_every_code_path_gives_the_same_bits(engine: CompiledBackend, quantity: 
 
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_few_kernels_are_made(robot: str) -> None:
-    """One for each leaf of the tree, and one for each body for the Jacobian in `local_world_aligned`."""
-    engine, mechanism = made(ROBOTS[robot]), ROBOTS[robot].mechanism
-    given = state(engine.model)
-    for quantity in ON_CHAINS:
-        for frame in engine.model.frame_names:
-            for reference in REFERENCES:
-                evaluate(engine, quantity, frame, reference, *given)
+    """One for each leaf of the tree; in `local_world_aligned` one for each body for Jacobians and for their
+    derivatives."""
+    mechanism = ROBOTS[robot].mechanism
+    kernels = {
+        (quantity, chain_of(mechanism, quantity, frame, reference))
+        for quantity in ON_CHAINS
+        for frame in range(len(mechanism.frames))
+        for reference in REFERENCES.values()
+    }
     ends = set(range(len(mechanism.bodies))) - {body.parent for body in mechanism.bodies}
-    assert len(engine._chain_kernels) == len(ON_CHAINS) * len(ends) + len(mechanism.bodies) + 1
+    assert len(kernels) == len(ON_CHAINS) * len(ends) + 2 * (len(mechanism.bodies) + 1)
+
+
+def test_frames_on_one_body_share_a_kernel() -> None:
+    model = a_chain(1)
+    engine = made(model)
+    q, v = np.zeros(1), np.ones(1)
+    for frame in model.frame_names:
+        for reference in REFERENCES:
+            engine.frame_velocity(q, v, frame, reference=reference)
+            engine.jacobian_derivative(q, v, frame, reference="local")
+    assert len(model.frame_names) > 1
+    assert len(engine._chain_kernels) == 2
 
 
 def test_a_chain_holds_the_body_of_its_frame() -> None:

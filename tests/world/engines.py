@@ -2,4 +2,4 @@
 
 from __future__ import annotations
 
-WORLDS = ("pybullet",)
+WORLDS = ("pybullet", "mujoco")

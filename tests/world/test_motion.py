@@ -105,16 +105,14 @@ FREE = {"collisions": False, "joint_limits": False, "joint_damping": False}
 
 @pytest.mark.parametrize("base", ["fixed", "floating"])
 @pytest.mark.parametrize("name", ["ur5", "panda"])
-def test_pybullet_steps_as_simulate_does(engine: str, name: str, base: dynx.model.model.Base) -> None:
-    if engine != "pybullet":
+def test_robots_step_as_simulate_does(engine: str, name: str, base: dynx.model.model.Base) -> None:
+    if engine not in ("pybullet", "mujoco"):
         pytest.skip("the plant of this engine has another scheme")
     model = dynx.load(name, base=base)
     rng = np.random.default_rng(4)
     q, v, tau = configuration.random(model, rng), rng.normal(size=model.nv), rng.normal(size=model.nv)
     controller = OpenLoop(model, np.tile(tau, (50, 1)), control_dt=2 * DT)
-    rollout = dynx.simulate(
-        model, controller, plant="pybullet", duration=0.1, dt=2 * DT, substeps=2, q0=q, v0=v
-    )
+    rollout = dynx.simulate(model, controller, plant=engine, duration=0.1, dt=2 * DT, substeps=2, q0=q, v0=v)
     scene = Scene("s", robots=(SceneRobot("r", model, q=tuple(q), v=tuple(v)),))
     with World(scene, engine, 2 * DT, substeps=2, **FREE) as world:
         world.step(50, torques={"r": tau})

@@ -91,13 +91,18 @@ def build_tree(model: Model) -> MujocoTree:
 
 
 def _body(parent: Any, name: str, pose: Pose) -> Any:
-    body = parent.add_body(name=name, pos=np.array(pose.xyz), quat=_quat_wxyz(_rotation(pose)))
+    body = parent.add_body(name=name, pos=np.array(pose.xyz), quat=quat_wxyz(_rotation(pose)))
+    set_substitute_inertia(body)
+    return body
+
+
+def set_substitute_inertia(body: Any) -> None:
+    """Give MuJoCo's body an inertia that its compiler accepts and does not simplify."""
     body.explicitinertial = True
     body.mass = 1.0
     body.inertia = np.array([1.0, 1.0, 1.0])
     body.ipos = np.array([0.25, 0.5, 0.75])
     body.iquat = np.array([0.5, 0.5, 0.5, 0.5])
-    return body
 
 
 def _write_inertias(model: Model, compiled: Any, tree: tuple[int, ...]) -> Floats:
@@ -113,7 +118,7 @@ def _write_inertias(model: Model, compiled: Any, tree: tuple[int, ...]) -> Float
             compiled.body_mass[number] = link.inertial.mass
             compiled.body_inertia[number] = moments
             compiled.body_ipos[number] = link.inertial.origin.xyz
-            compiled.body_iquat[number] = _quat_wxyz(axes)
+            compiled.body_iquat[number] = quat_wxyz(axes)
     masses = np.array(compiled.body_mass)
     total = masses.copy()
     for number in range(len(total) - 1, WORLD, -1):
@@ -135,6 +140,7 @@ def _rotation(pose: Pose) -> Array:
     return rotation_from_rpy(longdouble(pose.rpy))
 
 
-def _quat_wxyz(R: Array) -> Floats:
+def quat_wxyz(R: Array) -> Floats:
+    """Return the quaternion (w, x, y, z) of a rotation matrix (3, 3)."""
     x, y, z, w = quat_from_rotation(np.asarray(R, dtype=np.float64))
     return np.array([w, x, y, z])

@@ -62,7 +62,7 @@ class BulletWorld(WorldEngine):
             raise
         self._loaded_robots: list[BulletRobot] = []
         self._pushed: list[BulletBody] = []
-        self._coupled = [robot for robot in self._robots if robot.coupled]
+        self._corrected = [robot for robot in self._robots if robot.corrected]
         self._touch()
 
     def _load(self, folder: Path, settings: Mapping[str, Any]) -> None:
@@ -123,10 +123,10 @@ class BulletWorld(WorldEngine):
                     robot.apply()
                 for body in self._pushed:
                     body.push()
-                for robot in self._coupled:
+                for robot in self._corrected:
                     robot.before_step()
                 step(physicsClientId=number)
-                for robot in self._coupled:
+                for robot in self._corrected:
                     robot.after_step()
         except self._client.errors as error:
             raise self._client.failure("stepSimulation", error) from error

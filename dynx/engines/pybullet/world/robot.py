@@ -9,19 +9,23 @@ from pathlib import Path
 
 import numpy as np
 
+from dynx.backends import Backend, backend
 from dynx.control.engine_motors import MotorCommand
-from dynx.engines.pybullet.backend import PyBulletBackend
 from dynx.engines.pybullet.world.client import WorldClient
 from dynx.engines.pybullet.world.objects import UNLIMITED, BulletObject
 from dynx.engines.pybullet.world.shapes import ShapeFiles
 from dynx.errors import ArgumentError, UnsupportedFeatureError, shown
 from dynx.model.mechanism import build_mechanism
+from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.branchless import quat_exp
 from dynx.spatial.extended import longdouble
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import cross, quat_product, rotation_from_quat
 from dynx.world.layout import Collider, RobotLayout
 from dynx.world.state import RobotState
+
+STIFF = 0.25
+"""Share of a joint's speed that damping may remove in a step by Bullet's own, explicit law."""
 
 MODES = ("POSITION_CONTROL", "VELOCITY_CONTROL", "TORQUE_CONTROL", "PD_CONTROL")
 """Control modes of Bullet for a joint's motor."""
@@ -32,7 +36,9 @@ class BulletRobot:
 
     Bullet's stepper has no mimic joints. Their robot moves with all joints free during a step; the velocity
     at its end is then projected, in the metric of the mass matrix, on those that the coupling allows. That is
-    Gauss' principle, so torques, contacts and limits act on followers and drivers as they should.
+    Gauss' principle, so torques, contacts and limits act on followers and drivers as they should. Bullet's
+    damping uses the velocity at the beginning of a step, which diverges where it is stiff; then the velocity
+    at the end is damped in the same correction.
     """
 
     def __init__(
@@ -64,16 +70,34 @@ class BulletRobot:
         self._tau: Floats = np.zeros(model.nv)
         self._forces: list[float] | None = None
         self.motor: MotorCommand | None = None
-        for k, damping in zip(self.object.links, layout.damping.tolist(), strict=True):
-            if damping:
-                client.call(client.engine.changeDynamics, self.object.body, k, jointDamping=damping)
+        stiff = self._is_stiff(layout)
+        self.corrected = self._coupling is not None or stiff
+        """Whether the robot has mimic joints or stiff damping, so that `before_step` and `after_step` must be
+        called."""
+        base = np.zeros(self._base)
+        self._damping = h * self._S.T @ np.diag(np.concatenate([base, layout.damping])) @ self._S
+        if not self.corrected:
+            self._damp(layout.damping)
         self.release_motors()
         self.set_state(layout.q, layout.v)
 
-    @property
-    def coupled(self) -> bool:
-        """Whether the robot has mimic joints, so that `before_step` and `after_step` must be called."""
-        return self._coupling is not None
+    def _is_stiff(self, layout: RobotLayout) -> bool:
+        """Check whether damping removes more than `STIFF` of a joint's speed in a step at the start."""
+        if not layout.damping.any():
+            return False
+        M = self._tree_dynamics.mass_matrix(self._tree_q(layout.q))
+        inertia = np.linalg.pinv(M).diagonal()[self._base :]
+        return bool((self._h * layout.damping * inertia > STIFF).any())
+
+    def _damp(self, damping: Floats) -> None:
+        for k, number in zip(self.object.links, damping.tolist(), strict=True):
+            if number:
+                self._client.call(
+                    self._client.engine.changeDynamics, self.object.body, k, jointDamping=number
+                )
+
+    def _tree_q(self, q: Floats) -> Floats:
+        return q if self._coupling is None else self._coupling.expand_q(q)
 
     # -- state --------------------------------------------------------------------------------
 
@@ -88,7 +112,7 @@ class BulletRobot:
 
     def set_state(self, q: Floats, v: Floats) -> None:
         """Set the configuration and velocity of the model."""
-        tree_q = q if self._coupling is None else self._coupling.expand_q(q)
+        tree_q = self._tree_q(q)
         tree_v = self._S @ v
         if self._base:
             self._near = q[3:7].copy()
@@ -184,26 +208,25 @@ class BulletRobot:
                 forces=self._friction.tolist(),
             )
 
-    # -- mimic joints -------------------------------------------------------------------------
+    # -- mimic joints and stiff damping ---------------------------------------------------------
 
     @cached_property
-    def _tree_dynamics(self) -> PyBulletBackend:
+    def _tree_dynamics(self) -> Backend:
         """The robot with its mimic joints free."""
         joints = tuple(replace(joint, mimic=None) for joint in self.model.joints)
-        return PyBulletBackend(replace(self.model, joints=joints), validate=False)
+        return backend(DEFAULT_ENGINE, replace(self.model, joints=joints), validate=False)
 
     def before_step(self) -> None:
-        """Note the state at the beginning of a step of a robot with mimic joints."""
+        """Note the state at the beginning of a step."""
         self._begun = self.state()
 
     def after_step(self) -> None:
-        """Project the velocity at the end of a step, and step to it from the noted state."""
-        assert self._coupling is not None
+        """Correct the velocity at the end of a step, and step to it from the noted state."""
         q, h, base = self._begun.q, self._h, self._base
-        tree_q = self._coupling.expand_q(q)
-        M, rates = self._tree_dynamics.mass_matrix(tree_q), np.array(self.object.joint_states()[1])
+        M = self._tree_dynamics.mass_matrix(self._tree_q(q))
+        rates = np.array(self.object.joint_states()[1])
         if not base:
-            v = self._project(M, rates)
+            v = self._correct(M, rates)
             self.set_state(q + h * v, v)
             return
         R, c = rotation_from_quat(q[3:7]), self.object.root.center
@@ -211,7 +234,7 @@ class BulletRobot:
         # The velocity of the base frame as it was placed when the step began.
         w = R.T @ np.array(after.angular)
         linear = R.T @ np.array(after.linear) - cross(w, c)
-        v = self._project(M, np.concatenate([linear, w, rates]))
+        v = self._correct(M, np.concatenate([linear, w, rates]))
         angular, linear = R @ v[3:6], R @ (v[:3] + cross(v[3:6], c))
         quat = quat_product(quat_exp(h * angular), q[3:7])
         quat = quat / np.sqrt(quat.dot(quat))
@@ -221,10 +244,15 @@ class BulletRobot:
         v = np.concatenate([R_next.T @ linear - cross(w, c), w, v[6:]])
         self.set_state(np.concatenate([position, quat, q[7:] + h * v[6:]]), v)
 
-    def _project(self, M: Floats, v: Floats) -> Floats:
-        """Return the velocity of the model nearest to that of the tree, in the metric M."""
+    def _correct(self, M: Floats, v: Floats) -> Floats:
+        """Return the velocity of the model nearest to that of the tree in the metric M, damped."""
         S = self._S
-        return np.asarray(np.linalg.solve(S.T @ M @ S, S.T @ (M @ v)))
+        A, momentum = S.T @ M @ S + self._damping, S.T @ (M @ v)
+        try:
+            return np.asarray(np.linalg.solve(A, momentum))
+        except np.linalg.LinAlgError:
+            # A joint that moves no mass keeps no speed.
+            return np.asarray(np.linalg.lstsq(A, momentum)[0])
 
     def close(self) -> None:
         """Close the clients of its own."""

@@ -1,0 +1,119 @@
+"""Conversion between the coordinates of dynx and those of MuJoCo, for robots and for bodies of a scene.
+
+A floating base is in MuJoCo a body at the centre of mass of the root, with the axes of the base frame: then
+MuJoCo's Euler conserves the momentum of a free body, and takes the step of `dynx.simulate`. Its position is
+(point, quaternion wxyz), its velocity that of the point in world axes, then the angular velocity in base
+axes; forces likewise. A body of a scene is a floating base.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from dynx.engines.mujoco.tree import quat_wxyz
+from dynx.model import Model
+from dynx.model.mechanism import Mechanism
+from dynx.spatial.scalar import Array, Floats
+from dynx.spatial.se3 import homogeneous
+from dynx.spatial.so3 import cross, rotation_from_quat
+from dynx.world.layout import BodyLayout
+from dynx.world.state import BodyState, RobotState
+
+
+def root_center(mechanism: Mechanism) -> Array:
+    """Return the centre of mass (3,) of the root in the base frame [m]; zero without mass, and for a fixed
+    base."""
+    mass = mechanism.root.mass
+    if not mechanism.floating or mass == 0.0:
+        return np.zeros(3)
+    return np.asarray(mechanism.root.first_moment / mass)
+
+
+class RobotCoordinates:
+    """The coordinates of one robot in MuJoCo's q and v, of which it has views."""
+
+    def __init__(self, data: Any, model: Model, first: tuple[int, int]) -> None:
+        """`first` are the indices in q and v at which the robot begins."""
+        mechanism = model.mechanism
+        self._floating = model.floating
+        self._center = np.asarray(root_center(mechanism), dtype=float)
+        self._coupling = mechanism.coupling
+        self._q: Floats = data.qpos[first[0] : first[0] + mechanism.nq]
+        self._v: Floats = data.qvel[first[1] : first[1] + mechanism.nv]
+        self._force: Floats = data.qfrc_applied[first[1] : first[1] + mechanism.nv]
+        if self._coupling is not None:
+            self._S = self._coupling.matrix()
+            moving = [joint for joint in model.joints if joint.moves]
+            owners = [k for k, joint in enumerate(moving) if joint.mimic is None]
+            base_q, base_v = (7, 6) if model.floating else (0, 0)
+            self._own_q = np.array([*range(base_q), *(base_q + k for k in owners)], dtype=np.intp)
+            self._own_v = np.array([*range(base_v), *(base_v + k for k in owners)], dtype=np.intp)
+
+    def read(self) -> RobotState:
+        """Return new arrays q, v in the coordinates of the model."""
+        if self._coupling is None:
+            q, v = self._q.copy(), self._v.copy()
+        else:
+            q, v = self._q[self._own_q], self._v[self._own_v]
+        if self._floating:
+            q[3], q[4], q[5], q[6] = q[4], q[5], q[6], q[3]
+            R = rotation_from_quat(q[3:7])
+            q[:3] -= R @ self._center
+            v[:3] = v[:3] @ R - cross(v[3:6], self._center)
+        return RobotState(q, v)
+
+    def write(self, q: Floats, v: Floats) -> None:
+        """Set the state from q, v in the coordinates of the model."""
+        if self._coupling is not None:
+            q, v = self._coupling.expand_q(q), self._S @ v
+        self._q[:] = q
+        self._v[:] = v
+        if self._floating:
+            R = rotation_from_quat(q[3:7])
+            self._q[:3] += R @ self._center
+            self._q[3], self._q[4:7] = q[6], q[3:6]
+            self._v[:3] = R @ (v[:3] + cross(v[3:6], self._center))
+
+    def apply(self, tau: Floats) -> None:
+        """Apply the torque of a robot without mimic joints."""
+        self._force[:] = self.forces(tau)
+
+    def forces(self, tau: Floats) -> Floats:
+        """Return a torque with the wrench on a floating base, `tau[:6]` at its origin in its axes, converted
+        to MuJoCo's."""
+        if not self._floating:
+            return tau
+        w, x, y, z = self._q[3:7]
+        R = rotation_from_quat(np.array([x, y, z, w]))
+        force = tau[:3]
+        return np.concatenate([R @ force, tau[3:6] - cross(self._center, force), tau[6:]])
+
+
+class BodyCoordinates:
+    """The state of one moving body of a scene, of which it has views."""
+
+    def __init__(self, model: Any, data: Any, body: int, layout: BodyLayout) -> None:
+        joint = model.body_jntadr[body]
+        at, first = model.jnt_qposadr[joint], model.jnt_dofadr[joint]
+        self._center = layout.center
+        self._q: Floats = data.qpos[at : at + 7]
+        self._v: Floats = data.qvel[first : first + 6]
+
+    def read(self) -> BodyState:
+        """Return new arrays: the pose (4, 4) and the twist (6,) in world axes."""
+        w, x, y, z = self._q[3:7]
+        R = rotation_from_quat(np.array([x, y, z, w]))
+        lever, omega = R @ self._center, R @ self._v[3:]
+        twist = np.concatenate([self._v[:3] - cross(omega, lever), omega])
+        return BodyState(homogeneous(R, self._q[:3] - lever), twist)
+
+    def write(self, T: Floats, twist: Floats) -> None:
+        """Set the pose and the twist."""
+        R = T[:3, :3]
+        lever = R @ self._center
+        self._q[:3] = T[:3, 3] + lever
+        self._q[3:] = quat_wxyz(R)
+        self._v[:3] = twist[:3] + cross(twist[3:], lever)
+        self._v[3:] = twist[3:] @ R
