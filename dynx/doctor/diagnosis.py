@@ -116,16 +116,17 @@ def compare_as_loaded(
     seed: int = 0,
     tolerance: float = BAR,
 ) -> DoctorReport:
-    """Compare engines that load the file themselves, without a search for causes."""
+    """Compare engines that load the file themselves, without a search for causes.
+
+    The states are those of `diagnose`.
+    """
     started = time.perf_counter()
     examiner, variants = _examiners(engines, samples, seed, tolerance)
     checked_base(base)
     try:
         case = open_case(robot, base, {})
-        reference = _reference_of(readable(case).case, examiner)
-        before = examiner.examine(case, reference=reference, describe=True)
-        report = first_report(case, before, tolerance)
-        report = replace(report, variants=variants_as_loaded(case, reference, variants))
+        _, before, report = _loaded(case, examiner, tolerance)
+        report = replace(report, variants=variants_as_loaded(case, before.reference, variants))
     except DynxError as error:
         report = refused_report(str(_label(robot)), error, base=base)
     seconds = time.perf_counter() - started
@@ -171,18 +172,10 @@ def _diagnosis_of(
     progress: Progress,
 ) -> DoctorReport:
     progress("loading")
-    sound = readable(case).case
-    reference = _reference_of(sound, examiner)
-    before = examiner.examine(case, reference=reference, describe=True)
+    examiner, before, report = _loaded(case, examiner, tolerance)
+    reference, report = before.reference, with_meshes(report, case.source)
     rules = _rules_for(examiner)
-    found = with_original_lines(detections(case, rules), case.source, sound.source)
-    report = with_meshes(first_report(case, before, tolerance), case.source)
-    touching = _rare_contact(sound, found, examiner) if report.alike else None
-    if touching is not None:
-        examiner = examiner.at(touching)
-        reference = examiner.reference(sound)
-        before = examiner.examine(case, reference=reference, describe=True)
-        report = with_meshes(first_report(case, before, tolerance), case.source)
+    found = with_original_lines(detections(case, rules), case.source, readable(case).case.source)
     if report.alike and not _chosen_practice(case, found):
         return replace(
             report,
@@ -194,7 +187,7 @@ def _diagnosis_of(
     after = examiner.examine(full.case)
     proofs = Proofs(case, rules, examiner, before, full.case, after, tolerance, progress)
     attributions = proofs.attributions()
-    if after.reference.kinematics_only and any(each.refused for each in after.outputs.values()):
+    if after.reference.kinematics_only and any(each.no_results for each in after.outputs.values()):
         attributions = with_refusals(attributions, case, rules, examiner, before, tolerance, progress)
     best = smallest_mending(
         case,
@@ -246,13 +239,26 @@ def _reference_of(case: Case, examiner: Examiner) -> ReferenceValues:
         raise (refusal(case) or error) from None
 
 
-def _rare_contact(
-    case: Case, found: Sequence[tuple[Rule, Detection]], examiner: Examiner
-) -> Mapping[str, float] | None:
+def _loaded(case: Case, examiner: Examiner, tolerance: float) -> tuple[Examiner, Examination, DoctorReport]:
+    """Measure the engines on the file. Where they are alike, a state at which links touch is added, in an
+    engine that adds the forces."""
+    sound = readable(case).case
+    before = examiner.examine(case, reference=_reference_of(sound, examiner), describe=True)
+    report = first_report(case, before, tolerance)
+    touching = _rare_contact(case, sound, examiner) if report.alike else None
+    if touching is None:
+        return examiner, before, report
+    examiner = examiner.at(touching)
+    before = examiner.examine(case, reference=examiner.reference(sound), describe=True)
+    return examiner, before, first_report(case, before, tolerance)
+
+
+def _rare_contact(case: Case, sound: Case, examiner: Examiner) -> Mapping[str, float] | None:
     """Find positions at which links touch, in engines that add the forces; None where none touch."""
-    rules = dict.fromkeys(rule for rule, _ in found if rule.present_as)
+    found = detections(case, [rule for rule in _rules_for(examiner) if rule.present_as])
+    rules = dict.fromkeys(rule for rule, _ in found)
     engines = dict.fromkeys(engine for rule in rules for engine in rule.named_of(examiner.engines))
-    return deepest_contact(case, engines, examiner.seed) if engines else None
+    return deepest_contact(sound, engines, examiner.seed) if engines else None
 
 
 def _chosen_practice(case: Case, found: Sequence[tuple[Rule, Detection]]) -> bool:
@@ -296,7 +302,7 @@ def _unexplained(after: Examination, tolerance: float, known: Collection[str]) -
     it is not used on that)."""
     remaining = []
     for engine, output in after.outputs.items():
-        if output.refused is not None and engine not in known:
+        if output.no_results is not None and engine not in known:
             remaining.append(Unexplained(engine, output.missing, float("inf")))
         errors = after.errors(engine)
         quantity = max(errors, key=lambda name: errors[name], default=None)

@@ -64,8 +64,8 @@ class EngineResult:
     """Load call of one engine, and its relative errors `before` and `after` mending, by quantity.
 
     Errors are against the reference values that dynx computes from the file. `refused` is the message with
-    which the engine refuses the file, `refused_after` that for the mended file. With `not_used` the engine
-    itself refuses nothing; `refused` is the reason why dynx does not use it on the file: it would crash, its
+    which the engine refuses the file, `refused_after` that for the mended file. `not_used` and
+    `not_used_after` are the reasons why dynx does not use an engine that refuses nothing: it would crash, its
     results are undefined, or they are those of another robot.
     """
 
@@ -76,8 +76,18 @@ class EngineResult:
     refused_after: str | None = None
     before: Mapping[str, float] = field(default_factory=dict)
     after: Mapping[str, float] = field(default_factory=dict)
-    not_used: bool = False
-    not_used_after: bool = False
+    not_used: str | None = None
+    not_used_after: str | None = None
+
+    @property
+    def no_results(self) -> str | None:
+        """Reason why there are no results on the file; None where there are some."""
+        return self.not_used if self.refused is None else self.refused
+
+    @property
+    def no_results_after(self) -> str | None:
+        """Reason why there are no results on the mended file."""
+        return self.not_used_after if self.refused_after is None else self.refused_after
 
 
 @dataclass(frozen=True)
@@ -94,11 +104,11 @@ class VariantResult(EngineResult):
     @property
     def largest_error(self) -> float:
         """Largest error as loaded, infinite where the file is refused."""
-        return float("inf") if self.refused is not None else max(self.before.values(), default=0.0)
+        return float("inf") if self.no_results is not None else max(self.before.values(), default=0.0)
 
     def is_like(self, engine: EngineResult) -> bool:
         """Check whether the engine itself loads, or refuses, the file as this variant does."""
-        return (self.refused is None, self.before) == (engine.refused is None, engine.before)
+        return (self.no_results is None, self.before) == (engine.no_results is None, engine.before)
 
 
 @dataclass(frozen=True)
@@ -240,7 +250,7 @@ class DoctorReport:
         `variants` do not count.
         """
         largest = max((e for each in self.engines for e in each.before.values()), default=0.0)
-        refused = any(each.refused is not None for each in self.engines)
+        refused = any(each.no_results is not None for each in self.engines)
         compared = self.error is None and not self.kinematics_only
         return compared and not refused and largest <= self.tolerance
 
@@ -266,7 +276,7 @@ class DoctorReport:
     def remaining(self) -> float:
         """Largest error on the mended file, at its level and with its calls; infinite where an engine refuses
         it, and where nothing was examined."""
-        refused = self.error is not None or any(each.refused_after is not None for each in self.engines)
+        refused = self.error is not None or any(each.no_results_after is not None for each in self.engines)
         errors = (error for each in self.engines for error in each.after.values())
         return float("inf") if refused else max(errors, default=0.0)
 
@@ -341,7 +351,7 @@ class DoctorReport:
         """Write what remains in a file that is mended at a lower level than `physics`."""
         if not self.undone:
             return ""
-        without = [each.engine for each in self.engines if each.refused_after is not None]
+        without = [each.engine for each in self.engines if each.no_results_after is not None]
         if without:
             return f"; no result from {' and '.join(without)} when mended at level {self.level}"
         return f"; off by up to {self.remaining:.0e} when mended at level {self.level}"

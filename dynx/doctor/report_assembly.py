@@ -116,7 +116,7 @@ def _engine_result(case: Case, name: str, before: Examination) -> EngineResult:
 
 
 def _pairs(examination: Examination) -> tuple[PairError, ...]:
-    loaded = [name for name, each in examination.outputs.items() if each.refused is None]
+    loaded = [name for name, each in examination.outputs.items() if each.no_results is None]
     return tuple(
         PairError(
             (one, other),

@@ -124,7 +124,7 @@ def test_a_variant_that_is_like_its_engine_is_not_shown() -> None:
     """PyBullet fixes a robot without mass to the world, by either call."""
     massless = diagnose(find_trap("DX118"), base="floating", counterexamples=False)
     (variant,) = massless.variants
-    assert variant.refused is not None
+    assert variant.no_results is not None
     assert massless.variants_off == ()
 
 

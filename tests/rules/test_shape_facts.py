@@ -32,6 +32,7 @@ WITHOUT_SIZE = [
     '<capsule radius="1" length="0"/>',
 ]
 WITHOUT_ATTRIBUTE = ["<box/>", "<sphere/>", '<cylinder radius="1"/>', '<cylinder length="1"/>']
+WITHOUT_FILE = ["<mesh/>", '<mesh filename=""/>', '<mesh filename=" " scale="1 1 1"/>']
 TINY = ['<box size="1e-16 1 1"/>', '<sphere radius="1e-300"/>', '<cylinder radius="1e-9" length="1e-9"/>']
 
 
@@ -66,7 +67,7 @@ def test_mujoco_alone_refuses_a_size_that_is_not_positive(shape: str, tmp_path: 
     assert refusing == {"mujoco"}.intersection(INSTALLED)
 
 
-@pytest.mark.parametrize("shape", WITHOUT_ATTRIBUTE)
+@pytest.mark.parametrize("shape", WITHOUT_ATTRIBUTE + WITHOUT_FILE)
 def test_mujoco_and_pybullet_refuse_a_missing_size(shape: str, tmp_path: Path) -> None:
     refusing = {engine for engine in INSTALLED if refused(shaped(shape), engine, tmp_path)}
     assert refusing == {"mujoco", "pybullet"}.intersection(INSTALLED)
@@ -80,7 +81,7 @@ def test_the_least_size_is_a_size(shape: str, tmp_path: Path) -> None:
     )
 
 
-@pytest.mark.parametrize("shape", [*WITHOUT_SIZE, *WITHOUT_ATTRIBUTE])
+@pytest.mark.parametrize("shape", [*WITHOUT_SIZE, *WITHOUT_ATTRIBUTE, *WITHOUT_FILE])
 @pytest.mark.parametrize("choice", ["remove", "thicken"])
 def test_no_engine_refuses_the_mended_file(shape: str, choice: str, tmp_path: Path) -> None:
     case = case_of(
@@ -93,6 +94,14 @@ def test_no_engine_refuses_the_mended_file(shape: str, choice: str, tmp_path: Pa
     kept = choice == "thicken" and shape in WITHOUT_SIZE
     assert ("<collision>" in remedy.case.source.text) == kept
     assert not any(refused(remedy.case.source.text, engine, tmp_path) for engine in INSTALLED)
+
+
+def test_a_mesh_without_file_reaches_the_engines() -> None:
+    report = diagnose(shaped("<mesh/>"), samples=1)
+    refusing = {each.engine for each in report.engines if each.refused is not None}
+    assert refusing == {"mujoco", "pybullet"}.intersection(INSTALLED)
+    assert report.explained
+    assert {each.rule for each in report.differences} == ({"DX425"} if refusing else set())
 
 
 @pytest.mark.parametrize("tag", ["collision", "visual"])

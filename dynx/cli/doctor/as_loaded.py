@@ -120,8 +120,8 @@ def _show_many(out: Console, reports: Sequence[DoctorReport], seconds: float, no
         for engine in engines:
             result = results.get(engine)
             far = None if result is None else largest_quantity_error(result)
-            if result is not None and result.refused is not None:
-                cells.append("not used" if result.not_used else "refuses")
+            if result is not None and result.no_results is not None:
+                cells.append("not used" if result.refused is None else "refuses")
             else:
                 cells.append("" if far is None else error_text(far[1], report.tolerance))
         found = vote(report)
@@ -150,7 +150,7 @@ def vote_lines(report: DoctorReport, found: Vote) -> list[str]:
     without = [each for each in report.engines if each.engine in found.refused]
     lines += [f"{each.engine} {_absence(each)}" for each in without]
     wrong = [
-        each.engine for each in report.engines if each.refused is None and each.engine not in found.right
+        each.engine for each in report.engines if each.no_results is None and each.engine not in found.right
     ]
     if found.right:
         verb = "matches" if len(found.right) == 1 else "match"
@@ -170,7 +170,7 @@ def vote_lines(report: DoctorReport, found: Vote) -> list[str]:
 
 
 def _absence(each: EngineResult) -> str:
-    return "is not used on the file" if each.not_used else "does not load the file"
+    return "is not used on the file" if each.refused is None else "does not load the file"
 
 
 def _and(names: Sequence[str]) -> str:

@@ -81,9 +81,9 @@ def show_summary(out: Console, reports: Sequence[DoctorReport], seconds: float, 
 def _largest(report: DoctorReport) -> Text:
     if report.error is not None:
         return Text("")
-    without = [each for each in report.engines if each.refused is not None]
+    without = [each for each in report.engines if each.no_results is not None]
     if without:
-        word = "not used" if all(each.not_used for each in without) else "refused"
+        word = "not used" if all(each.refused is None for each in without) else "refused"
         return Text(word, STYLES["error"])
     return error_text(largest_error(report), report.tolerance)
 
@@ -92,9 +92,9 @@ def _remaining(report: DoctorReport) -> Text:
     """Write the error after mending."""
     if report.error is not None:
         return Text("")
-    without = [each for each in report.engines if each.refused_after is not None]
+    without = [each for each in report.engines if each.no_results_after is not None]
     if without:
-        word = "not used" if all(each.not_used_after for each in without) else "refused"
+        word = "not used" if all(each.refused_after is None for each in without) else "refused"
         return Text(word, STYLES["error"])
     return error_text(report.remaining, report.tolerance)
 

@@ -96,12 +96,12 @@ def show_engines(out: Console, report: DoctorReport) -> None:
     for each in report.engines:
         call = "; ".join(wording.name(line, 500) for line in each.call.splitlines())
         out.print(Text.assemble((f"  {each.engine} {one_line(each.version)}: ", "bold"), (call, "dim")))
-        if each.refused is not None:
+        if each.no_results is not None:
             sentence(out, wording.refusal(each), 6, "red")
-            if report.mended is not None and each.refused_after is None:
+            if report.mended is not None and each.no_results_after is None:
                 sentence(out, wording.loads_mended(each, report), 6, "green")
             elif report.mended is not None:
-                same = each.refused_after == each.refused
+                same = each.no_results_after == each.no_results
                 after = wording.refusal(each, mended=True)
                 sentence(out, after.partition(":")[0] if same else after, 6, "red")
 
@@ -198,9 +198,11 @@ def _cause_line(cause: Cause) -> Text:
 
 
 def _extent(cause: Cause) -> str:
-    """Write the number of places and the engines."""
+    """Write the number of places with an effect and the engines, and the number of places without effect."""
     engines = f" in {', '.join(map(wording.name, cause.engines))}" if cause.engines else ""
-    return f"{counted(len(cause.findings), 'place')}{engines}"
+    acting = sum(each.effect is not None for each in cause.findings) or len(cause.findings)
+    idle = len(cause.findings) - acting
+    return f"{counted(acting, 'place')}{engines}{f', {idle} without effect' * bool(idle)}"
 
 
 def _show_list(out: Console, title: str, items: Sequence[str]) -> None:
@@ -297,7 +299,7 @@ def _without_calls(report: DoctorReport) -> str:
 
 def _residual(report: DoctorReport) -> str:
     """Write the error that remains without the causes, and the engines that have none."""
-    missing = [each.engine for each in report.engines if each.refused_after is not None]
+    missing = [each.engine for each in report.engines if each.no_results_after is not None]
     without = f" (without {', '.join(map(wording.name, missing))})" if missing else ""
     residual = f"{wording.relative(report.residual)}{without}"
     if report.kinematics_only:
@@ -309,7 +311,7 @@ def _change(engine: EngineResult, key: str, tolerance: float, mended: bool) -> T
     """Write the error before mending, and the one after where either exceeds the tolerance."""
     before, after = engine.before.get(key), engine.after.get(key)
     if before is None:
-        word = "-" if engine.refused is None else "not used" if engine.not_used else "refused"
+        word = "-" if engine.no_results is None else "not used" if engine.refused is None else "refused"
         first = Text(word, "red")
     else:
         first = error_text(before, tolerance)

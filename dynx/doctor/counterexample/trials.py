@@ -124,7 +124,7 @@ def difference_of(examiner: Examiner, engine: str, quantity: str) -> Difference:
         except DynxError:
             return 0.0
         output = examination.outputs[engine]
-        if output.refused is not None or quantity in output.failed:
+        if output.no_results is not None or quantity in output.failed:
             return 0.0
         return examination.error(engine, quantity)
 

@@ -46,20 +46,25 @@ class EngineOutput:
     `deviation` maps a quantity to engine minus reference: by link (n, 4, 4) or (n, 6, nv) for poses and
     Jacobians, under "" (n, nv, nv) or (n, nv) for the rest, (n, 2, nv) for accelerations. A quantity that
     the engine could not compute is in `failed`, with its error message; `refused` is the message with which
-    it refused the file, or, with `not_used`, the reason why dynx does not use the engine on it.
+    it refused the file, `not_used` the reason why dynx does not use the engine on it.
     """
 
     engine: str
     refused: str | None = None
-    not_used: bool = False
+    not_used: str | None = None
     deviation: Mapping[str, Mapping[str, Floats]] = field(default_factory=dict)
     failed: Mapping[str, str] = field(default_factory=dict)
     description: LoadedModel | None = None
 
     @property
+    def no_results(self) -> str | None:
+        """Reason why there are no results; None where there are some."""
+        return self.not_used if self.refused is None else self.refused
+
+    @property
     def missing(self) -> str:
         """The quantity in which an engine without results shows: `LOADING` or `RESULT`."""
-        return RESULT if self.not_used else LOADING
+        return RESULT if self.refused is None else LOADING
 
     def first(self, count: int) -> EngineOutput:
         """Keep the first `count` states."""
@@ -106,21 +111,21 @@ class Examination:
     def error(self, engine: str, quantity: str) -> float:
         """Return the largest deviation over its scale; infinite where the engine computed nothing."""
         output = self.outputs[engine]
-        if output.refused is not None or quantity in output.failed:
+        if output.no_results is not None or quantity in output.failed:
             return float("inf")
         return _number(_largest(output.deviation.get(quantity, {})) / self.scale(quantity, engine))
 
     def errors(self, engine: str) -> dict[str, float]:
         """Return `error` of every quantity that was examined; empty where the file was refused."""
         output = self.outputs[engine]
-        if output.refused is not None:
+        if output.no_results is not None:
             return {}
         examined = [quantity for quantity in QUANTITIES if quantity in {*output.deviation, *output.failed}]
         return {quantity: self.error(engine, quantity) for quantity in examined}
 
     def max_error(self, engine: str) -> float:
         """Return the largest of `errors`, infinite where the file was refused."""
-        if self.outputs[engine].refused is not None:
+        if self.outputs[engine].no_results is not None:
             return float("inf")
         return max(self.errors(engine).values(), default=0.0)
 
@@ -142,7 +147,7 @@ class Examination:
         """Return the deviation of two engines from each other, relative to its scale; infinite where one
         computed nothing."""
         one, two = self.outputs[engine], self.outputs[other]
-        if quantity in {*one.failed, *two.failed} or one.refused or two.refused:
+        if quantity in {*one.failed, *two.failed} or one.no_results or two.no_results:
             return float("inf")
         gap = max_change(one.deviation.get(quantity, {}), two.deviation.get(quantity, {}))
         return _number(gap / self.scale(quantity, engine))
@@ -235,11 +240,10 @@ class Examiner:
             return EngineOutput(engine, refused=f"{engine} cannot return names that are not in UTF-8")
         except DynxError as error:
             # The name of the temporary file differs each time, so it is removed from messages.
-            return EngineOutput(
-                engine,
-                refused=str(error).replace(str(path), path.name),
-                not_used=isinstance(error, UnusableEngineError),
-            )
+            reason = str(error).replace(str(path), path.name)
+            if isinstance(error, UnusableEngineError):
+                return EngineOutput(engine, not_used=reason)
+            return EngineOutput(engine, refused=reason)
 
 
 def _outputs_of(engine: str, robot: LoadedRobot, reference: ReferenceValues, describe: bool) -> EngineOutput:
@@ -267,7 +271,7 @@ def _outputs_of(engine: str, robot: LoadedRobot, reference: ReferenceValues, des
         if reference.solvable:
             record(ACCELERATION, lambda: {"": _acceleration_deviation(robot, reference)})
     description = robot.describe() if describe else None
-    return EngineOutput(engine, None, False, deviation, failed, description)
+    return EngineOutput(engine, deviation=deviation, failed=failed, description=description)
 
 
 def _evaluate_samples(compute: Callable[..., Floats], *columns: Floats) -> Floats:

@@ -131,10 +131,10 @@ def differences(report: DoctorReport, folder: str) -> tuple[Difference, ...]:
     for engine in report.engines:
         if engine.engine in named:
             continue
-        if engine.refused is not None:
-            add_unexplained(engine.engine, "result" if engine.not_used else "loading", math.inf)
+        if engine.no_results is not None:
+            add_unexplained(engine.engine, "result" if engine.refused is None else "loading", math.inf)
         for quantity, error in engine.before.items():
-            if engine.refused is None and not error <= report.tolerance:
+            if engine.no_results is None and not error <= report.tolerance:
                 add_unexplained(engine.engine, quantity, error)
     return tuple(merged.values())
 

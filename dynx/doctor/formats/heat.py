@@ -82,9 +82,9 @@ def engine_map(report: DoctorReport) -> HeatMap:
     nothing = dict.fromkeys(rows, math.inf)
     columns: dict[tuple[str, ...], Mapping[str, float]] = {}
     for each in report.engines:
-        columns[each.engine, "as loaded"] = each.before if each.refused is None else nothing
+        columns[each.engine, "as loaded"] = each.before if each.no_results is None else nothing
         if mended:
-            columns[each.engine, "mended"] = each.after if each.refused_after is None else nothing
+            columns[each.engine, "mended"] = each.after if each.no_results_after is None else nothing
     return HeatMap.of("quantity", rows, columns)
 
 

@@ -74,7 +74,7 @@ def _cases(report: DoctorReport, new: Collection[Difference] | None) -> Iterator
 def _quantities(report: DoctorReport, *, accepted: bool) -> Iterator[tuple[str, Element | None]]:
     prefix = "known: " if accepted else ""
     for each in report.engines:
-        if each.refused is not None:
+        if each.no_results is not None:
             message = f"{prefix}{each.engine}, {wording.refusal(each)}"
             yield f"{each.engine} loads the file", _failure(message, known=accepted)
     for key in dict.fromkeys(key for each in report.engines for key in each.before):

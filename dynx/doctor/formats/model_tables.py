@@ -48,7 +48,7 @@ class ModelTable:
 
 def model_tables(report: DoctorReport) -> tuple[ModelTable, ModelTable]:
     """Tabulate the deviations of the engines from the file: those above rounding, and the others."""
-    engines = [each.engine for each in report.engines if each.refused is None]
+    engines = [each.engine for each in report.engines if each.no_results is None]
     engines += sorted({each.engine for each in report.model_difference} - set(engines))
     large = [each for each in report.model_difference if _is_large(each)]
     small = [each for each in report.model_difference if not _is_large(each)]

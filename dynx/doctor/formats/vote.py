@@ -29,7 +29,7 @@ class Vote:
 
 def vote(report: DoctorReport) -> Vote:
     """Group the engines by how they loaded the file."""
-    voters = [each.engine for each in report.engines if each.refused is None]
+    voters = [each.engine for each in report.engines if each.no_results is None]
     differing = {
         frozenset(pair.engines) for pair in report.pairs if not pair.relative_error <= report.tolerance
     }
@@ -44,8 +44,10 @@ def vote(report: DoctorReport) -> Vote:
         merged = [member for group in alike for member in group] + [engine]
         groups = [group for group in groups if group not in alike] + [merged]
     ordered = sorted(groups, key=lambda group: (-len(group), voters.index(group[0])))
-    right = tuple(each.engine for each in report.engines if each.refused is None and is_right(each, report))
-    refused = tuple(each.engine for each in report.engines if each.refused is not None)
+    right = tuple(
+        each.engine for each in report.engines if each.no_results is None and is_right(each, report)
+    )
+    refused = tuple(each.engine for each in report.engines if each.no_results is not None)
     return Vote(tuple(map(tuple, ordered)), right, refused)
 
 

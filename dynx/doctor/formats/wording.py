@@ -128,17 +128,16 @@ def unexplained(each: Unexplained) -> str:
 
 def refusal(each: EngineResult, *, mended: bool = False) -> str:
     """Write why an engine has no results on the file, or on the mended one."""
-    not_used, reason = (each.not_used_after, each.refused_after) if mended else (each.not_used, each.refused)
-    if not_used:
-        start = "not used on the mended file either" if mended else "not used"
-    else:
-        start = "refuses the mended file too" if mended else "refuses the file"
-    return f"{start}: {name(reason, 1000)}"
+    if mended:
+        refused = each.refused_after is not None
+        start = "refuses the mended file too" if refused else "not used on the mended file either"
+        return f"{start}: {name(each.no_results_after, 1000)}"
+    return f"{'not used' if each.refused is None else 'refuses the file'}: {name(each.no_results, 1000)}"
 
 
 def variant(each: VariantResult) -> list[str]:
     """Write what a loading variant changes, by its causes where they are known."""
-    if each.refused is not None:
+    if each.no_results is not None:
         return [refusal(each)]
     if not each.findings:
         key = max(each.before, key=lambda key: each.before[key])

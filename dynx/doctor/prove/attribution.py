@@ -234,9 +234,9 @@ class Attributor:
     def _effect(self, engine: str, with_cause: Examination, without: Examination) -> Effect:
         """Return the change of the engine's output, in the quantity in which it is largest."""
         one, other = with_cause.outputs[engine], without.outputs[engine]
-        if other.refused is not None:
+        if other.no_results is not None:
             return NO_EFFECT
-        if one.refused is not None:
+        if one.no_results is not None:
             return Effect(one.missing, float("inf"))
         largest = NO_EFFECT
         for quantity in QUANTITIES:

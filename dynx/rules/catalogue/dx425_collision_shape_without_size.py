@@ -1,13 +1,15 @@
-"""DX425 collision-shape-without-size: A size of a collision shape is zero, negative or missing.
+"""DX425 collision-shape-without-size: A size of a collision shape is zero, negative or missing, or a mesh has
+no file.
 
-Exporters and templates write ``<box size="0 0 0"/>`` or ``<sphere radius="0"/>`` for a link that has no
-shape, and a plate gets a thickness of zero.
+Exporters and templates write ``<box size="0 0 0"/>``, ``<sphere radius="0"/>`` or ``<mesh filename=""/>`` for
+a link that has no shape, and a plate gets a thickness of zero.
 
 - MuJoCo 4.0 refuses the file for any size that is not positive, of a box, sphere, cylinder or capsule ("size
   0 must be positive in geom"), and for a missing attribute ("required attribute missing"). Every positive
   size will do, however small.
 - PyBullet 3.2.7 reads sizes of zero and below; it refuses the file ("Cannot load URDF file") where the
   attribute is missing.
+- Both refuse a ``<mesh>`` without ``filename``, or with an empty one.
 - Drake 1.51 reads shapes only into a scene graph. Then a size that is not positive, of a visual shape too,
   raises ``SystemExit``, which ends the program; it accepts a sphere of radius zero.
 - Pinocchio 4.1 reads no shapes into a model.
@@ -16,7 +18,7 @@ The dynamics of a link that states its inertia does not depend on shapes; whethe
 
 What to do: remove the shape, or give it its size. ``dynx doctor --fix`` removes the ``<collision>``.
 ``--choose DX425=thicken`` writes 1e-6 m for each size of zero and positive sizes for negative ones instead,
-which keeps the contacts of a plate (a shape of which a size is missing is removed all the same);
+which keeps the contacts of a plate (a shape of which a size or the file is missing is removed all the same);
 ``--choose DX425=keep`` keeps the file, and MuJoCo refuses it.
 """
 
@@ -25,6 +27,7 @@ from collections.abc import Iterable, Mapping
 from dynx.errors import DescriptionError
 from dynx.model.xml.source import Edit, SourceElement
 from dynx.rules import Case, Correction, EditingRule, correction, measured_on
+from dynx.rules.geometry.bullet_boxes import lacks_file
 from dynx.rules.text.attributes import number_of, vector_of
 from dynx.rules.text.number_text import decimal
 
@@ -36,20 +39,22 @@ _SIZES: Mapping[str, tuple[str, ...]] = {
 }
 """The attributes that every engine requires, by shape."""
 
+_KNOWN = (*_SIZES, "mesh")
+
 _LEAST = 1e-6
 """Size [m] in place of zero: too small for anyone to see, and large beside the rounding of contacts."""
 
 
 class CollisionShapeWithoutSize(EditingRule):
     stage = "reading"
-    advice = "Remove the shape, or give it its size."
+    advice = "Remove the shape, or give it its size or file."
     engines = measured_on("mujoco", "pybullet")
     choices = {
         "remove": "remove collisions without size",
         "thicken": "write 1e-6 m for sizes of zero; remove a collision only where a size is missing",
         "keep": "keep them; engines that need a size then refuse the file",
     }
-    changed = "removed collision shapes without size, or gave them one"
+    changed = "removed collision shapes without size or file, or gave them a size"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
         """Yield the collisions whose first known shape has such a size."""
@@ -57,7 +62,7 @@ class CollisionShapeWithoutSize(EditingRule):
             for collision in link.all("collision"):
                 geometry = collision.first("geometry")
                 shapes = (
-                    [] if geometry is None else [each for each in geometry.children if each.tag in _SIZES]
+                    [] if geometry is None else [each for each in geometry.children if each.tag in _KNOWN]
                 )
                 for shape in shapes[:1]:
                     if fault := _fault(shape):
@@ -69,8 +74,8 @@ class CollisionShapeWithoutSize(EditingRule):
         chosen = self.chosen(case)
         if chosen == "keep":
             return ()
-        sizes = {name: _sizes(shape, name) for name in _SIZES[shape.tag]}
-        if chosen == "remove" or None in sizes.values():
+        sizes = {name: _sizes(shape, name) for name in _SIZES.get(shape.tag, ())}
+        if chosen == "remove" or not sizes or None in sizes.values():
             return (case.source.removal(collision),)
         return tuple(
             case.source.attribute_edit(shape, name, " ".join(decimal(abs(each) or _LEAST) for each in found))
@@ -81,6 +86,8 @@ class CollisionShapeWithoutSize(EditingRule):
 
 def _fault(shape: SourceElement) -> str | None:
     """Describe the fault of a shape's sizes; None also for text that is no number, which has other rules."""
+    if shape.tag == "mesh":
+        return "names no file" if lacks_file(shape) else None
     for name in _SIZES[shape.tag]:
         if name not in shape.attributes:
             return f"has no {name}"

@@ -13,11 +13,16 @@ MESH_TAGS = frozenset({"mesh", "sdf_mesh", "convex"})
 
 
 def collision_meshes(link: SourceElement) -> Iterator[tuple[SourceElement, SourceElement]]:
-    """Yield each collision shape of a link that is a mesh, and the element of its mesh."""
+    """Yield each collision shape of a link that is a mesh of a file, and the element of its mesh."""
     for collision in link.all("collision"):
         mesh = next((element for element in collision.walk() if element.tag in MESH_TAGS), None)
-        if mesh is not None:
+        if mesh is not None and not lacks_file(mesh):
             yield collision, mesh
+
+
+def lacks_file(mesh: SourceElement) -> bool:
+    """Check whether a mesh names no file."""
+    return not mesh.attributes.get("filename", "").strip()
 
 
 def bullet_box(filename: str, source: str) -> tuple[Box, str] | None:

@@ -196,13 +196,23 @@ def test_names_cannot_write_on_the_terminal(report: DoctorReport) -> None:
         assert "x" * 1000 not in text
 
 
-@pytest.mark.parametrize(("not_used", "word"), [(True, "not used"), (False, "refused")])
-def test_an_engine_that_is_not_used_on_the_mended_file_does_not_refuse_it(not_used: bool, word: str) -> None:
-    out = StringIO()
-    engine = EngineResult("pybullet", "1", "load", "why", "why", not_used=not_used, not_used_after=not_used)
+@pytest.mark.parametrize("key", ["not_used", "refused"])
+def test_an_engine_that_is_not_used_on_the_mended_file_does_not_refuse_it(key: str) -> None:
+    out, word = StringIO(), key.replace("_", " ")
+    engine = replace(EngineResult("pybullet", "1", "load"), **{key: "why", f"{key}_after": "why"})
     show_many(Console(file=out, width=200), [replace(differing(), engines=(engine,))])
     line = next(line for line in out.getvalue().splitlines() if "UNEXPLAINED" in line)
     assert line.count(word) == 2
+
+
+def test_places_with_and_without_effect_are_counted_apart() -> None:
+    """As many have an effect as in JSON."""
+    one = differing().findings[0]
+    assert one.effect is not None
+    places = [replace(one, effect=effect, link=f"l{k}") for k, effect in enumerate((one.effect, None, None))]
+    report = replace(differing(), findings=tuple(places))
+    assert f"(1 place in {one.engines[0]}, 2 without effect)" in shown(report, 200)
+    assert "(3 places" in shown(replace(report, findings=tuple(replace(x, effect=None) for x in places)), 200)
 
 
 def test_an_unknown_robot_is_refused_in_the_worker() -> None:

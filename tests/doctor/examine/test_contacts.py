@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from dynx.doctor.diagnosis import diagnose
+from dynx.doctor.diagnosis import compare_as_loaded, diagnose
 from dynx.doctor.examine.contacts import (
     deepest_contact,
     describe_contacts,
@@ -100,10 +100,18 @@ def test_contacts_at_rare_states_are_found_and_proved(seed: int) -> None:
     assert report.remaining <= report.tolerance
 
 
+def test_comparing_without_causes_looks_for_rare_contacts_too() -> None:
+    found = compare_as_loaded(swing(0.02).source.text)
+    before = {each.engine: max(each.before.values()) for each in found.engines}
+    assert not found.alike
+    assert {engine for engine, error in before.items() if error > found.tolerance} == {"mujoco"}
+
+
 def test_links_that_never_touch_are_alike() -> None:
     report = diagnose(swing(0.02, away=0.2).source.text, counterexamples=False)
     assert report.alike
     assert not report.differences
+    assert compare_as_loaded(swing(0.02, away=0.2).source.text).alike
 
 
 def test_a_rare_contact_is_found_beside_other_causes() -> None:

@@ -69,7 +69,7 @@ def test_a_refusal_names_the_line_of_the_file(engine: str, words: str) -> None:
     report = diagnose(case.source.text, engines=[engine], samples=1)
     assert case.source.root.all("joint")[0].all("axis")[0].line == 13
     [result] = report.engines
-    assert words in str(result.refused)
+    assert words in str(result.no_results)
 
 
 def test_a_texture_that_is_beside_the_description_becomes_a_colour(tmp_path: Path) -> None:

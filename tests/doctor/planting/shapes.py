@@ -17,6 +17,7 @@ def without_size(site: Site) -> PlantedDefect:
             '<cylinder radius="0.05" length="0"/>',
             '<box size="-0.1 0.1 0.1"/>',
             '<cylinder radius="0.05"/>',
+            '<mesh filename=""/>',
         ]
     )
     text = f"<collision>\n  <geometry>\n    {shape}\n  </geometry>\n</collision>"
