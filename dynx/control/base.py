@@ -30,12 +30,26 @@ ControllerState = TypeVar("ControllerState")
 Self = TypeVar("Self", bound="Controller[Any]")
 
 
-class Measurement(NamedTuple):
-    """Configuration `q` (nq,) and velocity `v` (nv,) as measured at time `t` [s]."""
-
+class _State(NamedTuple):
     t: float
     q: Floats
     v: Floats
+
+
+class Measurement(_State):
+    """Configuration `q` (nq,) and velocity `v` (nv,) as measured at time `t` [s]."""
+
+    random: Floats = np.zeros(0)
+    """Independent standard normal numbers of this control step; `Controller.random_size` is their number."""
+
+    def with_random(self, random: Floats) -> Measurement:
+        """Return the measurement with these random numbers."""
+        found = Measurement(*self)
+        found.random = random
+        return found
+
+    def _replace(self, **changes: Any) -> Measurement:
+        return Measurement(*super()._replace(**changes)).with_random(self.random)
 
 
 def gain(unit: str) -> Any:
@@ -70,6 +84,10 @@ class Controller(ABC, Generic[ControllerState]):
 
     control_dt: float | None = None
     """The control step that the controller was made for [s], where it matters."""
+
+    random_size: int = 0
+    """Number of random numbers in `Measurement.random`, for a controller of your own that needs some. They
+    follow from the seed and the rollout of `dynx.Noise` (0 without one) and the control step."""
 
     model: Model
     """The robot as the controller knows it; the model of the plant may differ."""
@@ -131,6 +149,8 @@ class Controller(ABC, Generic[ControllerState]):
         refuse_other_than_controller("the inner controller", inner)
         self._set(inner=inner, model=inner.model, lead=inner.lead, control_dt=inner.control_dt)
         self._set(needs_setpoint=inner.needs_setpoint)
+        if inner.random_size:
+            self._set(random_size=inner.random_size)
 
     def _set(self, **values: Any) -> None:
         """Set attributes in the constructor of a frozen dataclass."""

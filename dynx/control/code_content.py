@@ -31,6 +31,7 @@ IGNORED = frozenset(
         *("__dataclass_fields__", "__dataclass_params__", "__match_args__", "__parameters__"),
         *("__orig_bases__", "__abstractmethods__", "_abc_impl", "__slots__", "__firstlineno__"),
         *("__static_attributes__", "__annotate__", "__annotate_func__", "__annotations_cache__"),
+        "__slotnames__",  # copying an object adds it
     }
 )
 """Attributes of a class that are not its code."""

@@ -49,10 +49,10 @@ class Setup:
         """Check a scenario. Raises ArgumentError, LimitError or GainError if it cannot be simulated."""
         controller = known_controller(scenario)
         clock = clock_of(scenario)
-        require_memory(f"{clock.n_steps} steps", clock.n_steps * step_bytes(scenario.model))
-        moved = plant_model(scenario.model, scenario.payloads, scenario.mass_scale)
         if controller is not None:
             check_controller(scenario.model, controller, clock)
+        require_memory(f"{clock.n_steps} steps", clock.n_steps * step_bytes(scenario.model, controller))
+        moved = plant_model(scenario.model, scenario.payloads, scenario.mass_scale)
         setpoint_of = checked_reference(
             scenario.model, scenario.reference, within_limits=scenario.check_reference
         )
@@ -67,9 +67,10 @@ class Setup:
         return self.scenario.integrator or default_integrator(self.scenario.plant)
 
 
-def step_bytes(model: Model) -> int:
-    """Return the memory [bytes] of one step of a record and of its setpoint."""
-    return 8 * (3 * model.nq + 7 * model.nv)
+def step_bytes(model: Model, controller: Controller[Any] | None = None) -> int:
+    """Return the memory [bytes] of one step of a record, of its setpoint and random numbers."""
+    random = 0 if controller is None else controller.random_size
+    return 8 * (3 * model.nq + 7 * model.nv + random)
 
 
 def known_controller(scenario: Scenario) -> Controller[Any] | None:

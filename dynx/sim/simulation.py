@@ -97,7 +97,7 @@ class Simulation:
         self._record = Record.begin(*setup.start, clock.n_steps)
         self._progress = progress
         setpoints = setpoints_of(setup.setpoint_of, clock, setup.controller)
-        sensors = Sensors(scenario.model, clock, scenario.noise)
+        sensors = Sensors(scenario.model, clock, scenario.noise, setup.controller)
         self._plant = make_plant(
             scenario.plant,
             setup.model,
@@ -254,11 +254,11 @@ class Simulation:
 
     def _extend(self, end: int) -> None:
         """Extend the buffers to hold the steps until `end`, at least to twice their size."""
-        require_memory(f"{end} steps", end * step_bytes(self.scenario.model))
+        require_memory(f"{end} steps", end * step_bytes(self.scenario.model, self._setup.controller))
         clock = replace(self._loop.clock, n_steps=max(end, 2 * len(self._record)))
         self._record = self._record.extended(clock.n_steps)
         setpoints = setpoints_of(self._setup.setpoint_of, clock, self._setup.controller)
-        sensors = Sensors(self.scenario.model, clock, self.scenario.noise)
+        sensors = Sensors(self.scenario.model, clock, self.scenario.noise, self._setup.controller)
         self._loop = replace(self._loop, clock=clock, setpoints=setpoints, sensors=sensors)
 
     # -- state and record ---------------------------------------------------------------------

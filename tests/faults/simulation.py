@@ -208,8 +208,8 @@ SIMULATION_FAULTS = (
     Fault(
         "batch_noise_numbered_within_its_part",
         "dynx.sim.batch.batch",
-        right="PartNoise(noise.seed, noise.rollout + first, *deviations)",
-        wrong="PartNoise(noise.seed, noise.rollout, *deviations)",
+        right="PartNoise(noise.seed, noise.rollout + first, deviations, random_size)",
+        wrong="PartNoise(noise.seed, noise.rollout, deviations, random_size)",
         test_file="tests/sim/batch/test_partitions.py",
         test="test_processes_give_the_same_bits",
     ),

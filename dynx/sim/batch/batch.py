@@ -141,7 +141,7 @@ def simulate_batch(
         stand_ins["q0"] = scenario.model.neutral()
     setup = Setup.of(replace(scenario, **stand_ins))
     controller, moved, clock = setup.controller, setup.model, setup.clock
-    limit, noise = setup.limit, scenario.noise
+    limit = setup.limit
     assert controller is not None
     assert setup.setpoint_of is not None
     if parametric is not None and not isinstance(parametric, ParametricDynamics):
@@ -169,8 +169,11 @@ def simulate_batch(
     if parametric is None and not acting.armature.any():
         Solvability(moved).refuse_singular(False)
     delayed = clock.delay_steps > 0
+    noise = scenario.noise or Noise()
+    random_size, noisy = controller.random_size, noise.on_measurements(moved.nv)
+    deviations = noise.deviations(moved.nv) if noisy else None
     step = FusedStep(
-        moved, controller, clock.dt, tuple(gains or ()), parametric, noise is not None, delayed, limit, acting
+        moved, controller, clock.dt, tuple(gains or ()), parametric, noisy, delayed, limit, acting
     )
     rows = RolloutRows(rollouts)
     q, v = setup.start
@@ -200,7 +203,6 @@ def simulate_batch(
         start["steps_at_limit"] = zeros
     if state is not None:
         start["state"] = np.tile(state, (n, 1))
-    deviations = None if noise is None else noise.deviations(moved.nv)
     wrenches = acting.wrenches(clock) if acting.pushes else np.zeros((clock.n_steps, 0))
     kernels = _step_kernels(step, clock, wrenches)
     stops = BatchStops.of(step) if scenario.position_limits else None
@@ -218,9 +220,9 @@ def simulate_batch(
             setpoints,
             references,
             wrenches,
-            None
-            if noise is None or deviations is None
-            else PartNoise(noise.seed, noise.rollout + first, *deviations),
+            PartNoise(noise.seed, noise.rollout + first, deviations, random_size)
+            if noisy or random_size
+            else None,
             record_every,
             stops,
         )

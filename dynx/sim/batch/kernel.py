@@ -166,6 +166,8 @@ class FusedStep:
                 sizes |= {"q_measured": nq, "v_measured": nv}
             if self.noisy:
                 sizes |= {"noise_q": nv, "noise_v": nv}
+            if self.controller.random_size:
+                sizes["random"] = self.controller.random_size
             known = gains_of(innermost(self.controller))
             sizes |= {f"gain_{name}": known[name].size for name in self.gains}
             if self.limit is not None:
@@ -191,7 +193,8 @@ class FusedStep:
         setpoint = Setpoint(given["q_wanted"], given["v_wanted"], given["a_wanted"])
         own = traced_controller(controller, {name: given[f"gain_{name}"] for name in self.gains})
         watch = ControllerWatch(own)
-        outcome = traced_torque(own, Measurement(given["t"][0], q, v), setpoint, given.get("state"))
+        measurement = Measurement(given["t"][0], q, v).with_random(given.get("random", Measurement.random))
+        outcome = traced_torque(own, measurement, setpoint, given.get("state"))
         defect = defect_of_outcome(outcome)
         if defect:
             raise ArgumentError(f"{own.name}: {defect}")

@@ -10,7 +10,7 @@ import numpy as np
 
 from dynx.sim.batch.settling import Settling
 from dynx.sim.batch.stopping import BatchStops
-from dynx.sim.loop.noise import BLOCK_STEPS, NoiseStream
+from dynx.sim.loop.noise import BLOCK_STEPS, NoiseStream, Purpose
 from dynx.simd.kernel import Kernel
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint
@@ -31,14 +31,14 @@ class PartOutcome(NamedTuple):
 
 
 class PartNoise(NamedTuple):
-    """Noise of the measurements of a part."""
+    """Noise of the measurements of a part, and random numbers of its controllers."""
 
     seed: int
     first: int
     """Number of the part's first rollout in the batch."""
-    q: Floats
-    """Standard deviation (nv,)."""
-    v: Floats
+    deviations: tuple[Floats, Floats] | None
+    """Standard deviations (nv,) of q and v."""
+    random_size: int
 
 
 StepKernels = dict[tuple[bool, bool], Kernel]
@@ -113,12 +113,17 @@ class _Run:
         widths |= dict.fromkeys(("q_wanted", "q_reference"), int(part.references.shape[1]))
         widths["wrenches"] = int(part.wrenches.shape[1])
         self._pushing = pushing(part.wrenches)
+        self._noise: dict[str, Floats] = {}
+        self._drawn: dict[Purpose, Floats] = {}
         if part.noise is not None:
             self._stream = NoiseStream(part.noise.seed)
-            self._drawn = np.zeros((self._rows, BLOCK_STEPS, 2, nv))
-            self._noise = {name: np.zeros((self._rows, nv)) for name in ("noise_q", "noise_v")}
-        else:
-            self._noise = {}
+            blocks, size = (self._rows, BLOCK_STEPS), part.noise.random_size
+            if part.noise.deviations is not None:
+                self._drawn[Purpose.MEASUREMENT] = np.zeros((*blocks, 2, nv))
+                self._noise |= {name: np.zeros((self._rows, nv)) for name in ("noise_q", "noise_v")}
+            if size:
+                self._drawn[Purpose.CONTROLLER] = np.zeros((*blocks, size))
+                self._noise["random"] = np.zeros((self._rows, size))
         ports = [port for kernel in part.kernels.values() for port in kernel.inputs]
         self._dry = max((port.size for port in ports if port.name == "modes"), default=0)
         self._settling = Settling(self._rows, self._dry)
@@ -188,14 +193,21 @@ class _Run:
             self._draw(number, part.noise)
 
     def _draw(self, number: int, noise: PartNoise) -> None:
-        """Set the noise of a control step; noise is drawn for a block of steps at once."""
+        """Set noise and random numbers of a control step; they are drawn for a block of steps at once."""
         step = number % BLOCK_STEPS
         if step == 0:
             left = -(-self._part.n_steps // self._part.steps_per_control) - number
-            for row in range(self._part.count):
-                self._stream.draw(noise.first + row, number, self._drawn[row, :left])
-        for half, (name, deviation) in enumerate((("noise_q", noise.q), ("noise_v", noise.v))):
-            np.multiply(self._drawn[:, step, half], deviation, out=self._noise[name])
+            for purpose, drawn in self._drawn.items():
+                for row in range(self._part.count):
+                    self._stream.draw(noise.first + row, number, drawn[row, :left], purpose)
+        if noise.deviations is not None:
+            drawn = self._drawn[Purpose.MEASUREMENT]
+            for half, (name, deviation) in enumerate(
+                zip(("noise_q", "noise_v"), noise.deviations, strict=True)
+            ):
+                np.multiply(drawn[:, step, half], deviation, out=self._noise[name])
+        if noise.random_size:
+            self._noise["random"][:] = self._drawn[Purpose.CONTROLLER][:, step]
 
     def _arrays(self, kernel: Kernel, turn: int) -> tuple[list[Floats], list[Floats]]:
         """Return inputs and outputs of a kernel, from the set of buffers number `turn` to the next."""

@@ -14,6 +14,7 @@ from dynx.control.base import Controller, chain_of
 from dynx.control.content import attributes_of, entered
 from dynx.errors import ArgumentError, shown
 from dynx.model import Model
+from dynx.model.configuration import whole_number
 from dynx.sim.clock import TIME_ROUNDING, Clock
 
 MAX_DEPTH = 4
@@ -39,6 +40,19 @@ def check_controller(model: Model, controller: Controller[Any], clock: Clock) ->
         raise ArgumentError(
             f"{controller.name} was made for control_dt = {made_for:.12g} s; it is {clock.control_dt:.12g} s"
         )
+    refuse_wrong_random_size(controller)
+
+
+def refuse_wrong_random_size(controller: Controller[Any]) -> None:
+    """Raise ArgumentError for an invalid number of random numbers, or one that an inner controller lacks."""
+    outer = whole_number(f"random_size of {controller.name}", controller.random_size, 0)
+    for each in chain_of(controller):
+        wanted = whole_number(f"random_size of {each.name}", each.random_size, 0)
+        if wanted not in (0, outer):
+            raise ArgumentError(
+                f"{each.name} needs {wanted} random numbers; {controller.name}, which passes its measurement "
+                f"to it, has {outer}: give {controller.name} the same random_size"
+            )
 
 
 def controller_numbers(controller: Controller[Any]) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Measurement noise: one stream of normal numbers for each rollout.
+"""Measurement noise and random numbers of controllers: streams of normal numbers for each rollout.
 
 The numbers depend only on the seed, the rollout and the control step. So a rollout of a batch has the same
 noise in any partition of the batch, on any processor and thread, and when it is simulated alone.
@@ -7,6 +7,7 @@ noise in any partition of the batch, on any processor and thread, and when it is
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import IntEnum
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,13 @@ MAX_ROLLOUT = 2**63 - 1
 a batch, which follow it, still fit."""
 
 
+class Purpose(IntEnum):
+    """Use of normal numbers; each has a stream of its own."""
+
+    MEASUREMENT = 0
+    CONTROLLER = 1
+
+
 @dataclass(frozen=True)
 class Noise:
     """Gaussian noise on measurements: standard deviations of `q` [rad or m] and `v`, and a seed.
@@ -33,7 +41,8 @@ class Noise:
     A standard deviation is one number, or one for each coordinate (nv,); for the pose of a floating base it
     is a displacement along the axes of the base. Equal seeds give equal noise in every plant. ``Noise(...,
     rollout=17)`` gives a single rollout the noise of rollout 17 of a batch with the same seed; for a batch,
-    `rollout` is the number of its first rollout.
+    `rollout` is the number of its first rollout. Seed and rollout also determine the random numbers of a
+    controller (`Controller.random_size`).
     """
 
     q: ArrayLike = 0.0
@@ -51,27 +60,38 @@ class Noise:
             raise ArgumentError(f"rollout is {shown(self.rollout)}; wanted at most {MAX_ROLLOUT}")
         return checked_gain("noise.q", self.q, nv), checked_gain("noise.v", self.v, nv)
 
+    def on_measurements(self, nv: int) -> bool:
+        """Check whether a standard deviation is above zero."""
+        return any(each.any() for each in self.deviations(nv))
+
     def rows(self, model: Model, n_controls: int) -> tuple[Floats, Floats]:
         """Return the noise of q and of v at each control step (n_controls, nv)."""
         deviations = self.deviations(model.nv)
-        stream = NoiseStream(self.seed)
-        drawn = np.empty((n_controls, 2, model.nv))
-        for first in range(0, n_controls, BLOCK_STEPS):
-            stream.draw(self.rollout, first, drawn[first : first + BLOCK_STEPS])
+        drawn = self.numbers(Purpose.MEASUREMENT, (n_controls, 2, model.nv))
         return drawn[:, 0] * deviations[0], drawn[:, 1] * deviations[1]
+
+    def numbers(self, purpose: Purpose, shape: tuple[int, ...]) -> Floats:
+        """Return the normal numbers of this rollout, with a row for each control step."""
+        stream, drawn = NoiseStream(self.seed), np.empty(shape)
+        for first in range(0, len(drawn), BLOCK_STEPS):
+            stream.draw(self.rollout, first, drawn[first : first + BLOCK_STEPS], purpose)
+        return drawn
 
 
 class NoiseStream:
     """Standard normal numbers by Philox4x64 (Salmon et al., Parallel Random Numbers, 2011).
 
-    The generator's key is the seed and the number of the rollout; its counter is the block of control steps.
+    The generator's key is the seed and the number of the rollout; its counter is the purpose of the numbers
+    and the block of control steps.
     """
 
     def __init__(self, seed: int) -> None:
         self._bits: Any = np.random.Philox(0)
         self._normal = np.random.Generator(self._bits).standard_normal
         # The setter copies these arrays, so one dictionary can be reused for all states.
-        self._key = np.array([np.random.SeedSequence(seed).generate_state(1, np.uint64)[0], 0])
+        # In float64, which NumPy makes of a uint64 and an int, large numbers of rollouts would be rounded.
+        self._key = np.zeros(2, dtype=np.uint64)
+        self._key[0] = np.random.SeedSequence(seed).generate_state(1, np.uint64)[0]
         self._counter = np.zeros(4, dtype=np.uint64)
         self._state: dict[str, Any] = {
             **self._bits.state,
@@ -80,9 +100,10 @@ class NoiseStream:
             "buffer_pos": 4,
         }
 
-    def draw(self, rollout: int, control_step: int, numbers: Floats) -> None:
-        """Fill `numbers` (n, 2, nv) from `control_step` on, which must be the first of a block; n is at
-        most `BLOCK_STEPS`."""
-        self._key[1], self._counter[3] = rollout, control_step // BLOCK_STEPS
+    def draw(self, rollout: int, control_step: int, numbers: Floats, purpose: Purpose) -> None:
+        """Fill `numbers` (n, ...) from `control_step` on, which must be the first of a block; n is at most
+        `BLOCK_STEPS`."""
+        self._key[1] = rollout
+        self._counter[2:] = purpose, control_step // BLOCK_STEPS
         self._bits.state = self._state
         self._normal(out=numbers)

@@ -41,8 +41,8 @@ def traced_torque(
     own = is_own(controller)
     if own:
         t: Any = as_traced(measurement.t)
-        q, v, *wanted = (_user_array(values) for values in (*measurement[1:], *setpoint))
-        measurement, setpoint = Measurement(t, q, v), Setpoint(*wanted)
+        random, q, v, *wanted = map(_user_array, (measurement.random, *measurement[1:], *setpoint))
+        measurement, setpoint = Measurement(t, q, v).with_random(random), Setpoint(*wanted)
         state = traced_array(state) if isinstance(state, np.ndarray) else state
     try:
         outcome = controller.torque(measurement, setpoint, state)
@@ -101,7 +101,8 @@ class _Trace:
         state = self.symbols(*start.shape) if isinstance(start, np.ndarray) else start
         copy = rebind(controller, lambda dynamics: _SymbolicResults(dynamics.model, self), lambda _: {})
         t: Any = self.symbols()[()]
-        outcome = traced_torque(copy, Measurement(t, q, v), setpoint, state)
+        measurement = Measurement(t, q, v).with_random(self.symbols(controller.random_size))
+        outcome = traced_torque(copy, measurement, setpoint, state)
         self._values += outcome if isinstance(outcome, tuple) else (outcome,)
         self.results = list(self._indices())
 
@@ -169,8 +170,10 @@ def _difference(controller: Controller[Any], place: str, values: tuple[float, fl
     how = "" if values is None else f", {values[0]:.12g} in one call and {values[1]:.12g} in the next"
     return (
         f"{controller.name}.torque() depends on more than its arguments and attributes{how}: random numbers, "
-        "the time or a variable of the module, which tracing would freeze to one value; noise of the "
-        "measurements is noise=dynx.Noise(...), numbers that differ between rollouts are gains={...} "
+        "the time or a variable of the module, which tracing would freeze to one value; a controller with an "
+        "attribute random_size gets as many seeded random numbers in each control step, measurement.random; "
+        "noise of the measurements is noise=dynx.Noise(...), numbers that differ between rollouts are "
+        "gains={...} "
         f"({Path(file).name}, line {line})"
     )
 

@@ -200,10 +200,12 @@ class Loop:
         watch = ControllerWatch(controller)
         # An error here will be raised again when the step is taken.
         with suppress(Exception):
-            t, q, v = self.sensors(0, record.q, record.v)
+            measurement = self.sensors(0, record.q, record.v)
+            t, q, v = measurement
             beside = controller.model.integrate(q, np.full_like(v, PROBE_DISPLACEMENT))
-            for measurement in (Measurement(t, q, v), Measurement(t, beside, v + PROBE_DISPLACEMENT)):
-                controller.torque(measurement, self._setpoint(0), controller.initial_state())
+            displaced = Measurement(t, beside, v + PROBE_DISPLACEMENT).with_random(measurement.random)
+            for each in (measurement, displaced):
+                controller.torque(each, self._setpoint(0), controller.initial_state())
         watch.refuse_changed()
 
     def recovered_state(self, record: Record) -> Any:

@@ -1,28 +1,39 @@
-"""Measurements of the state, with delay and noise."""
+"""Measurements of the state, with delay and noise, and the random numbers of the controller."""
 
 from __future__ import annotations
 
-from dynx.control.base import Measurement
+from typing import Any
+
+from dynx.control.base import Controller, Measurement
 from dynx.model import Model
 from dynx.sim.clock import Clock
-from dynx.sim.loop.noise import Noise
+from dynx.sim.loop.noise import Noise, Purpose
 from dynx.spatial.scalar import Floats
 
 
 class Sensors:
     """Measurements at the control steps, from the recorded states."""
 
-    def __init__(self, model: Model, clock: Clock, noise: Noise | None) -> None:
+    def __init__(
+        self, model: Model, clock: Clock, noise: Noise | None, controller: Controller[Any] | None = None
+    ) -> None:
         """Raises GainError for an invalid standard deviation, ArgumentError for an invalid seed."""
         self._model = model
         self._clock = clock
-        self.noise = None if noise is None else noise.rows(model, clock.n_controls)
+        self.noise: tuple[Floats, Floats] | None = None
         """The noise of q and of v at each control step (n_controls, nv)."""
+        if noise is not None and noise.on_measurements(model.nv):
+            self.noise = noise.rows(model, clock.n_controls)
+        size = 0 if controller is None else controller.random_size
+        self.random = (
+            (noise or Noise()).numbers(Purpose.CONTROLLER, (clock.n_controls, size)) if size else None
+        )
+        """The random numbers of the controller at each control step (n_controls, random_size)."""
 
     @property
     def plain(self) -> bool:
-        """Whether measurements have neither delay nor noise."""
-        return self.noise is None and not self._clock.delay_steps
+        """Whether measurements have no delay, no noise and no random numbers."""
+        return self.noise is None and self.random is None and not self._clock.delay_steps
 
     def __call__(self, step: int, q: Floats, v: Floats) -> Measurement:
         """Return the measurement at physics step `step`, from the states (n, nq), (n, nv) until then.
@@ -31,8 +42,9 @@ class Sensors:
         """
         seen = max(step - self._clock.delay_steps, 0)
         measurement = Measurement(step * self._clock.dt, q[seen], v[seen])
-        if self.noise is None:
-            return measurement
         number = step // self._clock.steps_per_control
-        off_q, off_v = self.noise[0][number], self.noise[1][number]
-        return Measurement(measurement.t, self._model.integrate(measurement.q, off_q), measurement.v + off_v)
+        if self.noise is not None:
+            t, q, v = measurement
+            off_q, off_v = self.noise[0][number], self.noise[1][number]
+            measurement = Measurement(t, self._model.integrate(q, off_q), v + off_v)
+        return measurement if self.random is None else measurement.with_random(self.random[number])

@@ -48,7 +48,7 @@ TakeSteps = Callable[[int, int], bool]
 False if a step has to be repeated by the plain executor."""
 
 SETPOINT = ("q_wanted", "v_wanted", "a_wanted")
-NOISE = ("noise_q", "noise_v")
+NOISE = ("noise_q", "noise_v", "random")
 
 
 def staged_loop(loop: Loop, left: int) -> StagedLoop | str:
@@ -85,6 +85,7 @@ class StagedLoop:
         nq, nv = plant.model.nq, plant.model.nv
         sizes = dict.fromkeys(("v", "last_tau", "measured_v", *SETPOINT, *NOISE), nv) | {"t": 1}
         sizes |= dict.fromkeys(("q", "measured_q", "q_wanted"), nq)
+        sizes["random"] = 0 if loop.sensors.random is None else loop.sensors.random.shape[1]
         if loop.controller is not None:
             refuse_impure(loop.controller)
         if any(array.dtype != np.float64 for array in loop.setpoints):
@@ -141,7 +142,7 @@ class StagedLoop:
             q, v = given["measured_q"], given["measured_v"]
             if loop.sensors.noise is not None:
                 q, v = q + given["noise_q"], v + given["noise_v"]
-            measurement = Measurement(given["t"][0], q, v)
+            measurement = Measurement(given["t"][0], q, v).with_random(given["random"])
             setpoint = Setpoint(*(given[name] for name in SETPOINT))
             controller = traced_controller(loop.controller, tracer)
             tau, state = traced_torque(controller, measurement, setpoint, state)
@@ -185,7 +186,8 @@ class StagedLoop:
         # The setpoints of a reference may be stored column by column.
         rows = [array if array[:1].flags.c_contiguous else np.ascontiguousarray(array) for array in setpoints]
         arrays |= dict(zip(SETPOINT, rows, strict=True))
-        arrays |= dict(zip(NOISE, loop.sensors.noise or (zeros, zeros), strict=True))
+        random = zeros[:, :0] if loop.sensors.random is None else loop.sensors.random
+        arrays |= dict(zip(NOISE, (*(loop.sensors.noise or (zeros, zeros)), random), strict=True))
         if self._state_size:
             arrays["state"] = arrays["next_state"] = state = np.empty((n + 1, self._state_size))
             state[record.steps] = loop_state.controller_state

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from io import StringIO
 from pathlib import Path
+from typing import Any
 
 import pytest
 from click.testing import CliRunner
@@ -199,7 +200,8 @@ def test_names_cannot_write_on_the_terminal(report: DoctorReport) -> None:
 @pytest.mark.parametrize("key", ["not_used", "refused"])
 def test_an_engine_that_is_not_used_on_the_mended_file_does_not_refuse_it(key: str) -> None:
     out, word = StringIO(), key.replace("_", " ")
-    engine = replace(EngineResult("pybullet", "1", "load"), **{key: "why", f"{key}_after": "why"})
+    reasons: dict[str, Any] = {key: "why", f"{key}_after": "why"}
+    engine = EngineResult("pybullet", "1", "load", **reasons)
     show_many(Console(file=out, width=200), [replace(differing(), engines=(engine,))])
     line = next(line for line in out.getvalue().splitlines() if "UNEXPLAINED" in line)
     assert line.count(word) == 2
