@@ -17,7 +17,7 @@ from dynx.backends.arguments import Arguments
 from dynx.backends.quantities import QUANTITIES
 from dynx.compiled.mass_factors import factorize_mass_matrix, solve_with_factors
 from dynx.compiled.model_coordinates import argument_shapes, reduce_columns, reduce_rows, tree_coordinates
-from dynx.compiled.parameters import Parameters, Selection
+from dynx.compiled.parameters import JOINT, Parameters, Selection
 from dynx.compiled.robot_kernel import RobotKernels
 from dynx.compiled.simplification import simplify_mechanism
 from dynx.errors import ArgumentError, shown
@@ -106,6 +106,17 @@ class ParametricDynamics:
     def has_joint_dynamics(self) -> bool:
         """Whether damping, dry friction and armature of the joints are parameters."""
         return self._selection.joint_dynamics
+
+    def dry_friction(self, parameters: Floats) -> Floats:
+        """Return the dry friction (n, nv) of the model's coordinates, for parameters (n, p)."""
+        friction = np.zeros((len(parameters), self.model.mechanism.nv))
+        if self.has_joint_dynamics:
+            # The parameters of the joints are the last ones.
+            moving = sum(joint.moves for joint in self.model.joints)
+            first = len(self.parameters.names) - len(JOINT) * moving + JOINT.index("friction")
+            friction[:, 6 if self.model.floating else 0 :] = parameters[:, first :: len(JOINT)]
+        coupling = self.model.mechanism.coupling
+        return friction if coupling is None else np.asarray(friction @ abs(coupling.matrix()))
 
     def equation(
         self, parameters: Array, q: Array, v: Array, tau: Array

@@ -33,6 +33,7 @@ from dynx.sim.batch.rows import (
     refuse_ambiguous,
     split_rows,
 )
+from dynx.sim.batch.slip_bounds import refuse_small_slips
 from dynx.sim.batch.stopping import BatchStops
 from dynx.sim.batch.store import Store
 from dynx.sim.batch.traced_controller import innermost
@@ -40,7 +41,6 @@ from dynx.sim.clock import Clock
 from dynx.sim.loop.noise import Noise
 from dynx.sim.plants.disturbances import Push
 from dynx.sim.plants.model_error import MassScale, Payload
-from dynx.sim.plants.slip_bound import refuse_small_slip
 from dynx.sim.scenario.scenario import Scenario, field_names
 from dynx.sim.setup import Setup, require_duration
 from dynx.simd.machine import require_memory
@@ -164,8 +164,6 @@ def simulate_batch(
     if progress is not None and not callable(progress):
         raise ArgumentError(f"progress is {shown(progress)}; wanted a function of two numbers of rollouts")
     acting = BatchDisturbances.of(moved, setup.disturbances, varied)
-    most = varied["friction"].max(axis=0) if "friction" in varied else None
-    refuse_small_slip(setup.disturbances, setup.integrator, clock.dt, setup.start[0], most)
     if parametric is None and not acting.armature.any():
         Solvability(moved).refuse_singular(False)
     delayed = clock.delay_steps > 0
@@ -187,6 +185,7 @@ def simulate_batch(
     if parametric is not None:
         chosen = parametric.parameters.defaults if parameters is None else parameters
         fixed["parameters"] = rows.of("parameters", chosen, len(parametric.parameters.names))
+    refuse_small_slips(acting, parametric, clock.dt, start["q"], fixed)
     for name, values in (gains or {}).items():
         size = gains_of(innermost(controller))[name].size
         fixed[f"gain_{name}"] = rows.of(name, columns_of(name, values), size, spread=True)

@@ -18,7 +18,7 @@ from dynx.backends import Backend
 from dynx.backends.hooks import solve_mass_matrix
 from dynx.backends.joint_dynamics import JointDynamicsTerms
 from dynx.control.dynamics import EngineDynamics
-from dynx.control.friction import Coefficients, JointFriction
+from dynx.control.friction import Coefficients, JointFriction, refuse_unordered
 from dynx.control.gains import checked_gain
 from dynx.errors import ArgumentError, shown
 from dynx.model import Model
@@ -217,5 +217,6 @@ def _armature_matrix(model: Model, armature: Coefficients) -> Floats:
     if isinstance(armature, bool):
         return JointDynamicsTerms(model).armature if armature else np.zeros((model.nv, model.nv))
     base = 6 if model.floating else 0
+    refuse_unordered("armature", armature, model.nv - base)
     joints = checked_gain("armature", armature, model.nv - base, per="one for each joint")
     return np.diag(np.concatenate([np.zeros(base), joints]))

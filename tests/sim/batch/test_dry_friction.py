@@ -140,3 +140,31 @@ def test_a_slip_speed_below_the_bound_of_any_rollout_is_refused(arm: Model) -> N
     simulate_batch(arm, law, arm.neutral(), friction=np.full((3, 1), 1e-2), **options)
     with pytest.raises(ArgumentError, match="oscillates from step to step"):
         simulate_batch(arm, law, arm.neutral(), friction=np.array([[1e-2], [100.0], [0.0]]), **options)
+
+
+def test_the_bound_of_the_slip_speed_counts_what_differs_between_rollouts() -> None:
+    """It is h f / (M s) with the friction, the armature and the mass of each rollout, at its own start."""
+    robot, h, slip = slider(), 1e-2, 0.1
+    law = PD(robot, kp=0.0, kd=0.0)
+    most = 2.0 * MASS * slip / h
+    options: dict[str, Any] = {"dt": h, "friction_slip": slip, "duration": h}
+    light = np.array([[0.0], [0.1 * MASS]])
+
+    def batch(**given: Any) -> None:
+        simulate_batch(robot, law, robot.neutral(), **{**options, **given})
+
+    batch(friction=np.array([[0.0], [0.99 * most]]))
+    with pytest.raises(ArgumentError, match=r"is 2\.02 at rail in rollout 1, and 2 is the largest"):
+        batch(friction=np.array([[0.0], [1.01 * most]]))
+    batch(friction=1.05 * most, armature=light + 0.1 * MASS)
+    with pytest.raises(ArgumentError, match="rail in rollout 0"):
+        batch(friction=1.05 * most, armature=light)
+    plant = dynx.parametric(robot, links=["block"], joint_dynamics=True)
+    values = np.tile(plant.parameters.defaults, (3, 1))
+    values[:, plant.parameters.index("rail.friction")] = 0.99 * most
+    batch(parametric=plant, parameters=values)
+    for name, factor in (("rail.friction", 1.03), ("block.m", 0.98)):
+        heavier = values.copy()
+        heavier[2, plant.parameters.index(name)] *= factor
+        with pytest.raises(ArgumentError, match="rail in rollout 2"):
+            batch(parametric=plant, parameters=heavier)

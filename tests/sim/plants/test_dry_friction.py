@@ -24,6 +24,8 @@ from dynx.spatial.scalar import Floats
 from dynx.testing.strategies import models
 from tests.backends.robots import mixed_robot
 from tests.oracles.closed_form import MODELS
+from tests.sim import friction_scan
+from tests.sim.friction_scan import Case
 
 MASS, F = 2.0, 3.0
 STEPS = [1e-4, 1e-3, 1e-2]
@@ -178,13 +180,22 @@ RUBBING = {"allegro_left_hand", "centauro", "hextilt", "six_axis_arm", "tiago_no
 @pytest.mark.parametrize("name", sorted({each.name for each in robots()} & RUBBING))
 @pytest.mark.parametrize("dt", [1e-3, 1e-2])
 def test_nothing_oscillates_from_step_to_step(name: str, dt: float) -> None:
-    """Without motors a joint changes direction as gravity has it, and not in one step after another."""
-    robot = load(name)
-    options: dict[str, Any] = {"damping": True, "friction": True, "armature": True, "check_reference": False}
-    v0 = np.random.default_rng(0).uniform(-1.0, 1.0, robot.nv)
-    rollout = simulate(robot, v0=v0, dt=dt, duration=300 * dt, **options)
-    turns = rollout.v[2:] * rollout.v[1:-1] < 0.0
-    assert not np.any(turns[1:] & turns[:-1])
+    """A sample of the cases of `tests.sim.friction_scan`, which searches all robots."""
+    for friction in ("file", "drawn"):
+        finding = friction_scan.run(Case(name, dt, friction, batch=False))
+        assert finding.rattling == []
+        assert finding.note == ""
+        assert 0.0 < finding.stuck < 1.0
+
+
+def test_friction_that_oscillates_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Friction smoothed far below the bound of its slip speed does, and friction that sticks does not."""
+    robot, h = slider(), 1e-2
+    monkeypatch.setattr("dynx.sim.simulation.refuse_small_slip", lambda *_: None)
+    for slip, found in ((0.0, []), (h * F / MASS, []), (0.1 * h * F / MASS, ["rail"])):
+        rollout = simulate(robot, friction=F, friction_slip=slip, v0=[0.3], dt=h, duration=1.0)
+        record = rollout.q[None], rollout.v[None]
+        assert friction_scan.rattling_joints(robot, *record, np.zeros(1)) == found
 
 
 def test_coupled_coordinates_and_mimic_joints_stick() -> None:
