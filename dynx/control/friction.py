@@ -13,6 +13,7 @@ from dynx.backends.joint_dynamics import JointDynamicsTerms
 from dynx.control.gains import checked_gain
 from dynx.errors import ArgumentError, GainError, shown
 from dynx.model import Model
+from dynx.model.configuration import is_real
 from dynx.spatial.scalar import Array, Floats, sign, tanh
 
 SLIP = 1e-2
@@ -49,8 +50,6 @@ class JointFriction:
 
         Raises GainError for invalid coefficients, ArgumentError for an invalid slip speed.
         """
-        if not isinstance(slip, int | float) or not (slip == 0.0 or MIN_SLIP <= slip < np.inf):
-            raise ArgumentError(f"slip is {shown(slip)}; wanted a speed: 0, or {MIN_SLIP:g} or more")
         own, of_model = JointDynamicsTerms(model), (damping is True, friction is True)
         coupling = model.mechanism.coupling
         # The coefficients of the description belong to the joints of the tree, given ones to the coordinates.
@@ -59,7 +58,7 @@ class JointFriction:
             "model": model,
             "damping": self._coefficients("damping", damping, own.damping, model, through),
             "friction": self._coefficients("friction", friction, own.friction, model, through),
-            "slip": float(slip),
+            "slip": checked_slip("slip", slip),
             "to_tree": coupling.matrix() if coupling is not None and through else None,
         }
         for name, value in values.items():
@@ -119,10 +118,17 @@ class JointFriction:
         return np.concatenate([np.zeros(base), joints])
 
 
-def refuse_unordered(name: str, given: object, joints: int) -> None:
-    """Raise GainError for coefficients that are a text or a mapping."""
+def checked_slip(name: str, slip: object) -> float:
+    """Return a slip speed as a float. Raises ArgumentError unless it is 0 or at least `MIN_SLIP`."""
+    if is_real(slip) and (slip == 0.0 or MIN_SLIP <= float(slip) < np.inf):
+        return float(slip)
+    raise ArgumentError(f"{name} is {shown(slip)}; wanted a speed: 0, or {MIN_SLIP:g} or more")
+
+
+def refuse_unordered(name: str, given: object, joints: int, own: str = "True") -> None:
+    """Raise GainError for coefficients that are a text or a mapping; `own` stands for the description's."""
     if isinstance(given, str | Mapping):
         raise GainError(
             f"{name} is {shown(given)}; wanted one number, an array ({joints},) in the order of the joints, "
-            "or True for the values of the description"
+            f"or {own} for the values of the description"
         )

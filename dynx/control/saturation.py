@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.control.base import Controller, ControllerState, Measurement, Wrapper, parameter
+from dynx.control.friction import refuse_unordered
 from dynx.errors import GainError, LimitError, shown
 from dynx.model import Model
 from dynx.model.configuration import real_array
@@ -45,7 +46,7 @@ class Saturated(Wrapper[ControllerState], pure=True):
         return f"{self.inner.name}, saturated"
 
 
-def checked_limit(model: Model, limit: ArrayLike | None) -> Floats:
+def checked_limit(model: Model, limit: ArrayLike | None, name: str = "limit") -> Floats:
     """Return the effort limits (nv,): the model's, or one number or one for each joint; LimitError where one
     is 0.
 
@@ -55,11 +56,13 @@ def checked_limit(model: Model, limit: ArrayLike | None) -> Floats:
     base = 6 if model.floating else 0
     efforts: Floats = model.effort_limit
     if limit is not None:
-        given, n = real_array("limit", limit), model.nv - base
+        n = model.nv - base
+        refuse_unordered(name, limit, n, "None" if name == "limit" else "True")
+        given = real_array(name, limit)
         if base and given.shape == (model.nv,) and (given[:base] == np.inf).all():
             given = given[base:]
         if given.shape not in ((), (n,)) or not (given >= 0.0).all():
-            raise GainError(f"limit is {shown(limit)}; wanted one number, or {n}, 0 or more")
+            raise GainError(f"{name} is {shown(limit)}; wanted one number, or {n}, 0 or more")
         efforts = np.concatenate([np.full(base, np.inf), np.broadcast_to(given, (n,))])
     without = [name for name, effort in zip(model.joint_names, efforts[base:], strict=True) if effort == 0.0]
     if without:

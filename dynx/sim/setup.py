@@ -126,7 +126,8 @@ def effort_limits_of(scenario: Scenario) -> Floats | None:
         return None
     if isinstance(scenario.controller, EngineMotor):
         raise ArgumentError(f"effort_limits do not reach {scenario.controller.name}: give it `force`")
-    return checked_limit(scenario.model, None if scenario.effort_limits is True else scenario.effort_limits)
+    own = scenario.effort_limits is True
+    return checked_limit(scenario.model, None if own else scenario.effort_limits, "effort_limits")
 
 
 def _start(model: Model, setpoint_of: SetpointOf | None, scenario: Scenario) -> tuple[Floats, Floats]:

@@ -27,9 +27,13 @@ def checked_threads(threads: object) -> int:
     """Return `threads`, or the number of cores for None; ArgumentError unless it is a positive integer."""
     if threads is None:
         return core_count()
-    if isinstance(threads, bool) or not isinstance(threads, SupportsIndex) or index(threads) < 1:
+    try:
+        number = index(threads) if isinstance(threads, SupportsIndex) and threads is not True else 0
+    except TypeError:
+        number = 0
+    if number < 1:
         raise ArgumentError(f"threads is {shown(threads)}; wanted a positive integer, or None for all cores")
-    return index(threads)
+    return number
 
 
 def run_parts(task: Callable[[int], object], parts: int, threads: int) -> None:

@@ -77,6 +77,20 @@ SIMULATIONS: dict[str, tuple[dict[str, Any], type[DynxError], str]] = {
     "duration=1e12": ({"duration": 1e12}, ArgumentError, r"duration is 1e\+12 s, more than 1e\+12 steps"),
     "duration=1e8": ({"duration": 1e8}, ArgumentError, "100000000000 steps need about .* GB"),
     "effort_limits=None": ({"effort_limits": None}, ArgumentError, "effort_limits is None; wanted True"),
+    **{
+        f"{name}='much'": (
+            {name: "much"},
+            GainError,
+            f"^{name} is 'much'; wanted one number, an array .* or True for the values of the description",
+        )
+        for name in ("damping", "friction", "armature", "effort_limits")
+    },
+    "friction_slip='much'": (
+        {"friction_slip": "much"},
+        ArgumentError,
+        "^friction_slip is 'much'; wanted a sp",
+    ),
+    "mass_scale=array": ({"mass_scale": np.ones(6)}, ArgumentError, "^mass_scale of .* wanted a positive"),
     "check_reference=1": (
         {"check_reference": 1},
         ArgumentError,
@@ -120,6 +134,13 @@ def test_a_simulation_states_what_is_wanted(function: Callable[..., Any], slip: 
             ArgumentError,
             "need about",
         ),
+        (lambda: simulate_batch(ARM, PD, REST, duration=0.01, gains=2.0), ArgumentError, "wanted a mapping"),
+        (
+            lambda: simulate_batch(ARM, PD, REST, duration=0.01, threads=np.ones(2)),
+            ArgumentError,
+            "^threads is .* wanted a positive integer",
+        ),
+        (lambda: laws.Saturated(PD, limit="much"), GainError, "^limit is 'much'.* or None for the values"),
         (lambda: simulate_batch(ARM, PD, REST, duration=0.01, keep=3), ArgumentError, "a path is '3'"),
         (
             lambda: simulate_batch(ARM, PD, REST, duration=0.01, executor="x"),

@@ -156,6 +156,10 @@ def simulate_batch(
         )
     if parameters is not None and parametric is None:
         raise ArgumentError("parameters were given without the model that they are of: dynx.parametric(...)")
+    if gains is not None and not isinstance(gains, Mapping):
+        raise ArgumentError(
+            f"gains is {shown(gains)}; wanted a mapping from names, as in {{'kp': [100, 200]}}"
+        )
     whole_number("record_every", record_every, 0)
     if executor is not None and not isinstance(executor, Executor) and not hasattr(executor, "submit"):
         raise ArgumentError(

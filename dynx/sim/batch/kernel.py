@@ -37,6 +37,9 @@ from dynx.spatial.branchless import difference, integrate
 from dynx.spatial.scalar import Array, Floats, clamp, sign, tanh
 from dynx.trajectory.base import Setpoint
 
+MAX_FLOAT = float(np.finfo(np.float64).max)
+"""Largest finite number."""
+
 MAX_CACHED_KERNELS = 32
 """Number of kernels that this process keeps for later batches."""
 
@@ -114,6 +117,7 @@ class FusedStep:
             else:
                 results = {name: given[name] for name in ("state", "steps_at_limit") if name in given}
             tau = results["tau"] if controlled else given["tau"]
+            commanded = results.pop("commanded") if controlled else tau
             center = self._center(given) if self.model.floating else None
             scheme = SemiImplicitEuler(self.model, self.dt, center)
             q, v = given["q"], given["v"]
@@ -132,7 +136,7 @@ class FusedStep:
                 "v": v,
                 "max_error": max_error,
                 "squared_errors": given["squared_errors"] + error * error,
-                "sound_steps": _sound_steps(given["sound_steps"], v),
+                "sound_steps": _sound_steps(given["sound_steps"], v, commanded),
                 **results,
             }
 
@@ -185,7 +189,8 @@ class FusedStep:
         return {name: (size,) for name, size in sizes.items()}
 
     def _commanded(self, controller: Controller[Any], given: Mapping[str, Array]) -> dict[str, Array]:
-        """Return the torque within limits, the controller state, and the number of steps at effort limits."""
+        """Return the torque of the controller and within limits, the controller state, and the number of
+        steps at effort limits."""
         q, v = (given["q_measured"], given["v_measured"]) if self.delayed else (given["q"], given["v"])
         if self.noisy:
             off = given["noise_q"]
@@ -209,7 +214,7 @@ class FusedStep:
             raise UnsupportedFeatureError(
                 f"the torque of {own.name} has shape {np.shape(tau)}; wanted {given['v'].shape}"
             )
-        results = {} if state is None else {"state": state}
+        results = {"commanded": tau} if state is None else {"commanded": tau, "state": state}
         if self.limit is None:
             return {"tau": tau, **results}
         tau = clamp(tau, self.limit)
@@ -299,10 +304,15 @@ class FusedStep:
         return np.asarray(root.first_moment / mass)
 
 
-def _sound_steps(before: Array, v: Array) -> Array:
+def _sound_steps(before: Array, v: Array, commanded: Array) -> Array:
     """Return the number of steps before divergence (1,) after a step to the velocity `v`, counted on from
-    `before`; in and after the step k that leads to divergence it is -1 - k."""
+    `before`; in and after the step k that leads to divergence it is -1 - k.
+
+    A torque that is not finite counts as divergence, even if effort limits would make it finite.
+    """
     (steps,) = map(as_traced, before)
     sound = as_traced(sum(v * v)) < DIVERGENCE_SPEED**2  # not where it is NaN
-    counted = select(steps < 0.0, steps, select(sound, steps + 1.0, -1.0 - steps))
+    counted = select(sound, steps + 1.0, -1.0 - steps)
+    counted = select(as_traced(abs(sum(commanded + 0.0 * v))) <= MAX_FLOAT, counted, -1.0 - steps)
+    counted = select(steps < 0.0, steps, counted)
     return np.array([as_symbol(counted)], dtype=object)

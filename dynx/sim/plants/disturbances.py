@@ -18,7 +18,7 @@ from dynx.backends import Backend
 from dynx.backends.hooks import solve_mass_matrix
 from dynx.backends.joint_dynamics import JointDynamicsTerms
 from dynx.control.dynamics import EngineDynamics
-from dynx.control.friction import Coefficients, JointFriction, refuse_unordered
+from dynx.control.friction import Coefficients, JointFriction, checked_slip, refuse_unordered
 from dynx.control.gains import checked_gain
 from dynx.errors import ArgumentError, shown
 from dynx.model import Model
@@ -106,7 +106,7 @@ class Disturbances:
     ) -> None:
         """Raises GainError and ArgumentError for coefficients and pushes that `model` cannot have."""
         self.model = model
-        self.friction = JointFriction(model, damping, friction, slip)
+        self.friction = JointFriction(model, damping, friction, checked_slip("friction_slip", slip))
         self.pushes = tuple(push.checked(model) for push in pushes)
         self.armature = _armature_matrix(model, armature)
         """Armature (nv, nv), added to the mass matrix."""

@@ -53,7 +53,7 @@ def plant_model(model: Model, payload: Payload | Sequence[Payload] | None, mass_
     Raises UnknownNameError for an unknown frame or link, ArgumentError for an invalid factor or payload.
     """
     payloads = [] if payload is None else [payload] if isinstance(payload, Payload) else list(payload)
-    if not payloads and mass_scale == 1.0:
+    if not payloads and is_real(mass_scale) and mass_scale == 1.0:
         return model
     factors = {name: _factor(name, x) for name, x in _by_link(model, mass_scale).items()}
     links = [

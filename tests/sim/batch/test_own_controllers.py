@@ -223,3 +223,16 @@ def test_divergence_has_the_time_of_the_step_whose_torque_is_not_finite() -> Non
         assert many.worst[[0, 2]].tolist() == [np.inf, np.inf]
         assert "3 of 3 done, 2 diverged, the first at 0.031 s>" in repr(many)
         assert "2 diverged, the first at 0.031 s" in many._repr_html_()
+
+
+@pytest.mark.parametrize("torque", [np.inf, -np.inf])
+def test_an_infinite_torque_ends_a_rollout_though_limits_would_make_it_finite(torque: float) -> None:
+    def overflow(self: Own, measurement: Measurement, setpoint: Setpoint) -> Any:
+        return np.where(measurement.t > 4.5e-3, torque, 0.0) - measurement.v
+
+    for limits in (True, False):
+        options: dict[str, Any] = {"q0": np.zeros(6), "duration": 0.01, "effort_limits": limits}
+        with pytest.raises(ControlError, match=r"in step 5, .* not finite") as alone:
+            simulate(ARM, Own(overflow), GOAL, plant="compiled", **options)
+        many = simulate_batch(ARM, Own(overflow), GOAL, rollouts=2, **options)
+        np.testing.assert_array_equal(many.diverged, 2 * [alone.value.time])
