@@ -159,5 +159,9 @@ def _positions(scene: Scene, states: Sequence[WorldState]) -> tuple[list[str], F
         if robot.model.floating:
             paths[f"{robot.name}/{robot.model.root}"] = poses[ROOT][1]
         moving = (joint.child for joint in robot.model.joints if joint.moves)
-        paths |= {f"{robot.name}/{link}": poses[k][1] for k, link in enumerate(moving)}
+        # A position that no joint before it changes is the same at all times.
+        paths |= {
+            f"{robot.name}/{link}": np.broadcast_to(poses[k][1], (len(states), 3))
+            for k, link in enumerate(moving)
+        }
     return [*paths], np.stack([*paths.values(), np.zeros((len(states), 3))][: len(paths) or 1], axis=1)

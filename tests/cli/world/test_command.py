@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from click.testing import CliRunner, Result
 
+import dynx
 from dynx.cli.shell.main import cli
 from dynx.world import World, world_names
 from tests.world.engines import WORLDS
@@ -64,6 +65,15 @@ def test_engines_that_part_give_exit_code_1() -> None:
     stack = run("stack", "--engine", ",".join(ENGINES), "--duration", "0.2", "--within", "1e-12")
     assert stack.exit_code == 1, stack.output
     assert "distance between the motions" in stack.output
+
+
+@pytest.mark.skipif(len(ENGINES) < 2, reason="needs two engines")
+def test_the_motions_of_robots_are_compared() -> None:
+    if "ur5" not in {entry.name for entry in dynx.robots()}:
+        pytest.skip("needs example-robot-data")
+    result = run("pushing", "--engine", ",".join(ENGINES), "--duration", "0.1")
+    assert result.exit_code == 0, result.output
+    assert "shoulder_lift_joint" in result.output
 
 
 def test_files_are_written(scene: str, tmp_path: Path) -> None:
