@@ -2,4 +2,4 @@
 
 from __future__ import annotations
 
-WORLDS = ("pybullet", "mujoco")
+WORLDS = ("pybullet", "mujoco", "drake")

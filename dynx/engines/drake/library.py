@@ -24,12 +24,20 @@ try:
     _tree: Any = import_module("pydrake.multibody.tree")
     _plant: Any = import_module("pydrake.multibody.plant")
     _parsing: Any = import_module("pydrake.multibody.parsing")
+    _framework: Any = import_module("pydrake.systems.framework")
+    geometry: Any = import_module("pydrake.geometry")
+    """Drake's module of geometry: shapes, their properties, and queries."""
 except (ImportError, OSError) as error:
     raise NotInstalledError(
         "the engine 'drake' needs Drake: pip install 'dynx[drake]' "
         f"(wheels exist for Linux and macOS, 64 bit) ({error})"
     ) from error
 
+AddMultibodyPlantSceneGraph: Any = _plant.AddMultibodyPlantSceneGraph
+ContactModel: Any = _plant.ContactModel
+CoulombFriction: Any = _plant.CoulombFriction
+DiagramBuilder: Any = _framework.DiagramBuilder
+DiscreteContactApproximation: Any = _plant.DiscreteContactApproximation
 FixedOffsetFrame: Any = _tree.FixedOffsetFrame
 JacobianWrtVariable: Any = _tree.JacobianWrtVariable
 MultibodyForces: Any = _tree.MultibodyForces
@@ -49,6 +57,11 @@ end the process."""
 
 __all__ = [
     "DRAKE_FAILURES",
+    "AddMultibodyPlantSceneGraph",
+    "ContactModel",
+    "CoulombFriction",
+    "DiagramBuilder",
+    "DiscreteContactApproximation",
     "FixedOffsetFrame",
     "JacobianWrtVariable",
     "MultibodyForces",
@@ -64,6 +77,7 @@ __all__ = [
     "captured_log",
     "drake_version",
     "error_message",
+    "geometry",
 ]
 
 

@@ -61,7 +61,7 @@ def build_plant(mechanism: Mechanism) -> BuiltPlant:
     bodies: list[Any] = []
     counterweighted = False
     for index, inertia in enumerate([mechanism.root, *(body.inertia for body in mechanism.bodies)]):
-        first, *others = _parts(inertia)
+        first, *others = inertia_parts(inertia)
         bodies.append(plant.AddRigidBody(f"{index}", first))
         for number, part in enumerate(others):
             counterweight = plant.AddRigidBody(f"{index}:{number}", part)
@@ -76,14 +76,14 @@ def build_plant(mechanism: Mechanism) -> BuiltPlant:
     joints: list[Any] = []
     for index, body in enumerate(mechanism.bodies):
         carrier = bodies[body.parent - ROOT].body_frame()
-        before = plant.AddFrame(FixedOffsetFrame(f"before:{index}", carrier, _pose(body.R, body.p)))
+        before = plant.AddFrame(FixedOffsetFrame(f"before:{index}", carrier, drake_pose(body.R, body.p)))
         kind = RevoluteJoint if body.revolute else PrismaticJoint
         moved = bodies[index + 1].body_frame()
         joints.append(plant.AddJoint(kind(f"{index}", before, moved, np.array(body.axis))))
     frames = []
     for index, frame in enumerate(mechanism.frames):
         carrier = bodies[frame.body - ROOT].body_frame()
-        placed = FixedOffsetFrame(f"frame:{index}", carrier, _pose(frame.R, frame.p))
+        placed = FixedOffsetFrame(f"frame:{index}", carrier, drake_pose(frame.R, frame.p))
         frames.append(plant.AddFrame(placed))
     plant.Finalize()
 
@@ -106,7 +106,7 @@ def build_plant(mechanism: Mechanism) -> BuiltPlant:
     )
 
 
-def _parts(inertia: RigidInertia) -> list[Any]:
+def inertia_parts(inertia: RigidInertia) -> list[Any]:
     """Return Drake's inertia, or several that add up to it if it cannot be divided by its mass."""
     mass = float(inertia.mass)
     if not (inertia.first_moment.any() or inertia.rotational_inertia.any()):
@@ -127,6 +127,7 @@ def _inertia(mass: float, moments: RigidInertia) -> Any:
     return SpatialInertia(mass, moments.first_moment / divisor, unit, skip_validity_check=True)
 
 
-def _pose(R: Array, p: Array) -> Any:
+def drake_pose(R: Array, p: Array) -> Any:
+    """Return Drake's rigid transform for a rotation (3, 3) and a translation (3,)."""
     # Release builds of Drake, such as the wheels, do not check the matrix.
     return RigidTransform(RotationMatrix(np.asarray(R, dtype=float)), np.asarray(p, dtype=float))

@@ -1,0 +1,277 @@
+"""A world in Drake: a discrete plant with a scene graph (`build`), its state, contacts and queries.
+
+The plant's discrete update is called directly, so that a step depends on q, v and the forces alone: they are
+all of the state. Contacts and their forces are those of the last step, computed again from its beginning when
+they are asked for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import wraps
+from typing import Any, ClassVar, TypeVar
+
+import numpy as np
+
+from dynx.engines.drake.library import DRAKE_FAILURES, captured_log, drake_version, error_message
+from dynx.engines.drake.world.build import build_scene
+from dynx.engines.drake.world.distances import closest_of_pair, closest_to_plane
+from dynx.engines.drake.world.options import SETTINGS
+from dynx.errors import ClosedError, DynxError, EngineError, shown
+from dynx.model.geometry import HeightField, Plane
+from dynx.rbd.kinematics import body_poses
+from dynx.spatial.scalar import Floats
+from dynx.spatial.se3 import homogeneous
+from dynx.world.engine import RayHit, TouchingPoint, WorldEngine
+from dynx.world.layout import WORLD, Collider, Layout
+from dynx.world.ray_casting import cast_on_shape
+from dynx.world.settings import Setting
+from dynx.world.state import BodyState, RobotState
+
+LONGEST = 1.001
+"""Squared length of a quaternion above which it is normalised."""
+
+Method = TypeVar("Method", bound=Callable[..., Any])
+
+
+def _engine_errors(method: Method) -> Method:
+    """Make a method raise EngineError in place of Drake's exceptions, ClosedError after `close`."""
+
+    @wraps(method)
+    def call(self: DrakeWorld, *args: Any) -> Any:
+        try:
+            return method(self, *args)
+        except DynxError:
+            raise
+        except DRAKE_FAILURES as error:
+            if self.closed:
+                raise ClosedError(f"this world of {shown(self.layout.name)} is closed") from error
+            raise EngineError(
+                f"drake failed on the scene {shown(self.layout.name)}: {error_message(error)}"
+            ) from error
+
+    return call  # type: ignore[return-value]
+
+
+class DrakeWorld(WorldEngine):
+    """A scene in Drake behind the interface of `WorldEngine`."""
+
+    name: ClassVar[str] = "drake"
+    settings: ClassVar[Mapping[str, Setting]] = SETTINGS
+
+    @_engine_errors
+    def __init__(self, layout: Layout, dt: float, settings: Mapping[str, Any]) -> None:
+        super().__init__(layout, dt, settings)
+        self.closed = False
+        with captured_log():
+            self._built = built = build_scene(layout, dt, settings)
+            self._root = built.diagram.CreateDefaultContext()
+        self._plant, self._diagram = built.plant, built.diagram
+        self._past_root: Any = None
+        self._context = self._plant.GetMyMutableContextFromRoot(self._root)
+        self._updates = self._diagram.AllocateDiscreteVariables()
+        self._port = self._plant.get_applied_generalized_force_input_port()
+        self._torques: Floats = np.zeros(self._plant.num_velocities())
+        self._wrenches: Floats = np.zeros(self._plant.num_velocities())
+        self._applied: Floats = np.zeros(self._plant.num_velocities())
+        self._port.FixValue(self._context, self._applied)
+        self._quaternions = built.quaternions
+        self._past: tuple[Floats, Floats] | None = None
+        q, v = self._state()
+        for robot, coordinates in zip(layout.robots, built.robots, strict=True):
+            coordinates.write(robot.q, robot.v, q, v)
+        for number, body in built.bodies.items():
+            body.write(layout.bodies[number].T, layout.bodies[number].twist, q, v)
+        self._set_state(q, v)
+
+    # -- motion -------------------------------------------------------------------------------
+
+    @_engine_errors
+    def set_torques(self, robot: int, tau: Floats) -> None:
+        q = self._plant.GetPositions(self._context)
+        self._built.robots[robot].write_forces(tau, q, self._torques)
+
+    @_engine_errors
+    def set_wrenches(self, wrenches: Floats) -> None:
+        for number, body in self._built.bodies.items():
+            force, moment = wrenches[number, :3], wrenches[number, 3:]
+            self._wrenches[body.forces] = np.concatenate([moment, force])
+
+    @_engine_errors
+    def step(self, n: int) -> None:
+        forces = self._torques + self._wrenches
+        if not np.array_equal(forces, self._applied):
+            self._port.FixValue(self._context, forces)
+            self._applied = forces
+        diagram, root, updates = self._diagram, self._root, self._updates
+        for taken in range(n):
+            if taken == n - 1:
+                self._past = np.array(self._plant.GetPositionsAndVelocities(self._context)), self._applied
+            diagram.CalcForcedDiscreteVariableUpdate(root, updates)
+            root.SetDiscreteState(updates)
+            if len(self._quaternions):
+                self._normalise()
+
+    def _normalise(self) -> None:
+        """Normalise the quaternions of the state where one has become too long."""
+        q = self._plant.GetPositions(self._context)
+        quaternions = q[self._quaternions]
+        lengths = np.einsum("ij,ij->i", quaternions, quaternions)
+        if (lengths > LONGEST).any():
+            q = np.array(q)
+            q[self._quaternions] = quaternions / np.sqrt(lengths)[:, None]
+            self._plant.SetPositions(self._context, q)
+
+    # -- state --------------------------------------------------------------------------------
+
+    @_engine_errors
+    def robot_state(self, robot: int) -> RobotState:
+        return self._built.robots[robot].read(*self._state())
+
+    @_engine_errors
+    def body_state(self, body: int) -> BodyState:
+        if body in self._built.bodies:
+            return self._built.bodies[body].read(*self._state())
+        return BodyState(self.layout.bodies[body].T.copy(), np.zeros(6))
+
+    @_engine_errors
+    def set_robot_state(self, robot: int, q: Floats, v: Floats) -> None:
+        state = self._state()
+        self._built.robots[robot].write(q, v, *state)
+        self._set_state(*state)
+
+    @_engine_errors
+    def set_body_state(self, body: int, T: Floats, twist: Floats) -> None:
+        state = self._state()
+        self._built.bodies[body].write(T, twist, *state)
+        self._set_state(*state)
+
+    @_engine_errors
+    def dump(self) -> bytes:
+        return np.concatenate(self._state()).tobytes()
+
+    @_engine_errors
+    def load(self, data: bytes) -> None:
+        state = np.frombuffer(data).copy()
+        self._set_state(*np.split(state, [self._plant.num_positions()]))
+
+    def _state(self) -> tuple[Floats, Floats]:
+        """Return copies of the plant's q and v."""
+        plant, context = self._plant, self._context
+        return np.array(plant.GetPositions(context)), np.array(plant.GetVelocities(context))
+
+    def _set_state(self, q: Floats, v: Floats) -> None:
+        self._plant.SetPositionsAndVelocities(self._context, np.concatenate([q, v]))
+        self._past = None
+
+    # -- queries ------------------------------------------------------------------------------
+
+    @_engine_errors
+    def contacts(self) -> Sequence[TouchingPoint]:
+        if self._past is None:
+            pairs = self._query().ComputePointPairPenetration()
+            return [self._touching(pair, np.zeros(3)) for pair in pairs]
+        if self._past_root is None:
+            with captured_log():
+                self._past_root = self._diagram.CreateDefaultContext()
+        context = self._plant.GetMyMutableContextFromRoot(self._past_root)
+        state, forces = self._past
+        self._plant.SetPositionsAndVelocities(context, state)
+        self._port.FixValue(context, forces)
+        results = self._plant.get_contact_results_output_port().Eval(context)
+        infos = map(results.point_pair_contact_info, range(results.num_point_pair_contacts()))
+        # Drake's force is that on the second body.
+        return [self._touching(info.point_pair(), -np.array(info.contact_force())) for info in infos]
+
+    def _touching(self, pair: Any, force: Floats) -> TouchingPoint:
+        """Return a contact of Drake, with the force on the first body."""
+        normal = np.array(pair.nhat_BA_W)
+        along = max(0.0, float(force @ normal))
+        return TouchingPoint(
+            self._built.collider_of[pair.id_A.get_value()],
+            self._built.collider_of[pair.id_B.get_value()],
+            np.array(pair.p_WCa),
+            np.array(pair.p_WCb),
+            normal,
+            -float(pair.depth),
+            along,
+            force - float(force @ normal) * normal,
+        )
+
+    @_engine_errors
+    def closest(self, a: int, b: int, within: float) -> TouchingPoint | None:
+        first, second = (self.layout.colliders[number] for number in (a, b))
+        found: list[TouchingPoint] = []
+        if _is_plane(first) or _is_plane(second):
+            found = self._closest_to_planes(a, b)
+        else:
+            query = self._query()
+            for one in self._built.geometries[a]:
+                for other in self._built.geometries[b]:
+                    found.append(TouchingPoint(a, b, *closest_of_pair(query, one, other)))
+        nearest = min(found, key=lambda point: point.distance, default=None)
+        return nearest if nearest is not None and nearest.distance <= within else None
+
+    def _closest_to_planes(self, a: int, b: int) -> list[TouchingPoint]:
+        found = []
+        colliders = self.layout.colliders
+        for plane, other in ((a, b), (b, a)):
+            T_plane, T_other = self._pose(colliders[plane]), self._pose(colliders[other])
+            for ground in colliders[plane].shapes:
+                for placed in colliders[other].shapes:
+                    if isinstance(ground.shape, Plane) and not isinstance(placed.shape, Plane | HeightField):
+                        at = T_plane @ ground.T, placed.shape, T_other @ placed.T
+                        point = closest_to_plane((plane, other), *at)
+                        found.append(point if plane == a else _swapped(point))
+        return found
+
+    @_engine_errors
+    def cast_rays(self, origins: Floats, directions: Floats, length: float) -> Sequence[RayHit]:
+        nearest: Floats = np.full(len(origins), np.inf)
+        numbers, normals = np.full(len(origins), -1), np.full((len(origins), 3), np.nan)
+        for number, collider in enumerate(self.layout.colliders):
+            T = self._pose(collider)
+            for placed in collider.shapes:
+                distance, normal = cast_on_shape(placed.shape, T @ placed.T, origins, directions)
+                nearer = (distance < nearest) & (distance <= length)
+                nearest[nearer], numbers[nearer], normals[nearer] = distance[nearer], number, normal[nearer]
+        return [
+            RayHit(None if number < 0 else int(number), float(distance), normal)
+            for number, distance, normal in zip(numbers, nearest, normals, strict=True)
+        ]
+
+    def _query(self) -> Any:
+        """Return Drake's query of the shapes at the present state."""
+        graph = self._built.scene_graph
+        return graph.get_query_output_port().Eval(graph.GetMyContextFromRoot(self._root))
+
+    def _pose(self, collider: Collider) -> Floats:
+        """Return the pose (4, 4) of the owner of a collider."""
+        robot, body = collider.owner
+        if robot is None:
+            return np.eye(4) if body == WORLD else self.body_state(body).T_world_body
+        mechanism = self.layout.robots[robot].model.mechanism
+        q = self.robot_state(robot).q
+        poses = body_poses(mechanism, q if mechanism.coupling is None else mechanism.coupling.expand_q(q))
+        return np.asarray(homogeneous(*poses[body]))
+
+    # -- end ----------------------------------------------------------------------------------
+
+    @property
+    def version(self) -> str:
+        return f"drake {drake_version()}"
+
+    def close(self) -> None:
+        """Release Drake's diagram and contexts."""
+        if not self.closed:
+            self.closed = True
+            del self._port, self._updates, self._context, self._root, self._past_root
+            del self._plant, self._diagram, self._built
+
+
+def _is_plane(collider: Collider) -> bool:
+    return any(isinstance(placed.shape, Plane) for placed in collider.shapes)
+
+
+def _swapped(point: TouchingPoint) -> TouchingPoint:
+    return TouchingPoint(point.b, point.a, point.point_b, point.point_a, -point.normal, point.distance)

@@ -1,0 +1,180 @@
+"""Worlds in Drake: contacts, filters, distances, constraints, rays, refused features, saved states."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import dynx
+from dynx import Pose
+from dynx.engines.drake.world.build import build_scene
+from dynx.engines.drake.world.distances import support
+from dynx.engines.drake.world.engine import DrakeWorld
+from dynx.errors import SingularMassMatrixError, UnsupportedFeatureError
+from dynx.model.geometry import Box, Capsule, Collision, Cylinder, HeightField, Shape, Sphere
+from dynx.spatial.so3 import rotation_from_rpy
+from dynx.world import Material, PointToPoint, Scene, SceneBody, SceneRobot, Weld, World, box, ground, sphere
+from dynx.world.layout import Layout
+from dynx.world.preparation import prepare
+
+G = 9.81
+SWITCHES = {"collisions": True, "joint_limits": True, "joint_damping": True, "joint_friction": False}
+DEFAULTS = {name: setting.default for name, setting in DrakeWorld.settings.items()}
+
+
+def layout_of(scene: Scene) -> Layout:
+    return prepare(scene, **SWITCHES)
+
+
+def test_exactly_the_pairs_of_the_scene_collide() -> None:
+    other = dynx.load("panda").with_base_pose(Pose((0.6, 0.0, 0.0)))
+    robots = (SceneRobot("a", dynx.load("ur5")), SceneRobot("b", other, self_collision=True))
+    scene = Scene("s", robots=robots, bodies=(ground(), box("cube", (0.1,) * 3, mass=1.0)))
+    layout = layout_of(scene)
+    built = build_scene(layout, 1e-3, DEFAULTS)
+    inspector = built.scene_graph.model_inspector()
+    for a, first in enumerate(built.geometries):
+        for b, second in enumerate(built.geometries):
+            if a != b:
+                # Drake never tests two shapes that are fixed in the world.
+                tested = not inspector.CollisionFiltered(first[0], second[0])
+                assert tested == layout.collides[a, b]
+
+
+def test_a_box_rests_on_the_ground_with_its_weight() -> None:
+    cube = box("cube", (0.2, 0.2, 0.2), mass=2.0, pose=Pose((0, 0, 0.1)))
+    with World(Scene("s", bodies=(ground(), cube)), "drake") as world:
+        before = world.contacts()
+        world.step(300)
+        contacts = world.contacts()
+        height = world.state.bodies["cube"].T_world_body[2, 3]
+    assert all(contact.normal_force == 0.0 for contact in before)
+    (contact,) = contacts
+    assert (contact.a, contact.b) == ("ground", "cube")
+    assert_allclose(contact.normal, [0, 0, -1.0], atol=1e-9)
+    assert_allclose(contact.force, [0, 0, -2.0 * G], atol=1e-3)
+    # Two shapes of 1e6 N/m in series.
+    assert contact.distance == pytest.approx(-2.0 * G / 5e5, rel=1e-3)
+    assert height == pytest.approx(0.1 + contact.distance, abs=1e-8)
+
+
+@pytest.mark.parametrize("approximation", ["sap", "lagged", "similar"])
+def test_friction_on_a_slope_slows_a_sliding_ball(approximation: str) -> None:
+    slope, mu = float(np.arctan(0.4)), 0.3
+    tilted = (G * np.sin(slope), 0.0, -G * np.cos(slope))
+    material = Material(friction=mu)
+    # Too hard to turn to roll: a box would rattle on the one point of contact that Drake gives a pair.
+    ball = sphere("ball", 0.1, mass=1.0, inertia=1e3 * np.eye(3), pose=Pose((0, 0, 0.1)), material=material)
+    scene = Scene("slope", bodies=(ground(material=material), ball), gravity=tilted)
+    with World(scene, "drake", contact_approximation=approximation) as world:
+        world.step(400)
+        speed = world.state.bodies["ball"].twist[0]
+    assert speed == pytest.approx(0.4 * G * (np.sin(slope) - mu * np.cos(slope)), rel=0.02)
+
+
+@pytest.mark.parametrize("kind", ["weld", "point"])
+def test_constraints_hold_a_hanging_body(kind: str) -> None:
+    bar = SceneBody("bar", (Collision(Box((0.4, 0.1, 0.1))),), mass=1.0, pose=Pose((0.2, 0, 1.0)))
+    at = (-0.2, 0.0, 0.0)
+    constraint = Weld("world", "bar") if kind == "weld" else PointToPoint("bar", "world", at, (0.0, 0.0, 1.0))
+    with World(Scene("s", bodies=(bar,), constraints=(constraint,)), "drake") as world:
+        world.step(400)
+        T = world.state.bodies["bar"].T_world_body
+    assert_allclose(T[:3, :3] @ at + T[:3, 3], [0.0, 0.0, 1.0], atol=1e-4)
+    tilt = float(np.arcsin(-T[2, 0]))
+    assert abs(tilt) < 1e-3 if kind == "weld" else abs(tilt) > 0.3
+
+
+def test_mimic_joints_stay_coupled() -> None:
+    model = dynx.load("panda")
+    engine = DrakeWorld(layout_of(Scene("s", robots=(SceneRobot("r", model),))), 1e-3, DEFAULTS)
+    tau = np.zeros(model.nv)
+    tau[-1] = 1.0
+    engine.set_torques(0, tau)
+    engine.step(200)
+    q, _ = engine._state()
+    assert q[-1] > 1e-3
+    assert_allclose(q[-1], q[-2], atol=1e-6)
+
+
+SOLIDS = (Box((0.2, 0.4, 0.6)), Sphere(0.3), Cylinder(0.2, 0.5), Capsule(0.2, 0.5))
+
+
+@pytest.mark.parametrize("shape", SOLIDS, ids=lambda shape: type(shape).__name__)
+def test_the_support_of_a_solid_is_where_its_box_ends(shape: Shape) -> None:
+    from dynx.world.boxes import shape_box
+
+    for seed in range(5):
+        T = np.eye(4)
+        T[:3, :3] = R = rotation_from_rpy(np.random.default_rng(seed).uniform(-3, 3, 3))
+        _, upper = shape_box(shape, T)
+        for axis in range(3):
+            assert (R @ support(shape, R[axis]))[axis] == pytest.approx(upper[axis], abs=1e-12)
+
+
+def test_distances_to_the_ground_and_to_one_another() -> None:
+    bodies = (
+        ground(),
+        sphere("ball", 0.1, mass=1.0, pose=Pose((0, 0, 0.5))),
+        box("cube", (0.2,) * 3, mass=1.0, pose=Pose((1.0, 0, 0.3))),
+    )
+    with World(Scene("s", bodies=bodies), "drake") as world:
+        (down,) = world.closest_points("ball", "ground", 1.0)
+        (aside,) = world.closest_points("cube", "ball", 1.0)
+        assert world.closest_points("cube", "ball", 0.1) == ()
+    assert down.distance == pytest.approx(0.4)
+    assert_allclose(down.normal, [0, 0, 1.0], atol=1e-9)
+    assert_allclose(down.point_b, [0, 0, 0], atol=1e-9)
+    # The nearest point of the cube is on its edge.
+    assert aside.distance == pytest.approx(np.hypot(0.9, 0.1) - 0.1, abs=1e-5)
+    assert_allclose(aside.normal, np.array([0.9, 0, -0.1]) / np.hypot(0.9, 0.1), atol=1e-3)
+
+
+def test_a_ball_on_a_height_field_and_rays_at_its_points() -> None:
+    field = HeightField(((0.1, 0.1, 0.1), (0.1, 0.1, 0.1)), (4.0, 4.0))
+    land = SceneBody("land", (Collision(field),), pose=Pose((0, 0, 0.2)))
+    ball = sphere("ball", 0.1, mass=1.0, pose=Pose((0.4, 0.3, 0.4)))
+    with World(Scene("s", bodies=(land, ball)), "drake") as world:
+        world.step(300)
+        assert world.state.bodies["ball"].T_world_body[2, 3] == pytest.approx(0.4, abs=1e-4)
+        hits = world.cast_rays([[0, 0, 3.0], [0.4, 0.3, 3.0]], [[0, 0, -1.0]])
+    assert hits.names == ("land", "ball")
+    assert_allclose(hits.distance, [2.7, 2.5], atol=1e-4)
+
+
+def test_what_drake_lacks_is_refused() -> None:
+    for material, lacks in (
+        (Material(restitution=0.5), "restitution"),
+        (Material(rolling_friction=0.01), "rolling_friction"),
+    ):
+        scene = Scene("s", bodies=(ground(), sphere("ball", 0.1, mass=1.0, material=material)))
+        with pytest.raises(UnsupportedFeatureError, match=lacks):
+            World(scene, "drake")
+        World(scene, "drake", simplify_materials=True).close()
+    with pytest.raises(SingularMassMatrixError, match="LHand"):
+        World(Scene("s", robots=(SceneRobot("r", dynx.load("romeo")),)), "drake")
+
+
+def test_a_long_spin_keeps_quaternions_near_unit_length() -> None:
+    brick = box("brick", (0.3, 0.2, 0.1), mass=1.0, twist=(0, 0, 0, 0, 0, 40.0))
+    engine = DrakeWorld(layout_of(Scene("s", bodies=(brick,), gravity=(0, 0, 0))), 1e-3, DEFAULTS)
+    engine.step(2000)
+    q, _ = engine._state()
+    assert abs(float(q[:4] @ q[:4]) - 1.0) < 1e-2
+    T = engine.body_state(0).T_world_body
+    assert_allclose(T[:3, :3] @ T[:3, :3].T, np.eye(3), atol=1e-12)
+
+
+def test_a_restored_world_continues_bit_for_bit() -> None:
+    model = dynx.load("a1", base="floating")
+    q = model.neutral()
+    q[2] = 0.4
+    scene = Scene("s", robots=(SceneRobot("r", model, q=tuple(q)),), bodies=(ground(),))
+    engines = [DrakeWorld(layout_of(scene), 1e-3, DEFAULTS) for _ in range(2)]
+    engines[0].step(300)
+    engines[1].load(engines[0].dump())
+    for engine in engines:
+        engine.step(1000)
+    assert engines[0].contacts()
+    assert engines[0].dump() == engines[1].dump()
