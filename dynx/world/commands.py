@@ -11,6 +11,7 @@ from dynx.control.engine_motors import MotorCommand
 from dynx.errors import ArgumentError, ShapeError, UnknownNameError, nearest, shown
 from dynx.model import Model
 from dynx.model.configuration import checked_array
+from dynx.spatial.scalar import Floats
 from dynx.world.engine import WorldEngine
 from dynx.world.layout import Layout, RobotLayout
 from dynx.world.loads import RobotLoads, Wrench, checked_torques, robot_number
@@ -21,6 +22,8 @@ MotorsOf = Mapping[str, "Motor | MotorCommand | Sequence[Motor]"]
 
 Act = Callable[[WorldEngine], bool]
 """Apply the loads of the next step to the engine; False if one of them is not finite."""
+
+_NOTHING: dict[int, Floats] = {}
 
 
 class Commands:
@@ -62,7 +65,7 @@ class Commands:
 
         Returns False, and does nothing, where they must be sent again before each of them.
         """
-        checked = checked_torques(torques, self._robots, self._layout.robots) if torques else {}
+        checked = checked_torques(torques, self._robots, self._layout.robots) if torques else _NOTHING
         if count > 1 and any(self._floating[k] and tau[:6].any() for k, tau in checked.items()):
             return False
         if self._pushed:
@@ -73,11 +76,13 @@ class Commands:
         if self._commanded:
             self._command(engine, {})
         if self._loaded or checked:
-            for k in self._loaded - checked.keys():
-                engine.set_torques(k, self._zeros[k])
+            loaded = checked.keys()
+            if self._loaded != loaded:
+                for k in self._loaded - loaded:
+                    engine.set_torques(k, self._zeros[k])
+                self._loaded = set(loaded)
             for k, tau in checked.items():
                 engine.set_torques(k, tau)
-            self._loaded = set(checked)
         return True
 
     def plan(
@@ -126,10 +131,12 @@ class Commands:
             if isinstance(listed, MotorCommand):
                 commands[k] = checked_command(listed, self._layout.robots[k].model)
                 continue
-            given[k] = [listed] if isinstance(listed, Motor) else list(listed)
-            for each in given[k]:
+            several: Sequence[object] = listed if isinstance(listed, tuple | list) else [listed]
+            given[k] = []
+            for each in several:
                 if not isinstance(each, Motor):
                     raise ArgumentError(f"a motor of {name} is {shown(each)}; wanted a Motor or MotorCommand")
+                given[k].append(each)
         for k, loads in enumerate(self._loads):
             loads.set_motors(given.get(k, ()))
         return commands
@@ -185,6 +192,17 @@ class Commands:
             if k not in motored:
                 loads.memory = None
         self._remembering = bool(motored)
+
+
+def with_scene_motors(
+    scene_motors: Mapping[str, Sequence[Motor]], torques: object, motors: MotorsOf | None
+) -> MotorsOf:
+    """Add the motors of the scene on robots that neither `torques` nor `motors` name."""
+    for name, given in (("torques", torques), ("motors", motors)):
+        if given is not None and not isinstance(given, Mapping):
+            raise ArgumentError(f"{name} is of type {type(given).__name__}; wanted a dict by robot")
+    driven = {**(motors or {}), **(torques or {})}  # type: ignore[dict-item]
+    return {**{name: own for name, own in scene_motors.items() if name not in driven}, **(motors or {})}
 
 
 def checked_command(command: MotorCommand, model: Model) -> MotorCommand:

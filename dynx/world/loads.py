@@ -19,6 +19,8 @@ from dynx.world.layout import BodyLayout, RobotLayout
 from dynx.world.motors import Motor, combine
 from dynx.world.state import BodyState
 
+_FLOAT64 = np.dtype(np.float64)
+
 AXES = ("world", "local")
 
 
@@ -157,13 +159,15 @@ def checked_torques(
     """
     if torques is None:
         return {}
-    if not isinstance(torques, Mapping):
+    if type(torques) is not dict and not isinstance(torques, Mapping):
         raise ArgumentError(f"torques is of type {type(torques).__name__}; wanted a dict by robot")
     checked = {}
     for name, tau in torques.items():
-        number = robot_number(name, robots)
+        number = robots.get(name)
+        if number is None:
+            number = robot_number(name, robots)
         nv = layouts[number].model.nv
-        if type(tau) is not np.ndarray or tau.dtype != np.float64 or tau.shape != (nv,):
+        if type(tau) is not np.ndarray or tau.dtype is not _FLOAT64 or tau.shape != (nv,):
             tau = real_array(f"torque of {name}", tau)
             if tau.shape != (nv,):
                 raise ShapeError(f"torque of {name} has shape {tau.shape}; wanted ({nv},)")

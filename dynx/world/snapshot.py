@@ -34,9 +34,11 @@ class Snapshot:
     """Version of the engine."""
     identity: str
     """Hash of the scene, the step and the settings of the world."""
-    steps: int
     time: float
     """Time [s]."""
+    start: float
+    """Time [s] at which `steps` was 0."""
+    steps: int
     memory: Memory
     data: bytes
     """State of the engine, in the engine's own format."""
@@ -69,6 +71,7 @@ def write_snapshot(path: str | os.PathLike[str], snapshot: Snapshot, world: dict
         "version": snapshot.version,
         "identity": snapshot.identity,
         "steps": snapshot.steps,
+        "start": snapshot.start.hex(),
         "time": snapshot.time.hex(),
         "memory": [
             None if pair is None else [[x.hex() for x in numbers] for numbers in pair]
@@ -111,8 +114,8 @@ def _snapshot(header: dict[str, Any], data: bytes) -> Snapshot:
         None if pair is None else (_numbers(pair[0]), _numbers(pair[1])) for pair in header["memory"]
     )
     engine, version, identity = (str(header[name]) for name in ("engine", "version", "identity"))
-    time = float.fromhex(header["time"])
-    return Snapshot(engine, version, identity, int(header["steps"]), time, memory, data)
+    time, start = (float.fromhex(header[name]) for name in ("time", "start"))
+    return Snapshot(engine, version, identity, time, start, int(header["steps"]), memory, data)
 
 
 def _world(given: dict[str, Any]) -> dict[str, Any]:

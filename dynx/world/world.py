@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from dynx.errors import ArgumentError, ClosedError, DivergedError, EngineError
 from dynx.model.configuration import positive_seconds, whole_number
 from dynx.spatial.scalar import Floats
-from dynx.world.commands import Act, Commands, MotorsOf
+from dynx.world.commands import Act, Commands, MotorsOf, with_scene_motors
 from dynx.world.contacts import ClosestPoints, Contact, RayHits
 from dynx.world.engine import WorldEngine
 from dynx.world.identity import identity
@@ -30,7 +30,7 @@ from dynx.world.snapshot import Snapshot, read_snapshot, write_snapshot
 from dynx.world.state import BodyState, RobotState, WorldState
 from dynx.world.state_checks import apply_state, checked_state
 
-STEPS_BETWEEN_CHECKS = 100
+STEPS_BETWEEN_CHECKS = 1000
 """Number of steps of the engine after which the state is checked for divergence, unless it was read."""
 
 TIME_ROUNDING = 1e-9
@@ -130,12 +130,14 @@ class World:
         the world is then at the last state that was read or checked.
         """
         engine = self._require()
+        if not isinstance(wrenches, tuple | list):
+            raise ArgumentError(f"wrenches is of type {type(wrenches).__name__}; wanted a list of Wrench")
         if type(n) is not int or n < 1:
             n = whole_number("n", n, 1)
         count = n * self.substeps
         if self._scene_motors:
-            motors = self._with_scene_motors(torques or {}, motors or {})
-        held = not motors and not len(wrenches) and self._commands.hold(engine, torques, count)
+            motors = with_scene_motors(self._scene_motors, torques, motors)
+        held = not motors and not wrenches and self._commands.hold(engine, torques, count)
         act = None if held else self._commands.plan(torques, motors, wrenches)
         try:
             if act is None:
@@ -180,11 +182,6 @@ class World:
             self.step(1, **(fixed if loads is None else fixed | dict(loads(self))))
             if real_time:
                 time.sleep(max(0.0, began + (k + 1) * self.dt - time.perf_counter()))
-
-    def _with_scene_motors(self, torques: TorquesOf, motors: MotorsOf) -> MotorsOf:
-        """Add the motors of the scene on robots without torques and motors."""
-        given = {*torques, *motors}
-        return {**{name: each for name, each in self._scene_motors.items() if name not in given}, **motors}
 
     def _step_one_by_one(self, engine: WorldEngine, count: int, act: Act) -> None:
         for taken in range(count):
@@ -242,8 +239,9 @@ class World:
             self.engine,
             engine.version,
             self.identity,
-            self._steps,
+            self.time,
             self._start,
+            self._steps,
             self._commands.memory(),
             engine.dump(),
         )
@@ -260,7 +258,7 @@ class World:
         self._commands.forget()
         engine.load(snapshot.data)
         self._commands.remember(snapshot.memory)
-        self._start, self._steps = snapshot.time, snapshot.steps
+        self._start, self._steps = snapshot.start, snapshot.steps
         self._state = None
         self._note()
 

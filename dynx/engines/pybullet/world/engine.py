@@ -101,8 +101,9 @@ class BulletWorld(WorldEngine):
     def set_torques(self, robot: int, tau: Floats) -> None:
         found = self._robots[robot]
         acts = found.set_torques(tau)
-        if acts != (found in self._loaded_robots):
-            (self._loaded_robots.append if acts else self._loaded_robots.remove)(found)
+        if acts != found.loaded:
+            found.loaded = acts
+            self._loaded_robots = [each for each in self._robots if each.loaded]
 
     def set_wrenches(self, wrenches: Floats) -> None:
         self._pushed = []

@@ -67,8 +67,13 @@ class BulletRobot:
         self._owners = np.flatnonzero([joint.mimic is None for joint in model.joints if joint.moves])
         self._friction = layout.friction
         self._near = np.array([0.0, 0.0, 0.0, 1.0])
-        self._tau: Floats = np.zeros(model.nv)
+        self.loaded = False
+        """Whether `apply` is called before every step."""
+        self._wrench: Floats | None = None
         self._forces: list[float] | None = None
+        # Looked up once, because every step applies torques.
+        self._control = client.engine.setJointMotorControlArray
+        self._torque_control = client.engine.TORQUE_CONTROL
         self.motor: MotorCommand | None = None
         stiff = self._is_stiff(layout)
         self.corrected = self._coupling is not None or stiff
@@ -135,31 +140,35 @@ class BulletRobot:
 
     def set_torques(self, tau: Floats) -> bool:
         """Keep the generalised force for `apply`; return whether it has an effect."""
-        self._tau = np.array(tau)
-        joints = tau[self._base :]
+        numbers = tau.tolist()
+        base = self._base
+        self._wrench = np.array(tau[:6]) if base and any(numbers[:6]) else None
+        forces = numbers[base:]
+        if not any(forces):
+            self._forces = None
+            return self._wrench is not None
         if self._coupling is not None:
             # On the driver alone: the torque on its followers that has the same power.
             tree = np.zeros(len(self.object.links))
-            tree[self._owners] = joints
-            joints = tree
-        self._forces = joints.tolist() if joints.any() else None
-        return self._forces is not None or bool(tau[: self._base].any())
+            tree[self._owners] = forces
+            forces = tree.tolist()
+        self._forces = forces
+        return True
 
     def apply(self) -> None:
-        """Apply the generalised force during the next step."""
-        engine = self._client.engine
+        """Apply the generalised force during the next step. The engine's own errors are not translated."""
         if self._forces is not None:
-            self._client.call(
-                engine.setJointMotorControlArray,
+            self._control(
                 self.object.body,
                 self.object.links,
-                engine.TORQUE_CONTROL,
+                self._torque_control,
                 forces=self._forces,
+                physicsClientId=self._client.number,
             )
-        if self._base and self._tau[:6].any():
-            R = rotation_from_quat(self.object.root.coordinates(self.object.base_state(), self._near)[0][3:7])
-            force = self._tau[:3]
-            moment = self._tau[3:6] - cross(self.object.root.center, force)
+        if self._wrench is not None:
+            q, _ = self.object.root.coordinates(self.object.base_state(), self._near)
+            R, force = rotation_from_quat(q[3:7]), self._wrench[:3]
+            moment = self._wrench[3:] - cross(self.object.root.center, force)
             self.object.push_base((R @ force).tolist(), (R @ moment).tolist())
 
     def command(self, command: MotorCommand | None) -> None:

@@ -1,0 +1,95 @@
+"""Motors: stiff gains, limits, a quadruped that stands, wheels that roll."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import dynx
+from dynx.world import (
+    PDMotor,
+    PositionMotor,
+    Scene,
+    SceneRobot,
+    TorqueMotor,
+    VelocityMotor,
+    World,
+    ground,
+)
+from tests.world.engines import WORLDS
+from tests.world.scenes import standing
+
+
+def arm(engine: str) -> World:
+    model = dynx.load("six_axis_arm")
+    return World(Scene("s", robots=(SceneRobot("arm", model),)), engine, joint_damping=False)
+
+
+@pytest.mark.parametrize("engine", WORLDS)
+def test_a_stiff_position_motor_is_stable(engine: str) -> None:
+    target = np.array([0.3, -0.5, 0.8, 0.2, 0.4, -0.3])
+    with arm(engine) as world:
+        world.run(1.0, motors={"arm": PositionMotor(target, kp=1e6, kd=1e5)})
+        assert abs(world.state.robots["arm"].q - target).max() < 1e-3
+        assert abs(world.state.robots["arm"].v).max() < 1e-2
+
+
+@pytest.mark.parametrize("engine", WORLDS)
+def test_motors_at_the_end_of_a_step_agree_with_those_at_its_beginning(engine: str) -> None:
+    states = []
+    for motor in (PDMotor, PositionMotor):
+        with World(Scene("s", robots=(SceneRobot("arm", dynx.load("planar_2r")),)), engine) as world:
+            world.run(0.5, motors={"arm": motor(0.2, kp=40.0, kd=4.0)})
+            states.append(world.state.robots["arm"].q)
+    assert abs(states[0] - states[1]).max() < 5e-3
+
+
+@pytest.mark.parametrize("engine", WORLDS)
+def test_a_motor_gives_at_most_its_force(engine: str) -> None:
+    limits = np.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.0])
+    with arm(engine) as world:
+        world.step(motors={"arm": PositionMotor(100.0, kp=1e6, kd=1.0, max_force=limits)})
+        strained = world.state.robots["arm"].v
+        world.reset()
+        world.step(motors={"arm": TorqueMotor(limits)})
+        assert world.state.robots["arm"].v == pytest.approx(strained, abs=1e-12)
+
+
+@pytest.mark.parametrize("engine", WORLDS)
+@pytest.mark.parametrize("name", ["solo12", "a1"])
+def test_a_quadruped_stands_on_its_feet(engine: str, name: str) -> None:
+    scene, motor = standing(name)
+    with World(scene, engine) as world:
+        world.run(1.5, motors={"dog": motor})
+        forces = []
+        for _ in range(20):
+            world.step(motors={"dog": motor})
+            forces.append(sum(c.force[2] for c in world.contacts()))
+        state, touching = world.state.robots["dog"], {c.a for c in world.contacts()}
+    weight = scene.robots[0].model.total_mass * 9.81
+    assert np.mean(forces) == pytest.approx(weight, rel=0.01)
+    assert len(touching) == 4
+    assert all("foot" in link.lower() for link in touching)
+    assert abs(state.v).max() < 0.05
+    # Where PyBullet's world stands.
+    assert state.q[2] == pytest.approx({"solo12": 0.2309, "a1": 0.2914}[name], abs=2e-3)
+
+
+@pytest.mark.parametrize("engine", WORLDS)
+def test_r2d2_drives_on_its_wheels(engine: str) -> None:
+    data = pytest.importorskip("pybullet_data")
+    model = dynx.load(f"{data.getDataPath()}/r2d2.urdf", base="floating")
+    wheels = [name for name in model.joint_names if "wheel" in name]
+    others = [name for name in model.joint_names if "wheel" not in name]
+    q = np.zeros(model.nq)
+    q[6] = 1.0
+    with World(Scene("s", robots=(SceneRobot("r2d2", model, q=tuple(q)),)), engine) as world:
+        q[2] = -world.aabb("r2d2")[0][2]
+    scene = Scene("s", robots=(SceneRobot("r2d2", model, q=tuple(q)),), bodies=(ground(),))
+    motors = {"r2d2": [VelocityMotor(5.0, 20.0, joints=wheels), PositionMotor(0.0, 1e3, 1e2, joints=others)]}
+    with World(scene, engine, 2e-3) as world:
+        world.run(3.0, motors=motors)
+        before = world.state.robots["r2d2"].q
+        world.run(1.0, motors=motors)
+        after = world.state.robots["r2d2"].q
+    assert np.linalg.norm(after[:2] - before[:2]) == pytest.approx(5.0 * 0.035, rel=0.01)

@@ -1,0 +1,105 @@
+"""A saved world continues bit for bit, in memory and from a file in another process."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dynx.errors import ArgumentError
+from dynx.spatial.scalar import Floats
+from dynx.world import PositionMotor, Scene, VelocityMotor, World, box, ground
+from tests.world.engines import WORLDS
+from tests.world.scenes import crowd
+
+pytestmark = pytest.mark.parametrize("engine", WORLDS)
+
+
+def final(world: World, steps: int) -> Floats:
+    """Return all coordinates of a world after some steps under motors."""
+    motors = {"dog": PositionMotor([0.0, 0.8, -1.6] * 4, 100.0, 2.0), "arm": VelocityMotor(0.3, 20.0)}
+    world.step(steps, motors=motors)
+    state = world.state
+    parts = [part.ravel() for each in (*state.robots.values(), *state.bodies.values()) for part in each]
+    return np.concatenate(parts)
+
+
+IN_ANOTHER_PROCESS = """
+import sys
+from dynx.world import World
+from tests.world.test_saving import final
+with World.read(sys.argv[1]) as world:
+    print(world.time.hex(), final(world, 1000).tobytes().hex())
+"""
+
+
+def test_a_saved_world_continues_bit_for_bit(engine: str, tmp_path: Path) -> None:
+    with World(crowd(), engine) as world:
+        final(world, 100)
+        assert world.contacts()
+        world.write(tmp_path / "world")
+        snapshot = world.save()
+        time = world.time
+        expected = final(world, 1000)
+        assert len(world.contacts()) > 8
+        world.restore(snapshot)
+        assert world.time == time
+        assert (final(world, 1000) == expected).all()
+    run = subprocess.run(
+        [sys.executable, "-c", IN_ANOTHER_PROCESS, str(tmp_path / "world")],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    began, found = run.stdout.split()
+    assert float.fromhex(began) == time
+    assert (np.frombuffer(bytes.fromhex(found)) == expected).all()
+
+
+def small(mass: float = 1.0) -> Scene:
+    return Scene("s", bodies=(ground(), box("b", (0.1, 0.1, 0.1), mass=mass)))
+
+
+def test_a_snapshot_of_another_scene_or_step_is_refused(engine: str) -> None:
+    with World(small(), engine) as world, World(small(2.0), engine) as other:
+        before = world.state.bodies["b"].T_world_body
+        with pytest.raises(ArgumentError, match="another scene"):
+            world.restore(other.save())
+        with World(small(), engine, dt=2e-3) as slow, pytest.raises(ArgumentError, match="another scene"):
+            world.restore(slow.save())
+        assert (world.state.bodies["b"].T_world_body == before).all()
+
+
+def test_a_damaged_file_is_refused_before_the_engine_sees_it(engine: str, tmp_path: Path) -> None:
+    path = tmp_path / "world"
+    with World(small(), engine) as world:
+        world.write(path)
+    data = path.read_bytes()
+    for damaged in (
+        data[:-1],
+        data[: len(data) // 2],
+        data[:-9] + b"?" + data[-8:],
+        b"",
+        b"text",
+        data + b"0",
+    ):
+        path.write_bytes(damaged)
+        with pytest.raises(ArgumentError):
+            World.read(path)
+    with pytest.raises(ArgumentError):
+        World.read(tmp_path / "missing")
+
+
+def test_reset_returns_to_the_start(engine: str) -> None:
+    with World(small(), engine) as world:
+        start = world.state
+        world.step(50)
+        first = world.state
+        world.reset()
+        assert world.time == 0.0
+        assert (world.state.bodies["b"].T_world_body == start.bodies["b"].T_world_body).all()
+        world.step(50)
+        assert (world.state.bodies["b"].T_world_body == first.bodies["b"].T_world_body).all()
