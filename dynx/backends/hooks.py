@@ -100,7 +100,7 @@ class EngineHooks(ABC):
 
     def _bias_torque(self, q: Floats, v: Floats) -> Floats:
         """Return the inverse dynamics at zero acceleration (..., nv)."""
-        return self._inverse_dynamics(q, v, np.zeros_like(v))
+        return self._inverse_dynamics(q, v, np.zeros(v.shape))
 
     def _gravity_torque(self, q: Floats) -> Floats:
         """Return the inverse dynamics at rest (..., nv)."""
@@ -186,4 +186,7 @@ def _definite_solution(M: Floats, torque: Floats) -> Floats | None:
 
 def apply_matrix(matrix: Floats, vector: ArrayLike) -> Floats:
     """Return the products A x over batch axes, for A (..., m, n) and x (..., n)."""
+    if matrix.ndim == 2 and type(vector) is np.ndarray and vector.ndim == 1:
+        # For small arrays `dot` takes a third of the time of `matmul`.
+        return np.asarray(matrix.dot(vector))
     return np.asarray((matrix @ np.asarray(vector)[..., None])[..., 0])

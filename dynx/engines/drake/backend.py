@@ -124,7 +124,7 @@ class DrakeBackend(Backend):
         wanted = self._coordinates.accelerations(R, v, a)
         # Drake returns the classical acceleration of the origin; the spatial acceleration does not include w
         # x v.
-        acceleration = _linear_first(J @ wanted + bias.get_coeffs())
+        acceleration = _linear_first(J.dot(wanted) + bias.get_coeffs())
         if reference != "local_world_aligned":
             velocity = on_robot.CalcSpatialVelocityInWorld(context)
             acceleration[:3] -= np.cross(velocity.rotational(), velocity.translational())
@@ -170,18 +170,21 @@ class DrakeBackend(Backend):
 
     def _mass_matrix(self, q: Floats) -> Floats:
         context, R = self._set_positions(_upright(q) if self.model.floating else q)
-        plant = self._plant
-        # The composite inertia of a body made of parts with opposite masses cannot be divided by its mass.
-        compute = (
-            plant.CalcMassMatrixViaInverseDynamics if self._built.counterweighted else plant.CalcMassMatrix
-        )
-        M = self._coordinates.matrix_back(R, compute(context))
+        if self._built.counterweighted:
+            # The composite inertia of a body of parts with opposite masses cannot be divided by its mass.
+            M = self._plant.CalcMassMatrixViaInverseDynamics(context)
+        else:
+            M = self._plant.CalcMassMatrix(context)
+            if not self.model.floating:
+                # Drake copies one triangle to the other.
+                return self._coordinates.matrix_back(R, M)
+        M = self._coordinates.matrix_back(R, M)
         return np.asarray(0.5 * (M + M.T))
 
     def _bias_torque(self, q: Floats, v: Floats) -> Floats:
         if self.model.floating:
             # A zero acceleration in base axes need not be zero in the world axes that Drake uses.
-            return self._inverse_dynamics(q, v, np.zeros_like(v))
+            return self._inverse_dynamics(q, v, np.zeros(v.shape))
         context, R = self._set_state(q, v)
         bias = self._plant.CalcBiasTerm(context) - self._plant.CalcGravityGeneralizedForces(context)
         return self._coordinates.forces_back(R, bias)
