@@ -197,3 +197,9 @@ def test_reference_and_pinocchio_agree_about_random_robots(model: Model) -> None
     report = agree(model, ["reference", "pinocchio"], samples=3, referee_samples=1)
     assert report.error is None
     assert report.agree, (report.differences, report.suspects)
+
+
+@pytest.mark.parametrize(("n", "listed"), [(6, "joint5 moves"), (8, "joint5 ... moves")])
+def test_a_long_list_of_joints_that_move_nothing_is_cut(n: int, listed: str) -> None:
+    report = agree(massless_chain(n), backends=["reference"], samples=1)
+    assert any(listed in note for note in report.notes)

@@ -118,3 +118,11 @@ def test_positivity_is_not_checked_where_an_inertia_is_not_physical() -> None:
     check = identity_checks(ReferenceBackend(replace(model, links=(model.links[0], odd, *model.links[2:]))))
     assert check["mass matrix is positive"].agree
     assert "upper" in (check["mass matrix is positive"].note or "")
+
+
+def test_the_identities_hold_at_high_speed() -> None:
+    samples = draw_samples(arm(), 4, 0)
+    fast = replace(samples, v=1e3 * samples.v, a=1e6 * samples.a)
+    with ReferenceBackend(arm()) as backend:
+        for check in check_identities("reference", backend, Magnitudes(fast)):
+            assert check.agree, f"{check.identity}: {check.max_error}"

@@ -110,3 +110,12 @@ def test_the_step_of_derivatives_balances_truncation_against_rounding() -> None:
         for factor in (0.5, 2.0):
             other = truncation * factor**tolerances.ORDER + rounding / factor
             assert tolerances.derivative(depth) < 1.5 * other
+
+
+def test_a_follower_has_the_position_that_its_joint_gives_it() -> None:
+    magnitudes = Magnitudes(draw_samples(arm(), 3, 0))
+    model = magnitudes.samples.model
+    coupling = model.mechanism.coupling
+    assert coupling is not None
+    np.testing.assert_array_equal(magnitudes._q_tree, coupling.expand_q(magnitudes.samples.q))
+    assert magnitudes._joint_q.shape == (3, model.mechanism.nv)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from dynx.backends import Backend
 from dynx.backends.hooks import solve_mass_matrix
 from dynx.engines.pinocchio.backend import PinocchioBackend
-from dynx.errors import ClosedError, SingularMassMatrixError
+from dynx.errors import ClosedError, NotFiniteError, SingularMassMatrixError
 from dynx.model import Joint, JointDynamics, Link, Model
 from dynx.model.elements import Inertial, Pose
 from dynx.reference.backend import ReferenceBackend
@@ -301,3 +301,11 @@ def test_life_cycle(kind: type[Backend]) -> None:
     # A recipe, not a state: what was closed comes back open.
     copy = pickle.loads(pickle.dumps(engine))
     assert_same(all_quantities(copy, q, v, x), expected)
+
+
+def test_an_acceleration_that_is_not_finite_is_named() -> None:
+    model = mixed_robot()
+    backend = ReferenceBackend(model)
+    q, v = model.neutral(), np.zeros(model.nv)
+    with pytest.raises(NotFiniteError, match=r"^a\b"):
+        backend.frame_acceleration(q, v, np.full(model.nv, np.nan), model.root, point=[0.1, 0.0, 0.0])

@@ -68,3 +68,11 @@ def test_shapes_are_those_of_the_results(quantity: Quantity, mimic: bool) -> Non
 @each_quantity
 def test_every_algorithm_is_one_of_dynx_rbd(quantity: Quantity) -> None:
     assert quantity.algorithm.__module__.startswith("dynx.rbd.")
+
+
+def test_the_names_in_mujoco_exist() -> None:
+    mujoco = pytest.importorskip("mujoco")
+    for quantity in QUANTITIES.values():
+        name = quantity.other_names.get("MuJoCo", "")
+        if name.startswith("mj_"):
+            assert hasattr(mujoco, name), f"{quantity.name}: {name}"

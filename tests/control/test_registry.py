@@ -30,7 +30,7 @@ from dynx.control import (
     unregister_controller,
 )
 from dynx.control.base import gain
-from dynx.control.registry import BUILT_IN, controller_class, controller_names
+from dynx.control.registry import BUILT_IN, controller_class, controller_names, from_document, to_document
 from dynx.errors import ArgumentError, GainError, UnknownNameError
 from dynx.model import Model
 from dynx.model.loading import load
@@ -130,3 +130,11 @@ def test_an_engine_is_written_by_its_name() -> None:
         law = ComputedTorque(ARM, kp=400, kd=40, backend=engine)
         named = ComputedTorque(ARM, kp=400, kd=40, backend="pinocchio")
         assert controller_to_document(law) == controller_to_document(named)
+
+
+def test_a_table_of_torques_is_written_with_the_arguments_of_its_constructor() -> None:
+    model = load("pendulum")
+    table = OpenLoop(model, [[1.0], [2.0]], control_dt=0.01)
+    document = to_document(table)
+    assert document.keys() == {"controller", "torques", "control_dt"}
+    assert to_document(from_document(model, document)) == document

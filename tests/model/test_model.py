@@ -14,6 +14,7 @@ from hypothesis import given
 from dynx.errors import ArgumentError, UnknownNameError
 from dynx.model import Link, Model, Pose
 from dynx.model.loading import load
+from dynx.model.model import refuse_other_than_model
 from dynx.testing.strategies import models
 
 
@@ -91,3 +92,10 @@ def test_names_of_frames_are_unique() -> None:
 def test_names_are_case_sensitive() -> None:
     with pytest.raises(UnknownNameError, match="did you mean 'tool0'"):
         load("ur5").frame_index("TOOL0")
+
+
+def test_what_is_no_model_is_refused_with_an_example() -> None:
+    with pytest.raises(ArgumentError, match=r"of type str; wanted a Model, such as dynx\.load\('ur5'\)"):
+        refuse_other_than_model("ur5")
+    with pytest.raises(ArgumentError, match=r"of type float; wanted a Model, such as dynx\.load\(\.\.\.\)"):
+        refuse_other_than_model(3.0)

@@ -136,3 +136,21 @@ def test_plain_urdf_is_xacro_too(tmp_path: Path) -> None:
     path = tmp_path / "x.xacro"
     path.write_text(joint())
     assert load(path) == load(joint())
+
+
+def test_a_text_of_a_process_that_failed_is_not_its_reason(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "robot.xacro"
+    path.write_text("<robot/>")
+    monkeypatch.setattr(xacro_reading, "_reply", lambda command: (xacro_reading._TEXT + b"<robot/>", 3))
+    monkeypatch.setattr(xacro_reading, "find_spec", lambda name: object(), raising=False)
+    with pytest.raises(DescriptionError, match="its process ended with code 3"):
+        xacro_reading.expand_xacro(str(path), ())
+
+
+def test_memory_that_ran_out_is_named_with_its_limit() -> None:
+    error = RuntimeError("wrapped")
+    error.__context__ = MemoryError()
+    limit = xacro_reading.MAX_MEMORY / 2**30
+    assert xacro_reading._reason_of(error) == f"it needs more than {limit:g} GiB of memory"

@@ -123,4 +123,6 @@ def verdict(code: int, output: str) -> tuple[str, str]:
     unimported = re.search(r"found no collectors for (\S+)::", output) or failed
     if code in (2, 4) and unimported:
         return CAUGHT, f"import of {unimported[1]}"
+    if code == 4 and "ImportError while loading conftest" in output:
+        return CAUGHT, "import of tests/conftest.py"
     return BROKEN, output[-600:]

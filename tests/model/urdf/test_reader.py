@@ -334,3 +334,10 @@ def test_any_edit_of_a_real_file_gives_a_model_or_a_dynx_error(
 def test_any_text_gives_a_dynx_error(data: str | bytes) -> None:
     with pytest.raises(ModelError):
         load(b"<" + data if isinstance(data, bytes) else "<" + data)
+
+
+@pytest.mark.parametrize("tag", ["collision_checking", "self_collide", "kinematic", "surface"])
+def test_an_element_without_dynamics_is_not_noted(tag: str) -> None:
+    text = f'<robot name="r"><link name="a"><{tag}/></link></robot>'
+    assert not load(text).notes
+    assert load(text.replace(tag, "colision_checking")).notes

@@ -176,3 +176,8 @@ def test_one_long_attribute_and_many_attributes_are_read_in_linear_time() -> Non
     assert len(root.attributes) == MAX_ATTRIBUTES
     with pytest.raises(DescriptionError, match="1001 attributes; at most 1000 are read"):
         read(f'<a x="y" {many} last=""/>')
+
+
+def test_character_data_are_kept_where_they_are_asked_for() -> None:
+    root = read_xml("<a><b>one<!-- x --> two</b><c>three</c></a>", "x", [], with_text=("b",))
+    assert [each.text for each in root.children] == ["one two", ""]

@@ -158,3 +158,11 @@ def test_text_is_written_in_the_encoding_that_it_declares() -> None:
 def test_malformed_xml_raises_with_file_and_line() -> None:
     with pytest.raises(DescriptionError, match=r"arm\.urdf:2"):
         XmlSource("<r>\n<a></r>", "arm.urdf")
+
+
+def test_a_document_is_declared_in_the_encoding_that_it_is_saved_in() -> None:
+    text = '<?xml version="1.0" encoding="iso-8859-1"?><robot name="é"/>'
+    saved = XmlSource(text.encode("iso-8859-1"), "x").in_utf8()
+    assert saved.text == '<?xml version="1.0" encoding="UTF-8"?><robot name="é"/>'
+    assert saved.data.decode("utf-8") == saved.text
+    assert XmlSource(b"<robot/>", "x").in_utf8().text == "<robot/>"

@@ -234,3 +234,20 @@ def test_a_robot_without_an_acceleration_is_refused() -> None:
     with pytest.raises(SingularMassMatrixError):
         simulate_batch(hollow, law, hollow.neutral(), duration=0.01, check_reference=False)
     batch_and_one(hollow, law, hollow.neutral(), duration=0.01, check_reference=False, armature=1.0)
+
+
+def test_the_memory_that_a_batch_needs_is_compared_with_the_machine(
+    arm: Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[float] = []
+    monkeypatch.setattr("dynx.sim.batch.batch.require_memory", lambda what, size: asked.append(size))
+    law, goal = GravityCompensatedPD(arm, kp=1.0, kd=1.0), arm.neutral()
+    simulate_batch(arm, law, goal, rollouts=64, record_every=1, duration=0.02)
+    # 20 recorded states of q, v and torque, of 8 bytes each.
+    assert max(asked) >= 64 * 20 * 8 * (arm.nq + 2 * arm.nv)
+
+
+def test_a_start_with_other_rows_is_named(arm: Model) -> None:
+    law, goal = GravityCompensatedPD(arm, kp=1.0, kd=1.0), arm.neutral()
+    with pytest.raises(ArgumentError, match="q0"):
+        simulate_batch(arm, law, goal, rollouts=5, q0=np.zeros((3, arm.nq)), duration=0.02)

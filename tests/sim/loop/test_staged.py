@@ -393,3 +393,9 @@ def test_progress_is_told_to_the_end(on: bool) -> None:
         simulate(ARM, q0=np.zeros(6), duration=0.5, progress=lambda *steps: told.append(steps))
     assert told[-1] == (500, 500)
     assert len(told) > 2
+
+
+def test_a_step_that_is_not_compiled_is_named() -> None:
+    robot = load("free_body", base="floating")
+    rollout = simulate(robot, plant="reference", integrator="rk4", duration=2.5)
+    assert "the integrator rk4 with a floating base is not compiled" in rollout.executor

@@ -152,3 +152,8 @@ def test_the_command_line_simulates_a_plant_by_its_name(drifting: str) -> None:
 def test_a_plant_with_a_stepper_takes_no_integrator_of_dynx(drifting: str) -> None:
     with pytest.raises(ArgumentError, match="has a stepper of its own, which is integrator='engine'"):
         simulate(PENDULUM, plant=drifting, integrator="rk4", duration=0.1)
+
+
+def test_a_plant_that_does_not_exist_is_refused_as_a_plant() -> None:
+    with pytest.raises(UnknownBackendError, match="no plant 'pinochio'; did you mean 'pinocchio'"):
+        registry.require_plant("pinochio")

@@ -159,3 +159,8 @@ def test_a_file_imports_nothing() -> None:
     document = json.loads(Scenario(ARM).to_json())
     document["reference"] = {"class": "this:Zen", "fields": {}}
     assert isinstance(Scenario.from_dict(document).reference, Unknown)
+
+
+def test_a_controller_that_is_not_registered_is_named() -> None:
+    document = json.dumps({"controller": {"controller": "Absent"}, "model": {}})
+    assert "no controller 'Absent' is registered here" in Unknown("Absent", document).why
