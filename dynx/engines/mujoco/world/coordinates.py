@@ -83,7 +83,7 @@ class RobotCoordinates:
     def forces(self, tau: Floats) -> Floats:
         """Return a torque with the wrench on a floating base, `tau[:6]` at its origin in its axes, converted
         to MuJoCo's."""
-        if not self._floating:
+        if not self._floating or not any(tau[:6].tolist()):
             return tau
         w, x, y, z = self._q[3:7]
         R = rotation_from_quat(np.array([x, y, z, w]))
