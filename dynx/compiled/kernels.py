@@ -65,6 +65,10 @@ MAX_SECONDS_BESIDE_ROUTINES = 3.0
 """Longest predicted time of a compilation of a matrix that routines can evaluate instead: they are half as
 fast, but need no compilation for the robot."""
 
+UNOPTIMISED_SHARE = 0.5
+"""Largest share of the predicted time that a long program takes, because it is not optimised
+(`dynx.simd.emit`). It counts for quantities without routines, which NumPy would have to evaluate."""
+
 SECONDS_OF_OPERATION, SECONDS_OF_RESULT = 1.5e-4, 3e-4
 """Time to trace and compile an operation, and to compile the store of a number of the result."""
 
@@ -141,6 +145,8 @@ def compiles(mechanism: Mechanism, name: str) -> bool:
     compiled for all robots (`dynx.compiled.looped`) or by NumPy."""
     matrix = name in LOOPED and kernel_quantity(name).growth != "joints"
     limit = MAX_SECONDS_BESIDE_ROUTINES if matrix else MAX_COMPILE_SECONDS
+    if name not in LOOPED:
+        limit /= UNOPTIMISED_SHARE
     return compile_seconds(mechanism, name) <= limit
 
 

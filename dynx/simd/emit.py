@@ -40,7 +40,7 @@ PREFETCH_GROUPS = 8
 CACHE_LINE = 64
 """Size of a cache line [bytes]."""
 
-MAX_OPTIMISED_LENGTH = 20_000
+MAX_OPTIMISED_LENGTH = 16_000
 """Length of a program above which LLVM does not optimise it. Optimising takes some 0.2 ms for each operation,
 which is five times as long, and makes long programs a tenth to a fifth faster: they are limited by reading
 their code from memory."""

@@ -30,6 +30,9 @@ def test_long_code_is_not_compiled() -> None:
     assert not compiles(chain(20).mechanism, "inertial_regressor")
     assert not compiles(_star(101).mechanism, "mass_matrix")
     assert not compiles(_star(1000).mechanism, "frame_placements")
+    # Nothing but NumPy could evaluate it, and without optimisation it compiles in four seconds.
+    assert compiles(_star(300).mechanism, "kinetic_energy")
+    assert not compiles(_star(500).mechanism, "kinetic_energy")
     for robot in (mixed_robot(), mixed_robot("floating", mimic=True)):
         small = [quantity for quantity in QUANTITIES if quantity != "inertial_regressor"]
         assert all(compiles(robot.mechanism, quantity) for quantity in small)

@@ -52,6 +52,10 @@ PART = 1024
 """Number of rollouts in one part: small enough that their state stays in the processor's caches, and large
 enough that starting a call costs little. Results do not depend on it."""
 
+MAX_NV_WITHOUT_PUSHES = 32
+"""Largest number of coordinates for which steps without a push have a kernel of their own: it saves computing
+the place where pushes act, but compiles for seconds if the robot is larger."""
+
 Progress = Callable[[int, int], object]
 """Called with the number of finished rollouts and the total number."""
 
@@ -264,9 +268,15 @@ def refuse_uncompiled(scenario: Scenario) -> None:
 
 
 def _step_kernels(step: FusedStep, clock: Clock, wrenches: Floats) -> StepKernels:
-    """Return the kernels of a step with and without controller and pushes, for combinations that occur."""
+    """Return the kernels of a step with and without controller and pushes, for combinations that occur.
+
+    For a large robot the steps without a push are steps with a push of zero.
+    """
     controlled = np.arange(clock.n_steps) % clock.steps_per_control == 0
-    kinds = set(zip(controlled.tolist(), pushing(wrenches), strict=True))
+    pushed = pushing(wrenches)
+    if step.model.nv > MAX_NV_WITHOUT_PUSHES:
+        pushed = [any(pushed)] * clock.n_steps
+    kinds = set(zip(controlled.tolist(), pushed, strict=True))
     return {
         (controlled, pushed): step.kernel(controlled=controlled, pushed=pushed)
         for controlled, pushed in sorted(kinds)

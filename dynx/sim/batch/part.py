@@ -112,7 +112,8 @@ class _Run:
         widths: dict[str, int] = {**dict.fromkeys(("v_wanted", "a_wanted"), nv), "t": 1, "steps_held": 1}
         widths |= dict.fromkeys(("q_wanted", "q_reference"), int(part.references.shape[1]))
         widths["wrenches"] = int(part.wrenches.shape[1])
-        self._pushing = pushing(part.wrenches)
+        always = all(pushed for _, pushed in part.kernels)
+        self._pushing = [True] * part.n_steps if always else pushing(part.wrenches)
         self._noise: dict[str, Floats] = {}
         self._drawn: dict[Purpose, Floats] = {}
         if part.noise is not None:

@@ -12,7 +12,9 @@ from dynx.control import ComputedTorque, FrictionCompensation, GravityCompensate
 from dynx.errors import ArgumentError, GainError, SingularMassMatrixError, UnsupportedFeatureError
 from dynx.model import Link, Model
 from dynx.sim import Payload, Push, plant_model, simulate, simulate_batch
+from dynx.sim.batch.kernel import FusedStep
 from dynx.sim.batch.rollouts import BatchRollouts
+from dynx.simd.kernel import Kernel
 from tests.backends.robots import mixed_robot
 from tests.sim.bars import apart
 from tests.sim.batch.batches import assert_same, batch_and_one
@@ -71,6 +73,25 @@ def test_an_option_means_what_it_means_to_one_rollout(arm: Model, option: str) -
     if option != "of the description":
         # It is another motion than without, so the option did something.
         assert apart(found.q, held(arm).q) > 1e-6
+
+
+@pytest.mark.parametrize("control_dt", [1e-3, 4e-3])
+def test_pushes_need_no_second_kernel_for_a_large_robot(
+    arm: Model, control_dt: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("dynx.sim.batch.batch.MAX_NV_WITHOUT_PUSHES", 5)
+    kernels, original = [], FusedStep.kernel
+
+    def kernel(self: FusedStep, **chosen: bool) -> Kernel:
+        kernels.append(chosen["pushed"])
+        return original(self, **chosen)
+
+    monkeypatch.setattr(FusedStep, "kernel", kernel)
+    held(arm, pushes=PUSHES[:1], control_dt=control_dt)
+    assert kernels == [True] * (1 if control_dt == 1e-3 else 2)
+    kernels.clear()
+    held(arm, control_dt=control_dt)
+    assert True not in kernels
 
 
 @pytest.mark.parametrize("base", ["fixed", "floating"])
