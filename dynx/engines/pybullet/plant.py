@@ -178,7 +178,9 @@ class BulletPlant(Plant):
         Joints where `moves` is 0 stick: what rounding moved them is undone.
         """
         v, h = self._v, self._h
-        sticking = None if moves is None else moves[self._base_nv :] == 0.0
+        sticking = None
+        if moves is not None and 0.0 in moves.tolist():
+            sticking = moves[self._base_nv :] == 0.0
         if not self._floating:
             self._client.advance()
             joints, rates = self._joints(sticking)
@@ -207,7 +209,8 @@ class BulletPlant(Plant):
         if self._coupling is not None:
             positions, rates = positions[self._owners], rates[self._owners]
         if sticking is not None:
-            positions[sticking], rates[sticking] = self._q[self._base_nq :][sticking], 0.0
+            np.copyto(positions, self._q[self._base_nq :], where=sticking)
+            np.copyto(rates, 0.0, where=sticking)
         return positions, rates
 
     def _base_coordinates(self, base: BaseState, joints: Floats, rates: Floats) -> tuple[Floats, Floats]:
@@ -217,10 +220,13 @@ class BulletPlant(Plant):
 
     def _read(self, q: Floats, v: Floats, sticking: Mask | None = None) -> None:
         self._q, self._v = q, v
-        if self._floating or self._coupling is not None or (sticking is not None and sticking.any()):
-            # Bullet is set to the reported state, rounding of the conversion included, so that a rollout
-            # resumed from its record continues bit for bit.
+        # Bullet is set to the reported state, rounding of the conversion included, so that a rollout resumed
+        # from its record continues bit for bit.
+        if self._floating or self._coupling is not None:
             self._place()
+        elif sticking is not None:
+            joints = np.flatnonzero(sticking)
+            self._client.stop_joints(joints.tolist(), q[joints].tolist())
 
     def _place(self) -> None:
         q, v = self._q, self._v

@@ -47,6 +47,16 @@ class SteppingClient(BulletClient):
             self.place_base(base.position, base.quat_xyzw)
             self.call(self.engine.resetBaseVelocity, self.body, base.linear, base.angular)
 
+    def stop_joints(self, joints: list[int], positions: Reals) -> None:
+        """Set some joints to rest at the given positions."""
+        self.call(
+            self.engine.resetJointStatesMultiDof,
+            self.body,
+            joints,
+            [[x] for x in positions],
+            [[0.0]] * len(joints),
+        )
+
     def apply(self, torques: Reals) -> None:
         """Apply joint torques alone during the next step; motors are released."""
         if self._motors_hold:
