@@ -29,13 +29,16 @@ ENTRY = "kernel"
 """Name of the function."""
 
 PREFETCHED_COLUMNS = range(16, 129)
-"""Row lengths of outputs whose memory is prefetched before it is written.
+"""Row lengths of arrays whose memory is prefetched before it is read or written.
 
-Writing to memory outside the caches stalls. Short rows stall little, and processors prefetch long ones.
+Memory outside the caches stalls the processor. Short rows stall little, and processors prefetch long ones.
 """
 
 PREFETCH_GROUPS = 8
-"""Distance, in groups of samples, between prefetching a row and writing it."""
+"""Distance, in groups of samples, between prefetching a row and using it."""
+
+PREFETCH_TO_READ, PREFETCH_TO_WRITE = "i32 0, i32 2", "i32 1, i32 3"
+"""Hints of LLVM's prefetch: whether the memory will be written, and how near the processor it shall be."""
 
 CACHE_LINE = 64
 """Size of a cache line [bytes]."""
@@ -140,16 +143,16 @@ def _loop(program: Program, settings: Settings, segments: int, slots: int) -> st
     return "\n".join(lines)
 
 
-def _prefetched_outputs(program: Program) -> list[tuple[int, int]]:
-    """List (array number, row length) of the outputs whose rows are prefetched."""
-    ports = enumerate(program.outputs, start=len(program.inputs))
+def _prefetched_arrays(program: Program) -> list[tuple[int, int]]:
+    """List (array number, row length) of the arrays whose rows are prefetched."""
+    ports = enumerate((*program.inputs, *program.outputs))
     return [(number, port.size) for number, port in ports if port.size in PREFETCHED_COLUMNS]
 
 
 def _prefetch_pointers(program: Program) -> list[str]:
-    """Return the code that loads addresses and row strides of the prefetched outputs."""
+    """Return the code that loads addresses and row strides of the prefetched arrays."""
     lines = []
-    for k, _ in _prefetched_outputs(program):
+    for k, _ in _prefetched_arrays(program):
         lines += [
             f"  %at{k} = getelementptr inbounds i64, ptr %arguments, i64 {1 + 2 * k}",
             f"  %base{k} = load ptr, ptr %at{k}",
@@ -162,7 +165,8 @@ def _prefetch_pointers(program: Program) -> list[str]:
 def _prefetch(program: Program, lanes: int) -> list[str]:
     """Return the code that prefetches the rows of a later group; a prefetch beyond an array is harmless."""
     lines = []
-    for k, size in _prefetched_outputs(program):
+    for k, size in _prefetched_arrays(program):
+        hint = PREFETCH_TO_READ if k < len(program.inputs) else PREFETCH_TO_WRITE
         for lane in range(lanes):
             row = f"{k}_{lane}"
             lines += [
@@ -174,7 +178,7 @@ def _prefetch(program: Program, lanes: int) -> list[str]:
                 place = f"%line{row}_{start}"
                 lines += [
                     f"  {place} = getelementptr i8, ptr %row{row}, i64 {start}",
-                    f"  call void @llvm.prefetch.p0(ptr {place}, i32 1, i32 3, i32 1)",
+                    f"  call void @llvm.prefetch.p0(ptr {place}, {hint}, i32 1)",
                 ]
     return lines
 

@@ -238,3 +238,15 @@ def test_code_for_other_processors_of_the_family(target: Target) -> None:
     module = binding.parse_assembly(emit(program, target, Settings(target.lanes)))
     register = {8: "%zmm", 2: "%xmm"}[target.lanes]
     assert register in machine.emit_assembly(module)
+
+
+@pytest.mark.parametrize("size", [15, 16, 128, 129])
+def test_rows_of_medium_length_are_prefetched(size: int) -> None:
+    """Shorter rows stall little, and processors prefetch longer ones themselves."""
+    graph = Graph()
+    nodes = [graph.apply("neg", graph.input(k)) for k in range(size)]
+    program = extract_program(graph, [Port("x", (size,))], [Port("y", (size,))], nodes)
+    text = emit(program, TARGETS[0], Settings(2))
+    lines = 2 * -(-8 * size // 64) if 16 <= size <= 128 else 0
+    for hint in ("i32 0, i32 2, i32 1", "i32 1, i32 3, i32 1"):
+        assert text.count(f", {hint})") == lines
