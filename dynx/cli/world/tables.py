@@ -22,7 +22,10 @@ MAX_ROWS = 30
 def show(out: Console, report: Entry) -> None:
     """Print the final states, the contacts, and the distances between the engines."""
     engines: Sequence[Entry] = report["engines"]
-    names = ", ".join(f"{each['engine']} {each['version']}" for each in engines)
+    # Most versions begin with the name of the engine.
+    names = ", ".join(
+        f"{each['engine']} {each['version'].removeprefix(each['engine']).strip()}" for each in engines
+    )
     step = f"dt {report['dt']:g} s" + (f" in {report['substeps']} steps" if report["substeps"] > 1 else "")
     out.print(
         f"{one_line(report['scene'])}: {report['duration']:g} s, {step}, by {one_line(names)}", style="bold"
@@ -95,14 +98,14 @@ def _show_separations(out: Console, separations: Sequence[Entry]) -> None:
     if not separations:
         return
     distances = [parted["distance"] for parted in separations[0]["parted"]]
-    headings = [f"beyond {1e3 * distance:g} mm" for distance in distances]
+    headings = [f"> {1e3 * distance:g} mm" for distance in distances]
     table = Table(
         "engines",
         *headings,
         "largest [m]",
-        "at the end [m]",
+        "end [m]",
         "of",
-        right=(*headings, "largest [m]", "at the end [m]"),
+        right=(*headings, "largest [m]", "end [m]"),
     )
     for each in separations:
         times = (
@@ -115,7 +118,7 @@ def _show_separations(out: Console, separations: Sequence[Entry]) -> None:
             f"{each['distance'][-1]:.2e}",
             one_line(each["farthest"][int(np.argmax(each["distance"]))]),
         )
-    out.print("\ndistance between the motions: largest over all bodies and moving links")
+    out.print("\ndistance of the motions, the largest of all bodies and moving links, and when it exceeds")
     out.print(table)
 
 

@@ -64,7 +64,7 @@ def test_engines_that_agree_are_never_apart(scene: str) -> None:
 def test_engines_that_part_give_exit_code_1() -> None:
     stack = run("stack", "--engine", ",".join(ENGINES), "--duration", "0.2", "--within", "1e-12")
     assert stack.exit_code == 1, stack.output
-    assert "distance between the motions" in stack.output
+    assert "distance of the motions" in stack.output
 
 
 @pytest.mark.skipif(len(ENGINES) < 2, reason="needs two engines")
