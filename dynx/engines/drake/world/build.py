@@ -16,7 +16,6 @@ import numpy as np
 from dynx.backends.solvability import Solvability
 from dynx.engines.drake.library import (
     AddMultibodyPlantSceneGraph,
-    ContactModel,
     DiagramBuilder,
     FixedOffsetFrame,
     MultibodyPlant,
@@ -29,7 +28,7 @@ from dynx.engines.drake.library import (
 )
 from dynx.engines.drake.multibody_plant import drake_pose, inertia_parts
 from dynx.engines.drake.world.coordinates import BodyCoordinates, RobotCoordinates, root_center
-from dynx.engines.drake.world.options import APPROXIMATIONS, proximity_properties
+from dynx.engines.drake.world.options import APPROXIMATIONS, MODELS, proximity_properties, refuse_material
 from dynx.engines.drake.world.shapes import drake_shapes
 from dynx.errors import EngineLimitError, UnsupportedFeatureError, shown
 from dynx.model.mechanism import ROOT
@@ -76,7 +75,7 @@ def build_scene(layout: Layout, dt: float, settings: Mapping[str, Any]) -> Built
     plant, scene_graph = AddMultibodyPlantSceneGraph(builder, MultibodyPlant(time_step=dt))
     # Without sampled ports the state is q and v alone, and contacts are computed when they are asked for.
     plant.SetUseSampledOutputPorts(False)
-    plant.set_contact_model(ContactModel.kPoint)
+    plant.set_contact_model(MODELS[settings["contact_model"]])
     plant.set_discrete_contact_approximation(APPROXIMATIONS[settings["contact_approximation"]])
     plant.set_stiction_tolerance(settings["stiction_tolerance"])
     plant.set_adjacent_bodies_collision_filters(False)
@@ -204,10 +203,13 @@ def _add_shapes(
     """Add the shapes of all colliders; return Drake's numbers of them."""
     found = []
     for number, collider in enumerate(layout.colliders):
-        properties = proximity_properties(collider.name, collider.material, settings)
+        if settings["strict_materials"]:
+            refuse_material(collider.name, collider.material)
+        fixed = layout.is_fixed(collider.owner)
         carrier = carriers[collider.owner]
         added: list[Any] = []
         for placed in collider.shapes:
+            properties = proximity_properties(placed.shape, collider.material, settings, fixed)
             for shape in drake_shapes(placed.shape):
                 name = f"{number}.{len(added)}"
                 pose = carrier.pose(placed.T)

@@ -15,6 +15,7 @@ import numpy as np
 
 from dynx.engines.drake.library import DRAKE_FAILURES, captured_log, drake_version, error_message
 from dynx.engines.drake.world.build import build_scene
+from dynx.engines.drake.world.contacts import read_contacts, touching_point
 from dynx.engines.drake.world.distances import closest_of_pair, closest_to_plane
 from dynx.engines.drake.world.options import SETTINGS
 from dynx.errors import ClosedError, DynxError, EngineError, shown
@@ -170,7 +171,7 @@ class DrakeWorld(WorldEngine):
     def contacts(self) -> Sequence[TouchingPoint]:
         if self._past is None:
             pairs = self._query().ComputePointPairPenetration()
-            return [self._touching(pair, np.zeros(3)) for pair in pairs]
+            return [touching_point(pair, np.zeros(3), self._built.collider_of) for pair in pairs]
         if self._past_root is None:
             with captured_log():
                 self._past_root = self._diagram.CreateDefaultContext()
@@ -179,24 +180,9 @@ class DrakeWorld(WorldEngine):
         self._plant.SetPositionsAndVelocities(context, state)
         self._port.FixValue(context, forces)
         results = self._plant.get_contact_results_output_port().Eval(context)
-        infos = map(results.point_pair_contact_info, range(results.num_point_pair_contacts()))
-        # Drake's force is that on the second body.
-        return [self._touching(info.point_pair(), -np.array(info.contact_force())) for info in infos]
-
-    def _touching(self, pair: Any, force: Floats) -> TouchingPoint:
-        """Return a contact of Drake, with the force on the first body."""
-        normal = np.array(pair.nhat_BA_W)
-        along = max(0.0, float(force @ normal))
-        return TouchingPoint(
-            self._built.collider_of[pair.id_A.get_value()],
-            self._built.collider_of[pair.id_B.get_value()],
-            np.array(pair.p_WCa),
-            np.array(pair.p_WCb),
-            normal,
-            -float(pair.depth),
-            along,
-            force - float(force @ normal) * normal,
-        )
+        graph = self._built.scene_graph
+        query = graph.get_query_output_port().Eval(graph.GetMyContextFromRoot(self._past_root))
+        return read_contacts(results, query, self._built.collider_of)
 
     @_engine_errors
     def closest(self, a: int, b: int, within: float) -> TouchingPoint | None:

@@ -1,6 +1,11 @@
 """Settings of Drake's contacts.
 
-A contact of Drake is one point with a spring and a damper: two shapes of stiffness k have k / 2 together.
+Hydroelastic contact (Elandt et al., A pressure field model for fast, robust approximation of net contact
+force and moment, 2019) integrates a pressure over the surface where two shapes overlap: shapes that are fixed
+in the world are rigid, others have a modulus. Point contact is one point with a spring and a damper for each
+pair of shapes, on which a box that slides or is stacked rattles. Spheres and capsules always touch at a
+point, because their approximation by triangles would not roll well.
+
 Of two materials Drake takes the harmonic mean of the coefficients of friction. It has no restitution and no
 torsional or rolling friction.
 """
@@ -10,8 +15,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from dynx.engines.drake.library import CoulombFriction, DiscreteContactApproximation, geometry
+from dynx.engines.drake.library import (
+    ContactModel,
+    CoulombFriction,
+    DiscreteContactApproximation,
+    geometry,
+)
 from dynx.errors import UnsupportedFeatureError, shown
+from dynx.model.geometry import Capsule, Cylinder, Shape, Sphere
 from dynx.world.scene import Material
 from dynx.world.settings import Setting
 
@@ -19,13 +30,22 @@ SETTINGS: Mapping[str, Setting] = {
     "contact_approximation": Setting(
         "sap", "Drake's approximation of discrete contact", choices=("sap", "lagged", "similar")
     ),
-    "stiffness": Setting(1e6, "stiffness of every shape in contact [N/m]", 1e-3),
+    "contact_model": Setting(
+        "hydroelastic",
+        "pressure over the surface of contact, or one point",
+        choices=("hydroelastic", "point"),
+    ),
+    "modulus": Setting(1e7, "hydroelastic modulus of shapes that move [Pa]", 1e-3),
+    "resolution": Setting(
+        0.1, "length of the edges by which cylinders are approximated, relative to the radius", 0.02, 2.0
+    ),
+    "stiffness": Setting(1e6, "stiffness of every shape in contact at a point [N/m]", 1e-3),
     "relaxation_time": Setting(0.01, "dissipation of contacts under 'sap': time of relaxation [s]", 0.0),
     "dissipation": Setting(10.0, "dissipation of Hunt and Crossley under 'lagged' and 'similar' [s/m]", 0.0),
     "stiction_tolerance": Setting(1e-4, "sliding speed below which shapes count as sticking [m/s]", 1e-9),
-    "simplify_materials": Setting(
+    "strict_materials": Setting(
         False,
-        "whether restitution, torsional and rolling friction, which Drake lacks, are left out, not refused",
+        "whether restitution, torsional and rolling friction, which Drake lacks, are refused, not left out",
     ),
 }
 """Settings by name; the defaults are dynx's canonical ones."""
@@ -37,17 +57,14 @@ APPROXIMATIONS: Mapping[str, Any] = {
 }
 
 
-def proximity_properties(name: str, material: Material, settings: Mapping[str, Any]) -> Any:
-    """Return Drake's properties of the shapes of a collider.
+MODELS: Mapping[str, Any] = {
+    "hydroelastic": ContactModel.kHydroelasticWithFallback,
+    "point": ContactModel.kPoint,
+}
 
-    Raises UnsupportedFeatureError for coefficients that Drake does not have.
-    """
-    for each in ("restitution", "torsional_friction", "rolling_friction"):
-        if getattr(material, each) and not settings["simplify_materials"]:
-            raise UnsupportedFeatureError(
-                f"the material of {shown(name)} has {each}, which 'drake' does not have; "
-                "simplify_materials=True leaves it out"
-            )
+
+def proximity_properties(shape: Shape, material: Material, settings: Mapping[str, Any], fixed: bool) -> Any:
+    """Return Drake's properties of a shape, which is rigid if `fixed` in the world."""
     properties = geometry.ProximityProperties()
     geometry.AddContactMaterial(
         properties=properties,
@@ -56,4 +73,20 @@ def proximity_properties(name: str, material: Material, settings: Mapping[str, A
         friction=CoulombFriction(material.friction, material.friction),
     )
     properties.AddProperty("material", "relaxation_time", settings["relaxation_time"])
+    if settings["contact_model"] == "hydroelastic" and not isinstance(shape, Sphere | Capsule):
+        edge = settings["resolution"] * (shape.radius if isinstance(shape, Cylinder) else 1.0)
+        if fixed:
+            geometry.AddRigidHydroelasticProperties(edge, properties)
+        else:
+            geometry.AddCompliantHydroelasticProperties(edge, settings["modulus"], properties)
     return properties
+
+
+def refuse_material(name: str, material: Material) -> None:
+    """Raise UnsupportedFeatureError for coefficients that Drake does not have."""
+    for each in ("restitution", "torsional_friction", "rolling_friction"):
+        if getattr(material, each):
+            raise UnsupportedFeatureError(
+                f"the material of {shown(name)} has {each}, which 'drake' does not have; "
+                "strict_materials=False leaves it out"
+            )

@@ -1,0 +1,69 @@
+"""Contacts of Drake in the convention of dynx: the normal goes from b to a, the force is that on a."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from dynx.spatial.scalar import Floats
+from dynx.world.engine import TouchingPoint
+
+
+def read_contacts(results: Any, query: Any, collider_of: Mapping[int, int]) -> list[TouchingPoint]:
+    """Return the contacts of a step: one for each point, and one at the centroid of each surface.
+
+    A surface has the depth of the pair of shapes as its distance. `query` is that at the beginning of the
+    step.
+    """
+    infos = [results.point_pair_contact_info(k) for k in range(results.num_point_pair_contacts())]
+    # Drake's force is that on the second body.
+    found = [
+        touching_point(info.point_pair(), -np.array(info.contact_force()), collider_of) for info in infos
+    ]
+    count = results.num_hydroelastic_contacts()
+    if count:
+        pairs = query.ComputePointPairPenetration()
+        depths = {(pair.id_A.get_value(), pair.id_B.get_value()): float(pair.depth) for pair in pairs}
+        found += [
+            _on_surface(results.hydroelastic_contact_info(k), depths, collider_of) for k in range(count)
+        ]
+    return found
+
+
+def touching_point(pair: Any, force: Floats, collider_of: Mapping[int, int]) -> TouchingPoint:
+    """Return the contact of a pair of penetrating points, with the force on the first body."""
+    normal = np.array(pair.nhat_BA_W)
+    return TouchingPoint(
+        collider_of[pair.id_A.get_value()],
+        collider_of[pair.id_B.get_value()],
+        np.array(pair.p_WCa),
+        np.array(pair.p_WCb),
+        normal,
+        -float(pair.depth),
+        *_parts(force, normal),
+    )
+
+
+def _on_surface(
+    info: Any, depths: Mapping[tuple[int, int], float], collider_of: Mapping[int, int]
+) -> TouchingPoint:
+    surface = info.contact_surface()
+    a, b = surface.id_M().get_value(), surface.id_N().get_value()
+    faces = range(surface.num_faces())
+    # The normals of the surface go from the second shape into the first.
+    normal = np.sum([surface.area(k) * surface.face_normal(k) for k in faces], axis=0)
+    normal = normal / np.linalg.norm(normal)
+    depth = depths.get((a, b), depths.get((b, a), 0.0))
+    center, half = np.array(surface.centroid()), 0.5 * depth * normal
+    force = np.array(info.F_Ac_W().translational())
+    return TouchingPoint(
+        collider_of[a], collider_of[b], center - half, center + half, normal, -depth, *_parts(force, normal)
+    )
+
+
+def _parts(force: Floats, normal: Floats) -> tuple[float, Floats]:
+    """Return the force along the normal, at least 0, and the rest."""
+    along = float(force @ normal)
+    return max(0.0, along), force - along * normal
