@@ -16,7 +16,7 @@ from dynx.world import (
     World,
     ground,
 )
-from tests.world.engines import WORLDS
+from tests.world.engines import FAST_WORLDS, WORLDS
 from tests.world.scenes import standing
 
 
@@ -55,7 +55,7 @@ def test_a_motor_gives_at_most_its_force(engine: str) -> None:
         assert world.state.robots["arm"].v == pytest.approx(strained, abs=1e-12)
 
 
-@pytest.mark.parametrize("engine", WORLDS)
+@pytest.mark.parametrize("engine", FAST_WORLDS)
 @pytest.mark.parametrize("name", ["solo12", "a1"])
 def test_a_quadruped_stands_on_its_feet(engine: str, name: str) -> None:
     scene, motor = standing(name)
@@ -75,7 +75,7 @@ def test_a_quadruped_stands_on_its_feet(engine: str, name: str) -> None:
     assert state.q[2] == pytest.approx({"solo12": 0.2309, "a1": 0.2914}[name], abs=2e-3)
 
 
-@pytest.mark.parametrize("engine", WORLDS)
+@pytest.mark.parametrize("engine", FAST_WORLDS)
 def test_r2d2_drives_on_its_wheels(engine: str) -> None:
     data = pytest.importorskip("pybullet_data")
     model = dynx.load(f"{data.getDataPath()}/r2d2.urdf", base="floating")

