@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
 from dynx import Pose
-from dynx.model.geometry import Capsule, Collision, Cylinder, Shape, Sphere
+from dynx.model.geometry import Capsule, Collision, Cylinder, Mesh, Shape, Sphere
 from dynx.spatial.scalar import Floats
 from dynx.world import Contact, Material, Scene, SceneBody, World, Wrench, box, ground
 from tests.world.engines import WORLDS
@@ -92,6 +94,24 @@ def test_a_round_body_rests_at_its_height(engine: str, shape: Shape) -> None:
         world.run(0.5)
         assert world.state.bodies["round"].T_world_body[2, 3] == pytest.approx(height, abs=1e-3)
         assert force_on("round", world.contacts())[2] == pytest.approx(MASS * G, rel=0.01)
+
+
+def test_a_mesh_rests_at_its_height(engine: str, tmp_path: Path) -> None:
+    pytest.importorskip("trimesh")
+    corners = [(x, y, z) for x in (-0.1, 0.1) for y in (-0.1, 0.1) for z in (-0.1, 0.1)]
+    lines = [f"v {x} {y} {z}" for x, y, z in corners]
+    lines += ["f 1 2 4 3", "f 5 7 8 6", "f 1 5 6 2", "f 3 4 8 7", "f 1 3 7 5", "f 2 6 8 4"]
+    file = tmp_path / "cube.obj"
+    file.write_text("\n".join([*lines, ""]))
+    body = SceneBody("cube", (Collision(Mesh(str(file))),), Pose((0, 0, 0.1)), MASS)
+    with World(Scene("s", bodies=(ground(), body)), engine) as world:
+        world.run(0.5)
+        height = world.state.bodies["cube"].T_world_body[2, 3]
+        force = force_on("cube", world.contacts())[2]
+    # Drake's point contact gives a mesh one point at a time, on which it rocks.
+    assert engine == "drake" or force == pytest.approx(MASS * G, rel=0.01)
+    # A margin around the hull would lift it by a millimetre.
+    assert height == pytest.approx(0.1, abs=6e-4)
 
 
 def test_contacts_before_the_first_step_are_those_of_the_start(engine: str) -> None:

@@ -46,13 +46,21 @@ class ShapeFiles:
 
     def _hull_file(self, mesh: Mesh) -> str:
         if mesh not in self._files:
-            path = self._folder / f"hull{len(self._files)}.obj"
+            # Of an OBJ file Bullet makes a compound of hulls, whose margin cannot be set.
+            path = self._folder / f"hull{len(self._files)}.stl"
             vertices, faces = mesh.hull
-            lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in vertices.tolist()]
-            lines += [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in faces.tolist()]
-            path.write_text("\n".join([*lines, ""]), encoding="ascii")
+            path.write_bytes(binary_stl(vertices[faces]))
             self._files[mesh] = path
         return str(self._files[mesh])
+
+
+def binary_stl(triangles: Floats) -> bytes:
+    """Return triangles (n, 3, 3) as a binary STL file."""
+    records = np.zeros(
+        len(triangles), dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("spare", "<u2")]
+    )
+    records["corners"] = triangles
+    return b"\0" * 80 + len(triangles).to_bytes(4, "little") + records.tobytes()
 
 
 def is_ground(placed: PlacedShape) -> bool:

@@ -1,0 +1,57 @@
+"""Settings of engines: checked by name and value, and documented with their defaults."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from dynx.errors import ArgumentError, UnknownNameError
+from dynx.world import Scene, World, box
+from dynx.world.registry import world_class
+from dynx.world.settings import Setting, checked_settings
+from tests.world.engines import WORLDS
+
+PAGE = (Path(__file__).parents[2] / "docs" / "world.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("engine", WORLDS)
+def test_every_setting_is_documented_with_its_default(engine: str) -> None:
+    pytest.importorskip({"drake": "pydrake"}.get(engine, engine))
+    for name, setting in world_class(engine).settings.items():
+        assert f"| `{engine}` | `{name}` | {setting.default} | {setting.meaning} |" in PAGE
+
+
+@pytest.mark.parametrize("engine", WORLDS)
+def test_every_default_is_valid(engine: str) -> None:
+    pytest.importorskip({"drake": "pydrake"}.get(engine, engine))
+    known = world_class(engine).settings
+    defaults = checked_settings(engine, known, {})
+    assert checked_settings(engine, known, defaults) == defaults
+
+
+@pytest.mark.parametrize(
+    ("setting", "value"),
+    [
+        (Setting(1.0, ""), float("nan")),
+        (Setting(1.0, ""), "1"),
+        (Setting(1.0, "", least=0.5), 0.1),
+        (Setting(1.0, "", most=2.0), 3.0),
+        (Setting(1, ""), 1.5),
+        (Setting(True, ""), 1),
+        (Setting("a", "", choices=("a", "b")), "c"),
+        (Setting((1.0, 2.0), ""), (1.0,)),
+        (Setting((1.0, 2.0), ""), (1.0, -1.0)),
+    ],
+)
+def test_an_invalid_value_is_refused(setting: Setting, value: object) -> None:
+    with pytest.raises(ArgumentError, match="setting x"):
+        setting.checked("x", value)
+
+
+def test_a_setting_reaches_the_engine() -> None:
+    scene = Scene("s", bodies=(box("a", (1.0, 1.0, 1.0), mass=1.0),))
+    with World(scene, "pybullet", solver_iterations=7) as world:
+        assert world.settings["solver_iterations"] == 7
+    with pytest.raises(UnknownNameError, match="solver_iterations"):
+        World(scene, "pybullet", solver_iteration=7)
