@@ -1,5 +1,6 @@
 """Scenes of robots and bodies, and worlds in which they move and touch, on every engine alike."""
 
+from dynx.world.camera import Camera, Picture
 from dynx.world.comparison import WorldComparison, compare_worlds
 from dynx.world.contacts import ClosestPoints, Contact, RayHits
 from dynx.world.loads import Wrench
@@ -28,12 +29,14 @@ from dynx.world.world import World
 
 __all__ = [
     "BodyState",
+    "Camera",
     "ClosestPoints",
     "Contact",
     "ContactTable",
     "Material",
     "Motor",
     "PDMotor",
+    "Picture",
     "PointToPoint",
     "PositionMotor",
     "RayHits",

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
+
+import numpy as np
 
 from dynx.spatial.scalar import Floats
 
@@ -33,3 +35,8 @@ class WorldState:
     time: float
     robots: Mapping[str, RobotState]
     bodies: Mapping[str, BodyState]
+
+
+def is_finite(parts: Sequence[Floats]) -> bool:
+    """Check whether all numbers of a state are finite."""
+    return all(np.isfinite(part).all() for part in parts)

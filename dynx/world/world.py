@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from dynx.errors import ArgumentError, ClosedError, DivergedError, EngineError
 from dynx.model.configuration import positive_seconds, whole_number
 from dynx.spatial.scalar import Floats
+from dynx.world.camera import Camera, Picture, draw_picture
 from dynx.world.commands import Act, Commands, MotorsOf, with_scene_motors
 from dynx.world.contacts import ClosestPoints, Contact, RayHits
 from dynx.world.engine import WorldEngine
@@ -27,7 +28,7 @@ from dynx.world.scene.reading import scene_from_document
 from dynx.world.scene.writing import scene_document
 from dynx.world.settings import checked_settings, checked_switches
 from dynx.world.snapshot import Snapshot, read_snapshot, write_snapshot
-from dynx.world.state import BodyState, RobotState, WorldState
+from dynx.world.state import BodyState, RobotState, WorldState, is_finite
 from dynx.world.state_checks import apply_state, checked_state
 
 STEPS_BETWEEN_CHECKS = 1000
@@ -95,8 +96,7 @@ class World:
         self._queries = Queries(scene, self._layout)
         self._identity: str | None = None
         self._engine = self._build()
-        self._steps, self._start = 0, 0.0
-        self._unchecked = 0
+        self._steps, self._start, self._unchecked = 0, 0.0, 0
         self._state: WorldState | None = None
         self._good: tuple[WorldState, int, float]
         self._note()
@@ -331,6 +331,10 @@ class World:
         """Return what rays from `origins` (n, 3) along `directions` (n, 3) hit first within `length` [m]."""
         return self._queries.cast_rays(self._require(), origins, directions, length)
 
+    def camera(self, camera: Camera) -> Picture:
+        """Return what a camera sees: colour, depth and segmentation by name."""
+        return draw_picture(self.scene, self.state, camera)
+
     # -- end ----------------------------------------------------------------------------------
 
     def close(self) -> None:
@@ -365,7 +369,7 @@ class World:
         bodies = {name: engine.body_state(k) for name, k in self._bodies.items()}
         total = sum(float(np.sum(part)) for state in (*robots.values(), *bodies.values()) for part in state)
         if not math.isfinite(total):
-            bad = [name for name, parts in {**robots, **bodies}.items() if not _finite(parts)]
+            bad = [name for name, parts in {**robots, **bodies}.items() if not is_finite(parts)]
             self._diverge(f"the state of {' and '.join(bad[:3])} is not finite")
         self._state = WorldState(self.time, robots, bodies)
         self._good = self._state, self._steps, self._start
@@ -392,7 +396,3 @@ class World:
         apply_state(self._engine, state)
         self._commands.forget()
         self._state, self._unchecked = state, 0
-
-
-def _finite(parts: Sequence[Floats]) -> bool:
-    return all(np.isfinite(part).all() for part in parts)

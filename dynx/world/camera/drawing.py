@@ -1,0 +1,138 @@
+"""Pictures of scenes: the shapes of every part at its pose, shaded by a lamp beside the camera."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from dynx.errors import ArgumentError, DynxError
+from dynx.model import Model
+from dynx.model.geometry import Mesh, Shape, Visual
+from dynx.rbd.kinematics import body_poses
+from dynx.spatial.scalar import Floats
+from dynx.spatial.se3 import homogeneous, inverse
+from dynx.world.camera.buffer import DepthBuffer
+from dynx.world.camera.picture import Picture
+from dynx.world.camera.view import Camera
+from dynx.world.scene import Scene
+from dynx.world.state import WorldState
+
+BACKGROUND = (0.85, 0.9, 0.95)
+"""Colour of pixels in which nothing is seen."""
+
+AMBIENT = 0.35
+"""Share of the light that does not depend on the direction of a surface."""
+
+LAMP = np.array([-0.36, -0.48, -0.8])
+"""Unit vector (3,) towards the lamp, above and to the left of the camera, in the axes of the camera."""
+
+_GREY = (0.7, 0.7, 0.7, 1.0)
+
+
+class DrawnShape(NamedTuple):
+    """A shape, its colour, its pose in the world (4, 4), and the number of its part."""
+
+    part: int
+    shape: Shape
+    rgba: tuple[float, float, float, float]
+    T: Floats
+
+
+def draw_picture(scene: Scene, state: WorldState, camera: Camera) -> Picture:
+    """Return what a camera sees of a scene in a state.
+
+    Links are drawn as their visual shapes, and as their collision shapes where they have none or where one
+    cannot be read; bodies as their shapes, meshes as their triangles. Textures are ignored, and colours are
+    opaque, except for those of opacity 0, which are not drawn. Raises UnknownNameError for an unknown part
+    that carries the camera.
+    """
+    if not isinstance(camera, Camera):
+        raise ArgumentError(f"camera is of type {type(camera).__name__}; wanted a Camera")
+    frames = dict(part_poses(scene, state))
+    T_world_camera = camera.pose.matrix
+    if camera.part is not None:
+        scene.material(camera.part)
+        T_world_camera = frames[camera.part] @ T_world_camera
+    T_camera_world = np.asarray(inverse(T_world_camera))
+    buffer, colours = DepthBuffer(camera), [BACKGROUND]
+    drawn = [each for each in drawn_shapes(scene, frames) if each.rgba[3] > 0.0]
+    for number, each in enumerate(drawn):
+        buffer.draw(number, each.shape, T_camera_world @ each.T)
+        colours.append(each.rgba[:3])
+    shape = (camera.size[1], camera.size[0])
+    parts = np.array([-1, *(each.part for each in drawn)], np.intp)
+    light = _light(buffer, camera)
+    rgb = np.array(colours)[buffer.number + 1] * light[:, None]
+    return Picture(
+        np.rint(255.0 * rgb).astype(np.uint8).reshape(*shape, 3),
+        buffer.depth.reshape(shape),
+        parts[buffer.number + 1].reshape(shape),
+        scene.parts,
+    )
+
+
+def part_poses(scene: Scene, state: WorldState) -> Iterator[tuple[str, Floats]]:
+    """Yield every body and every link, as ``robot/link``, with its pose in the world (4, 4)."""
+    for robot in scene.robots:
+        yield from _link_poses(robot.name, robot.model, state.robots[robot.name].q)
+    for name, body in state.bodies.items():
+        yield name, body.T_world_body
+
+
+def drawn_shapes(scene: Scene, frames: dict[str, Floats]) -> Iterator[DrawnShape]:
+    """Yield the shapes of all parts; `frames` are the poses of the parts."""
+    number = {name: k for k, name in enumerate(scene.parts)}
+    for robot in scene.robots:
+        for link in robot.model.links:
+            name = f"{robot.name}/{link.name}"
+            for shape, rgba, T in _link_shapes(robot.model, link.name):
+                yield DrawnShape(number[name], shape, rgba, frames[name] @ T)
+    for body in scene.bodies:
+        for placed in body.shapes:
+            T = frames[body.name] @ placed.origin.matrix
+            yield DrawnShape(number[body.name], placed.shape, body.material.rgba, T)
+
+
+def _link_poses(robot: str, model: Model, q: Floats) -> Iterator[tuple[str, Floats]]:
+    mechanism = model.mechanism
+    poses = body_poses(mechanism, q if mechanism.coupling is None else mechanism.coupling.expand_q(q))
+    links = {link.name for link in model.links}
+    for frame in mechanism.frames:
+        if frame.name in links:
+            T = homogeneous(*poses[frame.body]) @ homogeneous(frame.R, frame.p)
+            yield f"{robot}/{frame.name}", np.asarray(T, dtype=np.float64)
+
+
+def _link_shapes(
+    model: Model, link: str
+) -> Iterator[tuple[Shape, tuple[float, float, float, float], Floats]]:
+    visuals = _readable_visuals(model, link)
+    for each in visuals or model.geometry.collisions(link):
+        material = each.material if isinstance(each, Visual) else None
+        rgba = _GREY if material is None or material.rgba is None else material.rgba
+        yield each.shape, rgba, each.origin.matrix
+
+
+def _readable_visuals(model: Model, link: str) -> tuple[Visual, ...]:
+    """Return the visual shapes of a link; none where one has a fault or a mesh that cannot be read."""
+    try:
+        visuals = model.geometry.visuals(link)
+        for each in visuals:
+            if isinstance(each.shape, Mesh):
+                _ = each.shape.triangles
+    except DynxError:
+        return ()
+    return visuals
+
+
+def _light(buffer: DepthBuffer, camera: Camera) -> Floats:
+    """Return the brightness of each pixel: largest where the visible side of the surface faces the lamp."""
+    columns, rows = camera.rays()
+    x, y = np.meshgrid(columns, rows)
+    normal = buffer.normal
+    along = normal[:, 0] * x.ravel() + normal[:, 1] * y.ravel() + normal[:, 2]
+    length = np.linalg.norm(normal, axis=1)
+    facing = np.where(along > 0.0, -1.0, 1.0) * (normal @ LAMP) / np.where(length > 0.0, length, 1.0)
+    return np.where(buffer.number >= 0, AMBIENT + (1.0 - AMBIENT) * np.maximum(facing, 0.0), 1.0)

@@ -1,0 +1,93 @@
+"""`Camera`: where a camera is, where it looks, and how large its picture is."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dynx.errors import ArgumentError, shown
+from dynx.model import Pose
+from dynx.model.configuration import checked_pose, checked_vector, is_real, whole_number
+from dynx.model.elements import IDENTITY
+from dynx.model.geometry.sizes import positive_number
+from dynx.spatial.scalar import Floats
+from dynx.spatial.se3 import homogeneous
+
+MAX_SIDE = 8192
+"""Largest width and height of a picture [pixels]."""
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A pinhole camera at `pose` in the frame of `part`, a body or ``robot/link`` that carries it, or in the
+    world.
+
+    Its axes are x to the right of the picture, y down and z along the optical axis. `field_of_view` is the
+    angle [rad] between the upper and the lower edge of the picture, `size` its width and height in pixels,
+    which are square. What is nearer than `near` or farther than `far` [m] along the optical axis is not seen.
+    """
+
+    pose: Pose = IDENTITY
+    field_of_view: float = math.pi / 3.0
+    size: tuple[int, int] = (320, 240)
+    part: str | None = None
+    near: float = 0.01
+    far: float = 1000.0
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        put(self, "pose", checked_pose("pose of a camera", self.pose))
+        if not is_real(self.field_of_view) or not 0.0 < self.field_of_view < math.pi:
+            raise ArgumentError(f"field_of_view is {shown(self.field_of_view)}; wanted 0 to pi [rad]")
+        if not isinstance(self.size, tuple | list) or len(self.size) != 2:
+            raise ArgumentError(f"size is {shown(self.size)}; wanted width and height")
+        sides = tuple(whole_number(f"size[{k}]", side, 1) for k, side in enumerate(self.size))
+        if max(sides) > MAX_SIDE:
+            raise ArgumentError(f"size is {shown(self.size)}; at most {MAX_SIDE} pixels each way are drawn")
+        put(self, "size", sides)
+        put(self, "near", positive_number("near", self.near))
+        put(self, "far", positive_number("far", self.far))
+        if self.near >= self.far:
+            raise ArgumentError(f"near is {self.near}; wanted less than far, {self.far}")
+
+    @classmethod
+    def look_at(
+        cls, eye: ArrayLike, target: ArrayLike, up: ArrayLike = (0.0, 0.0, 1.0), **options: Any
+    ) -> Camera:
+        """Return the camera at `eye` (3,) that sees `target` (3,) in the middle, with `up` (3,) upwards.
+
+        `options` are the other fields. Raises ArgumentError for equal points, or for `up` along the view.
+        """
+        start, end, above = (
+            checked_vector("eye", eye),
+            checked_vector("target", target),
+            checked_vector("up", up),
+        )
+        forward = end - start
+        distance = float(np.linalg.norm(forward))
+        if distance == 0.0:
+            raise ArgumentError(f"eye and target are both {start.tolist()}; wanted different points")
+        forward = forward / distance
+        right = np.cross(forward, above)
+        length = float(np.linalg.norm(right))
+        if length <= 1e-9 * float(np.linalg.norm(above)):
+            raise ArgumentError(f"up is {above.tolist()}, along the view; wanted another direction")
+        right = right / length
+        R = np.stack([right, np.cross(forward, right), forward], axis=1)
+        return cls(Pose.from_matrix(homogeneous(R, start), "the view"), **options)
+
+    @property
+    def focal_length(self) -> float:
+        """Distance from the pinhole to the picture [pixels]."""
+        return 0.5 * self.size[1] / math.tan(0.5 * self.field_of_view)
+
+    def rays(self) -> tuple[Floats, Floats]:
+        """Return x of the rays through the centres of the columns, and y of those of the rows, at z = 1."""
+        width, height = self.size
+        columns = (np.arange(width) + 0.5 - 0.5 * width) / self.focal_length
+        rows = (np.arange(height) + 0.5 - 0.5 * height) / self.focal_length
+        return np.asarray(columns, np.float64), np.asarray(rows, np.float64)

@@ -1,0 +1,105 @@
+"""Cameras of worlds: on links, of robots, beside PyBullet's own renderer, and in PNG files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import dynx
+from dynx.errors import ArgumentError
+from dynx.model import Pose
+from dynx.world import Camera, Material, Scene, SceneRobot, World, box, ground, sphere
+
+pytest.importorskip("pybullet")
+
+
+def scene() -> Scene:
+    red = Material(rgba=(1.0, 0.0, 0.0, 1.0))
+    bodies = (
+        ground(),
+        box("cube", (0.3, 0.3, 0.3), mass=1.0, pose=Pose((0.6, 0.4, 0.15)), material=red),
+        sphere("ball", 0.2, mass=1.0, pose=Pose((0.6, -0.4, 0.2))),
+    )
+    return Scene("scene", (SceneRobot("arm", dynx.load("ur5"), (0.0, -1.2, 1.0, 0.0, 0.0, 0.0)),), bodies)
+
+
+def test_robots_and_bodies_are_seen_by_name() -> None:
+    with World(scene(), "pybullet") as world:
+        picture = world.camera(Camera.look_at((2.5, 0.0, 1.5), (0.3, 0.0, 0.3)))
+        again = world.camera(Camera.look_at((2.5, 0.0, 1.5), (0.3, 0.0, 0.3)))
+    assert picture.depth.shape == (240, 320)
+    for name in ("arm", "arm/forearm_link", "cube", "ball", "ground"):
+        assert picture.mask(name).any()
+    red, green, blue = picture.rgb[picture.mask("cube")].astype(int).T
+    assert (red > 80).all()
+    assert not green.any()
+    assert not blue.any()
+    assert np.array_equal(picture.rgb, again.rgb)
+    assert "cube" in repr(picture)
+
+
+def test_a_camera_moves_with_the_link_that_carries_it() -> None:
+    # 10 cm before the flange, looking along its y axis, which is that of the last joint.
+    at = Pose.from_matrix(np.array([[1.0, 0, 0, 0], [0, 0, 1, 0.2], [0, -1, 0, 0], [0, 0, 0, 1]]))
+    camera = Camera(at, part="arm/wrist_3_link", size=(80, 60))
+    with World(scene(), "pybullet") as world:
+        first = world.camera(camera)
+        engine = dynx.backend("reference", world.scene.robots[0].model)
+        T = engine.forward_kinematics(world.state.robots["arm"].q)[engine.model.frame_index("wrist_3_link")]
+        fixed = world.camera(Camera(Pose.from_matrix(T @ at.matrix), size=(80, 60)))
+        world.set_state(robots={"arm": ([1.0, -1.2, 1.0, 0.0, 0.0, 0.0], np.zeros(6))})
+        moved = world.camera(camera)
+    assert np.allclose(first.depth, fixed.depth, rtol=1e-6)
+    assert not np.array_equal(first.depth, moved.depth)
+
+
+def test_pybullet_renders_the_same_depth_and_parts() -> None:
+    import pybullet
+
+    camera = Camera.look_at((2.0, 0.3, 1.2), (0.5, 0.0, 0.2), size=(160, 120), near=0.5, far=5.0)
+    bodies = scene().bodies[1:]
+    table = box("table", (2.0, 2.0, 0.1), pose=Pose((0.5, 0.0, -0.05)))
+    with World(Scene("s", bodies=(table, *bodies)), "pybullet") as world:
+        picture = world.camera(camera)
+        client = world._engine._client.number  # type: ignore[union-attr]
+        view = pybullet.computeViewMatrix((2.0, 0.3, 1.2), (0.5, 0.0, 0.2), (0.0, 0.0, 1.0))
+        projection = list(pybullet.computeProjectionMatrixFOV(60.0, 4.0 / 3.0, 0.5, 5.0))
+        # PyBullet's software renderer samples the lower left corners of pixels, dynx their centres.
+        projection[8], projection[9] = 1.0 / 160.0, 1.0 / 120.0
+        renderer = pybullet.ER_TINY_RENDERER
+        _, _, _, levels, numbers = pybullet.getCameraImage(
+            160, 120, view, projection, renderer=renderer, physicsClientId=client
+        )
+    levels = np.reshape(levels, (120, 160))
+    depth = 5.0 * 0.5 / (5.0 - (5.0 - 0.5) * levels)
+    numbers = np.reshape(numbers, (120, 160))
+    seen = picture.segmentation
+    inner = np.ones_like(seen, bool)
+    inner[0] = inner[-1] = inner[:, 0] = inner[:, -1] = False
+    for rows, columns in ((0, 1), (0, -1), (1, 0), (-1, 0)):
+        inner &= np.roll(seen, (rows, columns), (0, 1)) == seen
+    assert inner.mean() > 0.8
+    # Bodies have the numbers of the scene's order, and nothing is -1, in both.
+    assert np.array_equal(numbers[inner & ~picture.mask("ball")], seen[inner & ~picture.mask("ball")])
+    flat = inner & ~picture.mask("ball") & (seen >= 0)
+    assert np.abs(picture.depth[flat] - depth[flat]).max() < 1e-4
+
+
+def test_pictures_in_png_files_hold_colour_depth_and_parts(tmp_path: Path) -> None:
+    with World(scene(), "pybullet") as world:
+        picture = world.camera(Camera.look_at((2.5, 0.0, 1.5), (0.3, 0.0, 0.3), size=(64, 48), far=60.0))
+    for what in ("rgb", "depth", "segmentation"):
+        picture.write_png(tmp_path / f"{what}.png", what)
+    read = {what: np.array(Image.open(tmp_path / f"{what}.png")) for what in ("rgb", "depth", "segmentation")}
+    assert np.array_equal(read["rgb"], picture.rgb)
+    assert np.array_equal(read["segmentation"], picture.segmentation + 1)
+    seen = np.isfinite(picture.depth)
+    assert np.abs(read["depth"] / 1000.0 - picture.depth)[seen].max() <= 5.001e-4
+    assert (read["depth"][~seen] == 65535).all()
+    with pytest.raises(ArgumentError, match="wanted 'rgb'"):
+        picture.write_png(tmp_path / "a.png", "colour")
+    with pytest.raises(ArgumentError, match="written as"):
+        picture.write_png(tmp_path / "a.jpg")
