@@ -110,7 +110,8 @@ class Arguments:
 
     def finite_acceleration(self, a: Floats) -> Floats:
         """Return the result of forward dynamics; raises SingularMassMatrixError where it is not finite."""
-        if a.ndim == 1 and isfinite(hypot(*a.tolist()) if self._listed else np.vdot(a, a)):
+        # A sum that overflows is decided below.
+        if a.ndim == 1 and isfinite(sum(a.tolist()) if self._listed else np.vdot(a, a)):
             return a
         if not np.isfinite(a).all():
             rows = np.argwhere(~np.isfinite(a).all(axis=-1))

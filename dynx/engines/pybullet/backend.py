@@ -148,15 +148,17 @@ class PyBulletBackend(Backend):
 
     def _inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
         with self._lock:
-            if self._has_ballast:
-                return self._extrapolate([robot.inverse_dynamics(q, v, a) for robot in self._all_robots()])
-            return self._robot().inverse_dynamics(q, v, a)
+            robots = self._robots or self._all_robots()
+            if len(robots) == 1:
+                return robots[0].inverse_dynamics(q, v, a)
+            return self._extrapolate([robot.inverse_dynamics(q, v, a) for robot in robots])
 
     def _mass_matrix(self, q: Floats) -> Floats:
         with self._lock:
-            if self._has_ballast:
-                return self._extrapolate([robot.mass_matrix(q) for robot in self._all_robots()])
-            return self._robot().mass_matrix(q)
+            robots = self._robots or self._all_robots()
+            if len(robots) == 1:
+                return robots[0].mass_matrix(q)
+            return self._extrapolate([robot.mass_matrix(q) for robot in robots])
 
     def _forward_dynamics(self, q: Floats, v: Floats, tau: Floats) -> Floats:
         if self._has_ballast:
