@@ -171,8 +171,9 @@ def _definite_solution(M: Floats, torque: Floats) -> Floats | None:
     ((n - 1) / n)^(n - 1) > 1/e times their product, the determinant. The pivots of a Cholesky factorisation,
     which needs no scaling to a unit diagonal, give that; the bound leaves room for rounding.
     """
-    if not len(M):
-        return None
+    if len(M) < 2:
+        # A quotient is exact where a square root is not.
+        return np.asarray(torque / M[0]) if len(M) and 0.0 < M[0, 0] < np.inf else None
     factor, a, failed = _cholesky_solver()(M, torque)
     if failed:
         return None
