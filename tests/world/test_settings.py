@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from dynx.errors import ArgumentError, UnknownNameError
-from dynx.world import Scene, World, box
+from dynx.world import Scene, World, box, ground
 from dynx.world.registry import world_class
 from dynx.world.settings import Setting, checked_settings
 from tests.world.engines import WORLDS
@@ -55,3 +56,25 @@ def test_a_setting_reaches_the_engine() -> None:
         assert world.settings["solver_iterations"] == 7
     with pytest.raises(UnknownNameError, match="solver_iterations"):
         World(scene, "pybullet", solver_iteration=7)
+
+
+def other_value(setting: Setting) -> Any:
+    if setting.choices:
+        return setting.choices[-1]
+    if isinstance(setting.default, bool):
+        return not setting.default
+    if isinstance(setting.default, tuple):
+        return setting.default
+    grown = 2 * setting.default or 1
+    return min(grown, type(grown)(setting.most)) if setting.most < 1e9 else grown
+
+
+@pytest.mark.parametrize("engine", WORLDS)
+def test_a_world_steps_with_every_setting_changed(engine: str) -> None:
+    pytest.importorskip({"drake": "pydrake"}.get(engine, engine))
+    scene = Scene("s", bodies=(ground(), box("b", (0.1, 0.1, 0.1), mass=1.0)))
+    for name, setting in world_class(engine).settings.items():
+        value = other_value(setting)
+        with World(scene, engine, **{name: value}) as world:
+            assert world.settings[name] == value
+            world.step(5)
