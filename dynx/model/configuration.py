@@ -51,10 +51,11 @@ UNIT_NORM_TOLERANCE = 4 * float(np.finfo(np.float64).eps)
 """Largest deviation from 1 of the norm of a quaternion that counts as rounding."""
 
 
-def whole_number(name: str, value: object, least: int) -> int:
-    """Return a whole number that is at least `least`; raise ArgumentError for anything else."""
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
-        raise ArgumentError(f"{name} is {shown(value)}; wanted a whole number, at least {least}")
+def whole_number(name: str, value: object, least: int, most: float = np.inf) -> int:
+    """Return a whole number from `least` to `most`; raise ArgumentError for anything else."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not least <= value <= most:
+        end = "" if most == np.inf else f" and at most {most}"
+        raise ArgumentError(f"{name} is {shown(value)}; wanted a whole number, at least {least}{end}")
     return int(value)
 
 

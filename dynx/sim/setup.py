@@ -13,7 +13,7 @@ from dynx.control.saturation import checked_limit
 from dynx.errors import ArgumentError
 from dynx.model import Model
 from dynx.model.configuration import checked_array, checked_q, whole_number
-from dynx.sim.clock import Clock
+from dynx.sim.clock import MAX_STEPS, Clock
 from dynx.sim.loop.controller_checks import check_controller
 from dynx.sim.loop.references import SetpointOf, checked_reference
 from dynx.sim.plants.disturbances import Disturbances
@@ -76,17 +76,23 @@ def step_bytes(model: Model, controller: Controller[Any] | None = None) -> int:
 def known_controller(scenario: Scenario) -> Controller[Any] | None:
     """Return the controller of a scenario.
 
-    Raises ArgumentError if controller or reference were read from a file and cannot be rebuilt.
+    Raises ArgumentError for a part of the scenario that was read from a file and cannot be rebuilt.
     """
-    for part in (scenario.controller, scenario.reference):
+    refuse_unknown(scenario.reference, scenario.noise, *scenario.payloads, *scenario.all_pushes)
+    controller = scenario.controller
+    refuse_unknown(controller)
+    assert not isinstance(controller, Unknown)
+    return controller
+
+
+def refuse_unknown(*parts: object) -> None:
+    """Raise ArgumentError for a part of a scenario that was read from a file and cannot be rebuilt."""
+    for part in parts:
         if isinstance(part, Unknown):
             raise ArgumentError(
                 f"{part.name} was read from a file, and cannot be rebuilt: {part.why}. Otherwise replace "
                 "it with dataclasses.replace"
             )
-    controller = scenario.controller
-    assert not isinstance(controller, Unknown)
-    return controller
 
 
 def clock_of(scenario: Scenario) -> Clock:
@@ -116,7 +122,7 @@ def disturbances_of(scenario: Scenario, moved: Model) -> Disturbances:
         scenario.friction_slip,
         scenario.armature,
         scenario.all_pushes,
-        scenario.dt / whole_number("substeps", scenario.substeps, 1),
+        scenario.dt / whole_number("substeps", scenario.substeps, 1, MAX_STEPS),
     )
 
 

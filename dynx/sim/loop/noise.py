@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.control.gains import checked_gain
-from dynx.errors import ArgumentError, shown
 from dynx.model import Model
 from dynx.model.configuration import whole_number
 from dynx.spatial.scalar import Floats
@@ -56,8 +55,7 @@ class Noise:
         Raises GainError for an invalid standard deviation, ArgumentError for an invalid seed or rollout.
         """
         whole_number("seed", self.seed, 0)
-        if whole_number("rollout", self.rollout, 0) > MAX_ROLLOUT:
-            raise ArgumentError(f"rollout is {shown(self.rollout)}; wanted at most {MAX_ROLLOUT}")
+        whole_number("rollout", self.rollout, 0, MAX_ROLLOUT)
         return checked_gain("noise.q", self.q, nv), checked_gain("noise.v", self.v, nv)
 
     def on_measurements(self, nv: int) -> bool:

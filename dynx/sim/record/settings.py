@@ -9,11 +9,12 @@ from dynx.sim.loop.controller_checks import controller_numbers
 from dynx.sim.plants.model_error import plant_model
 from dynx.sim.scenario.documents import Unknown
 from dynx.sim.scenario.scenario import Scenario
-from dynx.sim.setup import clock_of, disturbances_of, effort_limits_of
+from dynx.sim.setup import clock_of, disturbances_of, effort_limits_of, refuse_unknown
 
 
 def settings_of(scenario: Scenario) -> dict[str, Any]:
     """Return plant, controller, times, limits, friction, noise and pushes of a scenario, fit for JSON."""
+    refuse_unknown(*scenario.payloads, *scenario.all_pushes)
     controller, clock, limit = scenario.controller, clock_of(scenario), effort_limits_of(scenario)
     moved = plant_model(scenario.model, scenario.payloads, scenario.mass_scale)
     disturbances = disturbances_of(scenario, moved)

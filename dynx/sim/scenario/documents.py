@@ -79,6 +79,10 @@ class Unknown:
     text: str
     """Its document as JSON."""
 
+    def __post_init__(self) -> None:
+        # Numbers of a wrong type raise their errors here, where the document is read.
+        _ = self.numbers, self.duration
+
     @property
     def numbers(self) -> dict[str, Any]:
         """Public numbers of a controller, such as gains."""
@@ -232,6 +236,8 @@ def _require_forms(document: Document) -> None:
             _require_forms(each)
     if not isinstance(document, dict):
         return
+    if not isinstance(document.get(NUMBERS, {}), dict) and FINGERPRINT in document:
+        raise TypeError(f"{NUMBERS} is {shown(document[NUMBERS])}; wanted a dict")
     for kind, forms in _FORMS.items():
         for name, form in forms.items() if kind in document else ():
             if not isinstance(document.get(name), form):

@@ -113,6 +113,8 @@ class Scenario:
         for name in ("position_limits", "check_reference"):
             if not isinstance(getattr(self, name), bool | np.bool_):
                 raise ArgumentError(f"{name} is {shown(getattr(self, name))}; wanted True or False")
+        if not isinstance(self.integrator, str | None):
+            raise ArgumentError(f"integrator is {shown(self.integrator)}; wanted the name of one, or None")
         if self.effort_limits is None:
             raise ArgumentError("effort_limits is None; wanted True (those of the model), False or numbers")
         if isinstance(self.plant, ScenePlant):
@@ -225,9 +227,12 @@ class Scenario:
         parts = {name: decode(value, model) for name, value in given.items()}
         try:
             scenario = cls(model, **parts)
-            # Objects with parts of wrong types may be made, and fail when they are compared or shown.
+            # Objects with parts of wrong types may be made, and fail when they are compared, shown or used.
             scenario.to_dict()
             repr(scenario)
+            if isinstance(scenario.reference, Trajectory):
+                for count in (2, 3):
+                    scenario.reference(np.linspace(0.0, float(scenario.reference.duration), count))
         except ArgumentError:
             raise
         except Exception as error:

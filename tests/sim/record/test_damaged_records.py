@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -82,6 +83,48 @@ ODD = st.sampled_from(
 )
 
 
+USES: list[Callable[[Rollout], Any]] = [
+    lambda rollout: simulate(SCENARIO, resume=rollout, step=3),
+    lambda rollout: json.dumps(rollout.settings),
+    lambda rollout: rollout.scenario == SCENARIO,
+    lambda rollout: repr(rollout) + str(rollout.summary()) + rollout._repr_html_(),
+    lambda rollout: None if rollout.scenario is None else simulate(replace(rollout.scenario, duration=2e-3)),
+]
+
+
+CRAFTED = [
+    ("integrator", {"array": [1.0, 2.0]}),
+    ("integrator", {"fingerprint": "a:b", "sha256": "0"}),
+    ("substeps", 10**400),
+    ("noise", {"fingerprint": "a:b", "sha256": "0"}),
+    ("controller", {"fingerprint": "a:b", "sha256": "0", "numbers": 3}),
+    ("reference", {"fingerprint": "a:b", "sha256": "0", "duration": [1]}),
+    ("reference.fields.duration", None),
+    ("reference.fields.start.fields.q", [[1], [1, 2]]),
+    ("reference.fields.curve", {"array": ["nan", "inf"]}),
+    ("controller.controller.backend", {"fingerprint": "a:b", "sha256": "0", "numbers": 3}),
+    ("payload", [{"fingerprint": "a:b", "sha256": "0"}]),
+    ("pushes", [{"class": "x:y", "fields": {}}]),
+]
+
+
+@pytest.mark.parametrize(("place", "odd"), CRAFTED, ids=range(len(CRAFTED)))
+def test_crafted_provenance_gives_errors_of_dynx(place: str, odd: Any) -> None:
+    document = SCENARIO.to_dict()
+    *path, last = place.split(".")
+    holder = document
+    for key in path:
+        holder = holder[key]
+    holder[last] = odd
+    try:
+        found = replace(simulate(SCENARIO), scenario=Scenario.from_dict(document))
+    except ArgumentError:
+        return
+    for use in USES:
+        with suppress(DynxError):
+            use(found)
+
+
 def places(document: Any) -> Iterator[tuple[Any, Any]]:
     """Yield every part of a document as the list or dict that holds it, and its key there."""
     for key in document if isinstance(document, dict) else range(len(document)):
@@ -106,8 +149,9 @@ def test_documents_with_odd_parts(
     write_arrays(path, {**content.arrays, **content.texts, TEXTS[kind]: text})
     found = outcome(kind, path)
     if isinstance(found, Rollout):
-        with suppress(DynxError):
-            simulate(SCENARIO, resume=found, step=3)
+        for use in USES:
+            with suppress(DynxError):
+                use(found)
 
 
 def test_a_record_names_no_other_file(files: dict[str, Path], tmp_path: Path) -> None:
