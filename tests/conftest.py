@@ -25,6 +25,8 @@ from dynx.model.library import EXAMPLE_ROBOT_DATA, robots
 
 EXAMPLES_INSTALLED = any(entry.source == EXAMPLE_ROBOT_DATA for entry in robots())
 
+needs_examples = pytest.mark.skipif(not EXAMPLES_INSTALLED, reason="needs example-robot-data")
+
 settings.register_profile(
     "ci",
     max_examples=100,

@@ -17,6 +17,7 @@ from click.testing import CliRunner, Result
 from dynx.agreement import refused_report, results_document
 from dynx.cli.shell.main import cli
 from dynx.errors import RobotNotFoundError
+from tests.conftest import needs_examples
 
 QUICK = ["--backends", "reference", "--samples", "1", "--jobs", "1"]
 
@@ -158,6 +159,7 @@ def test_arguments_that_cannot_be_used(arguments: list[str], clue: str) -> None:
     assert len(result.stderr) < 1000
 
 
+@needs_examples
 def test_all_is_the_whole_of_example_robot_data() -> None:
     from dynx.model.expansion import expand
 
@@ -168,7 +170,7 @@ def test_all_is_the_whole_of_example_robot_data() -> None:
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_an_interrupted_run_writes_what_is_done(number: int, code: int, tmp_path: Path) -> None:
     target = tmp_path / "out.json"
-    command = [sys.executable, "-m", "dynx", "agree", *["ur5"] * 5000, *QUICK, "--json", str(target)]
+    command = [sys.executable, "-m", "dynx", "agree", *["six_axis_arm"] * 5000, *QUICK, "--json", str(target)]
     for patience in (4.0, 16.0, 64.0):
         process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         time.sleep(patience)

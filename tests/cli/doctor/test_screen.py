@@ -15,6 +15,7 @@ from dynx.doctor.report import DoctorReport
 from dynx.doctor.task import DoctorTask
 from dynx.loaded import ENGINES, installed_engines
 from dynx.rules.traps import find_trap
+from tests.conftest import needs_examples
 from tests.doctor.formats.reports import differing
 
 pytestmark = pytest.mark.skipif(
@@ -39,6 +40,7 @@ def shown(report: DoctorReport, width: int = COLUMNS) -> str:
     return out.getvalue()
 
 
+@needs_examples
 def test_the_report_of_ur5_fits_a_screen() -> None:
     report = diagnose("ur5")
     assert len(report.engines) >= len(set(ENGINES) & set(installed_engines()))

@@ -98,7 +98,7 @@ def closed_pipe(*arguments: str) -> tuple[int, bytes]:
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGPIPE")
 @pytest.mark.parametrize(
     "arguments",
-    [["--help"], ["--version"], ["fk", "--help"], ["robots"], ["robots", "--json"], ["id", "ur5"]],
+    [["--help"], ["--version"], ["fk", "--help"], ["robots"], ["robots", "--json"], ["id", "six_axis_arm"]],
 )
 def test_a_closed_pipe_is_not_a_negative_result(arguments: list[str]) -> None:
     assert closed_pipe(*arguments) == (141, b"")
@@ -108,7 +108,9 @@ FULL = Path("/dev/full")
 
 
 @pytest.mark.skipif(not FULL.exists(), reason="no device that is always full")
-@pytest.mark.parametrize("arguments", [["--help"], ["info", "ur5"], ["info", "ur5", "--json"]])
+@pytest.mark.parametrize(
+    "arguments", [["--help"], ["info", "six_axis_arm"], ["info", "six_axis_arm", "--json"]]
+)
 def test_output_that_cannot_be_written_is_no_defect(arguments: list[str]) -> None:
     with FULL.open("w") as full:
         done = subprocess.run(
@@ -124,7 +126,7 @@ def test_output_that_cannot_be_written_is_no_defect(arguments: list[str]) -> Non
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="a POSIX shell")
-@pytest.mark.parametrize("arguments", ["info ur5", "info ur5 --json"])
+@pytest.mark.parametrize("arguments", ["info six_axis_arm", "info six_axis_arm --json"])
 def test_no_standard_output_at_all(arguments: str) -> None:
     script = f'"{sys.executable}" -m dynx {arguments} >&-'
     done = subprocess.run(["sh", "-c", script], stderr=subprocess.PIPE, text=True, check=False)

@@ -141,7 +141,7 @@ def test_a_plot_without_matplotlib_names_the_extra(tmp_path: Path, monkeypatch: 
 def test_an_interrupted_run_keeps_what_is_done(number: int, code: int, tmp_path: Path) -> None:
     target = tmp_path / "out.npz"
     # A slow plant, so that the run is not complete when the signal arrives.
-    start = [sys.executable, "-m", "dynx", "sim", "ur5", "--to", "elbow_joint=1", "--plant", "reference"]
+    start = [sys.executable, "-m", "dynx", "sim", "six_axis_arm", "--to", "joint3=1", "--plant", "reference"]
     start += ["--duration", "200", "--save", str(target)]
     for patience in (4.0, 16.0, 64.0):
         process = subprocess.Popen(start, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
