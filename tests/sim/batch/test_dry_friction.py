@@ -49,6 +49,48 @@ def test_blocks_stick_break_loose_and_stop(dt: float) -> None:
     assert np.all(np.abs(np.abs(many.q[:, 0]) - distance) <= np.abs(v0[:, 0]) * dt + 1e-12)
 
 
+@pytest.mark.parametrize("dt", STEPS)
+def test_loaded_blocks_stick_creep_slide_and_stop(dt: float) -> None:
+    """Blocks on a rail along gravity, in a batch and alone, at speeds known in each step."""
+    load_, steps = 0.5 * MASS, 100
+    robot = slider().with_gravity((load_ / MASS, 0.0, 0.0))
+    friction = load_ * np.array([0.0, 0.3, 1.0 - 1e-6, 1.0, 1.0 + 1e-6, 1.5, 0.9, 1.5, 0.2])
+    damping = MASS / dt * np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 20.0, 0.05, 0.1])
+    v0 = 10.0 * dt * np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, -1.0])
+    speeds = [[v] for v in v0]
+    for _ in range(steps):
+        for row, (f, d) in enumerate(zip(friction, damping, strict=True)):
+            # At the end of a step M (w - v) / h = load - d w - f sign(w), or w = 0 if that takes less than f.
+            free = MASS * speeds[row][-1] / dt + load_
+            speeds[row].append(np.sign(free) * max(abs(free) - f, 0.0) / (MASS / dt + d))
+    wanted = np.array(speeds)[:, 1:]
+    assert np.all(wanted[3:5] == 0.0)
+    assert np.all(wanted[[1, 2, 6, 8], -1] > 0.0)
+    assert wanted[5, -1] == wanted[7, -1] == 0.0
+    np.testing.assert_allclose(wanted[6, -1], 0.1 * load_ / damping[6], rtol=1e-9)
+    np.testing.assert_allclose(wanted[1], 0.7 * load_ / MASS * dt * np.arange(1, steps + 1), rtol=1e-9)
+    law = PD(robot, kp=0.0, kd=0.0)
+    options: dict[str, Any] = {"dt": dt, "duration": steps * dt}
+    each: dict[str, Any] = {"friction": friction[:, None], "damping": damping[:, None], "v0": v0[:, None]}
+    many = simulate_batch(robot, law, robot.neutral(), record_every=1, **each, **options)
+    for row in range(len(v0)):
+        own = {name: rows[row] for name, rows in each.items()}
+        one = simulate(robot, plant="compiled", **own, **options)
+        for v in (many.v_record[row, :, 0], one.v[1:, 0]):
+            np.testing.assert_allclose(v, wanted[row], rtol=1e-9, atol=1e-13 * dt)
+            np.testing.assert_array_equal(v == 0.0, wanted[row] == 0.0)
+
+
+@pytest.mark.parametrize("dt", STEPS)
+def test_smoothed_friction_creeps_at_its_speed(dt: float) -> None:
+    load_, slip = 0.5 * F, 1.01 * dt * F / MASS
+    robot = slider().with_gravity((load_ / MASS, 0.0, 0.0))
+    law, creep = PD(robot, kp=0.0, kd=0.0), slip * np.arctanh(load_ / F)
+    options: dict[str, Any] = {"friction": F, "dt": dt, "duration": 100 * dt, "friction_slip": slip}
+    assert abs(simulate(robot, plant="compiled", **options).v[-1, 0] / creep - 1.0) < 1e-9
+    assert abs(simulate_batch(robot, law, robot.neutral(), **options).v[0, 0] / creep - 1.0) < 1e-9
+
+
 @pytest.mark.parametrize("dt", [1e-3, 1e-2])
 def test_random_motions_are_those_of_one_rollout(arm: Model, dt: float) -> None:
     rng = np.random.default_rng(0)
