@@ -12,8 +12,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, NamedTuple
 
 from dynx.control.engine_motors import MotorCommand
-from dynx.errors import UnsupportedFeatureError
+from dynx.errors import EngineLimitError, UnsupportedFeatureError
 from dynx.spatial.scalar import Floats
+from dynx.world.camera.drawing import Drawing, DrawnShape
+from dynx.world.camera.view import Camera
 from dynx.world.layout import Layout
 from dynx.world.settings import Setting
 from dynx.world.state import BodyState, RobotState
@@ -140,6 +142,16 @@ class WorldEngine(ABC):
     @abstractmethod
     def cast_rays(self, origins: Floats, directions: Floats, length: float) -> Sequence[RayHit]:
         """Return the first hit of every ray, from origins (n, 3) along unit directions (n, 3)."""
+
+    # -- pictures -----------------------------------------------------------------------------
+
+    @classmethod
+    def draw(cls, shapes: Sequence[DrawnShape], T_world_camera: Floats, camera: Camera) -> Drawing:
+        """Draw shapes as a camera at the pose T (4, 4) sees them, by the engine's own renderer.
+
+        Raises EngineLimitError where the engine has none.
+        """
+        raise EngineLimitError(f"{cls.name} has no renderer in dynx; leave renderer out to draw without it")
 
     # -- end ----------------------------------------------------------------------------------
 

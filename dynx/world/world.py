@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from dynx.errors import ArgumentError, ClosedError, DivergedError, EngineError
 from dynx.model.configuration import positive_seconds, whole_number
 from dynx.spatial.scalar import Floats
-from dynx.world.camera import Camera, Picture, draw_picture
+from dynx.world.camera import Camera, Picture, cast_rays, draw_picture
 from dynx.world.commands import Act, Commands, MotorsOf, with_scene_motors
 from dynx.world.contacts import ClosestPoints, Contact, RayHits
 from dynx.world.engine import WorldEngine
@@ -331,9 +331,10 @@ class World:
         """Return what rays from `origins` (n, 3) along `directions` (n, 3) hit first within `length` [m]."""
         return self._queries.cast_rays(self._require(), origins, directions, length)
 
-    def camera(self, camera: Camera) -> Picture:
-        """Return what a camera sees: colour, depth and segmentation by name."""
-        return draw_picture(self.scene, self.state, camera)
+    def camera(self, camera: Camera, renderer: str | None = None) -> Picture:
+        """Return what a camera sees, drawn by dynx or by the renderer of an engine (``"pybullet"``)."""
+        draw = cast_rays if renderer is None else world_class(renderer).draw
+        return draw_picture(self.scene, self.state, camera, draw)
 
     # -- end ----------------------------------------------------------------------------------
 

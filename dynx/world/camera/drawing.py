@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dynx.errors import ArgumentError, DynxError
 from dynx.model import Model
@@ -40,7 +41,31 @@ class DrawnShape(NamedTuple):
     T: Floats
 
 
-def draw_picture(scene: Scene, state: WorldState, camera: Camera) -> Picture:
+class Drawing(NamedTuple):
+    """What is seen in each of the n pixels, by rows: colour (n, 3), depth (n,) [m], and the number (n,) of
+    the shape, -1 for none, whose depth is infinite."""
+
+    rgb: NDArray[np.uint8]
+    depth: Floats
+    number: NDArray[np.intp]
+
+
+Draw = Callable[[Sequence[DrawnShape], Floats, Camera], Drawing]
+"""A renderer: it draws shapes as a camera at a pose (4, 4) in the world sees them."""
+
+
+def cast_rays(shapes: Sequence[DrawnShape], T_world_camera: Floats, camera: Camera) -> Drawing:
+    """Draw shapes by the rays through the centres of pixels."""
+    T_camera_world = np.asarray(inverse(T_world_camera))
+    buffer = DepthBuffer(camera)
+    for number, each in enumerate(shapes):
+        buffer.draw(number, each.shape, T_camera_world @ each.T)
+    colours = np.array([BACKGROUND, *(each.rgba[:3] for each in shapes)])[buffer.number + 1]
+    rgb = np.rint(255.0 * colours * _light(buffer, camera)[:, None]).astype(np.uint8)
+    return Drawing(rgb, buffer.depth, buffer.number)
+
+
+def draw_picture(scene: Scene, state: WorldState, camera: Camera, draw: Draw = cast_rays) -> Picture:
     """Return what a camera sees of a scene in a state.
 
     Links are drawn as their visual shapes, and as their collision shapes where they have none or where one
@@ -55,20 +80,14 @@ def draw_picture(scene: Scene, state: WorldState, camera: Camera) -> Picture:
     if camera.part is not None:
         scene.material(camera.part)
         T_world_camera = frames[camera.part] @ T_world_camera
-    T_camera_world = np.asarray(inverse(T_world_camera))
-    buffer, colours = DepthBuffer(camera), [BACKGROUND]
-    drawn = [each for each in drawn_shapes(scene, frames) if each.rgba[3] > 0.0]
-    for number, each in enumerate(drawn):
-        buffer.draw(number, each.shape, T_camera_world @ each.T)
-        colours.append(each.rgba[:3])
-    shape = (camera.size[1], camera.size[0])
-    parts = np.array([-1, *(each.part for each in drawn)], np.intp)
-    light = _light(buffer, camera)
-    rgb = np.array(colours)[buffer.number + 1] * light[:, None]
+    shapes = [each for each in drawn_shapes(scene, frames) if each.rgba[3] > 0.0]
+    drawing = draw(shapes, T_world_camera, camera)
+    parts = np.array([-1, *(each.part for each in shapes)], np.intp)
+    rows = (camera.size[1], camera.size[0])
     return Picture(
-        np.rint(255.0 * rgb).astype(np.uint8).reshape(*shape, 3),
-        buffer.depth.reshape(shape),
-        parts[buffer.number + 1].reshape(shape),
+        drawing.rgb.reshape(*rows, 3),
+        drawing.depth.reshape(rows),
+        parts[drawing.number + 1].reshape(rows),
         scene.parts,
     )
 

@@ -81,16 +81,17 @@ def test_a_mesh_looks_like_its_primitive(
     which: int,
 ) -> None:
     make = trimesh.creation
-    shape, surface, error = [
+    cases: list[tuple[Shape, trimesh.Trimesh, float]] = [
         (Box((0.6, 0.4, 0.2)), make.box([0.6, 0.4, 0.2]), 1e-6),
         (Sphere(0.3), make.icosphere(subdivisions=4, radius=0.3), 3e-2),
         (Cylinder(0.2, 0.5), make.cylinder(0.2, 0.5, sections=256), 3e-2),
         (Capsule(0.2, 0.3), make.capsule(0.3, 0.2, count=[64, 64]), 3e-2),
-    ][which]
+    ]
+    shape, surface, error = cases[which]
     if which == 3:
         surface.apply_translation(-surface.bounds.mean(axis=0))
     path = tmp_path_factory.mktemp("mesh") / "a.obj"
-    path.write_text(surface.export(file_type="obj", digits=12))
+    path.write_text(str(surface.export(file_type="obj", digits=12)))
     camera = Camera(size=(64, 48))
     at = Pose((xyz[0], xyz[1], xyz[2] + 1.5), rpy)
     exact = see(camera, solid("a", shape, at))

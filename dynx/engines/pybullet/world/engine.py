@@ -23,6 +23,7 @@ from dynx.engines.pybullet.world.constraints import add_constraint
 from dynx.engines.pybullet.world.contacts import ContactReader
 from dynx.engines.pybullet.world.filters import set_filters
 from dynx.engines.pybullet.world.objects import BulletObject
+from dynx.engines.pybullet.world.renderer import draw
 from dynx.engines.pybullet.world.robot import BulletRobot
 from dynx.engines.pybullet.world.settings import SETTINGS
 from dynx.engines.pybullet.world.shapes import ShapeFiles, is_ground, load_ground
@@ -40,6 +41,7 @@ class BulletWorld(WorldEngine):
 
     name = "pybullet"
     settings: ClassVar[Mapping[str, Setting]] = SETTINGS
+    draw = staticmethod(draw)
 
     @classmethod
     def require_engine(cls) -> None:

@@ -1,0 +1,112 @@
+"""PyBullet's software renderer, as a second way to draw what a camera sees.
+
+It draws balls, cylinders and capsules as polyhedra, and samples the lower left corners of pixels, which the
+projection makes up for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from dynx.engines.pybullet.library import bullet
+from dynx.engines.pybullet.world.shapes import binary_stl
+from dynx.errors import EngineError, EngineLimitError
+from dynx.model.geometry import Box, Capsule, Cylinder, HeightField, Mesh, Plane, Shape, Sphere
+from dynx.spatial.scalar import Floats
+from dynx.spatial.se3 import inverse
+from dynx.spatial.so3 import quat_from_rotation
+from dynx.world.camera.drawing import Drawing, DrawnShape
+from dynx.world.camera.view import Camera
+
+GROUND_SIDE = 200.0
+"""Length of the edges of the square that is drawn for a plane [m]."""
+
+
+def draw(shapes: Sequence[DrawnShape], T_world_camera: Floats, camera: Camera) -> Drawing:
+    """Return what PyBullet draws of the shapes in a client of its own.
+
+    Raises EngineLimitError for a camera whose `far` PyBullet cannot resolve, EngineError where it fails.
+    """
+    if camera.far > 1e5 * camera.near:
+        raise EngineLimitError(
+            f"far is {camera.far}; wanted at most 1e5 times near, {camera.near}, because PyBullet stores "
+            "depths in single precision"
+        )
+    engine = bullet()
+    client = int(engine.connect(engine.DIRECT))
+    if client < 0:
+        raise EngineError("Bullet has no client left (1,024 at most); close worlds that are not needed")
+    try:
+        with TemporaryDirectory() as folder:
+            for number, each in enumerate(shapes):
+                _add(engine, client, each, Path(folder, f"{number}.stl"))
+            return _picture(engine, client, T_world_camera, camera)
+    except (SystemError, TypeError, ValueError, engine.error) as error:
+        raise EngineError(f"pybullet failed to draw: {error}") from error
+    finally:
+        engine.disconnect(client)
+
+
+def _add(engine: ModuleType, client: int, drawn: DrawnShape, file: Path) -> None:
+    """Add a body without mass, whose number is that of the shape."""
+    visual = engine.createVisualShape(
+        **_visual(engine, drawn.shape, file), rgbaColor=(*drawn.rgba[:3], 1.0), physicsClientId=client
+    )
+    engine.createMultiBody(
+        baseVisualShapeIndex=visual,
+        basePosition=drawn.T[:3, 3].tolist(),
+        baseOrientation=quat_from_rotation(drawn.T[:3, :3]).tolist(),
+        physicsClientId=client,
+    )
+
+
+def _visual(engine: ModuleType, shape: Shape, file: Path) -> dict[str, Any]:
+    if isinstance(shape, Box):
+        return {"shapeType": engine.GEOM_BOX, "halfExtents": [0.5 * edge for edge in shape.size]}
+    if isinstance(shape, Sphere):
+        return {"shapeType": engine.GEOM_SPHERE, "radius": shape.radius}
+    if isinstance(shape, Cylinder | Capsule):
+        kind = engine.GEOM_CYLINDER if isinstance(shape, Cylinder) else engine.GEOM_CAPSULE
+        return {"shapeType": kind, "radius": shape.radius, "length": shape.length}
+    if isinstance(shape, Plane):
+        x, y = 0.5 * GROUND_SIDE * np.array([[-1, 1, 1, -1], [-1, -1, 1, 1]])
+        corners = np.stack([x, y, np.zeros(4)], axis=1)[[[0, 1, 2], [0, 2, 3]]]
+    else:
+        assert isinstance(shape, Mesh | HeightField)
+        vertices, faces = shape.triangles if isinstance(shape, Mesh) else shape.triangles()
+        corners = vertices[faces]
+    file.write_bytes(binary_stl(corners))
+    return {"shapeType": engine.GEOM_MESH, "fileName": str(file)}
+
+
+def _picture(engine: ModuleType, client: int, T_world_camera: Floats, camera: Camera) -> Drawing:
+    width, height = camera.size
+    near, far, scale = camera.near, camera.far, 2.0 * camera.focal_length
+    # OpenGL's camera looks along -z, with y upwards; its matrices are stored by columns.
+    view = np.diag([1.0, -1.0, -1.0, 1.0]) @ inverse(T_world_camera)
+    projection = np.zeros((4, 4))
+    projection[0, 0], projection[1, 1] = scale / width, scale / height
+    projection[:2, 2] = 1.0 / width, 1.0 / height
+    projection[2, 2:] = -(far + near) / (far - near), -2.0 * far * near / (far - near)
+    projection[3, 2] = -1.0
+    image = engine.getCameraImage(
+        width,
+        height,
+        view.T.ravel().tolist(),
+        projection.T.ravel().tolist(),
+        shadow=0,
+        renderer=engine.ER_TINY_RENDERER,
+        physicsClientId=client,
+    )
+    colours, levels, numbers = (np.asarray(image[k]) for k in (2, 3, 4))
+    number = numbers.reshape(-1).astype(np.intp)
+    level = levels.reshape(-1).astype(np.float64)
+    depth = np.where(number >= 0, far * near / (far - (far - near) * level), np.inf)
+    rgb = colours.reshape(-1, 4)[:, :3].astype(np.uint8)
+    return Drawing(rgb, depth, number)
