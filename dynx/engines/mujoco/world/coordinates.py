@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
+from dynx.engines.mujoco.library import mujoco
 from dynx.engines.mujoco.tree import quat_wxyz
 from dynx.model import Model
 from dynx.model.mechanism import Mechanism
 from dynx.spatial.scalar import Array, Floats
-from dynx.spatial.se3 import homogeneous
 from dynx.spatial.so3 import cross, rotation_from_quat
 from dynx.world.layout import BodyLayout
 from dynx.world.state import BodyState, RobotState
@@ -58,10 +58,10 @@ class RobotCoordinates:
         else:
             q, v = self._q[self._own_q], self._v[self._own_v]
         if self._floating:
-            q[3], q[4], q[5], q[6] = q[4], q[5], q[6], q[3]
-            R = rotation_from_quat(q[3:7])
+            q[3:7] = q[[4, 5, 6, 3]]
+            R, linear = self._rotation(), v[:3].copy()
             q[:3] -= R @ self._center
-            v[:3] = v[:3] @ R - cross(v[3:6], self._center)
+            v[:3] = linear @ R - cross(v[3:6], self._center)
         return RobotState(q, v)
 
     def write(self, q: Floats, v: Floats) -> None:
@@ -85,10 +85,14 @@ class RobotCoordinates:
         to MuJoCo's."""
         if not self._floating or not any(tau[:6].tolist()):
             return tau
-        w, x, y, z = self._q[3:7]
-        R = rotation_from_quat(np.array([x, y, z, w]))
-        force = tau[:3]
+        R, force = self._rotation(), tau[:3]
         return np.concatenate([R @ force, tau[3:6] - cross(self._center, force), tau[6:]])
+
+    def _rotation(self) -> Floats:
+        """Return the rotation (3, 3) of a floating base."""
+        matrix = np.empty(9)
+        mujoco.mju_quat2Mat(matrix, self._q[3:7])
+        return matrix.reshape(3, 3)
 
 
 class BodyCoordinates:
@@ -98,16 +102,23 @@ class BodyCoordinates:
         joint = model.body_jntadr[body]
         at, first = model.jnt_qposadr[joint], model.jnt_dofadr[joint]
         self._center = layout.center
+        self._offset = bool(layout.center.any())
         self._q: Floats = data.qpos[at : at + 7]
         self._v: Floats = data.qvel[first : first + 6]
 
     def read(self) -> BodyState:
         """Return new arrays: the pose (4, 4) and the twist (6,) in world axes."""
-        w, x, y, z = self._q[3:7]
-        R = rotation_from_quat(np.array([x, y, z, w]))
-        lever, omega = R @ self._center, R @ self._v[3:]
-        twist = np.concatenate([self._v[:3] - cross(omega, lever), omega])
-        return BodyState(homogeneous(R, self._q[:3] - lever), twist)
+        matrix, T, twist = np.empty(9), np.eye(4), np.empty(6)
+        mujoco.mju_quat2Mat(matrix, self._q[3:])
+        T[:3, :3] = R = matrix.reshape(3, 3)
+        T[:3, 3] = self._q[:3]
+        twist[:3] = self._v[:3]
+        twist[3:] = R @ self._v[3:]
+        if self._offset:
+            lever = R @ self._center
+            T[:3, 3] -= lever
+            twist[:3] -= cross(twist[3:], lever)
+        return BodyState(T, twist)
 
     def write(self, T: Floats, twist: Floats) -> None:
         """Set the pose and the twist."""

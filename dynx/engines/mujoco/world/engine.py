@@ -33,8 +33,9 @@ _MISS = RayHit(None, np.inf, np.full(3, np.nan))
 STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 """Part of MuJoCo's state that determines the later steps; the physics state alone lacks the warm start."""
 
-OVERFLOWS = (int(mujoco.mjtWarning.mjWARN_CONTACTFULL), int(mujoco.mjtWarning.mjWARN_CNSTRFULL))
-"""Warnings of MuJoCo on memory that is too small for the contacts, of which it then leaves some out."""
+CONTACTS_LOST = int(mujoco.mjtWarning.mjWARN_CONTACTFULL)
+CONSTRAINTS_LOST = int(mujoco.mjtWarning.mjWARN_CNSTRFULL)
+"""Numbers of MuJoCo's warnings that memory is too small, so that contacts or constraints were left out."""
 
 Method = TypeVar("Method", bound=Callable[..., Any])
 
@@ -126,7 +127,7 @@ class MujocoWorld(WorldEngine):
                     coupled.apply(model, data)
                 mujoco.mj_step2(model, data)
         self._stepped, self._placed = True, False
-        if any(warnings[number] != 1 for number in OVERFLOWS):
+        if warnings[CONTACTS_LOST] != 1 or warnings[CONSTRAINTS_LOST] != 1:
             warnings[:] = 1
             raise EngineError(
                 f"mujoco has no memory for the contacts of the scene {shown(self.layout.name)}: "
