@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.bindings.urdf_text import spelled_out
 from benchmarks.tutorial_motion import DT, END, GRAVITY, KD, KP, STEPS, Task
-from benchmarks.urdf_for_peers import spelled_out
 from dynx.engines.pybullet.library import bullet
 from dynx.spatial.scalar import Floats
 

@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.bindings.urdf_text import moving_joints, spelled_out
 from benchmarks.compiling_peer import CompilingPeer
 from benchmarks.jax_peers import version_of
-from benchmarks.urdf_for_peers import moving_joints, spelled_out
 from dynx.backends.quantities import QUANTITIES
 from dynx.bench.cases import Batch, BenchmarkCase
 from dynx.bench.implementations import PreparedCall

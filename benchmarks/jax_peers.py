@@ -18,8 +18,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from benchmarks.bindings.urdf_text import moving_joints, spelled_out
 from benchmarks.compiling_peer import CompilingPeer, place_on_last_link
-from benchmarks.urdf_for_peers import moving_joints, spelled_out
 from dynx.backends.quantities import QUANTITIES
 from dynx.bench.cases import Batch, BenchmarkCase
 from dynx.bench.implementations import PreparedCall

@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.bindings.urdf_text import spelled_out
 from benchmarks.closed_loops import pinocchio_model, record_by_hand
 from benchmarks.simulator import Check, Simulator
 from benchmarks.tutorial_motion import AGREEMENT, DT, GRAVITY, KD, KP, STEPS, TRACKING, Task
-from benchmarks.urdf_for_peers import spelled_out
 from dynx.bench.timing import Call
 from dynx.control import Controller, Measurement
 from dynx.engines.pinocchio.library import pin

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.bindings.sample import FRAME, Call, Sample
-from benchmarks.urdf_for_peers import spelled_out
+from benchmarks.bindings.urdf_text import spelled_out
 from dynx.engines.drake.library import JacobianWrtVariable, MultibodyForces, MultibodyPlant, Parser
 from dynx.model import Model
 from dynx.spatial.scalar import Floats

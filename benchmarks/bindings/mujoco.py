@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from benchmarks.bindings.sample import FRAME, Call, Sample
-from benchmarks.urdf_for_peers import spelled_out
+from benchmarks.bindings.urdf_text import spelled_out
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.bindings.sample import FRAME, Call, Sample
-from benchmarks.urdf_for_peers import spelled_out
+from benchmarks.bindings.urdf_text import spelled_out
 from dynx.engines.pybullet.library import bullet
 from dynx.model import Model
 from dynx.spatial.scalar import Floats

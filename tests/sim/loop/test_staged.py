@@ -292,8 +292,7 @@ def test_a_reference_in_other_numbers() -> None:
 
 
 def test_no_controller_is_at_no_limit() -> None:
-    found = both(ARM, None, duration=0.05, q0=np.full(6, 0.3), effort_limits=5.0)
-    assert not found.saturated.any()
+    assert not both(ARM, None, duration=0.05, q0=np.full(6, 0.3), effort_limits=5.0).saturated.any()
 
 
 def test_progress_is_told_in_time_where_steps_are_slow(monkeypatch: pytest.MonkeyPatch) -> None:
