@@ -24,6 +24,10 @@ from dynx.sim.batch import batch as batch_module
 
 ROLLOUTS = 23
 
+PATIENCE = 600
+"""Time [s] in which a worker process starts and connects on a machine that is busy with other tests, where
+Dask's default of 30 s is too short for the imports of a new process."""
+
 
 @pytest.fixture(autouse=True)
 def small_parts(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -71,8 +75,13 @@ def by_threads() -> BatchRollouts:
 def client() -> Iterator[Any]:
     """Dask client of a cluster of two worker processes on this machine."""
     distributed = pytest.importorskip("distributed")
-    cluster = distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None)
-    with cluster, distributed.Client(cluster) as client:
+    dask = pytest.importorskip("dask")
+    patient = {"distributed.comm.timeouts.connect": PATIENCE, "distributed.comm.timeouts.tcp": PATIENCE}
+    with (
+        dask.config.set(patient),
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
+        distributed.Client(cluster) as client,
+    ):
         yield client
 
 
@@ -125,7 +134,7 @@ def test_a_cluster_does_the_work_of_a_worker_that_is_killed(
     before = set(client.run(os.getpid).values())
     found = batch(Deadly(client.get_executor(), tmp_path / "once"))
     assert equal(found, by_threads)
-    client.wait_for_workers(2, timeout=30)
+    client.wait_for_workers(2, timeout=PATIENCE)
     after = set(client.run(os.getpid).values())
     assert len(before & after) == 1
 
