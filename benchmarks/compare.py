@@ -11,8 +11,8 @@ import argparse
 import sys
 from collections.abc import Iterator, Sequence
 
-from benchmarks.compiling_peer import CompilingPeer
-from benchmarks.jax_peers import JaxPeer, OnDevice
+from benchmarks.libraries.compiling_peer import CompilingPeer
+from benchmarks.libraries.jax_peers import JaxPeer, OnDevice
 from benchmarks.peers import COMPILED, FRAMES, SUPPORTED, make_implementation
 from dynx.bench.cases import BENCHMARK_QUANTITIES, BenchmarkCase, draw_batch
 from dynx.bench.implementations import Implementation

@@ -13,10 +13,10 @@ from functools import cache, partial
 
 import numpy as np
 
-from benchmarks.casadi_peers import CasadiCode, CasadiMap
-from benchmarks.compiling_peer import CompilingPeer
-from benchmarks.jax_peers import AdamJax, Frax
-from benchmarks.mujoco_peers import MujocoInverse, MujocoRollout
+from benchmarks.libraries.casadi_peers import CasadiCode, CasadiMap
+from benchmarks.libraries.compiling_peer import CompilingPeer
+from benchmarks.libraries.jax_peers import AdamJax, Frax
+from benchmarks.libraries.mujoco_peers import MujocoInverse, MujocoRollout
 from dynx.bench.backend_implementations import backend_implementation
 from dynx.bench.cases import BENCHMARK_QUANTITIES, Batch, BenchmarkCase, draw_batch
 from dynx.bench.implementations import Implementation, PreparedCall

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from benchmarks.compiling_peer import CompilingPeer
+from benchmarks.libraries.compiling_peer import CompilingPeer
 from benchmarks.peers import (
     FRAMES,
     HAVE_THREADS,

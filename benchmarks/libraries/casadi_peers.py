@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks.bindings.urdf_text import moving_joints, spelled_out
-from benchmarks.compiling_peer import CompilingPeer
-from benchmarks.jax_peers import version_of
+from benchmarks.libraries.compiling_peer import CompilingPeer
+from benchmarks.libraries.jax_peers import version_of
 from dynx.backends.quantities import QUANTITIES
 from dynx.bench.cases import Batch, BenchmarkCase
 from dynx.bench.implementations import PreparedCall

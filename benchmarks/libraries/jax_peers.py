@@ -19,7 +19,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from benchmarks.bindings.urdf_text import moving_joints, spelled_out
-from benchmarks.compiling_peer import CompilingPeer, place_on_last_link
+from benchmarks.libraries.compiling_peer import CompilingPeer, place_on_last_link
 from dynx.backends.quantities import QUANTITIES
 from dynx.bench.cases import Batch, BenchmarkCase
 from dynx.bench.implementations import PreparedCall
