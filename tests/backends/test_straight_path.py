@@ -88,6 +88,8 @@ def test_what_is_no_valid_sample_is_refused_on_the_straight_path(size: int, base
         (lambda x: np.append(x[:-1], -1e160), ArgumentError),
         (lambda x: np.append(x[:-1], MAX_MAGNITUDE), ArgumentError),
         (lambda x: x[:-1], ShapeError),
+        (lambda x: np.zeros((len(x), 0)), ShapeError),
+        (lambda x: np.zeros((len(x), len(x) + 1)), ShapeError),
         (lambda x: x.astype(bool), DTypeError),
         (lambda x: None, DTypeError),
     )

@@ -84,7 +84,6 @@ class MujocoBackend(Backend):
         self._nv = self._mechanism.nv
         self._floating = model.floating
         self._dynamics = ProjectedDynamics(self._engine, floating=model.floating)
-        self._gravity: Floats = np.array(model.gravity)
         self._masses_add = tree.masses_add
         self._total_mass = float(self._engine.body_subtreemass[ROOT])
         self._lower, self._upper = _places_of_triangle(self._engine)
@@ -142,22 +141,6 @@ class MujocoBackend(Backend):
         twist = np.empty(6)
         mujoco.mj_objectVelocity(self._engine, work.data, XBODY, body, twist, reference == "local")
         return _linear_first(twist, work.p[body] if reference == "world" else None)
-
-    def _frame_acceleration(
-        self, q: Floats, v: Floats, a: Floats, frame: int, reference: Reference
-    ) -> Floats:
-        work, body = self._set_state(q, v), self._bodies[frame]
-        self._set_acceleration(work, v, a)
-        found = np.empty(6)
-        # The classical acceleration of the origin, minus gravity.
-        mujoco.mj_objectAcceleration(self._engine, work.data, XBODY, body, found, reference == "local")
-        if reference == LOCAL_WORLD_ALIGNED:
-            return np.concatenate((found[3:] + self._gravity, found[:3]))
-        found[3:] += self._gravity if reference == "world" else self._gravity @ work.R[body]
-        twist = np.empty(6)
-        mujoco.mj_objectVelocity(self._engine, work.data, XBODY, body, twist, reference == "local")
-        found[3:] -= cross(twist[:3], twist[3:])
-        return _linear_first(found, work.p[body] if reference == "world" else None)
 
     # -- dynamics -----------------------------------------------------------------------------
 

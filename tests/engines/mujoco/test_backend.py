@@ -49,6 +49,7 @@ def test_what_the_engine_computes() -> None:
         "bias_torque",
         "gravity_torque",
         "coriolis_matrix",
+        "frame_acceleration",
         "kinetic_energy",
         "inertial_regressor",
     }
