@@ -68,7 +68,7 @@ def robots() -> tuple[RobotEntry, ...]:
 
     Names are unique, and no alias equals the name or an alias of another robot.
     """
-    files = [(path, EXAMPLE_ROBOT_DATA, root) for root in _example_roots() for path in _urdf_files(root)]
+    files = [(path, EXAMPLE_ROBOT_DATA, root) for root in example_roots() for path in _urdf_files(root)]
     files += [(path, DYNX_MODELS, root) for root in own_roots() for path in _urdf_files(root)]
     relative = [path.relative_to(root).as_posix() for path, _, root in files]
     names: dict[str, int] = {}
@@ -120,7 +120,8 @@ def _urdf_files(root: Path) -> list[Path]:
     return sorted(path for path in descriptions if path.is_file())
 
 
-def _example_roots() -> list[Path]:
+def example_roots() -> list[Path]:
+    """Return the folder of the robots of example-robot-data in a list, or an empty list if it is missing."""
     for root in _example_candidates():
         if root.is_dir():
             return [root]

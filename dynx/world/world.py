@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NoReturn
 
 import numpy as np
@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, ClosedError, DivergedError, EngineError
 from dynx.model.configuration import positive_seconds, whole_number
+from dynx.model.package_paths import StrPath
 from dynx.spatial.scalar import Floats
 from dynx.world.camera import Camera, Picture, cast_rays, draw_picture
 from dynx.world.commands import Act, Commands, MotorsOf, with_scene_motors
@@ -24,6 +25,7 @@ from dynx.world.preparation import prepare
 from dynx.world.queries import MAX_RAY_LENGTH, Queries
 from dynx.world.registry import world_class
 from dynx.world.scene import Scene
+from dynx.world.scene.paths import ScenePaths
 from dynx.world.scene.reading import scene_from_document
 from dynx.world.scene.writing import scene_document
 from dynx.world.settings import checked_settings, checked_switches
@@ -268,24 +270,23 @@ class World:
         Raises DescriptionError for a collision shape that a file cannot have, and ArgumentError for a file
         that cannot be written.
         """
-        world = {
-            "scene": scene_document(self.scene),
-            "engine": self.engine,
-            "options": dict(self.options),
-            "settings": dict(self.settings),
-        }
-        write_snapshot(path, self.save(), world)
+        given = {"engine": self.engine, "options": dict(self.options), "settings": dict(self.settings)}
+        write_snapshot(path, self.save(), {"scene": scene_document(self.scene), **given})
 
     @classmethod
-    def read(cls, path: str | os.PathLike[str]) -> World:
-        """Return the world of a file that `write` wrote, in its state; meshes are read from their files.
+    def read(cls, path: StrPath, *, package_dirs: Iterable[StrPath] = ()) -> World:
+        """Return the world of a file that `write` wrote, in its state.
 
-        Read files that you trust only: a changed state can end the process inside an engine. Raises
-        ArgumentError for a file that is damaged, of another version of the engine, or whose meshes changed.
+        Meshes are read in the libraries of robots and in `package_dirs` only. Read files that you trust: a
+        changed state can end the process inside an engine. Raises ArgumentError for a file that is damaged,
+        of another version of the engine, or whose meshes changed.
         """
         snapshot, given = read_snapshot(path)
         world = cls(
-            scene_from_document(given["scene"]), given["engine"], **given["options"], **given["settings"]
+            scene_from_document(given["scene"], ScenePaths(None, package_dirs)),
+            given["engine"],
+            **given["options"],
+            **given["settings"],
         )
         try:
             world.restore(snapshot)

@@ -103,7 +103,7 @@ def test_an_unknown_name_offers_the_nearest() -> None:
 
 
 def test_the_error_of_an_empty_library(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(library, "_example_roots", list)
+    monkeypatch.setattr(library, "example_roots", list)
     monkeypatch.setattr(library, "own_roots", list)
     robots.cache_clear()
     try:

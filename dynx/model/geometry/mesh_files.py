@@ -38,8 +38,8 @@ def find_mesh(filename: str, source: str, package_dirs: Iterable[StrPath] = ()) 
     file is not in it.
 
     A description may come from anyone, so nothing is searched or listed outside the folder of its files (see
-    `_enclosing`) and the packages: a path that leads elsewhere, also by a symbolic link, gives None. Folders
-    in `package_dirs`, which the user names, are searched first: for packages, and for full paths in them.
+    `enclosing_folder`) and the packages: a path that leads elsewhere, also by a symbolic link, gives None.
+    Folders in `package_dirs`, which the user names, are searched first: for packages, and for full paths.
     """
     for folder in package_dirs:
         found = _in_user_folder(filename, Path(folder))
@@ -57,7 +57,7 @@ def find_mesh(filename: str, source: str, package_dirs: Iterable[StrPath] = ()) 
             return None
         else:
             path = folder / filename
-        return _existing(path, _enclosing(folder), shown(filename, 200))
+        return _existing(path, enclosing_folder(folder), shown(filename, 200))
     except (OSError, ValueError, RuntimeError):  # The name is invalid, or symbolic links form a cycle.
         return None
 
@@ -108,7 +108,7 @@ def _existing(path: Path, root: Path, described: str) -> Path | None:
 
 # Cached, because a robot has dozens of meshes.
 @lru_cache(maxsize=256)
-def _enclosing(folder: Path) -> Path:
+def enclosing_folder(folder: Path) -> Path:
     """Return the folder of all files that come with a description: the repository, else the package.
 
     Without either it is the description's own folder, or the one above where the name of the folder shows
@@ -150,7 +150,7 @@ def _package(name: str, folder: Path, elsewhere: tuple[tuple[str, str], ...]) ->
 
     The name alone is no evidence, because the description chooses it.
     """
-    enclosing = _enclosing(folder)
+    enclosing = enclosing_folder(folder)
     for root in (folder, *folder.parents):
         found = _find(name, [root]) if _is_private(root) else None
         if found is None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Iterable
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -13,6 +14,8 @@ from dynx.errors import ArgumentError, NotInstalledError, RobotNotFoundError, ne
 from dynx.files.reading import checked_path, printable, read_file
 from dynx.files.writing import write_bytes
 from dynx.model.library import own_roots
+from dynx.model.package_paths import StrPath
+from dynx.world.scene.paths import ScenePaths
 from dynx.world.scene.reading import scene_from_document
 from dynx.world.scene.scene import Scene
 from dynx.world.scene.writing import scene_document
@@ -23,10 +26,12 @@ SCENES = "scenes"
 """Folder of the scenes among the models of dynx."""
 
 
-def read_scene(source: str | os.PathLike[str]) -> Scene:
+def read_scene(source: str | os.PathLike[str], *, package_dirs: Iterable[StrPath] = ()) -> Scene:
     """Read a scene from a ``.toml`` or ``.json`` file, or one of the scenes of dynx by its name.
 
-    docs/world.md describes the keys. Robots are names or files beside the scene, meshes files beside it.
+    docs/world.md describes the keys. A file may come from anyone: the robots and meshes that it names lie in
+    its folder (its repository or package, if it lies in one), in the libraries of robots, or in
+    `package_dirs`, and no other file is read.
     Raises RobotNotFoundError where nothing is there, ArgumentError and its kinds for a file that is no scene,
     with the place in it, and the errors of `dynx.load` for its robots.
     """
@@ -40,7 +45,7 @@ def read_scene(source: str | os.PathLike[str]) -> Scene:
     except (ValueError, RecursionError) as error:
         raise ArgumentError(f"{name} cannot be read: {error}") from None
     try:
-        return scene_from_document(document, str(path.parent))
+        return scene_from_document(document, ScenePaths(path.parent, package_dirs))
     except ArgumentError as error:
         raise type(error)(f"{name}: {error}") from error
 
@@ -48,7 +53,8 @@ def read_scene(source: str | os.PathLike[str]) -> Scene:
 def write_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
     """Write a scene to a ``.toml`` or ``.json`` file, atomically; `read_scene` returns an equal one.
 
-    Robots are written as URDF text, and meshes by their full paths. Raises ArgumentError for another suffix
+    Robots are written as URDF text with the full paths of their meshes; those that lie neither with the file
+    nor with a library need `package_dirs` when it is read. Raises ArgumentError for another suffix
     or a file that cannot be written, NotInstalledError for ``.toml`` without tomli-w (``pip install
     'dynx[world]'``).
     """
@@ -56,7 +62,7 @@ def write_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
     suffix = Path(file).suffix.lower()
     if suffix not in SUFFIXES:
         raise ArgumentError(f"a scene is written as .toml or .json, not as {shown(Path(file).name)}")
-    document = scene_document(scene)
+    document = scene_document(scene, ScenePaths(os.path.dirname(file) or "."))
     if suffix == ".json":
         write_bytes(file, json.dumps(document, indent=1, allow_nan=False).encode())
         return

@@ -6,7 +6,6 @@ import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import MISSING, fields
-from importlib.util import find_spec
 
 import numpy as np
 
@@ -17,7 +16,6 @@ from dynx.model.elements import IDENTITY, ZERO
 from dynx.model.geometry import Box, Capsule, Collision, Cylinder, HeightField, Mesh, Plane, Shape, Sphere
 from dynx.model.geometry.sizes import finite_numbers
 from dynx.model.loading import load, read_model
-from dynx.model.package_paths import resolve_package
 from dynx.spatial.se3 import homogeneous
 from dynx.spatial.so3 import quat_from_rotation, rotation_from_quat
 from dynx.world.motors import Motor, PDMotor, PositionMotor, TorqueMotor, VelocityMotor
@@ -33,6 +31,7 @@ from dynx.world.scene.document_types import (
     ShapeDocument,
 )
 from dynx.world.scene.material import DEFAULT_MATERIAL, Material
+from dynx.world.scene.paths import ScenePaths
 from dynx.world.scene.robots import SceneRobot
 from dynx.world.scene.scene import Scene
 
@@ -47,19 +46,16 @@ MOTORS: dict[str, type[Motor]] = {
 }
 """Classes of motors by their names in a document."""
 
-DATA_PACKAGE = "pybullet_data"
-"""Python package whose files a scene may name as ``package://pybullet_data/FILE``, where it is installed."""
-
 QUATERNION_TOLERANCE = 1e-6
 """Largest deviation of the norm of a quaternion from 1."""
 
 
-def scene_from_document(document: object, folder: str | None = None) -> Scene:
+def scene_from_document(document: object, paths: ScenePaths | None = None) -> Scene:
     """Return the scene of a document.
 
-    Names of files are relative to `folder`; without one, robots are given as text only, so that a document
-    from elsewhere names no file that is read as a robot. Raises ArgumentError and its kinds, naming the place
-    in the document.
+    Files are looked for by `paths`; without them, robots are given as text only, so that a document from
+    elsewhere names no file that is read as a robot. Raises ArgumentError, DescriptionError and their kinds,
+    naming the place in the document.
     """
     if not isinstance(document, Mapping) or document.get("schema") != SCHEMA:
         raise ArgumentError(f"a scene's document has schema {SCHEMA!r}; this one does not")
@@ -67,10 +63,10 @@ def scene_from_document(document: object, folder: str | None = None) -> Scene:
     robots, bodies, constraints = [], [], []
     for k, robot in enumerate(given.robots):
         with _place(f"robots[{k}], {shown(robot.name)}"):
-            robots.append(_robot(robot, folder))
+            robots.append(_robot(robot, paths))
     for k, body in enumerate(given.bodies):
         with _place(f"bodies[{k}], {shown(body.name)}"):
-            bodies.append(_body(body, folder))
+            bodies.append(_body(body, paths or ScenePaths(None)))
     for k, constraint in enumerate(given.constraints):
         with _place(f"constraints[{k}]"):
             constraints.append(_constraint(constraint))
@@ -99,8 +95,8 @@ def _place(place: str) -> Iterator[None]:
 # -- robots ---------------------------------------------------------------------------------------
 
 
-def _robot(given: RobotDocument, folder: str | None) -> SceneRobot:
-    model, pose = _model(given, folder), _pose("pose", given.pose)
+def _robot(given: RobotDocument, paths: ScenePaths | None) -> SceneRobot:
+    model, pose = _model(given, paths), _pose("pose", given.pose)
     q = _coordinates("q", given.q, model, model.nq)
     if pose is not None and model.floating:
         start = model.neutral() if q is None else np.array(q)
@@ -120,7 +116,7 @@ def _robot(given: RobotDocument, folder: str | None) -> SceneRobot:
     )
 
 
-def _model(given: RobotDocument, folder: str | None) -> Model:
+def _model(given: RobotDocument, paths: ScenePaths | None) -> Model:
     if (given.robot is None) == (given.urdf is None):
         raise ArgumentError("wanted either robot (a name or a file) or urdf (its text)")
     pose = None if given.base == "floating" else _pose("pose", given.pose)
@@ -132,25 +128,26 @@ def _model(given: RobotDocument, folder: str | None) -> Model:
             base=given.base,
             lock=given.lock or None,
             base_pose=pose,
-            package_dirs=[os.path.join(folder or "", each) for each in given.mesh_folders],
+            package_dirs=(paths or ScenePaths(None)).folders(given.mesh_folders),
         )
     assert given.robot is not None
-    if folder is None:
+    if paths is None:
         raise ArgumentError(
             "robot is a name or a file, which a document from elsewhere may not name; wanted urdf"
         )
-    return load(_path(given.robot, folder), base=given.base, lock=given.lock or None, base_pose=pose)
+    robot = paths.find(given.robot, "robot") if _is_file(given.robot) else given.robot
+    return load(
+        robot,
+        base=given.base,
+        lock=given.lock or None,
+        base_pose=pose,
+        package_dirs=paths.package_dirs,
+    )
 
 
-def _path(robot: str, folder: str) -> str:
-    """Return the file of a robot beside the scene or in a package of data, or the name of a robot."""
-    if robot.startswith("package://"):
-        found = find_spec(DATA_PACKAGE)
-        roots = [] if found is None or found.origin is None else [os.path.dirname(found.origin)]
-        return str(resolve_package(robot, [folder, *roots]))
-    beside = os.path.join(folder, robot)
-    is_path = "/" in robot or os.sep in robot or robot.endswith((".urdf", ".xacro", ".xml"))
-    return beside if is_path and os.path.lexists(beside) else robot
+def _is_file(robot: str) -> bool:
+    """Check whether the robot of a scene is a file rather than a name."""
+    return "/" in robot or os.sep in robot or robot.endswith((".urdf", ".xacro", ".xml"))
 
 
 def _coordinates(
@@ -186,13 +183,13 @@ def _motor(k: int, given: MotorDocument) -> Motor:
 # -- bodies ---------------------------------------------------------------------------------------
 
 
-def _body(given: BodyDocument, folder: str | None) -> SceneBody:
+def _body(given: BodyDocument, paths: ScenePaths) -> SceneBody:
     if (given.shape is None) == (not given.shapes):
         raise ArgumentError("wanted either shape or shapes")
     shapes = given.shapes if given.shape is None else [given.shape]
     return SceneBody(
         given.name,
-        tuple(_shape(each, folder) for each in shapes),
+        tuple(_shape(each, paths) for each in shapes),
         _pose("pose", given.pose) or IDENTITY,
         given.mass,
         given.inertia,  # type: ignore[arg-type]
@@ -202,7 +199,7 @@ def _body(given: BodyDocument, folder: str | None) -> SceneBody:
     )
 
 
-def _shape(given: ShapeDocument, folder: str | None) -> Collision:
+def _shape(given: ShapeDocument, paths: ScenePaths) -> Collision:
     kinds = ("box", "sphere", "cylinder", "capsule", "plane", "mesh", "heights")
     present = [name for name in kinds if getattr(given, name) is not None]
     if len(present) != 1:
@@ -211,10 +208,10 @@ def _shape(given: ShapeDocument, folder: str | None) -> Collision:
     for name, owner in (("scale", "mesh"), ("size", "heights")):
         if getattr(given, name) is not None and present != [owner]:
             raise ArgumentError(f"{name} belongs to {owner}, not to {present[0]}")
-    return Collision(_solid(given, folder), _pose("pose of a shape", given.pose) or IDENTITY)
+    return Collision(_solid(given, paths), _pose("pose of a shape", given.pose) or IDENTITY)
 
 
-def _solid(given: ShapeDocument, folder: str | None) -> Shape:
+def _solid(given: ShapeDocument, paths: ScenePaths) -> Shape:
     if given.box is not None:
         return Box(given.box)  # type: ignore[arg-type]
     if given.sphere is not None:
@@ -229,7 +226,7 @@ def _solid(given: ShapeDocument, folder: str | None) -> Shape:
         return HeightField(given.heights, given.size)  # type: ignore[arg-type]
     if given.mesh is not None:
         scale = (1.0, 1.0, 1.0) if given.scale is None else given.scale
-        return Mesh(os.path.join(folder or "", given.mesh), scale)  # type: ignore[arg-type]
+        return Mesh(paths.find(given.mesh, "mesh"), scale)  # type: ignore[arg-type]
     return Plane()
 
 

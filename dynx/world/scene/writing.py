@@ -15,6 +15,7 @@ from dynx.world.motors import Motor
 from dynx.world.scene.bodies import SceneBody
 from dynx.world.scene.constraints import Constraint, Weld
 from dynx.world.scene.material import DEFAULT_MATERIAL, Material
+from dynx.world.scene.paths import ScenePaths
 from dynx.world.scene.reading import MOTORS, SCHEMA
 from dynx.world.scene.robots import SceneRobot
 from dynx.world.scene.scene import Scene
@@ -22,15 +23,16 @@ from dynx.world.scene.scene import Scene
 _MOTOR_KINDS = {kind: name for name, kind in MOTORS.items()}
 
 
-def scene_document(scene: Scene) -> dict[str, Any]:
+def scene_document(scene: Scene, paths: ScenePaths | None = None) -> dict[str, Any]:
     """Return the document of a scene, from which `scene_from_document` makes an equal one.
 
-    Robots are written as URDF text, with the full paths of their meshes. Raises DescriptionError for a
+    Robots are written as URDF text, with the full paths of their meshes; meshes of bodies as `paths` writes
+    them. Raises DescriptionError for a
     collision shape with a fault in the description of a robot.
     """
     parts = {
         "robots": [_robot(each) for each in scene.robots],
-        "bodies": [_body(each) for each in scene.bodies],
+        "bodies": [_body(each, paths or ScenePaths(None)) for each in scene.bodies],
         "constraints": [_constraint(each) for each in scene.constraints],
         "ignored": [list(pair) for pair in scene.ignored],
         "groups": {name: list(members) for name, members in scene.groups},
@@ -85,12 +87,12 @@ def _motor(motor: Motor) -> dict[str, Any]:
     return {"kind": _MOTOR_KINDS[type(motor)], **listed}
 
 
-def _body(body: SceneBody) -> dict[str, Any]:
+def _body(body: SceneBody, paths: ScenePaths) -> dict[str, Any]:
     document: dict[str, Any] = {"name": body.name}
     if len(body.shapes) == 1:
-        document["shape"] = _shape(body.shapes[0])
+        document["shape"] = _shape(body.shapes[0], paths)
     else:
-        document["shapes"] = [_shape(each) for each in body.shapes]
+        document["shapes"] = [_shape(each, paths) for each in body.shapes]
     if body.pose != IDENTITY:
         document["pose"] = pose_numbers(body.pose)
     for name in ("mass", "center_of_mass"):
@@ -106,14 +108,14 @@ def _body(body: SceneBody) -> dict[str, Any]:
     return document
 
 
-def _shape(placed: Collision) -> dict[str, Any]:
-    document = _size(placed)
+def _shape(placed: Collision, paths: ScenePaths) -> dict[str, Any]:
+    document = _size(placed, paths)
     if placed.origin != IDENTITY:
         document["pose"] = pose_numbers(placed.origin)
     return document
 
 
-def _size(placed: Collision) -> dict[str, Any]:
+def _size(placed: Collision, paths: ScenePaths) -> dict[str, Any]:
     shape = placed.shape
     if isinstance(shape, Box):
         return {"box": list(shape.size)}
@@ -126,7 +128,7 @@ def _size(placed: Collision) -> dict[str, Any]:
     if isinstance(shape, HeightField):
         return {"heights": [list(row) for row in shape.heights], "size": list(shape.size)}
     if isinstance(shape, Mesh):
-        return {"mesh": shape.file, "scale": list(shape.scale)}
+        return {"mesh": paths.write(shape.file), "scale": list(shape.scale)}
     assert isinstance(shape, Plane)
     return {"plane": True}
 

@@ -154,7 +154,7 @@ def test_paths_may_climb_within_the_package_or_repository(tmp_path: Path, marker
     mesh.write_bytes(b"")
     assert find_mesh("../../meshes/a.stl", str(robot)) is None
     (tmp_path / "repository" / marker).mkdir()
-    mesh_files._enclosing.cache_clear()
+    mesh_files.enclosing_folder.cache_clear()
     assert find_mesh("../../meshes/a.stl", str(robot)) == mesh
     with pytest.raises(MeshNotFoundError):
         find_mesh("../../meshes/b.stl", str(robot))

@@ -12,7 +12,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import dynx
-from dynx.errors import ArgumentError, DynxError, NotFiniteError, RobotNotFoundError, UnknownNameError
+from dynx.errors import (
+    ArgumentError,
+    DescriptionError,
+    DynxError,
+    NotFiniteError,
+    RobotNotFoundError,
+    UnknownNameError,
+)
 from dynx.model.geometry import Box, Capsule, Collision, Cylinder, HeightField, Sphere
 from dynx.world import (
     Material,
@@ -201,3 +208,56 @@ def test_files_that_are_no_scene_are_refused(tmp_path: Path) -> None:
             read_scene(path)
     with pytest.raises(ArgumentError, match=r"\.toml or \.json"):
         write_scene(Scene("empty"), tmp_path / "scene.yaml")
+
+
+CUBE = "\n".join(
+    ["solid cube"]
+    + [
+        f"facet normal 0 0 0\nouter loop\nvertex {a}\nvertex {b}\nvertex {c}\nendloop\nendfacet"
+        for a, b, c in [
+            ("0 0 0", "0 1 0", "1 0 0"),
+            ("0 0 0", "1 0 0", "0 0 1"),
+            ("0 0 0", "0 0 1", "0 1 0"),
+            ("1 0 0", "0 1 0", "0 0 1"),
+        ]
+    ]
+    + ["endsolid cube", ""]
+)
+
+
+def scene_with_mesh(folder: Path, mesh: str) -> Path:
+    folder.mkdir(exist_ok=True)
+    path = folder / "scene.json"
+    document = {"schema": "dynx.scene/1", "bodies": [{"name": "b", "shape": {"mesh": mesh}, "mass": 1.0}]}
+    path.write_text(json.dumps(document))
+    return path
+
+
+def test_meshes_lie_beside_the_scene_or_where_the_user_says(tmp_path: Path) -> None:
+    inside, outside = tmp_path / "inside", tmp_path / "outside"
+    for folder in (inside, outside):
+        folder.mkdir()
+        (folder / "cube.stl").write_text(CUBE)
+    scene = read_scene(scene_with_mesh(inside, "cube.stl"))
+    assert scene.body("b").inertial.mass == 1.0
+    write_scene(scene, inside / "copy.json")
+    assert json.loads((inside / "copy.json").read_text())["bodies"][0]["shape"]["mesh"] == "cube.stl"
+    for name in ("../outside/cube.stl", str(outside / "cube.stl")):
+        path = scene_with_mesh(inside, name)
+        with pytest.raises(DescriptionError, match="outside the folder of the scene"):
+            read_scene(path)
+        assert read_scene(path, package_dirs=[outside]).body("b").shapes
+    (inside / "link.stl").symlink_to(outside / "cube.stl")
+    with pytest.raises(DescriptionError, match="outside the folder of the scene"):
+        read_scene(scene_with_mesh(inside, "link.stl"))
+    with pytest.raises(DescriptionError, match=r"did you mean 'cube\.stl'"):
+        read_scene(scene_with_mesh(inside, "cub.stl"))
+    with pytest.raises(DescriptionError, match="wanted a path or package"):
+        read_scene(scene_with_mesh(inside, "http://example.org/cube.stl"))
+
+
+def test_a_document_from_elsewhere_reads_no_file_of_the_user(tmp_path: Path) -> None:
+    (tmp_path / "cube.stl").write_text(CUBE)
+    given = {"name": "b", "shape": {"mesh": str(tmp_path / "cube.stl")}}
+    with pytest.raises(DescriptionError, match="outside the folder of the scene"):
+        scene_from_document({"schema": "dynx.scene/1", "bodies": [given]})
