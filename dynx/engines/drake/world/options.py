@@ -4,7 +4,8 @@ Hydroelastic contact (Elandt et al., A pressure field model for fast, robust app
 force and moment, 2019) integrates a pressure over the surface where two shapes overlap: shapes that are fixed
 in the world are rigid, others have a modulus. Point contact is one point with a spring and a damper for each
 pair of shapes, on which a box that slides or is stacked rattles. Spheres and capsules always touch at a
-point, because their approximation by triangles would not roll well.
+point, because their approximation by triangles would not roll well, and meshes, because surfaces between
+hulls of thousands of triangles take minutes for a second of simulated time.
 
 Of two materials Drake takes the harmonic mean of the coefficients of friction. It has no restitution and no
 torsional or rolling friction.
@@ -22,7 +23,7 @@ from dynx.engines.drake.library import (
     geometry,
 )
 from dynx.errors import UnsupportedFeatureError, shown
-from dynx.model.geometry import Capsule, Cylinder, Shape, Sphere
+from dynx.model.geometry import Box, Cylinder, HeightField, Plane, Shape
 from dynx.world.scene import Material
 from dynx.world.settings import Setting
 
@@ -59,6 +60,9 @@ APPROXIMATIONS: Mapping[str, Any] = {
 }
 
 
+HYDROELASTIC = (Box, Cylinder, Plane, HeightField)
+"""Shapes that touch over surfaces."""
+
 MODELS: Mapping[str, Any] = {
     "hydroelastic": ContactModel.kHydroelasticWithFallback,
     "point": ContactModel.kPoint,
@@ -75,7 +79,7 @@ def proximity_properties(shape: Shape, material: Material, settings: Mapping[str
         friction=CoulombFriction(material.friction, material.friction),
     )
     properties.AddProperty("material", "relaxation_time", settings["relaxation_time"])
-    if settings["contact_model"] == "hydroelastic" and not isinstance(shape, Sphere | Capsule):
+    if settings["contact_model"] == "hydroelastic" and isinstance(shape, HYDROELASTIC):
         edge = settings["resolution"] * (shape.radius if isinstance(shape, Cylinder) else 1.0)
         if fixed:
             geometry.AddRigidHydroelasticProperties(edge, properties)
