@@ -9,12 +9,9 @@ import numpy as np
 
 from dynx.backends.joint_dynamics import JointDynamicsTerms
 from dynx.errors import EngineLimitError
-from dynx.model import Model
 from dynx.model.elements import Pose
 from dynx.model.geometry import Collision, Mesh
-from dynx.rbd.kinematics import body_poses
 from dynx.spatial.scalar import Floats
-from dynx.spatial.se3 import homogeneous
 from dynx.world.layout import (
     WORLD,
     Anchor,
@@ -27,6 +24,7 @@ from dynx.world.layout import (
     RobotLayout,
 )
 from dynx.world.scene import Material, PointToPoint, Scene, SceneBody, SceneRobot, Weld
+from dynx.world.scene.link_frames import LinkFrames
 
 MAX_COLLIDERS = 10_000
 """Largest number of links and bodies with shapes; the filter has an entry for each pair."""
@@ -91,26 +89,6 @@ def _body(body: SceneBody) -> BodyLayout:
         body.pose.matrix.copy(),
         np.array(body.twist),
     )
-
-
-class LinkFrames:
-    """The frames of a robot's links: the body of the mechanism that each is fixed to, and its pose there."""
-
-    def __init__(self, model: Model) -> None:
-        self._mechanism = model.mechanism
-        frames = model.mechanism.frames
-        self._at = {frame.name: (frame.body, homogeneous(frame.R, frame.p)) for frame in frames}
-
-    def __getitem__(self, link: str) -> tuple[int, Floats]:
-        body, T = self._at[link]
-        return body, np.asarray(T, dtype=np.float64)
-
-    def pose(self, q: Floats, link: str) -> Floats:
-        """Return T_world_link (4, 4) at the configuration `q` (nq,) of the model."""
-        coupling = self._mechanism.coupling
-        poses = body_poses(self._mechanism, q if coupling is None else coupling.expand_q(q))
-        body, T = self[link]
-        return np.asarray(homogeneous(*poses[body]) @ T)
 
 
 class _Parts:

@@ -1,9 +1,11 @@
 """`Scene`: a frozen description of a world, and its parts."""
 
 from dynx.world.scene.bodies import SceneBody, box, ground, sphere
+from dynx.world.scene.body_urdf import body_to_urdf
 from dynx.world.scene.constraints import PointToPoint, Weld
 from dynx.world.scene.files import read_scene, scene_names, write_scene
 from dynx.world.scene.material import Material
+from dynx.world.scene.mjcf import scene_to_mjcf
 from dynx.world.scene.robots import SceneRobot
 from dynx.world.scene.scene import Scene
 
@@ -14,10 +16,12 @@ __all__ = [
     "SceneBody",
     "SceneRobot",
     "Weld",
+    "body_to_urdf",
     "box",
     "ground",
     "read_scene",
     "scene_names",
+    "scene_to_mjcf",
     "sphere",
     "write_scene",
 ]

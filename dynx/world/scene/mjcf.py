@@ -1,0 +1,253 @@
+"""A scene as an MJCF document, which MuJoCo and its tools load without dynx.
+
+Each link and each body of the scene is a body of the document, so that the document can be read and edited
+by the names of the scene. Robots are nested as their joints are; links on fixed joints stay bodies.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import combinations
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
+
+import numpy as np
+
+from dynx.errors import EngineLimitError, UnsupportedFeatureError, shown
+from dynx.model.elements import IDENTITY, Inertial, Joint, Pose
+from dynx.model.geometry import HeightField, Plane
+from dynx.spatial.scalar import Floats
+from dynx.spatial.se3 import homogeneous
+from dynx.spatial.so3 import rotation_from_quat
+from dynx.world.scene.constraints import PointToPoint, Weld
+from dynx.world.scene.filters import CollisionFilter, merged_links
+from dynx.world.scene.link_frames import LinkFrames
+from dynx.world.scene.mjcf_shapes import ShapeWriter, add_inertial, placement, quat_text, text
+from dynx.world.scene.names import WORLD, split_name
+from dynx.world.scene.robots import SceneRobot
+from dynx.world.scene.scene import Scene
+
+MAX_DEPTH = 490
+"""Largest number of links in a row; MuJoCo's reader refuses elements that are nested 500 deep."""
+
+UNLIMITED = 1e10
+"""Joint limit [rad or m] that stands for an absent one beside one that is stated."""
+
+RANGE_GAP = 1e-12
+"""Range given to a joint whose limits are equal, which MuJoCo refuses, relative to the limit and at least in
+rad or m."""
+
+
+def scene_to_mjcf(scene: Scene) -> str:
+    """Return a scene as an MJCF document, complete in itself, that MuJoCo loads without dynx.
+
+    Bodies are named ``robot/link`` or as the body of the scene, joints ``robot/joint``, free joints as the
+    robot or body that they move, geoms by their part and number; the state at the start is the keyframe
+    ``start``. Meshes are written as their convex hulls. Left out are restitution, velocity and effort limits,
+    motors, added frames and visual shapes, of which links keep the first colour.
+
+    Raises UnsupportedFeatureError for an inertia that MuJoCo refuses, such as a link that moves without mass,
+    DescriptionError for a fault in a collision shape or its mesh, EngineLimitError for a robot with more than
+    `MAX_DEPTH` links in a row.
+    """
+    return _Document(scene).write()
+
+
+class _Document:
+    def __init__(self, scene: Scene) -> None:
+        self._scene = scene
+        self._root = Element("mujoco", model=scene.name)
+        SubElement(
+            self._root,
+            "compiler",
+            angle="radian",
+            autolimits="true",
+            inertiafromgeom="false",
+            fusestatic="false",
+        )
+        option = SubElement(self._root, "option", gravity=text(scene.gravity))
+        # MuJoCo's own filter of parents and children is replaced by that of the scene.
+        SubElement(option, "flag", filterparent="disable")
+        self._shapes = ShapeWriter(SubElement(self._root, "asset"))
+        self._bodies = {WORLD: SubElement(self._root, "worldbody")}
+        self._contact = SubElement(self._root, "contact")
+        self._equality = SubElement(self._root, "equality")
+
+    def write(self) -> str:
+        q: list[str] = []
+        v: list[str] = []
+        for robot in self._scene.robots:
+            self._add_robot(robot)
+            _extend_start(robot, q, v)
+        for body in self._scene.bodies:
+            element = SubElement(self._bodies[WORLD], "body", placement(body.pose.matrix), name=body.name)
+            self._bodies[body.name] = element
+            if not body.fixed:
+                SubElement(element, "freejoint", name=body.name, align="false")
+                if not add_inertial(element, body.inertial, body.name, self._scene.name, None):
+                    raise _too_light(body.name, self._scene.name, None)
+                R = body.pose.matrix[:3, :3]
+                q += [text(body.pose.xyz), quat_text(R)]
+                v += [text(body.twist[:3]), text(np.array(body.twist[3:]) @ R)]
+            self._shapes.add(element, body.name, body.shapes, body.material, body.material.rgba)
+        self._exclude_pairs()
+        for number, constraint in enumerate(self._scene.constraints):
+            self._constrain(number, constraint)
+        if q:
+            keyframe = SubElement(self._root, "keyframe")
+            SubElement(keyframe, "key", name="start", qpos=" ".join(q), qvel=" ".join(v))
+        for empty in [part for part in self._root if len(part) == 0 and not part.attrib]:
+            self._root.remove(empty)
+        indent(self._root)
+        return tostring(self._root, encoding="unicode") + "\n"
+
+    def _add_robot(self, robot: SceneRobot) -> None:
+        model = robot.model
+        root = _start_pose(robot)
+        bodies = {model.root: self._add_body(WORLD, f"{robot.name}/{model.root}", root)}
+        if model.floating:
+            SubElement(bodies[model.root], "freejoint", name=robot.name, align="false")
+        depths = {model.root: 1}
+        for joint in model.joints:
+            depths[joint.child] = depths[joint.parent] + 1
+            if depths[joint.child] > MAX_DEPTH:
+                raise EngineLimitError(
+                    f"robot {shown(robot.name)} has more than {MAX_DEPTH} links in a row; MuJoCo reads no "
+                    "deeper document"
+                )
+            parent, child = f"{robot.name}/{joint.parent}", f"{robot.name}/{joint.child}"
+            bodies[joint.child] = self._add_body(parent, child, joint.origin.matrix)
+            if joint.moves:
+                _add_joint(bodies[joint.child], f"{robot.name}/{joint.name}", joint)
+            if joint.moves and joint.mimic is not None:
+                SubElement(
+                    self._equality,
+                    "joint",
+                    joint1=f"{robot.name}/{joint.name}",
+                    joint2=f"{robot.name}/{joint.mimic.joint}",
+                    polycoef=text([joint.mimic.offset, joint.mimic.multiplier, 0.0, 0.0, 0.0]),
+                )
+        heads = merged_links(model)
+        self._add_inertials(robot, bodies, heads)
+        for link in model.links:
+            shapes = model.geometry.links.get(link.name)
+            if shapes is None:
+                continue
+            material = robot.material_of(link.name)
+            colours = (each.material.rgba for each in shapes.visuals if each.material is not None)
+            rgba = next((colour for colour in colours if colour is not None), material.rgba)
+            placed = model.geometry.collisions(link.name)
+            grounds = [each for each in placed if isinstance(each.shape, Plane | HeightField)]
+            if grounds and (model.floating or heads[link.name] != model.root):
+                kind = type(grounds[0].shape).__name__
+                raise UnsupportedFeatureError(
+                    f"{shown(f'{robot.name}/{link.name}')} moves with a {kind}, which MuJoCo refuses",
+                    source=model.source,
+                    line=grounds[0].line,
+                )
+            self._shapes.add(bodies[link.name], f"{robot.name}/{link.name}", placed, material, rgba)
+
+    def _add_body(self, parent: str, name: str, T: Floats) -> Element:
+        self._bodies[name] = SubElement(self._bodies[parent], "body", placement(T), name=name)
+        return self._bodies[name]
+
+    def _add_inertials(self, robot: SceneRobot, bodies: dict[str, Element], heads: dict[str, str]) -> None:
+        """Add the inertias of the links; raise UnsupportedFeatureError for links that move without one."""
+        model = robot.model
+        with_inertia = set() if model.floating else {model.root}
+        for link in model.links:
+            name = f"{robot.name}/{link.name}"
+            inertial = link.inertial or Inertial()
+            if inertial == Inertial():
+                continue
+            if add_inertial(bodies[link.name], inertial, name, model.source, link.line):
+                with_inertia.add(heads[link.name])
+        for link in model.links:
+            if heads[link.name] not in with_inertia:
+                raise _too_light(f"{robot.name}/{link.name}", model.source, link.line)
+
+    def _exclude_pairs(self) -> None:
+        """Exclude the pairs that may not collide; MuJoCo itself tests none that are both fixed."""
+        scene = self._scene
+        parts = [name for name in scene.parts if self._bodies[name].find("geom") is not None]
+        filters = CollisionFilter(scene.robots, scene.bodies, ())
+        fixed = {name for name in parts if filters.is_fixed(name)}
+        for a, b in combinations(parts, 2):
+            if not (a in fixed and b in fixed) and not scene.may_collide(a, b):
+                SubElement(self._contact, "exclude", body1=a, body2=b)
+
+    def _constrain(self, number: int, constraint: Weld | PointToPoint) -> None:
+        """Add a constraint between sites at its two ends."""
+        if isinstance(constraint, PointToPoint):
+            tag, at_b = "connect", Pose(constraint.point_b).matrix
+            at_a = Pose(constraint.point_a).matrix
+        else:
+            tag, at_b = "weld", IDENTITY.matrix
+            at_a = (
+                np.linalg.inv(self._start(constraint.a)) @ self._start(constraint.b)
+                if constraint.T_a_b is None
+                else constraint.T_a_b.matrix
+            )
+        sites = [f"constraint{number}/{end}" for end in "ab"]
+        for name, part, T in zip(sites, (constraint.a, constraint.b), (at_a, at_b), strict=True):
+            # A site of group 3 is not drawn unless it is asked for.
+            SubElement(self._bodies[part], "site", placement(T), name=name, group="3")
+        SubElement(self._equality, tag, site1=sites[0], site2=sites[1])
+
+    def _start(self, part: str) -> Floats:
+        """Return the pose of a part in the world at the start."""
+        owner, link = split_name(part)
+        if link is not None:
+            robot = self._scene.robot(owner)
+            return LinkFrames(robot.model).pose(np.array(robot.q), link)
+        return IDENTITY.matrix if owner == WORLD else self._scene.body(owner).pose.matrix
+
+
+def _too_light(name: str, source: str, line: int | None) -> UnsupportedFeatureError:
+    return UnsupportedFeatureError(
+        f"{shown(name)} moves without a mass and moments of its own or of links fixed to it, which MuJoCo "
+        "refuses; wanted a mass and three positive moments",
+        source=source,
+        line=line,
+    )
+
+
+def _start_pose(robot: SceneRobot) -> Floats:
+    if not robot.model.floating:
+        return robot.model.base_pose.matrix
+    q = np.array(robot.q)
+    return homogeneous(rotation_from_quat(q[3:7]), q[:3])
+
+
+def _extend_start(robot: SceneRobot, q: list[str], v: list[str]) -> None:
+    """Append the state of a robot at the start, in MuJoCo's coordinates."""
+    model = robot.model
+    start, speed = np.array(robot.q), np.array(robot.v)
+    coupling = model.mechanism.coupling
+    if coupling is not None:
+        start, speed = coupling.expand_q(start), coupling.matrix() @ speed
+    if model.floating:
+        R = rotation_from_quat(start[3:7])
+        start[3:7] = start[[6, 3, 4, 5]]
+        # MuJoCo's linear velocity of a floating base is in world axes, the angular one in those of the base.
+        speed[:3] = R @ speed[:3]
+    if len(start):
+        q.append(text(start))
+    if len(speed):
+        v.append(text(speed))
+
+
+def _add_joint(body: Element, name: str, joint: Joint) -> None:
+    attributes = {
+        "name": name,
+        "type": "slide" if joint.type == "prismatic" else "hinge",
+        "axis": text(joint.axis),
+    }
+    lower, upper = sorted((joint.limits.lower, joint.limits.upper))
+    if math.isfinite(lower) or math.isfinite(upper):
+        lower = lower if math.isfinite(lower) else -UNLIMITED
+        upper = max(upper if math.isfinite(upper) else UNLIMITED, lower + RANGE_GAP * max(1.0, abs(lower)))
+        attributes |= {"limited": "true", "range": text((lower, upper))}
+    dynamics = joint.dynamics
+    given = {"damping": dynamics.damping, "frictionloss": dynamics.friction, "armature": dynamics.armature}
+    attributes |= {key: repr(float(value)) for key, value in given.items() if value}
+    SubElement(body, "joint", attributes)

@@ -1,0 +1,145 @@
+"""Shapes and inertias as elements of MJCF, MuJoCo's format of models."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+from xml.etree.ElementTree import Element, SubElement
+
+import numpy as np
+
+from dynx.errors import UnsupportedFeatureError, shown
+from dynx.model.elements import Inertial
+from dynx.model.geometry import Box, Capsule, Collision, Cylinder, HeightField, Mesh, Plane, Shape, Sphere
+from dynx.spatial.extended import FLOAT64_EPS, jacobi_eigen, longdouble
+from dynx.spatial.scalar import Floats
+from dynx.spatial.so3 import quat_from_rotation, rotation_from_rpy
+from dynx.world.scene.material import Material
+
+LEAST_INERTIA = 1e-15
+"""Mass [kg] and principal moment [kg m^2] that MuJoCo requires of bodies that move (mjMINVAL)."""
+
+LEAST_HEIGHT = 1e-6
+"""Range of heights [m] that a level height field is given, because MuJoCo requires one above zero."""
+
+BASE_HEIGHT = 1.0
+"""Depth [m] of the solid below the lowest point of a height field."""
+
+ROUNDING = 1e-9
+"""Excess of the largest principal moment over the sum of the others, relative to it, that counts as
+rounding."""
+
+
+def text(values: Iterable[Any]) -> str:
+    """Return numbers as text, each the shortest that reads back exactly."""
+    return " ".join(repr(float(value)) for value in values)
+
+
+def quat_text(R: Floats) -> str:
+    """Return the quaternion (w, x, y, z) of a rotation matrix (3, 3) as text."""
+    x, y, z, w = quat_from_rotation(np.asarray(R, dtype=np.float64))
+    return text([w, x, y, z])
+
+
+def placement(T: Floats) -> dict[str, str]:
+    """Return the attributes of a pose (4, 4)."""
+    return {"pos": text(T[:3, 3]), "quat": quat_text(T[:3, :3])}
+
+
+def add_inertial(body: Element, inertial: Inertial, name: str, source: str, line: int | None) -> bool:
+    """Add an inertia, in principal axes, and return whether MuJoCo accepts it for a body that moves.
+
+    Raises UnsupportedFeatureError for a negative mass or moment, and for moments of which one exceeds the sum
+    of the others: MuJoCo refuses both.
+    """
+
+    def fault(why: str) -> UnsupportedFeatureError:
+        return UnsupportedFeatureError(f"{shown(name)} {why}, which MuJoCo refuses", source=source, line=line)
+
+    principal, axes = jacobi_eigen(longdouble(inertial.tensor))
+    moments = np.asarray(principal, dtype=np.float64)
+    scale = float(np.max(np.abs(moments)))
+    moments[np.abs(moments) <= 4.0 * FLOAT64_EPS * scale] = 0.0
+    if inertial.mass < 0.0 or moments.min() < 0.0:
+        raise fault(f"has the mass {inertial.mass:.4g} kg and the least moment {moments.min():.4g} kg m^2")
+    largest = int(np.argmax(moments))
+    others = float(np.delete(moments, largest).sum())
+    if moments[largest] > others + ROUNDING * scale:
+        raise fault(f"has the principal moments {text(moments)} kg m^2, of which one exceeds the others' sum")
+    moments[largest] = min(moments[largest], others)
+    R = rotation_from_rpy(longdouble(inertial.origin.rpy)) @ axes
+    given = {"pos": text(inertial.origin.xyz), "quat": quat_text(R)}
+    SubElement(body, "inertial", given, mass=repr(float(inertial.mass)), diaginertia=text(moments))
+    return bool(inertial.mass >= LEAST_INERTIA and moments.min() >= LEAST_INERTIA)
+
+
+class ShapeWriter:
+    """Adds shapes to bodies; equal meshes and height fields become one asset."""
+
+    def __init__(self, asset: Element) -> None:
+        self._asset = asset
+        self._names: dict[Shape, str] = {}
+
+    def add(
+        self, body: Element, name: str, placed: Iterable[Collision], material: Material, rgba: Iterable[float]
+    ) -> None:
+        """Add shapes of one material, named by the part and their number.
+
+        Raises DescriptionError for a mesh that cannot be read.
+        """
+        friction = (material.friction, material.torsional_friction, material.rolling_friction)
+        given = {"friction": text(friction), "condim": str(_directions(*friction)), "rgba": text(rgba)}
+        for number, each in enumerate(placed):
+            T = each.origin.matrix.copy()
+            shape = each.shape
+            if isinstance(shape, HeightField):
+                T[:3, 3] += T[:3, 2] * np.min(shape.heights)
+            attributes = {"name": f"{name}/{number}", **self._form(shape), **placement(T), **given}
+            SubElement(body, "geom", attributes)
+
+    def _form(self, shape: Shape) -> dict[str, str]:
+        if isinstance(shape, Box):
+            return {"type": "box", "size": text(0.5 * np.array(shape.size))}
+        if isinstance(shape, Sphere):
+            return {"type": "sphere", "size": text([shape.radius])}
+        if isinstance(shape, Cylinder | Capsule):
+            kind = "cylinder" if isinstance(shape, Cylinder) else "capsule"
+            return {"type": kind, "size": text([shape.radius, 0.5 * shape.length])}
+        if isinstance(shape, Plane):
+            return {"type": "plane", "size": "0 0 1"}
+        if isinstance(shape, HeightField):
+            return {"type": "hfield", "hfield": self._field(shape)}
+        return {"type": "mesh", "mesh": self._hull(shape)}
+
+    def _field(self, shape: HeightField) -> str:
+        if shape not in self._names:
+            heights = np.array(shape.heights)
+            span = max(float(np.ptp(heights)), LEAST_HEIGHT)
+            # MuJoCo reads the rows of a document from the highest y to the lowest.
+            rows = heights[::-1] - heights.min()
+            SubElement(
+                self._asset,
+                "hfield",
+                name=self._new_name("heights", shape),
+                nrow=str(heights.shape[0]),
+                ncol=str(heights.shape[1]),
+                size=text([0.5 * shape.size[0], 0.5 * shape.size[1], span, BASE_HEIGHT]),
+                elevation=text(rows.ravel()),
+            )
+        return self._names[shape]
+
+    def _hull(self, shape: Mesh) -> str:
+        if shape not in self._names:
+            vertices, _ = shape.hull
+            name = self._new_name("mesh", shape)
+            # The moments of a shell need no volume, so that a tiny mesh is accepted too.
+            SubElement(self._asset, "mesh", name=name, vertex=text(vertices.ravel()), inertia="shell")
+        return self._names[shape]
+
+    def _new_name(self, kind: str, shape: Shape) -> str:
+        return self._names.setdefault(shape, f"{kind}{len(self._names)}")
+
+
+def _directions(sliding: float, torsional: float, rolling: float) -> int:
+    """Return MuJoCo's number of directions in which a contact with these coefficients has forces."""
+    return 6 if rolling else 4 if torsional else 3 if sliding else 1
