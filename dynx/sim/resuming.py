@@ -22,13 +22,17 @@ def require_rollout(rollout: object) -> None:
         )
 
 
-def refuse_other_scenario(rollout: Rollout, scenario: Scenario) -> None:
-    """Raise ArgumentError if the scenario of `rollout` differs from `scenario` in more than the duration."""
+def refuse_scene(scenario: Scenario) -> None:
+    """Raise ArgumentError for a scenario in a scene, which a record does not determine."""
     if isinstance(scenario.plant, ScenePlant):
         raise ArgumentError(
             "a rollout in a scene cannot be resumed, because its record does not have the engine's contact "
             "forces: Simulation.save and restore continue exactly"
         )
+
+
+def refuse_other_scenario(rollout: Rollout, scenario: Scenario) -> None:
+    """Raise ArgumentError if the scenario of `rollout` differs from `scenario` in more than the duration."""
     then = rollout.scenario
     if then is None:
         raise ArgumentError("the rollout to resume has no scenario, so it cannot be compared")

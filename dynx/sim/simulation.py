@@ -25,7 +25,7 @@ from dynx.sim.plants.plant import plant_errors
 from dynx.sim.plants.registry import make_plant
 from dynx.sim.plants.slip_bound import refuse_small_slip
 from dynx.sim.record.rollout import Rollout
-from dynx.sim.resuming import changed_parts, refuse_other_scenario, require_rollout
+from dynx.sim.resuming import changed_parts, refuse_other_scenario, refuse_scene, require_rollout
 from dynx.sim.scenario.scenario import Scenario
 from dynx.sim.setup import Setup, step_bytes
 from dynx.simd.machine import require_memory
@@ -363,6 +363,7 @@ class Simulation:
         field that differs, and for a rollout with `departures`.
         """
         require_rollout(rollout)
+        refuse_scene(self.scenario)
         step = len(rollout) if step is None else step
         most = len(rollout) if self.n_steps is None else min(len(rollout), self.n_steps)
         if not isinstance(step, int) or not 0 <= step <= most:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -65,7 +66,9 @@ class Commands:
 
         Returns False, and does nothing, where they must be sent again before each of them.
         """
-        checked = checked_torques(torques, self._robots, self._layout.robots) if torques else _NOTHING
+        checked = (
+            checked_torques(torques, self._robots, self._layout.robots) if torques is not None else _NOTHING
+        )
         if count > 1 and any(self._floating[k] and tau[:6].any() for k, tau in checked.items()):
             return False
         if self._pushed:
@@ -203,6 +206,20 @@ def with_scene_motors(
             raise ArgumentError(f"{name} is of type {type(given).__name__}; wanted a dict by robot")
     driven = {**(motors or {}), **(torques or {})}  # type: ignore[dict-item]
     return {**{name: own for name, own in scene_motors.items() if name not in driven}, **(motors or {})}
+
+
+def loads_of(world: object, loads: Callable[..., object], fixed: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the arguments of the next step: those that `loads` gives for this world, or else the fixed ones.
+
+    Raises ArgumentError unless it gives a dict of torques, motors and wrenches.
+    """
+    given = loads(world)
+    if not isinstance(given, Mapping):
+        raise ArgumentError(f"loads returned {shown(given)}; wanted a dict of {', '.join(fixed)}")
+    for name in given:
+        if name not in fixed:
+            raise UnknownNameError(f"loads returned {shown(name)}{nearest(str(name), fixed)}")
+    return {**fixed, **given}
 
 
 def checked_command(command: MotorCommand, model: Model) -> MotorCommand:

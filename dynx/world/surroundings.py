@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -25,8 +25,10 @@ class ContactTable:
     ``t[step[k]]``; all else is as in `dynx.world.Contact`, in world axes.
     """
 
+    n_steps: int
+    """Number of steps of the rollout."""
     names: tuple[str, ...]
-    """Bodies and links (``robot/link``) that touch at some time."""
+    """All bodies and links (``robot/link``) of the scene."""
     step: Integers
     a: Integers
     b: Integers
@@ -43,11 +45,10 @@ class ContactTable:
     """Forces (m, 3) on a, perpendicular to the normals [N]."""
 
     @classmethod
-    def of(cls, steps: Sequence[Sequence[Contact]]) -> ContactTable:
-        """Return the table of the contacts of each step."""
+    def of(cls, steps: Sequence[Sequence[Contact]], parts: Sequence[str]) -> ContactTable:
+        """Return the table of the contacts of each step; `parts` are the bodies and links of the scene."""
         listed = [(k, contact) for k, contacts in enumerate(steps) for contact in contacts]
-        names = tuple(sorted({name for _, contact in listed for name in (contact.a, contact.b)}))
-        number = {name: k for k, name in enumerate(names)}
+        number = {name: k for k, name in enumerate(parts)}
         vectors = {
             name: np.array([getattr(contact, name) for _, contact in listed]).reshape(-1, 3)
             for name in ("point_a", "point_b", "normal", "friction_force")
@@ -57,7 +58,8 @@ class ContactTable:
             for name in ("distance", "normal_force")
         }
         return cls(
-            names=names,
+            n_steps=len(steps),
+            names=tuple(parts),
             step=np.array([k for k, _ in listed], dtype=np.int64),
             a=np.array([number[contact.a] for _, contact in listed], dtype=np.int64),
             b=np.array([number[contact.b] for _, contact in listed], dtype=np.int64),
@@ -85,25 +87,32 @@ class ContactTable:
             self.friction_force[k],
         )
 
-    def force_on(self, name: str, n: int) -> Floats:
-        """Return the sum of the contact forces on a body or link in each of `n` steps (n, 3) [N].
+    @property
+    def touching(self) -> tuple[str, ...]:
+        """Bodies and links that touch something at some time."""
+        numbers = np.unique(np.concatenate([self.a, self.b])).tolist()
+        return tuple(self.names[number] for number in numbers)
 
-        Raises UnknownNameError for a name that is in no contact.
+    def force_on(self, part: str) -> Floats:
+        """Return the sum of the contact forces on a part in each step (n_steps, 3) [N], in world axes.
+
+        A part is a body, ``robot/link``, or a robot for all its links. Raises UnknownNameError for another.
         """
-        if name not in self.names:
-            raise UnknownNameError(f"no contact of {shown(name)}{nearest(name, self.names)}")
-        number, total = self.names.index(name), np.zeros((n, 3))
+        own = np.array([name == part or name.startswith(f"{part}/") for name in self.names])
+        if not own.any():
+            known = dict.fromkeys([*self.names, *(name.partition("/")[0] for name in self.names)])
+            raise UnknownNameError(f"no part {shown(part)}{nearest(str(part), known)}")
+        total = np.zeros((self.n_steps, 3))
         force = self.normal_force[:, None] * self.normal + self.friction_force
         for side, sign in ((self.a, 1.0), (self.b, -1.0)):
-            rows = side == number
+            rows = own[side]
             np.add.at(total, self.step[rows], sign * force[rows])
         return total
 
     def first(self, n: int) -> ContactTable:
         """Return the contacts of the first `n` steps."""
         end = int(np.searchsorted(self.step, n))
-        arrays = {each.name: getattr(self, each.name)[:end] for each in fields(self) if each.name != "names"}
-        return ContactTable(self.names, **arrays)
+        return ContactTable(n, self.names, **{name: getattr(self, name)[:end] for name in _COLUMNS})
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,7 +166,7 @@ def from_document(document: Mapping[str, Any], file: ArrayFile, n: int) -> Surro
         kind: {str(name): file.array(f"{kind}_{k}", (n + 1, *shape)) for k, name in enumerate(document[kind])}
         for kind, shape in _PARTS.items()
     }
-    return Surroundings(ContactTable(names, **arrays), parts["bodies"], parts["robots"])
+    return Surroundings(ContactTable(n, names, **arrays), parts["bodies"], parts["robots"])
 
 
 _COLUMNS: dict[str, tuple[tuple[int | None, ...], type]] = {

@@ -16,7 +16,7 @@ from dynx.model.configuration import positive_seconds, whole_number
 from dynx.model.package_paths import StrPath
 from dynx.spatial.scalar import Floats
 from dynx.world.camera import Camera, Picture, cast_rays, draw_picture
-from dynx.world.commands import Act, Commands, MotorsOf, with_scene_motors
+from dynx.world.commands import Act, Commands, MotorsOf, loads_of, with_scene_motors
 from dynx.world.contacts import ClosestPoints, Contact, RayHits
 from dynx.world.engine import WorldEngine
 from dynx.world.identity import identity
@@ -173,7 +173,7 @@ class World:
         """
         self._require()
         n = math.ceil(positive_seconds("duration", duration) / self.dt - TIME_ROUNDING)
-        fixed = {"torques": torques, "motors": motors, "wrenches": wrenches}
+        fixed: dict[str, Any] = {"torques": torques, "motors": motors, "wrenches": wrenches}
         if loads is None and not real_time:
             self.step(max(1, n), torques, motors, wrenches)
             return
@@ -181,7 +181,7 @@ class World:
             raise ArgumentError(f"loads is of type {type(loads).__name__}; wanted a function of the world")
         began = time.perf_counter()
         for k in range(max(1, n)):
-            self.step(1, **(fixed if loads is None else fixed | dict(loads(self))))
+            self.step(1, **(fixed if loads is None else loads_of(self, loads, fixed)))
             if real_time:
                 time.sleep(max(0.0, began + (k + 1) * self.dt - time.perf_counter()))
 

@@ -162,6 +162,23 @@ def test_a_bad_call_is_refused_and_changes_nothing(world: World, fault: str) -> 
     world.step()
 
 
+@pytest.mark.parametrize(
+    ("loads", "message"),
+    [
+        (lambda world: None, "loads returned 'None'; wanted a dict of torques, motors, wrenches"),
+        (lambda world: {"torque": {}}, "loads returned 'torque'; did you mean 'torques'"),
+        (lambda world: np.zeros(6), "wanted a dict"),
+    ],
+)
+def test_loads_of_another_form_are_refused(world: World, loads: Any, message: str) -> None:
+    with pytest.raises(ArgumentError, match=message):
+        world.run(0.01, loads=loads)
+    wrong: Any = np.zeros(6)
+    for call in (world.step, lambda **given: world.run(0.01, **given)):
+        with pytest.raises(ArgumentError, match="torques is of type ndarray; wanted a dict by robot"):
+            call(torques=wrong)
+
+
 def test_a_closed_world_refuses_every_call(world: World) -> None:
     snapshot = world.save()
     world.close()

@@ -83,7 +83,8 @@ def setting(word: str) -> tuple[str, str]:
 def world() -> None:
     """Run a scene of robots and bodies with contacts, and compare the engines.
 
-    SCENE is a scene file (TOML or JSON) or the name of a scene of dynx; --help of a wrong name lists them.
+    SCENE is a scene file (TOML or JSON) or the name of a scene of dynx: bowling, duck, pushing, rolling,
+    slope, stack or standing.
     The final states are printed, the contacts of the last step, and for every two engines how far apart
     their motions are over time.
 

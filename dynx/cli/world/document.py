@@ -101,7 +101,8 @@ def _engine(comparison: WorldComparison, run: EngineRun) -> EngineEntry:
     moving = [body.name for body in scene.bodies if not body.fixed]
     return {
         "engine": run.engine,
-        "version": run.version,
+        # Most versions begin with the name of the engine.
+        "version": run.version.removeprefix(run.engine).strip(),
         "settings": dict(run.settings),
         "time": last.time,
         "error": None if run.error is None else str(run.error),

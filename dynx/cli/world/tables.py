@@ -22,10 +22,7 @@ MAX_ROWS = 30
 def show(out: Console, report: Entry) -> None:
     """Print the final states, the contacts, and the distances between the engines."""
     engines: Sequence[Entry] = report["engines"]
-    # Most versions begin with the name of the engine.
-    names = ", ".join(
-        f"{each['engine']} {each['version'].removeprefix(each['engine']).strip()}" for each in engines
-    )
+    names = ", ".join(f"{each['engine']} {each['version']}" for each in engines)
     step = f"dt {report['dt']:g} s" + (f" in {report['substeps']} steps" if report["substeps"] > 1 else "")
     out.print(
         f"{one_line(report['scene'])}: {report['duration']:g} s, {step}, by {one_line(names)}", style="bold"

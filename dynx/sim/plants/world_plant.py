@@ -108,7 +108,7 @@ class WorldPlant(Plant):
     def surroundings(self, n: int) -> Surroundings:
         states = self._states[: n + 1]
         return Surroundings(
-            ContactTable.of(self._contacts[:n]),
+            ContactTable.of(self._contacts[:n], self._world.scene.parts),
             {name: np.array([each.bodies[name].T_world_body for each in states]) for name in self._moving},
             {name: np.array([each.robots[name].q for each in states]) for name in self._others},
         )

@@ -45,8 +45,8 @@ def write_csv(rollout: RolloutData, file: BinaryIO) -> None:
     forces = np.zeros((len(rollout), 0))
     if rollout.surroundings is not None:
         contacts = rollout.surroundings.contacts
-        columns += [f"contact:{name}:{axis}" for name in contacts.names for axis in "xyz"]
-        each = [contacts.force_on(name, len(rollout)) for name in contacts.names]
+        columns += [f"contact:{name}:{axis}" for name in contacts.touching for axis in "xyz"]
+        each = [contacts.force_on(name) for name in contacts.touching]
         forces = np.concatenate([forces, *each], axis=1)
     nothing = [""] * (3 * model.nv + forces.shape[1])
     file.write((",".join(_quoted(column) for column in columns) + "\n").encode())

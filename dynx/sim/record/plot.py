@@ -77,11 +77,9 @@ def _contact_forces(rollout: RolloutData) -> dict[str, Floats]:
         return {}
     contacts = rollout.surroundings.contacts
     # The ground's force is the sum of the others.
-    moving = {name for name in contacts.names if "/" in name or name in rollout.surroundings.bodies}
+    moving = {name for name in contacts.touching if "/" in name or name in rollout.surroundings.bodies}
     found = {
-        name: np.linalg.norm(contacts.force_on(name, len(rollout)), axis=1)
-        for name in contacts.names
-        if name in moving
+        name: np.linalg.norm(contacts.force_on(name), axis=1) for name in contacts.touching if name in moving
     }
     largest = sorted(found, key=lambda name: -float(np.max(found[name])))[:MAX_CONTACT_CURVES]
     return {name: found[name] for name in sorted(largest)}

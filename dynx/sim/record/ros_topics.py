@@ -147,12 +147,12 @@ def _contact_topics(rollout: RolloutData) -> list[Topic]:
     contacts, n = rollout.surroundings.contacts, len(rollout)
     world = "world" if rollout.model.root != "world" else "map"
     topics, taken = [], set()
-    for name in contacts.names:
+    for name in contacts.touching:
         allowed = re.sub(r"[^A-Za-z0-9_/]", "_", name)
         # Names that differ in other characters only get a number.
         topic = next(each for each in _numbered(f"/contacts/{allowed}") if each not in taken)
         taken.add(topic)
-        force = np.concatenate([contacts.force_on(name, n), np.zeros((n, 3))], axis=1)
+        force = np.concatenate([contacts.force_on(name), np.zeros((n, 3))], axis=1)
         topics.append(Topic(topic, "geometry_msgs/WrenchStamped", 0, n, _stamped(world, force)))
     return topics
 

@@ -10,10 +10,10 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from dynx.errors import ArgumentError, NotInstalledError, RobotNotFoundError, nearest, shown
+from dynx.errors import ArgumentError, DescriptionError, NotInstalledError, RobotNotFoundError, nearest, shown
 from dynx.files.reading import checked_path, printable, read_file
 from dynx.files.writing import write_bytes
-from dynx.model.library import own_roots
+from dynx.model.library import own_roots, robots
 from dynx.model.package_paths import StrPath
 from dynx.world.scene.paths import ScenePaths
 from dynx.world.scene.reading import scene_from_document
@@ -46,8 +46,9 @@ def read_scene(source: str | os.PathLike[str], *, package_dirs: Iterable[StrPath
         raise ArgumentError(f"{name} cannot be read: {error}") from None
     try:
         return scene_from_document(document, ScenePaths(path.parent, package_dirs))
-    except ArgumentError as error:
-        raise type(error)(f"{name}: {error}") from error
+    except (ArgumentError, DescriptionError, RobotNotFoundError) as error:
+        kind = DescriptionError if isinstance(error, DescriptionError) else type(error)
+        raise kind(f"{name}: {error}") from error
 
 
 def write_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
@@ -84,7 +85,14 @@ def _named(name: str) -> Path:
         if name in scene_names() and path.is_file():
             return path
     known = scene_names()
-    raise RobotNotFoundError(f"no scene {shown(name)}{nearest(name, known)}; a file ends in .toml or .json")
+    hint = "; a scene names its robots in a .toml or .json file" if name in _robot_names() else ""
+    raise RobotNotFoundError(
+        f"no scene {shown(name)}{nearest(name, known)}; a file of a scene ends in .toml or .json{hint}"
+    )
+
+
+def _robot_names() -> set[str]:
+    return {entry.name for entry in robots()}
 
 
 def _text(data: bytes, name: str) -> str:

@@ -9,7 +9,7 @@ from dataclasses import MISSING, fields
 
 import numpy as np
 
-from dynx.errors import ArgumentError, DescriptionError, shown
+from dynx.errors import ArgumentError, DescriptionError, RobotNotFoundError, shown
 from dynx.files.documents import convert_document
 from dynx.model import Model, Pose
 from dynx.model.elements import IDENTITY, ZERO
@@ -86,10 +86,9 @@ def _place(place: str) -> Iterator[None]:
     """Name the place in the document in an error."""
     try:
         yield
-    except DescriptionError as error:
-        raise DescriptionError(f"{place}: {error}") from error
-    except ArgumentError as error:
-        raise type(error)(f"{place}: {error}") from error
+    except (ArgumentError, DescriptionError, RobotNotFoundError) as error:
+        kind = DescriptionError if isinstance(error, DescriptionError) else type(error)
+        raise kind(f"{place}: {error}") from error
 
 
 # -- robots ---------------------------------------------------------------------------------------
@@ -223,6 +222,8 @@ def _solid(given: ShapeDocument, paths: ScenePaths) -> Shape:
                 raise ArgumentError(f"{name} is {shown(numbers)}; wanted radius and length")
             return kind(*numbers)
     if given.heights is not None:
+        if given.size is None:
+            raise ArgumentError("heights has no size; wanted the extent of the grid along x and y")
         return HeightField(given.heights, given.size)  # type: ignore[arg-type]
     if given.mesh is not None:
         scale = (1.0, 1.0, 1.0) if given.scale is None else given.scale

@@ -81,13 +81,19 @@ def test_contact_forces_account_for_the_motion_of_what_is_pushed(engine: str) ->
     assert around is not None
     n, path = len(rollout), around.bodies["cube"][:, :3, 3]
     assert path[-1, 0] > path[0, 0] + 0.05
-    force = around.contacts.force_on("cube", n)
+    force = around.contacts.force_on("cube")
     # Newton's second law over the last 0.1 s: change of momentum = impulse of contacts and gravity.
     window = slice(n - 100, n)
     momentum = 0.5 * (path[n] - path[n - 1] - (path[n - 100] - path[n - 101])) / rollout.scenario.dt  # type: ignore[union-attr]
     impulse = 1e-3 * (force[window] + [0.0, 0.0, -0.5 * 9.81]).sum(axis=0)
     np.testing.assert_allclose(momentum, impulse, atol=0.03)
-    pusher = around.contacts.force_on("slider/pusher", n)
+    np.testing.assert_array_equal(
+        around.contacts.force_on("slider"), around.contacts.force_on("slider/pusher")
+    )
+    assert not around.contacts.force_on("slider/rail").any()
+    with pytest.raises(UnknownNameError, match="did you mean 'cube'"):
+        around.contacts.force_on("cub")
+    pusher = around.contacts.force_on("slider/pusher")
     assert (pusher[:, 0] <= 1e-9).all()
     assert pusher[:, 0].min() < -0.3 * 0.5 * 9.81
 
@@ -102,7 +108,7 @@ def test_a_floating_robot_rests_with_its_payload_on_the_ground(engine: str) -> N
     )
     around = rollout.surroundings
     assert around is not None
-    force = around.contacts.force_on("brick/body", len(rollout))
+    force = around.contacts.force_on("brick/body")
     np.testing.assert_allclose(force[-200:].mean(axis=0), [0.0, 0.0, 5.0 * 9.81], atol=0.05)
     assert around.contacts[999]
     assert {around.contacts[999][0].a, around.contacts[999][0].b} == {"brick/body", "ground"}

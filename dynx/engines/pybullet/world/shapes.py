@@ -55,11 +55,14 @@ class ShapeFiles:
 
 
 def binary_stl(triangles: Floats) -> bytes:
-    """Return triangles (n, 3, 3) as a binary STL file."""
+    """Return triangles (n, 3, 3) as a binary STL file, with the normals by which they are shaded."""
     records = np.zeros(
         len(triangles), dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("spare", "<u2")]
     )
     records["corners"] = triangles
+    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    records["normal"] = normals / np.where(lengths > 0.0, lengths, 1.0)
     return b"\0" * 80 + len(triangles).to_bytes(4, "little") + records.tobytes()
 
 
