@@ -13,7 +13,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 import numpy as np
 
 from dynx.errors import EngineLimitError, UnsupportedFeatureError, shown
-from dynx.model.elements import IDENTITY, Inertial, Joint, Pose
+from dynx.model.elements import IDENTITY, Joint, Pose
 from dynx.model.geometry import HeightField, Plane
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous
@@ -21,7 +21,8 @@ from dynx.spatial.so3 import rotation_from_quat
 from dynx.world.scene.constraints import PointToPoint, Weld
 from dynx.world.scene.filters import CollisionFilter, merged_links
 from dynx.world.scene.link_frames import LinkFrames
-from dynx.world.scene.mjcf_shapes import ShapeWriter, add_inertial, placement, quat_text, text
+from dynx.world.scene.mjcf_inertias import add_inertial, add_inertias
+from dynx.world.scene.mjcf_shapes import ShapeWriter, placement, quat_text, text
 from dynx.world.scene.names import WORLD, split_name
 from dynx.world.scene.robots import SceneRobot
 from dynx.world.scene.scene import Scene
@@ -43,7 +44,8 @@ def scene_to_mjcf(scene: Scene) -> str:
     Bodies are named ``robot/link`` or as the body of the scene, joints ``robot/joint``, free joints as the
     robot or body that they move, geoms by their part and number; the state at the start is the keyframe
     ``start``. Meshes are written as their convex hulls. Left out are restitution, velocity and effort limits,
-    motors, added frames and visual shapes, of which links keep the first colour.
+    motors, added frames and visual shapes, of which links keep the first colour. Where MuJoCo refuses the
+    inertias of links that fixed joints connect, the first of these links gets the merged inertia.
 
     Raises UnsupportedFeatureError for an inertia that MuJoCo refuses, such as a link that moves without mass,
     DescriptionError for a fault in a collision shape or its mesh, EngineLimitError for a robot with more than
@@ -79,12 +81,13 @@ class _Document:
             self._add_robot(robot)
             _extend_start(robot, q, v)
         for body in self._scene.bodies:
-            element = SubElement(self._bodies[WORLD], "body", placement(body.pose.matrix), name=body.name)
+            element = SubElement(
+                self._bodies[WORLD], "body", {"name": body.name, **placement(body.pose.matrix)}
+            )
             self._bodies[body.name] = element
             if not body.fixed:
                 SubElement(element, "freejoint", name=body.name, align="false")
-                if not add_inertial(element, body.inertial, body.name, self._scene.name, None):
-                    raise _too_light(body.name, self._scene.name, None)
+                add_inertial(element, body.inertial, body.name, self._scene.name)
                 R = body.pose.matrix[:3, :3]
                 q += [text(body.pose.xyz), quat_text(R)]
                 v += [text(body.twist[:3]), text(np.array(body.twist[3:]) @ R)]
@@ -127,7 +130,7 @@ class _Document:
                     polycoef=text([joint.mimic.offset, joint.mimic.multiplier, 0.0, 0.0, 0.0]),
                 )
         heads = merged_links(model)
-        self._add_inertials(robot, bodies, heads)
+        add_inertias(robot, bodies)
         for link in model.links:
             shapes = model.geometry.links.get(link.name)
             if shapes is None:
@@ -147,23 +150,8 @@ class _Document:
             self._shapes.add(bodies[link.name], f"{robot.name}/{link.name}", placed, material, rgba)
 
     def _add_body(self, parent: str, name: str, T: Floats) -> Element:
-        self._bodies[name] = SubElement(self._bodies[parent], "body", placement(T), name=name)
+        self._bodies[name] = SubElement(self._bodies[parent], "body", {"name": name, **placement(T)})
         return self._bodies[name]
-
-    def _add_inertials(self, robot: SceneRobot, bodies: dict[str, Element], heads: dict[str, str]) -> None:
-        """Add the inertias of the links; raise UnsupportedFeatureError for links that move without one."""
-        model = robot.model
-        with_inertia = set() if model.floating else {model.root}
-        for link in model.links:
-            name = f"{robot.name}/{link.name}"
-            inertial = link.inertial or Inertial()
-            if inertial == Inertial():
-                continue
-            if add_inertial(bodies[link.name], inertial, name, model.source, link.line):
-                with_inertia.add(heads[link.name])
-        for link in model.links:
-            if heads[link.name] not in with_inertia:
-                raise _too_light(f"{robot.name}/{link.name}", model.source, link.line)
 
     def _exclude_pairs(self) -> None:
         """Exclude the pairs that may not collide; MuJoCo itself tests none that are both fixed."""
@@ -190,7 +178,7 @@ class _Document:
         sites = [f"constraint{number}/{end}" for end in "ab"]
         for name, part, T in zip(sites, (constraint.a, constraint.b), (at_a, at_b), strict=True):
             # A site of group 3 is not drawn unless it is asked for.
-            SubElement(self._bodies[part], "site", placement(T), name=name, group="3")
+            SubElement(self._bodies[part], "site", {"name": name, "group": "3", **placement(T)})
         SubElement(self._equality, tag, site1=sites[0], site2=sites[1])
 
     def _start(self, part: str) -> Floats:
@@ -200,15 +188,6 @@ class _Document:
             robot = self._scene.robot(owner)
             return LinkFrames(robot.model).pose(np.array(robot.q), link)
         return IDENTITY.matrix if owner == WORLD else self._scene.body(owner).pose.matrix
-
-
-def _too_light(name: str, source: str, line: int | None) -> UnsupportedFeatureError:
-    return UnsupportedFeatureError(
-        f"{shown(name)} moves without a mass and moments of its own or of links fixed to it, which MuJoCo "
-        "refuses; wanted a mass and three positive moments",
-        source=source,
-        line=line,
-    )
 
 
 def _start_pose(robot: SceneRobot) -> Floats:

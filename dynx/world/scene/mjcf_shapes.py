@@ -1,4 +1,4 @@
-"""Shapes and inertias as elements of MJCF, MuJoCo's format of models."""
+"""Shapes as elements of MJCF, MuJoCo's format of models."""
 
 from __future__ import annotations
 
@@ -8,26 +8,16 @@ from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 
-from dynx.errors import UnsupportedFeatureError, shown
-from dynx.model.elements import Inertial
 from dynx.model.geometry import Box, Capsule, Collision, Cylinder, HeightField, Mesh, Plane, Shape, Sphere
-from dynx.spatial.extended import FLOAT64_EPS, jacobi_eigen, longdouble
 from dynx.spatial.scalar import Floats
-from dynx.spatial.so3 import quat_from_rotation, rotation_from_rpy
+from dynx.spatial.so3 import quat_from_rotation
 from dynx.world.scene.material import Material
-
-LEAST_INERTIA = 1e-15
-"""Mass [kg] and principal moment [kg m^2] that MuJoCo requires of bodies that move (mjMINVAL)."""
 
 LEAST_HEIGHT = 1e-6
 """Range of heights [m] that a level height field is given, because MuJoCo requires one above zero."""
 
 BASE_HEIGHT = 1.0
 """Depth [m] of the solid below the lowest point of a height field."""
-
-ROUNDING = 1e-9
-"""Excess of the largest principal moment over the sum of the others, relative to it, that counts as
-rounding."""
 
 
 def text(values: Iterable[Any]) -> str:
@@ -44,33 +34,6 @@ def quat_text(R: Floats) -> str:
 def placement(T: Floats) -> dict[str, str]:
     """Return the attributes of a pose (4, 4)."""
     return {"pos": text(T[:3, 3]), "quat": quat_text(T[:3, :3])}
-
-
-def add_inertial(body: Element, inertial: Inertial, name: str, source: str, line: int | None) -> bool:
-    """Add an inertia, in principal axes, and return whether MuJoCo accepts it for a body that moves.
-
-    Raises UnsupportedFeatureError for a negative mass or moment, and for moments of which one exceeds the sum
-    of the others: MuJoCo refuses both.
-    """
-
-    def fault(why: str) -> UnsupportedFeatureError:
-        return UnsupportedFeatureError(f"{shown(name)} {why}, which MuJoCo refuses", source=source, line=line)
-
-    principal, axes = jacobi_eigen(longdouble(inertial.tensor))
-    moments = np.asarray(principal, dtype=np.float64)
-    scale = float(np.max(np.abs(moments)))
-    moments[np.abs(moments) <= 4.0 * FLOAT64_EPS * scale] = 0.0
-    if inertial.mass < 0.0 or moments.min() < 0.0:
-        raise fault(f"has the mass {inertial.mass:.4g} kg and the least moment {moments.min():.4g} kg m^2")
-    largest = int(np.argmax(moments))
-    others = float(np.delete(moments, largest).sum())
-    if moments[largest] > others + ROUNDING * scale:
-        raise fault(f"has the principal moments {text(moments)} kg m^2, of which one exceeds the others' sum")
-    moments[largest] = min(moments[largest], others)
-    R = rotation_from_rpy(longdouble(inertial.origin.rpy)) @ axes
-    given = {"pos": text(inertial.origin.xyz), "quat": quat_text(R)}
-    SubElement(body, "inertial", given, mass=repr(float(inertial.mass)), diaginertia=text(moments))
-    return bool(inertial.mass >= LEAST_INERTIA and moments.min() >= LEAST_INERTIA)
 
 
 class ShapeWriter:

@@ -220,9 +220,12 @@ def test_links_collide_as_the_scene_says(self_collision: bool) -> None:
 @pytest.mark.parametrize(
     ("robot", "message"),
     [
-        (chain(INERTIAL, ""), "'r/l1' moves without a mass and moments"),
-        (chain("", INERTIAL, base="floating"), "'r/l0' moves without"),
-        (Model.build("m", [Link("l", Inertial(-2.0))], []), "'r/l' has the mass -2 kg"),
+        (chain(INERTIAL, ""), "'r/l1' moves with a mass of 0 kg and the principal moments 0, 0, 0"),
+        (chain("", INERTIAL, base="floating"), "'r/l0' moves with a mass of 0 kg"),
+        (
+            Model.build("m", [Link("l", Inertial(-2.0))], [], base="floating"),
+            "'r/l' has the mass -2 kg and the least moment 0",
+        ),
         (chain("", INERTIAL.replace('ixx="1"', 'ixx="9"')), "one exceeds the others' sum"),
         (
             chain(
@@ -242,6 +245,24 @@ def test_a_link_without_mass_moves_with_those_fixed_to_it() -> None:
     robot = chain("", "", INERTIAL, kind="fixed", base="floating")
     model, _ = load(Scene("s", robots=(SceneRobot("r", robot),)))
     assert model.body_subtreemass[1] == 2.0
+
+
+@pytest.mark.parametrize("base", ["fixed", "floating"])
+def test_links_that_mujoco_refuses_are_merged_with_those_fixed_to_them(base: Any) -> None:
+    point = (
+        '<inertial><mass value="0.5"/><inertia ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"/></inertial>'
+    )
+    links = [INERTIAL.replace('ixx="1"', 'ixx="2.5"'), point, INERTIAL, INERTIAL]
+    robot = chain(*links, kind="fixed", base=base)
+    model, data = load(Scene("s", robots=(SceneRobot("r", robot),)))
+    if base == "fixed":
+        assert model.body_subtreemass[1] == 4.5
+        return
+    assert model.body("r/l0").mass[0] == pytest.approx(6.5)
+    M = np.zeros((6, 6))
+    mujoco.mj_fullM(model, data, M)
+    reference = dynx.backend("reference", robot)
+    np.testing.assert_allclose(M, reference.mass_matrix(robot.neutral()), atol=1e-12)
 
 
 def test_the_depth_of_a_robot_is_bounded() -> None:
