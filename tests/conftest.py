@@ -55,12 +55,19 @@ LONGEST = (
 """Beginnings of the names of tests that take up to a minute each."""
 
 
+LARGEST_CHUNK = 2
+"""Largest number of tests that a parallel worker is given at a time."""
+
+
 def pytest_configure(config: pytest.Config) -> None:
     """Make one cache of compiled kernels for this run and its parallel workers, and remove it afterwards.
 
     Each kernel is compiled once, and no test depends on files of an earlier run. If DYNX_CACHE_DIR names a
     folder, that one is used and kept.
     """
+    # By default one worker gets an eighth of all tests at the start, with all of the longest among them.
+    if getattr(config.option, "maxschedchunk", 0) is None:
+        config.option.maxschedchunk = LARGEST_CHUNK
     if "DYNX_CACHE_DIR" not in os.environ:
         folder = tempfile.TemporaryDirectory(prefix="dynx-tests-")
         os.environ["DYNX_CACHE_DIR"] = folder.name
