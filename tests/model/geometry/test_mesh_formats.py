@@ -7,12 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import trimesh
 
 from dynx.errors import DescriptionError, ModelError
 from dynx.model.geometry import Mesh, mesh_reading
 from dynx.spatial.scalar import Floats
 from tests.model.geometry.mesh_files import accessor, dae, gltf, obj, stl, text_stl
+
+trimesh = pytest.importorskip("trimesh")
 
 GOOD = {
     "binary.stl": stl(),
