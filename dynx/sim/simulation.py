@@ -57,7 +57,7 @@ class Snapshot:
     executor: tuple[str, ...]
     departures: tuple[str, ...]
     plant_memory: Any = None
-    """What the plant needs besides the state, such as the world around the robot."""
+    """All that the plant needs besides the state, such as the world around the robot."""
 
     @property
     def time(self) -> float:

@@ -1,4 +1,4 @@
-"""What acts during the steps of one call: held torques, or loads that are evaluated before every step."""
+"""Loads during the steps of one call: held torques, or loads that are evaluated before every step."""
 
 from __future__ import annotations
 

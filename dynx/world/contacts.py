@@ -64,7 +64,7 @@ class RayHits(NamedTuple):
     """First hit of each of n rays."""
 
     names: tuple[str | None, ...]
-    """What each ray hits first; None where it hits nothing."""
+    """Name of the part that each ray hits first; None where it hits nothing."""
     distance: Floats
     """Distance (n,) from the origin of the ray [m]; infinity without a hit."""
     points: Floats

@@ -22,7 +22,7 @@ MAX_BYTES = 1 << 30
 """Largest file that is read."""
 
 Memory = tuple[tuple[tuple[float, ...], tuple[float, ...]] | None, ...]
-"""What each robot's motors keep from one step to the next (see `RobotLoads.memory`)."""
+"""Memory of each robot's motors from one step to the next (see `RobotLoads.memory`)."""
 
 
 @dataclass(frozen=True)

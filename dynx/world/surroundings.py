@@ -1,4 +1,4 @@
-"""What a rollout in a scene records besides its robot: contacts, bodies, and the other robots."""
+"""The record of a rollout in a scene besides its robot: contacts, bodies, and the other robots."""
 
 from __future__ import annotations
 

@@ -85,7 +85,7 @@ def bullet_tree(
 
 @dataclass(frozen=True)
 class Attachments:
-    """What a canonical URDF has besides the mechanism: shapes, and limits of joints."""
+    """Parts of a canonical URDF besides the mechanism: shapes, and limits of joints."""
 
     first: tuple[str, ...] = ()
     """Elements that precede every link but the root."""

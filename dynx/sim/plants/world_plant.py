@@ -25,7 +25,7 @@ from dynx.world.surroundings import ContactTable, Surroundings
 
 
 class Memory(NamedTuple):
-    """What a world plant needs, beside q and v, to continue: the world, and the record so far."""
+    """All that a world plant needs, besides q and v, to continue: the world, and the record so far."""
 
     snapshot: Snapshot
     contacts: tuple[tuple[Contact, ...], ...]

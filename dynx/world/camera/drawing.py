@@ -42,7 +42,7 @@ class DrawnShape(NamedTuple):
 
 
 class Drawing(NamedTuple):
-    """What is seen in each of the n pixels, by rows: colour (n, 3), depth (n,) [m], and the number (n,) of
+    """The sight in each of the n pixels, by rows: colour (n, 3), depth (n,) [m], and the number (n,) of
     the shape, -1 for none, whose depth is infinite."""
 
     rgb: NDArray[np.uint8]

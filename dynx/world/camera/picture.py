@@ -22,7 +22,7 @@ DEPTH_UNIT = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """What a camera sees; the first row is the upper one, the first column the left one."""
+    """A picture of a camera; the first row is the upper one, the first column the left one."""
 
     rgb: NDArray[np.uint8]
     """Colour (height, width, 3)."""

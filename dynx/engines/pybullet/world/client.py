@@ -18,7 +18,7 @@ class WorldClient:
         """Open an empty world. Raises EngineError where Bullet has no client left."""
         self.engine = engine
         self.errors = (SystemError, TypeError, ValueError, engine.error)
-        """What a failed call of Bullet raises."""
+        """Exceptions that a failed call of Bullet raises."""
         self._scene = scene
         self.number = int(engine.connect(engine.DIRECT))
         """Bullet's number of the client."""
