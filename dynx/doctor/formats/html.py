@@ -1,7 +1,6 @@
 """HTML page for people: one self-contained file without scripts, for screen and paper.
 
-The templates beside this module hold the markup. Everything they print is escaped, and control characters are
-made visible: names in a robot description may hold anything.
+The templates beside this module hold the markup of the report, those of `dynx.files.pages` the frame.
 """
 
 from __future__ import annotations
@@ -21,9 +20,10 @@ from dynx.doctor.formats.model_tables import model_tables
 from dynx.doctor.formats.text_changes import changes, excerpt
 from dynx.doctor.formats.vote import largest_error
 from dynx.doctor.report import DoctorReport
+from dynx.files.pages import page_environment, page_text
 
 if TYPE_CHECKING:
-    from jinja2 import Environment
+    from dynx.files.pages import Environment
 
 LIMITS = {"SHOWN_RULES": 6, "OPEN_PLACES": 2, "SHOWN_PLACES": 40, "OPEN_VALUES": 25, "OPEN_LINES": 80}
 """Largest numbers of rules in a robot's row of the overview, of expanded and of listed places of a cause,
@@ -38,49 +38,31 @@ def html_page(
 ) -> str:
     """Make the page, in ASCII, with the `command` line that reproduces it."""
     entries = {cause.rule: cause.entry for report in reports for cause in causes(report) if cause.entry}
-    page = template_environment().get_template("page.html.j2")
-    text = page.render(
+    page = template_environment().get_template("doctor.html.j2")
+    return page_text(
+        page,
         reports=reports,
         titles=wording.titles([report.robot for report in reports]),
         counts=Counter(report.status for report in reports),
         rules=[entries[rule] for rule in sorted(entries)],
         baseline=baseline,
         command=command,
-        version=__version__,
         footer=_footer(reports),
     )
-    return text.encode("ascii", "xmlcharrefreplace").decode("ascii")
 
 
 @cache
 def template_environment() -> Environment:
-    """Return the templates with the functions that they use. Only this function imports Jinja2."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    environment = Environment(
-        loader=PackageLoader("dynx.doctor.formats"),
-        autoescape=True,
-        finalize=_printable,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    """Return the templates with the functions that they use."""
+    environment = page_environment("dynx.doctor.formats")
     words = (wording.name, wording.relative, wording.quantity, wording.effect, wording.part)
     more = (wording.unexplained, wording.finding_effect, wording.variant, wording.change)
     filters = (*words, *more, wording.unread_meshes, wording.loads_mended, wording.refusal)
     environment.filters.update({each.__name__: each for each in filters})
-    environment.filters["capitalized"] = lambda text: text[:1].upper() + text[1:]
     views: tuple[Callable[..., Any], ...] = (causes, step_of, bar_position, largest_error)
     views += (wording.difference, engine_map, pair_map, joint_map, model_tables, changes, excerpt)
     environment.globals.update({each.__name__: each for each in views}, steps=ALL_STEPS, **LIMITS)
     return environment
-
-
-def _printable(value: Any) -> Any:
-    """Make the control characters of a text visible, except line breaks and tabs; markup stays as it is."""
-    if not isinstance(value, str) or hasattr(value, "__html__"):
-        return value
-    return "".join(c if c.isprintable() or c in "\n\t" else repr(c)[1:-1] for c in value)
 
 
 def bar_position(error: float) -> float:

@@ -110,7 +110,7 @@ def test_a_cause_leads_to_the_page_of_its_rule() -> None:
 
 @given(st.text(), st.sampled_from(["text", "text | name", "code(text)", "lines(text)", "listed([text])"]))
 def test_nothing_escapes_from_text(text: str, printed: str) -> None:
-    macros = '{% from "elements.html.j2" import code, lines, listed %}'
+    macros = '{% from "elements.html.j2" import code, listed %}{% from "parts.html.j2" import lines %}'
     template = template_environment().from_string(f"{macros}{{{{ {printed} }}}}")
     written, safe = (template.render(text=each) for each in (text, "x" * (text != "")))
     for mark in "<\">'":
